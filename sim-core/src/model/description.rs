@@ -1,0 +1,516 @@
+//! A scene as users name it: robots, static shapes, time step and solver, in f64 and editable.
+//!
+//! SI units, radians, z up, quaternions (x, y, z, w).
+
+use std::path::PathBuf;
+
+use super::error::ModelError;
+use super::pose::Pose;
+
+/// Everything a simulation starts from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Description {
+    /// Length of one physics step [s].
+    pub dt: f64,
+    /// Physics steps in a control frame.
+    pub substeps: usize,
+    /// Gravity in world axes [m/s²].
+    pub gravity: [f64; 3],
+    /// Options of the constraint solver.
+    pub solver: Solver,
+    /// Robots, in the order of their dofs.
+    pub robots: Vec<Robot>,
+    /// Shapes that never move.
+    pub shapes: Vec<StaticShape>,
+}
+
+/// Options of the constraint solver, with MuJoCo's meaning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solver {
+    /// Most Newton iterations of a step.
+    pub iterations: usize,
+    /// Most line-search iterations of a Newton iteration.
+    pub ls_iterations: usize,
+    /// Scaled improvement below which the solver stops [–].
+    pub tolerance: f64,
+    /// Shape of the friction cone.
+    pub cone: Cone,
+    /// Friction impedance over normal impedance [–].
+    pub impratio: f64,
+}
+
+impl Default for Solver {
+    fn default() -> Solver {
+        Solver {
+            iterations: 20,
+            ls_iterations: 100,
+            tolerance: 1e-8,
+            cone: Cone::Elliptic,
+            impratio: 1000.0,
+        }
+    }
+}
+
+/// Shape of the friction cone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Cone {
+    /// The cone of Coulomb's law.
+    #[default]
+    Elliptic,
+    /// A pyramid inside it.
+    Pyramidal,
+}
+
+/// A shape that never moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StaticShape {
+    /// Its name, unique in the scene.
+    pub name: String,
+    /// Its frame in the world.
+    pub pose: Pose,
+    /// Its geometry.
+    pub shape: Shape,
+}
+
+/// A tree of links.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Robot {
+    /// Its name, unique in the scene.
+    pub name: String,
+    /// Frame of the root link in the world.
+    pub pose: Pose,
+    /// Whether the root link moves freely.
+    pub floating: bool,
+    /// Whether its own links touch each other.
+    pub self_collisions: bool,
+    /// Links, in file order.
+    pub links: Vec<Link>,
+    /// Joints, in file order.
+    pub joints: Vec<Joint>,
+    /// What was ignored or mended, one sentence each.
+    pub notes: Vec<String>,
+    /// The file it was read from.
+    pub urdf: Option<PathBuf>,
+}
+
+/// A rigid body of a robot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Link {
+    /// Its name, unique in the robot.
+    pub name: String,
+    /// Its mass, if it has any.
+    pub inertial: Option<Inertial>,
+    /// Its shapes for contacts.
+    pub collisions: Vec<Collision>,
+}
+
+/// Mass properties of a link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inertial {
+    /// Mass [kg].
+    pub mass: f64,
+    /// Centre of mass in the link frame [m].
+    pub pos: [f64; 3],
+    /// Inertia about the centre of mass, in link axes. `(3, 3)` [kg·m²]
+    pub inertia: [[f64; 3]; 3],
+}
+
+/// A shape of a link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Collision {
+    /// Its name, if the file gives one.
+    pub name: Option<String>,
+    /// Its frame in the link frame.
+    pub pose: Pose,
+    /// Its geometry.
+    pub shape: Shape,
+}
+
+/// Geometry; axes of revolution are the local z axis.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// A cuboid.
+    Box {
+        /// Half of each edge [m].
+        half_extents: [f64; 3],
+    },
+    /// A ball.
+    Sphere {
+        /// Radius [m].
+        radius: f64,
+    },
+    /// A cylinder along z.
+    Cylinder {
+        /// Radius [m].
+        radius: f64,
+        /// Half of its height [m].
+        half_height: f64,
+    },
+    /// A cylinder along z with a half sphere at each end.
+    Capsule {
+        /// Radius [m].
+        radius: f64,
+        /// Half of the height of the cylinder between the half spheres [m].
+        half_height: f64,
+    },
+    /// Triangles of a file.
+    Mesh {
+        /// The file, as resolved.
+        path: PathBuf,
+        /// Factor on each axis [–].
+        scale: [f64; 3],
+    },
+}
+
+/// What connects a link to its parent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Its name, unique in the robot.
+    pub name: String,
+    /// What motion it allows.
+    pub kind: JointKind,
+    /// Index of the parent link.
+    pub parent: usize,
+    /// Index of the child link.
+    pub child: usize,
+    /// Joint frame, which is the child frame at position 0, in the parent frame.
+    pub origin: Pose,
+    /// Unit vector of the motion in the joint frame [–].
+    pub axis: [f64; 3],
+    /// Lowest and highest position [rad or m]; `None` is without limits.
+    pub range: Option<[f64; 2]>,
+    /// Largest drive effort [N·m or N]; `None` is without limit.
+    pub effort_limit: Option<f64>,
+    /// Largest speed [rad/s or m/s]; reported, not enforced.
+    pub velocity_limit: Option<f64>,
+    /// Viscous damping [N·m·s/rad or N·s/m].
+    pub damping: f64,
+    /// Dry friction [N·m or N].
+    pub friction: f64,
+    /// Inertia of the drive seen at the joint [kg·m² or kg].
+    pub armature: f64,
+    /// The joint it follows, if any.
+    pub mimic: Option<Mimic>,
+    /// Position at the start [rad or m].
+    pub q: f64,
+    /// Position target at the start [rad or m]; `None` is the start position.
+    pub target_q: Option<f64>,
+    /// Velocity target at the start [rad/s or m/s].
+    pub target_qd: f64,
+    /// Which errors the drive acts on.
+    pub target_mode: TargetMode,
+    /// Proportional gain of the drive [N·m/rad or N/m].
+    pub target_ke: f64,
+    /// Derivative gain of the drive [N·m·s/rad or N·s/m].
+    pub target_kd: f64,
+}
+
+/// The motion a joint allows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum JointKind {
+    /// None: the child is part of its parent.
+    #[default]
+    Fixed,
+    /// Rotation about the axis; URDF's `continuous` is one without a range.
+    Revolute,
+    /// Translation along the axis.
+    Prismatic,
+}
+
+/// Errors a drive acts on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TargetMode {
+    /// ke (q* − q) − kd q̇.
+    #[default]
+    Position,
+    /// kd (q̇* − q̇).
+    Velocity,
+    /// ke (q* − q) + kd (q̇* − q̇).
+    Both,
+}
+
+/// q = offset + multiplier · q of the leader.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mimic {
+    /// Index of the leader joint, which is itself no follower.
+    pub joint: usize,
+    /// Factor on the leader's position [–, or m/rad and the like].
+    pub multiplier: f64,
+    /// Position at the leader's 0 [rad or m].
+    pub offset: f64,
+}
+
+impl Joint {
+    /// A fixed joint between two links, to be refined by struct update syntax.
+    pub fn fixed(name: &str, parent: usize, child: usize) -> Joint {
+        Joint {
+            name: name.to_owned(),
+            kind: JointKind::Fixed,
+            parent,
+            child,
+            origin: Pose::identity(),
+            axis: [1.0, 0.0, 0.0],
+            range: None,
+            effort_limit: None,
+            velocity_limit: None,
+            damping: 0.0,
+            friction: 0.0,
+            armature: 0.0,
+            mimic: None,
+            q: 0.0,
+            target_q: None,
+            target_qd: 0.0,
+            target_mode: TargetMode::Position,
+            target_ke: 0.0,
+            target_kd: 0.0,
+        }
+    }
+
+    /// Whether it has a dof.
+    pub fn moves(&self) -> bool {
+        self.kind != JointKind::Fixed
+    }
+}
+
+impl Description {
+    /// An empty scene: steps of `dt` [s], `substeps` of them in a control frame, gravity 9.81 m/s² downwards.
+    pub fn new(dt: f64, substeps: usize) -> Description {
+        Description {
+            dt,
+            substeps,
+            gravity: [0.0, 0.0, -9.81],
+            solver: Solver::default(),
+            robots: Vec::new(),
+            shapes: Vec::new(),
+        }
+    }
+
+    /// Adds a static shape; an empty name becomes the first free one of `shape`, `shape_2`, …
+    pub fn add_shape(&mut self, name: &str, shape: Shape, pose: Pose) -> &mut StaticShape {
+        let name = if name.is_empty() {
+            self.free_shape_name(shape.kind())
+        } else {
+            name.to_owned()
+        };
+        self.shapes.push(StaticShape { name, pose, shape });
+        self.shapes.last_mut().expect("a shape was just added")
+    }
+
+    /// Adds a static box with these half edges [m].
+    pub fn add_box(&mut self, name: &str, half_extents: [f64; 3], pose: Pose) -> &mut StaticShape {
+        self.add_shape(name, Shape::Box { half_extents }, pose)
+    }
+
+    fn free_shape_name(&self, kind: &str) -> String {
+        (1..)
+            .map(|count| {
+                if count == 1 {
+                    kind.to_owned()
+                } else {
+                    format!("{kind}_{count}")
+                }
+            })
+            .find(|name| self.shapes.iter().all(|shape| shape.name != *name))
+            .expect("there are more names than shapes")
+    }
+}
+
+impl Shape {
+    /// Its kind in one word.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Shape::Box { .. } => "box",
+            Shape::Sphere { .. } => "sphere",
+            Shape::Cylinder { .. } => "cylinder",
+            Shape::Capsule { .. } => "capsule",
+            Shape::Mesh { .. } => "mesh",
+        }
+    }
+}
+
+impl Robot {
+    /// Link indices, parents before children: depth first, children in the order of their joints in the file.
+    ///
+    /// Links that hang from no root are left out; `Description::validate` refuses them.
+    pub fn link_order(&self) -> Vec<usize> {
+        let mut children = vec![Vec::new(); self.links.len()];
+        let mut has_parent = vec![false; self.links.len()];
+        for joint in &self.joints {
+            children[joint.parent].push(joint.child);
+            has_parent[joint.child] = true;
+        }
+        let mut order = Vec::with_capacity(self.links.len());
+        let mut seen = vec![false; self.links.len()];
+        let mut stack: Vec<usize> = (0..self.links.len())
+            .filter(|&link| !has_parent[link])
+            .rev()
+            .collect();
+        while let Some(link) = stack.pop() {
+            if std::mem::replace(&mut seen[link], true) {
+                continue;
+            }
+            order.push(link);
+            stack.extend(children[link].iter().rev());
+        }
+        order
+    }
+
+    /// Joint indices of the moving joints in the order of their dofs, which is that of their child links.
+    pub fn dofs(&self) -> Vec<usize> {
+        let mut joint_of = vec![None; self.links.len()];
+        for (index, joint) in self.joints.iter().enumerate() {
+            joint_of[joint.child] = Some(index);
+        }
+        self.link_order()
+            .into_iter()
+            .filter_map(|link| joint_of[link])
+            .filter(|&joint| self.joints[joint].moves())
+            .collect()
+    }
+
+    /// Sets the start positions [rad or m], one a dof.
+    ///
+    /// # Errors
+    /// Another number of values than dofs, or a value that is not finite.
+    pub fn set_joint_q(&mut self, values: &[f64]) -> Result<(), ModelError> {
+        self.set("joint_q", values, finite, |joint, value| joint.q = value)
+    }
+
+    /// Sets the position targets [rad or m] at the start, one a dof.
+    ///
+    /// # Errors
+    /// Another number of values than dofs, or a value that is not finite.
+    pub fn set_joint_target_q(&mut self, values: &[f64]) -> Result<(), ModelError> {
+        self.set("joint_target_q", values, finite, |joint, value| {
+            joint.target_q = Some(value)
+        })
+    }
+
+    /// Sets the velocity targets [rad/s or m/s] at the start, one a dof.
+    ///
+    /// # Errors
+    /// Another number of values than dofs, or a value that is not finite.
+    pub fn set_joint_target_qd(&mut self, values: &[f64]) -> Result<(), ModelError> {
+        self.set("joint_target_qd", values, finite, |joint, value| {
+            joint.target_qd = value
+        })
+    }
+
+    /// Sets which errors the drives act on, one a dof.
+    ///
+    /// # Errors
+    /// Another number of values than dofs.
+    pub fn set_joint_target_mode(&mut self, modes: &[TargetMode]) -> Result<(), ModelError> {
+        self.set(
+            "joint_target_mode",
+            modes,
+            |_, _| Ok(()),
+            |joint, mode| joint.target_mode = mode,
+        )
+    }
+
+    /// Sets the proportional gains [N·m/rad or N/m], one a dof.
+    ///
+    /// # Errors
+    /// Another number of values than dofs, or a value that is negative or not finite.
+    pub fn set_joint_target_ke(&mut self, values: &[f64]) -> Result<(), ModelError> {
+        self.set("joint_target_ke", values, not_negative, |joint, value| {
+            joint.target_ke = value
+        })
+    }
+
+    /// Sets the derivative gains [N·m·s/rad or N·s/m], one a dof.
+    ///
+    /// # Errors
+    /// Another number of values than dofs, or a value that is negative or not finite.
+    pub fn set_joint_target_kd(&mut self, values: &[f64]) -> Result<(), ModelError> {
+        self.set("joint_target_kd", values, not_negative, |joint, value| {
+            joint.target_kd = value
+        })
+    }
+
+    /// Sets the largest drive efforts [N·m or N], one a dof; infinity is without limit.
+    ///
+    /// # Errors
+    /// Another number of values than dofs, or a value that is negative or not a number.
+    pub fn set_joint_effort_limit(&mut self, values: &[f64]) -> Result<(), ModelError> {
+        let check = |what: &str, value: f64| {
+            if value == f64::INFINITY {
+                Ok(())
+            } else {
+                not_negative(what, value)
+            }
+        };
+        self.set("joint_effort_limit", values, check, |joint, value| {
+            joint.effort_limit = value.is_finite().then_some(value);
+        })
+    }
+
+    /// Sets the inertia of the drives [kg·m² or kg], one a dof.
+    ///
+    /// # Errors
+    /// Another number of values than dofs, or a value that is negative or not finite.
+    pub fn set_joint_armature(&mut self, values: &[f64]) -> Result<(), ModelError> {
+        self.set("joint_armature", values, not_negative, |joint, value| {
+            joint.armature = value
+        })
+    }
+
+    /// Checks every value, then writes them all in dof order.
+    fn set<T: Copy>(
+        &mut self,
+        field: &'static str,
+        values: &[T],
+        check: impl Fn(&str, T) -> Result<(), ModelError>,
+        write: impl Fn(&mut Joint, T),
+    ) -> Result<(), ModelError> {
+        let dofs = self.dofs();
+        if values.len() != dofs.len() {
+            return Err(ModelError::JointValues {
+                robot: self.name.clone(),
+                field,
+                expected: dofs.len(),
+                got: values.len(),
+            });
+        }
+        for (&dof, &value) in dofs.iter().zip(values) {
+            check(
+                &format!(
+                    "robot `{}`: {field} of joint `{}`",
+                    self.name, self.joints[dof].name
+                ),
+                value,
+            )?;
+        }
+        for (&dof, &value) in dofs.iter().zip(values) {
+            write(&mut self.joints[dof], value);
+        }
+        Ok(())
+    }
+}
+
+/// Refuses a number that is not finite.
+pub(super) fn finite(what: &str, value: f64) -> Result<(), ModelError> {
+    if value.is_finite() {
+        Ok(())
+    } else {
+        Err(ModelError::NotFinite {
+            what: what.to_owned(),
+            value,
+        })
+    }
+}
+
+/// Refuses a number that is negative or not finite.
+pub(super) fn not_negative(what: &str, value: f64) -> Result<(), ModelError> {
+    finite(what, value)?;
+    if value >= 0.0 {
+        Ok(())
+    } else {
+        Err(ModelError::OutOfRange {
+            what: what.to_owned(),
+            value,
+            rule: "it must not be negative",
+        })
+    }
+}

@@ -1,0 +1,342 @@
+//! What can be wrong with a robot or a scene: each variant names the culprit and the cure.
+
+use std::path::PathBuf;
+
+/// A description that cannot become a model.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// A file that cannot be opened or read.
+    #[error("{}: cannot be read: {reason}; give the path of an existing file", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        reason: String,
+    },
+
+    /// A file beyond a limit of this program.
+    #[error("{}: {what} exceeds the limit of {limit}", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// The quantity that is too large.
+        what: &'static str,
+        /// The largest value accepted, with its unit.
+        limit: String,
+    },
+
+    /// XML that is not well formed, or that this program refuses to expand.
+    #[error("{}:{line}:{column}: broken XML: {reason}", path.display())]
+    Xml {
+        /// The file.
+        path: PathBuf,
+        /// Line of the fault, from 1.
+        line: u32,
+        /// Column of the fault, from 1.
+        column: u32,
+        /// What the parser expected.
+        reason: String,
+    },
+
+    /// Well-formed XML that is not a robot description.
+    #[error("{}:{line}: {element}: {reason}", path.display())]
+    Urdf {
+        /// The file.
+        path: PathBuf,
+        /// Line of the element, from 1.
+        line: u32,
+        /// The element, such as ``<limit> of joint `elbow` ``.
+        element: String,
+        /// What is wrong, and the cure.
+        reason: String,
+    },
+
+    /// A number that is not a number, or not finite.
+    #[error("{what} is {value}; give a finite number")]
+    NotFinite {
+        /// Whose number it is.
+        what: String,
+        /// The value found.
+        value: f64,
+    },
+
+    /// A number outside what is meaningful.
+    #[error("{what} is {value}; {rule}")]
+    OutOfRange {
+        /// Whose number it is.
+        what: String,
+        /// The value found.
+        value: f64,
+        /// What it must be.
+        rule: &'static str,
+    },
+
+    /// An array of another length than the robot's number of dofs.
+    #[error("robot `{robot}`: {field} has {got} values, the robot has {expected} dofs")]
+    JointValues {
+        /// The robot.
+        robot: String,
+        /// The array.
+        field: &'static str,
+        /// Dofs of the robot.
+        expected: usize,
+        /// Values given.
+        got: usize,
+    },
+
+    /// A name that is empty or holds a character with a meaning of its own.
+    #[error("{what} name `{name}` is not usable: {rule}")]
+    BadName {
+        /// What bears the name.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// What a name must be.
+        rule: &'static str,
+    },
+
+    /// Two things of one kind with one name.
+    #[error("{owner}: two {what}s are named `{name}`; give each its own name")]
+    DuplicateName {
+        /// Where both are: the scene or a robot.
+        owner: String,
+        /// What they are.
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
+
+    /// A robot without any link.
+    #[error("robot `{robot}` has no links; a robot needs at least one <link>")]
+    NoLinks {
+        /// The robot.
+        robot: String,
+    },
+
+    /// A joint that names a link which does not exist.
+    #[error(
+        "robot `{robot}`: joint `{joint}`: {role} link `{link}` does not exist; the links are {known}"
+    )]
+    UnknownLink {
+        /// The robot.
+        robot: String,
+        /// The joint.
+        joint: String,
+        /// `parent` or `child`.
+        role: &'static str,
+        /// The name that was asked for.
+        link: String,
+        /// The names that exist, the first few.
+        known: String,
+    },
+
+    /// Links that hang from no joint, where there should be exactly one.
+    #[error("robot `{robot}` has {} roots: {}; connect all but one of them to a parent by a joint", roots.len(), list(roots))]
+    SeveralRoots {
+        /// The robot.
+        robot: String,
+        /// The links without a parent.
+        roots: Vec<String>,
+    },
+
+    /// A link that is the child of two joints.
+    #[error(
+        "robot `{robot}`: link `{link}` is the child of joints `{first}` and `{second}`; a link has one parent, closed loops are not part of URDF"
+    )]
+    TwoParents {
+        /// The robot.
+        robot: String,
+        /// The link.
+        link: String,
+        /// The joint met first.
+        first: String,
+        /// The joint met next.
+        second: String,
+    },
+
+    /// Links that follow one another in a circle.
+    #[error(
+        "robot `{robot}`: links {} hang from one another in a loop; a robot is a tree with one root",
+        list(links)
+    )]
+    LinkLoop {
+        /// The robot.
+        robot: String,
+        /// The links of the loop, from parent to child.
+        links: Vec<String>,
+    },
+
+    /// A joint of a kind that is not simulated.
+    #[error(
+        "robot `{robot}`: joint `{joint}`: type `{kind}` is not supported yet; use revolute, continuous, prismatic or fixed"
+    )]
+    JointKind {
+        /// The robot.
+        robot: String,
+        /// The joint.
+        joint: String,
+        /// The kind asked for.
+        kind: String,
+    },
+
+    /// An argument whose feature does not exist yet.
+    #[error("robot `{robot}`: {argument} is not supported yet; {cure}")]
+    NotSupported {
+        /// The robot.
+        robot: String,
+        /// The argument, as a user writes it.
+        argument: &'static str,
+        /// What to do instead.
+        cure: &'static str,
+    },
+
+    /// A joint axis without direction.
+    #[error(
+        "robot `{robot}`: joint `{joint}`: axis is zero; give it a direction in <axis xyz=\"…\"/>"
+    )]
+    ZeroAxis {
+        /// The robot.
+        robot: String,
+        /// The joint.
+        joint: String,
+    },
+
+    /// A revolute or prismatic joint whose range is not given.
+    #[error(
+        "robot `{robot}`: joint `{joint}`: {kind} without a range; add <limit lower=\"…\" upper=\"…\"/>{alternative}"
+    )]
+    NoRange {
+        /// The robot.
+        robot: String,
+        /// The joint.
+        joint: String,
+        /// Its kind.
+        kind: &'static str,
+        /// Another cure, if there is one.
+        alternative: &'static str,
+    },
+
+    /// A range that ends before it begins.
+    #[error(
+        "robot `{robot}`: joint `{joint}`: lower limit {lower} is above upper limit {upper}; exchange them, or make the joint continuous"
+    )]
+    EmptyRange {
+        /// The robot.
+        robot: String,
+        /// The joint.
+        joint: String,
+        /// Lower limit [rad or m].
+        lower: f64,
+        /// Upper limit [rad or m].
+        upper: f64,
+    },
+
+    /// A quaternion far from unit length.
+    #[error("{what}: quaternion has length {length}; give (x, y, z, w) of length 1")]
+    Quaternion {
+        /// Whose quaternion it is.
+        what: String,
+        /// Its length.
+        length: f64,
+    },
+
+    /// An inertia with a principal moment below zero.
+    #[error(
+        "robot `{robot}`: link `{link}`: inertia has a negative principal moment, {moment} kg·m²; give a positive definite <inertia>"
+    )]
+    NegativeInertia {
+        /// The robot.
+        robot: String,
+        /// The link.
+        link: String,
+        /// The moment [kg·m²].
+        moment: f64,
+    },
+
+    /// Principal moments that no distribution of mass can have.
+    #[error(
+        "robot `{robot}`: link `{link}`: its largest principal moment of inertia is {ratio:.4} times the sum of the other two, which no body can have; mend <inertia>, or call balance_inertias()"
+    )]
+    InertiaTriangle {
+        /// The robot.
+        robot: String,
+        /// The link.
+        link: String,
+        /// Largest principal moment over the sum of the others.
+        ratio: f64,
+    },
+
+    /// A moving body that weighs nothing, together with all that is fixed to it.
+    #[error(
+        "robot `{robot}`: link `{link}` is moved by joint `{joint}` but has no {lacks}, nor has any link fixed to it; add <inertial> with a positive mass and inertia"
+    )]
+    Massless {
+        /// The robot.
+        robot: String,
+        /// The link.
+        link: String,
+        /// The joint that moves it.
+        joint: String,
+        /// `mass` or `inertia`.
+        lacks: &'static str,
+    },
+
+    /// A mimic joint whose leader does not exist or does not move.
+    #[error(
+        "robot `{robot}`: joint `{joint}`: mimics `{leader}`, which {reason}; name another moving joint in <mimic joint=\"…\"/>"
+    )]
+    MimicLeader {
+        /// The robot.
+        robot: String,
+        /// The follower.
+        joint: String,
+        /// The joint it names.
+        leader: String,
+        /// Why this cannot be.
+        reason: &'static str,
+    },
+
+    /// Joints that mimic one another in a circle.
+    #[error(
+        "robot `{robot}`: joints {} mimic one another in a circle; let one of them lead",
+        list(joints)
+    )]
+    MimicLoop {
+        /// The robot.
+        robot: String,
+        /// The joints of the circle.
+        joints: Vec<String>,
+    },
+
+    /// A collision mesh that is not there.
+    #[error(
+        "robot `{robot}`: link `{link}`: collision mesh `{uri}` is missing: looked for {}; copy it there or mend the path",
+        list_paths(tried)
+    )]
+    MissingMesh {
+        /// The robot.
+        robot: String,
+        /// The link.
+        link: String,
+        /// The path as the file gives it.
+        uri: String,
+        /// The places looked at.
+        tried: Vec<PathBuf>,
+    },
+}
+
+/// Names in quotes, joined by commas.
+fn list(names: &[String]) -> String {
+    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    quoted.join(", ")
+}
+
+/// Paths in quotes, joined by commas.
+fn list_paths(paths: &[PathBuf]) -> String {
+    let names: Vec<String> = paths
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
+    list(&names)
+}
