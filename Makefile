@@ -1,0 +1,64 @@
+# demo · test · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
+#
+#   make demo     the Franka lesson in 4096 worlds, with a plot in out/       (make demo WORLDS=256)
+#   make test     every Rust and Python test
+#   make bench    speed, side by side with what it is compared with
+#   make check    formats, lints and types only
+
+SHELL  := /bin/bash
+VENV   := .venv
+PYTHON := $(VENV)/bin/python
+PIP    := $(PYTHON) -m pip --disable-pip-version-check
+WORLDS ?= 4096
+
+# The wheel, the tests and the lints build pyo3 with one environment; otherwise each would rebuild it for itself.
+export PYO3_PYTHON := $(CURDIR)/$(PYTHON)
+export PYO3_BUILD_EXTENSION_MODULE := 1
+
+RUST_SOURCES   := $(shell find sim-core sim-daemon py-client/src py-client/Cargo.toml Cargo.toml rust-toolchain.toml -name '*.rs' -o -name '*.toml')
+PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml -name '*.py' -o -name '*.pyi' -o -name '*.toml')
+PYTHON_TREES   := py-client/python py-client/tests tests/python examples benches
+CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
+
+.PHONY: demo test bench check wheel
+
+demo: wheel
+	$(PYTHON) examples/franka_lesson.py --worlds $(WORLDS)
+
+test: wheel
+	cargo fmt --all --check
+	$(CLIPPY)
+	@if cargo nextest --version >/dev/null 2>&1; \
+	then set -x; cargo nextest run --release --workspace --exclude py-client; \
+	else set -x; cargo test --release --workspace --exclude py-client --lib --bins --tests; fi
+	$(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . py-client/tests tests/python
+
+bench: wheel
+	cargo bench --workspace --exclude py-client
+	$(PYTHON) benches/round_trip.py
+
+check: wheel
+	cargo fmt --all --check
+	$(CLIPPY)
+	$(VENV)/bin/ruff check --config py-client/pyproject.toml $(PYTHON_TREES)
+	$(VENV)/bin/ruff format --check --config py-client/pyproject.toml $(PYTHON_TREES)
+	$(VENV)/bin/pyright --project py-client
+
+# One wheel holds client and daemon. pip would build it in an isolated copy of maturin; the one in the venv is enough.
+wheel: $(VENV)/.wheel
+$(VENV)/.wheel: $(VENV)/.packages $(RUST_SOURCES) $(PYTHON_SOURCES)
+	@echo "building the wheel (minutes the first time)"
+	$(PIP) install --quiet --no-build-isolation --no-deps --force-reinstall ./py-client
+	@touch $@
+
+$(VENV)/.packages: py-client/requirements-dev.txt | $(PYTHON)
+	$(PIP) install --quiet -r py-client/requirements-dev.txt
+	@touch $@
+
+# Debian splits ensurepip from python3; `python3 -m venv` then leaves half a folder behind.
+$(PYTHON):
+	@python3 -c 'import sys; sys.exit(sys.version_info < (3, 10))' || { echo "tightloop needs Python 3.10 or newer as python3"; exit 1; }
+	@python3 -c 'import ensurepip' 2>/dev/null || { \
+	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then apt-get update -qq && apt-get install -y -qq python3-venv; \
+	  else echo "python3 cannot make virtual environments: run 'sudo apt install python3-venv', then make again"; exit 1; fi; }
+	@rm -rf $(VENV) && python3 -m venv $(VENV)

@@ -1,0 +1,103 @@
+"""Thousands of robot worlds on your own machine, stepped from Python through shared memory.
+
+>>> import tightloop as tl
+>>> scene = tl.Scene(dt=1 / 480, substeps=8)
+>>> arm = scene.add_urdf("fr3_hand.urdf", name="arm")
+>>> with tl.launch(scene, worlds=4096) as sim:
+...     frame = sim.step(joint_f={"arm": torques})
+...     frame.joint_q                      # (4096, 9), a view of shared memory
+
+Conventions: SI, radians, right-handed, z up; quaternions (x, y, z, w); arrays have the worlds first.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tightloop._core import Frame, __version__
+    from tightloop.errors import (
+        CommandRefused,
+        DaemonLost,
+        DaemonRestarted,
+        FramesHeld,
+        InternalError,
+        LaunchError,
+        LeaseHeld,
+        LeaseLost,
+        ProtocolMismatch,
+        ResourceError,
+        SceneError,
+        TightloopError,
+        UnknownDaemon,
+        UrdfError,
+        WaitTimeout,
+    )
+    from tightloop.scene import Box, Robot, Scene
+    from tightloop.sim import FrameCopy, Sim, attach, launch
+
+_HOMES = {
+    "tightloop._core": ("Frame", "__version__"),
+    "tightloop.errors": (
+        "CommandRefused",
+        "DaemonLost",
+        "DaemonRestarted",
+        "FramesHeld",
+        "InternalError",
+        "LaunchError",
+        "LeaseHeld",
+        "LeaseLost",
+        "ProtocolMismatch",
+        "ResourceError",
+        "SceneError",
+        "TightloopError",
+        "UnknownDaemon",
+        "UrdfError",
+        "WaitTimeout",
+    ),
+    "tightloop.scene": ("Box", "Robot", "Scene"),
+    "tightloop.sim": ("FrameCopy", "Sim", "attach", "launch"),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "Box",
+    "CommandRefused",
+    "DaemonLost",
+    "DaemonRestarted",
+    "Frame",
+    "FrameCopy",
+    "FramesHeld",
+    "InternalError",
+    "LaunchError",
+    "LeaseHeld",
+    "LeaseLost",
+    "ProtocolMismatch",
+    "ResourceError",
+    "Robot",
+    "Scene",
+    "SceneError",
+    "Sim",
+    "TightloopError",
+    "UnknownDaemon",
+    "UrdfError",
+    "WaitTimeout",
+    "__version__",
+    "attach",
+    "launch",
+]
+
+
+def __getattr__(name: str) -> Any:
+    # Lazy (PEP 562): the daemon starts through this package too, and must not wait for NumPy.
+    home = _HOME_OF.get(name)
+    if home is None:
+        raise AttributeError(f"module `tightloop` has no attribute `{name}`")
+    from importlib import import_module
+
+    value = globals()[name] = getattr(import_module(home), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
