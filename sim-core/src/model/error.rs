@@ -282,6 +282,21 @@ pub enum ModelError {
         lacks: &'static str,
     },
 
+    /// A joint that meets no inertia at the reference pose.
+    #[error(
+        "joint `{joint}`: what it moves has no inertia about its axis at q = 0; give its links mass away from the axis, or the joint an armature"
+    )]
+    NoInertia {
+        /// `robot/joint`.
+        joint: String,
+    },
+
+    /// A mass matrix that cannot be factored.
+    #[error(
+        "the mass matrix at q = 0 is singular; give every moving link a positive mass and inertia, or its joint an armature"
+    )]
+    SingularMass,
+
     /// A mimic joint whose leader does not exist or does not move.
     #[error(
         "robot `{robot}`: joint `{joint}`: mimics `{leader}`, which {reason}; name another moving joint in <mimic joint=\"…\"/>"

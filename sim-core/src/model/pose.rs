@@ -90,21 +90,23 @@ impl Pose {
     /// Rotation matrix by rows; its columns are the axes of this frame in the parent. `(3, 3)` [–]
     pub fn rotation(&self) -> [[f64; 3]; 3] {
         let [x, y, z, w] = self.quat;
+        // 2 / |q|² makes a rotation of a quaternion that is a unit to a few digits only
+        let two = 2.0 / (x * x + y * y + z * z + w * w);
         [
             [
-                1.0 - 2.0 * (y * y + z * z),
-                2.0 * (x * y - w * z),
-                2.0 * (x * z + w * y),
+                1.0 - two * (y * y + z * z),
+                two * (x * y - w * z),
+                two * (x * z + w * y),
             ],
             [
-                2.0 * (x * y + w * z),
-                1.0 - 2.0 * (x * x + z * z),
-                2.0 * (y * z - w * x),
+                two * (x * y + w * z),
+                1.0 - two * (x * x + z * z),
+                two * (y * z - w * x),
             ],
             [
-                2.0 * (x * z - w * y),
-                2.0 * (y * z + w * x),
-                1.0 - 2.0 * (x * x + y * y),
+                two * (x * z - w * y),
+                two * (y * z + w * x),
+                1.0 - two * (x * x + y * y),
             ],
         ]
     }
