@@ -1,0 +1,426 @@
+//! Scene files: TOML on disk, JSON from Python, and the description they stand for.
+//!
+//! Paths in a file are relative to it; relative paths in a text are relative to the folder given with it.
+
+mod number;
+mod paths;
+mod summary;
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use sim_core::model::{
+    Cone, Description, ModelError, Pose, Robot, Shape, Solver, TargetMode, UrdfOptions,
+};
+
+pub use number::{Number, PerDof};
+pub use summary::urdf_summary;
+
+/// Why a scene cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// A scene file that cannot be read.
+    #[error("{}: cannot be read: {reason}; give the path of a scene file", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        reason: String,
+    },
+    /// A scene file that cannot be written.
+    #[error("{}: cannot be written: {reason}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        reason: String,
+    },
+    /// A text that is not a scene, with the place.
+    #[error("{place}: {reason}")]
+    Syntax {
+        /// The file, or what else held the text.
+        place: String,
+        /// What was found and what was expected.
+        reason: String,
+    },
+    /// A shape whose sizes do not fit its type.
+    #[error("shape `{shape}`: {reason}")]
+    Shape {
+        /// Its name, or its type and place in the list.
+        shape: String,
+        /// What is wrong, and the cure.
+        reason: String,
+    },
+    /// A robot or value that physics cannot use.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}
+
+/// A scene as a file holds it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFile {
+    /// Length of one physics step [s].
+    pub dt: Number,
+    /// Physics steps in a control frame.
+    pub substeps: usize,
+    /// Gravity in world axes [m/s²].
+    #[serde(default = "gravity")]
+    pub gravity: [Number; 3],
+    /// Options of the constraint solver.
+    #[serde(default)]
+    pub solver: SolverTable,
+    /// Static shapes.
+    #[serde(default, rename = "shape", skip_serializing_if = "Vec::is_empty")]
+    pub shapes: Vec<ShapeTable>,
+    /// Robots, in the order of their dofs.
+    #[serde(default, rename = "robot", skip_serializing_if = "Vec::is_empty")]
+    pub robots: Vec<RobotTable>,
+}
+
+fn gravity() -> [Number; 3] {
+    Description::new(1.0, 1).gravity.map(Number)
+}
+
+/// Options of the constraint solver; what is left out has its default.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SolverTable {
+    /// Most Newton iterations of a step.
+    pub iterations: usize,
+    /// Most line-search iterations of a Newton iteration.
+    pub ls_iterations: usize,
+    /// Scaled improvement below which the solver stops [–].
+    pub tolerance: Number,
+    /// Shape of the friction cone.
+    pub cone: ConeName,
+    /// Friction impedance over normal impedance [–].
+    pub impratio: Number,
+}
+
+impl Default for SolverTable {
+    fn default() -> SolverTable {
+        let solver = Solver::default();
+        SolverTable {
+            iterations: solver.iterations,
+            ls_iterations: solver.ls_iterations,
+            tolerance: Number(solver.tolerance),
+            cone: ConeName::Elliptic,
+            impratio: Number(solver.impratio),
+        }
+    }
+}
+
+/// Shape of the friction cone, by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ConeName {
+    /// The cone of Coulomb's law.
+    Elliptic,
+    /// A pyramid inside it.
+    Pyramidal,
+}
+
+/// A static shape; which sizes it has depends on its type.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShapeTable {
+    /// Its name; left out, it is named after its type.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Its type.
+    #[serde(rename = "type")]
+    pub kind: ShapeName,
+    /// Half of each edge of a box [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub half_extents: Option<[Number; 3]>,
+    /// Radius of a sphere, cylinder or capsule [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius: Option<Number>,
+    /// Half of the height of a cylinder, or of that between the half spheres of a capsule [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub half_height: Option<Number>,
+    /// Position in the world [m].
+    #[serde(default)]
+    pub pos: [Number; 3],
+    /// Orientation in the world, unit quaternion (x, y, z, w) [–].
+    #[serde(default = "no_rotation")]
+    pub quat: [Number; 4],
+}
+
+fn no_rotation() -> [Number; 4] {
+    Pose::identity().quat.map(Number)
+}
+
+/// Type of a static shape, by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ShapeName {
+    /// A cuboid.
+    Box,
+    /// A ball.
+    Sphere,
+    /// A cylinder along its z.
+    Cylinder,
+    /// A capsule along its z.
+    Capsule,
+}
+
+/// A robot from a URDF file. Joint values are one number for all dofs, or a list with one a dof.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotTable {
+    /// Its name in the scene; left out, it is the name in its file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Its URDF file.
+    pub urdf: PathBuf,
+    /// Folders that hold the packages of `package://` paths.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub package_dirs: Vec<PathBuf>,
+    /// Position of the root link in the world [m].
+    #[serde(default)]
+    pub pos: [Number; 3],
+    /// Orientation of the root link in the world, unit quaternion (x, y, z, w) [–].
+    #[serde(default = "no_rotation")]
+    pub quat: [Number; 4],
+    /// Whether the root link moves freely; not supported yet.
+    #[serde(default)]
+    pub floating: bool,
+    /// Whether its own links touch each other.
+    #[serde(default)]
+    pub self_collisions: bool,
+    /// Positions at the start [rad or m]; left out, 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_q: Option<PerDof<Number>>,
+    /// Position targets at the start [rad or m]; left out, the positions at the start.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_target_q: Option<PerDof<Number>>,
+    /// Velocity targets at the start [rad/s or m/s]; left out, 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_target_qd: Option<PerDof<Number>>,
+    /// Errors the drives act on; left out, position.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_target_mode: Option<PerDof<ModeName>>,
+    /// Proportional gains [N·m/rad or N/m]; left out, 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_target_ke: Option<PerDof<Number>>,
+    /// Derivative gains [N·m·s/rad or N·s/m]; left out, 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_target_kd: Option<PerDof<Number>>,
+    /// Largest drive efforts [N·m or N], `inf` for no limit; left out, those of the URDF file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_effort_limit: Option<PerDof<Number>>,
+    /// Inertia of the drives [kg·m² or kg]; left out, 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_armature: Option<PerDof<Number>>,
+}
+
+/// Errors a drive acts on, by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ModeName {
+    /// ke (q* − q) − kd q̇.
+    Position,
+    /// kd (q̇* − q̇).
+    Velocity,
+    /// ke (q* − q) + kd (q̇* − q̇).
+    Both,
+}
+
+/// Reads a scene file.
+///
+/// # Errors
+/// A file that is missing or not TOML, or an entry that is unknown or of a wrong type, with its line.
+pub fn load(path: &Path) -> Result<SceneFile, ConfigError> {
+    let fault = |error: std::io::Error| ConfigError::Read {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    };
+    let text = std::fs::read_to_string(path).map_err(fault)?;
+    parse(&text, &path.display().to_string())
+}
+
+/// Reads a scene from TOML; `place` names the text in messages.
+///
+/// # Errors
+/// Text that is not TOML, or an entry that is unknown or of a wrong type, with its line.
+pub fn parse(text: &str, place: &str) -> Result<SceneFile, ConfigError> {
+    toml::from_str(text).map_err(|error| syntax(place, error.to_string()))
+}
+
+fn syntax(place: &str, reason: String) -> ConfigError {
+    ConfigError::Syntax {
+        place: place.to_owned(),
+        reason: reason.trim_end().to_owned(),
+    }
+}
+
+impl SceneFile {
+    /// The scene as TOML.
+    pub fn to_toml(&self) -> String {
+        let text = toml::to_string(self).expect("every entry has a form in TOML");
+        // TOML, unlike JSON, has a number for infinity; only lists and numbers of joint values can hold it
+        let mut lines = String::with_capacity(text.len());
+        for line in text.lines() {
+            if line.starts_with("joint_") {
+                lines.push_str(&line.replace("\"inf\"", "inf"));
+            } else {
+                lines.push_str(line);
+            }
+            lines.push('\n');
+        }
+        lines
+    }
+
+    /// The scene as JSON, infinity as the string `"inf"`.
+    pub fn to_json(&self) -> serde_json::Value {
+        serde_json::to_value(self).expect("every entry has a form in JSON")
+    }
+
+    /// Reads a scene from JSON text.
+    ///
+    /// # Errors
+    /// Text that is not JSON, or an entry that is unknown or of a wrong type, with its place.
+    pub fn from_json(text: &str) -> Result<SceneFile, ConfigError> {
+        serde_json::from_str(text).map_err(|error| syntax("scene", error.to_string()))
+    }
+
+    /// Writes the scene as TOML, with paths made relative to that file; so far they are relative to `base_dir`.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn save(&self, path: &Path, base_dir: &Path) -> Result<(), ConfigError> {
+        let mut scene = self.clone();
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for robot in &mut scene.robots {
+            for path in std::iter::once(&mut robot.urdf).chain(&mut robot.package_dirs) {
+                *path = paths::relative_to(folder, &base_dir.join(&*path));
+            }
+        }
+        std::fs::write(path, scene.to_toml()).map_err(|error| ConfigError::Write {
+            path: path.to_owned(),
+            reason: error.to_string(),
+        })
+    }
+
+    /// The description this scene stands for, checked; relative paths are looked for in `base_dir`.
+    ///
+    /// # Errors
+    /// A robot file or a value that cannot be used, by name.
+    pub fn describe(&self, base_dir: &Path) -> Result<Description, ConfigError> {
+        let mut description = Description::new(self.dt.0, self.substeps);
+        description.gravity = self.gravity.map(|part| part.0);
+        description.solver = Solver {
+            iterations: self.solver.iterations,
+            ls_iterations: self.solver.ls_iterations,
+            tolerance: self.solver.tolerance.0,
+            cone: match self.solver.cone {
+                ConeName::Elliptic => Cone::Elliptic,
+                ConeName::Pyramidal => Cone::Pyramidal,
+            },
+            impratio: self.solver.impratio.0,
+        };
+        for (index, shape) in self.shapes.iter().enumerate() {
+            let name = shape.name.as_deref().unwrap_or_default();
+            description.add_shape(name, shape.shape(index)?, pose(&shape.pos, &shape.quat));
+        }
+        for table in &self.robots {
+            let options = UrdfOptions {
+                name: table.name.clone(),
+                pose: pose(&table.pos, &table.quat),
+                floating: table.floating,
+                self_collisions: table.self_collisions,
+                package_dirs: table
+                    .package_dirs
+                    .iter()
+                    .map(|dir| base_dir.join(dir))
+                    .collect(),
+            };
+            let robot = description.add_urdf(base_dir.join(&table.urdf), options)?;
+            table.set_joints(robot)?;
+        }
+        description.validate()?;
+        Ok(description)
+    }
+}
+
+fn pose(pos: &[Number; 3], quat: &[Number; 4]) -> Pose {
+    Pose {
+        pos: pos.map(|part| part.0),
+        quat: quat.map(|part| part.0),
+    }
+    .normalized()
+}
+
+impl ShapeTable {
+    fn shape(&self, index: usize) -> Result<Shape, ConfigError> {
+        let (kind, sizes): (_, &[&str]) = match self.kind {
+            ShapeName::Box => ("box", &["half_extents"]),
+            ShapeName::Sphere => ("sphere", &["radius"]),
+            ShapeName::Cylinder => ("cylinder", &["radius", "half_height"]),
+            ShapeName::Capsule => ("capsule", &["radius", "half_height"]),
+        };
+        let given = [
+            ("half_extents", self.half_extents.is_some()),
+            ("radius", self.radius.is_some()),
+            ("half_height", self.half_height.is_some()),
+        ];
+        for (size, given) in given {
+            if given != sizes.contains(&size) {
+                let shape = self.name.clone().unwrap_or_else(|| format!("#{index}"));
+                let reason = match given {
+                    true => format!("a {kind} has no {size}; give {}", sizes.join(" and ")),
+                    false => format!("{size} is missing; a {kind} needs {}", sizes.join(" and ")),
+                };
+                return Err(ConfigError::Shape { shape, reason });
+            }
+        }
+        let radius = self.radius.unwrap_or_default().0;
+        let half_height = self.half_height.unwrap_or_default().0;
+        Ok(match self.kind {
+            ShapeName::Box => Shape::Box {
+                half_extents: self.half_extents.unwrap_or_default().map(|half| half.0),
+            },
+            ShapeName::Sphere => Shape::Sphere { radius },
+            ShapeName::Cylinder => Shape::Cylinder {
+                radius,
+                half_height,
+            },
+            ShapeName::Capsule => Shape::Capsule {
+                radius,
+                half_height,
+            },
+        })
+    }
+}
+
+impl RobotTable {
+    fn set_joints(&self, robot: &mut Robot) -> Result<(), ModelError> {
+        type Setter = fn(&mut Robot, &[f64]) -> Result<(), ModelError>;
+        let fields: [(&Option<PerDof<Number>>, Setter); 7] = [
+            (&self.joint_q, Robot::set_joint_q),
+            (&self.joint_target_q, Robot::set_joint_target_q),
+            (&self.joint_target_qd, Robot::set_joint_target_qd),
+            (&self.joint_target_ke, Robot::set_joint_target_ke),
+            (&self.joint_target_kd, Robot::set_joint_target_kd),
+            (&self.joint_effort_limit, Robot::set_joint_effort_limit),
+            (&self.joint_armature, Robot::set_joint_armature),
+        ];
+        let dofs = robot.dofs().len();
+        for (values, set) in fields {
+            if let Some(values) = values {
+                set(robot, &values.spread(dofs, |value| value.0))?;
+            }
+        }
+        if let Some(modes) = &self.joint_target_mode {
+            robot.set_joint_target_mode(&modes.spread(dofs, |mode| match mode {
+                ModeName::Position => TargetMode::Position,
+                ModeName::Velocity => TargetMode::Velocity,
+                ModeName::Both => TargetMode::Both,
+            }))?;
+        }
+        Ok(())
+    }
+}
