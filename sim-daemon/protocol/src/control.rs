@@ -1,0 +1,76 @@
+//! Control messages: small, rare, as JSON over request-response. What moves the worlds travels as commands instead, so
+//! that it keeps its order.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Description;
+
+/// Longest request as JSON [bytes].
+pub(crate) const REQUEST_MAX: usize = 512;
+
+/// From client to daemon.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Request {
+    /// Who are you?
+    Describe,
+    /// Who is in control?
+    Controller,
+    /// Let me control; `pid` is mine.
+    Acquire {
+        /// Process of the client.
+        pid: u32,
+    },
+    /// I no longer want control.
+    Release {
+        /// The lease.
+        epoch: u64,
+    },
+    /// The holder of the lease is alive and running.
+    Heartbeat {
+        /// The lease.
+        epoch: u64,
+    },
+    /// End the daemon.
+    Shutdown,
+}
+
+/// From daemon to client.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Response {
+    /// Answer to [`Request::Describe`].
+    Description(Box<Description>),
+    /// Answer to [`Request::Controller`].
+    Controller {
+        /// Process in control, if any.
+        pid: Option<u32>,
+    },
+    /// Control is yours, through the services of this epoch.
+    Granted {
+        /// The lease.
+        epoch: u64,
+    },
+    /// Somebody else is in control.
+    Held {
+        /// Who.
+        pid: u32,
+    },
+    /// The slots for a new lease do not fit.
+    NoMemory {
+        /// Bytes free.
+        free: u64,
+        /// Bytes needed.
+        needed: u64,
+    },
+    /// Answer to [`Request::Heartbeat`] and [`Request::Release`]: whether that lease is the present one.
+    Lease {
+        /// False when the lease was lost.
+        valid: bool,
+    },
+    /// Answer to [`Request::Shutdown`].
+    Ending,
+    /// The request could not be read.
+    Refused {
+        /// One sentence.
+        reason: String,
+    },
+}

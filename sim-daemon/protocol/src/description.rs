@@ -1,0 +1,143 @@
+//! What a daemon tells about itself, so that a client that attaches knows as much as the one that launched.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Dtype;
+
+/// A running daemon in full: everything that does not change while it runs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Description {
+    /// Protocol version of the daemon.
+    pub protocol: u32,
+    /// Release of the daemon, such as "0.1.0".
+    pub release: String,
+    /// Name of the daemon.
+    pub name: String,
+    /// Random number of this run of the daemon.
+    pub session: u64,
+    /// Process of the daemon.
+    pub pid: u32,
+    /// Number of worlds.
+    pub worlds: usize,
+    /// Where the physics runs, such as "cpu".
+    pub device: String,
+    /// Precision of the run and of every real array of it: "f32" or "f64".
+    pub precision: String,
+    /// Threads that a step uses.
+    pub threads: usize,
+    /// Physics step [s].
+    pub dt: f64,
+    /// Physics steps per control frame.
+    pub substeps: usize,
+    /// Gravity in world axes [m/s²].
+    pub gravity: [f64; 3],
+    /// `robot/joint` of each dof.
+    pub dof_names: Vec<String>,
+    /// `robot/joint` of each coordinate.
+    pub coord_names: Vec<String>,
+    /// `robot/link` of each body.
+    pub body_names: Vec<String>,
+    /// The robots with their ranges in the lists above.
+    pub robots: Vec<RobotRange>,
+    /// Rows of the field table: what every frame carries, in this order.
+    pub fields: Vec<FieldInfo>,
+    /// Every row that could have been asked for.
+    pub known_fields: Vec<FieldInfo>,
+    /// What a step may set (`joint_f`, targets).
+    pub commands: Vec<InputInfo>,
+    /// What a write may set (`joint_q`, `joint_qd`).
+    pub writes: Vec<InputInfo>,
+    /// The scene as TOML text.
+    pub scene: String,
+    /// Folder to which paths in the scene are relative.
+    pub scene_folder: String,
+    /// What was ignored or mended while the scene was read, one sentence each.
+    pub notes: Vec<String>,
+    /// Frames that the controller, or one observer, may hold at once.
+    pub frames_held: usize,
+    /// Worlds that observers see: the first ones.
+    pub watch_worlds: usize,
+    /// Hash over the fields, inputs, worlds and dofs; see [`Description::schema_hash`].
+    pub schema: u64,
+}
+
+/// Ranges of one robot, each `[start, stop)`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RobotRange {
+    /// Name of the robot.
+    pub name: String,
+    /// Its dofs.
+    pub dofs: [usize; 2],
+    /// Its coordinates.
+    pub coords: [usize; 2],
+    /// Its bodies.
+    pub bodies: [usize; 2],
+}
+
+/// One row of the field table.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FieldInfo {
+    /// Name, such as `joint_q`.
+    pub name: String,
+    /// Type of an entry.
+    pub dtype: Dtype,
+    /// Shape in numbers, worlds first. Empty in `known_fields` rows that are not exported.
+    pub shape: Vec<usize>,
+    /// Shape in words, such as `(worlds, coords)`.
+    pub axes: String,
+    /// Unit, such as "rad or m".
+    pub unit: String,
+    /// One sentence.
+    pub doc: String,
+}
+
+/// An array that a client may send.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InputInfo {
+    /// Name, such as `joint_f`.
+    pub name: String,
+    /// Full number of columns: dofs or coordinates.
+    pub columns: usize,
+    /// Unit.
+    pub unit: String,
+    /// One sentence.
+    pub doc: String,
+}
+
+impl Description {
+    /// FNV-1a over everything that decides how bytes are read: both sides compute it and must agree.
+    pub fn schema_hash(&self) -> u64 {
+        let mut hash = crate::hash::Fnv::new();
+        hash.number(self.worlds as u64);
+        hash.text(&self.precision);
+        hash.number(self.frames_held as u64);
+        hash.number(self.watch_worlds as u64);
+        self.dof_names.iter().for_each(|name| hash.text(name));
+        self.coord_names.iter().for_each(|name| hash.text(name));
+        self.body_names.iter().for_each(|name| hash.text(name));
+        for field in &self.fields {
+            hash.text(&field.name);
+            hash.number(field.dtype as u64);
+            field.shape.iter().for_each(|&n| hash.number(n as u64));
+        }
+        for input in self.commands.iter().chain(&self.writes) {
+            hash.text(&input.name);
+            hash.number(input.columns as u64);
+        }
+        hash.value()
+    }
+
+    /// Type of the real arrays of this run.
+    pub fn real(&self) -> Dtype {
+        if self.precision == "f64" {
+            Dtype::F64
+        } else {
+            Dtype::F32
+        }
+    }
+
+    /// Threads that a step keeps busy: one world cannot use more than one.
+    pub fn busy_threads(&self) -> usize {
+        self.threads.min(self.worlds).max(1)
+    }
+}

@@ -1,0 +1,230 @@
+//! What can go wrong between a client and a daemon, with the culprit and the cure.
+
+use std::path::PathBuf;
+
+/// Everything a client can be told. The daemon's refusals arrive as [`ProtocolError::CommandRefused`].
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProtocolError {
+    /// The name cannot be one of a daemon.
+    #[error("daemon name {name:?}: {problem}; use 1 to 64 letters, digits, `-` and `_`")]
+    BadName {
+        /// What was given.
+        name: String,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+
+    /// The folder that holds the lock files cannot be used.
+    #[error(
+        "folder {path:?} cannot be used: {problem}; set TIGHTLOOP_ROOT to a folder of your own"
+    )]
+    Root {
+        /// The folder.
+        path: PathBuf,
+        /// What the system says.
+        problem: String,
+    },
+
+    /// Nothing with this name runs.
+    #[error("no daemon named {name:?} runs under {root:?}; running: {running}")]
+    NoDaemon {
+        /// The name asked for.
+        name: String,
+        /// Where it was looked for.
+        root: PathBuf,
+        /// Names of the running daemons, or "none".
+        running: String,
+    },
+
+    /// Another daemon has the name.
+    #[error("daemon {name:?} is already running (pid {pid}); choose another name or stop it")]
+    NameTaken {
+        /// The name.
+        name: String,
+        /// The process that holds it.
+        pid: u32,
+    },
+
+    /// Daemon and client speak different versions of this protocol.
+    #[error(
+        "daemon {name:?} speaks protocol version {daemon}, this client speaks {client}; \
+         use the same tightloop release on both sides"
+    )]
+    ProtocolVersion {
+        /// The daemon's name.
+        name: String,
+        /// The daemon's version.
+        daemon: u32,
+        /// Ours.
+        client: u32,
+    },
+
+    /// A fact announced at the handshake and the same fact in the description are not equal.
+    #[error(
+        "daemon {name:?}: {fact} is {announced} in the handshake and {described} in the description; \
+         use the same tightloop release on both sides"
+    )]
+    Handshake {
+        /// The daemon's name.
+        name: String,
+        /// Which fact.
+        fact: &'static str,
+        /// Value of the service attribute.
+        announced: String,
+        /// Value computed here from the description.
+        described: String,
+    },
+
+    /// The daemon ended or was killed; its state is lost.
+    #[error("daemon {name:?} (pid {pid}) is gone and its state is lost; launch a new one")]
+    DaemonLost {
+        /// The daemon's name.
+        name: String,
+        /// The process it was.
+        pid: u32,
+    },
+
+    /// Another daemon now runs under the name.
+    #[error("daemon {name:?} was restarted and its former state is lost; attach again")]
+    DaemonRestarted {
+        /// The daemon's name.
+        name: String,
+    },
+
+    /// Another client controls the daemon.
+    #[error(
+        "daemon {name:?} is controlled by process {pid}; wait until it releases or ends, or only observe"
+    )]
+    LeaseHeld {
+        /// The daemon's name.
+        name: String,
+        /// The controlling process.
+        pid: u32,
+    },
+
+    /// This client was the controller and no longer is.
+    #[error(
+        "control of daemon {name:?} was lost (this process did not answer for too long and another client took it); \
+         attach again"
+    )]
+    LeaseLost {
+        /// The daemon's name.
+        name: String,
+    },
+
+    /// As many frames are alive as there are slots for.
+    #[error(
+        "{held} frames are held and that is the limit; keep copies (`frame.copy()`) or start the daemon \
+         with a larger `frames_held`"
+    )]
+    FramesHeld {
+        /// How many.
+        held: usize,
+    },
+
+    /// The field cannot be commanded or written.
+    #[error("{field:?} cannot be {verb}; it is one of: {known}")]
+    NotAnInput {
+        /// The field asked for.
+        field: String,
+        /// "commanded" or "written".
+        verb: &'static str,
+        /// What could be.
+        known: String,
+    },
+
+    /// The frame does not carry the field.
+    #[error(
+        "frames carry no field {field:?}; they carry: {known}; ask for it in `fields` at launch"
+    )]
+    NoField {
+        /// The field asked for.
+        field: String,
+        /// What frames carry.
+        known: String,
+    },
+
+    /// An array does not have the shape that the field needs.
+    #[error("{field}: expected {expected}, got {got}")]
+    Shape {
+        /// The field.
+        field: String,
+        /// Shape or range needed.
+        expected: String,
+        /// Shape or range given.
+        got: String,
+    },
+
+    /// The daemon did not accept a command; no world was touched.
+    #[error("{reason}")]
+    CommandRefused {
+        /// What kind of refusal it is.
+        kind: crate::RefusalKind,
+        /// The daemon's sentence: field, world, dof and cure.
+        reason: String,
+    },
+
+    /// Shared memory is too small.
+    #[error(
+        "{path} has {free} bytes free and {needed} are needed ({what}); use fewer worlds, fewer fields or fewer \
+         frames_held, or enlarge it (Docker's default is 64 MB: `docker run --shm-size=8g`)"
+    )]
+    SharedMemory {
+        /// The file system.
+        path: String,
+        /// Bytes free.
+        free: u64,
+        /// Bytes needed.
+        needed: u64,
+        /// What for.
+        what: String,
+    },
+
+    /// Bytes from the other side make no sense.
+    #[error(
+        "malformed message from {from}: {problem}; use the same tightloop release on both sides"
+    )]
+    Malformed {
+        /// Which side sent it.
+        from: &'static str,
+        /// What is wrong.
+        problem: String,
+    },
+
+    /// The daemon lives but did not answer in time.
+    #[error(
+        "daemon {name:?} (pid {pid}) did not answer within {seconds} s; is it stopped or overloaded?"
+    )]
+    Timeout {
+        /// The daemon's name.
+        name: String,
+        /// Its process.
+        pid: u32,
+        /// How long was waited.
+        seconds: f64,
+    },
+
+    /// The caller's interrupt hook asked to stop waiting. The command itself may have been carried out.
+    #[error("interrupted while waiting for the daemon")]
+    Interrupted,
+
+    /// The transport failed.
+    #[error("shared-memory transport: {action}: {problem}")]
+    Transport {
+        /// What was tried.
+        action: String,
+        /// What the transport says.
+        problem: String,
+    },
+}
+
+impl ProtocolError {
+    /// A transport failure; `problem` is the transport's own error.
+    pub fn transport(action: impl Into<String>, problem: impl std::fmt::Debug) -> Self {
+        ProtocolError::Transport {
+            action: action.into(),
+            problem: format!("{problem:?}"),
+        }
+    }
+}

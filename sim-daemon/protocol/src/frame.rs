@@ -1,0 +1,134 @@
+//! A frame: one sample from the daemon, owned, with its checked field table.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+
+use iceoryx2::prelude::ipc_threadsafe;
+use iceoryx2::sample::Sample;
+
+use crate::{Dtype, FrameHeader, ProtocolError, Row, Table};
+
+pub(crate) type FrameSample = Sample<ipc_threadsafe::Service, [u64], FrameHeader>;
+
+/// The state of all worlds (or, for an observer, of the first ones) at one instant.
+///
+/// It stays valid and unchanged until dropped, even after the client is dropped or the daemon ends or is killed. It may be
+/// dropped on any thread. At most `frames_held` of them may be alive.
+#[derive(Debug)]
+pub struct Frame {
+    header: FrameHeader,
+    table: Arc<Table>,
+    // address of the payload: taken once, since asking the sample locks the subscriber
+    base: usize,
+    sample: Mutex<Option<FrameSample>>,
+    alive: Arc<AtomicUsize>,
+}
+
+/// One array of a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct View<'a> {
+    /// Name, such as `joint_q`.
+    pub name: &'a str,
+    /// Type of the entries.
+    pub dtype: Dtype,
+    /// Shape, worlds first; row-major and contiguous.
+    pub shape: &'a [usize],
+    /// First entry, 64-byte aligned; valid for `bytes` and as long as the frame lives, read-only.
+    pub ptr: *const u8,
+    /// Length in bytes.
+    pub bytes: usize,
+    words: &'a [u64],
+}
+
+impl Frame {
+    /// Wraps a sample whose table was checked against its payload; `alive` already counts this frame.
+    pub(crate) fn new(sample: FrameSample, table: Arc<Table>, alive: Arc<AtomicUsize>) -> Frame {
+        let (header, base) = (*sample.user_header(), sample.payload().as_ptr() as usize);
+        Frame {
+            header,
+            table,
+            base,
+            sample: Mutex::new(Some(sample)),
+            alive,
+        }
+    }
+
+    /// The head of the sample: session, acknowledged command, number of the frame.
+    pub fn header(&self) -> &FrameHeader {
+        &self.header
+    }
+
+    /// The field table.
+    pub fn table(&self) -> &Table {
+        &self.table
+    }
+
+    /// The array named so.
+    ///
+    /// # Errors
+    /// [`ProtocolError::NoField`].
+    pub fn field(&self, name: &str) -> Result<View<'_>, ProtocolError> {
+        let row = self.table.row(name).ok_or_else(|| ProtocolError::NoField {
+            field: name.to_owned(),
+            known: self
+                .table
+                .rows()
+                .iter()
+                .map(|row| row.name.as_str())
+                .collect::<Vec<_>>()
+                .join(", "),
+        })?;
+        Ok(self.view(row))
+    }
+
+    /// Every array in the order of the table.
+    pub fn fields(&self) -> impl Iterator<Item = View<'_>> {
+        self.table.rows().iter().map(|row| self.view(row))
+    }
+
+    fn view<'a>(&'a self, row: &'a Row) -> View<'a> {
+        let ptr = (self.base + row.offset) as *const u8;
+        // SAFETY: `Table::parse` checked that the row, rounded up to words, lies inside the payload and is aligned; the
+        // sample keeps the payload mapped while `self` lives; the daemon writes to a slot only after it was given back.
+        let words = unsafe { std::slice::from_raw_parts(ptr.cast::<u64>(), row.bytes.div_ceil(8)) };
+        View {
+            name: &row.name,
+            dtype: row.dtype,
+            shape: &row.shape,
+            ptr,
+            bytes: row.bytes,
+            words,
+        }
+    }
+}
+
+impl Drop for Frame {
+    fn drop(&mut self) {
+        // the slot goes back before the count goes down, so that the count never promises a slot that is not there
+        drop(self.sample.get_mut().ok().and_then(Option::take));
+        self.alive.fetch_sub(1, Ordering::Release);
+    }
+}
+
+impl<'a> View<'a> {
+    /// The entries as bytes.
+    pub fn as_bytes(&self) -> &'a [u8] {
+        &bytemuck::cast_slice(self.words)[..self.bytes]
+    }
+
+    /// The entries, when they are of the type asked for (`f32`, `f64`, `i32`, `u32`, `u64`, `u8`).
+    pub fn as_slice<T: Entry>(&self) -> Option<&'a [T]> {
+        (self.dtype == T::DTYPE).then(|| bytemuck::cast_slice(self.as_bytes()))
+    }
+}
+
+/// A Rust type that a [`Dtype`] stands for.
+pub trait Entry: bytemuck::Pod {
+    /// Its dtype.
+    const DTYPE: Dtype;
+}
+
+macro_rules! entries {
+    ($($rust:ty => $dtype:ident),*) => { $(impl Entry for $rust { const DTYPE: Dtype = Dtype::$dtype; })* };
+}
+entries!(f32 => F32, f64 => F64, i32 => I32, u32 => U32, u64 => U64, u8 => U8);

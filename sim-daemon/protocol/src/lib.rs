@@ -1,0 +1,46 @@
+//! The wire between a daemon and its clients, on one screen.
+//!
+//! ```text
+//!            wake (event)  ◄───────────────── notify ──────────────────┐
+//!            control (request-response, JSON) ◄── describe · acquire · heartbeat · release · shutdown
+//!  daemon    act/<epoch>   (pub-sub, 1 : 1)   ◄── command: header, field table, arrays ──   controller
+//!            obs/<epoch>   (pub-sub, 1 : 1)   ──► frame:   header, field table, arrays ──►
+//!            watch         (pub-sub, 1 : n)   ──► frames of the first worlds, at a limited rate ──► observers
+//! ```
+//!
+//! - A sample is `[u64]` words: a field table, then arrays, world-major and 64-byte aligned ([`header`], [`table`]).
+//! - Steps are lock-step: the client sends `seq = n`, the daemon answers `ack_seq = n` with a frame or a refusal.
+//! - A lease is one `epoch`, with services of its own; it ends by release, by death, or when another client asks for it
+//!   after the heartbeats stopped. Reset, write and forward travel as commands too, so that they keep their order.
+//! - A daemon's presence is a lock on `ROOT/NAME.lock` ([`place`]); its run is a random `session`.
+//! - Clients know no physics: the [`Description`] names what can be sent and what frames carry.
+//! - Every process here belongs to one user. A hostile process of that user is outside what shared memory can stop; against
+//!   mistakes, the daemon copies a command once and checks the copy, and the client checks each table before reading by it.
+//!
+//! [`Client`] is one end, [`host::Host`] the other. This crate alone uses iceoryx2.
+
+mod client;
+mod control;
+mod controller;
+mod description;
+mod error;
+mod frame;
+pub mod hash;
+pub mod header;
+mod liveness;
+mod loan;
+mod observer;
+mod pace;
+pub mod place;
+pub mod table;
+mod transport;
+
+pub use client::{AttachOptions, Client, Command, Hook, Values, keep_waiting};
+pub use description::{Description, FieldInfo, InputInfo, RobotRange};
+pub use error::ProtocolError;
+pub use frame::{Entry, Frame, View};
+pub use header::{
+    ALIGNMENT, CommandHeader, Dtype, FrameHeader, Op, PROTOCOL_VERSION, RefusalKind, Row,
+};
+pub use place::{cleanup_after_death, running, sweep};
+pub use table::{ROWS_MAX, Table};

@@ -1,0 +1,39 @@
+//! Is the daemon that we attached to still there?
+
+use crate::ProtocolError;
+use crate::place::{Beacon, Place, Presence};
+
+/// The daemon that a client attached to.
+#[derive(Debug, Clone)]
+pub(crate) struct Peer {
+    pub(crate) place: Place,
+    pub(crate) beacon: Beacon,
+}
+
+impl Peer {
+    /// Errors when the daemon ended, was killed, or is another one than it was. A few microseconds.
+    pub(crate) fn check(&self) -> Result<(), ProtocolError> {
+        match self.place.presence() {
+            Presence::Running(beacon) if beacon.session == self.beacon.session => Ok(()),
+            Presence::Absent => Err(self.lost()),
+            Presence::Running(_) => Err(ProtocolError::DaemonRestarted {
+                name: self.place.name().to_owned(),
+            }),
+            // somebody looks at the lock of a dead daemon, or a new one begins: the next look tells
+            Presence::Starting => Ok(()),
+        }
+    }
+
+    pub(crate) fn lost(&self) -> ProtocolError {
+        ProtocolError::DaemonLost {
+            name: self.place.name().to_owned(),
+            pid: self.beacon.pid,
+        }
+    }
+
+    pub(crate) fn lease_lost(&self) -> ProtocolError {
+        ProtocolError::LeaseLost {
+            name: self.place.name().to_owned(),
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The observing end of a client: newest frames, nothing asked of the daemon.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use iceoryx2::port::listener::Listener;
+
+use crate::client::{Hook, Link, S, malformed};
+use crate::controller::check_table;
+use crate::frame::FrameSample;
+use crate::transport::{self, FrameSubscriber, SLICE};
+use crate::{Description, Frame, ProtocolError, Table};
+
+/// A subscription to the observers' service.
+#[derive(Debug)]
+pub(crate) struct Observer {
+    link: Arc<Link>,
+    description: Arc<Description>,
+    table: Arc<Table>,
+    frames: Arc<AtomicUsize>,
+    subscriber: FrameSubscriber<S>,
+    listener: Listener<S>,
+}
+
+impl Observer {
+    pub(crate) fn open(
+        link: &Arc<Link>,
+        description: &Arc<Description>,
+    ) -> Result<Observer, ProtocolError> {
+        let ports = link.with_node(|node| {
+            let listener = transport::listener(&transport::open_event(node, "watch")?)?;
+            Ok((
+                transport::frame_subscriber(&transport::open_watch(node)?, 1)?,
+                listener,
+            ))
+        });
+        let (subscriber, listener) = match ports {
+            Ok(ports) => ports,
+            Err(error) => {
+                link.peer.check()?;
+                return Err(error);
+            }
+        };
+        // a daemon that sleeps shows a new observer its present state when it looks around
+        link.notify();
+        Ok(Observer {
+            link: Arc::clone(link),
+            description: Arc::clone(description),
+            table: Arc::new(Table::lay_out([])),
+            frames: Arc::new(AtomicUsize::new(0)),
+            subscriber,
+            listener,
+        })
+    }
+
+    pub(crate) fn latest(&mut self) -> Result<Option<Frame>, ProtocolError> {
+        let held = self.frames.load(Ordering::Acquire);
+        if held >= self.description.frames_held {
+            return Err(ProtocolError::FramesHeld { held });
+        }
+        let Some(sample) = self.receive()? else {
+            self.link.peer.check()?;
+            return Ok(None);
+        };
+        let header = *sample.user_header();
+        if header.session != self.link.peer.beacon.session
+            || header.schema != self.description.schema
+        {
+            return Err(malformed("the head of a frame: another session or schema"));
+        }
+        check_table(&mut self.table, sample.payload(), header.rows)?;
+        self.frames.fetch_add(1, Ordering::Acquire);
+        Ok(Some(Frame::new(
+            sample,
+            Arc::clone(&self.table),
+            Arc::clone(&self.frames),
+        )))
+    }
+
+    /// The newest sample; older ones are dropped.
+    fn receive(&self) -> Result<Option<FrameSample>, ProtocolError> {
+        let mut newest = None;
+        while let Some(sample) = self
+            .subscriber
+            .receive()
+            .map_err(|error| ProtocolError::transport("receive a frame", error))?
+        {
+            drop(newest.replace(sample));
+        }
+        Ok(newest)
+    }
+
+    pub(crate) fn wait_newer(
+        &mut self,
+        timeout: Option<Duration>,
+        hook: Hook<'_>,
+    ) -> Result<Option<Frame>, ProtocolError> {
+        let start = Instant::now();
+        loop {
+            if let Some(frame) = self.latest()? {
+                return Ok(Some(frame));
+            }
+            let left = timeout.map_or(SLICE, |timeout| {
+                timeout.saturating_sub(start.elapsed()).min(SLICE)
+            });
+            if left.is_zero() {
+                return Ok(None);
+            }
+            if let ControlFlow::Break(()) = hook() {
+                return Err(ProtocolError::Interrupted);
+            }
+            transport::park(&self.listener, left)?;
+        }
+    }
+}

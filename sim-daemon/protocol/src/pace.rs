@@ -1,0 +1,86 @@
+//! How to wait: spin while the answer is likely to come soon and a core is free for it, else sleep.
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use iceoryx2::port::listener::Listener;
+use iceoryx2::prelude::Service;
+
+use crate::ProtocolError;
+use crate::transport::{SLICE, park};
+
+const SPIN_MIN: Duration = Duration::from_micros(5);
+const SPIN_MAX: Duration = Duration::from_micros(200);
+/// Waking takes tens of microseconds: sleep this much less than the expected wait, and spin for the rest.
+const WAKE_MARGIN: Duration = Duration::from_micros(100);
+/// Beyond this, a wake-up is lost in the wait itself.
+const FORESEEN_MAX: Duration = Duration::from_millis(20);
+
+/// What was learnt about one kind of wait.
+#[derive(Debug, Clone)]
+pub(crate) struct Pace {
+    mean: Duration,
+    free_core: bool,
+}
+
+impl Pace {
+    /// `free_core`: whether a spinning thread takes a core from nobody.
+    pub(crate) fn new(free_core: bool) -> Pace {
+        Pace {
+            mean: SPIN_MAX / 2,
+            free_core,
+        }
+    }
+
+    /// Waits until `look` finds something or `around` breaks off.
+    ///
+    /// `around` runs whenever the thread has slept, hence at least every 50 ms; never while it spins.
+    pub(crate) fn wait<S: Service, T>(
+        &mut self,
+        listener: &Listener<S>,
+        mut look: impl FnMut() -> Result<Option<T>, ProtocolError>,
+        mut around: impl FnMut() -> Result<ControlFlow<T>, ProtocolError>,
+    ) -> Result<T, ProtocolError> {
+        if let Some(found) = look()? {
+            self.learn(Duration::ZERO);
+            return Ok(found);
+        }
+        let start = Instant::now();
+        if self.free_core && self.mean < FORESEEN_MAX {
+            if self.mean > SPIN_MAX {
+                park(listener, self.mean - WAKE_MARGIN)?;
+            }
+            let until = start.elapsed() + (2 * self.mean).clamp(SPIN_MIN, SPIN_MAX);
+            loop {
+                if let Some(found) = look()? {
+                    self.learn(start.elapsed());
+                    return Ok(found);
+                }
+                if start.elapsed() > until {
+                    break;
+                }
+                std::hint::spin_loop();
+            }
+        }
+        loop {
+            park(listener, SLICE)?;
+            // a notification may be an old one: only looking tells
+            if let Some(found) = look()? {
+                self.learn(start.elapsed());
+                return Ok(found);
+            }
+            if let ControlFlow::Break(found) = around()? {
+                return Ok(found);
+            }
+        }
+    }
+
+    fn learn(&mut self, wait: Duration) {
+        self.mean = (9 * self.mean + wait.min(2 * FORESEEN_MAX)) / 10;
+    }
+}
+
+/// Cores that this process may use.
+pub(crate) fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}

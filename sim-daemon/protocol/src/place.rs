@@ -1,0 +1,422 @@
+//! Where a daemon lives in the file system: lock file, transport folder, prefix of its shared memory.
+//!
+//! ```text
+//! ROOT/NAME.lock            held by flock for the daemon's life; one line: protocol version, pid, session
+//! /dev/shm/tl<hash>/        nodes, services and sockets; hash is over ROOT and NAME
+//! /dev/shm/tl<hash>_*       shared memory; each session has a prefix of its own
+//! ```
+//! So whoever can take the lock may remove the rest. The transport folder is in /dev/shm whatever ROOT is, since the path
+//! of a Unix socket is limited to 107 bytes.
+
+use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
+use std::io::{Read, Seek, Write};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use iceoryx2::config::Config;
+use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString};
+
+use crate::hash::Fnv;
+use crate::{PROTOCOL_VERSION, ProtocolError};
+
+/// Where POSIX shared memory is on Linux.
+pub const SHARED_MEMORY: &str = "/dev/shm";
+
+/// A name and the root folder it is looked up in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    root: PathBuf,
+    name: String,
+    stem: String,
+}
+
+/// What the lock file of a daemon says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Beacon {
+    /// Protocol version.
+    pub protocol: u32,
+    /// Process.
+    pub pid: u32,
+    /// Random number of the run.
+    pub session: u64,
+}
+
+/// State of a name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Presence {
+    /// Nobody holds the lock, or there is no lock file.
+    Absent,
+    /// Somebody holds it and has not written the beacon yet.
+    Starting,
+    /// A daemon runs.
+    Running(Beacon),
+}
+
+/// The root folder: `$TIGHTLOOP_ROOT`, else `$XDG_RUNTIME_DIR/tightloop`, else `/dev/shm/tightloop-<uid>`.
+pub fn default_root() -> PathBuf {
+    let variable = |name| {
+        std::env::var_os(name)
+            .filter(|value| !value.is_empty())
+            .map(PathBuf::from)
+    };
+    variable("TIGHTLOOP_ROOT")
+        .or_else(|| variable("XDG_RUNTIME_DIR").map(|folder| folder.join("tightloop")))
+        .unwrap_or_else(|| {
+            format!(
+                "{SHARED_MEMORY}/tightloop-{}",
+                rustix::process::getuid().as_raw()
+            )
+            .into()
+        })
+}
+
+impl Place {
+    /// The place of `name` under `root`, or under [`default_root`].
+    ///
+    /// # Errors
+    /// [`ProtocolError::BadName`]; [`ProtocolError::Root`] when the folder cannot be made or belongs to somebody else.
+    pub fn new(root: Option<&Path>, name: &str) -> Result<Place, ProtocolError> {
+        let bad = |problem| ProtocolError::BadName {
+            name: name.to_owned(),
+            problem,
+        };
+        if name.is_empty() {
+            return Err(bad("it is empty"));
+        }
+        if name.len() > 64 {
+            return Err(bad("it is too long"));
+        }
+        if !name
+            .bytes()
+            .all(|byte| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_')
+        {
+            return Err(bad("it has a character that is not allowed"));
+        }
+        let root = private_folder(&root.map_or_else(default_root, Path::to_owned))?;
+        let mut hash = Fnv::new();
+        hash.text(&root.to_string_lossy());
+        hash.text(name);
+        Ok(Place {
+            root,
+            name: name.to_owned(),
+            stem: format!("tl{:016x}", hash.value()),
+        })
+    }
+
+    /// The name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The root folder, absolute.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// The lock file.
+    pub fn lock_path(&self) -> PathBuf {
+        self.root.join(format!("{}.lock", self.name))
+    }
+
+    /// What every file of this daemon in [`SHARED_MEMORY`] begins with.
+    pub fn stem(&self) -> &str {
+        &self.stem
+    }
+
+    /// Whether a daemon runs here. Takes no lock for longer than an instant; a few microseconds.
+    pub fn presence(&self) -> Presence {
+        let Ok(mut file) = File::open(self.lock_path()) else {
+            return Presence::Absent;
+        };
+        match file.try_lock_shared() {
+            Err(TryLockError::WouldBlock) => {
+                read_beacon(&mut file).map_or(Presence::Starting, Presence::Running)
+            }
+            _ => Presence::Absent,
+        }
+    }
+
+    /// The transport's settings for one session, explicit in full: its default would read a file from the working folder.
+    pub(crate) fn transport_config(&self, session: u64) -> Config {
+        let mut config = Config::default();
+        let prefix = format!("{}_{:08x}_", self.stem, session as u32);
+        let folder = format!("{SHARED_MEMORY}/{}/", self.stem);
+        // lengths: 28 + 28 bytes here, at most 45 more for a socket, 107 allowed
+        config.global.prefix =
+            FileName::new(prefix.as_bytes()).expect("letters, digits and underscores");
+        config
+            .global
+            .set_root_path(&IoxPath::new(folder.as_bytes()).expect("letters, digits and slashes"));
+        config.global.node.cleanup_dead_nodes_on_creation = false;
+        config.global.node.cleanup_dead_nodes_on_destruction = false;
+        config.global.service.cleanup_dead_nodes_on_open = false;
+        config
+    }
+
+    /// Removes every file in [`SHARED_MEMORY`] that belongs to this name. Only the lock's holder may.
+    fn remove_shared_files(&self) {
+        let Ok(entries) = fs::read_dir(SHARED_MEMORY) else {
+            return;
+        };
+        for entry in entries.flatten() {
+            let file_name = entry.file_name();
+            let Some(name) = file_name.to_str() else {
+                continue;
+            };
+            let rest = name.strip_prefix(self.stem.as_str());
+            // failures are left to the next start: another cleaner may have been faster
+            let _ = match rest {
+                Some("") => fs::remove_dir_all(entry.path()),
+                Some(rest) if rest.starts_with('_') => fs::remove_file(entry.path()),
+                _ => Ok(()),
+            };
+        }
+    }
+}
+
+/// The lock of a name. Holding it is being the daemon; dropping it removes what is left of the daemon's files.
+#[derive(Debug)]
+pub struct Tenancy {
+    place: Place,
+    file: File,
+}
+
+impl Tenancy {
+    /// Takes the lock and removes what a killed predecessor left.
+    ///
+    /// # Errors
+    /// [`ProtocolError::NameTaken`] when a daemon runs under the name; [`ProtocolError::Root`].
+    pub fn take(place: &Place) -> Result<Tenancy, ProtocolError> {
+        // clients and sweepers hold the lock for microseconds: not worth an error
+        let deadline = Instant::now() + Duration::from_millis(500);
+        loop {
+            if let Some(tenancy) = Tenancy::try_take(place)? {
+                place.remove_shared_files();
+                private_folder(&Path::new(SHARED_MEMORY).join(&place.stem))?;
+                return Ok(tenancy);
+            }
+            if let Presence::Running(beacon) = place.presence() {
+                return Err(ProtocolError::NameTaken {
+                    name: place.name.clone(),
+                    pid: beacon.pid,
+                });
+            }
+            if Instant::now() > deadline {
+                return Err(ProtocolError::NameTaken {
+                    name: place.name.clone(),
+                    pid: 0,
+                });
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    /// Takes the lock if nobody has it.
+    fn try_take(place: &Place) -> Result<Option<Tenancy>, ProtocolError> {
+        let path = place.lock_path();
+        let root_error = |error: std::io::Error| ProtocolError::Root {
+            path: path.clone(),
+            problem: error.to_string(),
+        };
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .mode(0o600)
+            .open(&path)
+            .map_err(root_error)?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => return Ok(None),
+            Err(TryLockError::Error(error)) => return Err(root_error(error)),
+            Ok(()) => {}
+        }
+        // the file may have been removed between open and lock: then the lock is on nothing
+        let ours = file.metadata().map_err(root_error)?.ino();
+        match fs::metadata(&path) {
+            Ok(there) if there.ino() == ours => Ok(Some(Tenancy {
+                place: place.clone(),
+                file,
+            })),
+            _ => Ok(None),
+        }
+    }
+
+    /// Tells clients who we are; until then they see [`Presence::Starting`].
+    ///
+    /// # Errors
+    /// [`ProtocolError::Root`] when the lock file cannot be written.
+    pub fn announce(&mut self, session: u64) -> Result<(), ProtocolError> {
+        let line = format!(
+            "tightloop {PROTOCOL_VERSION} {} {session:016x}\n",
+            std::process::id()
+        );
+        let write = |file: &mut File| {
+            file.set_len(0)?;
+            file.rewind()?;
+            file.write_all(line.as_bytes())
+        };
+        write(&mut self.file).map_err(|error| ProtocolError::Root {
+            path: self.place.lock_path(),
+            problem: error.to_string(),
+        })
+    }
+
+    /// Where this is.
+    pub fn place(&self) -> &Place {
+        &self.place
+    }
+}
+
+impl Drop for Tenancy {
+    fn drop(&mut self) {
+        self.place.remove_shared_files();
+        // the file goes before the lock does, so nobody can lock a file that is about to go
+        let _ = fs::remove_file(self.place.lock_path());
+    }
+}
+
+/// Removes what a dead daemon left. Returns whether there is nothing left, that is, false while one runs.
+///
+/// # Errors
+/// [`ProtocolError::BadName`], [`ProtocolError::Root`].
+pub fn cleanup_after_death(root: Option<&Path>, name: &str) -> Result<bool, ProtocolError> {
+    let place = Place::new(root, name)?;
+    Ok(Tenancy::try_take(&place)?.is_some()) // dropping it cleans
+}
+
+/// Names of the daemons that run under `root`, sorted.
+///
+/// # Errors
+/// [`ProtocolError::Root`].
+pub fn running(root: Option<&Path>) -> Result<Vec<String>, ProtocolError> {
+    let mut names = names_with_lock(root)?;
+    names.retain(|place| matches!(place.presence(), Presence::Running(_)));
+    Ok(names.into_iter().map(|place| place.name).collect())
+}
+
+/// Removes what dead daemons of any name left under `root`; every start of a daemon does this.
+///
+/// # Errors
+/// [`ProtocolError::Root`].
+pub fn sweep(root: Option<&Path>) -> Result<(), ProtocolError> {
+    for place in names_with_lock(root)? {
+        if place.presence() == Presence::Absent {
+            drop(Tenancy::try_take(&place)?);
+        }
+    }
+    Ok(())
+}
+
+fn names_with_lock(root: Option<&Path>) -> Result<Vec<Place>, ProtocolError> {
+    let root = private_folder(&root.map_or_else(default_root, Path::to_owned))?;
+    let entries = fs::read_dir(&root).map_err(|error| ProtocolError::Root {
+        path: root.clone(),
+        problem: error.to_string(),
+    })?;
+    let mut places: Vec<Place> = entries
+        .flatten()
+        .filter_map(|entry| {
+            Place::new(
+                Some(&root),
+                entry.file_name().to_str()?.strip_suffix(".lock")?,
+            )
+            .ok()
+        })
+        .collect();
+    places.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(places)
+}
+
+fn read_beacon(file: &mut File) -> Option<Beacon> {
+    let mut text = String::new();
+    file.take(128).read_to_string(&mut text).ok()?;
+    let mut words = text.strip_suffix('\n')?.split(' ');
+    let ("tightloop", protocol, pid, session) =
+        (words.next()?, words.next()?, words.next()?, words.next()?)
+    else {
+        return None;
+    };
+    Some(Beacon {
+        protocol: protocol.parse().ok()?,
+        pid: pid.parse().ok()?,
+        session: u64::from_str_radix(session, 16).ok()?,
+    })
+}
+
+/// Makes a folder that only we may use, and returns it absolute.
+fn private_folder(path: &Path) -> Result<PathBuf, ProtocolError> {
+    let error = |problem: String| ProtocolError::Root {
+        path: path.to_owned(),
+        problem,
+    };
+    DirBuilder::new()
+        .recursive(true)
+        .mode(0o700)
+        .create(path)
+        .map_err(|cause| error(cause.to_string()))?;
+    let metadata = fs::metadata(path).map_err(|cause| error(cause.to_string()))?;
+    if metadata.uid() != rustix::process::geteuid().as_raw() {
+        return Err(error(format!("it belongs to user {}", metadata.uid())));
+    }
+    if metadata.mode() & 0o022 != 0 {
+        return Err(error("others may write in it".to_owned()));
+    }
+    fs::canonicalize(path).map_err(|cause| error(cause.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn root(test: &str) -> PathBuf {
+        std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()))
+    }
+
+    #[test]
+    fn a_name_is_taken_once_and_leaves_nothing() {
+        let root = root("place");
+        let place = Place::new(Some(&root), "one").unwrap();
+        let mut first = Tenancy::take(&place).unwrap();
+        assert_eq!(place.presence(), Presence::Starting);
+        first.announce(7).unwrap();
+        let beacon = Beacon {
+            protocol: PROTOCOL_VERSION,
+            pid: std::process::id(),
+            session: 7,
+        };
+        assert_eq!(place.presence(), Presence::Running(beacon));
+        assert_eq!(running(Some(&root)).unwrap(), ["one"]);
+        let error = Tenancy::take(&place).unwrap_err().to_string();
+        assert!(error.contains(&std::process::id().to_string()), "{error}");
+        assert!(!cleanup_after_death(Some(&root), "one").unwrap());
+        drop(first);
+        assert_eq!(place.presence(), Presence::Absent);
+        assert!(!Path::new(SHARED_MEMORY).join(place.stem()).exists());
+        assert_eq!(fs::read_dir(&root).unwrap().count(), 0);
+        fs::remove_dir(&root).unwrap();
+    }
+
+    #[test]
+    fn names_with_slashes_dots_or_nothing_are_refused() {
+        for name in ["", "a/b", "..", "a.lock", "ä", &"x".repeat(65)] {
+            assert!(
+                matches!(Place::new(None, name), Err(ProtocolError::BadName { .. })),
+                "{name:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_a_killed_daemon_left_is_swept() {
+        let root = root("sweep");
+        let place = Place::new(Some(&root), "dead").unwrap();
+        fs::write(place.lock_path(), "tightloop 1 1 0000000000000001\n").unwrap();
+        let shared = Path::new(SHARED_MEMORY).join(format!("{}_00000001_5.data", place.stem()));
+        fs::write(&shared, "x").unwrap();
+        sweep(Some(&root)).unwrap();
+        assert!(!shared.exists() && !place.lock_path().exists());
+        fs::remove_dir(&root).unwrap();
+    }
+}

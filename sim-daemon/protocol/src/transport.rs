@@ -1,0 +1,366 @@
+//! The services of one daemon and their limits, said once for both sides. The only file that knows iceoryx2's builders.
+
+use std::sync::Once;
+use std::time::Duration;
+
+use iceoryx2::config::Config;
+use iceoryx2::port::client::Client as ControlClient;
+use iceoryx2::port::listener::{Listener, ListenerWaitError};
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::server::Server;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::*;
+use iceoryx2::service::port_factory::{event, publish_subscribe};
+
+use crate::{ALIGNMENT, CommandHeader, FrameHeader, ProtocolError};
+
+/// Clients that may be attached at once, controllers and observers together.
+pub(crate) const CLIENTS_MAX: usize = 32;
+/// Longest time anybody sleeps without looking around.
+pub(crate) const SLICE: Duration = Duration::from_millis(50);
+
+/// Frames on their way out: from the daemon.
+pub(crate) type FramePublisher<S> = Publisher<S, [u64], FrameHeader>;
+/// Frames on their way in: at a client.
+pub(crate) type FrameSubscriber<S> = Subscriber<S, [u64], FrameHeader>;
+/// Commands on their way out: from a client.
+pub(crate) type CommandPublisher<S> = Publisher<S, [u64], CommandHeader>;
+/// Commands on their way in: at the daemon.
+pub(crate) type CommandSubscriber<S> = Subscriber<S, [u64], CommandHeader>;
+/// Service that carries frames.
+pub(crate) type FrameService<S> = publish_subscribe::PortFactory<S, [u64], FrameHeader>;
+/// Service that carries commands.
+pub(crate) type CommandService<S> = publish_subscribe::PortFactory<S, [u64], CommandHeader>;
+/// Requests from a client.
+pub(crate) type Requester<S> = ControlClient<S, [u8], (), [u8], ()>;
+/// Requests at the daemon.
+pub(crate) type Responder<S> = Server<S, [u8], (), [u8], ()>;
+
+/// A node: one process's membership in the transport of one daemon.
+pub(crate) fn node<S: Service>(config: &Config, role: &str) -> Result<Node<S>, ProtocolError> {
+    static QUIET: Once = Once::new();
+    // our errors say it better; the transport's own log goes to stderr when IOX2_LOG_LEVEL asks for it
+    QUIET.call_once(|| set_log_level_from_env_or(LogLevel::Fatal));
+    let name =
+        NodeName::new(role).map_err(|error| ProtocolError::transport("name a node", error))?;
+    NodeBuilder::new()
+        .name(&name)
+        .config(config)
+        .signal_handling_mode(SignalHandlingMode::Disabled)
+        .create::<S>()
+        .map_err(|error| ProtocolError::transport("create a node", error))
+}
+
+fn service_name(name: &str) -> Result<ServiceName, ProtocolError> {
+    ServiceName::new(name)
+        .map_err(|error| ProtocolError::transport(format!("name service {name}"), error))
+}
+
+/// Facts that the handshake compares, as attributes of the wake-up service: it has no types that could differ.
+pub(crate) mod facts {
+    pub(crate) const PROTOCOL: &str = "protocol";
+    pub(crate) const SCHEMA: &str = "schema";
+    pub(crate) const WORLDS: &str = "worlds";
+    pub(crate) const DOFS: &str = "dofs";
+}
+
+/// Number of frame slots that the controller's service has for `frames_held`.
+pub(crate) fn frame_slots(frames_held: usize) -> usize {
+    BUFFER + borrowed(frames_held) + LOANS
+}
+
+/// Number of frame slots that the observers' service has.
+pub(crate) fn watch_slots(frames_held: usize) -> usize {
+    CLIENTS_MAX * (BUFFER + borrowed(frames_held)) + 1 + LOANS
+}
+
+/// Number of command slots of a lease.
+pub(crate) const COMMAND_SLOTS: usize = COMMAND_BUFFER + 1 + LOANS;
+
+const BUFFER: usize = 1;
+const COMMAND_BUFFER: usize = 2;
+const LOANS: usize = 1;
+
+/// The frames held, and one that is looked at before it is handed out or dropped.
+fn borrowed(frames_held: usize) -> usize {
+    frames_held + 1
+}
+
+fn alignment() -> Alignment {
+    Alignment::new(ALIGNMENT).expect("a power of two")
+}
+
+/// Service of frames for the controller of lease `epoch`.
+pub(crate) fn create_frames<S: Service>(
+    node: &Node<S>,
+    epoch: u64,
+    frames_held: usize,
+) -> Result<FrameService<S>, ProtocolError> {
+    node.service_builder(&service_name(&format!("obs/{epoch}"))?)
+        .publish_subscribe::<[u64]>()
+        .user_header::<FrameHeader>()
+        .payload_alignment(alignment())
+        .enable_safe_overflow(true)
+        .subscriber_max_buffer_size(BUFFER)
+        .subscriber_max_borrowed_samples(borrowed(frames_held))
+        .history_size(0)
+        .max_publishers(1)
+        .max_subscribers(1)
+        .max_nodes(4)
+        .create()
+        .map_err(|error| ProtocolError::transport(format!("create service obs/{epoch}"), error))
+}
+
+/// Opens what [`create_frames`] created.
+pub(crate) fn open_frames<S: Service>(
+    node: &Node<S>,
+    epoch: u64,
+) -> Result<FrameService<S>, ProtocolError> {
+    open_frame_service(node, &format!("obs/{epoch}"))
+}
+
+fn open_frame_service<S: Service>(
+    node: &Node<S>,
+    name: &str,
+) -> Result<FrameService<S>, ProtocolError> {
+    node.service_builder(&service_name(name)?)
+        .publish_subscribe::<[u64]>()
+        .user_header::<FrameHeader>()
+        .payload_alignment(alignment())
+        .open()
+        .map_err(|error| ProtocolError::transport(format!("open service {name}"), error))
+}
+
+/// Service of frames for observers.
+pub(crate) fn create_watch<S: Service>(
+    node: &Node<S>,
+    frames_held: usize,
+) -> Result<FrameService<S>, ProtocolError> {
+    node.service_builder(&service_name("watch")?)
+        .publish_subscribe::<[u64]>()
+        .user_header::<FrameHeader>()
+        .payload_alignment(alignment())
+        .enable_safe_overflow(true)
+        .subscriber_max_buffer_size(BUFFER)
+        .subscriber_max_borrowed_samples(borrowed(frames_held))
+        .history_size(1)
+        .max_publishers(1)
+        .max_subscribers(CLIENTS_MAX)
+        .max_nodes(CLIENTS_MAX + 1)
+        .create()
+        .map_err(|error| ProtocolError::transport("create service watch", error))
+}
+
+/// Opens what [`create_watch`] created.
+pub(crate) fn open_watch<S: Service>(node: &Node<S>) -> Result<FrameService<S>, ProtocolError> {
+    open_frame_service(node, "watch")
+}
+
+/// The end of a service of frames that sends.
+pub(crate) fn frame_publisher<S: Service>(
+    service: &FrameService<S>,
+    words: usize,
+) -> Result<FramePublisher<S>, ProtocolError> {
+    service
+        .publisher_builder()
+        .initial_max_slice_len(words)
+        .max_loaned_samples(LOANS)
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .create()
+        .map_err(|error| ProtocolError::transport("create a frame publisher", error))
+}
+
+/// The end of a service of frames that receives; `history` is 1 for observers, who want the newest frame at once.
+pub(crate) fn frame_subscriber<S: Service>(
+    service: &FrameService<S>,
+    history: usize,
+) -> Result<FrameSubscriber<S>, ProtocolError> {
+    service
+        .subscriber_builder()
+        .buffer_size(BUFFER)
+        .history_request(history)
+        .create()
+        .map_err(|error| ProtocolError::transport("create a frame subscriber", error))
+}
+
+/// Service of commands of lease `epoch`: one publisher, which is what makes it a lease.
+pub(crate) fn create_commands<S: Service>(
+    node: &Node<S>,
+    epoch: u64,
+) -> Result<CommandService<S>, ProtocolError> {
+    node.service_builder(&service_name(&format!("act/{epoch}"))?)
+        .publish_subscribe::<[u64]>()
+        .user_header::<CommandHeader>()
+        .payload_alignment(alignment())
+        .enable_safe_overflow(true)
+        .subscriber_max_buffer_size(COMMAND_BUFFER)
+        .subscriber_max_borrowed_samples(1)
+        .history_size(0)
+        .max_publishers(1)
+        .max_subscribers(1)
+        .max_nodes(4)
+        .create()
+        .map_err(|error| ProtocolError::transport(format!("create service act/{epoch}"), error))
+}
+
+/// Opens what [`create_commands`] created.
+pub(crate) fn open_commands<S: Service>(
+    node: &Node<S>,
+    epoch: u64,
+) -> Result<CommandService<S>, ProtocolError> {
+    node.service_builder(&service_name(&format!("act/{epoch}"))?)
+        .publish_subscribe::<[u64]>()
+        .user_header::<CommandHeader>()
+        .payload_alignment(alignment())
+        .open()
+        .map_err(|error| ProtocolError::transport(format!("open service act/{epoch}"), error))
+}
+
+/// The end of a service of commands that sends.
+pub(crate) fn command_publisher<S: Service>(
+    service: &CommandService<S>,
+    words: usize,
+) -> Result<CommandPublisher<S>, ProtocolError> {
+    service
+        .publisher_builder()
+        .initial_max_slice_len(words)
+        .max_loaned_samples(LOANS)
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .create()
+        .map_err(|error| ProtocolError::transport("create a command publisher", error))
+}
+
+/// The end of a service of commands that receives.
+pub(crate) fn command_subscriber<S: Service>(
+    service: &CommandService<S>,
+) -> Result<CommandSubscriber<S>, ProtocolError> {
+    service
+        .subscriber_builder()
+        .create()
+        .map_err(|error| ProtocolError::transport("create a command subscriber", error))
+}
+
+/// Creates an event service; `attributes` are the handshake's facts.
+pub(crate) fn create_event<S: Service>(
+    node: &Node<S>,
+    name: &str,
+    attributes: &[(&str, String)],
+) -> Result<event::PortFactory<S>, ProtocolError> {
+    let failed = |error: &dyn std::fmt::Debug| {
+        ProtocolError::transport(format!("create event {name}"), error)
+    };
+    let mut specifier = AttributeSpecifier::new();
+    for (key, value) in attributes {
+        let key = (*key).try_into().map_err(|error| failed(&error))?;
+        let value = value.as_str().try_into().map_err(|error| failed(&error))?;
+        specifier = specifier
+            .define(&key, &value)
+            .map_err(|error| failed(&error))?;
+    }
+    node.service_builder(&service_name(name)?)
+        .event()
+        .max_listeners(CLIENTS_MAX)
+        .max_notifiers(CLIENTS_MAX + 1)
+        .max_nodes(CLIENTS_MAX + 1)
+        .event_id_max_value(1)
+        .create_with_attributes(&specifier)
+        .map_err(|error| failed(&error))
+}
+
+/// Opens what [`create_event`] created.
+pub(crate) fn open_event<S: Service>(
+    node: &Node<S>,
+    name: &str,
+) -> Result<event::PortFactory<S>, ProtocolError> {
+    node.service_builder(&service_name(name)?)
+        .event()
+        .open()
+        .map_err(|error| ProtocolError::transport(format!("open event {name}"), error))
+}
+
+/// An attribute of an event service.
+pub(crate) fn attribute<S: Service>(service: &event::PortFactory<S>, key: &str) -> String {
+    let found = service
+        .attributes()
+        .iter()
+        .find(|attribute| attribute.key().to_string() == key);
+    found.map_or_else(
+        || "absent".to_owned(),
+        |attribute| attribute.value().to_string(),
+    )
+}
+
+/// Creates a listener.
+pub(crate) fn listener<S: Service>(
+    service: &event::PortFactory<S>,
+) -> Result<Listener<S>, ProtocolError> {
+    service
+        .listener_builder()
+        .create()
+        .map_err(|error| ProtocolError::transport("create a listener", error))
+}
+
+/// Creates a notifier.
+pub(crate) fn notifier<S: Service>(
+    service: &event::PortFactory<S>,
+) -> Result<Notifier<S>, ProtocolError> {
+    service
+        .notifier_builder()
+        .create()
+        .map_err(|error| ProtocolError::transport("create a notifier", error))
+}
+
+/// Sleeps until notified or for `timeout`, and drains what was notified. A signal ends it early.
+pub(crate) fn park<S: Service>(
+    listener: &Listener<S>,
+    timeout: Duration,
+) -> Result<(), ProtocolError> {
+    match listener.timed_wait(|_| {}, timeout) {
+        Ok(_) | Err(ListenerWaitError::InterruptSignal) => Ok(()),
+        Err(error) => Err(ProtocolError::transport("wait for an event", error)),
+    }
+}
+
+/// The daemon's end of the control service; `response_max` in bytes.
+pub(crate) fn responder<S: Service>(
+    node: &Node<S>,
+    response_max: usize,
+) -> Result<Responder<S>, ProtocolError> {
+    let failed =
+        |error: &dyn std::fmt::Debug| ProtocolError::transport("create service control", error);
+    let service = node
+        .service_builder(&service_name("control")?)
+        .request_response::<[u8], [u8]>()
+        .max_clients(CLIENTS_MAX)
+        .max_servers(1)
+        .max_nodes(CLIENTS_MAX + 1)
+        .max_active_requests_per_client(1)
+        .max_loaned_requests(1)
+        .max_response_buffer_size(1)
+        .max_borrowed_responses_per_pending_response(1)
+        .enable_fire_and_forget_requests(true)
+        .create()
+        .map_err(|error| failed(&error))?;
+    service
+        .server_builder()
+        .initial_max_slice_len(response_max)
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .create()
+        .map_err(|error| failed(&error))
+}
+
+/// A client's end of the control service.
+pub(crate) fn requester<S: Service>(node: &Node<S>) -> Result<Requester<S>, ProtocolError> {
+    let service = node
+        .service_builder(&service_name("control")?)
+        .request_response::<[u8], [u8]>()
+        .open()
+        .map_err(|error| ProtocolError::transport("open service control", error))?;
+    service
+        .client_builder()
+        .initial_max_slice_len(crate::control::REQUEST_MAX)
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .create()
+        .map_err(|error| ProtocolError::transport("create a control client", error))
+}
