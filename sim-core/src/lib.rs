@@ -1,3 +1,13 @@
-//! Batched rigid-body physics: a description becomes a model, a model becomes worlds that step.
+//! Batched rigid-body physics: URDF becomes a [`model::Description`], that a [`model::Model`], and
+//! that a [`simulation::Simulation`] of many worlds.
+//!
+//! Imports run one way: `lane ← math ← model ← batch ← step ← backend ← simulation`. Start reading
+//! at [`step`], which is one physics step on one screen.
 
+pub mod backend;
+pub mod batch;
+pub mod lane;
+pub mod math;
 pub mod model;
+pub mod simulation;
+pub mod step;

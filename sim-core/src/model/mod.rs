@@ -2,13 +2,22 @@
 //!
 //! `Description` is named, f64 and editable; it is checked, then compiled.
 
+mod compile;
+pub mod constants;
 mod description;
 mod error;
+mod inertia;
+mod inverse_weight;
 mod pose;
+mod robot;
+mod urdf;
+mod validate;
 
+pub use compile::{Model, RobotRange, Start};
 pub use description::{
     Collision, Cone, Description, Inertial, Joint, JointKind, Link, Mimic, Robot, Shape, Solver,
     StaticShape, TargetMode,
 };
 pub use error::ModelError;
 pub use pose::Pose;
+pub use urdf::UrdfOptions;

@@ -1,5 +1,8 @@
 //! Position and orientation of a frame, in f64.
 
+/// How far a quaternion's length may be from 1: figures rounded to two digits, such as 0.7 or 0.71, pass.
+pub(super) const QUAT_SLACK: f64 = 0.02;
+
 /// A frame in its parent's frame: `x_parent = R x + pos`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
@@ -148,16 +151,21 @@ impl Pose {
         self.quat.iter().map(|part| part * part).sum::<f64>().sqrt()
     }
 
-    /// The same pose with a quaternion of length 1; the quaternion must not be zero.
+    /// The same pose with a quaternion of length 1.
+    ///
+    /// One whose length is off by more than [`QUAT_SLACK`] stays as it is: it is no rounding but a slip, which
+    /// `validate` refuses.
     pub fn normalized(&self) -> Pose {
         let length = self.quat_length();
+        let error = (length - 1.0).abs();
         // one that is a unit to the last bit stays as it was written
-        if (length - 1.0).abs() <= f64::EPSILON {
-            return *self;
-        }
-        Pose {
-            pos: self.pos,
-            quat: self.quat.map(|part| part / length),
+        if error > f64::EPSILON && error <= QUAT_SLACK {
+            Pose {
+                pos: self.pos,
+                quat: self.quat.map(|part| part / length),
+            }
+        } else {
+            *self
         }
     }
 }

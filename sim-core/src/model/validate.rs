@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use super::description::{Description, Inertial, Joint, Link, Robot, Shape};
 use super::error::ModelError;
 use super::inertia::{merge, negative_moment, principal_moments, triangle_excess};
-use super::pose::Pose;
+use super::pose::{Pose, QUAT_SLACK};
 
 /// Longest physics step [s]: longer ones are a slip of units.
 const DT_MAX: f64 = 1.0;
@@ -13,8 +13,6 @@ const DT_MAX: f64 = 1.0;
 const SUBSTEPS_MAX: usize = 10_000;
 /// Most iterations of the solver or its line search.
 const ITERATIONS_MAX: usize = 10_000;
-/// How far a quaternion's length may be from 1: rounded figures such as 0.7071 pass.
-const QUAT_SLACK: f64 = 1e-3;
 /// How far an axis' length may be from 1: roundings only, the reader normalises.
 const AXIS_SLACK: f64 = 1e-6;
 /// Smallest mass [kg] and principal moment [kg·m²] of a moving body, MuJoCo's mjMINVAL.

@@ -1,0 +1,293 @@
+//! A run of blocks that one thread works on: their state in lane order, and one workspace.
+
+use super::transfer::{self, Arena};
+use crate::backend::Values;
+use crate::batch::{Block, Field, Layout, status};
+use crate::lane::memory::Cpu as Machine;
+use crate::lane::{Lane, Num, Real};
+use crate::model::Model;
+use crate::model::constants::Constants;
+use crate::step::{FORWARD, STAGES, Stage};
+use std::ops::Range;
+
+/// What all chunks share.
+pub(super) struct Job<R> {
+    pub constants: Constants<R>,
+    pub layout: Layout,
+    /// Stages that evaluate the fields of the layout.
+    pub evaluate: Vec<Stage>,
+    /// Duration of a control frame [s].
+    pub frame_s: f64,
+    /// State and commands of a world after a reset, in the order of [`StateField`].
+    start: Vec<R>,
+}
+
+/// State and commands of a block: `COUNT` groups of one number a dof.
+#[derive(Clone, Copy)]
+enum StateField {
+    Q,
+    Qd,
+    Qdd,
+    F,
+    TargetQ,
+    TargetQd,
+}
+const COUNT: usize = 6;
+
+impl StateField {
+    fn of(field: Field) -> StateField {
+        match field {
+            Field::JointQ => StateField::Q,
+            Field::JointQd => StateField::Qd,
+            Field::JointF => StateField::F,
+            Field::JointTargetQ => StateField::TargetQ,
+            Field::JointTargetQd => StateField::TargetQd,
+            other => unreachable!("`{}` is not written from outside", other.row().name),
+        }
+    }
+}
+
+impl<R: Real> Job<R> {
+    pub fn new(model: &Model, layout: Layout) -> Job<R> {
+        let n = model.dofs();
+        let start = model.start();
+        let mut reset = vec![R::default(); COUNT * n];
+        for j in 0..n {
+            reset[StateField::Q as usize * n + j] = R::of(start.joint_q[j]);
+            reset[StateField::TargetQ as usize * n + j] = R::of(start.joint_target_q[j]);
+            reset[StateField::TargetQd as usize * n + j] = R::of(start.joint_target_qd[j]);
+        }
+        Job {
+            constants: model.constants().cast(),
+            evaluate: stages_for(&layout),
+            layout,
+            frame_s: model.substeps() as f64 * model.dt(),
+            start: reset,
+        }
+    }
+}
+
+/// The leading stages of [`FORWARD`] that the fields need, and the poses where they are asked for.
+fn stages_for(layout: &Layout) -> Vec<Stage> {
+    let mut last = None;
+    let mut poses = false;
+    for slot in &layout.slots {
+        let needs = match slot.field {
+            Field::BodyQ => {
+                poses = true;
+                Stage::Kinematics
+            }
+            Field::BiasForce => Stage::Bias,
+            Field::MassMatrix => Stage::MassMatrix,
+            Field::SmoothForce => Stage::Actuation,
+            Field::EfcJ | Field::EfcD | Field::EfcAref => Stage::Constraint,
+            Field::JointQdd | Field::ConstraintForce | Field::EfcForce => Stage::Solver,
+            _ => continue,
+        };
+        last = last.max(FORWARD.iter().position(|&stage| stage == needs));
+    }
+    let mut stages = FORWARD[..last.map_or(0, |last| last + 1)].to_vec();
+    if poses {
+        stages.push(Stage::Poses);
+    }
+    stages
+}
+
+pub(super) struct Chunk<F: Lane> {
+    worlds: Range<usize>,
+    /// `(blocks, COUNT, dofs, WIDTH)`
+    state: Vec<F::Real>,
+    /// Control frames since the reset of each world.
+    steps: Vec<u64>,
+    status: Vec<u32>,
+    pub block: Block<F, F>,
+    /// Room for one field of one block.
+    pub staging: Vec<F>,
+    /// Room for one register.
+    pub lanes: Vec<F::Real>,
+}
+
+impl<F: Lane> Chunk<F> {
+    pub fn new(job: &Job<F::Real>, worlds: Range<usize>) -> Self {
+        let n = job.constants.dofs.len();
+        let blocks = worlds.len().div_ceil(F::WIDTH);
+        let elements = job.layout.slots.iter().map(|slot| slot.shape[1..].iter().product());
+        let mut chunk = Chunk {
+            state: vec![F::Real::default(); blocks * COUNT * n * F::WIDTH],
+            steps: vec![0; worlds.len()],
+            status: vec![0; worlds.len()],
+            block: Block::new(&job.constants, F::default()),
+            staging: vec![F::default(); elements.max().unwrap_or(0)],
+            lanes: vec![F::Real::default(); F::WIDTH],
+            worlds,
+        };
+        // lanes past the last world run along from the same start
+        for lane in 0..blocks * F::WIDTH {
+            chunk.reset_lane(job, lane);
+        }
+        chunk
+    }
+
+    /// Place of a number of a world (counted from the chunk's first) in `state`.
+    fn place(&self, n: usize, world: usize, field: StateField, dof: usize) -> usize {
+        let (block, lane) = (world / F::WIDTH, world % F::WIDTH);
+        ((block * COUNT + field as usize) * n + dof) * F::WIDTH + lane
+    }
+
+    fn reset_lane(&mut self, job: &Job<F::Real>, world: usize) {
+        let n = job.constants.dofs.len();
+        let first = self.place(n, world, StateField::Q, 0);
+        for (k, &x) in job.start.iter().enumerate() {
+            self.state[first + k * F::WIDTH] = x;
+        }
+    }
+
+    pub fn reset(&mut self, job: &Job<F::Real>, mask: Option<&[bool]>) {
+        for world in 0..self.worlds.len() {
+            if mask.is_none_or(|mask| mask[self.worlds.start + world]) {
+                self.reset_lane(job, world);
+                self.steps[world] = 0;
+                self.status[world] = 0;
+            }
+        }
+    }
+
+    pub fn write(
+        &mut self,
+        job: &Job<F::Real>,
+        field: Field,
+        columns: &Range<usize>,
+        values: Values<'_>,
+        mask: Option<&[bool]>,
+    ) {
+        let n = job.constants.dofs.len();
+        let target = StateField::of(field);
+        let writes_state = matches!(target, StateField::Q | StateField::Qd);
+        for world in 0..self.worlds.len() {
+            let outside = self.worlds.start + world;
+            if mask.is_some_and(|mask| !mask[outside]) {
+                continue;
+            }
+            let row = outside * columns.len();
+            for (k, dof) in columns.clone().enumerate() {
+                let place = self.place(n, world, target, dof);
+                self.state[place] = match values {
+                    Values::F32(v) => F::Real::of(f64::from(v[row + k])),
+                    Values::F64(v) => F::Real::of(v[row + k]),
+                };
+            }
+            if writes_state {
+                for dof in 0..n {
+                    let place = self.place(n, world, StateField::Qdd, dof);
+                    self.state[place] = F::Real::default();
+                }
+            }
+        }
+    }
+
+    /// All substeps and the output of every block.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `F`; the arena holds the job's layout.
+    #[inline(always)]
+    pub unsafe fn run(&mut self, job: &Job<F::Real>, substeps: usize, arena: Arena) {
+        let n = job.constants.dofs.len();
+        let stride = COUNT * n * F::WIDTH;
+        for block in 0..self.worlds.len().div_ceil(F::WIDTH) {
+            let state = block * stride..(block + 1) * stride;
+            self.load(n, state.clone());
+            let mut machine = Machine::<F>::new(&mut []);
+            for pass in 0..=substeps {
+                let evaluates = pass == substeps;
+                if evaluates {
+                    // before the evaluation, which moves the warm start: what is read must not change the run
+                    self.store(n, state.clone());
+                    self.count(block, substeps > 0);
+                }
+                let stages = if evaluates { &job.evaluate[..] } else { &STAGES[..] };
+                for stage in stages {
+                    stage.run(&mut machine, &job.constants, &mut self.block);
+                }
+            }
+            let first = block * F::WIDTH;
+            let worlds = first..(first + F::WIDTH).min(self.worlds.len());
+            for slot in &job.layout.slots {
+                let rows = self.worlds.start + worlds.start..self.worlds.start + worlds.end;
+                // SAFETY: the arena holds the layout, and these worlds are this chunk's alone.
+                unsafe {
+                    match slot.field {
+                        Field::Time => arena.put(slot, rows, |w| {
+                            self.steps[w - self.worlds.start] as f64 * job.frame_s
+                        }),
+                        Field::Step => arena.put(slot, rows, |w| self.steps[w - self.worlds.start]),
+                        Field::Status => arena.put(slot, rows, |w| self.status[w - self.worlds.start]),
+                        _ => transfer::export(self, &job.constants, slot, rows, arena),
+                    }
+                }
+            }
+        }
+    }
+
+    /// State and commands of a block into its workspace.
+    #[inline(always)]
+    fn load(&mut self, n: usize, state: Range<usize>) {
+        let b = &mut self.block;
+        let groups = [
+            &mut b.joint_q,
+            &mut b.joint_qd,
+            &mut b.joint_qdd,
+            &mut b.joint_f,
+            &mut b.joint_target_q,
+            &mut b.joint_target_qd,
+        ];
+        let mut from = self.state[state].chunks_exact(F::WIDTH);
+        for group in groups {
+            for x in group[..n].iter_mut() {
+                *x = F::load(from.next().expect("a register for every number"));
+            }
+        }
+        b.unconverged[0] = F::c(0.0);
+    }
+
+    /// The state of a block out of its workspace; commands did not change.
+    #[inline(always)]
+    fn store(&mut self, n: usize, state: Range<usize>) {
+        let b = &self.block;
+        let mut to = self.state[state].chunks_exact_mut(F::WIDTH);
+        for group in [&b.joint_q, &b.joint_qd, &b.joint_qdd] {
+            for x in &group[..n] {
+                x.store(to.next().expect("a register for every number"));
+            }
+        }
+    }
+
+    /// Counts the frame where there was one, and notes trouble.
+    #[inline(always)]
+    fn count(&mut self, block: usize, stepped: bool) {
+        let (zero, one, infinity) = (F::c(0.0), F::c(1.0), F::c(f64::INFINITY));
+        let mut trouble = zero;
+        for group in [&self.block.joint_q, &self.block.joint_qd] {
+            for x in group {
+                // false for NaN too
+                trouble = F::select(x.abs().lt(infinity), trouble, one);
+            }
+        }
+        let first = block * F::WIDTH;
+        let last = (first + F::WIDTH).min(self.worlds.len());
+        let flags = [(trouble, status::NOT_FINITE), (self.block.unconverged[0], status::NOT_CONVERGED)];
+        for (flag, bit) in flags {
+            if bit == status::NOT_CONVERGED && !stepped {
+                continue;
+            }
+            flag.store(&mut self.lanes);
+            for (status, lane) in self.status[first..last].iter_mut().zip(&self.lanes) {
+                *status = if *lane > F::Real::default() { *status | bit } else { *status & !bit };
+            }
+        }
+        if stepped {
+            for step in &mut self.steps[first..last] {
+                *step += 1;
+            }
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! The CPU: blocks of worlds, one world a SIMD lane, spread over threads. Sole user of rayon.
+//!
+//! A control frame is one pass per block with all substeps in cache; nothing is allocated in it.
+
+mod chunk;
+mod dispatch;
+mod transfer;
+
+pub use dispatch::{available, create};
+
+use super::{Backend, BackendError, Values};
+use crate::batch::{Field, Layout};
+use crate::lane::Lane;
+use crate::model::Model;
+use chunk::{Chunk, Job};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Chunks a thread: enough that a slow block does not leave the others idle.
+const CHUNKS_PER_THREAD: usize = 4;
+
+/// Runs a chunk, compiled for an instruction set.
+type Run<F> = unsafe fn(&mut Chunk<F>, &Job<<F as crate::lane::Num>::Real>, usize, transfer::Arena);
+
+struct Cpu<F: Lane> {
+    chunks: Vec<Chunk<F>>,
+    job: Job<F::Real>,
+    pool: Option<rayon::ThreadPool>,
+    threads: usize,
+    device: String,
+    arena_words: usize,
+    run: Run<F>,
+}
+
+impl<F: Lane> Cpu<F> {
+    fn new(
+        model: &Model,
+        worlds: usize,
+        layout: &Layout,
+        threads: usize,
+        instructions: &str,
+        run: Run<F>,
+    ) -> Result<Self, BackendError> {
+        let blocks = worlds.div_ceil(F::WIDTH);
+        let threads = threads.min(blocks);
+        let parts = if threads == 1 { 1 } else { (threads * CHUNKS_PER_THREAD).min(blocks) };
+        let job = Job::new(model, layout.clone());
+        let chunks = (0..parts)
+            .map(|part| {
+                let first = part * blocks / parts * F::WIDTH;
+                let end = ((part + 1) * blocks / parts * F::WIDTH).min(worlds);
+                Chunk::new(&job, first..end)
+            })
+            .collect();
+        let pool = if threads == 1 {
+            None
+        } else {
+            let builder = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .thread_name(|i| format!("step-{i}"));
+            let failed = |e: rayon::ThreadPoolBuildError| BackendError::Threads {
+                threads,
+                reason: e.to_string(),
+            };
+            Some(builder.build().map_err(failed)?)
+        };
+        let plural = if threads == 1 { "" } else { "s" };
+        Ok(Cpu {
+            chunks,
+            job,
+            pool,
+            threads,
+            device: format!(
+                "cpu ({instructions}, {} world{} a block, {threads} thread{plural})",
+                F::WIDTH,
+                if F::WIDTH == 1 { "" } else { "s" },
+            ),
+            arena_words: layout.bytes / 8,
+            run,
+        })
+    }
+}
+
+impl<F: Lane> Backend for Cpu<F> {
+    fn device(&self) -> &str {
+        &self.device
+    }
+
+    fn threads(&self) -> usize {
+        self.threads
+    }
+
+    fn write(&mut self, field: Field, columns: Range<usize>, values: Values<'_>, mask: Option<&[bool]>) {
+        for chunk in &mut self.chunks {
+            chunk.write(&self.job, field, &columns, values, mask);
+        }
+    }
+
+    fn reset(&mut self, mask: Option<&[bool]>) {
+        for chunk in &mut self.chunks {
+            chunk.reset(&self.job, mask);
+        }
+    }
+
+    fn run(&mut self, substeps: usize, arena: &mut [u64]) {
+        assert!(arena.len() >= self.arena_words, "the arena is smaller than the layout");
+        let arena = transfer::Arena::new(arena);
+        let (run, job) = (self.run, &self.job);
+        // SAFETY: `dispatch` chose `run` for instructions that this processor has; the arena holds the
+        // layout (asserted), outlives the call, and each chunk writes the rows of its own worlds only.
+        match &self.pool {
+            None => self.chunks.iter_mut().for_each(|chunk| unsafe { run(chunk, job, substeps, arena) }),
+            Some(pool) => pool.install(|| {
+                self.chunks.par_iter_mut().for_each(|chunk| {
+                    // SAFETY: as above.
+                    unsafe { run(chunk, job, substeps, arena) }
+                });
+            }),
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Out of a block, into the arena: the one place where lane order becomes world-major.
+
+use super::chunk::Chunk;
+use crate::batch::{Field, Slot};
+use crate::lane::{Lane, Num};
+use crate::math::factor::tri;
+use crate::model::constants::Constants;
+use std::ops::Range;
+
+/// The arena of a frame, shared by the threads that write it.
+#[derive(Clone, Copy)]
+pub struct Arena {
+    base: *mut u8,
+    bytes: usize,
+}
+
+// SAFETY: threads write disjoint rows only (contract of `put` and `export`).
+unsafe impl Send for Arena {}
+// SAFETY: as above.
+unsafe impl Sync for Arena {}
+
+impl Arena {
+    pub fn new(words: &mut [u64]) -> Arena {
+        Arena { base: words.as_mut_ptr().cast(), bytes: size_of_val(words) }
+    }
+
+    /// The elements of a slot that belong to some worlds.
+    ///
+    /// # Safety
+    /// The memory behind the arena lives, and nobody else uses these rows.
+    #[inline(always)]
+    unsafe fn rows<'a, T: Copy>(self, slot: &Slot, worlds: &Range<usize>) -> &'a mut [T] {
+        let elements: usize = slot.shape[1..].iter().product();
+        assert!(size_of::<T>() == slot.dtype.bytes() && worlds.end <= slot.shape[0]);
+        assert!(slot.offset + slot.bytes <= self.bytes);
+        let first = slot.offset + worlds.start * elements * size_of::<T>();
+        // SAFETY: inside the arena (asserted), aligned since offsets are multiples of 64 and the base
+        // of 8; alive and exclusive by contract.
+        unsafe {
+            std::slice::from_raw_parts_mut(self.base.add(first).cast(), worlds.len() * elements)
+        }
+    }
+
+    /// Writes one number a world.
+    ///
+    /// # Safety
+    /// As [`Arena::rows`].
+    #[inline(always)]
+    pub unsafe fn put<T: Copy>(self, slot: &Slot, worlds: Range<usize>, value: impl Fn(usize) -> T) {
+        // SAFETY: by contract.
+        let rows = unsafe { self.rows::<T>(slot, &worlds) };
+        for (x, world) in rows.iter_mut().zip(worlds) {
+            *x = value(world);
+        }
+    }
+}
+
+/// Writes a field of a block, for the worlds of `worlds` (one a lane, from lane 0).
+///
+/// # Safety
+/// As [`Arena::rows`].
+#[inline(always)]
+pub(super) unsafe fn export<F: Lane>(
+    chunk: &mut Chunk<F>,
+    m: &Constants<F::Real>,
+    slot: &Slot,
+    worlds: Range<usize>,
+    arena: Arena,
+) {
+    let n: usize = slot.shape[1..].iter().product();
+    stage(chunk, m, slot.field, n);
+    // SAFETY: by contract.
+    let rows = unsafe { arena.rows::<F::Real>(slot, &worlds) };
+    for (e, x) in chunk.staging[..n].iter().enumerate() {
+        x.store(&mut chunk.lanes);
+        for (world, lane) in chunk.lanes[..worlds.len()].iter().enumerate() {
+            rows[world * n + e] = *lane;
+        }
+    }
+}
+
+/// Gathers a field, one register an element.
+#[inline(always)]
+fn stage<F: Lane>(chunk: &mut Chunk<F>, m: &Constants<F::Real>, field: Field, n: usize) {
+    let (b, w, to) = (&chunk.block, &chunk.block.work, &mut chunk.staging[..n]);
+    match field {
+        Field::JointQ => to.copy_from_slice(&b.joint_q),
+        Field::JointQd => to.copy_from_slice(&b.joint_qd),
+        Field::JointQdd => to.copy_from_slice(&b.joint_qdd),
+        Field::JointF => to.copy_from_slice(&b.joint_f),
+        Field::JointTargetQ => to.copy_from_slice(&b.joint_target_q),
+        Field::JointTargetQd => to.copy_from_slice(&b.joint_target_qd),
+        Field::BodyQ => to.copy_from_slice(w.body_q.as_flattened()),
+        Field::BiasForce => to.copy_from_slice(&w.bias_force),
+        Field::SmoothForce => to.copy_from_slice(&w.smooth_force),
+        Field::ConstraintForce => to.copy_from_slice(&w.constraint_force),
+        Field::EfcD => to.copy_from_slice(&w.efc_weight),
+        Field::EfcAref => to.copy_from_slice(&w.efc_aref),
+        Field::EfcForce => to.copy_from_slice(&w.efc_force),
+        Field::MassMatrix => {
+            let dofs = m.dofs.len();
+            for i in 0..dofs {
+                for j in 0..dofs {
+                    to[i * dofs + j] = w.mass_matrix[tri(i.max(j), i.min(j))];
+                }
+            }
+        }
+        Field::EfcJ => jacobian(m, &w.efc_weight, &w.limit_side, to),
+        Field::Time | Field::Step | Field::Status => unreachable!("counters are not staged"),
+    }
+}
+
+/// The constraint Jacobian in full, `(rows, dofs)`.
+#[inline(always)]
+fn jacobian<F: Num>(m: &Constants<F::Real>, weight: &[F], side: &[F], to: &mut [F]) {
+    let (dofs, zero, one) = (m.dofs.len(), F::c(0.0), F::c(1.0));
+    to.fill(zero);
+    let mut row = 0;
+    for e in &m.equalities {
+        to[row * dofs + e.follower] = one;
+        to[row * dofs + e.leader] = -F::k(e.multiplier);
+        row += 1;
+    }
+    for f in &m.frictions {
+        to[row * dofs + f.dof] = one;
+        row += 1;
+    }
+    for (l, side) in m.limits.iter().zip(side) {
+        to[row * dofs + l.dof] = F::select(zero.lt(weight[row]), *side, zero);
+        row += 1;
+    }
+}

@@ -1,0 +1,96 @@
+//! What can go wrong at the door of a backend.
+
+/// An argument or a machine that does not fit.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BackendError {
+    /// No worlds.
+    #[error("worlds is 0; ask for at least 1")]
+    NoWorlds,
+    /// No threads.
+    #[error("threads is 0; ask for at least 1, or leave it out")]
+    NoThreads,
+    /// More memory than the machine has left.
+    #[error(
+        "{worlds} worlds need {needed_mb} MB of memory and {available_mb} MB are available; ask for fewer worlds or fields"
+    )]
+    Memory {
+        /// Worlds asked for.
+        worlds: usize,
+        /// [MB]
+        needed_mb: u64,
+        /// [MB]
+        available_mb: u64,
+    },
+    /// A block width that this processor does not have.
+    #[error("this processor has no {instructions}, which {lanes} worlds a block need; use lanes = auto")]
+    Lanes {
+        /// Worlds a block.
+        lanes: usize,
+        /// Instruction set.
+        instructions: &'static str,
+    },
+    /// Threads that the system does not start.
+    #[error("cannot start {threads} threads: {reason}; ask for fewer")]
+    Threads {
+        /// Threads asked for.
+        threads: usize,
+        /// What the system says.
+        reason: String,
+    },
+    /// A field of another group.
+    #[error("field `{field}` is not {expected}; use one of: {choices}")]
+    Group {
+        /// The field.
+        field: &'static str,
+        /// What would be.
+        expected: &'static str,
+        /// Fields that are.
+        choices: String,
+    },
+    /// Columns outside of a field.
+    #[error("field `{field}` has {columns} columns; {start}..{end} is outside")]
+    Columns {
+        /// The field.
+        field: &'static str,
+        /// Columns it has.
+        columns: usize,
+        /// First asked for.
+        start: usize,
+        /// One past the last asked for.
+        end: usize,
+    },
+    /// An array of the wrong size.
+    #[error("`{field}` has {got} values; {worlds} worlds × {columns} columns = {expected} are needed")]
+    Length {
+        /// The field.
+        field: &'static str,
+        /// Values given.
+        got: usize,
+        /// Values needed.
+        expected: usize,
+        /// Worlds of the simulation.
+        worlds: usize,
+        /// Columns written.
+        columns: usize,
+    },
+    /// A mask of the wrong size.
+    #[error("the mask has {got} entries; the simulation has {worlds} worlds")]
+    Mask {
+        /// Entries given.
+        got: usize,
+        /// Worlds of the simulation.
+        worlds: usize,
+    },
+    /// NaN or infinity.
+    #[error("`{field}` is {value} in world {world} for `{name}`; nothing was written, send finite numbers")]
+    NotFinite {
+        /// The field.
+        field: &'static str,
+        /// First world concerned.
+        world: usize,
+        /// `robot/joint`.
+        name: String,
+        /// The value.
+        value: f64,
+    },
+}

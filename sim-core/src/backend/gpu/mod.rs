@@ -1,0 +1,1 @@
+//! The GPU: recorded programs (see `lane::record`) as WGSL.

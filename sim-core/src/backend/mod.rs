@@ -1,0 +1,58 @@
+//! Machines that keep worlds: where the text runs, and how fields come and go.
+
+pub mod cpu;
+mod error;
+pub mod gpu;
+
+pub use error::BackendError;
+
+use crate::batch::Field;
+use std::ops::Range;
+
+/// World-major numbers from outside, in either precision.
+#[derive(Clone, Copy, Debug)]
+pub enum Values<'a> {
+    /// Single precision.
+    F32(&'a [f32]),
+    /// Double precision.
+    F64(&'a [f64]),
+}
+
+impl Values<'_> {
+    /// Number of values.
+    pub fn len(&self) -> usize {
+        match self {
+            Values::F32(v) => v.len(),
+            Values::F64(v) => v.len(),
+        }
+    }
+
+    /// No values?
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The first that is not finite.
+    pub fn first_not_finite(&self) -> Option<usize> {
+        match self {
+            Values::F32(v) => v.iter().position(|x| !x.is_finite()),
+            Values::F64(v) => v.iter().position(|x| !x.is_finite()),
+        }
+    }
+}
+
+/// What keeps the worlds. Arguments were checked by [`crate::simulation::Simulation`].
+pub trait Backend: Send {
+    /// What it runs on, for people.
+    fn device(&self) -> &str;
+    /// Threads that a step may use.
+    fn threads(&self) -> usize;
+    /// Sets columns of a state or command field in the worlds of the mask (none = all);
+    /// a written state clears the warm start of its worlds.
+    fn write(&mut self, field: Field, columns: Range<usize>, values: Values<'_>, mask: Option<&[bool]>);
+    /// Back to the start, in the worlds of the mask (none = all).
+    fn reset(&mut self, mask: Option<&[bool]>);
+    /// Runs `substeps` substeps (none = evaluates only), then writes every field of the layout
+    /// into the arena, 8-byte words. No allocation, no error.
+    fn run(&mut self, substeps: usize, arena: &mut [u64]);
+}

@@ -1,0 +1,192 @@
+//! One block of worlds at work: state, commands, and what the stages of a step leave for each other.
+
+use crate::lane::{Num, Real};
+use crate::math::quat::Quat;
+use crate::math::spatial::{Inertia, Spatial};
+use crate::math::vec3::{Mat3, Vec3};
+use crate::model::constants::Constants;
+
+/// Arrays of a block. `F` is a number of every world, `V` a cell that a step may change.
+pub struct Block<F, V> {
+    /// Joint positions. `(coords)` [rad or m]
+    pub joint_q: Vec<V>,
+    /// Joint velocities. `(dofs)` [rad/s or m/s]
+    pub joint_qd: Vec<V>,
+    /// Joint accelerations: the solver's result, and its next start. `(dofs)` [rad/s² or m/s²]
+    pub joint_qdd: Vec<V>,
+    /// 1 where the solver used up its iterations since this was cleared, else 0. `(1)` [–]
+    pub unconverged: Vec<V>,
+    /// Joint torques applied. `(dofs)` [N·m or N]
+    pub joint_f: Vec<F>,
+    /// Position targets. `(dofs)` [rad or m]
+    pub joint_target_q: Vec<F>,
+    /// Velocity targets. `(dofs)` [rad/s or m/s]
+    pub joint_target_qd: Vec<F>,
+    /// What the stages leave for each other.
+    pub work: Workspace<F>,
+}
+
+/// Results and scratch of the stages. Positions and moments are about the robot's base, in world axes.
+pub struct Workspace<F> {
+    /// Rotation of each dof's frame, by columns. `(dofs, 3, 3)` [–]
+    pub rotation: Vec<Mat3<F>>,
+    /// Origin of each dof's frame. `(dofs, 3)` [m]
+    pub origin: Vec<Vec3<F>>,
+    /// Motion axis of each dof at the base, linear then angular. `(dofs, 2, 3)` [–]
+    pub motion: Vec<Spatial<F>>,
+    /// Inertia of each dof's body about the base. `(dofs, 10)` [kg, kg·m, kg·m²]
+    pub inertia: Vec<Inertia<F>>,
+    /// Coriolis, centrifugal and gravity forces. `(dofs)` [N·m or N]
+    pub bias_force: Vec<F>,
+    /// Packed lower triangle, see [`crate::math::factor::tri`]. `(dofs (dofs + 1) / 2)` [kg·m², kg·m or kg]
+    pub mass_matrix: Vec<F>,
+    /// All forces but those of constraints. `(dofs)` [N·m or N]
+    pub smooth_force: Vec<F>,
+    /// Regularised stiffness D = 1/R of each row; 0 where it is not active. `(rows)` [kg·m² or kg]
+    pub efc_weight: Vec<F>,
+    /// Reference acceleration. `(rows)` [rad/s² or m/s²]
+    pub efc_aref: Vec<F>,
+    /// +1 where the lower bound is the nearer, -1 where the upper is. `(limits)` [–]
+    pub limit_side: Vec<F>,
+    /// Force of each row. `(rows)` [N·m or N]
+    pub efc_force: Vec<F>,
+    /// Constraint forces in joint space, Jᵀ f. `(dofs)` [N·m or N]
+    pub constraint_force: Vec<F>,
+    /// Orientation of each dof's frame. `(dofs, 4)` [–]
+    pub orientation: Vec<Quat<F>>,
+    /// Link frames in the world: position, quaternion (x, y, z, w). `(bodies, 7)` [m, –]
+    pub body_q: Vec<[F; 7]>,
+    /// Scratch of a stage: velocity of each body. `(dofs, 2, 3)`
+    pub velocity: Vec<Spatial<F>>,
+    /// Scratch of a stage: acceleration, then force of each body. `(dofs, 2, 3)`
+    pub force: Vec<Spatial<F>>,
+    /// Scratch of a stage: inertia of each subtree. `(dofs, 10)`
+    pub composite: Vec<Inertia<F>>,
+    /// Scratch of a stage: a matrix to factor. Packed as `mass_matrix`.
+    pub hessian: Vec<F>,
+    /// Scratch of a stage. `(4, dofs)`
+    pub vector: [Vec<F>; 4],
+    /// Scratch of a stage. `(2, rows)`
+    pub row: [Vec<F>; 2],
+}
+
+/// An array that stages read or write; the order of a step is checked against these.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Slot {
+    /// [`Block::joint_q`]
+    JointQ,
+    /// [`Block::joint_qd`]
+    JointQd,
+    /// [`Block::joint_qdd`]
+    JointQdd,
+    /// [`Block::unconverged`]
+    Unconverged,
+    /// [`Block::joint_f`]
+    JointF,
+    /// [`Block::joint_target_q`]
+    JointTargetQ,
+    /// [`Block::joint_target_qd`]
+    JointTargetQd,
+    /// [`Workspace::rotation`]
+    Rotation,
+    /// [`Workspace::origin`]
+    Origin,
+    /// [`Workspace::motion`]
+    Motion,
+    /// [`Workspace::inertia`]
+    Inertia,
+    /// [`Workspace::bias_force`]
+    BiasForce,
+    /// [`Workspace::mass_matrix`]
+    MassMatrix,
+    /// [`Workspace::smooth_force`]
+    SmoothForce,
+    /// [`Workspace::efc_weight`]
+    EfcWeight,
+    /// [`Workspace::efc_aref`]
+    EfcAref,
+    /// [`Workspace::limit_side`]
+    LimitSide,
+    /// [`Workspace::efc_force`]
+    EfcForce,
+    /// [`Workspace::constraint_force`]
+    ConstraintForce,
+    /// [`Workspace::body_q`]
+    BodyQ,
+}
+
+/// The numbers of a slot, flat.
+pub enum Numbers<'a, F, V> {
+    /// Cells.
+    Cells(&'a mut [V]),
+    /// Values.
+    Values(&'a mut [F]),
+}
+
+impl<F: Num, V: Copy> Block<F, V> {
+    /// Room for a model; every number 0, every cell a copy of `cell`.
+    pub fn new<R: Real>(m: &Constants<R>, cell: V) -> Self {
+        let (n, rows) = (m.dofs.len(), m.rows());
+        let zero = F::c(0.0);
+        let packed = n * (n + 1) / 2;
+        Block {
+            joint_q: vec![cell; n],
+            joint_qd: vec![cell; n],
+            joint_qdd: vec![cell; n],
+            unconverged: vec![cell; 1],
+            joint_f: vec![zero; n],
+            joint_target_q: vec![zero; n],
+            joint_target_qd: vec![zero; n],
+            work: Workspace {
+                rotation: vec![[[zero; 3]; 3]; n],
+                origin: vec![[zero; 3]; n],
+                motion: vec![[[zero; 3]; 2]; n],
+                inertia: vec![[zero; 10]; n],
+                bias_force: vec![zero; n],
+                mass_matrix: vec![zero; packed],
+                smooth_force: vec![zero; n],
+                efc_weight: vec![zero; rows],
+                efc_aref: vec![zero; rows],
+                limit_side: vec![zero; m.limits.len()],
+                efc_force: vec![zero; rows],
+                constraint_force: vec![zero; n],
+                orientation: vec![[zero; 4]; n],
+                body_q: vec![[zero; 7]; m.frames.len()],
+                velocity: vec![[[zero; 3]; 2]; n],
+                force: vec![[[zero; 3]; 2]; n],
+                composite: vec![[zero; 10]; n],
+                hessian: vec![zero; packed],
+                vector: [vec![zero; n], vec![zero; n], vec![zero; n], vec![zero; n]],
+                row: [vec![zero; rows], vec![zero; rows]],
+            },
+        }
+    }
+
+    /// The numbers of a slot.
+    pub fn numbers(&mut self, slot: Slot) -> Numbers<'_, F, V> {
+        use Numbers::{Cells, Values};
+        let w = &mut self.work;
+        match slot {
+            Slot::JointQ => Cells(&mut self.joint_q),
+            Slot::JointQd => Cells(&mut self.joint_qd),
+            Slot::JointQdd => Cells(&mut self.joint_qdd),
+            Slot::Unconverged => Cells(&mut self.unconverged),
+            Slot::JointF => Values(&mut self.joint_f),
+            Slot::JointTargetQ => Values(&mut self.joint_target_q),
+            Slot::JointTargetQd => Values(&mut self.joint_target_qd),
+            Slot::Rotation => Values(w.rotation.as_flattened_mut().as_flattened_mut()),
+            Slot::Origin => Values(w.origin.as_flattened_mut()),
+            Slot::Motion => Values(w.motion.as_flattened_mut().as_flattened_mut()),
+            Slot::Inertia => Values(w.inertia.as_flattened_mut()),
+            Slot::BiasForce => Values(&mut w.bias_force),
+            Slot::MassMatrix => Values(&mut w.mass_matrix),
+            Slot::SmoothForce => Values(&mut w.smooth_force),
+            Slot::EfcWeight => Values(&mut w.efc_weight),
+            Slot::EfcAref => Values(&mut w.efc_aref),
+            Slot::LimitSide => Values(&mut w.limit_side),
+            Slot::EfcForce => Values(&mut w.efc_force),
+            Slot::ConstraintForce => Values(&mut w.constraint_force),
+            Slot::BodyQ => Values(w.body_q.as_flattened_mut()),
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! THE table of fields: what can be written, stepped and read, with name, shape and unit.
+
+use crate::model::Model;
+
+/// Element type of an array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Dtype {
+    /// 32-bit float.
+    F32,
+    /// 64-bit float.
+    F64,
+    /// Signed 32-bit integer.
+    I32,
+    /// Unsigned 32-bit integer.
+    U32,
+    /// Unsigned 64-bit integer.
+    U64,
+    /// Byte.
+    U8,
+}
+
+impl Dtype {
+    /// Size of an element [bytes].
+    pub const fn bytes(self) -> usize {
+        match self {
+            Dtype::U8 => 1,
+            Dtype::F32 | Dtype::I32 | Dtype::U32 => 4,
+            Dtype::F64 | Dtype::U64 => 8,
+        }
+    }
+}
+
+/// Element type of a field: fixed, or the precision of the run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FieldDtype {
+    /// f32 or f64, as the run is.
+    Real,
+    /// Fixed.
+    Fixed(Dtype),
+}
+
+/// Who may write a field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    /// What resumes a world; `write` sets it.
+    State,
+    /// Held over a control frame; `step` sets it.
+    Command,
+    /// Evaluated at the state of the frame.
+    Derived,
+    /// Kept by the simulation itself; part of every frame.
+    Counter,
+}
+
+/// A dimension after `worlds`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// Degrees of freedom.
+    Dofs,
+    /// Position coordinates.
+    Coords,
+    /// Links.
+    Bodies,
+    /// Constraint rows.
+    Rows,
+    /// A fixed number.
+    Size(usize),
+}
+
+impl Axis {
+    /// Its length for a model.
+    pub fn len(self, model: &Model) -> usize {
+        match self {
+            Axis::Dofs => model.dofs(),
+            Axis::Coords => model.coords(),
+            Axis::Bodies => model.bodies(),
+            Axis::Rows => model.rows(),
+            Axis::Size(n) => n,
+        }
+    }
+
+    /// Its name in documents.
+    pub fn name(self) -> String {
+        match self {
+            Axis::Dofs => "dofs".into(),
+            Axis::Coords => "coords".into(),
+            Axis::Bodies => "bodies".into(),
+            Axis::Rows => "rows".into(),
+            Axis::Size(n) => n.to_string(),
+        }
+    }
+}
+
+/// One row of the table.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldRow {
+    /// The field.
+    pub field: Field,
+    /// Its name for clients.
+    pub name: &'static str,
+    /// Who may write it.
+    pub group: Group,
+    /// Dimensions after `worlds`.
+    pub shape: &'static [Axis],
+    /// Unit; `–` for none.
+    pub unit: &'static str,
+    /// Element type.
+    pub dtype: FieldDtype,
+    /// What it is.
+    pub doc: &'static str,
+}
+
+macro_rules! fields {
+    ($($field:ident $name:literal $group:ident [$($axis:expr),*] $unit:literal $dtype:expr, $doc:literal;)*) => {
+        /// A field of every world.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum Field {
+            $(#[doc = $doc] $field,)*
+        }
+
+        impl Field {
+            /// All rows, in order.
+            pub const ALL: &'static [Field] = &[$(Field::$field),*];
+
+            /// Its row of the table.
+            pub fn row(self) -> &'static FieldRow {
+                use Axis::*;
+                match self {
+                    $(Field::$field => {
+                        const ROW: FieldRow = FieldRow {
+                            field: Field::$field,
+                            name: $name,
+                            group: Group::$group,
+                            shape: &[$($axis),*],
+                            unit: $unit,
+                            dtype: $dtype,
+                            doc: $doc,
+                        };
+                        &ROW
+                    })*
+                }
+            }
+        }
+    };
+}
+
+const REAL: FieldDtype = FieldDtype::Real;
+const F64: FieldDtype = FieldDtype::Fixed(Dtype::F64);
+const U64: FieldDtype = FieldDtype::Fixed(Dtype::U64);
+const U32: FieldDtype = FieldDtype::Fixed(Dtype::U32);
+
+fields! {
+    JointQ "joint_q" State [Coords] "rad or m" REAL, "Joint positions.";
+    JointQd "joint_qd" State [Dofs] "rad/s or m/s" REAL, "Joint velocities.";
+    JointQdd "joint_qdd" Derived [Dofs] "rad/s² or m/s²" REAL, "Joint accelerations under the commands held, constraints included.";
+    JointF "joint_f" Command [Dofs] "N·m or N" REAL, "Joint torques applied, not clamped by the effort limit.";
+    JointTargetQ "joint_target_q" Command [Dofs] "rad or m" REAL, "Position targets of the drives.";
+    JointTargetQd "joint_target_qd" Command [Dofs] "rad/s or m/s" REAL, "Velocity targets of the drives.";
+    BodyQ "body_q" Derived [Bodies, Size(7)] "m, –" REAL, "Link frames in the world: position, then quaternion (x, y, z, w).";
+    MassMatrix "mass_matrix" Derived [Dofs, Dofs] "kg·m², kg·m or kg" REAL, "Joint-space inertia, armature included.";
+    BiasForce "bias_force" Derived [Dofs] "N·m or N" REAL, "Coriolis, centrifugal and gravity forces: what holds the joints at zero acceleration.";
+    SmoothForce "smooth_force" Derived [Dofs] "N·m or N" REAL, "Applied, drive and damping forces less the bias: all but constraint forces.";
+    ConstraintForce "constraint_force" Derived [Dofs] "N·m or N" REAL, "Constraint forces in joint space, Jᵀ f.";
+    EfcJ "efc_J" Derived [Rows, Dofs] "–" REAL, "Constraint Jacobian: equalities, frictions, limits; zero in a row that is not active.";
+    EfcD "efc_D" Derived [Rows] "kg·m² or kg" REAL, "Regularised stiffness of a constraint row, 1/R; zero in a row that is not active.";
+    EfcAref "efc_aref" Derived [Rows] "rad/s² or m/s²" REAL, "Reference acceleration of a constraint row.";
+    EfcForce "efc_force" Derived [Rows] "N·m or N" REAL, "Force of a constraint row.";
+    Time "time" Counter [] "s" F64, "Simulated time since the world's reset.";
+    Step "step" Counter [] "–" U64, "Control frames since the world's reset.";
+    Status "status" Counter [] "–" U32, "Trouble of the world, as bits; 0 = none.";
+}
+
+impl Field {
+    /// The field of this name.
+    pub fn named(name: &str) -> Option<Field> {
+        Field::ALL.iter().copied().find(|field| field.row().name == name)
+    }
+
+    /// Elements per world.
+    pub fn elements(self, model: &Model) -> usize {
+        self.row().shape.iter().map(|axis| axis.len(model)).product()
+    }
+}

@@ -1,0 +1,315 @@
+//! The machine that the one text of physics is written for.
+//!
+//! Equations are plain functions over [`Num`], one value per world. What needs control flow or
+//! scratch memory takes a machine [`Cx`] and the macros [`each!`], [`times!`], [`push!`], [`when!`]
+//! and [`break_if!`]. Three machines run the same text: [`scalar`] numbers (`f64`, the reference,
+//! and `f32`), [`simd`] registers with one world a lane, and [`record`], which turns it into WGSL.
+//!
+//! A run-time `if` on a world's value does not type-check: select with [`Num::select`], or open a
+//! block with [`when!`]. Loops over the tree and branches on model constants are native Rust.
+
+pub mod memory;
+pub mod record;
+pub mod scalar;
+pub mod simd;
+
+use std::ops::{Add, Mul, Neg, Sub};
+
+/// The precision in which constants of the model are kept: `f32` or `f64`.
+pub trait Real: Copy + Default + PartialOrd + Send + Sync + std::fmt::Debug + 'static {
+    /// Distance from 1 to the next larger number.
+    const EPSILON: f64;
+    /// True for `f64`.
+    const DOUBLE: bool;
+    /// Rounds a double to this precision.
+    fn of(x: f64) -> Self;
+    /// Widens to a double.
+    fn to_f64(self) -> f64;
+}
+
+impl Real for f32 {
+    const EPSILON: f64 = f32::EPSILON as f64;
+    const DOUBLE: bool = false;
+    #[inline(always)]
+    fn of(x: f64) -> f32 {
+        x as f32
+    }
+    #[inline(always)]
+    fn to_f64(self) -> f64 {
+        f64::from(self)
+    }
+}
+
+impl Real for f64 {
+    const EPSILON: f64 = f64::EPSILON;
+    const DOUBLE: bool = true;
+    #[inline(always)]
+    fn of(x: f64) -> f64 {
+        x
+    }
+    #[inline(always)]
+    fn to_f64(self) -> f64 {
+        self
+    }
+}
+
+/// A number of every world of a block: what the equations are written in.
+///
+/// All operations are correctly rounded (IEEE 754) on the CPU, `fma` included, so that a world's
+/// result does not depend on the width of the block it runs in.
+pub trait Num:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+{
+    /// Precision of constants.
+    type Real: Real;
+    /// A truth value of every world.
+    type Mask: Copy;
+
+    /// The same constant in every world.
+    fn k(x: Self::Real) -> Self;
+    /// The same constant in every world, rounded from a double.
+    #[inline(always)]
+    fn c(x: f64) -> Self {
+        Self::k(Self::Real::of(x))
+    }
+    /// `self * b + c`, rounded once.
+    fn fma(self, b: Self, c: Self) -> Self;
+    /// `c - self * b`, rounded once.
+    fn fnma(self, b: Self, c: Self) -> Self;
+    /// `self / b`.
+    fn div(self, b: Self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// The smaller; `b` where either is not a number.
+    fn min(self, b: Self) -> Self;
+    /// The larger; `b` where either is not a number.
+    fn max(self, b: Self) -> Self;
+    /// Absolute value.
+    fn abs(self) -> Self;
+    /// Nearest integer, ties to even.
+    fn round(self) -> Self;
+    /// `self < b`, false where either is not a number.
+    fn lt(self, b: Self) -> Self::Mask;
+    /// `a` where the mask holds, else `b`.
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+    /// Both hold.
+    fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Either holds.
+    fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Does not hold.
+    fn not(a: Self::Mask) -> Self::Mask;
+
+    /// Sine and cosine, by the project's own polynomials: the same on every machine.
+    ///
+    /// Reduction to [-π/4, π/4] by three parts of π/2 (Cody and Waite 1980), then the Taylor
+    /// polynomials, cut where the remainder is below an eighth of an ulp.
+    /// Good to about an ulp while |self| < 10⁴ in `f32`, 10⁸ in `f64`.
+    #[inline(always)]
+    fn sincos(self) -> (Self, Self) {
+        let n = (self * Self::c(std::f64::consts::FRAC_2_PI)).round();
+        let mut r = self;
+        for part in half_pi_parts::<Self::Real>() {
+            r = n.fnma(Self::c(part), r);
+        }
+        let r2 = r * r;
+        let (mut s, mut c) = (Self::c(0.0), Self::c(0.0));
+        let terms = if Self::Real::DOUBLE { 8 } else { 5 };
+        for i in (1..=terms).rev() {
+            s = s.fma(r2, Self::c(INVERSE_FACTORIAL[2 * i + 1] * sign(i)));
+            c = c.fma(r2, Self::c(INVERSE_FACTORIAL[2 * i] * sign(i)));
+        }
+        let s = (r * r2).fma(s, r);
+        let c = r2.fma(c, Self::c(1.0));
+        // n mod 4 = swap + 2 half, by arithmetic that every machine has
+        let quadrant = Self::c(4.0).fnma(n.fma(Self::c(0.25), Self::c(-0.375)).round(), n);
+        let half = quadrant.fma(Self::c(0.5), Self::c(-0.25)).round();
+        let swap = Self::c(2.0).fnma(half, quadrant);
+        let swapped = Self::c(0.5).lt(swap);
+        let sign_sin = Self::c(2.0).fnma(half, Self::c(1.0));
+        let sign_cos = sign_sin * Self::c(2.0).fnma(swap, Self::c(1.0));
+        (
+            Self::select(swapped, c, s) * sign_sin,
+            Self::select(swapped, s, c) * sign_cos,
+        )
+    }
+}
+
+#[inline(always)]
+fn sign(i: usize) -> f64 {
+    if i % 2 == 0 { 1.0 } else { -1.0 }
+}
+
+/// π/2 as a sum of numbers of the given precision, largest first.
+#[inline(always)]
+fn half_pi_parts<R: Real>() -> [f64; 3] {
+    if R::DOUBLE {
+        [
+            std::f64::consts::FRAC_PI_2,
+            6.123_233_995_736_766e-17,
+            -1.497_384_904_859_169_8e-33,
+        ]
+    } else {
+        [
+            1.570_796_370_506_286_6,
+            -4.371_139_000_186_243e-8,
+            -1.715_124_510_005_537_6e-15,
+        ]
+    }
+}
+
+/// 1/k! for k = 0..=17.
+const INVERSE_FACTORIAL: [f64; 18] = {
+    let mut t = [1.0; 18];
+    let mut factorial = 1.0;
+    let mut k = 1;
+    while k < 18 {
+        factorial *= k as f64;
+        t[k] = 1.0 / factorial;
+        k += 1;
+    }
+    t
+};
+
+/// A number that the CPU can load, store and look into: one register of worlds.
+pub trait Lane: Num + Default + Send + Sync + 'static {
+    /// Worlds in a register.
+    const WIDTH: usize;
+    /// Reads `WIDTH` neighbouring values.
+    fn load(from: &[Self::Real]) -> Self;
+    /// Writes `WIDTH` neighbouring values.
+    fn store(self, to: &mut [Self::Real]);
+    /// The mask that holds in every world.
+    fn all() -> Self::Mask;
+    /// Does the mask hold in any world?
+    fn any(mask: Self::Mask) -> bool;
+}
+
+/// A table of rows in scratch memory: `rows` rows of `stride` numbers, one value per world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Table {
+    /// First number of row 0.
+    pub base: usize,
+    /// Numbers in a row.
+    pub stride: usize,
+    /// Rows that fit.
+    pub rows: usize,
+}
+
+/// The machine: variables, scratch rows, and control flow in which every world stops by itself.
+///
+/// A stop is sticky: a world that has left a loop does not change because its neighbours go on.
+pub trait Cx: Sized {
+    /// One number per world.
+    type F: Num;
+    /// A mutable cell, for what changes inside a block or from one round of a loop to the next.
+    type V: Copy;
+    /// A row or loop index, the same in all worlds.
+    type I: Copy;
+    /// A fresh row of a list, a different one in each world.
+    type Row: Copy;
+    /// An open loop.
+    type Loop;
+    /// An open block.
+    type Block;
+    /// A list of rows whose length is known at run time and differs per world.
+    type List;
+
+    /// A new variable.
+    fn var(&mut self, x: Self::F) -> Self::V;
+    /// Its present value.
+    fn get(&self, v: &Self::V) -> Self::F;
+    /// Assigns in the active worlds only.
+    fn set(&mut self, v: &mut Self::V, x: Self::F);
+
+    /// A constant index.
+    fn at(&self, i: usize) -> Self::I;
+    /// Reads number `k` of a row.
+    fn load(&mut self, t: Table, row: Self::I, k: usize) -> Self::F;
+    /// Writes number `k` of a row, in the active worlds only.
+    fn store(&mut self, t: Table, row: Self::I, k: usize, x: Self::F);
+    /// Writes number `k` of a row; what inactive worlds hold there becomes undefined.
+    fn fill(&mut self, t: Table, row: Self::I, k: usize, x: Self::F);
+    /// First write to number `k` of a fresh row.
+    fn init(&mut self, t: Table, row: Self::Row, k: usize, x: Self::F);
+
+    /// An empty list of at most `capacity` rows; what does not fit is counted, not stored.
+    fn list(&mut self, capacity: usize) -> Self::List;
+    /// Opens a block for the worlds in `mask`, with a fresh row; see [`push!`].
+    fn push(&mut self, list: &mut Self::List, mask: MaskOf<Self>) -> (Self::Block, Option<Self::Row>);
+    /// Rows that were pushed, those that did not fit included.
+    fn pushed(&mut self, list: &Self::List) -> Self::F;
+    /// Opens a block for the worlds in `mask`; false if there are none. See [`when!`].
+    fn enter(&mut self, mask: MaskOf<Self>) -> (Self::Block, bool);
+    /// Closes a block.
+    fn leave(&mut self, block: Self::Block);
+
+    /// Opens a loop over the rows of a list; see [`each!`].
+    fn rows(&mut self, list: &Self::List) -> Self::Loop;
+    /// Opens a loop of at most `n` rounds; see [`times!`].
+    fn times(&mut self, n: usize) -> Self::Loop;
+    /// Enters the next round, or closes the loop.
+    fn next(&mut self, l: &mut Self::Loop) -> Option<Self::I>;
+    /// Ends the loop for the worlds in `mask`; true if none is left. See [`break_if!`].
+    fn stop(&mut self, mask: MaskOf<Self>) -> bool;
+}
+
+/// The mask of a machine's numbers.
+pub type MaskOf<C> = <<C as Cx>::F as Num>::Mask;
+
+/// `each!(cx, row in list, { … })`: the body for every row of the list.
+#[macro_export]
+macro_rules! each {
+    ($cx:ident, $row:ident in $list:expr, $body:block) => {{
+        let mut rows = $crate::lane::Cx::rows($cx, &$list);
+        while let Some($row) = $crate::lane::Cx::next($cx, &mut rows) $body
+    }};
+}
+
+/// `times!(cx, n, { … })`: at most `n` rounds; see [`break_if!`].
+#[macro_export]
+macro_rules! times {
+    ($cx:ident, $n:expr, $body:block) => {{
+        let mut rounds = $crate::lane::Cx::times($cx, $n);
+        while let Some(_) = $crate::lane::Cx::next($cx, &mut rounds) $body
+    }};
+}
+
+/// `push!(cx, list, mask, row, { … })`: a fresh row in the worlds of the mask, filled by the body.
+#[macro_export]
+macro_rules! push {
+    ($cx:ident, $list:expr, $mask:expr, $row:ident, $body:block) => {{
+        let (block, row) = $crate::lane::Cx::push($cx, &mut $list, $mask);
+        if let Some($row) = row $body
+        $crate::lane::Cx::leave($cx, block);
+    }};
+}
+
+/// `when!(cx, mask, { … })`: the body in the worlds of the mask.
+#[macro_export]
+macro_rules! when {
+    ($cx:ident, $mask:expr, $body:block) => {{
+        let (block, any) = $crate::lane::Cx::enter($cx, $mask);
+        if any $body
+        $crate::lane::Cx::leave($cx, block);
+    }};
+}
+
+/// `break_if!(cx, mask)`: ends the loop for the worlds of the mask. Only at the level of a loop
+/// body, not inside a [`when!`].
+#[macro_export]
+macro_rules! break_if {
+    ($cx:ident, $mask:expr) => {
+        // `continue` reaches `next`, which closes the loop
+        if $crate::lane::Cx::stop($cx, $mask) {
+            continue;
+        }
+    };
+}
+
+/// New variables from values.
+#[inline(always)]
+pub fn set_all<C: Cx>(cx: &mut C, to: &mut [C::V], from: &[C::F]) {
+    for (v, x) in to.iter_mut().zip(from) {
+        cx.set(v, *x);
+    }
+}

@@ -1,0 +1,92 @@
+//! One world at a time: `f64`, the reference, and `f32`, bitwise equal to a SIMD lane.
+
+use super::{Lane, Num};
+
+macro_rules! scalar {
+    ($real:ident) => {
+        impl Num for $real {
+            type Real = $real;
+            type Mask = bool;
+            #[inline(always)]
+            fn k(x: $real) -> Self {
+                x
+            }
+            #[inline(always)]
+            fn fma(self, b: Self, c: Self) -> Self {
+                self.mul_add(b, c)
+            }
+            #[inline(always)]
+            fn fnma(self, b: Self, c: Self) -> Self {
+                (-self).mul_add(b, c)
+            }
+            #[inline(always)]
+            fn div(self, b: Self) -> Self {
+                self / b
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                <$real>::sqrt(self)
+            }
+            // not `f32::min`: that one returns the number where the other is not one, and x86 does not
+            #[inline(always)]
+            fn min(self, b: Self) -> Self {
+                if self < b { self } else { b }
+            }
+            #[inline(always)]
+            fn max(self, b: Self) -> Self {
+                if self > b { self } else { b }
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                <$real>::abs(self)
+            }
+            #[inline(always)]
+            fn round(self) -> Self {
+                self.round_ties_even()
+            }
+            #[inline(always)]
+            fn lt(self, b: Self) -> bool {
+                self < b
+            }
+            #[inline(always)]
+            fn select(mask: bool, a: Self, b: Self) -> Self {
+                if mask { a } else { b }
+            }
+            #[inline(always)]
+            fn and(a: bool, b: bool) -> bool {
+                a & b
+            }
+            #[inline(always)]
+            fn or(a: bool, b: bool) -> bool {
+                a | b
+            }
+            #[inline(always)]
+            fn not(a: bool) -> bool {
+                !a
+            }
+        }
+
+        impl Lane for $real {
+            const WIDTH: usize = 1;
+            #[inline(always)]
+            fn load(from: &[$real]) -> Self {
+                from[0]
+            }
+            #[inline(always)]
+            fn store(self, to: &mut [$real]) {
+                to[0] = self;
+            }
+            #[inline(always)]
+            fn all() -> bool {
+                true
+            }
+            #[inline(always)]
+            fn any(mask: bool) -> bool {
+                mask
+            }
+        }
+    };
+}
+
+scalar!(f32);
+scalar!(f64);

@@ -1,0 +1,236 @@
+//! One world a lane of an x86 register: [`F32x8`] (AVX2) and [`F32x16`] (AVX-512).
+//!
+//! SAFETY of every intrinsic here: the types are used only below a function that enables their
+//! target features (`backend/cpu/dispatch.rs`), after the machine was asked whether it has them;
+//! everything above is `#[inline(always)]`, so that it inherits the features.
+#![cfg(target_arch = "x86_64")]
+#![allow(clippy::undocumented_unsafe_blocks)] // one proof serves all blocks: the module's text
+
+use super::{Lane, Num};
+use std::arch::x86_64::*;
+use std::ops::{Add, Mul, Neg, Sub};
+
+/// Implements [`Num`] and [`Lane`] for a register type.
+/// The bracketed names are intrinsics or the functions below that make up for missing ones.
+macro_rules! register {
+    ($(#[$doc:meta])* $name:ident($reg:ty), width $width:literal, mask $mask:ty,
+     arithmetic [$add:ident $sub:ident $mul:ident $div:ident $fma:ident $fnma:ident $sqrt:ident $min:ident $max:ident],
+     memory [$splat:ident $load:ident $store:ident],
+     bits [$neg:ident $abs:ident $round:ident $lt:ident $select:ident],
+     masks [$and:ident $or:ident $not:ident $any:ident $all:ident]) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug)]
+        #[repr(transparent)]
+        pub struct $name($reg);
+
+        impl Default for $name {
+            #[inline(always)]
+            fn default() -> Self {
+                Self(unsafe { $splat(0.0) })
+            }
+        }
+        impl Add for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn add(self, b: Self) -> Self {
+                Self(unsafe { $add(self.0, b.0) })
+            }
+        }
+        impl Sub for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(self, b: Self) -> Self {
+                Self(unsafe { $sub(self.0, b.0) })
+            }
+        }
+        impl Mul for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(self, b: Self) -> Self {
+                Self(unsafe { $mul(self.0, b.0) })
+            }
+        }
+        impl Neg for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                Self(unsafe { $neg(self.0) })
+            }
+        }
+
+        impl Num for $name {
+            type Real = f32;
+            type Mask = $mask;
+            #[inline(always)]
+            fn k(x: f32) -> Self {
+                Self(unsafe { $splat(x) })
+            }
+            #[inline(always)]
+            fn fma(self, b: Self, c: Self) -> Self {
+                Self(unsafe { $fma(self.0, b.0, c.0) })
+            }
+            #[inline(always)]
+            fn fnma(self, b: Self, c: Self) -> Self {
+                Self(unsafe { $fnma(self.0, b.0, c.0) })
+            }
+            #[inline(always)]
+            fn div(self, b: Self) -> Self {
+                Self(unsafe { $div(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                Self(unsafe { $sqrt(self.0) })
+            }
+            #[inline(always)]
+            fn min(self, b: Self) -> Self {
+                Self(unsafe { $min(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn max(self, b: Self) -> Self {
+                Self(unsafe { $max(self.0, b.0) })
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                Self(unsafe { $abs(self.0) })
+            }
+            #[inline(always)]
+            fn round(self) -> Self {
+                Self(unsafe { $round(self.0) })
+            }
+            #[inline(always)]
+            fn lt(self, b: Self) -> $mask {
+                unsafe { $lt(self.0, b.0) }
+            }
+            #[inline(always)]
+            fn select(mask: $mask, a: Self, b: Self) -> Self {
+                Self(unsafe { $select(mask, a.0, b.0) })
+            }
+            #[inline(always)]
+            fn and(a: $mask, b: $mask) -> $mask {
+                unsafe { $and(a, b) }
+            }
+            #[inline(always)]
+            fn or(a: $mask, b: $mask) -> $mask {
+                unsafe { $or(a, b) }
+            }
+            #[inline(always)]
+            fn not(a: $mask) -> $mask {
+                unsafe { $not(a) }
+            }
+        }
+
+        impl Lane for $name {
+            const WIDTH: usize = $width;
+            #[inline(always)]
+            fn load(from: &[f32]) -> Self {
+                assert!(from.len() >= $width);
+                // the slice holds a register (asserted); the load may be unaligned
+                Self(unsafe { $load(from.as_ptr()) })
+            }
+            #[inline(always)]
+            fn store(self, to: &mut [f32]) {
+                assert!(to.len() >= $width);
+                // the slice holds a register (asserted); the store may be unaligned
+                unsafe { $store(to.as_mut_ptr(), self.0) }
+            }
+            #[inline(always)]
+            fn all() -> $mask {
+                unsafe { $all() }
+            }
+            #[inline(always)]
+            fn any(mask: $mask) -> bool {
+                unsafe { $any(mask) }
+            }
+        }
+    };
+}
+
+register!(
+    /// Eight worlds in an AVX2 register.
+    F32x8(__m256), width 8, mask __m256,
+    arithmetic [_mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_fmadd_ps _mm256_fnmadd_ps
+        _mm256_sqrt_ps _mm256_min_ps _mm256_max_ps],
+    memory [_mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps],
+    bits [neg8 abs8 round8 lt8 select8],
+    masks [_mm256_and_ps _mm256_or_ps not8 any8 all8]
+);
+
+register!(
+    /// Sixteen worlds in an AVX-512 register.
+    F32x16(__m512), width 16, mask __mmask16,
+    arithmetic [_mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_fmadd_ps _mm512_fnmadd_ps
+        _mm512_sqrt_ps _mm512_min_ps _mm512_max_ps],
+    memory [_mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps],
+    bits [neg16 _mm512_abs_ps round16 lt16 select16],
+    masks [and16 or16 not16 any16 all16]
+);
+
+#[inline(always)]
+unsafe fn neg8(a: __m256) -> __m256 {
+    unsafe { _mm256_xor_ps(a, _mm256_set1_ps(-0.0)) }
+}
+#[inline(always)]
+unsafe fn abs8(a: __m256) -> __m256 {
+    unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), a) }
+}
+#[inline(always)]
+unsafe fn round8(a: __m256) -> __m256 {
+    unsafe { _mm256_round_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(a) }
+}
+#[inline(always)]
+unsafe fn lt8(a: __m256, b: __m256) -> __m256 {
+    unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(a, b) }
+}
+#[inline(always)]
+unsafe fn select8(mask: __m256, a: __m256, b: __m256) -> __m256 {
+    unsafe { _mm256_blendv_ps(b, a, mask) }
+}
+#[inline(always)]
+unsafe fn all8() -> __m256 {
+    unsafe { _mm256_castsi256_ps(_mm256_set1_epi32(-1)) }
+}
+#[inline(always)]
+unsafe fn not8(a: __m256) -> __m256 {
+    unsafe { _mm256_xor_ps(a, all8()) }
+}
+#[inline(always)]
+unsafe fn any8(a: __m256) -> bool {
+    unsafe { _mm256_movemask_ps(a) != 0 }
+}
+
+#[inline(always)]
+unsafe fn neg16(a: __m512) -> __m512 {
+    unsafe { _mm512_xor_ps(a, _mm512_set1_ps(-0.0)) }
+}
+#[inline(always)]
+unsafe fn round16(a: __m512) -> __m512 {
+    unsafe { _mm512_roundscale_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(a) }
+}
+#[inline(always)]
+unsafe fn lt16(a: __m512, b: __m512) -> __mmask16 {
+    unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b) }
+}
+#[inline(always)]
+unsafe fn select16(mask: __mmask16, a: __m512, b: __m512) -> __m512 {
+    unsafe { _mm512_mask_blend_ps(mask, b, a) }
+}
+#[inline(always)]
+unsafe fn and16(a: __mmask16, b: __mmask16) -> __mmask16 {
+    a & b
+}
+#[inline(always)]
+unsafe fn or16(a: __mmask16, b: __mmask16) -> __mmask16 {
+    a | b
+}
+#[inline(always)]
+unsafe fn not16(a: __mmask16) -> __mmask16 {
+    !a
+}
+#[inline(always)]
+unsafe fn any16(a: __mmask16) -> bool {
+    a != 0
+}
+#[inline(always)]
+unsafe fn all16() -> __mmask16 {
+    0xffff
+}

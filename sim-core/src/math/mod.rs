@@ -1,0 +1,6 @@
+//! Small algebra, written once for every machine: vectors, rotations, spatial inertia, factors.
+
+pub mod factor;
+pub mod quat;
+pub mod spatial;
+pub mod vec3;

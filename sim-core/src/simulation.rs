@@ -1,0 +1,281 @@
+//! Many worlds of one model: reset, write, step, read.
+
+use crate::backend::{Backend, BackendError, Values, cpu};
+use crate::batch::{Dtype, Field, Group, Layout};
+use crate::model::Model;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Precision of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// Single: SIMD lanes.
+    #[default]
+    F32,
+    /// Double: the reference, scalar.
+    F64,
+}
+
+/// Worlds a block on the CPU.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Lanes {
+    /// As many as the processor can; in `f64` always one.
+    #[default]
+    Auto,
+    /// One.
+    Scalar,
+    /// Eight, AVX2.
+    Eight,
+    /// Sixteen, AVX-512.
+    Sixteen,
+}
+
+/// How to run a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Number of worlds.
+    pub worlds: usize,
+    /// Precision of state, commands and fields.
+    pub precision: Precision,
+    /// Threads of a step; none = one a core.
+    pub threads: Option<usize>,
+    /// Worlds a block.
+    pub lanes: Lanes,
+    /// Fields of a frame; counters come with every frame.
+    pub fields: Vec<Field>,
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options {
+            worlds: 1,
+            precision: Precision::F32,
+            threads: None,
+            lanes: Lanes::Auto,
+            fields: vec![Field::JointQ, Field::JointQd, Field::BodyQ],
+        }
+    }
+}
+
+/// Many worlds of one model.
+pub struct Simulation {
+    model: Arc<Model>,
+    worlds: usize,
+    precision: Precision,
+    layout: Layout,
+    backend: Box<dyn Backend>,
+}
+
+impl Simulation {
+    /// Worlds at the start state of the model.
+    ///
+    /// # Errors
+    /// Options that make no sense or that this machine cannot meet, memory included (checked before
+    /// it is taken).
+    pub fn new(model: Arc<Model>, options: &Options) -> Result<Simulation, BackendError> {
+        if options.worlds == 0 {
+            return Err(BackendError::NoWorlds);
+        }
+        if options.threads == Some(0) {
+            return Err(BackendError::NoThreads);
+        }
+        check_memory(&model, options)?;
+        let layout = Simulation::layout_of(&model, options);
+        let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
+        let threads = options.threads.unwrap_or_else(cores);
+        let (worlds, precision) = (options.worlds, options.precision);
+        let backend = cpu::create(&model, worlds, precision, options.lanes, &layout, threads)?;
+        Ok(Simulation { model, worlds, precision, layout, backend })
+    }
+
+    /// The model.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+    /// Number of worlds.
+    pub fn worlds(&self) -> usize {
+        self.worlds
+    }
+    /// Precision of the run.
+    pub fn precision(&self) -> Precision {
+        self.precision
+    }
+    /// What it runs on, for people.
+    pub fn device(&self) -> &str {
+        self.backend.device()
+    }
+    /// Threads that a step uses.
+    pub fn threads(&self) -> usize {
+        self.backend.threads()
+    }
+    /// Arrays that `step` and `forward` write.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The layout that a simulation would have.
+    pub fn layout_of(model: &Model, options: &Options) -> Layout {
+        let real = match options.precision {
+            Precision::F32 => Dtype::F32,
+            Precision::F64 => Dtype::F64,
+        };
+        Layout::new(model, options.worlds, real, &options.fields)
+    }
+
+    /// Memory that the worlds take in this process, an arena not included [bytes].
+    pub fn memory_of(model: &Model, options: &Options) -> u64 {
+        let (real, width) = match options.precision {
+            Precision::F32 => (4, 16),
+            Precision::F64 => (8, 1),
+        };
+        let worlds = (options.worlds as u64).saturating_add(width);
+        // state and commands of a world, its counters; see backend/cpu/chunk.rs
+        worlds.saturating_mul(6 * model.dofs() as u64 * real + 12)
+    }
+
+    /// Sets columns of a command; it holds until it is set again or the world is reset.
+    ///
+    /// `values` is `(worlds, columns)`, world-major.
+    ///
+    /// # Errors
+    /// A field that is no command, columns or length that do not fit, a value that is not finite;
+    /// nothing is written then.
+    pub fn command(
+        &mut self,
+        field: Field,
+        columns: Range<usize>,
+        values: Values<'_>,
+    ) -> Result<(), BackendError> {
+        self.check(field, Group::Command, &columns, values)?;
+        self.backend.write(field, columns, values, None);
+        Ok(())
+    }
+
+    /// Sets columns of the state in the worlds of the mask (none = all), and clears their warm start.
+    ///
+    /// `values` is `(worlds, columns)`, world-major; rows of other worlds are not read into the state.
+    ///
+    /// # Errors
+    /// A field that is no state, columns, length or mask that do not fit, a value that is not finite;
+    /// nothing is written then.
+    pub fn write(
+        &mut self,
+        field: Field,
+        columns: Range<usize>,
+        values: Values<'_>,
+        mask: Option<&[bool]>,
+    ) -> Result<(), BackendError> {
+        self.check(field, Group::State, &columns, values)?;
+        self.check_mask(mask)?;
+        self.backend.write(field, columns, values, mask);
+        Ok(())
+    }
+
+    /// Back to the start state, `joint_f` 0 and targets as in the scene, in the worlds of the mask.
+    ///
+    /// # Errors
+    /// A mask of the wrong length.
+    pub fn reset(&mut self, mask: Option<&[bool]>) -> Result<(), BackendError> {
+        self.check_mask(mask)?;
+        self.backend.reset(mask);
+        Ok(())
+    }
+
+    /// Advances every world by one control frame, then writes every field into the arena.
+    ///
+    /// # Panics
+    /// If the arena (8-byte words) is smaller than the layout.
+    pub fn step(&mut self, arena: &mut [u64]) {
+        self.backend.run(self.model.substeps(), arena);
+    }
+
+    /// Evaluates every field at the present state into the arena, without stepping.
+    ///
+    /// # Panics
+    /// If the arena (8-byte words) is smaller than the layout.
+    pub fn forward(&mut self, arena: &mut [u64]) {
+        self.backend.run(0, arena);
+    }
+
+    fn check(
+        &self,
+        field: Field,
+        group: Group,
+        columns: &Range<usize>,
+        values: Values<'_>,
+    ) -> Result<(), BackendError> {
+        let row = field.row();
+        if row.group != group {
+            let choices = Field::ALL.iter().map(|field| field.row()).filter(|row| row.group == group);
+            return Err(BackendError::Group {
+                field: row.name,
+                expected: if group == Group::State { "part of the state" } else { "a command" },
+                choices: choices.map(|row| row.name).collect::<Vec<_>>().join(", "),
+            });
+        }
+        let all = field.elements(&self.model);
+        if columns.start > columns.end || columns.end > all {
+            return Err(BackendError::Columns {
+                field: row.name,
+                columns: all,
+                start: columns.start,
+                end: columns.end,
+            });
+        }
+        let expected = self.worlds * columns.len();
+        if values.len() != expected {
+            return Err(BackendError::Length {
+                field: row.name,
+                got: values.len(),
+                expected,
+                worlds: self.worlds,
+                columns: columns.len(),
+            });
+        }
+        if let Some(place) = values.first_not_finite() {
+            return Err(BackendError::NotFinite {
+                field: row.name,
+                world: place / columns.len(),
+                name: self.model.dof_names()[columns.start + place % columns.len()].clone(),
+                value: match values {
+                    Values::F32(v) => f64::from(v[place]),
+                    Values::F64(v) => v[place],
+                },
+            });
+        }
+        Ok(())
+    }
+
+    fn check_mask(&self, mask: Option<&[bool]>) -> Result<(), BackendError> {
+        match mask {
+            Some(mask) if mask.len() != self.worlds => {
+                Err(BackendError::Mask { got: mask.len(), worlds: self.worlds })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Refuses what would not fit, before anything is taken.
+fn check_memory(model: &Model, options: &Options) -> Result<(), BackendError> {
+    const MB: u64 = 1 << 20;
+    // a system that does not say how much is free is not asked twice: the allocation itself will tell
+    let Some(available) = available_memory() else { return Ok(()) };
+    let needed = Simulation::memory_of(model, options);
+    if needed > available {
+        return Err(BackendError::Memory {
+            worlds: options.worlds,
+            needed_mb: needed / MB,
+            available_mb: available / MB,
+        });
+    }
+    Ok(())
+}
+
+/// Memory that can be taken without swapping [bytes].
+fn available_memory() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
+    let kb: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kb * 1024)
+}

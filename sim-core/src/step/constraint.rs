@@ -1,0 +1,66 @@
+//! Constraint rows of joints: stiffness D and reference acceleration of each (Todorov 2014; MuJoCo
+//! documentation, "Computation: constraint model").
+//!
+//!     aref = -b v - k d(r) r          R = (1 - d) / d × inverse weight,  D = 1 / R
+//!
+//! Rows stand in MuJoCo's order: equalities, frictions, limits. Their Jacobians have one or two
+//! entries, known when the model is compiled; only the side of a limit is found at run time.
+
+use super::{BlockOf, ConstantsOf};
+use crate::lane::{Cx, Num};
+use crate::model::constants::{Impedance, Soft};
+
+#[inline(always)]
+pub(super) fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let w = &mut b.work;
+    let mut row = 0;
+    for equality in &m.equalities {
+        let multiplier = C::F::k(equality.multiplier);
+        let (f, l) = (equality.follower, equality.leader);
+        let position = multiplier.fnma(cx.get(&b.joint_q[l]), cx.get(&b.joint_q[f]))
+            - C::F::k(equality.offset);
+        let velocity = multiplier.fnma(cx.get(&b.joint_qd[l]), cx.get(&b.joint_qd[f]));
+        (w.efc_weight[row], w.efc_aref[row]) = soft_row(&equality.soft, position, velocity);
+        row += 1;
+    }
+    for friction in &m.frictions {
+        w.efc_weight[row] = C::F::k(friction.weight);
+        w.efc_aref[row] = -(cx.get(&b.joint_qd[friction.dof]) * C::F::k(friction.damping));
+        row += 1;
+    }
+    let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+    for (n, limit) in m.limits.iter().enumerate() {
+        let q = cx.get(&b.joint_q[limit.dof]);
+        let (above, below) = (q - C::F::k(limit.lower), C::F::k(limit.upper) - q);
+        let side = C::F::select(above.lt(below), one, -one);
+        let distance = above.min(below);
+        let velocity = side * cx.get(&b.joint_qd[limit.dof]);
+        let (weight, aref) = soft_row(&limit.soft, distance, velocity);
+        let active = distance.lt(zero);
+        w.efc_weight[row] = C::F::select(active, weight, zero);
+        w.efc_aref[row] = C::F::select(active, aref, zero);
+        w.limit_side[n] = side;
+        row += 1;
+    }
+}
+
+/// (D, aref) of a row at this position and velocity.
+#[inline(always)]
+fn soft_row<F: Num>(soft: &Soft<F::Real>, position: F, velocity: F) -> (F, F) {
+    let d = impedance(&soft.impedance, position);
+    let weight = d.div((F::c(1.0) - d) * F::k(soft.inverse_weight));
+    let spring = F::k(soft.stiffness) * d * position;
+    (weight, -velocity.fma(F::k(soft.damping), spring))
+}
+
+/// d(r): from `d_min` at 0 to `d_max` at `width`, along two parabolas.
+#[inline(always)]
+fn impedance<F: Num>(i: &Impedance<F::Real>, position: F) -> F {
+    let (one, midpoint) = (F::c(1.0), F::k(i.midpoint));
+    let x = position.abs().div(F::k(i.width)).min(one);
+    let rest = one - x;
+    let rising = (x * x).div(midpoint);
+    let falling = one - (rest * rest).div(one - midpoint);
+    let y = F::select(x.lt(midpoint), rising, falling);
+    y.fma(F::k(i.d_max) - F::k(i.d_min), F::k(i.d_min))
+}
