@@ -17,58 +17,63 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tightloop._core import Frame, __version__
     from tightloop.errors import (
+        ArgumentError,
         CommandRefused,
         DaemonLost,
         DaemonRestarted,
         FramesHeld,
-        InternalError,
         LaunchError,
         LeaseHeld,
         LeaseLost,
         ProtocolMismatch,
         ResourceError,
         SceneError,
+        SimClosed,
         TightloopError,
+        TransportError,
         UnknownDaemon,
+        UnknownField,
         UrdfError,
         WaitTimeout,
     )
-    from tightloop.scene import Box, Robot, Scene
+    from tightloop.scene import Robot, Scene, StaticShape
     from tightloop.sim import FrameCopy, Sim, attach, launch
 
 _HOMES = {
     "tightloop._core": ("Frame", "__version__"),
     "tightloop.errors": (
+        "ArgumentError",
         "CommandRefused",
         "DaemonLost",
         "DaemonRestarted",
         "FramesHeld",
-        "InternalError",
         "LaunchError",
         "LeaseHeld",
         "LeaseLost",
         "ProtocolMismatch",
         "ResourceError",
         "SceneError",
+        "SimClosed",
         "TightloopError",
+        "TransportError",
         "UnknownDaemon",
+        "UnknownField",
         "UrdfError",
         "WaitTimeout",
     ),
-    "tightloop.scene": ("Box", "Robot", "Scene"),
+    "tightloop.scene": ("Robot", "Scene", "StaticShape"),
     "tightloop.sim": ("FrameCopy", "Sim", "attach", "launch"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Box",
+    "ArgumentError",
     "CommandRefused",
     "DaemonLost",
     "DaemonRestarted",
     "Frame",
     "FrameCopy",
     "FramesHeld",
-    "InternalError",
     "LaunchError",
     "LeaseHeld",
     "LeaseLost",
@@ -78,8 +83,12 @@ __all__ = [
     "Scene",
     "SceneError",
     "Sim",
+    "SimClosed",
+    "StaticShape",
     "TightloopError",
+    "TransportError",
     "UnknownDaemon",
+    "UnknownField",
     "UrdfError",
     "WaitTimeout",
     "__version__",

@@ -1,7 +1,7 @@
-"""Every exception tightloop raises on its own account; each says what is wrong and what to do.
+"""Every exception that tightloop raises on its own account; each says what is wrong and what to do.
 
-All derive from `TightloopError`. Where Python has a word for the mistake (`ValueError`, `TimeoutError`, …)
-the exception derives from that too, so that ordinary `except` clauses work.
+All derive from `TightloopError`. Where Python has a word for the mistake (`ValueError`, `TimeoutError`, …) the
+exception derives from that too, so that ordinary `except` clauses work.
 """
 
 from __future__ import annotations
@@ -9,6 +9,10 @@ from __future__ import annotations
 
 class TightloopError(Exception):
     """Base of all exceptions of this package."""
+
+
+class ArgumentError(TightloopError, ValueError):
+    """An argument of `launch` or `attach` is not valid; the message lists what is."""
 
 
 class SceneError(TightloopError, ValueError):
@@ -27,12 +31,16 @@ class ResourceError(LaunchError):
     """There is not enough memory, or not enough room in shared memory, for that many worlds."""
 
 
-class UnknownDaemon(LaunchError):
-    """No daemon of that name is running."""
+class UnknownDaemon(TightloopError, LookupError):
+    """No daemon of that name is running; the message lists those that are."""
 
 
 class ProtocolMismatch(TightloopError, RuntimeError):
     """Client and daemon are of different versions; the message names both."""
+
+
+class TransportError(TightloopError, OSError):
+    """The shared-memory transport failed; the message holds its reason."""
 
 
 class LeaseHeld(TightloopError, RuntimeError):
@@ -40,7 +48,7 @@ class LeaseHeld(TightloopError, RuntimeError):
 
 
 class LeaseLost(TightloopError, RuntimeError):
-    """This client controlled the daemon and no longer does: its heartbeat was missed, or it was closed."""
+    """This client controlled the daemon and no longer does, since it did not answer for too long."""
 
 
 class DaemonLost(TightloopError, ConnectionError):
@@ -48,11 +56,19 @@ class DaemonLost(TightloopError, ConnectionError):
 
 
 class DaemonRestarted(DaemonLost):
-    """A daemon of the same name runs again, but not the one this client knew; its state is lost."""
+    """A daemon of the same name runs, but not the one that this client knew; its state is lost."""
+
+
+class SimClosed(TightloopError, RuntimeError):
+    """The simulation was closed; frames already received stay valid."""
 
 
 class CommandRefused(TightloopError, ValueError):
-    """A command has the wrong shape, dtype or value; the message names field, world and dof. The daemon goes on."""
+    """A command has a wrong shape, dtype or value; the message names field, world and dof. The daemon goes on."""
+
+
+class UnknownField(TightloopError, AttributeError):
+    """Frames of this run do not carry that field; ask for it in ``fields`` at launch."""
 
 
 class FramesHeld(TightloopError, RuntimeError):
@@ -61,7 +77,3 @@ class FramesHeld(TightloopError, RuntimeError):
 
 class WaitTimeout(TightloopError, TimeoutError):
     """The daemon is alive but did not answer in time."""
-
-
-class InternalError(TightloopError, RuntimeError):
-    """A bug in tightloop; please report it with the message."""

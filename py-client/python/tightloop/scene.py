@@ -1,42 +1,44 @@
-"""What is simulated: robots, static shapes, time step and solver. A scene is data; nothing runs until `tightloop.launch`."""
+"""What is simulated: robots, static shapes, time step and solver. A scene is data; `tightloop.launch` runs it."""
 
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from tightloop import _core
-from tightloop.errors import SceneError
-from tightloop.robot import Robot, Vector
+from tightloop import _core, checks
+from tightloop.checks import Quaternion, Triple, Vector
+from tightloop.robot import PER_DOF, Robot
 
 Cone = Literal["elliptic", "pyramidal"]
 
-_CONES = ("elliptic", "pyramidal")
-_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]*")
-# A quaternion typed with four digits is off by less; anything further is a slip (degrees, w first, Euler angles).
-_QUAT_NORM_SLACK = 1e-3
+_ORIGIN = (0.0, 0.0, 0.0)
+_UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
-class Box:
-    """A static box: ``half_extents`` [m], ``pos`` [m] and ``quat`` (x, y, z, w) of its centre in the world."""
+class StaticShape:
+    """A shape that never moves: ``pos`` [m] and ``quat`` (x, y, z, w) of its centre in the world, and its sizes [m]."""
 
     name: str
-    half_extents: tuple[float, float, float]
-    pos: tuple[float, float, float]
-    quat: tuple[float, float, float, float]
+    type: Literal["box", "sphere", "cylinder", "capsule"]
+    pos: Triple
+    quat: Quaternion
+    half_extents: Triple | None = None
+    radius: float | None = None
+    half_height: float | None = None
 
 
-@dataclass
-class _Solver:
+@dataclass(frozen=True)
+class Solver:
+    """Options of the constraint solver; see `Scene.solver`."""
+
     iterations: int = 20
     ls_iterations: int = 100
     tolerance: float = 1e-8
@@ -56,13 +58,15 @@ class Scene:
         SceneError: A value is out of range; the message names it.
     """
 
+    __slots__ = ("_solver", "dt", "gravity", "robots", "shapes", "substeps")
+
     def __init__(self, *, dt: float = 1 / 480, substeps: int = 8, gravity: Vector = (0.0, 0.0, -9.81)) -> None:
-        self.dt = _number("Scene: dt", dt, above=0.0, unit="seconds")
-        self.substeps = _integer("Scene: substeps", substeps, least=1)
-        self.gravity = _vector("Scene: gravity", gravity, 3)
+        self.dt = checks.number("Scene: dt", dt, above=0.0)
+        self.substeps = checks.integer("Scene: substeps", substeps, least=1)
+        self.gravity = checks.triple("Scene: gravity", gravity)
         self.robots: dict[str, Robot] = {}
-        self.boxes: dict[str, Box] = {}
-        self._solver = _Solver()
+        self.shapes: dict[str, StaticShape] = {}
+        self._solver = Solver()
 
     def solver(
         self,
@@ -78,63 +82,83 @@ class Scene:
         Args:
             iterations: Newton iterations a physics step, at most.
             ls_iterations: Line-search iterations a Newton iteration, at most.
-            tolerance: Stops early once the scaled improvement or gradient falls below it [–]; 0 never stops early.
+            tolerance: The solver stops once its scaled improvement or gradient is smaller [–]; at 0 it never does.
             cone: Friction cone of contacts, ``"elliptic"`` or ``"pyramidal"``.
-            impratio: Ratio of frictional to normal impedance of elliptic contacts [–], above 0.
+            impratio: Frictional over normal impedance of elliptic contacts [–], above 0.
         """
-        if cone not in _CONES:
-            raise SceneError(f"solver: unknown cone {cone!r}; choose one of {', '.join(map(repr, _CONES))}")
-        self._solver = _Solver(
-            iterations=_integer("solver: iterations", iterations, least=1),
-            ls_iterations=_integer("solver: ls_iterations", ls_iterations, least=1),
-            tolerance=_number("solver: tolerance", tolerance, least=0.0),
+        checks.choice("cone", cone, ("elliptic", "pyramidal"))
+        self._solver = Solver(
+            iterations=checks.integer("solver: iterations", iterations, least=1),
+            ls_iterations=checks.integer("solver: ls_iterations", ls_iterations, least=1),
+            tolerance=checks.number("solver: tolerance", tolerance, least=0.0),
             cone=cone,
-            impratio=_number("solver: impratio", impratio, above=0.0),
+            impratio=checks.number("solver: impratio", impratio, above=0.0),
         )
 
     def add_box(
-        self,
-        *,
-        half_extents: Vector,
-        pos: Vector = (0.0, 0.0, 0.0),
-        quat: Vector = (0.0, 0.0, 0.0, 1.0),
-        name: str | None = None,
-    ) -> Box:
+        self, *, half_extents: Vector, pos: Vector = _ORIGIN, quat: Vector = _UPRIGHT, name: str | None = None
+    ) -> StaticShape:
         """Add a static box.
 
         Args:
             half_extents: Half the length of each side [m], above 0.
             pos: Centre in the world [m].
             quat: Orientation (x, y, z, w).
-            name: Unique name; ``box1``, ``box2``, … if left out.
+            name: Unique name; ``box``, ``box_2``, … if left out.
         """
-        name = self._name(name, "box")
-        extents = _vector(f"box `{name}`: half_extents", half_extents, 3)
-        if min(extents) <= 0.0:
-            raise SceneError(f"box `{name}`: half_extents {extents} must all be above 0")
-        box = Box(name, extents, *_pose(f"box `{name}`", pos, quat))
-        self.boxes[name] = box
-        return box
+        return self._add_shape("box", name, pos, quat, half_extents=half_extents)
+
+    def add_sphere(
+        self, *, radius: float, pos: Vector = _ORIGIN, quat: Vector = _UPRIGHT, name: str | None = None
+    ) -> StaticShape:
+        """Add a static sphere of that radius [m]; the rest as in `add_box`."""
+        return self._add_shape("sphere", name, pos, quat, radius=radius)
+
+    def add_cylinder(
+        self,
+        *,
+        radius: float,
+        half_height: float,
+        pos: Vector = _ORIGIN,
+        quat: Vector = _UPRIGHT,
+        name: str | None = None,
+    ) -> StaticShape:
+        """Add a static cylinder along its z axis, sizes [m]; the rest as in `add_box`."""
+        return self._add_shape("cylinder", name, pos, quat, radius=radius, half_height=half_height)
+
+    def add_capsule(
+        self,
+        *,
+        radius: float,
+        half_height: float,
+        pos: Vector = _ORIGIN,
+        quat: Vector = _UPRIGHT,
+        name: str | None = None,
+    ) -> StaticShape:
+        """Add a static capsule along its z axis, sizes [m]; ``half_height`` is that between the caps' centres."""
+        return self._add_shape("capsule", name, pos, quat, radius=radius, half_height=half_height)
 
     def add_urdf(
         self,
         path: str | os.PathLike[str],
         *,
         name: str | None = None,
-        pos: Vector = (0.0, 0.0, 0.0),
-        quat: Vector = (0.0, 0.0, 0.0, 1.0),
+        pos: Vector = _ORIGIN,
+        quat: Vector = _UPRIGHT,
         floating: bool = False,
         self_collisions: bool = False,
+        package_dirs: Sequence[str | os.PathLike[str]] = (),
     ) -> Robot:
         """Add a robot from a URDF file, which is read and checked at once.
 
         Args:
             path: The URDF file.
-            name: Unique name, the prefix of joint and link names; the robot's own name if left out.
+            name: Unique name, which stands before joint and link names; the robot's name in the file if left out.
             pos: Where the root link stands in the world [m].
             quat: Its orientation (x, y, z, w).
-            floating: Let the root link move freely instead of fixing it.
-            self_collisions: Let links of this robot touch each other (neighbours never do).
+            floating: Whether the root link moves freely.
+            self_collisions: Whether links of this robot touch each other (neighbours never do).
+            package_dirs: Folders that hold the packages of ``package://`` paths; those above the file if left out.
 
         Returns:
             The robot, to set start state, drives and limits.
@@ -143,30 +167,93 @@ class Scene:
             UrdfError: The file is missing, is not URDF, or describes a robot that cannot be simulated.
         """
         urdf = Path(path).expanduser().absolute()
-        summary = json.loads(_core.read_urdf(str(urdf)))
-        name = self._name(name or _plain(summary["name"]), "robot")
-        pose = _pose(f"robot `{name}`", pos, quat)
-        robot = Robot(name, urdf, *pose, bool(floating), bool(self_collisions), summary)
+        packages = [Path(folder).expanduser().absolute() for folder in package_dirs]
+        summary = json.loads(_core.read_urdf(str(urdf), [str(folder) for folder in packages], bool(floating)))
+        own_name = re.sub(r"[^A-Za-z0-9_.\-]", "_", summary["name"])
+        name = checks.name("robot", own_name if name is None else name, self._names())
+        position, orientation = checks.pose(f"robot `{name}`", pos, quat)
+        robot = Robot(
+            name,
+            urdf=urdf,
+            package_dirs=packages,
+            pos=position,
+            quat=orientation,
+            floating=bool(floating),
+            self_collisions=bool(self_collisions),
+            summary=summary,
+        )
         self.robots[name] = robot
         return robot
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the scene as a TOML file; paths inside are relative to that file."""
-        file = Path(path).expanduser().absolute()
-        file.write_text(_core.scene_to_toml(self._json(), str(file.parent)), encoding="utf-8")
+        """Write the scene as a TOML file; paths inside are relative to that file.
+
+        Raises:
+            SceneError: The file cannot be written.
+        """
+        _core.save_scene(self._json(), str(Path(path).expanduser().absolute()))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Scene:
         """Read a scene file, and the robots that it names.
 
         Raises:
-            SceneError: The file is missing, or a key or value in it is wrong.
+            SceneError: The file is missing, or an entry in it is wrong.
             UrdfError: A robot in it cannot be read.
         """
         file = Path(path).expanduser().absolute()
-        return cls._from_json(_core.scene_from_toml(str(file)))
+        data = json.loads(_core.load_scene(str(file)))
+        scene = cls(dt=data["dt"], substeps=data["substeps"], gravity=data["gravity"])
+        scene.solver(**data["solver"])
+        for shape in data.get("shape", ()):
+            getattr(scene, f"add_{shape.pop('type')}")(**shape)
+        for table in data.get("robot", ()):
+            joints = {name: table.pop(name) for name in PER_DOF if name in table}
+            packages = [file.parent / folder for folder in table.pop("package_dirs", ())]
+            robot = scene.add_urdf(file.parent / table.pop("urdf"), package_dirs=packages, **table)
+            for name, values in joints.items():
+                setattr(robot, name, values if name == "joint_target_mode" else np.array(values, dtype=float))
+        return scene
+
+    def to_toml(self) -> str:
+        """The scene as the text of a scene file, paths absolute; this is what a daemon gets."""
+        return _core.scene_to_toml(self._json())
 
     def __repr__(self) -> str:
-        parts = [f"dt={self.dt:.6g}", f"substeps={self.substeps}"]
-        parts += [f"robots={list(self.robots)}", f"boxes={list(self.boxes)}"]
-        return f"Scene({', '.join(parts)})"
+        return f"Scene(dt={self.dt:.6g}, substeps={self.substeps}, robots={[*self.robots]}, shapes={[*self.shapes]})"
+
+    def _json(self) -> str:
+        return json.dumps(
+            {
+                "dt": self.dt,
+                "substeps": self.substeps,
+                "gravity": self.gravity,
+                "solver": asdict(self._solver),
+                "shape": [asdict(shape) for shape in self.shapes.values()],
+                "robot": [robot.table() for robot in self.robots.values()],
+            }
+        )
+
+    def _add_shape(self, kind: Any, name: str | None, pos: Vector, quat: Vector, **sizes: Any) -> StaticShape:
+        name = checks.name(kind, self._free_name(kind) if name is None else name, self._names())
+        what = f"{kind} `{name}`"
+        checked: dict[str, Any] = {}
+        for size, value in sizes.items():
+            if size == "half_extents":
+                checked[size] = checks.triple(f"{what}: {size}", value)
+                checks.number(f"{what}: smallest of {size}", min(checked[size]), above=0.0)
+            else:
+                checked[size] = checks.number(f"{what}: {size}", value, above=0.0)
+        shape = StaticShape(name, kind, *checks.pose(what, pos, quat), **checked)
+        self.shapes[name] = shape
+        return shape
+
+    def _names(self) -> list[str]:
+        return [*self.robots, *self.shapes]
+
+    def _free_name(self, kind: str) -> str:
+        names = self._names()
+        count = 1
+        while (name := kind if count == 1 else f"{kind}_{count}") in names:
+            count += 1
+        return name

@@ -1,0 +1,87 @@
+"""Types of the Rust module."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop.sim import FrameCopy
+
+__version__: str
+
+class Sample: ...
+
+class Frame:
+    """The state of all worlds at one instant: each field is a read-only NumPy view of shared memory, worlds first.
+
+    A frame, and every array taken from it, stays valid and unchanged until dropped, even after the daemon died.
+    At most ``frames_held`` frames may be alive; ``copy()`` is for those to keep. Real arrays are float32 or float64,
+    as the precision of the run says. Only the fields asked for in ``launch(fields=...)`` are there, besides
+    ``time``, ``step`` and ``status``.
+
+    Raises:
+        UnknownField: The frame does not carry that field; the message lists those it carries.
+    """
+
+    joint_q: NDArray[Any]
+    """Joint positions [rad or m], ``(worlds, coords)``."""
+    joint_qd: NDArray[Any]
+    """Joint velocities [rad/s or m/s], ``(worlds, dofs)``."""
+    joint_qdd: NDArray[Any]
+    """Joint accelerations under the commands held, constraints included [rad/s² or m/s²], ``(worlds, dofs)``."""
+    joint_f: NDArray[Any]
+    """Joint torques applied [N·m or N], ``(worlds, dofs)``."""
+    joint_target_q: NDArray[Any]
+    """Position targets of the drives [rad or m], ``(worlds, dofs)``."""
+    joint_target_qd: NDArray[Any]
+    """Velocity targets of the drives [rad/s or m/s], ``(worlds, dofs)``."""
+    body_q: NDArray[Any]
+    """Link frames in the world: position [m], then quaternion (x, y, z, w), ``(worlds, bodies, 7)``."""
+    mass_matrix: NDArray[Any]
+    """Joint-space inertia, armature included [kg·m², kg·m or kg], ``(worlds, dofs, dofs)``."""
+    bias_force: NDArray[Any]
+    """Coriolis, centrifugal and gravity forces [N·m or N], ``(worlds, dofs)``."""
+    smooth_force: NDArray[Any]
+    """All forces but the constraints', less the bias [N·m or N], ``(worlds, dofs)``."""
+    constraint_force: NDArray[Any]
+    """Constraint forces in joint space [N·m or N], ``(worlds, dofs)``."""
+    efc_J: NDArray[Any]
+    """Constraint Jacobian, zero in a row that is not active [–], ``(worlds, rows, dofs)``."""
+    efc_D: NDArray[Any]
+    """Regularised stiffness of a constraint row, zero if not active [kg·m² or kg], ``(worlds, rows)``."""
+    efc_aref: NDArray[Any]
+    """Reference acceleration of a constraint row [rad/s² or m/s²], ``(worlds, rows)``."""
+    efc_force: NDArray[Any]
+    """Force of a constraint row [N·m or N], ``(worlds, rows)``."""
+    time: NDArray[np.float64]
+    """Simulated time since the world's reset [s], ``(worlds,)``."""
+    step: NDArray[np.uint64]
+    """Control frames since the world's reset [–], ``(worlds,)``."""
+    status: NDArray[np.uint32]
+    """Trouble of the world, as bits; 0 is none [–], ``(worlds,)``."""
+
+    @property
+    def fields(self) -> list[str]:
+        """Names of the fields that this frame carries."""
+
+    def copy(self) -> FrameCopy:
+        """The frame's arrays in memory of their own, as attributes of the same names."""
+
+class Client:
+    """A connection to a daemon; `tightloop.Sim` wraps it, and documents its methods."""
+
+    def __init__(self, name: str, *, lease: bool) -> None: ...
+    def describe(self) -> str: ...
+    def step(self, joint_f: Any, joint_target_q: Any, joint_target_qd: Any, /) -> Frame: ...
+    def write(self, joint_q: Any, joint_qd: Any, mask: Any, /) -> Frame: ...
+    def reset(self, mask: Any, /) -> Frame: ...
+    def forward(self) -> Frame: ...
+    def close(self) -> None: ...
+
+def sweep(name: str, /) -> bool: ...
+def command_line(arguments: list[str], /) -> int: ...
+def read_urdf(path: str, package_dirs: list[str], floating: bool, /) -> str: ...
+def scene_to_toml(scene: str, /) -> str: ...
+def save_scene(scene: str, path: str, /) -> None: ...
+def load_scene(path: str, /) -> str: ...
+def known_fields() -> str: ...

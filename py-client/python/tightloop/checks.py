@@ -1,0 +1,86 @@
+"""Checks of single values at the door of a scene; each error names the value, and what it should be."""
+
+from __future__ import annotations
+
+import math
+import operator
+import re
+from collections.abc import Sequence
+from typing import Any, SupportsFloat, SupportsIndex
+
+from tightloop.errors import SceneError
+
+Vector = Sequence[float]
+Triple = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]*")
+# A quaternion typed with four digits is off by less; anything further is a slip (degrees, Euler angles).
+_QUAT_NORM_SLACK = 1e-3
+
+
+def number(what: str, value: SupportsFloat, *, above: float | None = None, least: float | None = None) -> float:
+    """A finite float, above or at least a bound."""
+    try:
+        checked = float(value)
+    except (TypeError, ValueError):
+        raise SceneError(f"{what} is {value!r}; give a number") from None
+    if not math.isfinite(checked):
+        raise SceneError(f"{what} is {checked}; give a finite number")
+    if above is not None and checked <= above:
+        raise SceneError(f"{what} is {checked:g}; it must be above {above:g}")
+    if least is not None and checked < least:
+        raise SceneError(f"{what} is {checked:g}; it must be at least {least:g}")
+    return checked
+
+
+def integer(what: str, value: SupportsIndex, *, least: int, error: type[Exception] = SceneError) -> int:
+    """An int, at least a bound; floats are refused even when they are whole."""
+    try:
+        checked = operator.index(value)
+    except TypeError:
+        raise error(f"{what} is {value!r}; give a whole number") from None
+    if checked < least:
+        raise error(f"{what} is {checked}; it must be at least {least}")
+    return checked
+
+
+def triple(what: str, values: Vector) -> Triple:
+    """Three finite floats."""
+    x, y, z = _numbers(what, values, 3)
+    return x, y, z
+
+
+def pose(what: str, pos: Vector, quat: Vector) -> tuple[Triple, Quaternion]:
+    """A position [m] and a unit quaternion (x, y, z, w)."""
+    x, y, z, w = _numbers(f"{what}: quat", quat, 4)
+    norm = math.hypot(x, y, z, w)
+    if abs(norm - 1.0) > _QUAT_NORM_SLACK:
+        raise SceneError(f"{what}: quat {(x, y, z, w)} has length {norm:.4g}; give a unit quaternion (x, y, z, w)")
+    return triple(f"{what}: pos", pos), (x / norm, y / norm, z / norm, w / norm)
+
+
+def name(what: str, given: str, taken: Sequence[str]) -> str:
+    """A name that can stand before a slash and that nothing else in the scene has."""
+    if not isinstance(given, str) or not _NAME.fullmatch(given):
+        raise SceneError(f"{what} name {given!r}: use letters, digits, `_`, `-` and `.`")
+    if given in taken:
+        raise SceneError(f"{what} name `{given}` is taken; give another name=")
+    return given
+
+
+def choice(what: str, given: Any, known: Sequence[str], *, error: type[Exception] = SceneError) -> str:
+    """One of a list of words."""
+    if given not in known:
+        raise error(f"unknown {what} {given!r}; choose one of {', '.join(map(repr, known))}")
+    return given
+
+
+def _numbers(what: str, values: Vector, count: int) -> tuple[float, ...]:
+    try:
+        checked = tuple(number(what, value) for value in values)
+    except TypeError:
+        raise SceneError(f"{what} is {values!r}; give {count} numbers") from None
+    if len(checked) != count:
+        raise SceneError(f"{what} has {len(checked)} values; give {count}")
+    return checked

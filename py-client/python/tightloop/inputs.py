@@ -1,0 +1,48 @@
+"""Arrays that need a conversion before they can be commands. Ready ones (float, contiguous) never come here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop.errors import CommandRefused
+
+
+def as_array(field: str, robot: str | None, value: Any, worlds: int, columns: int) -> NDArray[np.float64]:
+    """Any array of real numbers as float64, contiguous, shape ``(worlds, columns)``.
+
+    Raises:
+        CommandRefused: The shape is neither ``(worlds, columns)`` nor ``(columns,)``, or these are no real numbers.
+    """
+    what = field if robot is None else f"{field} of robot `{robot}`"
+    given = _numpy(what, value)
+    if given.dtype.kind not in "fiu":
+        raise CommandRefused(f"{what}: dtype {given.dtype} is not a real number; give float32 or float64")
+    if given.shape not in ((worlds, columns), (columns,)):
+        expected = f"expected shape {(worlds, columns)}, or {(columns,)} for every world alike"
+        raise CommandRefused(f"{what}: {expected}; got {given.shape}")
+    with np.errstate(over="ignore"):  # float128 may become inf, which is refused by name
+        return np.array(np.broadcast_to(given, (worlds, columns)), dtype=np.float64, order="C")
+
+
+def as_mask(value: Any, worlds: int) -> NDArray[np.bool_]:
+    """A bool for every world, contiguous, shape ``(worlds,)``.
+
+    Raises:
+        CommandRefused: Another shape or dtype.
+    """
+    given = _numpy("mask", value)
+    if given.dtype != np.bool_:
+        raise CommandRefused(f"mask: dtype {given.dtype} is not bool; give True for the worlds meant")
+    if given.shape != (worlds,):
+        raise CommandRefused(f"mask: expected shape {(worlds,)}; got {given.shape}")
+    return np.ascontiguousarray(given)
+
+
+def _numpy(what: str, value: Any) -> NDArray[Any]:
+    try:
+        return np.asarray(value)
+    except (ValueError, TypeError) as problem:
+        raise CommandRefused(f"{what}: is no array: {problem}") from None

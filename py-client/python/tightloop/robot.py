@@ -1,0 +1,218 @@
+"""A robot of a scene: what its URDF says, and the start state, drives and limits that the user sets over it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Generic, Literal, TypeVar, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tightloop.checks import Quaternion, Triple
+from tightloop.errors import SceneError
+
+Mode = Literal["position", "velocity", "both"]
+
+MODES = ("position", "velocity", "both")
+
+T = TypeVar("T")
+V = TypeVar("V")
+
+
+class _PerDof(Generic[T, V]):
+    """A property with one entry a dof. Reads as a read-only copy; a single value is written to every dof."""
+
+    def __init__(self, doc: str) -> None:
+        self.__doc__ = doc
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    @overload
+    def __get__(self, robot: None, owner: type) -> _PerDof[T, V]: ...
+    @overload
+    def __get__(self, robot: Robot, owner: type) -> T: ...
+    def __get__(self, robot: Robot | None, owner: type) -> Any:
+        return self if robot is None else self.read(robot)
+
+    def __set__(self, robot: Robot, values: V) -> None:
+        robot._own[self.name] = self.checked(robot, values)
+
+    def read(self, robot: Robot) -> Any:
+        raise NotImplementedError
+
+    def checked(self, robot: Robot, values: Any) -> Any:
+        raise NotImplementedError
+
+    def error(self, robot: Robot, problem: str) -> SceneError:
+        return SceneError(f"robot `{robot.name}`: {self.name} {problem}")
+
+    def expected(self, robot: Robot) -> str:
+        return f"expected {robot.dofs}, one a dof ({_some(robot.joint_names)}), or a single one for all"
+
+
+class _Numbers(_PerDof[NDArray[np.float64], ArrayLike]):
+    def __init__(self, doc: str, *, otherwise: str | None = None, signed: bool = True, limit: bool = False) -> None:
+        super().__init__(doc)
+        self.otherwise, self.signed, self.limit = otherwise, signed, limit
+
+    def read(self, robot: Robot) -> NDArray[np.float64]:
+        own = robot._own.get(self.name)
+        if own is None and self.otherwise is not None:
+            own = getattr(robot, self.otherwise)
+        values = np.array(robot._urdf_values(self.name) if own is None else own, dtype=np.float64)
+        # `arm.joint_q[3] = 1` would change a copy: better an error than silence
+        values.flags.writeable = False
+        return values
+
+    def checked(self, robot: Robot, values: ArrayLike) -> NDArray[np.float64]:
+        try:
+            given = np.asarray(values)
+            kind = given.dtype.kind
+        except ValueError as problem:
+            raise self.error(robot, f"is no array: {problem}") from None
+        if kind not in "fiu":
+            raise self.error(robot, f"has dtype {given.dtype}; give real numbers")
+        if given.ndim != 0 and given.shape != (robot.dofs,):
+            got = f"{given.shape[0]} values" if given.ndim == 1 else f"shape {given.shape}"
+            raise self.error(robot, f"has {got}; {self.expected(robot)}")
+        checked = np.full(robot.dofs, given, dtype=np.float64)
+        for name, value in zip(robot.joint_names, checked, strict=True):
+            if not (np.isfinite(value) or (self.limit and value == np.inf)):
+                cure = "a finite number, or inf for no limit" if self.limit else "a finite number"
+                raise self.error(robot, f"of dof `{robot.name}/{name}` is {value}; give {cure}")
+            if value < 0.0 and not self.signed:
+                raise self.error(robot, f"of dof `{robot.name}/{name}` is {value}; it cannot be negative")
+        return checked
+
+
+class _Modes(_PerDof[tuple[Mode, ...], "Mode | Sequence[Mode]"]):
+    def read(self, robot: Robot) -> tuple[Mode, ...]:
+        return robot._own.get(self.name) or tuple(robot._urdf_values(self.name))
+
+    def checked(self, robot: Robot, values: Mode | Sequence[Mode]) -> tuple[Mode, ...]:
+        modes: tuple[Mode, ...] = (values,) * robot.dofs if isinstance(values, str) else tuple(values)
+        if len(modes) != robot.dofs:
+            raise self.error(robot, f"has {len(modes)} values; {self.expected(robot)}")
+        for name, mode in zip(robot.joint_names, modes, strict=True):
+            if mode not in MODES:
+                choices = ", ".join(map(repr, MODES))
+                raise self.error(robot, f"of dof `{robot.name}/{name}` is {mode!r}; choose one of {choices}")
+        return modes
+
+
+class Robot:
+    """A robot of a scene, made by `Scene.add_urdf`.
+
+    Properties have one entry a moving joint, in the order of ``joint_names``; a single value is written to all of them.
+    What is not set here is the URDF's.
+    """
+
+    # A misspelt property is an error
+    __slots__ = (
+        "_own",
+        "_summary",
+        "floating",
+        "name",
+        "package_dirs",
+        "pos",
+        "quat",
+        "self_collisions",
+        "urdf",
+    )
+
+    joint_q = _Numbers("Start positions [rad or m], shape ``(dofs,)``.")
+    joint_target_q = _Numbers(
+        "Position targets at the start [rad or m], shape ``(dofs,)``; the start positions if not set.",
+        otherwise="joint_q",
+    )
+    joint_target_qd = _Numbers("Velocity targets at the start [rad/s or m/s], shape ``(dofs,)``.")
+    joint_target_mode = _Modes(
+        "What a drive acts on: ``position``: ke (q* − q) − kd q̇; ``velocity``: kd (q̇* − q̇); ``both``: their sum."
+    )
+    joint_target_ke = _Numbers("Proportional gains of the drives [N·m/rad or N/m], shape ``(dofs,)``.", signed=False)
+    joint_target_kd = _Numbers("Derivative gains of the drives [N·m·s/rad or N·s/m], shape ``(dofs,)``.", signed=False)
+    joint_effort_limit = _Numbers(
+        "Largest sum of a joint's drive forces [N·m or N], shape ``(dofs,)``; inf is no limit. Spares ``joint_f``.",
+        signed=False,
+        limit=True,
+    )
+    joint_armature = _Numbers("Inertia of the drives seen at the joint [kg·m² or kg], shape ``(dofs,)``.", signed=False)
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        urdf: Path,
+        package_dirs: list[Path],
+        pos: Triple,
+        quat: Quaternion,
+        floating: bool,
+        self_collisions: bool,
+        summary: dict[str, Any],
+    ) -> None:
+        self.name = name
+        self.urdf = urdf
+        self.package_dirs = package_dirs
+        self.pos = pos
+        self.quat = quat
+        self.floating = floating
+        self.self_collisions = self_collisions
+        self._summary = summary
+        self._own: dict[str, Any] = {}
+
+    @property
+    def joint_names(self) -> list[str]:
+        """Moving joints in the order of their dofs, as the URDF names them (``sim.dof_names`` has ``robot/joint``)."""
+        return list(self._summary["joint_names"])
+
+    @property
+    def link_names(self) -> list[str]:
+        """Links in the order of their bodies, as the URDF names them."""
+        return list(self._summary["link_names"])
+
+    @property
+    def notes(self) -> list[str]:
+        """What was ignored or mended while the URDF was read, one sentence each."""
+        return list(self._summary["notes"])
+
+    @property
+    def dofs(self) -> int:
+        """Number of moving joints."""
+        return len(self._summary["joint_names"])
+
+    def table(self) -> dict[str, Any]:
+        """The robot as a scene file has it, paths absolute; what was not set is left out."""
+        own = {name: values if isinstance(values, tuple) else _portable(values) for name, values in self._own.items()}
+        packages = [str(folder) for folder in self.package_dirs]
+        return {
+            "name": self.name,
+            "urdf": str(self.urdf),
+            "package_dirs": packages,
+            "pos": self.pos,
+            "quat": self.quat,
+            "floating": self.floating,
+            "self_collisions": self.self_collisions,
+        } | own
+
+    def _urdf_values(self, name: str) -> Any:
+        if name == "joint_target_mode":
+            return ["position"] * self.dofs
+        return self._summary.get(name, [0.0] * self.dofs)
+
+    def __repr__(self) -> str:
+        return f"Robot({self.name!r}, dofs={self.dofs}, urdf={str(self.urdf)!r})"
+
+
+PER_DOF = tuple(name for name, value in vars(Robot).items() if isinstance(value, _PerDof))
+
+
+def _portable(values: NDArray[np.float64]) -> float | str | list[float | str]:
+    """As JSON, which has no infinity; one value where all dofs have the same."""
+    entries = ["inf" if np.isinf(value) else float(value) for value in values]
+    return entries[0] if entries and len(set(entries)) == 1 else entries
+
+
+def _some(names: list[str], most: int = 3) -> str:
+    return ", ".join(names[:most]) + (", …" if len(names) > most else "")

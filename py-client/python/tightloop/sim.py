@@ -1,0 +1,233 @@
+"""A running simulation: `launch` starts a daemon of its own, `attach` joins one, and `Sim` steps it."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import weakref
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import ArrayLike, NDArray
+
+from tightloop import _core, checks
+from tightloop._core import Frame
+from tightloop.daemon import Daemon
+from tightloop.errors import ArgumentError
+from tightloop.scene import Scene
+
+#: An array (worlds, dofs) for the whole scene, one (dofs,) for every world, or such arrays by robot name.
+Command = ArrayLike | Mapping[str, ArrayLike]
+
+DEVICES = ("auto", "cpu", "gpu")
+PRECISIONS = ("f32", "f64")
+
+
+class FrameCopy:
+    """The arrays of a frame in memory of its own; `Frame.copy` makes it. Attributes are those of the frame."""
+
+    def __init__(self, arrays: dict[str, NDArray[Any]]) -> None:
+        self.__dict__.update(arrays)
+
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        raise AttributeError(f"this frame carries no field {name!r}; it carries: {', '.join(self.__dict__)}")
+
+
+class Sim:
+    """A simulation that a daemon runs; made by `launch` and `attach`, closed by ``close`` or the end of a ``with``.
+
+    Attributes:
+        name: Name of the daemon.
+        pid: Its process.
+        device: Where the physics runs, ``"cpu"``.
+        precision: ``"f32"`` or ``"f64"``, the type of every real array.
+        worlds: Number of worlds.
+        threads: Threads that a step may use.
+        dt: Physics step [s].
+        substeps: Physics steps a control frame.
+        fields: What every frame carries.
+        dof_names: ``robot/joint`` of each dof.
+        coord_names: ``robot/joint`` of each coordinate.
+        body_names: ``robot/link`` of each body.
+        dofs: Slice of each robot's dofs, by robot name.
+        coords: Slice of each robot's coordinates.
+        bodies: Slice of each robot's bodies.
+        info: Everything the daemon tells about itself, notes on the scene included.
+    """
+
+    def __init__(self, client: _core.Client, daemon: Daemon | None) -> None:
+        self._client = client
+        # Runs when the last reference goes, and at interpreter exit
+        self._end = weakref.finalize(self, _end, client, daemon, os.getpid())
+        self.info: dict[str, Any] = json.loads(client.describe())
+        self.name: str = self.info["name"]
+        self.pid: int = self.info["pid"]
+        self.device: str = self.info["device"]
+        self.precision: str = self.info["precision"]
+        self.worlds: int = self.info["worlds"]
+        self.threads: int = self.info["threads"]
+        self.dt: float = self.info["dt"]
+        self.substeps: int = self.info["substeps"]
+        self.fields = tuple(field["name"] for field in self.info["fields"])
+        self.dof_names: list[str] = self.info["dof_names"]
+        self.coord_names: list[str] = self.info["coord_names"]
+        self.body_names: list[str] = self.info["body_names"]
+        self.dofs, self.coords, self.bodies = (
+            {robot["name"]: slice(*robot[range_]) for robot in self.info["robots"]}
+            for range_ in ("dofs", "coords", "bodies")
+        )
+
+    def step(
+        self,
+        *,
+        joint_f: Command | None = None,
+        joint_target_q: Command | None = None,
+        joint_target_qd: Command | None = None,
+    ) -> Frame:
+        """Advance every world by one control frame. What is left out keeps its last value.
+
+        Args:
+            joint_f: Joint torques [N·m or N], shape ``(worlds, dofs)`` or ``(dofs,)``, held over the substeps.
+                Not clamped by the effort limit.
+            joint_target_q: Drive targets [rad or m], same shapes.
+            joint_target_qd: Drive velocity targets [rad/s or m/s], same shapes.
+                Each may be a dict of arrays by robot name, with that robot's dofs only.
+
+        Returns:
+            A frame of read-only views. It stays valid, unchanged, until it is dropped.
+
+        Raises:
+            CommandRefused: A wrong shape, dtype or value; no world was touched.
+            FramesHeld: As many frames are alive as ``frames_held`` allows.
+            LeaseHeld: Another client controls the daemon.
+            LeaseLost: This client did, and no longer does.
+            DaemonLost: The daemon went away; its state is lost.
+        """
+        return self._client.step(joint_f, joint_target_q, joint_target_qd)
+
+    def reset(self, *, mask: ArrayLike | None = None) -> Frame:
+        """Put worlds back to the scene's start: state, ``time``, ``joint_f`` = 0, and targets.
+
+        Args:
+            mask: Which worlds, bool, shape ``(worlds,)``; all if left out.
+
+        Returns:
+            A frame evaluated at that state. Raises as `step` does.
+        """
+        return self._client.reset(mask)
+
+    def write(
+        self,
+        *,
+        joint_q: Command | None = None,
+        joint_qd: Command | None = None,
+        mask: ArrayLike | None = None,
+    ) -> Frame:
+        """Set the state. What is left out, and worlds outside the mask, keep theirs.
+
+        Args:
+            joint_q: Joint positions [rad or m], shape ``(worlds, coords)`` or ``(coords,)``, or a dict by robot.
+            joint_qd: Joint velocities [rad/s or m/s], shape ``(worlds, dofs)`` or ``(dofs,)``, or a dict by robot.
+            mask: Which worlds, bool, shape ``(worlds,)``; all if left out.
+
+        Returns:
+            A frame evaluated at that state. Raises as `step` does.
+        """
+        return self._client.write(joint_q, joint_qd, mask)
+
+    def forward(self) -> Frame:
+        """Evaluate every field at the present state and commands, without stepping. Raises as `step` does."""
+        return self._client.forward()
+
+    def close(self) -> None:
+        """End the simulation: a launched daemon stops, an attached one is released. Frames stay valid."""
+        self._end()
+
+    def __enter__(self) -> Sim:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        state = "" if self._end.alive else ", closed"
+        return f"Sim({self.name!r}, worlds={self.worlds}, device={self.device!r}, pid={self.pid}{state})"
+
+
+def launch(
+    scene: Scene,
+    *,
+    worlds: int,
+    device: str = "auto",
+    precision: str = "f32",
+    threads: int | None = None,
+    fields: Sequence[str] = ("joint_q", "joint_qd", "body_q"),
+    name: str | None = None,
+    log: str | os.PathLike[str] | None = None,
+    frames_held: int = 4,
+) -> Sim:
+    """Start a daemon that simulates a scene, and join it. The daemon ends with this process, however that ends.
+
+    Args:
+        scene: What to simulate; later changes to it have no effect.
+        worlds: How many copies of it, at least 1.
+        device: ``"cpu"``, or ``"auto"`` for the best there is.
+        precision: ``"f32"``, or ``"f64"`` for the same physics in double precision.
+        threads: Most threads a step may use; all cores if left out.
+        fields: What frames carry besides ``time``, ``step`` and ``status``: names of `Frame` attributes.
+        name: Name of the daemon, for `attach`; a unique one if left out.
+        log: File for the daemon's news; warnings and errors go to stderr if left out.
+        frames_held: How many frames may be alive at once, at least 1.
+
+    Raises:
+        ArgumentError: An argument is not valid; the message lists what is.
+        SceneError: The scene is not valid.
+        ResourceError: Memory or shared memory does not hold that many worlds.
+        LaunchError: The daemon did not start; the message holds its reason.
+    """
+    if not isinstance(scene, Scene):
+        raise ArgumentError(f"launch: scene is {type(scene).__name__}; give a tightloop.Scene")
+    worlds = checks.integer("launch: worlds", worlds, least=1, error=ArgumentError)
+    frames_held = checks.integer("launch: frames_held", frames_held, least=1, error=ArgumentError)
+    checks.choice("device", device, DEVICES, error=ArgumentError)
+    checks.choice("precision", precision, PRECISIONS, error=ArgumentError)
+    known = [field["name"] for field in json.loads(_core.known_fields())]
+    if isinstance(fields, str):
+        raise ArgumentError(f"launch: fields is {fields!r}; give a list of names, such as ({fields!r},)")
+    for field in fields:
+        checks.choice("field", field, known, error=ArgumentError)
+    arguments = {"worlds": worlds, "device": device, "precision": precision, "frames-held": frames_held}
+    arguments["fields"] = ",".join(fields)
+    arguments["name"] = name or f"sim-{os.getpid()}-{secrets.token_hex(4)}"
+    if threads is not None:
+        arguments["threads"] = checks.integer("launch: threads", threads, least=1, error=ArgumentError)
+    if log is not None:
+        arguments["log"] = str(Path(log).expanduser().absolute())
+    daemon = Daemon.start(scene.to_toml(), arguments)
+    try:
+        return Sim(_core.Client(arguments["name"], lease=True), daemon)
+    except BaseException:
+        daemon.stop()
+        raise
+
+
+def attach(name: str) -> Sim:
+    """Join a daemon that is already running. It goes on when this client ends.
+
+    The first command makes this client its controller; until it ends, others that try get `LeaseHeld`.
+
+    Raises:
+        UnknownDaemon: No daemon of that name is running; the message lists those that are.
+        ProtocolMismatch: The daemon is of another release.
+    """
+    return Sim(_core.Client(name, lease=False), None)
+
+
+def _end(client: _core.Client, daemon: Daemon | None, owner: int) -> None:
+    # A forked child must not end what belongs to its parent
+    if os.getpid() == owner:
+        client.close()
+        if daemon is not None:
+            daemon.stop()

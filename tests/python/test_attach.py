@@ -1,0 +1,111 @@
+"""A second client of a daemon that runs by itself, started from the command line with a scene file."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import tightloop as tl
+from leftovers import alive, left_of, stems_of, wait_until
+
+
+@pytest.fixture
+def served(pendulum, tmp_path, unique) -> Iterator[tuple[str, int]]:
+    """Name and pid of a daemon started by hand."""
+    file, name = tmp_path / "scene.toml", unique()
+    pendulum.save(file)
+    command = [sys.executable, "-m", "tightloop", "serve", str(file), "--worlds=3", f"--name={name}"]
+    command += ["--fields=joint_q,joint_qd,body_q,mass_matrix"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        try:
+            assert process.stdout is not None and process.stdout.readline()
+            yield name, process.pid
+        finally:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+                process.wait(5)
+
+
+def test_an_attached_client_knows_as_much_as_the_one_that_launched(served, pendulum):
+    name, pid = served
+    attached = tl.attach(name)
+    with tl.launch(pendulum, worlds=3, fields=("joint_q", "joint_qd", "body_q", "mass_matrix")) as launched:
+        for (
+            fact
+        ) in "worlds device precision dt substeps fields dof_names coord_names body_names dofs coords bodies".split():
+            assert getattr(attached, fact) == getattr(launched, fact), fact
+        assert (attached.name, attached.pid) == (name, pid)
+        tau = np.float32([[1, 2], [3, 4], [5, 6]])
+        assert np.array_equal(attached.step(joint_f=tau).joint_q, launched.step(joint_f=tau).joint_q)
+    attached.close()
+
+
+def test_control_passes_on_when_the_first_client_closes(served):
+    name, _ = served
+    first, second = tl.attach(name), tl.attach(name)
+    assert first.reset().step[0] == 0
+    with pytest.raises(tl.LeaseHeld, match=str(os.getpid())):
+        second.step()
+    first.close()
+    assert second.step().step[0] == 1
+    second.close()
+
+
+def test_control_passes_on_when_the_first_client_is_killed(served):
+    name, _ = served
+    code = f"import tightloop as tl, os, signal; tl.attach({name!r}).step(); os.kill(os.getpid(), signal.SIGKILL)"
+    subprocess.run([sys.executable, "-c", code], check=False)
+    second = tl.attach(name)
+
+    def stepped() -> bool:
+        try:
+            return second.step().step[0] == 2
+        except tl.LeaseHeld:
+            return False
+
+    assert wait_until(stepped, 1.0), "within a second of the death"
+    second.close()
+
+
+def test_the_end_of_a_client_does_not_end_a_daemon_started_by_hand(served):
+    name, pid = served
+    code = f"import tightloop as tl; sim = tl.attach({name!r}); sim.step()"
+    for _ in range(2):
+        subprocess.run([sys.executable, "-c", code], check=True)
+    assert alive(pid)
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_daemon_started_by_hand_ends_clean_on_a_signal(served, root, how):
+    name, pid = served
+    stems = stems_of(pid)
+    os.kill(pid, how)
+    assert wait_until(lambda: not alive(pid), 2)
+    assert left_of(stems) == []
+    assert not any(name in path.name for path in root.iterdir())
+
+
+def test_a_daemon_that_was_restarted_is_told_from_the_one_known(pendulum, tmp_path, unique):
+    name = unique()
+    with tl.launch(pendulum, worlds=1, name=name) as first:
+        known = tl.attach(name)
+        first.close()
+        with tl.launch(pendulum, worlds=1, name=name), pytest.raises(tl.DaemonRestarted, match=name):
+            known.step()
+    known.close()
+
+
+def test_a_dead_daemon_is_told(served):
+    name, pid = served
+    sim = tl.attach(name)
+    sim.step()
+    os.kill(pid, signal.SIGKILL)
+    with pytest.raises(tl.DaemonLost, match=str(pid)):
+        sim.step()
+    sim.close()
