@@ -1,0 +1,10 @@
+//! Descriptions and URDF files: what is read, what is mended, what is refused.
+
+mod build;
+mod fr3;
+mod meshes;
+mod mimic;
+mod pose;
+mod refused;
+mod urdf;
+mod validate;

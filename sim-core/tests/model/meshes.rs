@@ -1,0 +1,176 @@
+//! Where meshes are looked for.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use sim_core::model::{ModelError, Robot, Shape, UrdfOptions};
+
+use crate::build::assert_says;
+
+/// A folder of its own for each test, removed at the end: `pkg/urdf`, `pkg/meshes/hand.stl`.
+struct Package {
+    root: PathBuf,
+}
+
+impl Package {
+    fn new(test: &str) -> Package {
+        let root =
+            std::env::temp_dir().join(format!("tightloop-meshes-{}-{test}", std::process::id()));
+        fs::create_dir_all(root.join("pkg/urdf")).unwrap();
+        fs::create_dir_all(root.join("pkg/meshes")).unwrap();
+        fs::write(root.join("pkg/meshes/hand.stl"), b"").unwrap();
+        Package { root }
+    }
+
+    fn mesh(&self) -> PathBuf {
+        self.root.join("pkg/meshes/hand.stl")
+    }
+
+    /// Reads a robot whose only link has this mesh; the file lies in `folder`.
+    fn read(
+        &self,
+        folder: &str,
+        element: &str,
+        uri: &str,
+        options: UrdfOptions,
+    ) -> Result<Robot, ModelError> {
+        let text = format!(
+            "<robot name=\"r\"><link name=\"hand\"><{element}><geometry>\
+             <mesh filename=\"{uri}\" scale=\"1 2 3\"/></geometry></{element}></link></robot>"
+        );
+        Robot::from_urdf_text(&text, self.root.join(folder).join("r.urdf"), options)
+    }
+}
+
+impl Drop for Package {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.root);
+    }
+}
+
+#[track_caller]
+fn assert_leads_to(robot: Result<Robot, ModelError>, mesh: &Path) {
+    match &robot.unwrap().links[0].collisions[0].shape {
+        Shape::Mesh { path, scale } => {
+            assert_eq!(path.canonicalize().unwrap(), mesh.canonicalize().unwrap());
+            assert_eq!(*scale, [1.0, 2.0, 3.0]);
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn relative_absolute_and_file_paths_are_followed() {
+    let package = Package::new("paths");
+    let none = UrdfOptions::default;
+    let mesh = package.mesh();
+    assert_leads_to(
+        package.read("pkg/urdf", "collision", "../meshes/hand.stl", none()),
+        &mesh,
+    );
+    assert_leads_to(
+        package.read("pkg/urdf", "collision", mesh.to_str().unwrap(), none()),
+        &mesh,
+    );
+    assert_leads_to(
+        package.read(
+            "pkg/urdf",
+            "collision",
+            &format!("file://{}", mesh.display()),
+            none(),
+        ),
+        &mesh,
+    );
+}
+
+#[test]
+fn packages_are_found_above_the_file_and_in_package_dirs() {
+    let package = Package::new("packages");
+    let uri = "package://pkg/meshes/hand.stl";
+    assert_leads_to(
+        package.read("pkg/urdf", "collision", uri, UrdfOptions::default()),
+        &package.mesh(),
+    );
+    assert_leads_to(
+        package.read("elsewhere", "collision", uri, UrdfOptions::default()),
+        &package.mesh(),
+    );
+    for dir in [package.root.clone(), package.root.join("pkg")] {
+        let options = UrdfOptions {
+            package_dirs: vec![dir],
+            ..UrdfOptions::default()
+        };
+        let text = "<robot name=\"r\"><link name=\"hand\"><collision><geometry>\
+            <mesh filename=\"package://pkg/meshes/hand.stl\" scale=\"1 2 3\"/></geometry></collision></link></robot>";
+        assert_leads_to(
+            Robot::from_urdf_text(text, "/r.urdf", options),
+            &package.mesh(),
+        );
+    }
+}
+
+#[test]
+fn missing_collision_mesh_is_refused_with_link_and_path() {
+    let package = Package::new("missing");
+    let error = package
+        .read(
+            "pkg/urdf",
+            "collision",
+            "../meshes/palm.stl",
+            UrdfOptions::default(),
+        )
+        .unwrap_err();
+    assert_says(
+        &error.to_string(),
+        &[
+            "`hand`",
+            "../meshes/palm.stl",
+            "pkg/urdf/../meshes/palm.stl",
+        ],
+    );
+    let error = package
+        .read(
+            "pkg/urdf",
+            "collision",
+            "package://ghost/palm.stl",
+            UrdfOptions::default(),
+        )
+        .unwrap_err();
+    assert_says(&error.to_string(), &["`hand`", "package://ghost/palm.stl"]);
+}
+
+#[test]
+fn missing_visual_mesh_is_a_note() {
+    let package = Package::new("visual");
+    let robot = package
+        .read("pkg/urdf", "visual", "palm.stl", UrdfOptions::default())
+        .unwrap();
+    assert_says(
+        &robot.notes[0],
+        &["`hand`", "visual mesh `palm.stl` is missing"],
+    );
+}
+
+#[test]
+fn paths_out_of_their_package_and_other_protocols_are_refused() {
+    let package = Package::new("escape");
+    for uri in [
+        "package://pkg/../pkg/meshes/hand.stl",
+        "package://pkg/a/../../x.stl",
+        "package://../pkg/x.stl",
+    ] {
+        let error = package
+            .read("pkg/urdf", "collision", uri, UrdfOptions::default())
+            .unwrap_err();
+        assert_says(&error.to_string(), &["`hand`", uri, "leaves its package"]);
+    }
+    let error = package
+        .read(
+            "pkg/urdf",
+            "collision",
+            "http://x/y.stl",
+            UrdfOptions::default(),
+        )
+        .unwrap_err();
+    assert_says(&error.to_string(), &["`hand`", "http://x/y.stl", "file://"]);
+}
