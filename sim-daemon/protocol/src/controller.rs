@@ -5,8 +5,6 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use std::ops::ControlFlow;
-
 use iceoryx2::port::listener::Listener;
 use iceoryx2::prelude::PortFactory;
 
@@ -14,7 +12,8 @@ use crate::client::{Command, Hook, Link, S, Values, lock, malformed};
 use crate::control::{Request, Response};
 use crate::frame::FrameSample;
 use crate::header::encode_row;
-use crate::pace::{Pace, cores};
+use crate::liveness::Peer;
+use crate::pace::{Pace, Waiting, cores};
 use crate::transport::{self, CommandPublisher, FrameService, FrameSubscriber};
 use crate::{
     ALIGNMENT, CommandHeader, Description, Dtype, Frame, InputInfo, Op, ProtocolError, ROWS_MAX,
@@ -295,31 +294,15 @@ impl Controller {
 
     /// Waits for the answer to the command sent last.
     fn answer(&mut self, op: Op, hook: Hook<'_>) -> Result<FrameSample, ProtocolError> {
-        let (seq, epoch) = (self.seq, self.epoch);
-        let (subscriber, service, peer) = (&self.subscriber, &self.service, &self.link.peer);
-        let look = || loop {
-            match subscriber.receive() {
-                Ok(None) => return Ok(None),
-                Ok(Some(sample)) => {
-                    let header = sample.user_header();
-                    if header.ack_seq == seq && header.epoch == epoch {
-                        return Ok(Some(sample));
-                    }
-                }
-                Err(error) => return Err(ProtocolError::transport("receive a frame", error)),
-            }
+        let mut waiting = Answer {
+            seq: self.seq,
+            epoch: self.epoch,
+            subscriber: &self.subscriber,
+            service: &self.service,
+            peer: &self.link.peer,
+            hook,
         };
-        let around = || {
-            if hook().is_break() {
-                return Err(ProtocolError::Interrupted);
-            }
-            peer.check()?;
-            if service.dynamic_config().number_of_publishers() == 0 {
-                return Err(peer.lease_lost());
-            }
-            Ok(ControlFlow::Continue(()))
-        };
-        let sample = self.paces[op as usize - 1].wait(&self.listener, look, around)?;
+        let sample = self.paces[op as usize - 1].wait(&self.listener, &mut waiting)?;
         self.unanswered = false;
         Ok(sample)
     }
@@ -350,6 +333,44 @@ impl Drop for Controller {
     fn drop(&mut self) {
         self.link.tell(&Request::Release { epoch: self.epoch });
         self.link.notify();
+    }
+}
+
+/// The wait for the answer to a command.
+struct Answer<'a> {
+    seq: u64,
+    epoch: u64,
+    subscriber: &'a FrameSubscriber<S>,
+    service: &'a FrameService<S>,
+    peer: &'a Peer,
+    hook: Hook<'a>,
+}
+
+impl Waiting<FrameSample> for Answer<'_> {
+    fn look(&mut self) -> Result<Option<FrameSample>, ProtocolError> {
+        loop {
+            match self.subscriber.receive() {
+                Ok(None) => return Ok(None),
+                Ok(Some(sample)) => {
+                    let header = sample.user_header();
+                    if header.ack_seq == self.seq && header.epoch == self.epoch {
+                        return Ok(Some(sample));
+                    }
+                }
+                Err(error) => return Err(ProtocolError::transport("receive a frame", error)),
+            }
+        }
+    }
+
+    fn around(&mut self) -> Result<Option<FrameSample>, ProtocolError> {
+        if (self.hook)().is_break() {
+            return Err(ProtocolError::Interrupted);
+        }
+        self.peer.check()?;
+        if self.service.dynamic_config().number_of_publishers() == 0 {
+            return Err(self.peer.lease_lost());
+        }
+        Ok(None)
     }
 }
 

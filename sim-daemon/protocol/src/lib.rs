@@ -27,6 +27,7 @@ mod error;
 mod frame;
 pub mod hash;
 pub mod header;
+pub mod host;
 mod liveness;
 mod loan;
 mod observer;

@@ -1,6 +1,5 @@
 //! How to wait: spin while the answer is likely to come soon and a core is free for it, else sleep.
 
-use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::listener::Listener;
@@ -15,6 +14,15 @@ const SPIN_MAX: Duration = Duration::from_micros(200);
 const WAKE_MARGIN: Duration = Duration::from_micros(100);
 /// Beyond this, a wake-up is lost in the wait itself.
 const FORESEEN_MAX: Duration = Duration::from_millis(20);
+
+/// What is waited for.
+pub(crate) trait Waiting<T> {
+    /// Looks for it; called over and over.
+    fn look(&mut self) -> Result<Option<T>, ProtocolError>;
+
+    /// Looks at everything else; called after each sleep, hence at least every 50 ms, never while spinning.
+    fn around(&mut self) -> Result<Option<T>, ProtocolError>;
+}
 
 /// What was learnt about one kind of wait.
 #[derive(Debug, Clone)]
@@ -32,16 +40,13 @@ impl Pace {
         }
     }
 
-    /// Waits until `look` finds something or `around` breaks off.
-    ///
-    /// `around` runs whenever the thread has slept, hence at least every 50 ms; never while it spins.
+    /// Waits until something is found.
     pub(crate) fn wait<S: Service, T>(
         &mut self,
         listener: &Listener<S>,
-        mut look: impl FnMut() -> Result<Option<T>, ProtocolError>,
-        mut around: impl FnMut() -> Result<ControlFlow<T>, ProtocolError>,
+        waiting: &mut impl Waiting<T>,
     ) -> Result<T, ProtocolError> {
-        if let Some(found) = look()? {
+        if let Some(found) = waiting.look()? {
             self.learn(Duration::ZERO);
             return Ok(found);
         }
@@ -52,7 +57,7 @@ impl Pace {
             }
             let until = start.elapsed() + (2 * self.mean).clamp(SPIN_MIN, SPIN_MAX);
             loop {
-                if let Some(found) = look()? {
+                if let Some(found) = waiting.look()? {
                     self.learn(start.elapsed());
                     return Ok(found);
                 }
@@ -65,11 +70,11 @@ impl Pace {
         loop {
             park(listener, SLICE)?;
             // a notification may be an old one: only looking tells
-            if let Some(found) = look()? {
+            if let Some(found) = waiting.look()? {
                 self.learn(start.elapsed());
                 return Ok(found);
             }
-            if let ControlFlow::Break(found) = around()? {
+            if let Some(found) = waiting.around()? {
                 return Ok(found);
             }
         }

@@ -17,6 +17,8 @@ use crate::{ALIGNMENT, CommandHeader, FrameHeader, ProtocolError};
 
 /// Clients that may be attached at once, controllers and observers together.
 pub(crate) const CLIENTS_MAX: usize = 32;
+/// Control requests of one client that may be unread: a heartbeat and one that is waited for.
+const CONTROL_ACTIVE: usize = 2;
 /// Longest time anybody sleeps without looking around.
 pub(crate) const SLICE: Duration = Duration::from_millis(50);
 
@@ -335,7 +337,7 @@ pub(crate) fn responder<S: Service>(
         .max_clients(CLIENTS_MAX)
         .max_servers(1)
         .max_nodes(CLIENTS_MAX + 1)
-        .max_active_requests_per_client(1)
+        .max_active_requests_per_client(CONTROL_ACTIVE)
         .max_loaned_requests(1)
         .max_response_buffer_size(1)
         .max_borrowed_responses_per_pending_response(1)

@@ -1,0 +1,93 @@
+//! A command at the daemon: copied once, then checked; nothing is read from shared memory twice.
+
+use crate::controller::MASK;
+use crate::{CommandHeader, Dtype, Op, Row, Table};
+
+/// The last command received.
+#[derive(Debug)]
+pub struct Inbox {
+    pub(super) header: CommandHeader,
+    pub(super) op: Op,
+    pub(super) table: Table,
+    words: Vec<u64>,
+    used: usize,
+}
+
+/// The numbers of an array in a command.
+#[derive(Debug, Clone, Copy)]
+pub enum Numbers<'a> {
+    /// Single precision.
+    F32(&'a [f32]),
+    /// Double precision.
+    F64(&'a [f64]),
+}
+
+impl Inbox {
+    pub(super) fn new(capacity_bytes: usize) -> Inbox {
+        Inbox {
+            header: CommandHeader::default(),
+            op: Op::Forward,
+            table: Table::lay_out([]),
+            words: vec![0; capacity_bytes.div_ceil(8)],
+            used: 0,
+        }
+    }
+
+    /// Copies a payload and checks its table, unless the table is the one that was checked last.
+    pub(super) fn take(&mut self, header: CommandHeader, payload: &[u64]) -> Result<(), String> {
+        self.header = header;
+        self.used = 0;
+        self.op =
+            Op::from_wire(header.op).ok_or_else(|| format!("unknown operation {}", header.op))?;
+        let Some(words) = self.words.get_mut(..payload.len()) else {
+            return Err(format!(
+                "a command of {} bytes, at most {} fit",
+                payload.len() * 8,
+                self.words.len() * 8
+            ));
+        };
+        words.copy_from_slice(payload);
+        if !self.table.describes(words, header.rows) {
+            self.table = Table::parse(words, header.rows)?;
+        }
+        self.used = payload.len();
+        Ok(())
+    }
+
+    /// What is asked for.
+    pub fn op(&self) -> Op {
+        self.op
+    }
+
+    /// Lease and number of the command.
+    pub fn header(&self) -> &CommandHeader {
+        &self.header
+    }
+
+    /// The arrays, without the mask.
+    pub fn arrays(&self) -> impl Iterator<Item = &Row> {
+        self.table.rows().iter().filter(|row| row.name != MASK)
+    }
+
+    /// The numbers of an array; `None` when it is not of floats.
+    pub fn numbers(&self, row: &Row) -> Option<Numbers<'_>> {
+        let bytes = self.bytes(row);
+        match row.dtype {
+            Dtype::F32 => Some(Numbers::F32(bytemuck::cast_slice(bytes))),
+            Dtype::F64 => Some(Numbers::F64(bytemuck::cast_slice(bytes))),
+            _ => None,
+        }
+    }
+
+    /// The mask, one byte a world, if there is one. Its length is not checked.
+    pub fn mask(&self) -> Option<&[u8]> {
+        let row = self.table.row(MASK)?;
+        (row.dtype == Dtype::U8).then(|| self.bytes(row))
+    }
+
+    /// Bytes of an array of this command's table; the table was checked against the payload.
+    fn bytes(&self, row: &Row) -> &[u8] {
+        let bytes: &[u8] = bytemuck::cast_slice(&self.words[..self.used]);
+        &bytes[row.offset..row.offset + row.bytes]
+    }
+}

@@ -1,0 +1,105 @@
+//! The services of one lease, at the daemon.
+
+use std::time::{Duration, Instant};
+
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::prelude::{Node, PortFactory};
+
+use super::S;
+use super::memory::{reserve, slot_bytes};
+use crate::transport::{self, CommandService, CommandSubscriber, FramePublisher};
+use crate::{ProtocolError, Table};
+
+/// A holder whose heartbeats stopped for this long loses the lease when somebody else asks for it.
+const SILENCE_MAX: Duration = Duration::from_secs(2);
+/// A holder that was granted the lease and did not open its services within this time is gone.
+const JOIN_MAX: Duration = Duration::from_secs(5);
+
+/// One lease: free until somebody is granted it.
+#[derive(Debug)]
+pub(super) struct Lane {
+    pub(super) epoch: u64,
+    pub(super) holder: Option<Holder>,
+    pub(super) last_seq: u64,
+    pub(super) subscriber: CommandSubscriber<S>,
+    pub(super) publisher: FramePublisher<S>,
+    pub(super) notifier: Notifier<S>,
+    commands: CommandService<S>,
+}
+
+/// Who holds a lease.
+#[derive(Debug)]
+pub(super) struct Holder {
+    pub(super) pid: u32,
+    pub(super) since: Instant,
+    pub(super) beat: Instant,
+    joined: bool,
+}
+
+impl Lane {
+    /// Creates the services of lease `epoch` and takes the memory of its frames.
+    pub(super) fn open(
+        node: &Node<S>,
+        epoch: u64,
+        frame: &Table,
+        frames_held: usize,
+    ) -> Result<Lane, ProtocolError> {
+        let frames = transport::create_frames(node, epoch, frames_held)?;
+        let publisher = transport::frame_publisher(&frames, slot_bytes(frame) / 8)?;
+        reserve(
+            &node.config().global.prefix.to_string(),
+            publisher.id().value(),
+            "the frames of a lease",
+        )?;
+        let notifier = transport::notifier(&transport::create_event(
+            node,
+            &format!("obs/{epoch}"),
+            &[],
+        )?)?;
+        let commands = transport::create_commands(node, epoch)?;
+        let subscriber = transport::command_subscriber(&commands)?;
+        Ok(Lane {
+            epoch,
+            holder: None,
+            last_seq: 0,
+            subscriber,
+            publisher,
+            notifier,
+            commands,
+        })
+    }
+
+    pub(super) fn grant(&mut self, pid: u32) {
+        let now = Instant::now();
+        self.holder = Some(Holder {
+            pid,
+            since: now,
+            beat: now,
+            joined: false,
+        });
+    }
+
+    /// Whether the holder is gone: its publisher went, by release or because a dead process was cleaned up.
+    pub(super) fn is_over(&mut self) -> bool {
+        let publishers = self.commands.dynamic_config().number_of_publishers();
+        let Some(holder) = &mut self.holder else {
+            return false;
+        };
+        holder.joined |= publishers > 0;
+        publishers == 0 && (holder.joined || holder.since.elapsed() > JOIN_MAX)
+    }
+
+    /// Whether the holder has been silent for too long.
+    pub(super) fn is_silent(&self) -> bool {
+        self.holder
+            .as_ref()
+            .is_some_and(|holder| holder.beat.elapsed() > SILENCE_MAX)
+    }
+
+    /// Lets go of the slots of dead processes, and meets new ones.
+    pub(super) fn refresh(&self) {
+        // a client that cannot be reached is one that went: the next look at `is_over` tells
+        let _ = self.publisher.update_connections();
+    }
+}

@@ -1,0 +1,107 @@
+//! Shared memory of a daemon: how much it will take, whether that is there, and taking it for certain.
+
+use std::fs::{self, OpenOptions};
+
+use rustix::fs::{FallocateFlags, fallocate, statvfs};
+
+use crate::controller::command_bytes;
+use crate::place::SHARED_MEMORY;
+use crate::transport::{COMMAND_SLOTS, frame_slots, watch_slots};
+use crate::{Description, ProtocolError, Table};
+
+/// What the transport puts before a payload [bytes]: its header, ours, alignment.
+const SLOT_HEAD: usize = 256;
+/// Everything that does not grow with the worlds: services, connections, control messages.
+const FIXED: usize = 4 << 20;
+
+/// Room for a refusal's sentence, whatever the size of a frame [bytes].
+const REFUSAL: usize = 2048;
+
+/// Payload of a slot of the controller's service [bytes].
+pub(crate) fn slot_bytes(frame: &Table) -> usize {
+    frame.total_bytes().max(REFUSAL)
+}
+
+/// Bytes of one lease: frames, and the commands that its holder will send.
+pub(crate) fn lease_bytes(description: &Description, frame: &Table) -> usize {
+    let frames = frame_slots(description.frames_held) * (slot_bytes(frame) + SLOT_HEAD);
+    frames + COMMAND_SLOTS * (command_bytes(description) + SLOT_HEAD)
+}
+
+/// What observers see of a frame: the first worlds.
+pub(crate) fn watch_table(description: &Description, frame: &Table) -> Table {
+    Table::lay_out(frame.rows().iter().map(|row| {
+        let mut shape = row.shape.clone();
+        shape[0] = shape[0].min(description.watch_worlds);
+        (row.name.clone(), row.dtype, shape, 0)
+    }))
+}
+
+/// Bytes of everything.
+pub(crate) fn all_bytes(description: &Description, frame: &Table) -> usize {
+    let watch = watch_slots(description.frames_held)
+        * (watch_table(description, frame).total_bytes() + SLOT_HEAD);
+    lease_bytes(description, frame) + watch + FIXED
+}
+
+/// Refuses when `bytes`, and 5 % for what is not counted, do not fit; past the end, shared memory kills instead of failing.
+pub(crate) fn check(bytes: usize, what: &str) -> Result<(), ProtocolError> {
+    let status = statvfs(SHARED_MEMORY).map_err(|error| {
+        ProtocolError::transport(format!("ask for the free space of {SHARED_MEMORY}"), error)
+    })?;
+    let (free, needed) = (
+        status.f_bavail * status.f_frsize,
+        (bytes + bytes / 20) as u64,
+    );
+    if needed > free {
+        return Err(ProtocolError::SharedMemory {
+            path: SHARED_MEMORY.to_owned(),
+            free,
+            needed,
+            what: what.to_owned(),
+        });
+    }
+    Ok(())
+}
+
+/// Takes the pages of a port's data segment now, so that nobody else can: later writes cannot fail.
+pub(crate) fn reserve(prefix: &str, port: u128, what: &str) -> Result<(), ProtocolError> {
+    let path = format!("{SHARED_MEMORY}/{prefix}{port}.data");
+    let failed =
+        |error: &dyn std::fmt::Debug| ProtocolError::transport(format!("reserve {path}"), error);
+    let file = OpenOptions::new()
+        .write(true)
+        .open(&path)
+        .map_err(|error| failed(&error))?;
+    let needed = file.metadata().map_err(|error| failed(&error))?.len();
+    match fallocate(&file, FallocateFlags::empty(), 0, needed) {
+        Ok(()) => Ok(()),
+        Err(rustix::io::Errno::NOSPC) => {
+            let free = statvfs(SHARED_MEMORY).map_or(0, |status| status.f_bavail * status.f_frsize);
+            Err(ProtocolError::SharedMemory {
+                path: SHARED_MEMORY.to_owned(),
+                free,
+                needed,
+                what: what.to_owned(),
+            })
+        }
+        Err(error) => Err(failed(&error)),
+    }
+}
+
+/// Size of all files whose name begins with `stem` [bytes]; for tests and news.
+pub(crate) fn used(stem: &str) -> u64 {
+    let Ok(entries) = fs::read_dir(SHARED_MEMORY) else {
+        return 0;
+    };
+    entries
+        .flatten()
+        .filter(|entry| {
+            entry
+                .file_name()
+                .to_str()
+                .is_some_and(|name| name.starts_with(stem))
+        })
+        .filter_map(|entry| Some(entry.metadata().ok()?.len()))
+        .sum()
+}
