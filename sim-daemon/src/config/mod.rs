@@ -10,10 +10,11 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use sim_core::model::{
-    Cone, Description, ModelError, Pose, Robot, Shape, Solver, TargetMode, UrdfOptions,
+    Cone, Description, ModelError, Pose, Robot, Shape, Solver, TargetMode,
 };
 
 pub use number::{Number, PerDof};
+pub use sim_core::model::UrdfOptions;
 pub use summary::urdf_summary;
 
 /// Why a scene cannot be used.
