@@ -197,7 +197,12 @@ impl Simulation {
         self.backend.run(0, arena);
     }
 
-    fn check(
+    /// Checks what [`Simulation::command`] or [`Simulation::write`] would, without setting anything:
+    /// so that of several arrays none is set when one is wrong.
+    ///
+    /// # Errors
+    /// As theirs; `group` is the one the field must be of.
+    pub fn check(
         &self,
         field: Field,
         group: Group,
@@ -246,7 +251,11 @@ impl Simulation {
         Ok(())
     }
 
-    fn check_mask(&self, mask: Option<&[bool]>) -> Result<(), BackendError> {
+    /// Checks the length of a mask.
+    ///
+    /// # Errors
+    /// A mask of the wrong length.
+    pub fn check_mask(&self, mask: Option<&[bool]>) -> Result<(), BackendError> {
         match mask {
             Some(mask) if mask.len() != self.worlds => {
                 Err(BackendError::Mask { got: mask.len(), worlds: self.worlds })

@@ -12,6 +12,7 @@ use crate::client::{Command, Hook, Link, S, Values, lock, malformed};
 use crate::control::{Request, Response};
 use crate::frame::FrameSample;
 use crate::header::encode_row;
+use crate::host::memory::reserve;
 use crate::liveness::Peer;
 use crate::pace::{Pace, Waiting, cores};
 use crate::transport::{self, CommandPublisher, FrameService, FrameSubscriber};
@@ -82,8 +83,10 @@ impl Controller {
             let subscriber = transport::frame_subscriber(&service, 0)?;
             let listener = transport::listener(&event)?;
             // last: the daemon counts the lease as used once it sees this
-            let publisher =
-                transport::command_publisher(&transport::open_commands(node, epoch)?, words)?;
+            let commands = transport::open_commands(node, epoch)?;
+            let publisher = transport::command_publisher(&commands, words)?;
+            let prefix = node.config().global.prefix.to_string();
+            reserve(&prefix, publisher.id().value(), "the commands of a lease")?;
             Ok((service, subscriber, listener, publisher))
         });
         let (service, subscriber, listener, publisher) = match ports {

@@ -9,9 +9,7 @@ mod summary;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sim_core::model::{
-    Cone, Description, ModelError, Pose, Robot, Shape, Solver, TargetMode,
-};
+use sim_core::model::{Cone, Description, ModelError, Pose, Robot, Shape, Solver, TargetMode};
 
 pub use number::{Number, PerDof};
 pub use sim_core::model::UrdfOptions;

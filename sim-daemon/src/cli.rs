@@ -1,0 +1,155 @@
+//! The command line. Doc comments here are the help.
+
+use std::ffi::OsString;
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+use sim_protocol::{AttachOptions, Client, keep_waiting};
+
+use crate::error::DaemonError;
+use crate::session;
+
+/// Batched robot simulation, served over shared memory.
+#[derive(Debug, Parser)]
+#[command(name = "tightloop", version, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Keep the worlds of a scene and serve them to clients until stopped.
+    ///
+    /// Prints one line of JSON when clients may attach: {"ready": {…}}, or {"error": {"kind": …, "message": …}}.
+    ///
+    /// Example: tightloop serve examples/franka.toml --worlds 4096 --name franka
+    Serve(Serve),
+    /// List the daemons that run, one name a line.
+    ///
+    /// Example: tightloop list
+    List,
+    /// Stop a daemon and wait until it is gone.
+    ///
+    /// Example: tightloop stop franka
+    Stop {
+        /// Name of the daemon.
+        name: String,
+    },
+}
+
+/// Arguments of `serve` as given; `session` checks them.
+#[derive(Debug, Args)]
+pub(crate) struct Serve {
+    /// Scene file in TOML; `-` reads it from standard input, with paths relative to the working folder.
+    pub(crate) scene: PathBuf,
+
+    /// Number of worlds.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) worlds: u64,
+
+    /// Where the physics runs: cpu, or auto for the best there is.
+    #[arg(long, default_value = "auto")]
+    pub(crate) device: String,
+
+    /// Name under which clients find the daemon.
+    #[arg(long, default_value = "tightloop")]
+    pub(crate) name: String,
+
+    /// Threads of a step; one a core if left out.
+    #[arg(long)]
+    pub(crate) threads: Option<usize>,
+
+    /// Precision of state, commands and fields: f32 or f64.
+    #[arg(long, default_value = "f32")]
+    pub(crate) precision: String,
+
+    /// Fields that frames carry, separated by commas; time, step and status come with every frame.
+    #[arg(long, value_delimiter = ',', default_value = "joint_q,joint_qd,body_q")]
+    pub(crate) fields: Vec<String>,
+
+    /// Frames that a client may hold at once.
+    #[arg(long, default_value_t = 4)]
+    pub(crate) frames_held: usize,
+
+    /// Worlds that observers see: the first ones.
+    #[arg(long, default_value_t = 64)]
+    pub(crate) watch_worlds: usize,
+
+    /// End when this process, our parent, ends.
+    #[arg(long, value_name = "PID")]
+    pub(crate) parent: Option<u32>,
+
+    /// Append news to this file instead of telling them on stderr.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) log: Option<PathBuf>,
+}
+
+/// Runs a command line; the exit code is 0 done, 1 failed, 2 misused.
+pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // help and version go to stdout with code 0, mistakes to stderr with code 2: clap knows
+            let _ = error.print();
+            return error.exit_code();
+        }
+    };
+    let result = match &cli.command {
+        Command::Serve(serve) => session::run(serve),
+        Command::List => list(),
+        Command::Stop { name } => stop(name),
+    };
+    match result {
+        Ok(()) => 0,
+        Err(error) => {
+            let _ = writeln!(std::io::stderr(), "tightloop: {error}");
+            error.exit_code()
+        }
+    }
+}
+
+fn list() -> Result<(), DaemonError> {
+    for name in sim_protocol::running(None)? {
+        // whoever reads our list may stop reading
+        if writeln!(std::io::stdout(), "{name}").is_err() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+fn stop(name: &str) -> Result<(), DaemonError> {
+    let client = Client::attach(name, &AttachOptions::default(), &mut keep_waiting())?;
+    client.shutdown(&mut keep_waiting())?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn help_says_what_it_said() {
+        let mut serve = Cli::command();
+        let serve = serve
+            .find_subcommand_mut("serve")
+            .unwrap()
+            .clone()
+            .term_width(100);
+        let help = serve.clone().render_long_help().to_string();
+        assert_eq!(
+            help,
+            include_str!("serve_help.txt"),
+            "if the change is wanted, change serve_help.txt"
+        );
+    }
+}

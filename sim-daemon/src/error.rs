@@ -1,0 +1,81 @@
+//! Why a daemon does not start, or ends.
+
+use sim_core::backend::BackendError;
+use sim_core::model::ModelError;
+use sim_protocol::ProtocolError;
+
+use crate::config::ConfigError;
+
+/// Everything that ends a daemon, or keeps it from starting.
+#[derive(Debug, thiserror::Error)]
+pub enum DaemonError {
+    /// An argument is not one of those there are.
+    #[error("{argument} {value:?}: {problem}")]
+    Argument {
+        /// Which argument.
+        argument: &'static str,
+        /// What was given.
+        value: String,
+        /// What is wrong, and what would be right.
+        problem: String,
+    },
+    /// The scene cannot be read.
+    #[error("scene {name}: {problem}")]
+    Read {
+        /// The file, or "standard input".
+        name: String,
+        /// What the system says.
+        problem: String,
+    },
+    /// The scene makes no sense.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The model cannot be compiled.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The simulation cannot be built.
+    #[error(transparent)]
+    Backend(#[from] BackendError),
+    /// The wire fails.
+    #[error(transparent)]
+    Protocol(#[from] ProtocolError),
+    /// The log file cannot be written.
+    #[error("log file {path:?}: {problem}")]
+    Log {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What the system says.
+        problem: String,
+    },
+    /// The system refuses something that every system has.
+    #[error("{action}: {problem}")]
+    System {
+        /// What was tried.
+        action: &'static str,
+        /// What the system says.
+        problem: String,
+    },
+}
+
+impl DaemonError {
+    /// Class of the error, for programs: the name of the Python exception.
+    pub fn kind(&self) -> &'static str {
+        use DaemonError::*;
+        match self {
+            Argument { .. } | Protocol(ProtocolError::BadName { .. }) => "ArgumentError",
+            Backend(
+                BackendError::NoWorlds | BackendError::NoThreads | BackendError::Lanes { .. },
+            ) => "ArgumentError",
+            Backend(BackendError::Memory { .. }) | Protocol(ProtocolError::SharedMemory { .. }) => {
+                "ResourceError"
+            }
+            Read { .. } | Config(_) | Model(_) => "SceneError",
+            Backend(_) | Protocol(_) | Log { .. } | System { .. } => "LaunchError",
+        }
+    }
+
+    /// Exit code: 2 when the command line was wrong, else 1.
+    pub fn exit_code(&self) -> i32 {
+        if self.kind() == "ArgumentError" { 2 } else { 1 }
+    }
+}

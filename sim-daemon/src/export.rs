@@ -1,0 +1,288 @@
+//! Between physics and wire: the only file that knows both sim-core and sim-protocol.
+
+use sim_core::backend::{BackendError, Values};
+use sim_core::batch::{Dtype, Field, FieldDtype, FieldRow, Group, Layout};
+use sim_core::model::{Description as Scene, Model};
+use sim_core::simulation::{Options, Precision, Simulation};
+use sim_protocol::host::{Inbox, Numbers};
+use sim_protocol::{self as wire, InputInfo, Op, RefusalKind, RobotRange, Row, Table};
+
+/// Why a command is not carried out; nothing was changed.
+#[derive(Debug)]
+pub(crate) struct Refusal {
+    pub(crate) kind: RefusalKind,
+    pub(crate) reason: String,
+}
+
+/// What remains to be done for a frame once the inputs are set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Advance {
+    Step,
+    Forward,
+}
+
+/// What there is to say about a run besides its model.
+pub(crate) struct Facts<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) scene_text: String,
+    pub(crate) scene_folder: String,
+    pub(crate) device: String,
+    pub(crate) threads: usize,
+    pub(crate) frames_held: usize,
+    pub(crate) watch_worlds: usize,
+}
+
+/// The table of a frame: the layout's arena behind the field table.
+pub(crate) fn frame_table(layout: &Layout) -> Table {
+    let slots = layout.slots.iter();
+    let slots = slots.map(|slot| {
+        let name = slot.field.row().name.to_owned();
+        (name, dtype(slot.dtype), slot.shape.clone(), slot.offset)
+    });
+    Table::over_arena(slots, layout.bytes)
+}
+
+/// What clients are told; the host adds who it is.
+pub(crate) fn description(
+    model: &Model,
+    options: &Options,
+    layout: &Layout,
+    facts: Facts<'_>,
+) -> wire::Description {
+    let real = real(options.precision);
+    let input = |group| {
+        let rows = Field::ALL
+            .iter()
+            .filter(move |field| field.row().group == group);
+        rows.map(|field| InputInfo {
+            name: field.row().name.to_owned(),
+            columns: field.elements(model),
+            unit: field.row().unit.to_owned(),
+            doc: field.row().doc.to_owned(),
+        })
+        .collect()
+    };
+    wire::Description {
+        protocol: 0,
+        release: String::new(),
+        name: String::new(),
+        session: 0,
+        pid: 0,
+        worlds: options.worlds,
+        device: facts.device,
+        precision: precision_name(options.precision).to_owned(),
+        threads: facts.threads,
+        dt: model.dt(),
+        substeps: model.substeps(),
+        gravity: facts.scene.gravity,
+        dof_names: model.dof_names().to_vec(),
+        coord_names: model.coord_names().to_vec(),
+        body_names: model.body_names().to_vec(),
+        robots: model
+            .robots()
+            .iter()
+            .map(|robot| RobotRange {
+                name: robot.name.clone(),
+                dofs: [robot.dofs.start, robot.dofs.end],
+                coords: [robot.coords.start, robot.coords.end],
+                bodies: [robot.bodies.start, robot.bodies.end],
+            })
+            .collect(),
+        fields: layout
+            .slots
+            .iter()
+            .map(|slot| field_info(slot.field.row(), dtype(slot.dtype), slot.shape.clone()))
+            .collect(),
+        known_fields: Field::ALL
+            .iter()
+            .map(|field| {
+                let row = field.row();
+                let dtype = match row.dtype {
+                    FieldDtype::Real => real,
+                    FieldDtype::Fixed(fixed) => dtype(fixed),
+                };
+                field_info(row, dtype, Vec::new())
+            })
+            .collect(),
+        commands: input(Group::Command),
+        writes: input(Group::State),
+        scene: facts.scene_text,
+        scene_folder: facts.scene_folder,
+        notes: facts
+            .scene
+            .robots
+            .iter()
+            .flat_map(|robot| {
+                robot
+                    .notes
+                    .iter()
+                    .map(|note| format!("{}: {note}", robot.name))
+            })
+            .collect(),
+        frames_held: facts.frames_held,
+        watch_worlds: facts.watch_worlds.min(options.worlds),
+        schema: 0,
+    }
+}
+
+fn field_info(row: &FieldRow, dtype: wire::Dtype, shape: Vec<usize>) -> wire::FieldInfo {
+    let axes = row
+        .shape
+        .iter()
+        .map(|axis| format!(", {}", axis.name()))
+        .collect::<String>();
+    wire::FieldInfo {
+        name: row.name.to_owned(),
+        dtype,
+        shape,
+        axes: if axes.is_empty() {
+            "(worlds,)".to_owned()
+        } else {
+            format!("(worlds{axes})")
+        },
+        unit: row.unit.to_owned(),
+        doc: row.doc.to_owned(),
+    }
+}
+
+/// "f32" or "f64".
+pub(crate) fn precision_name(precision: Precision) -> &'static str {
+    match precision {
+        Precision::F32 => "f32",
+        Precision::F64 => "f64",
+    }
+}
+
+fn real(precision: Precision) -> wire::Dtype {
+    match precision {
+        Precision::F32 => wire::Dtype::F32,
+        Precision::F64 => wire::Dtype::F64,
+    }
+}
+
+fn dtype(dtype: Dtype) -> wire::Dtype {
+    match dtype {
+        Dtype::F32 => wire::Dtype::F32,
+        Dtype::F64 => wire::Dtype::F64,
+        Dtype::I32 => wire::Dtype::I32,
+        Dtype::U32 => wire::Dtype::U32,
+        Dtype::U64 => wire::Dtype::U64,
+        Dtype::U8 => wire::Dtype::U8,
+    }
+}
+
+/// Sets the inputs of a command, all of them or none, and says how to go on.
+///
+/// `mask` is scratch that is kept between calls, so that nothing is allocated.
+pub(crate) fn apply(
+    simulation: &mut Simulation,
+    inbox: &Inbox,
+    mask: &mut Vec<bool>,
+) -> Result<Advance, Refusal> {
+    let masked = match (inbox.op(), inbox.mask()) {
+        (_, None) => None,
+        (Op::Reset | Op::Write, Some(bytes)) => {
+            mask.clear();
+            mask.extend(bytes.iter().map(|&byte| byte != 0));
+            Some(mask.as_slice())
+        }
+        (op, Some(_)) => {
+            return Err(refusal(
+                RefusalKind::Malformed,
+                format!("{op:?} takes no mask"),
+            ));
+        }
+    };
+    match inbox.op() {
+        Op::Step | Op::Write => {
+            // one array is checked as it is set; of several, none may be set before all are checked
+            let alone = inbox.arrays().nth(1).is_none();
+            for row in inbox.arrays().filter(|_| !alone) {
+                let (field, columns, values) = input(simulation, inbox, row)?;
+                let group = if inbox.op() == Op::Step {
+                    Group::Command
+                } else {
+                    Group::State
+                };
+                simulation.check(field, group, &columns, values)?;
+            }
+            if let Some(mask) = masked {
+                simulation.check_mask(Some(mask))?;
+            }
+            for row in inbox.arrays() {
+                let (field, columns, values) = input(simulation, inbox, row)?;
+                match inbox.op() {
+                    Op::Step => simulation.command(field, columns, values)?,
+                    _ => simulation.write(field, columns, values, masked)?,
+                }
+            }
+        }
+        Op::Reset => simulation.reset(masked)?,
+        Op::Forward => {}
+    }
+    Ok(if inbox.op() == Op::Step {
+        Advance::Step
+    } else {
+        Advance::Forward
+    })
+}
+
+/// An array of a command as the simulation takes it.
+fn input<'a>(
+    simulation: &Simulation,
+    inbox: &'a Inbox,
+    row: &Row,
+) -> Result<(Field, std::ops::Range<usize>, Values<'a>), Refusal> {
+    let field = Field::named(&row.name).ok_or_else(|| {
+        refusal(
+            RefusalKind::Field,
+            format!("there is no field `{}`", row.name),
+        )
+    })?;
+    let shape = |needed: String| refusal(RefusalKind::Shape, format!("`{}`: {needed}", row.name));
+    let [worlds, columns] = row.shape[..] else {
+        return Err(shape(format!(
+            "an array (worlds, columns) is needed, this one has {} axes",
+            row.shape.len()
+        )));
+    };
+    if worlds != simulation.worlds() {
+        return Err(shape(format!(
+            "{worlds} worlds given, the simulation has {}",
+            simulation.worlds()
+        )));
+    }
+    let end = row
+        .start
+        .checked_add(columns)
+        .ok_or_else(|| shape("columns out of range".to_owned()))?;
+    let values = match (inbox.numbers(row), simulation.precision()) {
+        (Some(Numbers::F32(values)), Precision::F32) => Values::F32(values),
+        (Some(Numbers::F64(values)), Precision::F64) => Values::F64(values),
+        (_, precision) => {
+            return Err(shape(format!(
+                "entries must be {}",
+                real(precision).numpy_name()
+            )));
+        }
+    };
+    Ok((field, row.start..end, values))
+}
+
+fn refusal(kind: RefusalKind, reason: String) -> Refusal {
+    Refusal { kind, reason }
+}
+
+impl From<BackendError> for Refusal {
+    fn from(error: BackendError) -> Refusal {
+        let kind = match error {
+            BackendError::NotFinite { .. } => RefusalKind::NotFinite,
+            BackendError::Columns { .. }
+            | BackendError::Length { .. }
+            | BackendError::Mask { .. } => RefusalKind::Shape,
+            BackendError::Group { .. } => RefusalKind::Field,
+            _ => RefusalKind::Backend,
+        };
+        refusal(kind, error.to_string())
+    }
+}

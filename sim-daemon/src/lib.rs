@@ -1,0 +1,21 @@
+//! The process that keeps the worlds: it reads a scene, builds a simulation, and serves it to clients until stopped.
+//!
+//! [`serve`] is the whole command line as one function, so that a Python wheel can carry it.
+
+mod cli;
+pub mod config;
+mod error;
+mod export;
+mod news;
+mod server;
+mod session;
+mod watchdog;
+
+use std::ffi::OsString;
+
+pub use error::DaemonError;
+
+/// Runs the command line `args` (the program's name first) and returns its exit code: 0 done, 1 failed, 2 misused.
+pub fn serve(args: impl IntoIterator<Item = OsString>) -> i32 {
+    cli::run(args)
+}

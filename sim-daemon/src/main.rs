@@ -1,0 +1,5 @@
+//! `tightloop`: see `tightloop help`.
+
+fn main() -> std::process::ExitCode {
+    std::process::ExitCode::from(sim_daemon::serve(std::env::args_os()) as u8)
+}

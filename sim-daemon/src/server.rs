@@ -1,0 +1,36 @@
+//! The loop of a daemon: one command in, one frame out.
+
+use std::time::Instant;
+
+use sim_core::simulation::Simulation;
+use sim_protocol::host::{Host, Next};
+
+use crate::error::DaemonError;
+use crate::export::{self, Advance};
+
+/// Serves until somebody asks to end.
+pub(crate) fn run(mut simulation: Simulation, mut host: Host) -> Result<(), DaemonError> {
+    let mut mask = Vec::with_capacity(simulation.worlds());
+    let mut scratch = Vec::new();
+    loop {
+        match host.next()? {
+            Next::Command => {
+                let started = Instant::now();
+                match export::apply(&mut simulation, host.inbox(), &mut mask) {
+                    Ok(Advance::Step) => host.answer(started, |arena| simulation.step(arena))?,
+                    Ok(Advance::Forward) => {
+                        host.answer(started, |arena| simulation.forward(arena))?
+                    }
+                    Err(refusal) => host.refuse(refusal.kind, &refusal.reason)?,
+                }
+            }
+            Next::Watch => {
+                // nobody steps now, so there is time to evaluate what observers have not seen
+                scratch.resize(simulation.layout().bytes.div_ceil(8), 0);
+                simulation.forward(&mut scratch);
+                host.show(&scratch)?;
+            }
+            Next::End => return Ok(()),
+        }
+    }
+}
