@@ -1,1 +1,3 @@
-//! The GPU: recorded programs (see `lane::record`) as WGSL.
+//! The GPU: the one text of physics, recorded for a model and printed as compute shaders.
+
+pub mod program;

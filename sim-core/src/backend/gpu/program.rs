@@ -1,0 +1,289 @@
+//! A recording as a WGSL compute shader: one world a thread, one `let` a value.
+//!
+//! Memory is a structure of arrays with the world innermost, so that neighbouring threads touch
+//! neighbouring numbers. The number of worlds and the size of a workgroup are constants of the
+//! pipeline (`worlds`, `workgroup`): the program's text depends on neither.
+//!
+//! Binding 0 holds the fields: input i is `fields[inputs[i] * worlds + world]`. Binding 1 holds the
+//! rows: number k of row r of a table is `scratch[(base + r * stride + k) * worlds + world]`, and is
+//! declared only where a table is used.
+//!
+//! What WGSL leaves open: an implementation may fuse a product with a sum, treat numbers below
+//! 2^-126 as 0, and assume that nothing is infinite or not a number. An infinite constant is
+//! therefore printed as the largest finite number of its sign; one that is not a number was refused
+//! by the recorder.
+
+use crate::lane::record::Recording;
+use crate::lane::record::tree::{Binary, Cell, Op, Operand, Rounds, Row, Statement, Unary};
+use std::fmt::{self, Write};
+
+/// What a program is called and where it finds its numbers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ProgramOptions {
+    /// Name of the entry point.
+    pub entry: String,
+    /// Threads of a workgroup, unless the pipeline overrides `workgroup`.
+    pub workgroup: u32,
+    /// Field of each input; none: 0, 1, 2, …
+    pub inputs: Option<Vec<u32>>,
+    /// Field of each output; none: the fields after the inputs'. It may be that of an input: all
+    /// inputs are read before any output is written.
+    pub outputs: Option<Vec<u32>>,
+}
+
+impl Default for ProgramOptions {
+    fn default() -> ProgramOptions {
+        ProgramOptions {
+            entry: "main".to_owned(),
+            workgroup: 32,
+            inputs: None,
+            outputs: None,
+        }
+    }
+}
+
+/// The recording as WGSL.
+///
+/// # Panics
+/// If `inputs` or `outputs` does not give a field for each of the recording's.
+pub fn wgsl(recording: &Recording, options: &ProgramOptions) -> String {
+    let n = recording.inputs() as u32;
+    let fields = |given: &Option<Vec<u32>>, first: u32, count: usize| {
+        let fields = given
+            .clone()
+            .unwrap_or_else(|| (first..first + count as u32).collect());
+        assert_eq!(
+            fields.len(),
+            count,
+            "a field for each input and output of the recording"
+        );
+        fields
+    };
+    let inputs = fields(&options.inputs, 0, recording.inputs());
+    let outputs = fields(&options.outputs, n, recording.outputs());
+    let mut printer = Printer {
+        recording,
+        text: String::new(),
+        indent: 1,
+    };
+    printer
+        .program(options, &inputs, &outputs)
+        .expect("writing to a string does not fail");
+    printer.text
+}
+
+struct Printer<'a> {
+    recording: &'a Recording,
+    text: String,
+    indent: usize,
+}
+
+/// Writes one line, indented.
+macro_rules! line {
+    ($printer:ident, $($arg:tt)*) => {{
+        for _ in 0..$printer.indent {
+            $printer.text.push_str("    ");
+        }
+        writeln!($printer.text, $($arg)*)
+    }};
+}
+
+impl Printer<'_> {
+    fn program(
+        &mut self,
+        options: &ProgramOptions,
+        inputs: &[u32],
+        outputs: &[u32],
+    ) -> fmt::Result {
+        writeln!(self.text, "override worlds: u32;")?;
+        writeln!(
+            self.text,
+            "override workgroup: u32 = {}u;",
+            options.workgroup
+        )?;
+        writeln!(
+            self.text,
+            "@group(0) @binding(0) var<storage, read_write> fields: array<f32>;"
+        )?;
+        if self.recording.scratch() > 0 {
+            writeln!(
+                self.text,
+                "@group(0) @binding(1) var<storage, read_write> scratch: array<f32>;"
+            )?;
+        }
+        writeln!(self.text, "\n@compute @workgroup_size(workgroup)")?;
+        writeln!(
+            self.text,
+            "fn {}(@builtin(global_invocation_id) thread: vec3<u32>) {{",
+            options.entry
+        )?;
+        line!(self, "let world = thread.x;")?;
+        line!(self, "if (world >= worlds) {{ return; }}")?;
+        for i in self.recording.live_inputs() {
+            line!(
+                self,
+                "let x{i} = fields[{}u * worlds + world];",
+                inputs[i as usize]
+            )?;
+        }
+        self.block(&self.recording.body)?;
+        for (x, field) in self.recording.outputs.iter().zip(outputs) {
+            line!(
+                self,
+                "fields[{field}u * worlds + world] = {};",
+                self.operand(*x)
+            )?;
+        }
+        writeln!(self.text, "}}")
+    }
+
+    fn block(&mut self, body: &[Statement]) -> fmt::Result {
+        for statement in body {
+            self.statement(statement)?;
+        }
+        Ok(())
+    }
+
+    fn nested(&mut self, body: &[Statement]) -> fmt::Result {
+        self.indent += 1;
+        self.block(body)?;
+        self.indent -= 1;
+        line!(self, "}}")
+    }
+
+    /// v: variable, n: rows of a list, i: index of a loop or fresh row, t: value, x: input.
+    fn statement(&mut self, statement: &Statement) -> fmt::Result {
+        match statement {
+            Statement::Let(number) => {
+                let op = self.recording.values[*number as usize];
+                if op.is_inline() {
+                    return Ok(());
+                }
+                line!(self, "let t{number} = {};", self.op(op))
+            }
+            Statement::Var { name, value } => {
+                line!(self, "var v{name} = {};", self.operand(*value))
+            }
+            Statement::Set { name, value } => {
+                line!(self, "v{name} = {};", self.operand(*value))
+            }
+            Statement::Store { cell, value } => {
+                line!(self, "{} = {};", scratch(cell), self.operand(*value))
+            }
+            Statement::List { name } => line!(self, "var n{name} = 0u;"),
+            Statement::When { mask, body } => {
+                line!(self, "if ({}) {{", self.operand(*mask))?;
+                self.nested(body)
+            }
+            Statement::Push {
+                list,
+                capacity,
+                row,
+                mask,
+                body,
+            } => {
+                line!(self, "if ({}) {{", self.operand(*mask))?;
+                self.indent += 1;
+                if !body.is_empty() {
+                    line!(self, "let i{row} = n{list};")?;
+                }
+                line!(self, "n{list} = n{list} + 1u;")?;
+                if !body.is_empty() {
+                    line!(self, "if (i{row} < {capacity}u) {{")?;
+                    self.nested(body)?;
+                }
+                self.indent -= 1;
+                line!(self, "}}")
+            }
+            Statement::Loop {
+                index: i,
+                rounds,
+                body,
+            } => {
+                let end = match rounds {
+                    Rounds::Times(n) => format!("{n}u"),
+                    Rounds::Rows { list, capacity } => {
+                        line!(self, "let end{i} = min(n{list}, {capacity}u);")?;
+                        format!("end{i}")
+                    }
+                };
+                line!(self, "for (var i{i} = 0u; i{i} < {end}; i{i}++) {{")?;
+                self.nested(body)
+            }
+            Statement::Stop(mask) => line!(self, "if ({}) {{ break; }}", self.operand(*mask)),
+        }
+    }
+
+    fn op(&self, op: Op) -> String {
+        let x = |a: Operand| self.operand(a);
+        match op {
+            Op::Input(i) => format!("x{i}"),
+            Op::Get(name) => format!("v{name}"),
+            Op::Load(cell) => scratch(&cell),
+            Op::Count(list) => format!("f32(n{list})"),
+            Op::Unary(unary, a) => match unary {
+                Unary::Neg => format!("(-{})", x(a)),
+                Unary::Not => format!("(!{})", x(a)),
+                Unary::Sqrt => format!("sqrt({})", x(a)),
+                Unary::Abs => format!("abs({})", x(a)),
+                Unary::Round => format!("round({})", x(a)),
+            },
+            Op::Binary(binary, a, b) => {
+                let (a, b) = (x(a), x(b));
+                match binary {
+                    Binary::Add => format!("{a} + {b}"),
+                    Binary::Sub => format!("{a} - {b}"),
+                    Binary::Mul => format!("{a} * {b}"),
+                    Binary::Div => format!("{a} / {b}"),
+                    Binary::Min => format!("min({a}, {b})"),
+                    Binary::Max => format!("max({a}, {b})"),
+                    Binary::Lt => format!("{a} < {b}"),
+                    Binary::And => format!("{a} && {b}"),
+                    Binary::Or => format!("{a} || {b}"),
+                }
+            }
+            Op::Fma(a, b, c) => format!("fma({}, {}, {})", x(a), x(b), x(c)),
+            // WGSL names the value of the false case first
+            Op::Select(mask, a, b) => format!("select({}, {}, {})", x(b), x(a), x(mask)),
+        }
+    }
+
+    fn operand(&self, x: Operand) -> String {
+        match x {
+            Operand::Constant(bits) => literal(f32::from_bits(bits)),
+            Operand::Truth(mask) => mask.to_string(),
+            Operand::Value(number) => match self.recording.values[number as usize] {
+                op if op.is_inline() => self.op(op),
+                _ => format!("t{number}"),
+            },
+        }
+    }
+}
+
+fn scratch(cell: &Cell) -> String {
+    let Cell { table, row, number } = cell;
+    let first = table.base + number;
+    match row {
+        Row::At(i) => format!("scratch[{}u * worlds + world]", first + i * table.stride),
+        Row::Name(name) => {
+            format!(
+                "scratch[(i{name} * {}u + {first}u) * worlds + world]",
+                table.stride
+            )
+        }
+    }
+}
+
+/// The shortest decimal that reads back as the same `f32`; infinities as the largest number.
+fn literal(x: f32) -> String {
+    assert!(
+        !x.is_nan(),
+        "the recorder refuses constants that are not numbers"
+    );
+    let x = x.clamp(f32::MIN, f32::MAX);
+    if x < 0.0 {
+        format!("({x:?}f)")
+    } else {
+        format!("{x:?}f")
+    }
+}

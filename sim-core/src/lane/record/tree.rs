@@ -1,0 +1,169 @@
+//! What a recording is made of: values in the order they were computed, statements in blocks.
+
+use crate::lane::Table;
+
+/// What an operation reads: a constant, or a value computed before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Operand {
+    /// Bits of an `f32`, so that it can be compared and hashed.
+    Constant(u32),
+    Truth(bool),
+    /// Number of the value in [`super::Recording::values`].
+    Value(u32),
+}
+
+impl Operand {
+    /// A constant. Negative zero becomes zero, so that equal constants are the same constant.
+    pub(crate) fn number(x: f32) -> Operand {
+        Operand::Constant((x + 0.0).to_bits())
+    }
+
+    /// The constant that this is, if it is one.
+    pub(crate) fn constant(self) -> Option<f32> {
+        match self {
+            Operand::Constant(bits) => Some(f32::from_bits(bits)),
+            _ => None,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Unary {
+    Neg,
+    Sqrt,
+    Abs,
+    Round,
+    Not,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Binary {
+    Add,
+    Sub,
+    Mul,
+    Div,
+    Min,
+    Max,
+    Lt,
+    And,
+    Or,
+}
+
+/// How a value was computed. Variables, lists, loop indices and rows share one numbering: `name`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Op {
+    Input(u32),
+    /// A variable's value at this point.
+    Get(u32),
+    /// A number in scratch memory at this point.
+    Load(Cell),
+    /// Rows pushed to a list up to this point.
+    Count(u32),
+    Unary(Unary, Operand),
+    Binary(Binary, Operand, Operand),
+    /// `a * b + c`, rounded once.
+    Fma(Operand, Operand, Operand),
+    /// Mask, value where it holds, value where it does not.
+    Select(Operand, Operand, Operand),
+}
+
+impl Op {
+    /// Calls `f` with every operand.
+    pub(crate) fn each_operand(&self, mut f: impl FnMut(Operand)) {
+        match *self {
+            Op::Input(_) | Op::Get(_) | Op::Load(_) | Op::Count(_) => {}
+            Op::Unary(_, a) => f(a),
+            Op::Binary(_, a, b) => {
+                f(a);
+                f(b);
+            }
+            Op::Fma(a, b, c) | Op::Select(a, b, c) => {
+                f(a);
+                f(b);
+                f(c);
+            }
+        }
+    }
+
+    /// Is it written where it is used, instead of in a statement of its own?
+    pub(crate) fn is_inline(&self) -> bool {
+        matches!(self, Op::Unary(Unary::Neg | Unary::Not, _) | Op::Input(_))
+    }
+}
+
+/// Which row of a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Row {
+    At(usize),
+    /// The index of an open loop, or the fresh row of an open push.
+    Name(u32),
+}
+
+/// Number `number` of a row of a table in scratch memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Cell {
+    pub table: Table,
+    pub row: Row,
+    pub number: usize,
+}
+
+/// How often a loop runs at most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Rounds {
+    Times(usize),
+    /// The rows that a list holds when the loop starts.
+    Rows {
+        list: u32,
+        capacity: usize,
+    },
+}
+
+impl Rounds {
+    pub(crate) fn max(self) -> usize {
+        match self {
+            Rounds::Times(n) => n,
+            Rounds::Rows { capacity, .. } => capacity,
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Statement {
+    /// Computes a value.
+    Let(u32),
+    Var {
+        name: u32,
+        value: Operand,
+    },
+    Set {
+        name: u32,
+        value: Operand,
+    },
+    Store {
+        cell: Cell,
+        value: Operand,
+    },
+    /// An empty list.
+    List {
+        name: u32,
+    },
+    When {
+        mask: Operand,
+        body: Vec<Statement>,
+    },
+    /// Counts a row where the mask holds; the body runs where the row fits.
+    Push {
+        list: u32,
+        capacity: usize,
+        row: u32,
+        mask: Operand,
+        body: Vec<Statement>,
+    },
+    Loop {
+        index: u32,
+        rounds: Rounds,
+        body: Vec<Statement>,
+    },
+    /// Leaves the innermost loop where the mask holds.
+    Stop(Operand),
+}

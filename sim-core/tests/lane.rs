@@ -1,0 +1,359 @@
+//! The CPU machines: the same text gives the same bits whatever the width of a block.
+
+mod toy;
+
+use sim_core::lane::{Cx, Lane, Num, Table};
+use sim_core::{break_if, each, push, times, when};
+
+const POINTS: Table = Table {
+    base: 0,
+    stride: 2,
+    rows: 4,
+};
+const POINTS_SCRATCH: usize = 8;
+
+/// A text in the style of a contact solver: rows found at run time, a damped Newton iteration over
+/// them that stops by itself, and blocks. Its inputs: where the points are, and a start.
+#[inline(always)]
+fn solve<C: Cx>(cx: &mut C, x: &[C::F]) -> Vec<C::F> {
+    let c = C::F::c;
+    let mut points = cx.list(POINTS.rows);
+    for k in 0..6 {
+        let (sin, cos) = (x[0] * c(0.7) + c(f64::from(k))).sincos();
+        push!(cx, points, sin.lt(x[1]), row, {
+            cx.init(POINTS, row, 0, cos);
+            cx.init(POINTS, row, 1, sin * sin + c(0.5));
+        });
+    }
+    let mut at = cx.var(x[2]);
+    let mut rounds = cx.var(c(0.0));
+    times!(cx, 12, {
+        let here = cx.get(&at);
+        let mut slope = cx.var(here - x[2]);
+        let mut stiffness = cx.var(c(1.0));
+        each!(cx, row in points, {
+            let depth = here - cx.load(POINTS, row, 0);
+            let weight = cx.load(POINTS, row, 1);
+            let pushed = c(0.0).lt(depth);
+            when!(cx, pushed, {
+                let more = weight.fma(depth, cx.get(&slope));
+                cx.set(&mut slope, more);
+                let more = cx.get(&stiffness) + weight;
+                cx.set(&mut stiffness, more);
+            });
+        });
+        let step = cx.get(&slope).div(cx.get(&stiffness));
+        break_if!(cx, step.abs().lt(c(1e-6)));
+        cx.set(&mut at, here - step);
+        let more = cx.get(&rounds) + c(1.0);
+        cx.set(&mut rounds, more);
+    });
+    vec![cx.get(&at), cx.get(&rounds), cx.pushed(&points)]
+}
+
+fn inputs(n: usize) -> Vec<[f32; 3]> {
+    toy::worlds(&mut toy::Random(11), n)
+}
+
+fn scalar(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
+    toy::on_cpu_with(worlds, POINTS_SCRATCH, |cx, x: &[f32]| solve(cx, x))
+}
+
+#[cfg(target_arch = "x86_64")]
+mod wide {
+    use super::*;
+    use sim_core::lane::simd::{F32x8, F32x16};
+
+    #[target_feature(enable = "avx2,fma")]
+    pub fn solve_by_eight(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
+        toy::on_cpu_with(worlds, POINTS_SCRATCH, |cx, x: &[F32x8]| solve(cx, x))
+    }
+
+    #[target_feature(enable = "avx512f")]
+    pub fn solve_by_sixteen(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
+        toy::on_cpu_with(worlds, POINTS_SCRATCH, |cx, x: &[F32x16]| solve(cx, x))
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub fn run_by_eight(steps: &[toy::Step], worlds: &[[f32; toy::INPUTS]]) -> Vec<Vec<f32>> {
+        toy::on_cpu::<F32x8>(steps, worlds)
+    }
+
+    #[target_feature(enable = "avx512f")]
+    pub fn run_by_sixteen(steps: &[toy::Step], worlds: &[[f32; toy::INPUTS]]) -> Vec<Vec<f32>> {
+        toy::on_cpu::<F32x16>(steps, worlds)
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub fn sincos_by_eight(x: &[f32]) -> Vec<(f32, f32)> {
+        sincos::<F32x8>(x)
+    }
+
+    #[target_feature(enable = "avx512f")]
+    pub fn sincos_by_sixteen(x: &[f32]) -> Vec<(f32, f32)> {
+        sincos::<F32x16>(x)
+    }
+
+    pub fn has_eight() -> bool {
+        let has = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+        if !has {
+            println!("skipped: no AVX2");
+        }
+        has
+    }
+
+    pub fn has_sixteen() -> bool {
+        let has = is_x86_feature_detected!("avx512f");
+        if !has {
+            println!("skipped: no AVX-512");
+        }
+        has
+    }
+}
+
+fn bits(worlds: &[Vec<f32>]) -> Vec<Vec<u32>> {
+    worlds
+        .iter()
+        .map(|w| w.iter().map(|x| x.to_bits()).collect())
+        .collect()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn eight_worlds_a_block_equal_one_bitwise() {
+    if wide::has_eight() {
+        // 27: a block that is not full, too
+        let worlds = inputs(27);
+        // SAFETY: the machine has the features, as was just asked
+        let eight = unsafe { wide::solve_by_eight(&worlds) };
+        assert_eq!(bits(&eight), bits(&scalar(&worlds)));
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn sixteen_worlds_a_block_equal_one_bitwise() {
+    if wide::has_sixteen() {
+        let worlds = inputs(75);
+        // SAFETY: the machine has the features, as was just asked
+        let sixteen = unsafe { wide::solve_by_sixteen(&worlds) };
+        assert_eq!(bits(&sixteen), bits(&scalar(&worlds)));
+    }
+}
+
+#[test]
+fn the_text_of_these_tests_takes_every_path() {
+    let results = scalar(&inputs(200));
+    let column = |k: usize| results.iter().map(move |r| r[k]);
+    assert!(column(1).any(|rounds| rounds == 0.0) && column(1).any(|rounds| rounds >= 3.0));
+    assert!(column(2).any(|pushed| pushed == 0.0), "an empty list");
+    assert!(
+        column(2).any(|pushed| pushed > POINTS.rows as f32),
+        "a list that overflows"
+    );
+}
+
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn order_of_worlds_does_not_change_their_bits() {
+    let worlds = inputs(64);
+    let order: Vec<usize> = (0..64).map(|i| (i * 37 + 5) % 64).collect();
+    let permuted: Vec<_> = order.iter().map(|i| worlds[*i]).collect();
+    let check = |straight: Vec<Vec<f32>>, other: Vec<Vec<f32>>| {
+        for (i, result) in order.iter().zip(&other) {
+            assert_eq!(bits(std::slice::from_ref(result)), bits(&straight[*i..=*i]));
+        }
+    };
+    if wide::has_eight() {
+        // SAFETY: the machine has the features, as was just asked
+        unsafe {
+            check(
+                wide::solve_by_eight(&worlds),
+                wide::solve_by_eight(&permuted),
+            )
+        };
+    }
+    if wide::has_sixteen() {
+        // SAFETY: the machine has the features, as was just asked
+        unsafe {
+            check(
+                wide::solve_by_sixteen(&worlds),
+                wide::solve_by_sixteen(&permuted),
+            )
+        };
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn random_programs_agree_bitwise_in_every_width() {
+    for seed in 0..300 {
+        let mut random = toy::Random(seed + 1000);
+        let steps = toy::program(&mut random, 3, 4, 12);
+        let worlds = toy::worlds::<{ toy::INPUTS }>(&mut random, 40);
+        let one = bits(&toy::on_cpu::<f32>(&steps, &worlds));
+        if wide::has_eight() {
+            // SAFETY: the machine has the features, as was just asked
+            let eight = unsafe { wide::run_by_eight(&steps, &worlds) };
+            assert_eq!(bits(&eight), one, "8 worlds, seed {seed}: {steps:#?}");
+        }
+        if wide::has_sixteen() {
+            // SAFETY: the machine has the features, as was just asked
+            let sixteen = unsafe { wide::run_by_sixteen(&steps, &worlds) };
+            assert_eq!(bits(&sixteen), one, "16 worlds, seed {seed}: {steps:#?}");
+        }
+    }
+}
+
+#[test]
+fn f32_agrees_with_f64() {
+    let worlds = inputs(500);
+    let double: Vec<[f64; 3]> = worlds.iter().map(|w| w.map(f64::from)).collect();
+    let double = toy::on_cpu_with(&double, POINTS_SCRATCH, |cx, x: &[f64]| solve(cx, x));
+    for (single, double) in scalar(&worlds).iter().zip(&double) {
+        // the iteration stops where it moves by less than 1e-6; its result is at most 3, with some
+        // ten roundings behind each of six rows
+        let tolerance = 1e-6 + 60.0 * 3.0 * f64::from(f32::EPSILON) / 2.0;
+        let error = (f64::from(single[0]) - double[0]).abs();
+        assert!(error < tolerance, "{single:?} instead of {double:?}");
+        assert_eq!(f64::from(single[2]), double[2], "rows pushed");
+    }
+}
+
+/// A world that stops keeps what it had, however long its neighbours go on.
+fn countdown<C: Cx>(cx: &mut C, x: &[C::F]) -> Vec<C::F> {
+    let mut rounds = cx.var(C::F::c(0.0));
+    times!(cx, 100, {
+        break_if!(cx, x[0].lt(cx.get(&rounds) + C::F::c(1.0)));
+        let more = cx.get(&rounds) + C::F::c(1.0);
+        cx.set(&mut rounds, more);
+    });
+    vec![cx.get(&rounds)]
+}
+
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn a_world_that_stopped_does_not_move_with_its_neighbours() {
+    let worlds: Vec<[f32; 1]> = (0..48).map(|i| [(i * 7 % 48) as f32]).collect();
+    let expected: Vec<Vec<f32>> = worlds.iter().map(|x| x.to_vec()).collect();
+    let scalar = toy::on_cpu_with(&worlds, 0, |cx, x: &[f32]| countdown(cx, x));
+    assert_eq!(scalar, expected);
+    if wide::has_eight() {
+        use sim_core::lane::simd::F32x8;
+        let eight = toy::on_cpu_with(&worlds, 0, |cx, x: &[F32x8]| countdown(cx, x));
+        assert_eq!(eight, expected);
+    }
+    if wide::has_sixteen() {
+        use sim_core::lane::simd::F32x16;
+        let sixteen = toy::on_cpu_with(&worlds, 0, |cx, x: &[F32x16]| countdown(cx, x));
+        assert_eq!(sixteen, expected);
+    }
+}
+
+#[test]
+fn rows_that_do_not_fit_are_counted_and_not_stored() {
+    let table = Table {
+        base: 1,
+        stride: 1,
+        rows: 2,
+    };
+    let mut memory = vec![-1.0f64; 4];
+    let mut machine = sim_core::lane::memory::Cpu::new(&mut memory);
+    let cx = &mut machine;
+    let mut list = cx.list(2);
+    for k in 0..5 {
+        push!(cx, list, 0.5f64.lt(f64::from(k)), row, {
+            cx.init(table, row, 0, f64::from(k))
+        });
+    }
+    assert_eq!(cx.pushed(&list), 4.0);
+    let mut rounds = 0;
+    each!(cx, _row in list, { rounds += 1 });
+    assert_eq!(rounds, 2);
+    assert_eq!(memory, [-1.0, 1.0, 2.0, -1.0]);
+}
+
+fn sincos<F: Lane<Real = f32>>(x: &[f32]) -> Vec<(f32, f32)> {
+    let mut results = Vec::new();
+    for block in x.chunks(F::WIDTH) {
+        let mut padded = block.to_vec();
+        padded.resize(F::WIDTH, 0.0);
+        let (sin, cos) = F::load(&padded).sincos();
+        let (mut s, mut c) = (padded.clone(), padded);
+        sin.store(&mut s);
+        cos.store(&mut c);
+        results.extend(s.into_iter().zip(c).take(block.len()));
+    }
+    results
+}
+
+/// Random angles up to a limit, and those near multiples of π/2 and π/4, where reductions fail.
+fn angles(limit: f64) -> Vec<f64> {
+    let mut random = toy::Random(5);
+    let mut angles = vec![0.0, -0.0, 1e-30, -1e-8, limit, -limit];
+    for _ in 0..100_000 {
+        angles.push(random.unit() * limit);
+        angles.push(random.unit() * 4.0);
+    }
+    let quarters = (limit / std::f64::consts::FRAC_PI_4) as usize;
+    for _ in 0..50_000 {
+        let near = random.below(quarters) as f64 * std::f64::consts::FRAC_PI_4;
+        angles.push(near + random.unit() * near * 1e-7);
+        angles.push(near * (1.0 + f64::EPSILON * random.below(4) as f64));
+    }
+    angles
+}
+
+#[test]
+fn sincos_in_f32_is_good_to_an_ulp_of_one_up_to_ten_thousand() {
+    let angles: Vec<f32> = angles(1e4).into_iter().map(|x| x as f32).collect();
+    let mut worst = 0.0f64;
+    for (x, (sin, cos)) in angles.iter().zip(sincos::<f32>(&angles)) {
+        let (s, c) = f64::from(*x).sin_cos();
+        worst = worst
+            .max((f64::from(sin) - s).abs())
+            .max((f64::from(cos) - c).abs());
+    }
+    // half an ulp of the result's rounding, as much for the polynomial's, below 1
+    assert!(worst <= f64::from(f32::EPSILON), "{worst:e}");
+}
+
+#[test]
+fn sincos_in_f64_is_good_to_an_ulp_of_one_up_to_ten_thousand() {
+    let mut worst = 0.0f64;
+    for x in angles(1e4) {
+        let (sin, cos) = Num::sincos(x);
+        let (s, c) = x.sin_cos();
+        worst = worst.max((sin - s).abs()).max((cos - c).abs());
+    }
+    assert!(worst <= f64::EPSILON, "{worst:e}");
+}
+
+#[test]
+fn sine_near_zero_is_good_relatively() {
+    for k in -30..0 {
+        let x = 2f32.powi(k) * 1.3;
+        let (sin, cos) = Num::sincos(x);
+        assert!((f64::from(sin) / f64::from(x).sin() - 1.0).abs() < f64::from(f32::EPSILON));
+        assert!((f64::from(cos) - f64::from(x).cos()).abs() < f64::from(f32::EPSILON));
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn sincos_is_bitwise_the_same_in_every_width() {
+    let angles: Vec<f32> = angles(1e6).into_iter().map(|x| x as f32).collect();
+    let one = sincos::<f32>(&angles);
+    let same = |wide: Vec<(f32, f32)>| {
+        let bits = |(s, c): (f32, f32)| (s.to_bits(), c.to_bits());
+        wide.into_iter().zip(&one).all(|(a, b)| bits(a) == bits(*b))
+    };
+    if wide::has_eight() {
+        // SAFETY: the machine has the features, as was just asked
+        assert!(same(unsafe { wide::sincos_by_eight(&angles) }));
+    }
+    if wide::has_sixteen() {
+        // SAFETY: the machine has the features, as was just asked
+        assert!(same(unsafe { wide::sincos_by_sixteen(&angles) }));
+    }
+}

@@ -1,0 +1,45 @@
+//! The recorder: what it refuses, what it folds, and that its programs are right.
+
+mod algebra;
+mod programs;
+mod refusals;
+mod refused_blocks;
+#[path = "../toy/mod.rs"]
+mod toy;
+
+use sim_core::backend::gpu::program::{ProgramOptions, wgsl};
+use sim_core::lane::record::{Misuse, Recorded, Recorder, Recording, record};
+use sim_core::lane::{Num, Table};
+
+const TABLE: Table = Table {
+    base: 0,
+    stride: 2,
+    rows: 3,
+};
+
+fn c(x: f64) -> Recorded {
+    Num::c(x)
+}
+
+/// The recording of a text with two inputs that should be accepted; its program is valid.
+#[track_caller]
+fn accepted(text: impl FnOnce(&mut Recorder, &[Recorded]) -> Vec<Recorded>) -> Recording {
+    let recording = record(2, text).unwrap_or_else(|e| panic!("refused: {e}"));
+    toy::validated(&wgsl(&recording, &ProgramOptions::default()));
+    recording
+}
+
+/// Why a text with two inputs is refused. The error names this file, and the text still ends.
+#[track_caller]
+fn refused(text: impl FnOnce(&mut Recorder, &[Recorded]) -> Vec<Recorded>) -> Misuse {
+    let error = record(2, text).expect_err("a bad text is refused");
+    assert!(
+        error.file.contains("tests/record/") && error.line > 0,
+        "{error}"
+    );
+    error.misuse
+}
+
+fn evaluated(recording: &Recording, inputs: [f32; 2]) -> Vec<f32> {
+    recording.evaluate(&inputs, &mut [0.0; 16])
+}

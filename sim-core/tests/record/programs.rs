@@ -1,0 +1,144 @@
+//! Whole programs: their text, and their results against the scalar machine.
+
+use crate::{TABLE, accepted, c, toy};
+use sim_core::backend::gpu::program::{ProgramOptions, wgsl};
+use sim_core::lane::record::{Recorded, record};
+use sim_core::lane::{Cx, Num};
+
+#[test]
+fn constants_read_back_from_the_program_bit_for_bit() {
+    let mut random = toy::Random(1);
+    let mut constants = vec![
+        1e-5f32,
+        f32::MIN_POSITIVE,
+        f32::MAX,
+        -f32::MAX,
+        1e-44,
+        -0.1,
+        16777216.0,
+    ];
+    constants.extend(
+        std::iter::repeat_with(|| f32::from_bits(random.bits() as u32))
+            .filter(|x| x.is_finite())
+            .take(1000),
+    );
+    let recording = record(1, |_, x| {
+        constants
+            .iter()
+            .map(|k| x[0].max(Recorded::k(*k)))
+            .collect()
+    });
+    let recording = recording.expect("constants are recorded");
+    let module = toy::validated(&wgsl(&recording, &ProgramOptions::default()));
+    let mut found = std::collections::HashSet::new();
+    for (_, expression) in module.entry_points[0].function.expressions.iter() {
+        if let naga::Expression::Literal(naga::Literal::F32(x)) = expression {
+            found.insert(x.to_bits());
+        }
+    }
+    for k in constants {
+        let bits = k.to_bits();
+        // a negative number may be the negation of a literal
+        assert!(
+            found.contains(&bits) || found.contains(&(-k).to_bits()),
+            "{k:?}"
+        );
+    }
+}
+
+#[test]
+fn infinite_constants_become_the_largest_numbers() {
+    let good = accepted(|_, x| {
+        let infinity = Recorded::k(f32::INFINITY);
+        vec![
+            x[0].min(infinity),
+            x[0].max(-infinity),
+            Num::select(x[0].lt(x[1]), infinity, x[0]),
+        ]
+    });
+    let program = wgsl(&good, &ProgramOptions::default());
+    assert_eq!(good.statements().lets, 2, "a limit at infinity is none");
+    assert!(
+        program.contains("3.4028235e38f") && !program.contains("inf"),
+        "{program}"
+    );
+}
+
+#[test]
+fn fields_and_names_of_a_program_are_the_callers() {
+    let recording = accepted(|cx, x| {
+        let row = cx.at(1);
+        cx.store(TABLE, row, 1, x[1]);
+        vec![x[0] + x[1]]
+    });
+    let options = ProgramOptions {
+        entry: "kinematics".to_owned(),
+        workgroup: 64,
+        inputs: Some(vec![12, 7]),
+        outputs: Some(vec![12]),
+    };
+    let program = wgsl(&recording, &options);
+    let module = toy::validated(&program);
+    assert_eq!(module.entry_points[0].name, "kinematics");
+    for line in [
+        "override workgroup: u32 = 64u;",
+        "if (world >= worlds) { return; }",
+        "let x1 = fields[7u * worlds + world];",
+        "scratch[3u * worlds + world] = x1;",
+        "fields[12u * worlds + world] = t2;",
+    ] {
+        assert!(program.contains(line), "{line} is not in\n{program}");
+    }
+}
+
+#[test]
+fn random_programs_evaluate_as_scalar_f32_runs() {
+    let mut loops = 0;
+    for seed in 0..300 {
+        let mut random = toy::Random(seed);
+        let steps = toy::program(&mut random, 3, 4, 12);
+        let worlds = toy::worlds::<{ toy::INPUTS }>(&mut random, 24);
+        let scalar = toy::on_cpu::<f32>(&steps, &worlds);
+        let recording = toy::recorded(&steps);
+        loops += recording.statements().loops;
+        toy::validated(&wgsl(&recording, &ProgramOptions::default()));
+        for (world, expected) in worlds.iter().zip(&scalar) {
+            let got = recording.evaluate(world, &mut [0.0; toy::SCRATCH]);
+            let same = got
+                .iter()
+                .zip(expected)
+                .all(|(a, b)| toy::bits(*a) == toy::bits(*b));
+            assert!(
+                same,
+                "seed {seed}: {got:?}, not {expected:?} from {world:?}, {steps:#?}"
+            );
+        }
+    }
+    assert!(loops > 1000, "the programs have loops: {loops}");
+}
+
+#[test]
+fn recording_twice_gives_the_same_program() {
+    let steps = toy::program(&mut toy::Random(3), 3, 4, 12);
+    let options = ProgramOptions::default();
+    assert_eq!(
+        wgsl(&toy::recorded(&steps), &options),
+        wgsl(&toy::recorded(&steps), &options)
+    );
+}
+
+#[test]
+fn five_thousand_statements_are_recorded_in_milliseconds() {
+    // 100 ms leaves a factor of ten or more for a busy machine (4 ms when alone)
+    let start = std::time::Instant::now();
+    let recording = accepted(|_, x| {
+        let mut sum = x[0];
+        for k in 0..5000 {
+            sum = sum.fma(x[k % 2], c(k as f64));
+        }
+        vec![sum]
+    });
+    let taken = start.elapsed();
+    assert!(recording.statements().total() >= 5000);
+    assert!(taken.as_millis() < 100, "{taken:?}, validation included");
+}
