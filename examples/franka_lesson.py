@@ -26,7 +26,7 @@ from matplotlib import pyplot as plt
 
 HERE = Path(__file__).parent
 REFERENCE = HERE.parent / "tests/data"
-URDF = HERE / "assets/fr3/fr3_hand.urdf"
+URDF = HERE / "assets/fr3/fr3_franka_hand.urdf"
 
 FRAMES = 180  # 3 s at 60 Hz
 # float32 values, as the reference has them. The fingers start outside their limit, and settle.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import json
 import subprocess
 import sys
 from pathlib import Path
@@ -49,15 +48,6 @@ def test_the_command_line_speaks():
         assert done.returncode == 0 and "--worlds" in done.stdout
         done = subprocess.run([*command, "serve"], capture_output=True, text=True, check=False)
         assert done.returncode == 2 and "SCENE" in done.stderr
-
-
-def test_stubs_and_field_table_name_the_same_fields():
-    stubs = ast.parse((PACKAGE / "_core.pyi").read_text())
-    frame = next(node for node in stubs.body if isinstance(node, ast.ClassDef) and node.name == "Frame")
-    named = [
-        node.target.id for node in frame.body if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)
-    ]
-    assert named == [field["name"] for field in json.loads(_core.known_fields())]
 
 
 def test_stubs_and_module_name_the_same_things():

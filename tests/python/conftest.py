@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import tightloop as tl
 
 REPOSITORY = Path(__file__).parents[2]
-URDF = REPOSITORY / "examples/assets/fr3/fr3_hand.urdf"
+URDF = REPOSITORY / "examples/assets/fr3/fr3_franka_hand.urdf"
 
 # The lesson's start state and drives, float32 values as the recorded reference has them
 START = np.float32(

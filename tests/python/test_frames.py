@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import gc
 import os
 import signal
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -108,6 +110,15 @@ def test_a_field_that_was_not_asked_for_is_named_with_those_that_were(pendulum):
         assert not hasattr(frame, "mass_matrix")
         with pytest.raises(tl.UnknownField, match=r"joint_qd.*joint_q.*fields"):
             _ = frame.joint_qd
+
+
+def test_stubs_and_field_table_name_the_same_fields(pendulum):
+    stubs = ast.parse((Path(tl.__file__).parent / "_core.pyi").read_text())
+    frame = next(node for node in stubs.body if isinstance(node, ast.ClassDef) and node.name == "Frame")
+    targets = [node.target for node in frame.body if isinstance(node, ast.AnnAssign)]
+    with tl.launch(pendulum, worlds=1) as sim:
+        known = [field["name"] for field in sim.info["known_fields"]]
+    assert [target.id for target in targets if isinstance(target, ast.Name)] == known
 
 
 def test_reset_of_some_worlds_leaves_the_others(pendulum):

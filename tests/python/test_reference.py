@@ -30,7 +30,7 @@ def recorded(name: str) -> NDArray[np.float64]:
 
 def urdfs() -> list[Path]:
     """The project's own description, and the published one where it is present."""
-    own = REPOSITORY / "examples/assets/fr3/fr3_hand.urdf"
+    own = REPOSITORY / "examples/assets/fr3/fr3_franka_hand.urdf"
     published = SHARED / "fr3_franka_hand/urdf/fr3_franka_hand.urdf"
     return [own, published] if published.exists() else [own]
 

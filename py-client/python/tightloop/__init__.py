@@ -2,7 +2,7 @@
 
 >>> import tightloop as tl
 >>> scene = tl.Scene(dt=1 / 480, substeps=8)
->>> arm = scene.add_urdf("fr3_hand.urdf", name="arm")
+>>> arm = scene.add_urdf("fr3_franka_hand.urdf", name="arm")
 >>> with tl.launch(scene, worlds=4096) as sim:
 ...     frame = sim.step(joint_f={"arm": torques})
 ...     frame.joint_q                      # (4096, 9), a view of shared memory

@@ -34,7 +34,7 @@ def number(what: str, value: SupportsFloat, *, above: float | None = None, least
     return checked
 
 
-def integer(what: str, value: SupportsIndex, *, least: int, error: type[Exception] = SceneError) -> int:
+def integer(what: str, value: SupportsIndex, *, least: int = 1, error: type[Exception] = SceneError) -> int:
     """An int, at least a bound; floats are refused even when they are whole."""
     try:
         checked = operator.index(value)
@@ -69,11 +69,10 @@ def name(what: str, given: str, taken: Sequence[str]) -> str:
     return given
 
 
-def choice(what: str, given: Any, known: Sequence[str], *, error: type[Exception] = SceneError) -> str:
+def choice(what: str, given: Any, known: Sequence[str]) -> None:
     """One of a list of words."""
     if given not in known:
-        raise error(f"unknown {what} {given!r}; choose one of {', '.join(map(repr, known))}")
-    return given
+        raise SceneError(f"unknown {what} {given!r}; choose one of {', '.join(map(repr, known))}")
 
 
 def _numbers(what: str, values: Vector, count: int) -> tuple[float, ...]:

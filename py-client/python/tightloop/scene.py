@@ -62,7 +62,7 @@ class Scene:
 
     def __init__(self, *, dt: float = 1 / 480, substeps: int = 8, gravity: Vector = (0.0, 0.0, -9.81)) -> None:
         self.dt = checks.number("Scene: dt", dt, above=0.0)
-        self.substeps = checks.integer("Scene: substeps", substeps, least=1)
+        self.substeps = checks.integer("Scene: substeps", substeps)
         self.gravity = checks.triple("Scene: gravity", gravity)
         self.robots: dict[str, Robot] = {}
         self.shapes: dict[str, StaticShape] = {}
@@ -88,8 +88,8 @@ class Scene:
         """
         checks.choice("cone", cone, ("elliptic", "pyramidal"))
         self._solver = Solver(
-            iterations=checks.integer("solver: iterations", iterations, least=1),
-            ls_iterations=checks.integer("solver: ls_iterations", ls_iterations, least=1),
+            iterations=checks.integer("solver: iterations", iterations),
+            ls_iterations=checks.integer("solver: ls_iterations", ls_iterations),
             tolerance=checks.number("solver: tolerance", tolerance, least=0.0),
             cone=cone,
             impratio=checks.number("solver: impratio", impratio, above=0.0),

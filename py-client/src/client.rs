@@ -1,0 +1,150 @@
+//! A client of one daemon, as Python holds it: steps without the interpreter lock, and listens to Ctrl-C meanwhile.
+
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use pyo3::prelude::*;
+use sim_protocol::{AttachOptions, Client as Connection, Description, Hook, ProtocolError};
+
+use crate::errors::{protocol, raise};
+use crate::frame::Frame;
+use crate::input::{Axis, Inputs, Mask};
+
+/// A connection to a daemon. `tightloop.Sim` wraps it, and documents its methods.
+#[pyclass(frozen, module = "tightloop._core")]
+pub(crate) struct Client {
+    description: Arc<Description>,
+    // None once closed; a step that runs in another thread keeps its own reference until it returns
+    connection: Mutex<Option<Arc<Connection>>>,
+}
+
+#[pymethods]
+impl Client {
+    /// Attach to a daemon, and become its controller if ``lease`` is true (otherwise the first command does).
+    #[new]
+    #[pyo3(signature = (name, *, lease))]
+    fn new(py: Python<'_>, name: &str, lease: bool) -> PyResult<Client> {
+        let connection = waiting(py, |hook| {
+            let connection = Connection::attach(name, &AttachOptions::default(), hook)?;
+            if lease {
+                connection.acquire(hook)?;
+            }
+            Ok(connection)
+        })?;
+        Ok(Client {
+            description: Arc::clone(connection.description()),
+            connection: Mutex::new(Some(connection.into())),
+        })
+    }
+
+    /// What the daemon tells about itself, as JSON.
+    fn describe(&self) -> String {
+        serde_json::to_string(&*self.description).expect("a description is plain data")
+    }
+
+    fn step(
+        &self,
+        py: Python<'_>,
+        joint_f: Option<&Bound<'_, PyAny>>,
+        joint_target_q: Option<&Bound<'_, PyAny>>,
+        joint_target_qd: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Frame> {
+        let connection = self.connection(py)?;
+        let mut inputs = Inputs::new(&self.description);
+        inputs.add("joint_f", Axis::Dofs, joint_f)?;
+        inputs.add("joint_target_q", Axis::Dofs, joint_target_q)?;
+        inputs.add("joint_target_qd", Axis::Dofs, joint_target_qd)?;
+        let commands = inputs.commands()?;
+        frame(py, |hook| connection.step(&commands, hook))
+    }
+
+    fn write(
+        &self,
+        py: Python<'_>,
+        joint_q: Option<&Bound<'_, PyAny>>,
+        joint_qd: Option<&Bound<'_, PyAny>>,
+        mask: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Frame> {
+        let connection = self.connection(py)?;
+        let mut inputs = Inputs::new(&self.description);
+        inputs.add("joint_q", Axis::Coords, joint_q)?;
+        inputs.add("joint_qd", Axis::Dofs, joint_qd)?;
+        let mask = Mask::new(mask, self.description.worlds)?;
+        let (commands, mask) = (inputs.commands()?, mask.as_slice()?);
+        frame(py, |hook| connection.write(&commands, mask, hook))
+    }
+
+    fn reset(&self, py: Python<'_>, mask: Option<&Bound<'_, PyAny>>) -> PyResult<Frame> {
+        let connection = self.connection(py)?;
+        let mask = Mask::new(mask, self.description.worlds)?;
+        let mask = mask.as_slice()?;
+        frame(py, |hook| connection.reset(mask, hook))
+    }
+
+    fn forward(&self, py: Python<'_>) -> PyResult<Frame> {
+        let connection = self.connection(py)?;
+        frame(py, |hook| connection.forward(hook))
+    }
+
+    /// Give the lease back and end the connection; calls after it raise ``SimClosed``.
+    fn close(&self, py: Python<'_>) {
+        let connection = self
+            .connection
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
+        py.detach(|| drop(connection));
+    }
+}
+
+impl Client {
+    fn connection(&self, py: Python<'_>) -> PyResult<Arc<Connection>> {
+        let connection = self
+            .connection
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        connection.clone().ok_or_else(|| {
+            let name = &self.description.name;
+            raise(
+                py,
+                "SimClosed",
+                format!("simulation `{name}` was closed; launch or attach again"),
+            )
+        })
+    }
+}
+
+fn frame<F>(py: Python<'_>, call: F) -> PyResult<Frame>
+where
+    F: FnOnce(Hook<'_>) -> Result<sim_protocol::Frame, ProtocolError> + Send,
+{
+    Frame::new(py, waiting(py, call)?)
+}
+
+/// Runs a call that may wait, without the interpreter lock; Ctrl-C ends it with its exception.
+fn waiting<T, F>(py: Python<'_>, call: F) -> PyResult<T>
+where
+    T: Send,
+    F: FnOnce(Hook<'_>) -> Result<T, ProtocolError> + Send,
+{
+    let mut interrupt = None;
+    let result = py.detach(|| {
+        call(&mut || match Python::attach(|py| py.check_signals()) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(raised) => {
+                interrupt = Some(raised);
+                ControlFlow::Break(())
+            }
+        })
+    });
+    match interrupt {
+        Some(raised) => Err(raised),
+        None => result.map_err(|error| protocol(py, &error)),
+    }
+}
+
+/// Remove what a dead daemon of that name left behind; whether nothing is left, that is, false while one runs.
+#[pyfunction]
+pub(crate) fn sweep(py: Python<'_>, name: &str) -> PyResult<bool> {
+    sim_protocol::cleanup_after_death(None, name).map_err(|error| protocol(py, &error))
+}

@@ -1,0 +1,39 @@
+//! Errors as the exceptions of `tightloop.errors`.
+
+use pyo3::prelude::*;
+use pyo3::types::PyType;
+use sim_protocol::ProtocolError;
+
+/// The exception class `tightloop.errors.<class>` with a message.
+pub(crate) fn raise(py: Python<'_>, class: &str, message: impl Into<String>) -> PyErr {
+    let found = py
+        .import("tightloop.errors")
+        .and_then(|errors| errors.getattr(class))
+        .and_then(|class| Ok(class.cast_into::<PyType>()?));
+    match found {
+        Ok(class) => PyErr::from_type(class, (message.into(),)),
+        Err(error) => error,
+    }
+}
+
+/// A protocol error as the exception that a Python caller expects.
+pub(crate) fn protocol(py: Python<'_>, error: &ProtocolError) -> PyErr {
+    use ProtocolError::*;
+    let class = match error {
+        BadName { .. } => "ArgumentError",
+        NoDaemon { .. } => "UnknownDaemon",
+        ProtocolVersion { .. } | Handshake { .. } | Malformed { .. } => "ProtocolMismatch",
+        DaemonLost { .. } => "DaemonLost",
+        DaemonRestarted { .. } => "DaemonRestarted",
+        LeaseHeld { .. } => "LeaseHeld",
+        LeaseLost { .. } => "LeaseLost",
+        FramesHeld { .. } => "FramesHeld",
+        NoField { .. } => "UnknownField",
+        NotAnInput { .. } | Shape { .. } | CommandRefused { .. } => "CommandRefused",
+        SharedMemory { .. } => "ResourceError",
+        Timeout { .. } => "WaitTimeout",
+        Root { .. } | NameTaken { .. } => "LaunchError",
+        _ => "TransportError",
+    };
+    raise(py, class, error.to_string())
+}

@@ -1,0 +1,128 @@
+//! Frames: read-only NumPy views of shared memory that keep their sample alive.
+
+use std::sync::{Mutex, PoisonError};
+
+use numpy::ndarray::{ArrayViewD, IxDyn};
+use numpy::npyffi::flags::NPY_ARRAY_WRITEABLE;
+use numpy::{Element, PyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use sim_protocol::{Dtype, View};
+
+use crate::errors::protocol;
+
+/// What every array of a frame holds on to. The slot in shared memory is given back when the last of them goes.
+#[pyclass(frozen, module = "tightloop._core")]
+pub(crate) struct Sample(sim_protocol::Frame);
+
+/// The state of all worlds at one instant: each field is a read-only NumPy view of shared memory, worlds first.
+///
+/// A frame, and every array taken from it, stays valid and unchanged until dropped, even after the daemon died.
+/// At most ``frames_held`` frames may be alive; ``copy()`` is for those to keep.
+#[pyclass(frozen, module = "tightloop")]
+pub(crate) struct Frame {
+    // not the frame itself, which keeps the arrays made so far: that would be a circle
+    sample: Py<Sample>,
+    arrays: Mutex<Vec<(usize, Py<PyAny>)>>,
+}
+
+#[pymethods]
+impl Frame {
+    fn __getattr__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let sample = self.sample.bind(py);
+        let view = sample
+            .get()
+            .0
+            .field(name)
+            .map_err(|error| protocol(py, &error))?;
+        let key = view.ptr as usize;
+        let find = |arrays: &[(usize, Py<PyAny>)]| {
+            arrays
+                .iter()
+                .find(|(made, _)| *made == key)
+                .map(|(_, array)| array.bind(py).clone())
+        };
+        // not held while NumPy allocates, which may run other Python threads
+        if let Some(array) = find(&self.arrays()) {
+            return Ok(array);
+        }
+        let array = read_only(sample, &view);
+        self.arrays().push((key, array.clone().unbind()));
+        Ok(array)
+    }
+
+    /// The frame's arrays in memory of their own, as attributes of the same names. Takes no slot.
+    fn copy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let arrays = PyDict::new(py);
+        for view in self.sample.bind(py).get().0.fields() {
+            arrays.set_item(
+                view.name,
+                self.__getattr__(py, view.name)?.call_method0("copy")?,
+            )?;
+        }
+        py.import("tightloop.sim")?
+            .getattr("FrameCopy")?
+            .call1((arrays,))
+    }
+
+    /// Names of the fields that this frame carries.
+    #[getter]
+    fn fields(&self, py: Python<'_>) -> Vec<String> {
+        self.sample
+            .bind(py)
+            .get()
+            .0
+            .fields()
+            .map(|view| view.name.to_owned())
+            .collect()
+    }
+
+    fn __dir__(&self, py: Python<'_>) -> Vec<String> {
+        let mut names = self.fields(py);
+        names.extend(["copy", "fields"].map(str::to_owned));
+        names
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        let views = self.sample.bind(py).get().0.fields();
+        let fields: Vec<String> = views
+            .map(|view| format!("{} {:?}", view.name, view.shape))
+            .collect();
+        format!("Frame({})", fields.join(", "))
+    }
+}
+
+impl Frame {
+    pub(crate) fn new(py: Python<'_>, frame: sim_protocol::Frame) -> PyResult<Frame> {
+        Ok(Frame {
+            sample: Py::new(py, Sample(frame))?,
+            arrays: Mutex::default(),
+        })
+    }
+
+    fn arrays(&self) -> std::sync::MutexGuard<'_, Vec<(usize, Py<PyAny>)>> {
+        self.arrays.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A NumPy array over the field, which keeps the sample alive.
+fn read_only<'py>(sample: &Bound<'py, Sample>, view: &View<'_>) -> Bound<'py, PyAny> {
+    match view.dtype {
+        Dtype::F32 => array::<f32>(sample, view),
+        Dtype::F64 => array::<f64>(sample, view),
+        Dtype::I32 => array::<i32>(sample, view),
+        Dtype::U32 => array::<u32>(sample, view),
+        Dtype::U64 => array::<u64>(sample, view),
+        Dtype::U8 => array::<u8>(sample, view),
+    }
+}
+
+fn array<'py, T: Element>(sample: &Bound<'py, Sample>, view: &View<'_>) -> Bound<'py, PyAny> {
+    // SAFETY: `Table::parse` checked that the field lies inside the sample, is aligned and as long as its shape says.
+    let entries = unsafe { ArrayViewD::from_shape_ptr(IxDyn(view.shape), view.ptr.cast::<T>()) };
+    // SAFETY: the array holds `sample`, whose memory nobody writes to or gives back while it lives.
+    let array = unsafe { PyArrayDyn::borrow_from_array(&entries, sample.clone().into_any()) };
+    // SAFETY: the array is new, so nobody else looks at its flags.
+    unsafe { (*array.as_array_ptr()).fields.flags &= !NPY_ARRAY_WRITEABLE };
+    array.into_any()
+}

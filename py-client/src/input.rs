@@ -1,0 +1,194 @@
+//! What a caller gives for a command: arrays for the whole scene or by robot, made ready to be copied once.
+
+use std::ops::Range;
+
+use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyMapping};
+use sim_protocol::{Command, Description, Values};
+
+use crate::errors::raise;
+
+/// What the columns of an input are.
+#[derive(Clone, Copy)]
+pub(crate) enum Axis {
+    Dofs,
+    Coords,
+}
+
+/// The arrays of one command.
+pub(crate) struct Inputs<'a, 'py> {
+    description: &'a Description,
+    arrays: Vec<Input<'py>>,
+}
+
+struct Input<'py> {
+    field: &'static str,
+    columns: Range<usize>,
+    array: Array<'py>,
+}
+
+enum Array<'py> {
+    F32(PyReadonlyArrayDyn<'py, f32>),
+    F64(PyReadonlyArrayDyn<'py, f64>),
+}
+
+impl Input<'_> {
+    fn command(&self) -> PyResult<Command<'_>> {
+        let values = match &self.array {
+            Array::F32(array) => Values::F32(array.as_slice()?),
+            Array::F64(array) => Values::F64(array.as_slice()?),
+        };
+        Ok(Command {
+            field: self.field,
+            columns: self.columns.clone(),
+            values,
+        })
+    }
+}
+
+impl<'a, 'py> Inputs<'a, 'py> {
+    pub(crate) fn new(description: &'a Description) -> Inputs<'a, 'py> {
+        Inputs {
+            description,
+            arrays: Vec::with_capacity(3),
+        }
+    }
+
+    /// Takes an argument: nothing, an array for the whole scene, or a mapping of arrays by robot.
+    pub(crate) fn add(
+        &mut self,
+        field: &'static str,
+        axis: Axis,
+        value: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<()> {
+        let Some(value) = value else { return Ok(()) };
+        let columns = match axis {
+            Axis::Dofs => 0..self.description.dof_names.len(),
+            Axis::Coords => 0..self.description.coord_names.len(),
+        };
+        if let Some(array) = self.ready(value, &columns) {
+            self.arrays.push(Input {
+                field,
+                columns,
+                array,
+            });
+        } else if let Ok(robots) = value.cast::<PyDict>() {
+            for (name, value) in robots {
+                self.add_robot(field, axis, &name, &value)?;
+            }
+        } else if let Ok(robots) = value.cast::<PyMapping>() {
+            for item in robots.items()? {
+                let (name, value): (Bound<'py, PyAny>, Bound<'py, PyAny>) = item.extract()?;
+                self.add_robot(field, axis, &name, &value)?;
+            }
+        } else {
+            self.convert(field, None, columns, value)?;
+        }
+        Ok(())
+    }
+
+    fn add_robot(
+        &mut self,
+        field: &'static str,
+        axis: Axis,
+        name: &Bound<'py, PyAny>,
+        value: &Bound<'py, PyAny>,
+    ) -> PyResult<()> {
+        let robots = &self.description.robots;
+        let found = name
+            .extract::<&str>()
+            .ok()
+            .and_then(|name| robots.iter().find(|robot| robot.name == name));
+        let Some(robot) = found else {
+            let known: Vec<String> = robots
+                .iter()
+                .map(|robot| format!("`{}`", robot.name))
+                .collect();
+            let (known, name) = (known.join(", "), name.str()?);
+            return Err(raise(
+                name.py(),
+                "CommandRefused",
+                format!("{field}: no robot `{name}`; there are: {known}"),
+            ));
+        };
+        let [start, stop] = match axis {
+            Axis::Dofs => robot.dofs,
+            Axis::Coords => robot.coords,
+        };
+        match self.ready(value, &(start..stop)) {
+            Some(array) => self.arrays.push(Input {
+                field,
+                columns: start..stop,
+                array,
+            }),
+            None => self.convert(field, Some(&robot.name), start..stop, value)?,
+        }
+        Ok(())
+    }
+
+    /// The array itself, when it needs no conversion.
+    fn ready(&self, value: &Bound<'py, PyAny>, columns: &Range<usize>) -> Option<Array<'py>> {
+        let shape = [self.description.worlds, columns.len()];
+        if let Ok(array) = value.cast::<PyArrayDyn<f32>>() {
+            (array.shape() == shape && array.is_c_contiguous())
+                .then(|| array.try_readonly().ok().map(Array::F32))?
+        } else if let Ok(array) = value.cast::<PyArrayDyn<f64>>() {
+            (array.shape() == shape && array.is_c_contiguous())
+                .then(|| array.try_readonly().ok().map(Array::F64))?
+        } else {
+            None
+        }
+    }
+
+    /// The slow way, for everything else that NumPy can make an array of; or an error that says why not.
+    fn convert(
+        &mut self,
+        field: &'static str,
+        robot: Option<&str>,
+        columns: Range<usize>,
+        value: &Bound<'py, PyAny>,
+    ) -> PyResult<()> {
+        let arguments = (field, robot, value, self.description.worlds, columns.len());
+        let array = value
+            .py()
+            .import("tightloop.inputs")?
+            .getattr("as_array")?
+            .call1(arguments)?;
+        let array = Array::F64(array.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?);
+        self.arrays.push(Input {
+            field,
+            columns,
+            array,
+        });
+        Ok(())
+    }
+
+    /// The arrays as the protocol takes them.
+    pub(crate) fn commands(&self) -> PyResult<Vec<Command<'_>>> {
+        self.arrays.iter().map(Input::command).collect()
+    }
+}
+
+/// Which worlds a reset or a write touches.
+pub(crate) struct Mask<'py>(Option<PyReadonlyArrayDyn<'py, bool>>);
+
+impl<'py> Mask<'py> {
+    pub(crate) fn new(mask: Option<&Bound<'py, PyAny>>, worlds: usize) -> PyResult<Mask<'py>> {
+        let Some(mask) = mask else {
+            return Ok(Mask(None));
+        };
+        let checked = mask
+            .py()
+            .import("tightloop.inputs")?
+            .getattr("as_mask")?
+            .call1((mask, worlds))?;
+        Ok(Mask(Some(
+            checked.cast_into::<PyArrayDyn<bool>>()?.try_readonly()?,
+        )))
+    }
+
+    pub(crate) fn as_slice(&self) -> PyResult<Option<&[bool]>> {
+        Ok(self.0.as_ref().map(|mask| mask.as_slice()).transpose()?)
+    }
+}

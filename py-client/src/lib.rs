@@ -1,0 +1,39 @@
+//! The Python module `tightloop._core`: a client of the daemon, NumPy views of its frames, and the daemon itself.
+//!
+//! Thin on purpose: arguments are checked in Python (`python/tightloop`), numbers by the daemon. What is here is what has
+//! to be fast (a step) or has to be Rust (views of shared memory, scene files, the command line).
+
+mod client;
+mod errors;
+mod frame;
+mod input;
+mod scene;
+
+use std::ffi::OsString;
+
+use pyo3::prelude::*;
+
+/// Run the command line, such as ``["tightloop", "serve", "scene.toml"]``; returns its exit code.
+#[pyfunction]
+fn command_line(py: Python<'_>, arguments: Vec<OsString>) -> i32 {
+    py.detach(|| sim_daemon::serve(arguments))
+}
+
+#[pymodule(name = "_core")]
+mod core {
+    use super::*;
+
+    #[pymodule_export]
+    use super::client::{Client, sweep};
+    #[pymodule_export]
+    use super::command_line;
+    #[pymodule_export]
+    use super::frame::{Frame, Sample};
+    #[pymodule_export]
+    use super::scene::{load_scene, read_urdf, save_scene, scene_to_toml};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

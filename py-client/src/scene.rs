@@ -1,0 +1,56 @@
+//! Scenes as Python has them, JSON, and as files and daemons do, TOML.
+
+use std::path::{Path, PathBuf};
+
+use pyo3::prelude::*;
+use sim_daemon::config::{self, ConfigError, SceneFile, UrdfOptions};
+
+use crate::errors::raise;
+
+/// Names, defaults and notes of a URDF file as JSON, arrays in dof order.
+#[pyfunction]
+pub(crate) fn read_urdf(
+    py: Python<'_>,
+    path: PathBuf,
+    package_dirs: Vec<PathBuf>,
+    floating: bool,
+) -> PyResult<String> {
+    let options = UrdfOptions {
+        package_dirs,
+        floating,
+        ..UrdfOptions::default()
+    };
+    let summary = config::urdf_summary(&path, options);
+    summary
+        .map(|summary| summary.to_string())
+        .map_err(|error| raise(py, "UrdfError", error.to_string()))
+}
+
+/// A scene given as JSON, as TOML; paths stay as they are.
+#[pyfunction]
+pub(crate) fn scene_to_toml(py: Python<'_>, scene: &str) -> PyResult<String> {
+    Ok(from_json(py, scene)?.to_toml())
+}
+
+/// Write a scene given as JSON with absolute paths as a TOML file with paths relative to it.
+#[pyfunction]
+pub(crate) fn save_scene(py: Python<'_>, scene: &str, path: PathBuf) -> PyResult<()> {
+    from_json(py, scene)?
+        .save(&path, Path::new("/"))
+        .map_err(|error| scene_error(py, &error))
+}
+
+/// Read a TOML file as JSON; paths stay relative to the file.
+#[pyfunction]
+pub(crate) fn load_scene(py: Python<'_>, path: PathBuf) -> PyResult<String> {
+    let scene = config::load(&path).map_err(|error| scene_error(py, &error))?;
+    Ok(scene.to_json().to_string())
+}
+
+fn from_json(py: Python<'_>, scene: &str) -> PyResult<SceneFile> {
+    SceneFile::from_json(scene).map_err(|error| scene_error(py, &error))
+}
+
+fn scene_error(py: Python<'_>, error: &ConfigError) -> PyErr {
+    raise(py, "SceneError", error.to_string())
+}
