@@ -10,6 +10,7 @@ mod inertia;
 mod inverse_weight;
 mod pose;
 mod robot;
+mod tree;
 mod urdf;
 mod validate;
 

@@ -1,0 +1,128 @@
+//! The tree of links: its shape, and that all that moves weighs something.
+
+use std::collections::HashSet;
+
+use super::description::{Inertial, Joint, Robot};
+use super::error::ModelError;
+use super::inertia::{merge, principal_moments};
+use super::pose::Pose;
+
+/// Smallest mass [kg] and principal moment [kg·m²] of a moving body, MuJoCo's mjMINVAL.
+const INERTIA_MIN: f64 = 1e-15;
+
+impl Robot {
+    /// One root, one parent each, no loop.
+    pub(super) fn validate_tree(&self) -> Result<(), ModelError> {
+        let robot = || self.name.clone();
+        if self.links.is_empty() {
+            return Err(ModelError::NoLinks { robot: robot() });
+        }
+        let mut parent_joint: Vec<Option<&Joint>> = vec![None; self.links.len()];
+        for joint in &self.joints {
+            for (role, link) in [("parent", joint.parent), ("child", joint.child)] {
+                if link >= self.links.len() {
+                    return Err(ModelError::UnknownLink {
+                        robot: robot(),
+                        joint: joint.name.clone(),
+                        role,
+                        link: format!("#{link}"),
+                        known: format!("#0 to #{}", self.links.len() - 1),
+                    });
+                }
+            }
+            if let Some(first) = parent_joint[joint.child].replace(joint) {
+                return Err(ModelError::TwoParents {
+                    robot: robot(),
+                    link: self.links[joint.child].name.clone(),
+                    first: first.name.clone(),
+                    second: joint.name.clone(),
+                });
+            }
+        }
+        let roots: Vec<usize> = (0..self.links.len())
+            .filter(|&link| parent_joint[link].is_none())
+            .collect();
+        if roots.len() > 1 {
+            let roots = roots
+                .into_iter()
+                .map(|link| self.links[link].name.clone())
+                .collect();
+            return Err(ModelError::SeveralRoots {
+                robot: robot(),
+                roots,
+            });
+        }
+        let reached: HashSet<usize> = self.link_order().into_iter().collect();
+        let Some(lost) = (0..self.links.len()).find(|link| !reached.contains(link)) else {
+            return Ok(());
+        };
+        // upwards from a link that hangs from no root, the first one met twice lies on the loop
+        let up = |link: usize| parent_joint[link].map_or(link, |joint| joint.parent);
+        let mut met = HashSet::new();
+        let mut link = lost;
+        while met.insert(link) {
+            link = up(link);
+        }
+        let mut ring = vec![link];
+        while up(ring[ring.len() - 1]) != link {
+            ring.push(up(ring[ring.len() - 1]));
+        }
+        ring.reverse();
+        let links = ring
+            .into_iter()
+            .map(|link| self.links[link].name.clone())
+            .collect();
+        Err(ModelError::LinkLoop {
+            robot: robot(),
+            links,
+        })
+    }
+
+    /// Each moving link weighs something, together with the links fixed to it.
+    pub(super) fn validate_moving_mass(&self) -> Result<(), ModelError> {
+        let nothing = Inertial {
+            mass: 0.0,
+            pos: [0.0; 3],
+            inertia: [[0.0; 3]; 3],
+        };
+        let mut parent_joint: Vec<Option<&Joint>> = vec![None; self.links.len()];
+        for joint in &self.joints {
+            parent_joint[joint.child] = Some(joint);
+        }
+        // the link each one moves with, and its frame in that link's
+        let mut carrier: Vec<(usize, Pose)> = (0..self.links.len())
+            .map(|link| (link, Pose::identity()))
+            .collect();
+        let mut bodies = vec![nothing; self.links.len()];
+        let order = self.link_order();
+        for &link in &order {
+            if let Some(joint) = parent_joint[link].filter(|joint| !joint.moves()) {
+                let (body, frame) = carrier[joint.parent];
+                carrier[link] = (body, frame.mul(&joint.origin));
+            }
+            if let Some(inertial) = &self.links[link].inertial {
+                let (body, frame) = carrier[link];
+                bodies[body] = merge(&bodies[body], &frame, inertial);
+            }
+        }
+        for link in order {
+            let Some(joint) = parent_joint[link].filter(|joint| joint.moves()) else {
+                continue;
+            };
+            let lacks = if bodies[link].mass < INERTIA_MIN {
+                "mass"
+            } else if principal_moments(bodies[link].inertia)[0] < INERTIA_MIN {
+                "inertia"
+            } else {
+                continue;
+            };
+            return Err(ModelError::Massless {
+                robot: self.name.clone(),
+                link: self.links[link].name.clone(),
+                joint: joint.name.clone(),
+                lacks,
+            });
+        }
+        Ok(())
+    }
+}

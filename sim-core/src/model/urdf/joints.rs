@@ -1,0 +1,241 @@
+//! Joints of a URDF file: axes, limits, dynamics and who follows whom.
+
+use std::collections::HashMap;
+
+use roxmltree::Node;
+use urdf_rs::JointType;
+
+use super::super::description::{Joint, JointKind, Mimic};
+use super::super::error::ModelError;
+use super::reader::{Reader, pose};
+use super::scan::{children, has};
+
+impl<'a, 'input> Reader<'a, 'input> {
+    /// All joints, in file order.
+    pub(super) fn joints(&mut self, urdf: &urdf_rs::Robot) -> Result<Vec<Joint>, ModelError> {
+        let link_names: Vec<&str> = urdf.links.iter().map(|link| link.name.as_str()).collect();
+        let link_index: HashMap<&str, usize> = link_names
+            .iter()
+            .enumerate()
+            .map(|(i, &name)| (name, i))
+            .collect();
+        let mut joints = Vec::with_capacity(urdf.joints.len());
+        for (index, joint) in urdf.joints.iter().enumerate() {
+            let node = self.scan.joints[index];
+            let find = |role, name: &str| {
+                link_index
+                    .get(name)
+                    .copied()
+                    .ok_or_else(|| ModelError::UnknownLink {
+                        robot: self.robot.clone(),
+                        joint: joint.name.clone(),
+                        role,
+                        link: name.to_owned(),
+                        known: first_few(&link_names),
+                    })
+            };
+            let mut made = Joint::fixed(
+                &joint.name,
+                find("parent", &joint.parent.link)?,
+                find("child", &joint.child.link)?,
+            );
+            made.origin = pose(&joint.origin);
+            made.kind = match joint.joint_type {
+                JointType::Revolute | JointType::Continuous => JointKind::Revolute,
+                JointType::Prismatic => JointKind::Prismatic,
+                _ => JointKind::Fixed,
+            };
+            if made.moves() {
+                made.axis = self.axis(joint)?;
+                self.limits(joint, node, &mut made)?;
+                if let Some(dynamics) = &joint.dynamics {
+                    made.damping = dynamics.damping;
+                    made.friction = dynamics.friction;
+                }
+            } else {
+                for name in ["limit", "dynamics", "mimic"] {
+                    if let Some(child) = children(node, name).next() {
+                        self.scan
+                            .ignore(child, format!("<{name}> of a fixed joint"));
+                    }
+                }
+            }
+            joints.push(made);
+        }
+        self.mimics(urdf, &mut joints)?;
+        Ok(joints)
+    }
+
+    fn axis(&mut self, joint: &urdf_rs::Joint) -> Result<[f64; 3], ModelError> {
+        let axis = *joint.axis.xyz;
+        // scaled first, so that neither a tiny nor a huge axis is lost in the squares
+        let largest = axis
+            .iter()
+            .fold(0.0_f64, |largest, part| largest.max(part.abs()));
+        if largest == 0.0 {
+            return Err(ModelError::ZeroAxis {
+                robot: self.robot.clone(),
+                joint: joint.name.clone(),
+            });
+        }
+        let scaled = axis.map(|part| part / largest);
+        let scaled_length = scaled.iter().map(|part| part * part).sum::<f64>().sqrt();
+        let length = scaled_length * largest;
+        // one that is a unit to the last bits stays as it was written
+        if (length - 1.0).abs() <= 4.0 * f64::EPSILON {
+            return Ok(axis);
+        }
+        if (length - 1.0).abs() > 1e-6 {
+            self.notes.push(format!(
+                "joint `{}`: axis of length {length} is scaled to 1",
+                joint.name
+            ));
+        }
+        Ok(scaled.map(|part| part / scaled_length))
+    }
+
+    fn limits(
+        &mut self,
+        joint: &urdf_rs::Joint,
+        node: Node<'a, 'input>,
+        made: &mut Joint,
+    ) -> Result<(), ModelError> {
+        let (lower, upper) = (has(node, "limit", "lower"), has(node, "limit", "upper"));
+        let limit = &joint.limit;
+        let finite = |name: &str, value: f64| {
+            (has(node, "limit", name) && value != f64::INFINITY).then_some(value)
+        };
+        made.effort_limit = finite("effort", limit.effort);
+        made.velocity_limit = finite("velocity", limit.velocity);
+        if made.effort_limit == Some(0.0) {
+            self.notes.push(format!(
+                "joint `{}`: effort limit 0 leaves its drive without effect",
+                joint.name
+            ));
+        }
+        if joint.joint_type == JointType::Continuous {
+            if lower || upper {
+                self.scan
+                    .ignore(node, "range of a continuous joint".to_owned());
+            }
+            return Ok(());
+        }
+        if !lower && !upper {
+            let (kind, alternative) = match made.kind {
+                JointKind::Prismatic => ("prismatic", ""),
+                _ => ("revolute", ", or make it continuous"),
+            };
+            let (robot, joint) = (self.robot.clone(), joint.name.clone());
+            return Err(ModelError::NoRange {
+                robot,
+                joint,
+                kind,
+                alternative,
+            });
+        }
+        let mut range = [limit.lower, limit.upper];
+        if range == [f64::NEG_INFINITY, f64::INFINITY] {
+            return Ok(());
+        }
+        for (given, name, side) in [(lower, "lower", 0), (upper, "upper", 1)] {
+            if !given {
+                // absent ones are 0, whatever the version of the file makes of them
+                range[side] = 0.0;
+                self.notes.push(format!(
+                    "joint `{}`: no {name} limit is given, taken as 0",
+                    joint.name
+                ));
+            }
+        }
+        made.range = Some(range);
+        Ok(())
+    }
+
+    /// Followers of followers come to follow the first leader: q = o₁ + m₁ (o₂ + m₂ q_leader).
+    fn mimics(&self, urdf: &urdf_rs::Robot, joints: &mut [Joint]) -> Result<(), ModelError> {
+        let index: HashMap<&str, usize> = urdf
+            .joints
+            .iter()
+            .enumerate()
+            .map(|(i, joint)| (joint.name.as_str(), i))
+            .collect();
+        let mut direct: Vec<Option<Mimic>> = vec![None; joints.len()];
+        for (i, joint) in joints.iter().enumerate().filter(|(_, joint)| joint.moves()) {
+            let Some(mimic) = &urdf.joints[i].mimic else {
+                continue;
+            };
+            let refuse = |reason| {
+                let (robot, joint, leader) =
+                    (self.robot.clone(), joint.name.clone(), mimic.joint.clone());
+                Err(ModelError::MimicLeader {
+                    robot,
+                    joint,
+                    leader,
+                    reason,
+                })
+            };
+            let Some(&leader) = index.get(mimic.joint.as_str()) else {
+                return refuse("does not exist");
+            };
+            if leader == i {
+                return refuse("is itself");
+            }
+            if !joints[leader].moves() {
+                return refuse("is fixed");
+            }
+            let (multiplier, offset) =
+                (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
+            direct[i] = Some(Mimic {
+                joint: leader,
+                multiplier,
+                offset,
+            });
+        }
+        let mut on_chain = vec![false; joints.len()];
+        for start in 0..joints.len() {
+            // down to a joint that follows none, or whose leader is known already
+            let mut chain: Vec<(usize, Mimic)> = Vec::new();
+            let mut joint = start;
+            while let Some(mimic) = direct[joint].filter(|_| joints[joint].mimic.is_none()) {
+                if std::mem::replace(&mut on_chain[joint], true) {
+                    let circle = chain.iter().skip_while(|(member, _)| *member != joint);
+                    let joints = circle
+                        .map(|&(member, _)| joints[member].name.clone())
+                        .collect();
+                    return Err(ModelError::MimicLoop {
+                        robot: self.robot.clone(),
+                        joints,
+                    });
+                }
+                chain.push((joint, mimic));
+                joint = mimic.joint;
+            }
+            for (follower, mimic) in chain.into_iter().rev() {
+                joints[follower].mimic = Some(match joints[mimic.joint].mimic {
+                    None => mimic,
+                    Some(next) => Mimic {
+                        joint: next.joint,
+                        multiplier: mimic.multiplier * next.multiplier,
+                        offset: mimic.offset + mimic.multiplier * next.offset,
+                    },
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Enough names to see the slip, not a page of them.
+fn first_few(names: &[&str]) -> String {
+    let shown: Vec<String> = names
+        .iter()
+        .take(8)
+        .map(|name| format!("`{name}`"))
+        .collect();
+    let more = if names.len() > shown.len() {
+        ", …"
+    } else {
+        ""
+    };
+    format!("{}{more}", shown.join(", "))
+}

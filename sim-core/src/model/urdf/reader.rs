@@ -1,0 +1,206 @@
+//! Links of a URDF file, and the robot as a whole.
+
+use std::path::Path;
+
+use roxmltree::Node;
+use urdf_rs::Geometry;
+
+use super::super::description::{Collision, Inertial, Link, Robot, Shape};
+use super::super::error::ModelError;
+use super::super::pose::Pose;
+use super::UrdfOptions;
+use super::mesh::{self, Found};
+use super::scan::{Scan, children};
+
+/// Turns what urdf-rs read, and what the scan knows of presence, into a robot.
+pub(super) struct Reader<'a, 'input> {
+    pub scan: Scan<'a, 'input>,
+    pub path: &'a Path,
+    pub options: UrdfOptions,
+    /// Name of the robot, for messages.
+    pub robot: String,
+    pub notes: Vec<String>,
+}
+
+impl<'a, 'input> Reader<'a, 'input> {
+    pub fn robot(&mut self) -> Result<Robot, ModelError> {
+        self.refuse_joint_kinds()?;
+        let urdf =
+            urdf_rs::read_from_string(&self.scan.text).map_err(|error| ModelError::Urdf {
+                path: self.path.to_owned(),
+                line: 1,
+                element: "<robot>".to_owned(),
+                reason: error.to_string(),
+            })?;
+        let file_name = if urdf.name.is_empty() {
+            "robot"
+        } else {
+            &urdf.name
+        };
+        self.robot = self
+            .options
+            .name
+            .clone()
+            .unwrap_or_else(|| file_name.to_owned());
+
+        let links = self.links(&urdf)?;
+        let joints = self.joints(&urdf)?;
+        let mut notes = self.scan.notes();
+        notes.append(&mut self.notes);
+        Ok(Robot {
+            name: self.robot.clone(),
+            pose: self.options.pose.normalized(),
+            floating: self.options.floating,
+            self_collisions: self.options.self_collisions,
+            links,
+            joints,
+            notes,
+            urdf: Some(self.path.to_owned()),
+        })
+    }
+
+    /// urdf-rs names neither the joint nor the line of a kind it does not know.
+    fn refuse_joint_kinds(&self) -> Result<(), ModelError> {
+        for &node in &self.scan.joints {
+            match node.attribute("type").unwrap_or_default() {
+                "revolute" | "continuous" | "prismatic" | "fixed" => {}
+                kind @ ("floating" | "planar" | "spherical" | "ball") => {
+                    let root = node.document().root_element();
+                    let name = root.attribute("name").unwrap_or("robot");
+                    return Err(ModelError::JointKind {
+                        robot: self.options.name.clone().unwrap_or_else(|| name.to_owned()),
+                        joint: node.attribute("name").unwrap_or_default().to_owned(),
+                        kind: kind.to_owned(),
+                    });
+                }
+                kind => {
+                    let reason = format!(
+                        "type `{kind}` is unknown; use revolute, continuous, prismatic or fixed"
+                    );
+                    return Err(self.scan.fault(node, reason));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn links(&mut self, urdf: &urdf_rs::Robot) -> Result<Vec<Link>, ModelError> {
+        let mut links = Vec::with_capacity(urdf.links.len());
+        for (index, link) in urdf.links.iter().enumerate() {
+            let node = self.scan.links[index];
+            let has_inertial = children(node, "inertial").next().is_some();
+            let collision_nodes: Vec<Node> = children(node, "collision").collect();
+            let mut collisions = Vec::with_capacity(link.collision.len());
+            for (collision, &node) in link.collision.iter().zip(&collision_nodes) {
+                collisions.push(Collision {
+                    name: collision.name.clone(),
+                    pose: pose(&collision.origin),
+                    shape: self.shape(&link.name, &collision.geometry, node)?,
+                });
+            }
+            if !has_inertial && !collisions.is_empty() {
+                let name = &link.name;
+                self.notes.push(format!(
+                    "link `{name}` has collisions but no <inertial>; its mass is taken as 0"
+                ));
+            }
+            self.note_missing_visuals(&link.name, node);
+            links.push(Link {
+                name: link.name.clone(),
+                inertial: has_inertial.then(|| inertial(&link.inertial)),
+                collisions,
+            });
+        }
+        Ok(links)
+    }
+
+    fn shape(&self, link: &str, geometry: &Geometry, node: Node) -> Result<Shape, ModelError> {
+        Ok(match geometry {
+            Geometry::Box { size } => Shape::Box {
+                half_extents: size.map(|edge| 0.5 * edge),
+            },
+            Geometry::Sphere { radius } => Shape::Sphere { radius: *radius },
+            Geometry::Cylinder { radius, length } => Shape::Cylinder {
+                radius: *radius,
+                half_height: 0.5 * length,
+            },
+            Geometry::Capsule { radius, length } => Shape::Capsule {
+                radius: *radius,
+                half_height: 0.5 * length,
+            },
+            Geometry::Mesh { filename, scale } => {
+                let path = match mesh::resolve(filename, self.folder(), &self.options.package_dirs)
+                {
+                    Found::File(path) => path,
+                    Found::Missing(tried) => {
+                        let (robot, link) = (self.robot.clone(), link.to_owned());
+                        return Err(ModelError::MissingMesh {
+                            robot,
+                            link,
+                            uri: filename.clone(),
+                            tried,
+                        });
+                    }
+                    Found::Refused(rule) => {
+                        return Err(self
+                            .scan
+                            .fault(node, format!("collision mesh `{filename}`: {rule}")));
+                    }
+                };
+                Shape::Mesh {
+                    path,
+                    scale: scale.map_or([1.0; 3], |scale| *scale),
+                }
+            }
+        })
+    }
+
+    /// Visuals have no part in the physics, so a missing one is worth a note only.
+    fn note_missing_visuals(&mut self, link: &str, node: Node) {
+        let meshes = children(node, "visual")
+            .flat_map(|visual| children(visual, "geometry"))
+            .flat_map(|geometry| children(geometry, "mesh"))
+            .filter_map(|mesh| mesh.attribute("filename"));
+        for uri in meshes {
+            if !matches!(
+                mesh::resolve(uri, self.folder(), &self.options.package_dirs),
+                Found::File(_)
+            ) {
+                self.notes
+                    .push(format!("link `{link}`: visual mesh `{uri}` is missing"));
+            }
+        }
+    }
+
+    fn folder(&self) -> &'a Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+}
+
+pub(super) fn pose(origin: &urdf_rs::Pose) -> Pose {
+    Pose::from_rpy(*origin.xyz, *origin.rpy)
+}
+
+fn inertial(inertial: &urdf_rs::Inertial) -> Inertial {
+    let urdf_rs::Inertia {
+        ixx,
+        ixy,
+        ixz,
+        iyy,
+        iyz,
+        izz,
+    } = inertial.inertia;
+    let inertia = [[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]];
+    let frame = pose(&inertial.origin);
+    // without rpy the figures stay as they are written, to the bit
+    let turned = if *inertial.origin.rpy == [0.0; 3] {
+        inertia
+    } else {
+        frame.rotate_tensor(inertia)
+    };
+    Inertial {
+        mass: inertial.mass.value,
+        pos: frame.pos,
+        inertia: turned,
+    }
+}
