@@ -2,6 +2,7 @@
 
 mod build;
 mod fr3;
+mod hostile;
 mod meshes;
 mod mimic;
 mod pose;
