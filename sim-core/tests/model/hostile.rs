@@ -45,7 +45,7 @@ fn unknown_elements_nested_100_000_deep_overflow_no_stack() {
 }
 
 #[test]
-fn chain_of_10_000_links_that_follow_one_another_is_read_within_a_second() {
+fn chain_of_10_000_links_that_follow_one_another_is_read_within_5_s() {
     let mut body = link("l0", "");
     for i in 1..=10_000 {
         let mimic = format!("<mimic joint=\"j{}\" multiplier=\"-1\"/>", i + 1);
@@ -61,7 +61,7 @@ fn chain_of_10_000_links_that_follow_one_another_is_read_within_a_second() {
     let start = Instant::now();
     let robot = read(&body).unwrap();
     assert!(
-        start.elapsed() < Duration::from_secs(1),
+        start.elapsed() < Duration::from_secs(5),
         "{:?}",
         start.elapsed()
     );
