@@ -4,7 +4,7 @@
 //!     f(j) = I a + v ×* I v + Σ f(child)  c(j) = S · f(j)
 
 use super::{BlockOf, ConstantsOf};
-use crate::lane::{Cx, Num};
+use crate::lane::Cx;
 use crate::math::spatial::{
     ANGULAR, LINEAR, Spatial, cross_force_add, cross_motion, momentum, power, scale_sum, sum,
 };

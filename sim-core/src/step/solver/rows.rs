@@ -1,0 +1,180 @@
+//! Laws of the constraint rows, and sums over them.
+
+use crate::lane::Num;
+use crate::math::factor::tri;
+use crate::model::constants::Constants;
+
+/// What a row does at `jar`: force -s', stiffness s'', and which piece of s it is on.
+pub(super) struct Law<F> {
+    pub force: F,
+    pub stiffness: F,
+    pub state: F,
+}
+
+/// s = ½ D jar²
+#[inline(always)]
+pub(super) fn equality<F: Num>(jar: F, weight: F) -> Law<F> {
+    Law { force: -(weight * jar), stiffness: weight, state: F::c(0.0) }
+}
+
+/// s = ½ D jar² within the zone R × loss, beyond it a line of slope ± loss (Huber).
+#[inline(always)]
+pub(super) fn dry_friction<F: Num>(jar: F, weight: F, zone: F, loss: F) -> Law<F> {
+    let (zero, one) = (F::c(0.0), F::c(1.0));
+    let (below, above) = (jar.lt(-zone), zone.lt(jar));
+    let slides = F::or(below, above);
+    let bound = F::select(below, loss, -loss);
+    Law {
+        force: F::select(slides, bound, -(weight * jar)),
+        stiffness: F::select(slides, zero, weight),
+        state: F::select(below, -one, F::select(above, one, zero)),
+    }
+}
+
+/// s = ½ D jar² where jar < 0, else 0. A row of weight 0 is never active.
+#[inline(always)]
+pub(super) fn one_sided<F: Num>(jar: F, weight: F) -> Law<F> {
+    let zero = F::c(0.0);
+    let push = -(weight * jar);
+    let active = zero.lt(push);
+    Law {
+        force: F::select(active, push, zero),
+        stiffness: F::select(active, weight, zero),
+        state: F::select(active, F::c(1.0), zero),
+    }
+}
+
+/// jar = J a - aref
+#[inline(always)]
+pub(super) fn residual<F: Num>(m: &Constants<F::Real>, side: &[F], aref: &[F], a: &[F], jar: &mut [F]) {
+    let mut r = 0;
+    for e in &m.equalities {
+        jar[r] = F::k(e.multiplier).fnma(a[e.leader], a[e.follower]) - aref[r];
+        r += 1;
+    }
+    for f in &m.frictions {
+        jar[r] = a[f.dof] - aref[r];
+        r += 1;
+    }
+    for (l, side) in m.limits.iter().zip(side) {
+        jar[r] = side.fma(a[l.dof], -aref[r]);
+        r += 1;
+    }
+}
+
+/// Adds Jᵀ W J to the Hessian and Jᵀ (f + W J a) to the right-hand side.
+#[inline(always)]
+pub(super) fn assemble<F: Num>(
+    m: &Constants<F::Real>,
+    side: &[F],
+    weight: &[F],
+    aref: &[F],
+    jar: &[F],
+    hessian: &mut [F],
+    rhs: &mut [F],
+) {
+    let mut r = 0;
+    for e in &m.equalities {
+        let law = equality(jar[r], weight[r]);
+        let pull = law.stiffness.fma(jar[r] + aref[r], law.force);
+        let (f, l, ratio) = (e.follower, e.leader, F::k(e.multiplier));
+        let shared = law.stiffness * ratio;
+        hessian[tri(f, f)] = hessian[tri(f, f)] + law.stiffness;
+        hessian[tri(l, l)] = shared.fma(ratio, hessian[tri(l, l)]);
+        let coupling = tri(f.max(l), f.min(l));
+        hessian[coupling] = hessian[coupling] - shared;
+        rhs[f] = rhs[f] + pull;
+        rhs[l] = ratio.fnma(pull, rhs[l]);
+        r += 1;
+    }
+    for f in &m.frictions {
+        let law = dry_friction(jar[r], weight[r], F::k(f.zone), F::k(f.loss));
+        let diagonal = tri(f.dof, f.dof);
+        hessian[diagonal] = hessian[diagonal] + law.stiffness;
+        rhs[f.dof] = rhs[f.dof] + law.stiffness.fma(jar[r] + aref[r], law.force);
+        r += 1;
+    }
+    for (l, side) in m.limits.iter().zip(side) {
+        let law = one_sided(jar[r], weight[r]);
+        let diagonal = tri(l.dof, l.dof);
+        hessian[diagonal] = hessian[diagonal] + law.stiffness;
+        let pull = law.stiffness.fma(jar[r] + aref[r], law.force);
+        rhs[l.dof] = side.fma(pull, rhs[l.dof]);
+        r += 1;
+    }
+}
+
+/// How many rows are on another piece of their cost.
+#[inline(always)]
+pub(super) fn changes<F: Num>(m: &Constants<F::Real>, weight: &[F], jar: &[F], other: &[F]) -> F {
+    let mut sum = F::c(0.0);
+    let mut r = m.equalities.len();
+    for f in &m.frictions {
+        let (zone, loss) = (F::k(f.zone), F::k(f.loss));
+        let before = dry_friction(jar[r], weight[r], zone, loss).state;
+        let after = dry_friction(other[r], weight[r], zone, loss).state;
+        sum = sum + (before - after).abs();
+        r += 1;
+    }
+    for _ in &m.limits {
+        let before = one_sided(jar[r], weight[r]).state;
+        let after = one_sided(other[r], weight[r]).state;
+        sum = sum + (before - after).abs();
+        r += 1;
+    }
+    sum
+}
+
+/// Force of every row, and their sum in joint space.
+#[inline(always)]
+pub(super) fn forces<F: Num>(
+    m: &Constants<F::Real>,
+    side: &[F],
+    weight: &[F],
+    jar: &[F],
+    force: &mut [F],
+    joint: &mut [F],
+) {
+    let mut r = 0;
+    for e in &m.equalities {
+        force[r] = equality(jar[r], weight[r]).force;
+        joint[e.follower] = joint[e.follower] + force[r];
+        joint[e.leader] = F::k(e.multiplier).fnma(force[r], joint[e.leader]);
+        r += 1;
+    }
+    for f in &m.frictions {
+        force[r] = dry_friction(jar[r], weight[r], F::k(f.zone), F::k(f.loss)).force;
+        joint[f.dof] = joint[f.dof] + force[r];
+        r += 1;
+    }
+    for (l, side) in m.limits.iter().zip(side) {
+        force[r] = one_sided(jar[r], weight[r]).force;
+        joint[l.dof] = side.fma(force[r], joint[l.dof]);
+        r += 1;
+    }
+}
+
+/// Σ s(jar)
+#[inline(always)]
+pub(super) fn cost<F: Num>(m: &Constants<F::Real>, weight: &[F], jar: &[F]) -> F {
+    let half = F::c(0.5);
+    let mut sum = F::c(0.0);
+    let mut r = 0;
+    for _ in &m.equalities {
+        sum = (half * weight[r] * jar[r]).fma(jar[r], sum);
+        r += 1;
+    }
+    for f in &m.frictions {
+        let (zone, size) = (F::k(f.zone), jar[r].abs());
+        let inside = half * weight[r] * jar[r] * jar[r];
+        let outside = F::k(f.loss) * half.fnma(zone, size);
+        sum = sum + F::select(zone.lt(size), outside, inside);
+        r += 1;
+    }
+    for _ in &m.limits {
+        let push = one_sided(jar[r], weight[r]).force;
+        sum = (half * push).fnma(jar[r], sum);
+        r += 1;
+    }
+    sum
+}

@@ -1,0 +1,118 @@
+//! A world's result, bit for bit, whatever runs beside it.
+
+mod common;
+
+use common::{Demo, Run, command, lesson};
+use sim_core::backend::{Values, cpu};
+use sim_core::batch::Field;
+use sim_core::model::Model;
+use sim_core::simulation::{Lanes, Options, Precision};
+use std::sync::Arc;
+
+const FIELDS: [Field; 6] = [
+    Field::JointQ,
+    Field::JointQd,
+    Field::JointQdd,
+    Field::BodyQ,
+    Field::MassMatrix,
+    Field::EfcForce,
+];
+
+/// A number in [-1, 1) from a world's seed: no shared generator, so worlds can be moved about.
+fn noise(seed: usize, k: usize) -> f64 {
+    let mut x = (seed as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (k as u64) << 32;
+    for _ in 0..3 {
+        x ^= x >> 31;
+        x = x.wrapping_mul(0xd6e8_feb8_6659_fd93);
+    }
+    (x >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+/// Bits of all fields of each world after some frames; world w starts and is driven by `seeds[w]`.
+fn run(model: &Arc<Model>, demo: Demo, seeds: &[usize], lanes: Lanes, threads: usize, precision: Precision) -> Vec<Vec<u64>> {
+    let worlds = seeds.len();
+    let options =
+        Options { worlds, precision, threads: Some(threads), lanes, fields: FIELDS.to_vec() };
+    let mut run = Run::new(model, options);
+    let rows = |scale: f64, base: &dyn Fn(usize) -> f64, salt: usize| -> Vec<f64> {
+        seeds.iter().flat_map(|&s| (0..9).map(move |j| (s, j)))
+            .map(|(s, j)| base(j) + scale * noise(s, salt + j)).collect()
+    };
+    // starts so far apart that some worlds meet limits, others do not
+    let q = rows(0.6, &|j| common::START[j], 0);
+    run.sim.write(Field::JointQ, 0..9, Values::F64(&q), None).unwrap();
+    let qd = rows(1.0, &|_| 0.0, 100);
+    run.sim.write(Field::JointQd, 0..9, Values::F64(&qd), None).unwrap();
+    for frame in 0..12 {
+        let (field, row) = command(demo, frame);
+        let values = rows(0.3, &|j| row[j], 1000 * (frame + 1));
+        run.sim.command(field, 0..9, Values::F64(&values)).unwrap();
+        run.step();
+    }
+    (0..worlds)
+        .map(|w| FIELDS.iter().flat_map(|&f| run.get(f, w)).map(f64::to_bits).collect())
+        .collect()
+}
+
+#[test]
+fn world_alone_equals_the_same_world_among_others_at_any_position() {
+    for (demo, precision) in [(Demo::Torque, Precision::F32), (Demo::Target, Precision::F32), (Demo::Target, Precision::F64)] {
+        let model = lesson(demo).compile().unwrap();
+        let many: Vec<usize> = (0..67).collect();
+        let together = run(&model, demo, &many, Lanes::Auto, 1, precision);
+        let backwards: Vec<usize> = many.iter().rev().copied().collect();
+        let moved = run(&model, demo, &backwards, Lanes::Auto, 1, precision);
+        for world in 0..67 {
+            assert_eq!(together[world], moved[66 - world], "{demo:?}: world {world} elsewhere");
+        }
+        for world in [0, 15, 16, 66] {
+            let alone = run(&model, demo, &[world], Lanes::Auto, 1, precision);
+            assert_eq!(together[world], alone[0], "{demo:?}: world {world} alone");
+        }
+    }
+}
+
+#[test]
+fn two_threads_equal_one() {
+    let model = lesson(Demo::Target).compile().unwrap();
+    let seeds: Vec<usize> = (0..300).collect();
+    let one = run(&model, Demo::Target, &seeds, Lanes::Auto, 1, Precision::F32);
+    let two = run(&model, Demo::Target, &seeds, Lanes::Auto, 2, Precision::F32);
+    assert!(one == two);
+}
+
+#[test]
+fn scalar_equals_eight_equals_sixteen_worlds_a_block() {
+    let seeds: Vec<usize> = (0..40).collect();
+    for demo in [Demo::Torque, Demo::Target] {
+        let model = lesson(demo).compile().unwrap();
+        let scalar = run(&model, demo, &seeds, Lanes::Scalar, 1, Precision::F32);
+        for lanes in [Lanes::Eight, Lanes::Sixteen] {
+            if cpu::available(lanes) {
+                let wide = run(&model, demo, &seeds, lanes, 1, Precision::F32);
+                assert!(scalar == wide, "{demo:?} {lanes:?}");
+            } else {
+                println!("skipped: this processor has no {lanes:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn fields_that_are_asked_for_do_not_change_the_motion() {
+    let model = lesson(Demo::Target).compile().unwrap();
+    let motion = |fields: &[Field]| {
+        let options = Options { fields: fields.to_vec(), threads: Some(1), ..Options::default() };
+        let mut run = Run::new(&model, options);
+        for frame in 0..20 {
+            let (field, row) = command(Demo::Target, frame);
+            run.command(field, &row);
+            run.step();
+            if frame % 3 == 0 {
+                run.forward();
+            }
+        }
+        run.get(Field::JointQ, 0).iter().map(|q| q.to_bits()).collect::<Vec<_>>()
+    };
+    assert_eq!(motion(&[Field::JointQ]), motion(Field::ALL));
+}
