@@ -80,6 +80,13 @@ impl Lane {
         });
     }
 
+    /// Notes that the holder opened its services; it may be gone again before anybody looked.
+    pub(super) fn joined(&mut self) {
+        if let Some(holder) = &mut self.holder {
+            holder.joined = true;
+        }
+    }
+
     /// Whether the holder is gone: its publisher went, by release or because a dead process was cleaned up.
     pub(super) fn is_over(&mut self) -> bool {
         let publishers = self.commands.dynamic_config().number_of_publishers();

@@ -322,7 +322,11 @@ impl State {
                     continue; // nobody waits for an answer
                 }
                 // the ports of the holder go right after this: `is_over` sees that
-                Ok(Request::Release { .. }) => continue,
+                Ok(Request::Release { epoch }) => {
+                    let lane = self.lane.as_mut().filter(|lane| lane.epoch == epoch);
+                    lane.into_iter().for_each(Lane::joined);
+                    continue;
+                }
                 Ok(Request::Shutdown) => {
                     end = true;
                     Some(Response::Ending)
@@ -511,6 +515,7 @@ impl Waiting<Next> for State {
             return Ok(None);
         }
         lane.last_seq = header.seq;
+        lane.joined();
         if let Err(problem) = taken {
             self.refuse(
                 RefusalKind::Malformed,
