@@ -48,7 +48,7 @@ check: wheel
 wheel: $(VENV)/.wheel
 $(VENV)/.wheel: $(VENV)/.packages $(RUST_SOURCES) $(PYTHON_SOURCES)
 	@echo "building the wheel (minutes the first time)"
-	$(PIP) install --quiet --no-build-isolation --no-deps --force-reinstall ./py-client
+	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PIP) install --quiet --no-build-isolation --no-deps --force-reinstall ./py-client
 	@touch $@
 
 $(VENV)/.packages: py-client/requirements-dev.txt | $(PYTHON)

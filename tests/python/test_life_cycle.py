@@ -151,7 +151,7 @@ def test_other_python_threads_run_while_a_step_waits(pendulum):
 
 def test_threads_that_share_a_sim_take_turns(pendulum):
     with tl.launch(pendulum, worlds=2, frames_held=8) as sim:
-        threads = [threading.Thread(target=lambda: [sim.step() for _ in range(50)]) for _ in range(4)]
+        threads = [threading.Thread(target=lambda: [sim.step().fields for _ in range(50)]) for _ in range(4)]
         for thread in threads:
             thread.start()
         for thread in threads:
