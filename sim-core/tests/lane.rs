@@ -273,6 +273,41 @@ fn rows_that_do_not_fit_are_counted_and_not_stored() {
     assert_eq!(memory, [-1.0, 1.0, 2.0, -1.0]);
 }
 
+#[test]
+#[should_panic(expected = "out of bounds")]
+fn a_row_beyond_the_scratch_memory_is_not_reached() {
+    let mut memory = [0.0f64; 4];
+    let mut cx = sim_core::lane::memory::Cpu::new(&mut memory);
+    let row = cx.at(2);
+    let _ = cx.load(
+        Table {
+            base: 0,
+            stride: 2,
+            rows: 3,
+        },
+        row,
+        1,
+    );
+}
+
+#[cfg(debug_assertions)]
+#[test]
+#[should_panic(expected = "row 2")]
+fn a_row_outside_its_table_is_found_in_debug_builds() {
+    let mut memory = [0.0f64; 8];
+    let mut cx = sim_core::lane::memory::Cpu::new(&mut memory);
+    let row = cx.at(2);
+    let _ = cx.load(
+        Table {
+            base: 0,
+            stride: 2,
+            rows: 2,
+        },
+        row,
+        1,
+    );
+}
+
 fn sincos<F: Lane<Real = f32>>(x: &[f32]) -> Vec<(f32, f32)> {
     let mut results = Vec::new();
     for block in x.chunks(F::WIDTH) {

@@ -129,16 +129,20 @@ fn recording_twice_gives_the_same_program() {
 
 #[test]
 fn five_thousand_statements_are_recorded_in_milliseconds() {
-    // 100 ms leaves a factor of ten or more for a busy machine (4 ms when alone)
-    let start = std::time::Instant::now();
-    let recording = accepted(|_, x| {
-        let mut sum = x[0];
-        for k in 0..5000 {
-            sum = sum.fma(x[k % 2], c(k as f64));
-        }
-        vec![sum]
-    });
-    let taken = start.elapsed();
-    assert!(recording.statements().total() >= 5000);
-    assert!(taken.as_millis() < 100, "{taken:?}, validation included");
+    let once = || {
+        let start = std::time::Instant::now();
+        let recording = record(2, |_, x| {
+            let mut sum = x[0];
+            for k in 0..5000 {
+                sum = sum.fma(x[k % 2], c(k as f64));
+            }
+            vec![sum]
+        });
+        let taken = start.elapsed();
+        assert!(recording.expect("a sum is recorded").statements().total() >= 5000);
+        taken
+    };
+    // the fastest of several, so that a busy machine does not count; 1 ms is usual
+    let fastest = (0..10).map(|_| once()).min().expect("it was recorded");
+    assert!(fastest.as_millis() < 20, "{fastest:?}");
 }
