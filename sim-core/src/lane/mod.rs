@@ -136,7 +136,7 @@ pub trait Num:
 
 #[inline(always)]
 fn sign(i: usize) -> f64 {
-    if i % 2 == 0 { 1.0 } else { -1.0 }
+    if i.is_multiple_of(2) { 1.0 } else { -1.0 }
 }
 
 /// π/2 as a sum of numbers of the given precision, largest first.

@@ -41,10 +41,10 @@ mod state;
 pub(crate) mod tree;
 
 pub use error::{Misuse, RecordError};
-pub use number::{Recorded, RecordedMask};
 pub use handles::{
     RecordedBlock, RecordedIndex, RecordedList, RecordedLoop, RecordedRow, RecordedVariable,
 };
+pub use number::{Recorded, RecordedMask};
 pub use recorder::Recorder;
 
 use std::panic::Location;
@@ -89,7 +89,16 @@ pub struct Statements {
 impl Statements {
     /// All of them.
     pub fn total(&self) -> usize {
-        let Statements { lets, variables, sets, loads, stores, blocks, loops, stops } = *self;
+        let Statements {
+            lets,
+            variables,
+            sets,
+            loads,
+            stores,
+            blocks,
+            loops,
+            stops,
+        } = *self;
         lets + variables + sets + loads + stores + blocks + loops + stops
     }
 }
@@ -208,7 +217,9 @@ impl Recording {
             Statement::When { mask, .. } | Statement::Push { mask, .. } => mark(*mask),
             Statement::List { .. } | Statement::Loop { .. } => {}
         });
-        (0..self.inputs as u32).filter(|i| used[*i as usize]).collect()
+        (0..self.inputs as u32)
+            .filter(|i| used[*i as usize])
+            .collect()
     }
 
     fn each_statement(&self, f: &mut impl FnMut(&Statement)) {
