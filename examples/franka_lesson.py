@@ -107,7 +107,7 @@ def run(title: str, sim: tl.Sim, command: str, values: Callable[[int, NDArray[np
 def plot(path: Path, target: Run, torque: Run, reference: dict[str, NDArray[np.float64]]) -> None:
     """Draw commanded and actual positions of both demos over time."""
     seconds = np.arange(FRAMES + 1) / 60
-    figure, axes = plt.subplots(2, 2, figsize=(11, 6.5), sharex=True, constrained_layout=True)
+    figure, axes = plt.subplots(2, 2, figsize=(10, 6), sharex=True, constrained_layout=True)
     elbow, fingers, push, moved = axes.flat
 
     for demo, axis, dof in ((target, elbow, 3), (target, fingers, 7), (torque, moved, 2)):
@@ -127,7 +127,7 @@ def plot(path: Path, target: Run, torque: Run, reference: dict[str, NDArray[np.f
         axis.grid(alpha=0.3)
         axis.legend(fontsize=8, loc="best")
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=100)
 
 
 def main() -> None:
