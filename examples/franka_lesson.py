@@ -30,8 +30,9 @@ URDF = HERE / "assets/fr3/fr3_franka_hand.urdf"
 
 FRAMES = 180  # 3 s at 60 Hz
 # float32 values, as the reference has them. The fingers start outside their limit, and settle.
-START = np.float32(
-    [-3.6802115e-3, 2.3901723e-2, 3.6804110e-3, -2.3683236, -1.2918962e-4, 2.3922248, 7.8549200e-1, 0.05, 0.05]
+START = np.array(
+    [-3.6802115e-3, 2.3901723e-2, 3.6804110e-3, -2.3683236, -1.2918962e-4, 2.3922248, 7.8549200e-1, 0.05, 0.05],
+    dtype=np.float32,
 )
 STIFFNESS = np.array([4500.0, 4500, 3500, 3500, 2000, 2000, 2000, 100, 100])  # [N·m/rad, N/m]
 

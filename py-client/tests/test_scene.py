@@ -46,7 +46,7 @@ def test_a_robot_starts_with_what_its_file_says(urdf):
     assert robot.joint_target_mode == ("position", "position")
 
 
-def test_one_value_is_for_every_dof_and_lists_are_one_a_dof(arm):
+def test_one_value_is_for_every_dof_and_lists_are_one_a_dof(arm: tl.Robot):
     arm.joint_target_ke = 30
     arm.joint_armature = [0.1, 0.2]
     arm.joint_target_mode = "velocity"
@@ -57,14 +57,14 @@ def test_one_value_is_for_every_dof_and_lists_are_one_a_dof(arm):
     assert arm.joint_target_mode == ("both", "position")
 
 
-def test_targets_are_the_start_positions_until_set(arm):
+def test_targets_are_the_start_positions_until_set(arm: tl.Robot):
     arm.joint_q = [0.1, 0.2]
     assert arm.joint_target_q.tolist() == [0.1, 0.2]
     arm.joint_target_q = 0
     assert arm.joint_target_q.tolist() == [0, 0]
 
 
-def test_a_property_cannot_be_changed_in_place(arm):
+def test_a_property_cannot_be_changed_in_place(arm: tl.Robot):
     with pytest.raises(ValueError, match="read-only"):
         arm.joint_q[0] = 1
     given = np.zeros(2)
@@ -89,16 +89,16 @@ def test_a_property_cannot_be_changed_in_place(arm):
         ("joint_target_mode", ["both"], r"joint_target_mode has 1 values; expected 2"),
     ],
 )
-def test_a_wrong_property_names_robot_field_and_dof(arm, name, value, named):
+def test_a_wrong_property_names_robot_field_and_dof(arm: tl.Robot, name, value, named):
     before = getattr(arm, name)
     with pytest.raises(tl.SceneError, match=named):
         setattr(arm, name, value)
     assert np.array_equal(getattr(arm, name), before)
 
 
-def test_a_property_that_does_not_exist_is_an_error(arm):
+def test_a_property_that_does_not_exist_is_an_error(arm: tl.Robot):
     with pytest.raises(AttributeError, match="joint_stiffness"):
-        arm.joint_stiffness = 3
+        arm.joint_stiffness = 3  # pyright: ignore[reportAttributeAccessIssue]
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,9 @@ FRAMES = 180
 SUBSTEPS = 8
 DOFS = 9
 # Start state and commands are float32 values, also in a float64 run.
-START = np.float32(
-    [-3.6802115e-3, 2.3901723e-2, 3.6804110e-3, -2.3683236, -1.2918962e-4, 2.3922248, 7.8549200e-1, 0.05, 0.05]
+START = np.array(
+    [-3.6802115e-3, 2.3901723e-2, 3.6804110e-3, -2.3683236, -1.2918962e-4, 2.3922248, 7.8549200e-1, 0.05, 0.05],
+    dtype=np.float32,
 )
 
 

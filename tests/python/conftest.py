@@ -19,8 +19,9 @@ REPOSITORY = Path(__file__).parents[2]
 URDF = REPOSITORY / "examples/assets/fr3/fr3_franka_hand.urdf"
 
 # The lesson's start state and drives, float32 values as the recorded reference has them
-START = np.float32(
-    [-3.6802115e-3, 2.3901723e-2, 3.6804110e-3, -2.3683236, -1.2918962e-4, 2.3922248, 7.8549200e-1, 0.05, 0.05]
+START = np.array(
+    [-3.6802115e-3, 2.3901723e-2, 3.6804110e-3, -2.3683236, -1.2918962e-4, 2.3922248, 7.8549200e-1, 0.05, 0.05],
+    dtype=np.float32,
 )
 STIFFNESS = np.array([4500.0, 4500, 3500, 3500, 2000, 2000, 2000, 100, 100])
 

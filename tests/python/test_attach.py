@@ -41,7 +41,7 @@ def test_an_attached_client_knows_as_much_as_the_one_that_launched(served, pendu
         ) in "worlds device precision dt substeps fields dof_names coord_names body_names dofs coords bodies".split():
             assert getattr(attached, fact) == getattr(launched, fact), fact
         assert (attached.name, attached.pid) == (name, pid)
-        tau = np.float32([[1, 2], [3, 4], [5, 6]])
+        tau = np.array([[1, 2], [3, 4], [5, 6]], dtype=np.float32)
         assert np.array_equal(attached.step(joint_f=tau).joint_q, launched.step(joint_f=tau).joint_q)
     attached.close()
 

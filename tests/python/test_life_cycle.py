@@ -102,6 +102,7 @@ def test_kill_9_of_the_daemon_at_any_moment_is_told_within_a_second(pendulum, ro
             stems = stems_of(sim.pid)
             killer = threading.Timer(0.003 * kill % 0.05, os.kill, (sim.pid, signal.SIGKILL))
             killer.start()
+            step_began = time.monotonic()
             with pytest.raises(tl.DaemonLost, match=str(sim.pid)):
                 while True:
                     step_began = time.monotonic()

@@ -36,7 +36,8 @@ if TYPE_CHECKING:
         UrdfError,
         WaitTimeout,
     )
-    from tightloop.scene import Robot, Scene, StaticShape
+    from tightloop.robot import Robot
+    from tightloop.scene import Scene, StaticShape
     from tightloop.sim import FrameCopy, Sim, attach, launch
 
 _HOMES = {
@@ -61,7 +62,8 @@ _HOMES = {
         "UrdfError",
         "WaitTimeout",
     ),
-    "tightloop.scene": ("Robot", "Scene", "StaticShape"),
+    "tightloop.robot": ("Robot",),
+    "tightloop.scene": ("Scene", "StaticShape"),
     "tightloop.sim": ("FrameCopy", "Sim", "attach", "launch"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Generic, Literal, TypeVar, overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,38 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop.checks import Quaternion, Triple
 from tightloop.errors import SceneError
 
-Mode = Literal["position", "velocity", "both"]
-
 MODES = ("position", "velocity", "both")
 
-T = TypeVar("T")
-V = TypeVar("V")
 
-
-class _PerDof(Generic[T, V]):
-    """A property with one entry a dof. Reads as a read-only copy; a single value is written to every dof."""
+class _PerDof:
+    """A property with one entry a dof; a single value is written to every dof."""
 
     def __init__(self, doc: str) -> None:
         self.__doc__ = doc
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
-
-    @overload
-    def __get__(self, robot: None, owner: type) -> _PerDof[T, V]: ...
-    @overload
-    def __get__(self, robot: Robot, owner: type) -> T: ...
-    def __get__(self, robot: Robot | None, owner: type) -> Any:
-        return self if robot is None else self.read(robot)
-
-    def __set__(self, robot: Robot, values: V) -> None:
-        robot._own[self.name] = self.checked(robot, values)
-
-    def read(self, robot: Robot) -> Any:
-        raise NotImplementedError
-
-    def checked(self, robot: Robot, values: Any) -> Any:
-        raise NotImplementedError
 
     def error(self, robot: Robot, problem: str) -> SceneError:
         return SceneError(f"robot `{robot.name}`: {self.name} {problem}")
@@ -52,12 +31,18 @@ class _PerDof(Generic[T, V]):
         return f"expected {robot.dofs}, one a dof ({_some(robot.joint_names)}), or a single one for all"
 
 
-class _Numbers(_PerDof[NDArray[np.float64], ArrayLike]):
+class _Numbers(_PerDof):
     def __init__(self, doc: str, *, otherwise: str | None = None, signed: bool = True, limit: bool = False) -> None:
         super().__init__(doc)
         self.otherwise, self.signed, self.limit = otherwise, signed, limit
 
-    def read(self, robot: Robot) -> NDArray[np.float64]:
+    @overload
+    def __get__(self, robot: None, owner: type) -> _Numbers: ...
+    @overload
+    def __get__(self, robot: Robot, owner: type) -> NDArray[np.float64]: ...
+    def __get__(self, robot: Robot | None, owner: type) -> _Numbers | NDArray[np.float64]:
+        if robot is None:
+            return self
         own = robot._own.get(self.name)
         if own is None and self.otherwise is not None:
             own = getattr(robot, self.otherwise)
@@ -66,13 +51,12 @@ class _Numbers(_PerDof[NDArray[np.float64], ArrayLike]):
         values.flags.writeable = False
         return values
 
-    def checked(self, robot: Robot, values: ArrayLike) -> NDArray[np.float64]:
+    def __set__(self, robot: Robot, values: ArrayLike) -> None:
         try:
             given = np.asarray(values)
-            kind = given.dtype.kind
         except ValueError as problem:
             raise self.error(robot, f"is no array: {problem}") from None
-        if kind not in "fiu":
+        if given.dtype.kind not in "fiu":
             raise self.error(robot, f"has dtype {given.dtype}; give real numbers")
         if given.ndim != 0 and given.shape != (robot.dofs,):
             got = f"{given.shape[0]} values" if given.ndim == 1 else f"shape {given.shape}"
@@ -84,22 +68,26 @@ class _Numbers(_PerDof[NDArray[np.float64], ArrayLike]):
                 raise self.error(robot, f"of dof `{robot.name}/{name}` is {value}; give {cure}")
             if value < 0.0 and not self.signed:
                 raise self.error(robot, f"of dof `{robot.name}/{name}` is {value}; it cannot be negative")
-        return checked
+        robot._own[self.name] = checked
 
 
-class _Modes(_PerDof[tuple[Mode, ...], "Mode | Sequence[Mode]"]):
-    def read(self, robot: Robot) -> tuple[Mode, ...]:
-        return robot._own.get(self.name) or tuple(robot._urdf_values(self.name))
+class _Modes(_PerDof):
+    @overload
+    def __get__(self, robot: None, owner: type) -> _Modes: ...
+    @overload
+    def __get__(self, robot: Robot, owner: type) -> tuple[str, ...]: ...
+    def __get__(self, robot: Robot | None, owner: type) -> _Modes | tuple[str, ...]:
+        return self if robot is None else robot._own.get(self.name) or tuple(robot._urdf_values(self.name))
 
-    def checked(self, robot: Robot, values: Mode | Sequence[Mode]) -> tuple[Mode, ...]:
-        modes: tuple[Mode, ...] = (values,) * robot.dofs if isinstance(values, str) else tuple(values)
+    def __set__(self, robot: Robot, values: str | Sequence[str]) -> None:
+        modes = (values,) * robot.dofs if isinstance(values, str) else tuple(values)
         if len(modes) != robot.dofs:
             raise self.error(robot, f"has {len(modes)} values; {self.expected(robot)}")
         for name, mode in zip(robot.joint_names, modes, strict=True):
             if mode not in MODES:
                 choices = ", ".join(map(repr, MODES))
                 raise self.error(robot, f"of dof `{robot.name}/{name}` is {mode!r}; choose one of {choices}")
-        return modes
+        robot._own[self.name] = modes
 
 
 class Robot:

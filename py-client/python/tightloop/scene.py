@@ -17,6 +17,7 @@ from tightloop.checks import Quaternion, Triple, Vector
 from tightloop.robot import PER_DOF, Robot
 
 Cone = Literal["elliptic", "pyramidal"]
+ShapeType = Literal["box", "sphere", "cylinder", "capsule"]
 
 _ORIGIN = (0.0, 0.0, 0.0)
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -27,7 +28,7 @@ class StaticShape:
     """A shape that never moves: ``pos`` [m] and ``quat`` (x, y, z, w) of its centre in the world, and its sizes [m]."""
 
     name: str
-    type: Literal["box", "sphere", "cylinder", "capsule"]
+    type: ShapeType
     pos: Triple
     quat: Quaternion
     half_extents: Triple | None = None
@@ -234,7 +235,7 @@ class Scene:
             }
         )
 
-    def _add_shape(self, kind: Any, name: str | None, pos: Vector, quat: Vector, **sizes: Any) -> StaticShape:
+    def _add_shape(self, kind: ShapeType, name: str | None, pos: Vector, quat: Vector, **sizes: Any) -> StaticShape:
         name = checks.name(kind, self._free_name(kind) if name is None else name, self._names())
         what = f"{kind} `{name}`"
         checked: dict[str, Any] = {}
