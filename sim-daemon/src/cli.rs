@@ -104,7 +104,10 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
     match result {
         Ok(()) => 0,
         Err(error) => {
-            let _ = writeln!(std::io::stderr(), "tightloop: {error}");
+            // whoever launched us reads it from our line on stdout
+            if !matches!(&cli.command, Command::Serve(serve) if serve.parent.is_some()) {
+                let _ = writeln!(std::io::stderr(), "tightloop: {error}");
+            }
             error.exit_code()
         }
     }

@@ -67,10 +67,14 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
     announce(&ready);
     let result = server::run(simulation, host);
     drop(watchdog);
-    news.tell(match &result {
-        Ok(()) => "ended",
-        Err(_) => "failed",
-    });
+    match &result {
+        Ok(()) => news.tell("ended"),
+        Err(error) => news.tell(&format!("failed: {error}")),
+    }
+    if let (Err(error), Some(_)) = (&result, serve.parent) {
+        // the one line is said; this is for the terminal of whoever launched us
+        let _ = writeln!(std::io::stderr(), "tightloop: {error}");
+    }
     result
 }
 

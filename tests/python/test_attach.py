@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import signal
 import subprocess
@@ -99,6 +100,18 @@ def test_a_daemon_that_was_restarted_is_told_from_the_one_known(pendulum, tmp_pa
         with tl.launch(pendulum, worlds=1, name=name), pytest.raises(tl.DaemonRestarted, match=name):
             known.step()
     known.close()
+
+
+def test_another_protocol_version_is_refused_with_both_versions(root, unique):
+    name = unique()
+    lock = root / f"{name}.lock"
+    with lock.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)  # as a daemon of some later release would
+        file.write(f"tightloop 4711 {os.getpid()} 0000000000000001\n")
+        file.flush()
+        with pytest.raises(tl.ProtocolMismatch, match=r"4711.*\d"):
+            tl.attach(name)
+    lock.unlink()
 
 
 def test_a_dead_daemon_is_told(served):

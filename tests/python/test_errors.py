@@ -75,6 +75,12 @@ def test_a_wrong_argument_of_launch_is_named_with_what_is_valid(pendulum, argume
         tl.launch(pendulum, **({"worlds": 1} | arguments))
 
 
+def test_a_launch_that_fails_says_so_once(pendulum, capfd):
+    with pytest.raises(tl.ArgumentError):
+        tl.launch(pendulum, worlds=1, device="tpu")
+    assert capfd.readouterr() == ("", "")
+
+
 @pytest.mark.parametrize("fields", [("joint_q",), ("joint_q", "mass_matrix", "body_q")])
 def test_more_worlds_than_memory_holds_are_refused_before_it_is_touched(pendulum, fields):
     with pytest.raises(tl.ResourceError, match=r"worlds"):

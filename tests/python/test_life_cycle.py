@@ -15,8 +15,8 @@ import pytest
 import tightloop as tl
 from leftovers import alive, left_of, stems_of, wait_until
 
-# Kills each way; 50 is a thorough run.
-KILLS = int(os.environ.get("TIGHTLOOP_KILLS", "6"))
+# Kills each way
+KILLS = int(os.environ.get("TIGHTLOOP_KILLS", "50"))
 
 CALLER = """
 import os, signal, sys, time
@@ -111,6 +111,22 @@ def test_kill_9_of_the_daemon_at_any_moment_is_told_within_a_second(pendulum, ro
             killer.join()
         assert left_of(stems) == []
         assert not list(root.iterdir())
+
+
+def test_the_next_start_of_any_daemon_cleans_up_after_both_sides_were_killed(pendulum, pendulum_urdf, root):
+    process = caller(pendulum_urdf, "time.sleep(9)")
+    pid = daemon_of(process)
+    stems = stems_of(pid)
+    for victim in (pid, process.pid):
+        os.kill(victim, signal.SIGSTOP)  # so that neither can clean up after the other
+    for victim in (pid, process.pid):
+        os.kill(victim, signal.SIGKILL)
+    process.communicate()
+    assert wait_until(lambda: not alive(pid), 1.0)
+    assert left_of(stems) and list(root.iterdir())
+    with tl.launch(pendulum, worlds=1):
+        assert left_of(stems) == []
+    assert not list(root.iterdir())
 
 
 def test_a_name_can_be_used_again_after_its_daemon_was_killed(pendulum, unique):
