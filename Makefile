@@ -17,7 +17,7 @@ export PYO3_BUILD_EXTENSION_MODULE := 1
 
 RUST_SOURCES   := $(shell find sim-core sim-daemon py-client/src py-client/Cargo.toml Cargo.toml rust-toolchain.toml -name '*.rs' -o -name '*.toml')
 PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml -name '*.py' -o -name '*.pyi' -o -name '*.toml')
-PYTHON_TREES   := py-client/python py-client/tests tests/python examples benches
+PYTHON_TREES   := py-client/python py-client/tests tests examples benches
 CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
 .PHONY: demo test bench check wheel
@@ -34,7 +34,8 @@ test: wheel
 	$(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . py-client/tests tests/python
 
 bench: wheel
-	cargo bench --workspace --exclude py-client
+	cargo bench --package tightloop --bench step
+	$(PYTHON) benches/peers.py
 	$(PYTHON) benches/round_trip.py
 
 check: wheel
