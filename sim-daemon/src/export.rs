@@ -2,7 +2,7 @@
 
 use sim_core::backend::{BackendError, Values};
 use sim_core::batch::{Dtype, Field, FieldDtype, FieldRow, Group, Layout};
-use sim_core::model::{Description as Scene, Model};
+use sim_core::model::{Description as Scene, Model, Robot};
 use sim_core::simulation::{Options, Precision, Simulation};
 use sim_protocol::host::{Inbox, Numbers};
 use sim_protocol::{self as wire, InputInfo, Op, RefusalKind, RobotRange, Row, Table};
@@ -108,21 +108,28 @@ pub(crate) fn description(
         writes: input(Group::State),
         scene: facts.scene_text,
         scene_folder: facts.scene_folder,
-        notes: facts
-            .scene
-            .robots
-            .iter()
-            .flat_map(|robot| {
-                robot
-                    .notes
-                    .iter()
-                    .map(|note| format!("{}: {note}", robot.name))
-            })
-            .collect(),
+        notes: notes(facts.scene),
         frames_held: facts.frames_held,
         watch_worlds: facts.watch_worlds.min(options.worlds),
         schema: 0,
     }
+}
+
+/// What was ignored or mended, and what is kept without an effect.
+fn notes(scene: &Scene) -> Vec<String> {
+    let collides = |robot: &Robot| robot.links.iter().any(|link| !link.collisions.is_empty());
+    let mut notes = Vec::new();
+    if !scene.shapes.is_empty() || scene.robots.iter().any(collides) {
+        notes.push("contacts are not simulated yet: shapes pass through each other".to_owned());
+    }
+    for robot in &scene.robots {
+        let named = robot
+            .notes
+            .iter()
+            .map(|note| format!("{}: {note}", robot.name));
+        notes.extend(named);
+    }
+    notes
 }
 
 fn field_info(row: &FieldRow, dtype: wire::Dtype, shape: Vec<usize>) -> wire::FieldInfo {
