@@ -21,11 +21,12 @@ PYTHON_TREES   := py-client/python py-client/tests tests examples benches
 CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
 .PHONY: demo test bench check wheel
+.NOTPARALLEL: # pip installs into one venv, cargo and the tests use all cores by themselves
 
 demo: wheel
 	$(PYTHON) examples/franka_lesson.py --worlds $(WORLDS)
 
-test: wheel
+test: wheel $(VENV)/.dev
 	cargo fmt --all --check
 	$(CLIPPY)
 	@if cargo nextest --version >/dev/null 2>&1; \
@@ -33,12 +34,12 @@ test: wheel
 	else set -x; cargo test --release --workspace --exclude py-client --lib --bins --tests; fi
 	$(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . py-client/tests tests/python
 
-bench: wheel
+bench: wheel $(VENV)/.dev
 	cargo bench --package tightloop --bench step
 	$(PYTHON) benches/peers.py
 	$(PYTHON) benches/round_trip.py
 
-check: wheel
+check: wheel $(VENV)/.dev
 	cargo fmt --all --check
 	$(CLIPPY)
 	$(VENV)/bin/ruff check --config py-client/pyproject.toml $(PYTHON_TREES)
@@ -47,13 +48,17 @@ check: wheel
 
 # One wheel holds client and daemon. pip would build it in an isolated copy of maturin; the one in the venv is enough.
 wheel: $(VENV)/.wheel
-$(VENV)/.wheel: $(VENV)/.packages $(RUST_SOURCES) $(PYTHON_SOURCES)
+$(VENV)/.wheel: $(VENV)/.demo $(RUST_SOURCES) $(PYTHON_SOURCES)
 	@echo "building the wheel (minutes the first time)"
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PIP) install --quiet --no-build-isolation --no-deps --force-reinstall ./py-client
 	@touch $@
 
-$(VENV)/.packages: py-client/requirements-dev.txt | $(PYTHON)
-	$(PIP) install --quiet -r py-client/requirements-dev.txt
+$(VENV)/.demo: py-client/requirements-demo.txt | $(PYTHON)
+	$(PIP) install --quiet -r $<
+	@touch $@
+
+$(VENV)/.dev: py-client/requirements-dev.txt $(VENV)/.demo
+	$(PIP) install --quiet -r $<
 	@touch $@
 
 # Debian splits ensurepip from python3; `python3 -m venv` then leaves half a folder behind.
