@@ -36,7 +36,7 @@ pub(crate) struct Controller {
     /// A command whose answer was not waited for, since the caller interrupted.
     unanswered: bool,
     paces: [Pace; 4],
-    table: Arc<Table>,
+    table: Option<Arc<Table>>,
     frames: Arc<AtomicUsize>,
     publisher: CommandPublisher<S>,
     subscriber: FrameSubscriber<S>,
@@ -106,7 +106,7 @@ impl Controller {
             seq: 0,
             unanswered: false,
             paces: std::array::from_fn(|_| Pace::new(free_core)),
-            table: Arc::new(Table::lay_out([])),
+            table: None,
             frames: Arc::clone(frames),
             publisher,
             subscriber,
@@ -322,13 +322,9 @@ impl Controller {
         {
             return Err(malformed("the head of a frame: another session or schema"));
         }
-        check_table(&mut self.table, payload, header.rows)?;
+        let table = check_table(&mut self.table, payload, header.rows)?;
         self.frames.fetch_add(1, Ordering::Acquire);
-        Ok(Frame::new(
-            sample,
-            Arc::clone(&self.table),
-            Arc::clone(&self.frames),
-        ))
+        Ok(Frame::new(sample, table, Arc::clone(&self.frames)))
     }
 }
 
@@ -377,20 +373,26 @@ impl Waiting<FrameSample> for Answer<'_> {
     }
 }
 
-/// Checks the table of a sample, unless it is the one that was checked last.
+/// Checks the table of a frame, unless one of the same schema was checked before: the daemon lays out every frame alike.
+///
+/// Either way what is read lies inside the payload, whatever the daemon wrote.
 pub(crate) fn check_table(
-    known: &mut Arc<Table>,
+    known: &mut Option<Arc<Table>>,
     payload: &[u64],
     rows: u32,
-) -> Result<(), ProtocolError> {
-    if !known.describes(payload, rows) {
-        let table = Table::parse(payload, rows).map_err(|problem| ProtocolError::Malformed {
-            from: "the daemon",
-            problem,
-        })?;
-        *known = Arc::new(table);
+) -> Result<Arc<Table>, ProtocolError> {
+    if let Some(table) = known
+        && table.rows().len() == rows as usize
+        && table.total_bytes() <= size_of_val(payload)
+    {
+        return Ok(Arc::clone(table));
     }
-    Ok(())
+    let malformed = |problem| ProtocolError::Malformed {
+        from: "the daemon",
+        problem,
+    };
+    let table = Arc::new(Table::parse(payload, rows).map_err(malformed)?);
+    Ok(Arc::clone(known.insert(table)))
 }
 
 /// The daemon's sentence out of a refusal.

@@ -18,7 +18,7 @@ use crate::{Description, Frame, ProtocolError, Table};
 pub(crate) struct Observer {
     link: Arc<Link>,
     description: Arc<Description>,
-    table: Arc<Table>,
+    table: Option<Arc<Table>>,
     frames: Arc<AtomicUsize>,
     subscriber: FrameSubscriber<S>,
     listener: Listener<S>,
@@ -48,7 +48,7 @@ impl Observer {
         Ok(Observer {
             link: Arc::clone(link),
             description: Arc::clone(description),
-            table: Arc::new(Table::lay_out([])),
+            table: None,
             frames: Arc::new(AtomicUsize::new(0)),
             subscriber,
             listener,
@@ -70,13 +70,9 @@ impl Observer {
         {
             return Err(malformed("the head of a frame: another session or schema"));
         }
-        check_table(&mut self.table, sample.payload(), header.rows)?;
+        let table = check_table(&mut self.table, sample.payload(), header.rows)?;
         self.frames.fetch_add(1, Ordering::Acquire);
-        Ok(Some(Frame::new(
-            sample,
-            Arc::clone(&self.table),
-            Arc::clone(&self.frames),
-        )))
+        Ok(Some(Frame::new(sample, table, Arc::clone(&self.frames))))
     }
 
     /// The newest sample; older ones are dropped.

@@ -225,8 +225,15 @@ impl Tenancy {
             .create(true)
             .truncate(false)
             .mode(0o600)
-            .open(&path)
-            .map_err(root_error)?;
+            .open(&path);
+        let file = match file {
+            // the last daemon there took the folder with it
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                private_folder(&place.root)?;
+                return Ok(None);
+            }
+            opened => opened.map_err(root_error)?,
+        };
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => return Ok(None),
             Err(TryLockError::Error(error)) => return Err(root_error(error)),
@@ -274,6 +281,10 @@ impl Drop for Tenancy {
         self.place.remove_shared_files();
         // the file goes before the lock does, so nobody can lock a file that is about to go
         let _ = fs::remove_file(self.place.lock_path());
+        // our own folder in shared memory goes with the last daemon; any other is the user's
+        if self.place.root.starts_with(SHARED_MEMORY) && self.place.root == default_root() {
+            let _ = fs::remove_dir(&self.place.root);
+        }
     }
 }
 

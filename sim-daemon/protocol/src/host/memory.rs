@@ -66,9 +66,17 @@ pub(crate) fn check(bytes: usize, what: &str) -> Result<(), ProtocolError> {
 
 /// Takes the pages of a port's data segment now, so that nobody else can: later writes cannot fail.
 pub(crate) fn reserve(prefix: &str, port: u128, what: &str) -> Result<(), ProtocolError> {
-    let path = format!("{SHARED_MEMORY}/{prefix}{port}.data");
     let failed =
-        |error: &dyn std::fmt::Debug| ProtocolError::transport(format!("reserve {path}"), error);
+        |error: &dyn std::fmt::Debug| ProtocolError::transport(format!("reserve {what}"), error);
+    // the transport puts a hash of its own between prefix and port
+    let ending = format!("_{port}.data");
+    let is_ours = |name: &str| name.starts_with(prefix) && name.ends_with(&ending);
+    let path = fs::read_dir(SHARED_MEMORY)
+        .map_err(|error| failed(&error))?
+        .flatten()
+        .find(|entry| entry.file_name().to_str().is_some_and(is_ours))
+        .ok_or_else(|| failed(&format!("no file {prefix}*{ending}")))?
+        .path();
     let file = OpenOptions::new()
         .write(true)
         .open(&path)
