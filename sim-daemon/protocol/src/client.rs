@@ -346,6 +346,18 @@ impl Client {
         call(observer)
     }
 
+    /// Lets a test send what it likes through the ports of the lease, and reads the answer.
+    #[cfg(test)]
+    pub(crate) fn raw(
+        &self,
+        send: impl FnOnce(&crate::transport::CommandPublisher<S>, u64),
+    ) -> Result<Frame, ProtocolError> {
+        lock(&self.controller)
+            .as_mut()
+            .expect("the lease is held")
+            .raw(send)
+    }
+
     /// Errors when the daemon is gone. A few microseconds.
     ///
     /// # Errors

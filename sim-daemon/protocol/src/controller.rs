@@ -76,7 +76,7 @@ impl Controller {
             }
             _ => return Err(malformed("the answer to acquire")),
         };
-        let words = command_bytes(description) / 8;
+        let bytes = command_bytes(description);
         let ports = link.with_node(|node| {
             let service = transport::open_frames(node, epoch)?;
             let event = transport::open_event(node, &format!("obs/{epoch}"))?;
@@ -84,7 +84,7 @@ impl Controller {
             let listener = transport::listener(&event)?;
             // last: the daemon counts the lease as used once it sees this
             let commands = transport::open_commands(node, epoch)?;
-            let publisher = transport::command_publisher(&commands, words)?;
+            let publisher = transport::command_publisher(&commands, bytes)?;
             let prefix = node.config().global.prefix.to_string();
             reserve(&prefix, publisher.id().value(), "the commands of a lease")?;
             Ok((service, subscriber, listener, publisher))
@@ -134,6 +134,19 @@ impl Controller {
         }
         self.send(op, arrays, mask)?;
         let sample = self.answer(op, hook)?;
+        self.open(sample)
+    }
+
+    /// Lets a test send what it likes, and reads the answer.
+    #[cfg(test)]
+    pub(crate) fn raw(
+        &mut self,
+        send: impl FnOnce(&CommandPublisher<S>, u64),
+    ) -> Result<Frame, ProtocolError> {
+        self.seq += 1;
+        send(&self.publisher, self.seq);
+        self.link.notify();
+        let sample = self.answer(Op::Step, &mut crate::keep_waiting())?;
         self.open(sample)
     }
 
@@ -236,7 +249,7 @@ impl Controller {
             |error: &dyn std::fmt::Debug| ProtocolError::transport("send a command", error);
         let mut loan = self
             .publisher
-            .loan_slice_uninit(total / 8)
+            .loan_slice_uninit(total / ALIGNMENT)
             .map_err(|error| failed(&error))?;
         self.seq += 1;
         *loan.user_header_mut() = CommandHeader {
@@ -246,7 +259,7 @@ impl Controller {
             op: op as u32,
             rows: rows as u32,
         };
-        let words = crate::loan::initialised(loan.payload_mut());
+        let words = crate::loan::words(loan.payload_mut());
         let (table, data) = words.split_at_mut(head / 8);
         let (table, _) = table.as_chunks_mut();
         let mut offset = 0;
@@ -282,7 +295,7 @@ impl Controller {
                 .zip(mask)
                 .for_each(|(byte, &set)| *byte = u8::from(set));
         }
-        // SAFETY: shared memory is zero or was written, and any bits are a u64.
+        // SAFETY: shared memory is zero or was written, and any bits are a line.
         let sent = unsafe { loan.assume_init() }
             .send()
             .map_err(|error| failed(&error))?;
@@ -313,7 +326,7 @@ impl Controller {
     /// Makes a frame of an answer, or an error of a refusal.
     fn open(&mut self, sample: FrameSample) -> Result<Frame, ProtocolError> {
         let header = *sample.user_header();
-        let payload = sample.payload();
+        let payload = bytemuck::cast_slice(sample.payload());
         if header.outcome != 0 {
             return Err(refusal(header.outcome, header.rows, payload));
         }

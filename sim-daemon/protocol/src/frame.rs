@@ -7,9 +7,9 @@ use std::sync::{Arc, Mutex};
 use iceoryx2::prelude::ipc_threadsafe;
 use iceoryx2::sample::Sample;
 
-use crate::{Dtype, FrameHeader, ProtocolError, Row, Table};
+use crate::{Dtype, FrameHeader, Line, ProtocolError, Row, Table};
 
-pub(crate) type FrameSample = Sample<ipc_threadsafe::Service, [u64], FrameHeader>;
+pub(crate) type FrameSample = Sample<ipc_threadsafe::Service, [Line], FrameHeader>;
 
 /// The state of all worlds (or, for an observer, of the first ones) at one instant.
 ///

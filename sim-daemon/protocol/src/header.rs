@@ -1,6 +1,6 @@
 //! Headers of the two kinds of samples, and the row that describes one array in them.
 //!
-//! A sample is `[u64]` words, 64-byte aligned: first the field table ([`Row::WORDS`] words a row), then, from the next
+//! A sample is lines of eight words, 64-byte aligned: first the field table ([`Row::WORDS`] words a row), then, from the next
 //! 64-byte boundary, the arrays. Numbers are little endian, as everything that shares memory with us is.
 
 use iceoryx2::prelude::ZeroCopySend;
@@ -11,6 +11,23 @@ pub const PROTOCOL_VERSION: u32 = 1;
 
 /// Alignment of a sample and of every array in it [bytes].
 pub const ALIGNMENT: usize = 64;
+
+/// What samples are made of: 64 bytes, 64-byte aligned.
+///
+/// Words with an alignment set on the service would do as well, but the transport then takes 64 bytes for each of them.
+#[derive(
+    Debug, Default, Clone, Copy, PartialEq, Eq, ZeroCopySend, bytemuck::Pod, bytemuck::Zeroable,
+)]
+#[repr(C)]
+#[repr(align(64))]
+#[type_name("tightloop.Line.v1")]
+pub struct Line(pub [u64; Line::WORDS]);
+const _: () = assert!(size_of::<Line>() == ALIGNMENT && align_of::<Line>() == ALIGNMENT);
+
+impl Line {
+    /// Words in a line.
+    pub const WORDS: usize = ALIGNMENT / 8;
+}
 
 /// Head of a sample from the daemon.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq, ZeroCopySend)]

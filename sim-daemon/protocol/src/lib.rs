@@ -8,7 +8,7 @@
 //!            watch         (pub-sub, 1 : n)   ──► frames of the first worlds, at a limited rate ──► observers
 //! ```
 //!
-//! - A sample is `[u64]` words: a field table, then arrays, world-major and 64-byte aligned ([`header`], [`table`]).
+//! - A sample is lines of eight words: a field table, then arrays, world-major and 64-byte aligned ([`header`], [`table`]).
 //! - Steps are lock-step: the client sends `seq = n`, the daemon answers `ack_seq = n` with a frame or a refusal.
 //! - A lease is one `epoch`, with services of its own; it ends by release, by death, or when another client asks for it
 //!   after the heartbeats stopped. Reset, write and forward travel as commands too, so that they keep their order.
@@ -41,7 +41,7 @@ pub use description::{Description, FieldInfo, InputInfo, RobotRange};
 pub use error::ProtocolError;
 pub use frame::{Entry, Frame, View};
 pub use header::{
-    ALIGNMENT, CommandHeader, Dtype, FrameHeader, Op, PROTOCOL_VERSION, RefusalKind, Row,
+    ALIGNMENT, CommandHeader, Dtype, FrameHeader, Line, Op, PROTOCOL_VERSION, RefusalKind, Row,
 };
 pub use place::{cleanup_after_death, running, sweep};
 pub use table::{ROWS_MAX, Table};

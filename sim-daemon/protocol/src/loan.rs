@@ -2,8 +2,11 @@
 
 use std::mem::MaybeUninit;
 
+use crate::Line;
+
 /// The words of a loan. Their content is whatever was in the slot before.
-pub(crate) fn initialised(words: &mut [MaybeUninit<u64>]) -> &mut [u64] {
-    // SAFETY: shared memory is zero or was written, never uninitialised, and any bits are a u64.
-    unsafe { &mut *(std::ptr::from_mut(words) as *mut [u64]) }
+pub(crate) fn words(lines: &mut [MaybeUninit<Line>]) -> &mut [u64] {
+    // SAFETY: shared memory is zero or was written, never uninitialised, and any bits are a line.
+    let lines = unsafe { &mut *(std::ptr::from_mut(lines) as *mut [Line]) };
+    bytemuck::cast_slice_mut(lines)
 }

@@ -70,7 +70,11 @@ impl Observer {
         {
             return Err(malformed("the head of a frame: another session or schema"));
         }
-        let table = check_table(&mut self.table, sample.payload(), header.rows)?;
+        let table = check_table(
+            &mut self.table,
+            bytemuck::cast_slice(sample.payload()),
+            header.rows,
+        )?;
         self.frames.fetch_add(1, Ordering::Acquire);
         Ok(Some(Frame::new(sample, table, Arc::clone(&self.frames))))
     }

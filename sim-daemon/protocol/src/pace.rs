@@ -15,6 +15,9 @@ const WAKE_MARGIN: Duration = Duration::from_micros(100);
 /// Beyond this, a wake-up is lost in the wait itself.
 const FORESEEN_MAX: Duration = Duration::from_millis(20);
 
+/// Most waits that sleep at once after spinning was in vain.
+const REST_MAX: u32 = 64;
+
 /// What is waited for.
 pub(crate) trait Waiting<T> {
     /// Looks for it; called over and over.
@@ -29,6 +32,9 @@ pub(crate) trait Waiting<T> {
 pub(crate) struct Pace {
     mean: Duration,
     free_core: bool,
+    /// Waits to sleep through before spinning is tried again, and how many there were the last time.
+    resting: u32,
+    rest: u32,
 }
 
 impl Pace {
@@ -37,6 +43,8 @@ impl Pace {
         Pace {
             mean: SPIN_MAX / 2,
             free_core,
+            resting: 0,
+            rest: 0,
         }
     }
 
@@ -51,7 +59,9 @@ impl Pace {
             return Ok(found);
         }
         let start = Instant::now();
-        if self.free_core && self.mean < FORESEEN_MAX {
+        if self.resting > 0 {
+            self.resting -= 1;
+        } else if self.free_core && self.mean < FORESEEN_MAX {
             if self.mean > SPIN_MAX {
                 park(listener, self.mean - WAKE_MARGIN)?;
             }
@@ -59,6 +69,7 @@ impl Pace {
             loop {
                 if let Some(found) = waiting.look()? {
                     self.learn(start.elapsed());
+                    self.rest = 0;
                     return Ok(found);
                 }
                 if start.elapsed() > until {
@@ -66,6 +77,9 @@ impl Pace {
                 }
                 std::hint::spin_loop();
             }
+            // perhaps the core was not free after all, and the answer could not be computed since we spun
+            self.rest = (2 * self.rest).clamp(1, REST_MAX);
+            self.resting = self.rest;
         }
         loop {
             park(listener, SLICE)?;

@@ -13,7 +13,7 @@ use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::*;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 
-use crate::{ALIGNMENT, CommandHeader, FrameHeader, ProtocolError};
+use crate::{ALIGNMENT, CommandHeader, FrameHeader, Line, ProtocolError};
 
 /// Clients that may be attached at once, controllers and observers together.
 pub(crate) const CLIENTS_MAX: usize = 32;
@@ -23,17 +23,17 @@ const CONTROL_ACTIVE: usize = 2;
 pub(crate) const SLICE: Duration = Duration::from_millis(50);
 
 /// Frames on their way out: from the daemon.
-pub(crate) type FramePublisher<S> = Publisher<S, [u64], FrameHeader>;
+pub(crate) type FramePublisher<S> = Publisher<S, [Line], FrameHeader>;
 /// Frames on their way in: at a client.
-pub(crate) type FrameSubscriber<S> = Subscriber<S, [u64], FrameHeader>;
+pub(crate) type FrameSubscriber<S> = Subscriber<S, [Line], FrameHeader>;
 /// Commands on their way out: from a client.
-pub(crate) type CommandPublisher<S> = Publisher<S, [u64], CommandHeader>;
+pub(crate) type CommandPublisher<S> = Publisher<S, [Line], CommandHeader>;
 /// Commands on their way in: at the daemon.
-pub(crate) type CommandSubscriber<S> = Subscriber<S, [u64], CommandHeader>;
+pub(crate) type CommandSubscriber<S> = Subscriber<S, [Line], CommandHeader>;
 /// Service that carries frames.
-pub(crate) type FrameService<S> = publish_subscribe::PortFactory<S, [u64], FrameHeader>;
+pub(crate) type FrameService<S> = publish_subscribe::PortFactory<S, [Line], FrameHeader>;
 /// Service that carries commands.
-pub(crate) type CommandService<S> = publish_subscribe::PortFactory<S, [u64], CommandHeader>;
+pub(crate) type CommandService<S> = publish_subscribe::PortFactory<S, [Line], CommandHeader>;
 /// Requests from a client.
 pub(crate) type Requester<S> = ControlClient<S, [u8], (), [u8], ()>;
 /// Requests at the daemon.
@@ -89,10 +89,6 @@ fn borrowed(frames_held: usize) -> usize {
     frames_held + 1
 }
 
-fn alignment() -> Alignment {
-    Alignment::new(ALIGNMENT).expect("a power of two")
-}
-
 /// Service of frames for the controller of lease `epoch`.
 pub(crate) fn create_frames<S: Service>(
     node: &Node<S>,
@@ -100,9 +96,8 @@ pub(crate) fn create_frames<S: Service>(
     frames_held: usize,
 ) -> Result<FrameService<S>, ProtocolError> {
     node.service_builder(&service_name(&format!("obs/{epoch}"))?)
-        .publish_subscribe::<[u64]>()
+        .publish_subscribe::<[Line]>()
         .user_header::<FrameHeader>()
-        .payload_alignment(alignment())
         .enable_safe_overflow(true)
         .subscriber_max_buffer_size(BUFFER)
         .subscriber_max_borrowed_samples(borrowed(frames_held))
@@ -127,9 +122,8 @@ fn open_frame_service<S: Service>(
     name: &str,
 ) -> Result<FrameService<S>, ProtocolError> {
     node.service_builder(&service_name(name)?)
-        .publish_subscribe::<[u64]>()
+        .publish_subscribe::<[Line]>()
         .user_header::<FrameHeader>()
-        .payload_alignment(alignment())
         .open()
         .map_err(|error| ProtocolError::transport(format!("open service {name}"), error))
 }
@@ -140,9 +134,8 @@ pub(crate) fn create_watch<S: Service>(
     frames_held: usize,
 ) -> Result<FrameService<S>, ProtocolError> {
     node.service_builder(&service_name("watch")?)
-        .publish_subscribe::<[u64]>()
+        .publish_subscribe::<[Line]>()
         .user_header::<FrameHeader>()
-        .payload_alignment(alignment())
         .enable_safe_overflow(true)
         .subscriber_max_buffer_size(BUFFER)
         .subscriber_max_borrowed_samples(borrowed(frames_held))
@@ -162,11 +155,11 @@ pub(crate) fn open_watch<S: Service>(node: &Node<S>) -> Result<FrameService<S>, 
 /// The end of a service of frames that sends.
 pub(crate) fn frame_publisher<S: Service>(
     service: &FrameService<S>,
-    words: usize,
+    bytes: usize,
 ) -> Result<FramePublisher<S>, ProtocolError> {
     service
         .publisher_builder()
-        .initial_max_slice_len(words)
+        .initial_max_slice_len(bytes / ALIGNMENT)
         .max_loaned_samples(LOANS)
         .backpressure_strategy(BackpressureStrategy::DiscardData)
         .create()
@@ -192,9 +185,8 @@ pub(crate) fn create_commands<S: Service>(
     epoch: u64,
 ) -> Result<CommandService<S>, ProtocolError> {
     node.service_builder(&service_name(&format!("act/{epoch}"))?)
-        .publish_subscribe::<[u64]>()
+        .publish_subscribe::<[Line]>()
         .user_header::<CommandHeader>()
-        .payload_alignment(alignment())
         .enable_safe_overflow(true)
         .subscriber_max_buffer_size(COMMAND_BUFFER)
         .subscriber_max_borrowed_samples(1)
@@ -212,9 +204,8 @@ pub(crate) fn open_commands<S: Service>(
     epoch: u64,
 ) -> Result<CommandService<S>, ProtocolError> {
     node.service_builder(&service_name(&format!("act/{epoch}"))?)
-        .publish_subscribe::<[u64]>()
+        .publish_subscribe::<[Line]>()
         .user_header::<CommandHeader>()
-        .payload_alignment(alignment())
         .open()
         .map_err(|error| ProtocolError::transport(format!("open service act/{epoch}"), error))
 }
@@ -222,11 +213,11 @@ pub(crate) fn open_commands<S: Service>(
 /// The end of a service of commands that sends.
 pub(crate) fn command_publisher<S: Service>(
     service: &CommandService<S>,
-    words: usize,
+    bytes: usize,
 ) -> Result<CommandPublisher<S>, ProtocolError> {
     service
         .publisher_builder()
-        .initial_max_slice_len(words)
+        .initial_max_slice_len(bytes / ALIGNMENT)
         .max_loaned_samples(LOANS)
         .backpressure_strategy(BackpressureStrategy::DiscardData)
         .create()

@@ -46,7 +46,7 @@ impl Lane {
         frames_held: usize,
     ) -> Result<Lane, ProtocolError> {
         let frames = transport::create_frames(node, epoch, frames_held)?;
-        let publisher = transport::frame_publisher(&frames, slot_bytes(frame) / 8)?;
+        let publisher = transport::frame_publisher(&frames, slot_bytes(frame))?;
         reserve(
             &node.config().global.prefix.to_string(),
             publisher.id().value(),

@@ -46,13 +46,7 @@ pub(crate) fn all_bytes(description: &Description, frame: &Table) -> usize {
 
 /// Refuses when `bytes`, and 5 % for what is not counted, do not fit; past the end, shared memory kills instead of failing.
 pub(crate) fn check(bytes: usize, what: &str) -> Result<(), ProtocolError> {
-    let status = statvfs(SHARED_MEMORY).map_err(|error| {
-        ProtocolError::transport(format!("ask for the free space of {SHARED_MEMORY}"), error)
-    })?;
-    let (free, needed) = (
-        status.f_bavail * status.f_frsize,
-        (bytes + bytes / 20) as u64,
-    );
+    let (free, needed) = (free_bytes(), (bytes + bytes / 20) as u64);
     if needed > free {
         return Err(ProtocolError::SharedMemory {
             path: SHARED_MEMORY.to_owned(),
@@ -62,6 +56,27 @@ pub(crate) fn check(bytes: usize, what: &str) -> Result<(), ProtocolError> {
         });
     }
     Ok(())
+}
+
+/// What can still be taken: of the file system, of the machine and of our control group, whichever is least.
+fn free_bytes() -> u64 {
+    let number = |path: &str| fs::read_to_string(path).ok()?.trim().parse::<u64>().ok();
+    let file_system = statvfs(SHARED_MEMORY).map_or(0, |status| status.f_bavail * status.f_frsize);
+    let machine = fs::read_to_string("/proc/meminfo").ok().and_then(|text| {
+        let line = text
+            .lines()
+            .find_map(|line| line.strip_prefix("MemAvailable:"))?;
+        Some(line.trim().strip_suffix(" kB")?.parse::<u64>().ok()? * 1024)
+    });
+    // "max" is no number, and no limit
+    let limit = number("/sys/fs/cgroup/memory.max");
+    let group = limit
+        .zip(number("/sys/fs/cgroup/memory.current"))
+        .map(|(limit, used)| limit.saturating_sub(used));
+    [machine, group]
+        .into_iter()
+        .flatten()
+        .fold(file_system, u64::min)
 }
 
 /// Takes the pages of a port's data segment now, so that nobody else can: later writes cannot fail.
@@ -85,7 +100,7 @@ pub(crate) fn reserve(prefix: &str, port: u128, what: &str) -> Result<(), Protoc
     match fallocate(&file, FallocateFlags::empty(), 0, needed) {
         Ok(()) => Ok(()),
         Err(rustix::io::Errno::NOSPC) => {
-            let free = statvfs(SHARED_MEMORY).map_or(0, |status| status.f_bavail * status.f_frsize);
+            let free = free_bytes();
             Err(ProtocolError::SharedMemory {
                 path: SHARED_MEMORY.to_owned(),
                 free,

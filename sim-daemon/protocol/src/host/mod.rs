@@ -5,6 +5,8 @@ mod inbox;
 mod janitor;
 mod lane;
 pub(crate) mod memory;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,7 +26,7 @@ use crate::controller::command_bytes;
 use crate::pace::{Pace, Waiting, cores};
 use crate::place::Tenancy;
 use crate::transport::{self, FramePublisher, FrameService, Responder, facts};
-use crate::{Description, Dtype, FrameHeader, ProtocolError, RefusalKind, Table};
+use crate::{ALIGNMENT, Description, Dtype, FrameHeader, ProtocolError, RefusalKind, Table};
 
 type S = ipc::Service;
 
@@ -116,7 +118,7 @@ impl Host {
                 .expect("descriptions are plain data");
         let responder = transport::responder(&node, description_json.len().max(RESPONSE_MIN))?;
         let watch_service = transport::create_watch(&node, description.frames_held)?;
-        let watch = transport::frame_publisher(&watch_service, watch_table.total_bytes() / 8)?;
+        let watch = transport::frame_publisher(&watch_service, watch_table.total_bytes())?;
         let prefix = node.config().global.prefix.to_string();
         memory::reserve(&prefix, watch.id().value(), "the frames of observers")?;
         let watch_notifier = transport::notifier(&transport::create_event(&node, "watch", &[])?)?;
@@ -356,13 +358,13 @@ impl State {
         };
         let Ok(mut loan) = lane
             .publisher
-            .loan_slice_uninit(self.frame.total_bytes() / 8)
+            .loan_slice_uninit(self.frame.total_bytes() / ALIGNMENT)
         else {
             // the holder keeps more frames than it said: it is told that its lease is lost
             self.renew();
             return Ok(());
         };
-        let words = crate::loan::initialised(loan.payload_mut());
+        let words = crate::loan::words(loan.payload_mut());
         let (head, arena) = words.split_at_mut(Table::head_bytes(self.frame.rows().len()) / 8);
         head[..self.frame.words().len()].copy_from_slice(self.frame.words());
         fill(arena);
@@ -386,7 +388,7 @@ impl State {
         if let Some(holder) = &mut lane.holder {
             holder.beat = now;
         }
-        // SAFETY: shared memory is zero or was written, and any bits are a u64.
+        // SAFETY: shared memory is zero or was written, and any bits are a line.
         unsafe { loan.assume_init() }
             .send()
             .map_err(|error| ProtocolError::transport("send a frame", error))?;
@@ -400,11 +402,11 @@ impl State {
         (self.shown, self.unseen) = (Instant::now(), false);
         let Ok(mut loan) = self
             .watch
-            .loan_slice_uninit(self.watch_table.total_bytes() / 8)
+            .loan_slice_uninit(self.watch_table.total_bytes() / ALIGNMENT)
         else {
             return Ok(()); // observers keep every slot: they miss a frame
         };
-        let words = crate::loan::initialised(loan.payload_mut());
+        let words = crate::loan::words(loan.payload_mut());
         words[..self.watch_table.words().len()].copy_from_slice(self.watch_table.words());
         let (from, head): (&[u8], _) = (
             bytemuck::cast_slice(arena),
@@ -417,7 +419,7 @@ impl State {
                 .copy_from_slice(&from[source.offset - head..][..target.bytes]);
         }
         *loan.user_header_mut() = header(&self.description, &self.watch_table, self.frames);
-        // SAFETY: shared memory is zero or was written, and any bits are a u64.
+        // SAFETY: shared memory is zero or was written, and any bits are a line.
         unsafe { loan.assume_init() }
             .send()
             .map_err(|error| ProtocolError::transport("send a frame", error))?;
@@ -434,11 +436,14 @@ impl State {
         let end = reason.floor_char_boundary(room);
         let reason = &reason.as_bytes()[..end];
         let table = Table::lay_out([("reason".to_owned(), Dtype::U8, vec![reason.len()], 0)]);
-        let Ok(mut loan) = lane.publisher.loan_slice_uninit(table.total_bytes() / 8) else {
+        let Ok(mut loan) = lane
+            .publisher
+            .loan_slice_uninit(table.total_bytes() / ALIGNMENT)
+        else {
             self.renew();
             return Ok(());
         };
-        let words = crate::loan::initialised(loan.payload_mut());
+        let words = crate::loan::words(loan.payload_mut());
         words[..table.words().len()].copy_from_slice(table.words());
         let offset = table.rows()[0].offset;
         bytemuck::cast_slice_mut::<u64, u8>(words)[offset..offset + reason.len()]
@@ -449,7 +454,7 @@ impl State {
             outcome: kind as u32,
             ..header(&self.description, &table, self.frames)
         };
-        // SAFETY: shared memory is zero or was written, and any bits are a u64.
+        // SAFETY: shared memory is zero or was written, and any bits are a line.
         unsafe { loan.assume_init() }
             .send()
             .map_err(|error| ProtocolError::transport("send a refusal", error))?;
@@ -496,7 +501,9 @@ impl Waiting<Next> for State {
             return Ok(None);
         };
         let header = *sample.user_header();
-        let taken = self.inbox.take(header, sample.payload());
+        let taken = self
+            .inbox
+            .take(header, bytemuck::cast_slice(sample.payload()));
         drop(sample);
         if header.session != self.description.session
             || header.epoch != lane.epoch

@@ -1,0 +1,245 @@
+//! A host without physics against clients that send nonsense.
+
+use std::path::PathBuf;
+use std::sync::mpsc::{Sender, channel};
+use std::thread::JoinHandle;
+
+use super::*;
+use crate::place::Place;
+use crate::transport::CommandPublisher;
+use crate::{
+    AttachOptions, Client, CommandHeader, Frame, Hook, InputInfo, Op, keep_waiting,
+};
+
+type Clients = iceoryx2::prelude::ipc_threadsafe::Service;
+
+/// A daemon on a thread: it answers every command with the number of commands so far.
+struct Fake {
+    name: String,
+    root: PathBuf,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+fn description() -> Description {
+    let input = |name: &str| InputInfo {
+        name: name.to_owned(),
+        columns: 3,
+        unit: "-".to_owned(),
+        doc: String::new(),
+    };
+    Description {
+        protocol: 0,
+        release: String::new(),
+        name: String::new(),
+        session: 0,
+        pid: 0,
+        worlds: 2,
+        device: "none".to_owned(),
+        precision: "f32".to_owned(),
+        threads: 1,
+        dt: 0.01,
+        substeps: 1,
+        gravity: [0.0; 3],
+        dof_names: ["a/x", "a/y", "a/z"].map(str::to_owned).to_vec(),
+        coord_names: Vec::new(),
+        body_names: Vec::new(),
+        robots: Vec::new(),
+        fields: Vec::new(),
+        known_fields: Vec::new(),
+        commands: vec![input("joint_f")],
+        writes: vec![input("joint_q")],
+        scene: String::new(),
+        scene_folder: String::new(),
+        notes: Vec::new(),
+        frames_held: 2,
+        watch_worlds: 1,
+        schema: 0,
+    }
+}
+
+/// Serves until told to stop; sends word when clients may come.
+fn serve(place: &Place, stop: Arc<AtomicBool>, ready: Sender<()>) {
+    let table = Table::over_arena([("count".to_owned(), Dtype::U64, vec![2], 0)], 64);
+    let tenancy = Tenancy::take(place).unwrap();
+    let mut host = Host::open(tenancy, description(), table, stop).unwrap();
+    let janitor = host.janitor();
+    ready.send(()).unwrap();
+    let mut count = 0;
+    loop {
+        match host.next().unwrap() {
+            Next::Command => {
+                count += 1;
+                host.answer(Instant::now(), |arena| arena[..2].fill(count))
+                    .unwrap();
+            }
+            Next::Watch => host.show(&[count; 8]).unwrap(),
+            Next::End => break,
+        }
+    }
+    janitor.clean();
+}
+
+impl Fake {
+    fn start(test: &str) -> Fake {
+        let root = std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()));
+        let place = Place::new(Some(&root), "fake").unwrap();
+        let (stop, (ready, wait)) = (Arc::new(AtomicBool::new(false)), channel());
+        let theirs = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || serve(&place, theirs, ready));
+        wait.recv().unwrap();
+        Fake {
+            name: "fake".to_owned(),
+            root,
+            stop,
+            thread: Some(thread),
+        }
+    }
+
+    fn attach(&self) -> Client {
+        let options = AttachOptions {
+            root: Some(self.root.clone()),
+            ..AttachOptions::default()
+        };
+        Client::attach(&self.name, &options, &mut keep_waiting()).unwrap()
+    }
+}
+
+impl Drop for Fake {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        self.thread.take().unwrap().join().unwrap();
+        std::fs::remove_dir(&self.root).expect("nothing is left in the root folder");
+    }
+}
+
+fn count(frame: &Frame) -> u64 {
+    frame.field("count").unwrap().as_slice::<u64>().unwrap()[0]
+}
+
+/// Puts a command together by hand and sends it through the client's own port.
+fn send(publisher: &CommandPublisher<Clients>, header: CommandHeader, payload: &[u64]) {
+    let mut loan = publisher
+        .loan_slice_uninit(payload.len().div_ceil(crate::Line::WORDS))
+        .unwrap();
+    *loan.user_header_mut() = header;
+    crate::loan::words(loan.payload_mut())[..payload.len()].copy_from_slice(payload);
+    // SAFETY: shared memory is zero or was written, and any bits are a line.
+    unsafe { loan.assume_init() }.send().unwrap();
+}
+
+#[test]
+fn hostile_commands_are_refused_with_a_reason_and_the_host_goes_on() {
+    let fake = Fake::start("hostile");
+    let client = fake.attach();
+    let hook: Hook<'_> = &mut keep_waiting();
+    assert_eq!(count(&client.step(&[], hook).unwrap()), 1);
+    let session = client.description().session;
+    let good = Table::lay_out([("joint_f".to_owned(), Dtype::F32, vec![2, 3], 0)]);
+    let mut payload = vec![0; good.total_bytes() / 8];
+    payload[..good.words().len()].copy_from_slice(good.words());
+    let with = |word: usize, value: u64| {
+        let mut payload = payload.clone();
+        payload[word] = value;
+        payload
+    };
+    let header = CommandHeader {
+        session,
+        epoch: 1,
+        seq: 0,
+        op: Op::Step as u32,
+        rows: 1,
+    };
+    let cases: [(&str, CommandHeader, Vec<u64>, &str); 9] = [
+        (
+            "a truncated table",
+            header,
+            payload[..8].to_vec(),
+            "field table of 1 rows",
+        ),
+        (
+            "many rows",
+            CommandHeader {
+                rows: u32::MAX,
+                ..header
+            },
+            payload.clone(),
+            "rows in the field table",
+        ),
+        ("an offset outside", header, with(10, 1 << 40), "do not lie"),
+        ("a huge shape", header, with(5, u64::MAX), "does not make"),
+        (
+            "a shape that overflows",
+            header,
+            with(6, 1 << 63),
+            "does not make",
+        ),
+        (
+            "an unknown type",
+            header,
+            with(4, 77 | 2 << 32),
+            "unknown dtype 77",
+        ),
+        ("no name", header, with(0, 0), "a name is empty"),
+        (
+            "an unknown operation",
+            CommandHeader { op: 9, ..header },
+            payload.clone(),
+            "unknown operation 9",
+        ),
+        (
+            "another session",
+            CommandHeader {
+                session: 1,
+                ..header
+            },
+            payload.clone(),
+            "stale",
+        ),
+    ];
+    for (what, header, payload, words) in cases {
+        let refusal =
+            client.raw(|publisher, seq| send(publisher, CommandHeader { seq, ..header }, &payload));
+        let error = refusal.unwrap_err();
+        assert!(
+            matches!(error, ProtocolError::CommandRefused { .. }),
+            "{what}: {error}"
+        );
+        assert!(
+            error.to_string().contains(words),
+            "{what}: {words} is not in: {error}"
+        );
+    }
+    let old =
+        client.raw(|publisher, seq| send(publisher, CommandHeader { seq, ..header }, &payload));
+    assert_eq!(
+        count(&old.unwrap()),
+        2,
+        "nothing that was refused was carried out"
+    );
+    assert_eq!(count(&client.step(&[], &mut keep_waiting()).unwrap()), 3);
+}
+
+#[test]
+fn facts_that_differ_are_refused_with_both_named() {
+    let root = std::env::temp_dir().join(format!("tightloop-facts-{}", std::process::id()));
+    let place = Place::new(Some(&root), "facts").unwrap();
+    let mut tenancy = Tenancy::take(&place).unwrap();
+    let node = transport::node::<S>(&place.transport_config(5), "daemon").unwrap();
+    let attributes = [(facts::PROTOCOL, "7".to_owned())];
+    let wake = transport::create_event(&node, "wake", &attributes).unwrap();
+    tenancy.announce(5).unwrap();
+    let options = AttachOptions {
+        root: Some(root.clone()),
+        ..AttachOptions::default()
+    };
+    let error = Client::attach("facts", &options, &mut keep_waiting())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("protocol version is 7 in the handshake and 1"),
+        "{error}"
+    );
+    drop((wake, node, tenancy));
+    std::fs::remove_dir(root).expect("nothing is left in the root folder");
+}
