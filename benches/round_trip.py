@@ -30,10 +30,11 @@ BUDGET_US = 5.0
 PARTS = {"p50_us": 50, "p99_us": 99, "p999_us": 99.9}
 
 
-def in_process() -> dict[str, float]:
-    """Percentiles of a step in one process, in Rust [us]."""
+def in_rust() -> tuple[dict[str, float], dict[str, float]]:
+    """Percentiles of a step in Rust, in process and through a daemon [us]."""
     command = ["cargo", "bench", "--quiet", "--package", "tightloop", "--bench", "round_trip"]
-    return json.loads(subprocess.run(command, cwd=REPOSITORY, stdout=subprocess.PIPE, check=True).stdout)
+    measured = json.loads(subprocess.run(command, cwd=REPOSITORY, stdout=subprocess.PIPE, check=True).stdout)
+    return measured, measured["wire"]
 
 
 def through_python(sim: tl.Sim) -> dict[str, float]:
@@ -54,18 +55,19 @@ def through_python(sim: tl.Sim) -> dict[str, float]:
 
 def main() -> int:
     """Measure in turns, print medians over the rounds; 0 when the budget is kept."""
-    rust, python = [], []
+    rows: dict[str, list[dict[str, float]]] = {"in process, Rust": [], "daemon, Rust": [], "daemon, Python": []}
     with tl.launch(scene(driven=True), worlds=1, threads=1) as sim:
         for _ in range(ROUNDS):
-            rust.append(in_process())
-            python.append(through_python(sim))
-    print(f"one world, {MEASURED} steps, median of {ROUNDS} rounds, {os.cpu_count()} cores")
-    print(f"{'us':>20}{'p50':>9}{'p99':>9}{'p99.9':>9}")
-    medians = [{part: float(np.median([row[part] for row in rows])) for part in PARTS} for rows in (rust, python)]
-    for what, row in zip(("in process, Rust", "Python, daemon"), medians, strict=True):
-        print(f"{what:>20}" + "".join(f"{row[part]:9.2f}" for part in PARTS))
-    added = float(np.median([there["p50_us"] - here["p50_us"] for here, there in zip(rust, python, strict=True)]))
-    print(f"{'added at p50':>20}{added:9.2f}   (budget {BUDGET_US:.0f})")
+            for measured, percentiles in zip(rows.values(), (*in_rust(), through_python(sim)), strict=True):
+                measured.append(percentiles)
+    print(f"one world, {MEASURED} steps, median of {ROUNDS} rounds, {os.cpu_count()} cores [us]")
+    print(f"{'':>20}{'p50':>9}{'p99':>9}{'p99.9':>9}")
+    for what, measured in rows.items():
+        medians = [float(np.median([percentiles[part] for percentiles in measured])) for part in PARTS]
+        print(f"{what:>20}" + "".join(f"{median:9.2f}" for median in medians))
+    here, _, there = rows.values()
+    added = float(np.median([b["p50_us"] - a["p50_us"] for a, b in zip(here, there, strict=True)]))
+    print(f"{'added by Python':>20}{added:9.2f}   (budget {BUDGET_US:.0f} at p50)")
     return int(added > BUDGET_US)
 
 
