@@ -85,7 +85,13 @@ impl Simulation {
         let threads = options.threads.unwrap_or_else(cores);
         let (worlds, precision) = (options.worlds, options.precision);
         let backend = cpu::create(&model, worlds, precision, options.lanes, &layout, threads)?;
-        Ok(Simulation { model, worlds, precision, layout, backend })
+        Ok(Simulation {
+            model,
+            worlds,
+            precision,
+            layout,
+            backend,
+        })
     }
 
     /// The model.
@@ -211,10 +217,17 @@ impl Simulation {
     ) -> Result<(), BackendError> {
         let row = field.row();
         if row.group != group {
-            let choices = Field::ALL.iter().map(|field| field.row()).filter(|row| row.group == group);
+            let choices = Field::ALL
+                .iter()
+                .map(|field| field.row())
+                .filter(|row| row.group == group);
             return Err(BackendError::Group {
                 field: row.name,
-                expected: if group == Group::State { "part of the state" } else { "a command" },
+                expected: if group == Group::State {
+                    "part of the state"
+                } else {
+                    "a command"
+                },
                 choices: choices.map(|row| row.name).collect::<Vec<_>>().join(", "),
             });
         }
@@ -257,9 +270,10 @@ impl Simulation {
     /// A mask of the wrong length.
     pub fn check_mask(&self, mask: Option<&[bool]>) -> Result<(), BackendError> {
         match mask {
-            Some(mask) if mask.len() != self.worlds => {
-                Err(BackendError::Mask { got: mask.len(), worlds: self.worlds })
-            }
+            Some(mask) if mask.len() != self.worlds => Err(BackendError::Mask {
+                got: mask.len(),
+                worlds: self.worlds,
+            }),
             _ => Ok(()),
         }
     }
@@ -269,7 +283,9 @@ impl Simulation {
 fn check_memory(model: &Model, options: &Options) -> Result<(), BackendError> {
     const MB: u64 = 1 << 20;
     // a system that does not say how much is free is not asked twice: the allocation itself will tell
-    let Some(available) = available_memory() else { return Ok(()) };
+    let Some(available) = available_memory() else {
+        return Ok(());
+    };
     let needed = Simulation::memory_of(model, options);
     if needed > available {
         return Err(BackendError::Memory {
@@ -284,7 +300,9 @@ fn check_memory(model: &Model, options: &Options) -> Result<(), BackendError> {
 /// Memory that can be taken without swapping [bytes].
 fn available_memory() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
+    let line = text
+        .lines()
+        .find(|line| line.starts_with("MemAvailable:"))?;
     let kb: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
     Some(kb * 1024)
 }

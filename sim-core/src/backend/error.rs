@@ -22,7 +22,9 @@ pub enum BackendError {
         available_mb: u64,
     },
     /// A block width that this processor does not have.
-    #[error("this processor has no {instructions}, which {lanes} worlds a block need; use lanes = auto")]
+    #[error(
+        "this processor has no {instructions}, which {lanes} worlds a block need; use lanes = auto"
+    )]
     Lanes {
         /// Worlds a block.
         lanes: usize,
@@ -60,7 +62,9 @@ pub enum BackendError {
         end: usize,
     },
     /// An array of the wrong size.
-    #[error("`{field}` has {got} values; {worlds} worlds × {columns} columns = {expected} are needed")]
+    #[error(
+        "`{field}` has {got} values; {worlds} worlds × {columns} columns = {expected} are needed"
+    )]
     Length {
         /// The field.
         field: &'static str,
@@ -82,7 +86,9 @@ pub enum BackendError {
         worlds: usize,
     },
     /// NaN or infinity.
-    #[error("`{field}` is {value} in world {world} for `{name}`; nothing was written, send finite numbers")]
+    #[error(
+        "`{field}` is {value} in world {world} for `{name}`; nothing was written, send finite numbers"
+    )]
     NotFinite {
         /// The field.
         field: &'static str,

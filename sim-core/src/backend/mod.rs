@@ -49,7 +49,13 @@ pub trait Backend: Send {
     fn threads(&self) -> usize;
     /// Sets columns of a state or command field in the worlds of the mask (none = all);
     /// a written state clears the warm start of its worlds.
-    fn write(&mut self, field: Field, columns: Range<usize>, values: Values<'_>, mask: Option<&[bool]>);
+    fn write(
+        &mut self,
+        field: Field,
+        columns: Range<usize>,
+        values: Values<'_>,
+        mask: Option<&[bool]>,
+    );
     /// Back to the start, in the worlds of the mask (none = all).
     fn reset(&mut self, mask: Option<&[bool]>);
     /// Runs `substeps` substeps (none = evaluates only), then writes every field of the layout

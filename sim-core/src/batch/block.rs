@@ -38,7 +38,7 @@ pub struct Workspace<F> {
     pub inertia: Vec<Inertia<F>>,
     /// Coriolis, centrifugal and gravity forces. `(dofs)` [N·m or N]
     pub bias_force: Vec<F>,
-    /// Packed lower triangle, see [`crate::math::factor::tri`]. `(dofs (dofs + 1) / 2)` [kg·m², kg·m or kg]
+    /// Packed, see [`crate::math::factor::Pattern::at`]. `(pattern)` [kg·m², kg·m or kg]
     pub mass_matrix: Vec<F>,
     /// All forces but those of constraints. `(dofs)` [N·m or N]
     pub smooth_force: Vec<F>,
@@ -128,7 +128,7 @@ impl<F: Num, V: Copy> Block<F, V> {
     pub fn new<R: Real>(m: &Constants<R>, cell: V) -> Self {
         let (n, rows) = (m.dofs.len(), m.rows());
         let zero = F::c(0.0);
-        let packed = n * (n + 1) / 2;
+        let packed = m.pattern.len();
         Block {
             joint_q: vec![cell; n],
             joint_qd: vec![cell; n],

@@ -173,11 +173,18 @@ fields! {
 impl Field {
     /// The field of this name.
     pub fn named(name: &str) -> Option<Field> {
-        Field::ALL.iter().copied().find(|field| field.row().name == name)
+        Field::ALL
+            .iter()
+            .copied()
+            .find(|field| field.row().name == name)
     }
 
     /// Elements per world.
     pub fn elements(self, model: &Model) -> usize {
-        self.row().shape.iter().map(|axis| axis.len(model)).product()
+        self.row()
+            .shape
+            .iter()
+            .map(|axis| axis.len(model))
+            .product()
     }
 }

@@ -33,8 +33,13 @@ pub struct Layout {
 impl Layout {
     /// Arrays of the given fields, each once, then of all counters.
     pub fn new(model: &Model, worlds: usize, real: Dtype, fields: &[Field]) -> Layout {
-        let counters = Field::ALL.iter().filter(|field| field.row().group == Group::Counter);
-        let mut layout = Layout { slots: Vec::new(), bytes: 0 };
+        let counters = Field::ALL
+            .iter()
+            .filter(|field| field.row().group == Group::Counter);
+        let mut layout = Layout {
+            slots: Vec::new(),
+            bytes: 0,
+        };
         for &field in fields.iter().chain(counters) {
             if layout.slots.iter().any(|slot| slot.field == field) {
                 continue;
@@ -46,7 +51,13 @@ impl Layout {
             let mut shape = vec![worlds];
             shape.extend(field.row().shape.iter().map(|axis| axis.len(model)));
             let bytes = shape.iter().product::<usize>() * dtype.bytes();
-            layout.slots.push(Slot { field, dtype, shape, offset: layout.bytes, bytes });
+            layout.slots.push(Slot {
+                field,
+                dtype,
+                shape,
+                offset: layout.bytes,
+                bytes,
+            });
             layout.bytes += bytes.next_multiple_of(ALIGNMENT);
         }
         layout

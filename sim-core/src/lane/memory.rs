@@ -1,6 +1,6 @@
 //! The CPU machine: a mask of active worlds, and scratch rows of one block of worlds.
 
-use super::{Cx, Lane, Num, Table};
+use super::{Cx, Lane, Table};
 
 /// Runs the text natively: loops are Rust loops, blocks are masks.
 pub struct Cpu<'a, F: Lane> {
@@ -12,12 +12,18 @@ impl<'a, F: Lane> Cpu<'a, F> {
     /// A machine with every world active, over scratch memory for the tables of the text.
     #[inline(always)]
     pub fn new(memory: &'a mut [F]) -> Self {
-        Cpu { mask: F::all(), memory }
+        Cpu {
+            mask: F::all(),
+            memory,
+        }
     }
 
     #[inline(always)]
     fn cell(&mut self, t: Table, row: usize, k: usize) -> &mut F {
-        debug_assert!(row < t.rows && k < t.stride, "row {row}, number {k} of {t:?}");
+        debug_assert!(
+            row < t.rows && k < t.stride,
+            "row {row}, number {k} of {t:?}"
+        );
         &mut self.memory[t.base + row * t.stride + k]
     }
 }
@@ -98,7 +104,11 @@ impl<F: Lane> Cx for Cpu<'_, F> {
 
     #[inline(always)]
     fn list(&mut self, capacity: usize) -> Rows<F> {
-        Rows { capacity, used: 0, count: F::c(0.0) }
+        Rows {
+            capacity,
+            used: 0,
+            count: F::c(0.0),
+        }
     }
     #[inline(always)]
     fn push(&mut self, list: &mut Rows<F>, mask: F::Mask) -> (F::Mask, Option<F>) {
@@ -114,9 +124,7 @@ impl<F: Lane> Cx for Cpu<'_, F> {
             return (outer, None);
         }
         // rows are filled in order, so at most one more row comes into use
-        if list.used < list.capacity
-            && F::any(F::and(fits, F::c(list.used as f64 - 0.5).lt(row)))
-        {
+        if list.used < list.capacity && F::any(F::and(fits, F::c(list.used as f64 - 0.5).lt(row))) {
             list.used += 1;
         }
         self.mask = fits;
@@ -139,11 +147,23 @@ impl<F: Lane> Cx for Cpu<'_, F> {
 
     #[inline(always)]
     fn rows(&mut self, list: &Rows<F>) -> Loop<F> {
-        Loop { round: 0, rounds: list.used, outer: self.mask, live: self.mask, count: Some(list.count) }
+        Loop {
+            round: 0,
+            rounds: list.used,
+            outer: self.mask,
+            live: self.mask,
+            count: Some(list.count),
+        }
     }
     #[inline(always)]
     fn times(&mut self, n: usize) -> Loop<F> {
-        Loop { round: 0, rounds: n, outer: self.mask, live: self.mask, count: None }
+        Loop {
+            round: 0,
+            rounds: n,
+            outer: self.mask,
+            live: self.mask,
+            count: None,
+        }
     }
     #[inline(always)]
     fn next(&mut self, l: &mut Loop<F>) -> Option<usize> {

@@ -235,7 +235,11 @@ pub trait Cx: Sized {
     /// An empty list of at most `capacity` rows; what does not fit is counted, not stored.
     fn list(&mut self, capacity: usize) -> Self::List;
     /// Opens a block for the worlds in `mask`, with a fresh row; see [`push!`].
-    fn push(&mut self, list: &mut Self::List, mask: MaskOf<Self>) -> (Self::Block, Option<Self::Row>);
+    fn push(
+        &mut self,
+        list: &mut Self::List,
+        mask: MaskOf<Self>,
+    ) -> (Self::Block, Option<Self::Row>);
     /// Rows that were pushed, those that did not fit included.
     fn pushed(&mut self, list: &Self::List) -> Self::F;
     /// Opens a block for the worlds in `mask`; false if there are none. See [`when!`].

@@ -1,6 +1,8 @@
 //! Spatial vectors and inertias about a fixed reference point, in world axes (Featherstone 2008, chapter 2).
 
-use super::vec3::{Mat3, Vec3, add, constant, cross, cross_add, dot, scale, scale_add, transform, transform_add};
+use super::vec3::{
+    Mat3, Vec3, add, constant, cross, cross_add, dot, scale, scale_add, transform, transform_add,
+};
 use crate::lane::Num;
 
 /// A motion or force: linear part, then angular part.

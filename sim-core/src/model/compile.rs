@@ -4,15 +4,19 @@
 //! axis is z; constraint parameters that derive from mass are evaluated at the reference pose q = 0.
 
 use super::constants::{Constants, Dof, Equality, Frame, Friction, Impedance, Limit, Newton, Soft};
-use super::{Description, JointKind, ModelError, Pose, Robot, TargetMode};
 use super::inverse_weight;
+use super::{Description, JointKind, ModelError, Pose, Robot, TargetMode};
 use crate::math::factor::Pattern;
 use std::ops::Range;
 use std::sync::Arc;
 
 /// MuJoCo's default `solimp` (0.9, 0.95, 0.001, 0.5, 2).
-const IMPEDANCE: Impedance<f64> =
-    Impedance { d_min: 0.9, d_max: 0.95, width: 0.001, midpoint: 0.5 };
+const IMPEDANCE: Impedance<f64> = Impedance {
+    d_min: 0.9,
+    d_max: 0.95,
+    inverse_width: 1.0 / 0.001,
+    midpoint: 0.5,
+};
 /// MuJoCo's default `solref`: time constant [s], damping ratio.
 const SOLREF: [f64; 2] = [0.02, 1.0];
 /// Stiffness and damping of joint limits in force space, Newton's `limit_ke`, `limit_kd`.
@@ -122,18 +126,26 @@ impl Description {
     /// # Errors
     /// Whatever [`Description::validate`] finds, and a mass matrix that is not positive definite.
     pub fn compile(&self) -> Result<Arc<Model>, ModelError> {
-        let mut checked = self.clone();
-        checked.validate()?;
-        compile(&checked).map(Arc::new)
+        self.validate()?;
+        compile(self).map(Arc::new)
     }
 }
 
 fn compile(scene: &Description) -> Result<Model, ModelError> {
-    let mut builder = Builder { dt: scene.dt, ..Builder::default() };
+    let mut builder = Builder::default();
     for robot in &scene.robots {
         builder.add(robot);
     }
-    let Builder { dofs, frames, joints, robots, dof_names, body_names, start, couplings, .. } = builder;
+    let Builder {
+        dofs,
+        frames,
+        joints,
+        robots,
+        dof_names,
+        body_names,
+        start,
+        couplings,
+    } = builder;
 
     let mut entries = couplings.clone();
     for (k, dof) in dofs.iter().enumerate() {
@@ -193,7 +205,13 @@ fn add_rows(constants: &mut Constants<f64>, joints: &[DofJoint], inverse_weight:
         let weight = inverse_weight[dof];
         if let Some((leader, multiplier, offset)) = joint.mimic {
             let soft = soft(SOLREF, weight + inverse_weight[leader], dt);
-            constants.equalities.push(Equality { follower: dof, leader, multiplier, offset, soft });
+            constants.equalities.push(Equality {
+                follower: dof,
+                leader,
+                multiplier,
+                offset,
+                soft,
+            });
         }
         if joint.friction > 0.0 {
             let soft = soft(SOLREF, weight, dt);
@@ -213,7 +231,12 @@ fn add_rows(constants: &mut Constants<f64>, joints: &[DofJoint], inverse_weight:
                 2.0 / (LIMIT_KD * f),
                 0.5 * LIMIT_KD * f * (1.0 / (LIMIT_KE * f)).sqrt(),
             ];
-            constants.limits.push(Limit { dof, lower, upper, soft: soft(solref, weight, dt) });
+            constants.limits.push(Limit {
+                dof,
+                lower,
+                upper,
+                soft: soft(solref, weight, dt),
+            });
         }
     }
 }
@@ -240,7 +263,6 @@ struct Carrier {
 
 #[derive(Default)]
 struct Builder {
-    dt: f64,
     dofs: Vec<Dof<f64>>,
     frames: Vec<Frame<f64>>,
     joints: Vec<DofJoint>,
@@ -257,12 +279,21 @@ impl Builder {
         let order = robot.dofs();
         // the base stands still: its frame has the world's axes and its origin as reference point
         let mut carriers = vec![
-            Carrier { dof: None, pose: Pose { pos: [0.0; 3], quat: robot.pose.quat } };
+            Carrier {
+                dof: None,
+                pose: Pose {
+                    pos: [0.0; 3],
+                    quat: robot.pose.quat
+                }
+            };
             robot.links.len()
         ];
         for link in robot.link_order() {
-            if let Some((index, joint)) =
-                robot.joints.iter().enumerate().find(|(_, joint)| joint.child == link)
+            if let Some((index, joint)) = robot
+                .joints
+                .iter()
+                .enumerate()
+                .find(|(_, joint)| joint.child == link)
             {
                 let parent = carriers[joint.parent];
                 let mut pose = parent.pose.mul(&joint.origin);
@@ -277,7 +308,8 @@ impl Builder {
                 carriers[link] = Carrier { dof, pose };
             }
             let carrier = carriers[link];
-            self.body_names.push(format!("{}/{}", robot.name, robot.links[link].name));
+            self.body_names
+                .push(format!("{}/{}", robot.name, robot.links[link].name));
             self.frames.push(Frame {
                 dof: carrier.dof,
                 position: carrier.pose.pos,
@@ -295,7 +327,11 @@ impl Builder {
                 self.couplings.push((dof, leader));
                 (leader, mimic.multiplier, mimic.offset)
             });
-            self.joints.push(DofJoint { range: joint.range, friction: joint.friction, mimic });
+            self.joints.push(DofJoint {
+                range: joint.range,
+                friction: joint.friction,
+                mimic,
+            });
         }
         self.robots.push(RobotRange {
             name: robot.name.clone(),
@@ -319,27 +355,40 @@ impl Builder {
             inertia: [0.0; 6],
             armature: joint.armature,
             damping: joint.damping,
-            ke: if drives_position { joint.target_ke } else { 0.0 },
+            ke: if drives_position {
+                joint.target_ke
+            } else {
+                0.0
+            },
             kd: joint.target_kd,
             follows_velocity: joint.target_mode != TargetMode::Position,
             effort_limit: joint.effort_limit.filter(|limit| limit.is_finite()),
         });
-        self.dof_names.push(format!("{}/{}", robot.name, joint.name));
+        self.dof_names
+            .push(format!("{}/{}", robot.name, joint.name));
         self.start.joint_q.push(joint.q);
-        self.start.joint_target_q.push(joint.target_q.unwrap_or(joint.q));
+        self.start
+            .joint_target_q
+            .push(joint.target_q.unwrap_or(joint.q));
         self.start.joint_target_qd.push(joint.target_qd);
     }
 
     /// Mass, centre and inertia of all links that move with a dof.
     fn set_mass(&mut self, robot: &Robot, carriers: &[Carrier], dof: usize) {
         let parts = || {
-            carriers.iter().zip(&robot.links).filter(|(c, _)| c.dof == Some(dof)).filter_map(
-                |(carrier, link)| {
+            carriers
+                .iter()
+                .zip(&robot.links)
+                .filter(|(c, _)| c.dof == Some(dof))
+                .filter_map(|(carrier, link)| {
                     let inertial = link.inertial.as_ref()?;
                     let center = carrier.pose.transform(inertial.pos);
-                    Some((inertial.mass, center, carrier.pose.rotate_tensor(inertial.inertia)))
-                },
-            )
+                    Some((
+                        inertial.mass,
+                        center,
+                        carrier.pose.rotate_tensor(inertial.inertia),
+                    ))
+                })
         };
         let mass: f64 = parts().map(|(mass, _, _)| mass).sum();
         let mut center = [0.0; 3];
@@ -380,13 +429,20 @@ fn z_to(axis: [f64; 3]) -> Pose {
     }
     let quat = [-axis[1], axis[0], 0.0, 1.0 + axis[2]];
     let norm = quat.iter().map(|x| x * x).sum::<f64>().sqrt();
-    Pose { pos: [0.0; 3], quat: quat.map(|x| x / norm) }
+    Pose {
+        pos: [0.0; 3],
+        quat: quat.map(|x| x / norm),
+    }
 }
 
 impl Pose {
     /// Half a turn about the parent's x axis, applied after this rotation.
     fn flipped(&self) -> Pose {
-        Pose { pos: [0.0; 3], quat: [1.0, 0.0, 0.0, 0.0] }.mul(self)
+        Pose {
+            pos: [0.0; 3],
+            quat: [1.0, 0.0, 0.0, 0.0],
+        }
+        .mul(self)
     }
 }
 
@@ -396,5 +452,7 @@ fn hash(model: &Model) -> u64 {
         "{:?} {} {} {:?} {:?} {:?}",
         model.constants, model.dt, model.substeps, model.dof_names, model.body_names, model.start
     );
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| {
+        (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
+    })
 }

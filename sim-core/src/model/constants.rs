@@ -92,9 +92,9 @@ pub struct Impedance<R> {
     pub d_min: R,
     /// At `width` and beyond [–].
     pub d_max: R,
-    /// [m or rad]
-    pub width: R,
-    /// As a share of the width [–].
+    /// 1 / width, the position at which `d_max` is reached [1/m or 1/rad].
+    pub inverse_width: R,
+    /// Where the parabolas meet, as a share of the width [–].
     pub midpoint: R,
 }
 
@@ -162,7 +162,7 @@ impl<R: Real> Constants<R> {
             impedance: Impedance {
                 d_min: cast(s.impedance.d_min),
                 d_max: cast(s.impedance.d_max),
-                width: cast(s.impedance.width),
+                inverse_width: cast(s.impedance.inverse_width),
                 midpoint: cast(s.impedance.midpoint),
             },
         };

@@ -22,7 +22,10 @@ pub(super) fn at_reference(
 ) -> Result<Reference, ModelError> {
     let n = constants.dofs.len();
     if n == 0 {
-        return Ok(Reference { dof_inverse_weight: Vec::new(), mean_inertia: 1.0 });
+        return Ok(Reference {
+            dof_inverse_weight: Vec::new(),
+            mean_inertia: 1.0,
+        });
     }
     let mut frames: Vec<([[f64; 3]; 3], [f64; 3])> = Vec::with_capacity(n);
     let mut motions: Vec<Spatial<f64>> = Vec::with_capacity(n);
@@ -31,12 +34,19 @@ pub(super) fn at_reference(
         let (rotation, origin) = match dof.parent {
             Some(p) => {
                 let (r, o) = &frames[p];
-                (dof.rotation.map(|c| transform(r, c)), transform_add(r, dof.position, *o))
+                (
+                    dof.rotation.map(|c| transform(r, c)),
+                    transform_add(r, dof.position, *o),
+                )
             }
             None => (dof.rotation, dof.position),
         };
         let z = rotation[2];
-        motions.push(if dof.revolute { [cross(origin, z), z] } else { [z, [0.0; 3]] });
+        motions.push(if dof.revolute {
+            [cross(origin, z), z]
+        } else {
+            [z, [0.0; 3]]
+        });
         let inertia = place::<f64>(dof.mass, dof.center, dof.inertia, &rotation, origin);
         frames.push((rotation, origin));
         let mut i = Some(k);
@@ -53,11 +63,16 @@ pub(super) fn at_reference(
     }
     let mean_inertia = (0..n).map(|k| mass_matrix[(k, k)]).sum::<f64>() / n as f64;
     if let Some(k) = (0..n).find(|&k| !(mass_matrix[(k, k)] > f64::MIN_POSITIVE)) {
-        return Err(ModelError::NoInertia { joint: names[k].clone() });
+        return Err(ModelError::NoInertia {
+            joint: names[k].clone(),
+        });
     }
     let factor = mass_matrix
         .llt(faer::Side::Lower)
         .map_err(|_| ModelError::SingularMass)?;
     let inverse = factor.inverse();
-    Ok(Reference { dof_inverse_weight: (0..n).map(|k| inverse[(k, k)]).collect(), mean_inertia })
+    Ok(Reference {
+        dof_inverse_weight: (0..n).map(|k| inverse[(k, k)]).collect(),
+        mean_inertia,
+    })
 }

@@ -11,7 +11,11 @@ pub(super) fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
     for (j, dof) in m.dofs.iter().enumerate() {
         let (q, qd) = (cx.get(&b.joint_q[j]), cx.get(&b.joint_qd[j]));
         let error = b.joint_target_q[j] - q;
-        let rate = if dof.follows_velocity { b.joint_target_qd[j] - qd } else { -qd };
+        let rate = if dof.follows_velocity {
+            b.joint_target_qd[j] - qd
+        } else {
+            -qd
+        };
         let mut drive = error.fma(C::F::k(dof.ke), rate * C::F::k(dof.kd));
         if let Some(limit) = dof.effort_limit {
             let limit = C::F::k(limit);

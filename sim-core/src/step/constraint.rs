@@ -7,7 +7,7 @@
 //! entries, known when the model is compiled; only the side of a limit is found at run time.
 
 use super::{BlockOf, ConstantsOf};
-use crate::lane::{Cx, Num};
+use crate::lane::{Cx, Num, Real};
 use crate::model::constants::{Impedance, Soft};
 
 #[inline(always)]
@@ -56,11 +56,11 @@ fn soft_row<F: Num>(soft: &Soft<F::Real>, position: F, velocity: F) -> (F, F) {
 /// d(r): from `d_min` at 0 to `d_max` at `width`, along two parabolas.
 #[inline(always)]
 fn impedance<F: Num>(i: &Impedance<F::Real>, position: F) -> F {
-    let (one, midpoint) = (F::c(1.0), F::k(i.midpoint));
-    let x = position.abs().div(F::k(i.width)).min(one);
+    let (one, midpoint) = (F::c(1.0), i.midpoint.to_f64());
+    let x = (position.abs() * F::k(i.inverse_width)).min(one);
     let rest = one - x;
-    let rising = (x * x).div(midpoint);
-    let falling = one - (rest * rest).div(one - midpoint);
-    let y = F::select(x.lt(midpoint), rising, falling);
+    let rising = x * x * F::c(1.0 / midpoint);
+    let falling = (rest * rest).fnma(F::c(1.0 / (1.0 - midpoint)), one);
+    let y = F::select(x.lt(F::k(i.midpoint)), rising, falling);
     y.fma(F::k(i.d_max) - F::k(i.d_min), F::k(i.d_min))
 }

@@ -4,19 +4,23 @@
 
 use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, Num, Real};
-use crate::math::factor::{factor, solve, tri};
+use crate::math::factor::{factor, solve};
 
 #[inline(always)]
 pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let w = &mut b.work;
     let dt = C::F::k(m.dt);
     let [acceleration, ..] = &mut w.vector;
-    if m.dofs.iter().any(|dof| dof.damping.to_f64() + dof.kd.to_f64() > 0.0) {
+    if m.dofs
+        .iter()
+        .any(|dof| dof.damping.to_f64() + dof.kd.to_f64() > 0.0)
+    {
         w.hessian.copy_from_slice(&w.mass_matrix);
         for (j, dof) in m.dofs.iter().enumerate() {
             // a clamped drive keeps its damping here, as under MuJoCo's `actfrcrange`
             let damping = C::F::k(dof.damping) + C::F::k(dof.kd);
-            w.hessian[tri(j, j)] = dt.fma(damping, w.hessian[tri(j, j)]);
+            let diagonal = m.pattern.at(j, j);
+            w.hessian[diagonal] = dt.fma(damping, w.hessian[diagonal]);
             acceleration[j] = w.smooth_force[j] + w.constraint_force[j];
         }
         factor(&m.pattern, &mut w.hessian);

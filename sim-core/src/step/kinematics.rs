@@ -15,8 +15,11 @@ pub(super) fn kinematics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
     // parents precede children (model/compile.rs sorts them), so one forward pass suffices
     for (j, dof) in m.dofs.iter().enumerate() {
         let q = cx.get(&b.joint_q[j]);
-        let [ex, ey, ez] =
-            [constant(dof.rotation[0]), constant(dof.rotation[1]), constant(dof.rotation[2])];
+        let [ex, ey, ez] = [
+            constant(dof.rotation[0]),
+            constant(dof.rotation[1]),
+            constant(dof.rotation[2]),
+        ];
         let (x, y, z, mut origin) = match dof.parent {
             Some(parent) => {
                 let r = &w.rotation[parent];

@@ -4,7 +4,6 @@
 
 use crate::batch::Workspace;
 use crate::lane::Num;
-use crate::math::factor::tri;
 use crate::math::spatial::{momentum, power};
 use crate::model::constants::Constants;
 
@@ -17,10 +16,10 @@ pub(super) fn mass_matrix<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) 
     for (i, dof) in m.dofs.iter().enumerate().rev() {
         let composite = w.composite[i];
         let force = momentum(&composite, &w.motion[i]);
-        w.mass_matrix[tri(i, i)] = power(&w.motion[i], &force) + F::k(dof.armature);
+        w.mass_matrix[m.pattern.at(i, i)] = power(&w.motion[i], &force) + F::k(dof.armature);
         let mut ancestor = dof.parent;
         while let Some(j) = ancestor {
-            w.mass_matrix[tri(i, j)] = power(&w.motion[j], &force);
+            w.mass_matrix[m.pattern.at(i, j)] = power(&w.motion[j], &force);
             ancestor = m.dofs[j].parent;
         }
         if let Some(parent) = dof.parent {

@@ -98,16 +98,32 @@ impl Stage {
             Stage::Kinematics => &[JointQ],
             Stage::Bias => &[JointQd, Motion, Inertia],
             Stage::MassMatrix => &[Motion, Inertia],
-            Stage::Actuation => {
-                &[JointQ, JointQd, JointF, JointTargetQ, JointTargetQd, BiasForce]
-            }
+            Stage::Actuation => &[
+                JointQ,
+                JointQd,
+                JointF,
+                JointTargetQ,
+                JointTargetQd,
+                BiasForce,
+            ],
             Stage::Constraint => &[JointQ, JointQd],
-            Stage::Solver => {
-                &[JointQdd, Unconverged, MassMatrix, SmoothForce, EfcWeight, EfcAref, LimitSide]
-            }
-            Stage::Integrate => {
-                &[JointQ, JointQd, JointQdd, MassMatrix, SmoothForce, ConstraintForce]
-            }
+            Stage::Solver => &[
+                JointQdd,
+                Unconverged,
+                MassMatrix,
+                SmoothForce,
+                EfcWeight,
+                EfcAref,
+                LimitSide,
+            ],
+            Stage::Integrate => &[
+                JointQ,
+                JointQd,
+                JointQdd,
+                MassMatrix,
+                SmoothForce,
+                ConstraintForce,
+            ],
             Stage::Poses => &[JointQ, Rotation, Origin],
         }
     }

@@ -1,25 +1,28 @@
 //! A run of blocks that one thread works on: their state in lane order, and one workspace.
 
+use super::dispatch::RunStage;
 use super::transfer::{self, Arena};
 use crate::backend::Values;
 use crate::batch::{Block, Field, Layout, status};
 use crate::lane::memory::Cpu as Machine;
-use crate::lane::{Lane, Num, Real};
+use crate::lane::{Lane, Real};
 use crate::model::Model;
 use crate::model::constants::Constants;
 use crate::step::{FORWARD, STAGES, Stage};
 use std::ops::Range;
 
 /// What all chunks share.
-pub(super) struct Job<R> {
-    pub constants: Constants<R>,
+pub(super) struct Job<F: Lane> {
+    pub constants: Constants<F::Real>,
+    /// Every stage, by its number in [`Stage::ALL`].
+    stages: [RunStage<F>; Stage::ALL.len()],
     pub layout: Layout,
     /// Stages that evaluate the fields of the layout.
     pub evaluate: Vec<Stage>,
     /// Duration of a control frame [s].
     pub frame_s: f64,
     /// State and commands of a world after a reset, in the order of [`StateField`].
-    start: Vec<R>,
+    start: Vec<F::Real>,
 }
 
 /// State and commands of a block: `COUNT` groups of one number a dof.
@@ -47,18 +50,19 @@ impl StateField {
     }
 }
 
-impl<R: Real> Job<R> {
-    pub fn new(model: &Model, layout: Layout) -> Job<R> {
+impl<F: Lane> Job<F> {
+    pub fn new(model: &Model, layout: Layout, stages: [RunStage<F>; Stage::ALL.len()]) -> Job<F> {
         let n = model.dofs();
         let start = model.start();
-        let mut reset = vec![R::default(); COUNT * n];
+        let mut reset = vec![F::Real::default(); COUNT * n];
         for j in 0..n {
-            reset[StateField::Q as usize * n + j] = R::of(start.joint_q[j]);
-            reset[StateField::TargetQ as usize * n + j] = R::of(start.joint_target_q[j]);
-            reset[StateField::TargetQd as usize * n + j] = R::of(start.joint_target_qd[j]);
+            reset[StateField::Q as usize * n + j] = F::Real::of(start.joint_q[j]);
+            reset[StateField::TargetQ as usize * n + j] = F::Real::of(start.joint_target_q[j]);
+            reset[StateField::TargetQd as usize * n + j] = F::Real::of(start.joint_target_qd[j]);
         }
         Job {
             constants: model.constants().cast(),
+            stages,
             evaluate: stages_for(&layout),
             layout,
             frame_s: model.substeps() as f64 * model.dt(),
@@ -103,22 +107,27 @@ pub(super) struct Chunk<F: Lane> {
     pub block: Block<F, F>,
     /// Room for one field of one block.
     pub staging: Vec<F>,
-    /// Room for one register.
+    /// The same, number by number.
     pub lanes: Vec<F::Real>,
 }
 
 impl<F: Lane> Chunk<F> {
-    pub fn new(job: &Job<F::Real>, worlds: Range<usize>) -> Self {
+    pub fn new(job: &Job<F>, worlds: Range<usize>) -> Self {
         let n = job.constants.dofs.len();
         let blocks = worlds.len().div_ceil(F::WIDTH);
-        let elements = job.layout.slots.iter().map(|slot| slot.shape[1..].iter().product());
+        let elements = job
+            .layout
+            .slots
+            .iter()
+            .map(|slot| slot.shape[1..].iter().product());
+        let elements: usize = elements.max().unwrap_or(1);
         let mut chunk = Chunk {
             state: vec![F::Real::default(); blocks * COUNT * n * F::WIDTH],
             steps: vec![0; worlds.len()],
             status: vec![0; worlds.len()],
             block: Block::new(&job.constants, F::default()),
-            staging: vec![F::default(); elements.max().unwrap_or(0)],
-            lanes: vec![F::Real::default(); F::WIDTH],
+            staging: vec![F::default(); elements],
+            lanes: vec![F::Real::default(); elements * F::WIDTH],
             worlds,
         };
         // lanes past the last world run along from the same start
@@ -134,7 +143,7 @@ impl<F: Lane> Chunk<F> {
         ((block * COUNT + field as usize) * n + dof) * F::WIDTH + lane
     }
 
-    fn reset_lane(&mut self, job: &Job<F::Real>, world: usize) {
+    fn reset_lane(&mut self, job: &Job<F>, world: usize) {
         let n = job.constants.dofs.len();
         let first = self.place(n, world, StateField::Q, 0);
         for (k, &x) in job.start.iter().enumerate() {
@@ -142,7 +151,7 @@ impl<F: Lane> Chunk<F> {
         }
     }
 
-    pub fn reset(&mut self, job: &Job<F::Real>, mask: Option<&[bool]>) {
+    pub fn reset(&mut self, job: &Job<F>, mask: Option<&[bool]>) {
         for world in 0..self.worlds.len() {
             if mask.is_none_or(|mask| mask[self.worlds.start + world]) {
                 self.reset_lane(job, world);
@@ -154,7 +163,7 @@ impl<F: Lane> Chunk<F> {
 
     pub fn write(
         &mut self,
-        job: &Job<F::Real>,
+        job: &Job<F>,
         field: Field,
         columns: &Range<usize>,
         values: Values<'_>,
@@ -190,7 +199,7 @@ impl<F: Lane> Chunk<F> {
     /// # Safety
     /// The processor has the instructions of `F`; the arena holds the job's layout.
     #[inline(always)]
-    pub unsafe fn run(&mut self, job: &Job<F::Real>, substeps: usize, arena: Arena) {
+    pub unsafe fn run(&mut self, job: &Job<F>, substeps: usize, arena: Arena) {
         let n = job.constants.dofs.len();
         let stride = COUNT * n * F::WIDTH;
         for block in 0..self.worlds.len().div_ceil(F::WIDTH) {
@@ -204,9 +213,16 @@ impl<F: Lane> Chunk<F> {
                     self.store(n, state.clone());
                     self.count(block, substeps > 0);
                 }
-                let stages = if evaluates { &job.evaluate[..] } else { &STAGES[..] };
+                let stages = if evaluates {
+                    &job.evaluate[..]
+                } else {
+                    &STAGES[..]
+                };
                 for stage in stages {
-                    stage.run(&mut machine, &job.constants, &mut self.block);
+                    // SAFETY: by contract the processor has the instructions of the job's stages.
+                    unsafe {
+                        job.stages[*stage as usize](&mut machine, &job.constants, &mut self.block);
+                    }
                 }
             }
             let first = block * F::WIDTH;
@@ -220,7 +236,9 @@ impl<F: Lane> Chunk<F> {
                             self.steps[w - self.worlds.start] as f64 * job.frame_s
                         }),
                         Field::Step => arena.put(slot, rows, |w| self.steps[w - self.worlds.start]),
-                        Field::Status => arena.put(slot, rows, |w| self.status[w - self.worlds.start]),
+                        Field::Status => {
+                            arena.put(slot, rows, |w| self.status[w - self.worlds.start])
+                        }
                         _ => transfer::export(self, &job.constants, slot, rows, arena),
                     }
                 }
@@ -274,14 +292,21 @@ impl<F: Lane> Chunk<F> {
         }
         let first = block * F::WIDTH;
         let last = (first + F::WIDTH).min(self.worlds.len());
-        let flags = [(trouble, status::NOT_FINITE), (self.block.unconverged[0], status::NOT_CONVERGED)];
+        let flags = [
+            (trouble, status::NOT_FINITE),
+            (self.block.unconverged[0], status::NOT_CONVERGED),
+        ];
         for (flag, bit) in flags {
             if bit == status::NOT_CONVERGED && !stepped {
                 continue;
             }
             flag.store(&mut self.lanes);
             for (status, lane) in self.status[first..last].iter_mut().zip(&self.lanes) {
-                *status = if *lane > F::Real::default() { *status | bit } else { *status & !bit };
+                *status = if *lane > F::Real::default() {
+                    *status | bit
+                } else {
+                    *status & !bit
+                };
             }
         }
         if stepped {

@@ -2,64 +2,107 @@
 
 use super::chunk::{Chunk, Job};
 use super::transfer::Arena;
-use super::{Backend, BackendError, Cpu, Layout, Run};
+use super::{Backend, BackendError, Cpu, Layout};
+use crate::batch::Block;
+use crate::lane::memory::Cpu as Machine;
 use crate::lane::{Lane, Num};
 use crate::model::Model;
+use crate::model::constants::Constants;
 use crate::simulation::{Lanes, Precision};
+use crate::step::Stage;
+
+/// A stage on a block, compiled for an instruction set: a function of its own, so that registers are
+/// given out for one page of equations and a profile names it.
+///
+/// # Safety
+/// The processor has the instructions that it was compiled for.
+pub(super) type RunStage<F> =
+    unsafe fn(&mut Machine<'_, F>, &Constants<<F as Num>::Real>, &mut Block<F, F>);
+
+/// A chunk, compiled for an instruction set.
+///
+/// # Safety
+/// As [`Chunk::run`].
+pub(super) type RunChunk<F> = unsafe fn(&mut Chunk<F>, &Job<F>, usize, Arena);
+
+/// The text, compiled for an instruction set.
+pub(super) struct Program<F: Lane> {
+    pub stages: [RunStage<F>; Stage::ALL.len()],
+    pub chunk: RunChunk<F>,
+}
 
 macro_rules! compiled {
-    ($(#[$doc:meta])* $name:ident, $features:literal) => {
-        $(#[$doc])*
-        ///
-        /// # Safety
-        /// The processor has these features; see also [`Chunk::run`].
-        #[target_feature(enable = $features)]
-        #[cfg(target_arch = "x86_64")]
-        unsafe fn $name<F: Lane>(
-            chunk: &mut Chunk<F>,
-            job: &Job<<F as Num>::Real>,
-            substeps: usize,
-            arena: Arena,
-        ) {
-            // SAFETY: by contract.
-            unsafe { chunk.run(job, substeps, arena) }
+    ($(#[$attribute:meta])* mod $name:ident $($features:literal)?) => {
+        $(#[$attribute])*
+        mod $name {
+            use super::*;
+
+            $(#[target_feature(enable = $features)])?
+            unsafe fn stage<F: Lane, const S: usize>(
+                machine: &mut Machine<'_, F>,
+                constants: &Constants<F::Real>,
+                block: &mut Block<F, F>,
+            ) {
+                Stage::ALL[S].run(machine, constants, block);
+            }
+
+            $(#[target_feature(enable = $features)])?
+            unsafe fn chunk<F: Lane>(
+                chunk: &mut Chunk<F>,
+                job: &Job<F>,
+                substeps: usize,
+                arena: Arena,
+            ) {
+                // SAFETY: by contract.
+                unsafe { chunk.run(job, substeps, arena) }
+            }
+
+            pub fn program<F: Lane>() -> Program<F> {
+                Program {
+                    stages: [
+                        stage::<F, 0>,
+                        stage::<F, 1>,
+                        stage::<F, 2>,
+                        stage::<F, 3>,
+                        stage::<F, 4>,
+                        stage::<F, 5>,
+                        stage::<F, 6>,
+                        stage::<F, 7>,
+                    ],
+                    chunk: chunk::<F>,
+                }
+            }
         }
     };
 }
 
 compiled!(
     /// AVX-512, as on Skylake-X, Zen 4 and later.
-    with_avx512,
-    "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma,bmi1,bmi2"
+    #[cfg(target_arch = "x86_64")]
+    mod avx512 "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma,bmi1,bmi2"
 );
 compiled!(
     /// AVX2 and fused multiply-add, as on Haswell, Zen and later.
-    with_avx2,
-    "avx2,fma,bmi1,bmi2"
+    #[cfg(target_arch = "x86_64")]
+    mod avx2 "avx2,fma,bmi1,bmi2"
 );
-
-/// Whatever the target has. Without a fused instruction `mul_add` is a library call: slow, the same bits.
-///
-/// # Safety
-/// See [`Chunk::run`].
-unsafe fn portable<F: Lane>(
-    chunk: &mut Chunk<F>,
-    job: &Job<<F as Num>::Real>,
-    substeps: usize,
-    arena: Arena,
-) {
-    // SAFETY: by contract.
-    unsafe { chunk.run(job, substeps, arena) }
-}
+compiled!(
+    /// Whatever the target has. Without a fused instruction `mul_add` is a library call: slow, the same bits.
+    mod portable
+);
 
 /// Does this processor run blocks of this width?
 pub fn available(lanes: Lanes) -> bool {
     #[cfg(target_arch = "x86_64")]
     let (avx2, avx512) = (
-        is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
-            && is_x86_feature_detected!("bmi1") && is_x86_feature_detected!("bmi2"),
-        is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq")
-            && is_x86_feature_detected!("avx512vl") && is_x86_feature_detected!("avx512bw"),
+        is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2"),
+        is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512dq")
+            && is_x86_feature_detected!("avx512vl")
+            && is_x86_feature_detected!("avx512bw"),
     );
     #[cfg(not(target_arch = "x86_64"))]
     let (avx2, avx512) = (false, false);
@@ -94,18 +137,31 @@ pub fn create(
             Lanes::Eight => (8, "AVX2 with FMA"),
             _ => (16, "AVX-512"),
         };
-        return Err(BackendError::Lanes { lanes, instructions });
+        return Err(BackendError::Lanes {
+            lanes,
+            instructions,
+        });
     }
     match (precision, lanes) {
         (Precision::F64, _) => scalar::<f64>(model, worlds, layout, threads, fused, "f64"),
         #[cfg(target_arch = "x86_64")]
-        (Precision::F32, Lanes::Sixteen) => {
-            boxed::<crate::lane::simd::F32x16>(model, worlds, layout, threads, "AVX-512", with_avx512)
-        }
+        (Precision::F32, Lanes::Sixteen) => boxed::<crate::lane::simd::F32x16>(
+            model,
+            worlds,
+            layout,
+            threads,
+            "AVX-512",
+            avx512::program(),
+        ),
         #[cfg(target_arch = "x86_64")]
-        (Precision::F32, Lanes::Eight) => {
-            boxed::<crate::lane::simd::F32x8>(model, worlds, layout, threads, "AVX2", with_avx2)
-        }
+        (Precision::F32, Lanes::Eight) => boxed::<crate::lane::simd::F32x8>(
+            model,
+            worlds,
+            layout,
+            threads,
+            "AVX2",
+            avx2::program(),
+        ),
         (Precision::F32, _) => scalar::<f32>(model, worlds, layout, threads, fused, "f32"),
     }
 }
@@ -120,10 +176,24 @@ fn scalar<F: Lane>(
 ) -> Result<Box<dyn Backend>, BackendError> {
     #[cfg(target_arch = "x86_64")]
     if fused {
-        return boxed::<F>(model, worlds, layout, threads, &format!("{name} scalar, FMA"), with_avx2);
+        return boxed::<F>(
+            model,
+            worlds,
+            layout,
+            threads,
+            &format!("{name} scalar, FMA"),
+            avx2::program(),
+        );
     }
     let _ = fused;
-    boxed::<F>(model, worlds, layout, threads, &format!("{name} scalar"), portable)
+    boxed::<F>(
+        model,
+        worlds,
+        layout,
+        threads,
+        &format!("{name} scalar"),
+        portable::program(),
+    )
 }
 
 fn boxed<F: Lane>(
@@ -132,7 +202,14 @@ fn boxed<F: Lane>(
     layout: &Layout,
     threads: usize,
     instructions: &str,
-    run: Run<F>,
+    program: Program<F>,
 ) -> Result<Box<dyn Backend>, BackendError> {
-    Ok(Box::new(Cpu::<F>::new(model, worlds, layout, threads, instructions, run)?))
+    Ok(Box::new(Cpu::<F>::new(
+        model,
+        worlds,
+        layout,
+        threads,
+        instructions,
+        program,
+    )?))
 }

@@ -13,23 +13,21 @@ use crate::batch::{Field, Layout};
 use crate::lane::Lane;
 use crate::model::Model;
 use chunk::{Chunk, Job};
+use dispatch::{Program, RunChunk};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Chunks a thread: enough that a slow block does not leave the others idle.
 const CHUNKS_PER_THREAD: usize = 4;
 
-/// Runs a chunk, compiled for an instruction set.
-type Run<F> = unsafe fn(&mut Chunk<F>, &Job<<F as crate::lane::Num>::Real>, usize, transfer::Arena);
-
 struct Cpu<F: Lane> {
     chunks: Vec<Chunk<F>>,
-    job: Job<F::Real>,
+    job: Job<F>,
     pool: Option<rayon::ThreadPool>,
     threads: usize,
     device: String,
     arena_words: usize,
-    run: Run<F>,
+    run: RunChunk<F>,
 }
 
 impl<F: Lane> Cpu<F> {
@@ -39,12 +37,16 @@ impl<F: Lane> Cpu<F> {
         layout: &Layout,
         threads: usize,
         instructions: &str,
-        run: Run<F>,
+        program: Program<F>,
     ) -> Result<Self, BackendError> {
         let blocks = worlds.div_ceil(F::WIDTH);
         let threads = threads.min(blocks);
-        let parts = if threads == 1 { 1 } else { (threads * CHUNKS_PER_THREAD).min(blocks) };
-        let job = Job::new(model, layout.clone());
+        let parts = if threads == 1 {
+            1
+        } else {
+            (threads * CHUNKS_PER_THREAD).min(blocks)
+        };
+        let job = Job::new(model, layout.clone(), program.stages);
         let chunks = (0..parts)
             .map(|part| {
                 let first = part * blocks / parts * F::WIDTH;
@@ -76,7 +78,7 @@ impl<F: Lane> Cpu<F> {
                 if F::WIDTH == 1 { "" } else { "s" },
             ),
             arena_words: layout.bytes / 8,
-            run,
+            run: program.chunk,
         })
     }
 }
@@ -90,7 +92,13 @@ impl<F: Lane> Backend for Cpu<F> {
         self.threads
     }
 
-    fn write(&mut self, field: Field, columns: Range<usize>, values: Values<'_>, mask: Option<&[bool]>) {
+    fn write(
+        &mut self,
+        field: Field,
+        columns: Range<usize>,
+        values: Values<'_>,
+        mask: Option<&[bool]>,
+    ) {
         for chunk in &mut self.chunks {
             chunk.write(&self.job, field, &columns, values, mask);
         }
@@ -103,13 +111,19 @@ impl<F: Lane> Backend for Cpu<F> {
     }
 
     fn run(&mut self, substeps: usize, arena: &mut [u64]) {
-        assert!(arena.len() >= self.arena_words, "the arena is smaller than the layout");
+        assert!(
+            arena.len() >= self.arena_words,
+            "the arena is smaller than the layout"
+        );
         let arena = transfer::Arena::new(arena);
         let (run, job) = (self.run, &self.job);
         // SAFETY: `dispatch` chose `run` for instructions that this processor has; the arena holds the
         // layout (asserted), outlives the call, and each chunk writes the rows of its own worlds only.
         match &self.pool {
-            None => self.chunks.iter_mut().for_each(|chunk| unsafe { run(chunk, job, substeps, arena) }),
+            None => self
+                .chunks
+                .iter_mut()
+                .for_each(|chunk| unsafe { run(chunk, job, substeps, arena) }),
             Some(pool) => pool.install(|| {
                 self.chunks.par_iter_mut().for_each(|chunk| {
                     // SAFETY: as above.

@@ -3,7 +3,6 @@
 use super::chunk::Chunk;
 use crate::batch::{Field, Slot};
 use crate::lane::{Lane, Num};
-use crate::math::factor::tri;
 use crate::model::constants::Constants;
 use std::ops::Range;
 
@@ -21,7 +20,10 @@ unsafe impl Sync for Arena {}
 
 impl Arena {
     pub fn new(words: &mut [u64]) -> Arena {
-        Arena { base: words.as_mut_ptr().cast(), bytes: size_of_val(words) }
+        Arena {
+            base: words.as_mut_ptr().cast(),
+            bytes: size_of_val(words),
+        }
     }
 
     /// The elements of a slot that belong to some worlds.
@@ -46,7 +48,12 @@ impl Arena {
     /// # Safety
     /// As [`Arena::rows`].
     #[inline(always)]
-    pub unsafe fn put<T: Copy>(self, slot: &Slot, worlds: Range<usize>, value: impl Fn(usize) -> T) {
+    pub unsafe fn put<T: Copy>(
+        self,
+        slot: &Slot,
+        worlds: Range<usize>,
+        value: impl Fn(usize) -> T,
+    ) {
         // SAFETY: by contract.
         let rows = unsafe { self.rows::<T>(slot, &worlds) };
         for (x, world) in rows.iter_mut().zip(worlds) {
@@ -71,10 +78,16 @@ pub(super) unsafe fn export<F: Lane>(
     stage(chunk, m, slot.field, n);
     // SAFETY: by contract.
     let rows = unsafe { arena.rows::<F::Real>(slot, &worlds) };
-    for (e, x) in chunk.staging[..n].iter().enumerate() {
-        x.store(&mut chunk.lanes);
-        for (world, lane) in chunk.lanes[..worlds.len()].iter().enumerate() {
-            rows[world * n + e] = *lane;
+    let lanes = &mut chunk.lanes[..n * F::WIDTH];
+    for (x, lanes) in chunk.staging[..n]
+        .iter()
+        .zip(lanes.chunks_exact_mut(F::WIDTH))
+    {
+        x.store(lanes);
+    }
+    for (lane, row) in rows.chunks_exact_mut(n.max(1)).enumerate() {
+        for (x, lanes) in row.iter_mut().zip(lanes.chunks_exact(F::WIDTH)) {
+            *x = lanes[lane];
         }
     }
 }
@@ -101,7 +114,10 @@ fn stage<F: Lane>(chunk: &mut Chunk<F>, m: &Constants<F::Real>, field: Field, n:
             let dofs = m.dofs.len();
             for i in 0..dofs {
                 for j in 0..dofs {
-                    to[i * dofs + j] = w.mass_matrix[tri(i.max(j), i.min(j))];
+                    to[i * dofs + j] = match m.pattern.find(i, j) {
+                        Some(place) => w.mass_matrix[place],
+                        None => F::c(0.0),
+                    };
                 }
             }
         }

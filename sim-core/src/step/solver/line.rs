@@ -1,59 +1,96 @@
 //! The cost along a segment, and its exact minimum.
 
 use super::super::ConstantsOf;
-use super::rows::{dry_friction, equality, one_sided};
+use super::rows::{Law, dry_friction, equality, one_sided};
 use crate::lane::{Cx, Num, Real};
 use crate::model::constants::Constants;
 use crate::{break_if, times};
 
-/// The cost along a segment.
+/// The cost p along the segment from `a` (α = 0) to the minimum of its quadratic model (α = 1).
+///
+///     p'(α) = -(1 - α) d + Σ (f(model) - f) jv        d = -p'(0) = sᵀ M s + Σ W jv²
+///
+/// Rows that stay on their piece of cost follow the model, and add nothing.
 pub(super) struct Line<'a, F> {
-    /// Slope of the smooth part at α = 0.
-    pub start: F,
-    /// Its curvature.
-    pub curvature: F,
-    /// D of each row.
-    pub weight: &'a [F],
-    /// J a - aref of each row.
-    pub jar: &'a [F],
-    /// Its change over the whole segment.
-    pub jv: &'a [F],
-}
-
-/// First and second derivative of the cost along a line, and the size of the terms they sum.
-pub(super) struct Derivative<F> {
-    pub slope: F,
-    pub curvature: F,
+    /// -p'(0), what the model says of the gain at α = 1, twice.
+    pub descent: F,
+    /// Size of the terms that p' sums.
     pub size: F,
+    weight: &'a [F],
+    jar: &'a [F],
+    jv: &'a [F],
 }
 
-impl<F: Num> Line<'_, F> {
+/// First and second derivative of the cost along a line, and the size of the terms of the first.
+struct Derivative<F> {
+    slope: F,
+    curvature: F,
+    size: F,
+}
+
+impl<'a, F: Num> Line<'a, F> {
+    /// `curvature` is sᵀ M s; `jar` and its change `jv` over the segment are `(rows)`.
     #[inline(always)]
-    pub fn derivative(&self, m: &Constants<F::Real>, alpha: F) -> Derivative<F> {
-        let smooth = self.curvature * alpha;
-        let mut d = Derivative {
-            slope: self.start + smooth,
-            curvature: self.curvature,
-            size: self.start.abs() + smooth.abs(),
-        };
-        let (frictions, limits) = (m.equalities.len(), m.equalities.len() + m.frictions.len());
+    pub fn new(
+        m: &Constants<F::Real>,
+        curvature: F,
+        weight: &'a [F],
+        jar: &'a [F],
+        jv: &'a [F],
+    ) -> Self {
+        let (mut descent, mut size) = (curvature, curvature);
         for r in 0..m.rows() {
+            let law = law(m, r, jar[r], weight[r]);
+            descent = (law.stiffness * jv[r]).fma(jv[r], descent);
+            size = size + (law.force * jv[r]).abs();
+        }
+        Line {
+            descent,
+            size,
+            weight,
+            jar,
+            jv,
+        }
+    }
+
+    #[inline(always)]
+    fn derivative(&self, m: &Constants<F::Real>, alpha: F) -> Derivative<F> {
+        let rest = F::c(1.0) - alpha;
+        let slope = -(rest * self.descent);
+        let mut d = Derivative {
+            slope,
+            curvature: self.descent,
+            size: slope.abs(),
+        };
+        // equalities have one piece only
+        for r in m.equalities.len()..m.rows() {
             let (jv, weight) = (self.jv[r], self.weight[r]);
-            let jar = alpha.fma(jv, self.jar[r]);
-            let law = if r < frictions {
-                equality(jar, weight)
-            } else if r < limits {
-                let friction = &m.frictions[r - frictions];
-                dry_friction(jar, weight, F::k(friction.zone), F::k(friction.loss))
-            } else {
-                one_sided(jar, weight)
-            };
-            let power = law.force * jv;
-            d.slope = d.slope - power;
+            let start = law(m, r, self.jar[r], weight);
+            let here = law(m, r, alpha.fma(jv, self.jar[r]), weight);
+            let model = (start.stiffness * alpha).fnma(jv, start.force);
+            // exactly nothing where the piece is the same, whatever rounding says
+            let moved = F::c(0.5).lt((here.state - start.state).abs());
+            let power = F::select(moved, (model - here.force) * jv, F::c(0.0));
+            d.slope = d.slope + power;
             d.size = d.size + power.abs();
-            d.curvature = (law.stiffness * jv).fma(jv, d.curvature);
+            d.curvature = ((here.stiffness - start.stiffness) * jv).fma(jv, d.curvature);
         }
         d
+    }
+}
+
+/// The law of a row by its number.
+#[inline(always)]
+fn law<F: Num>(m: &Constants<F::Real>, r: usize, jar: F, weight: F) -> Law<F> {
+    let frictions = m.equalities.len();
+    let limits = frictions + m.frictions.len();
+    if r < frictions {
+        equality(jar, weight)
+    } else if r < limits {
+        let friction = &m.frictions[r - frictions];
+        dry_friction(jar, weight, F::k(friction.zone), F::k(friction.loss))
+    } else {
+        one_sided(jar, weight)
     }
 }
 
@@ -74,7 +111,7 @@ pub(super) fn search<C: Cx>(
         let d = line.derivative(m, alpha);
         let below = C::F::select(d.slope.lt(zero), alpha, cx.get(&low));
         let above = C::F::select(d.slope.lt(zero), cx.get(&high), alpha);
-        let found = d.slope.abs().lt(d.size * resolution);
+        let found = C::F::not((d.size * resolution).lt(d.slope.abs()));
         break_if!(cx, C::F::or(found, (above - below).lt(above * resolution)));
         cx.set(&mut low, below);
         cx.set(&mut high, above);

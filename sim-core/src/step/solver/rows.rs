@@ -1,7 +1,6 @@
 //! Laws of the constraint rows, and sums over them.
 
 use crate::lane::Num;
-use crate::math::factor::tri;
 use crate::model::constants::Constants;
 
 /// What a row does at `jar`: force -s', stiffness s'', and which piece of s it is on.
@@ -14,7 +13,11 @@ pub(super) struct Law<F> {
 /// s = ½ D jar²
 #[inline(always)]
 pub(super) fn equality<F: Num>(jar: F, weight: F) -> Law<F> {
-    Law { force: -(weight * jar), stiffness: weight, state: F::c(0.0) }
+    Law {
+        force: -(weight * jar),
+        stiffness: weight,
+        state: F::c(0.0),
+    }
 }
 
 /// s = ½ D jar² within the zone R × loss, beyond it a line of slope ± loss (Huber).
@@ -46,7 +49,13 @@ pub(super) fn one_sided<F: Num>(jar: F, weight: F) -> Law<F> {
 
 /// jar = J a - aref
 #[inline(always)]
-pub(super) fn residual<F: Num>(m: &Constants<F::Real>, side: &[F], aref: &[F], a: &[F], jar: &mut [F]) {
+pub(super) fn residual<F: Num>(
+    m: &Constants<F::Real>,
+    side: &[F],
+    aref: &[F],
+    a: &[F],
+    jar: &mut [F],
+) {
     let mut r = 0;
     for e in &m.equalities {
         jar[r] = F::k(e.multiplier).fnma(a[e.leader], a[e.follower]) - aref[r];
@@ -79,9 +88,10 @@ pub(super) fn assemble<F: Num>(
         let pull = law.stiffness.fma(jar[r] + aref[r], law.force);
         let (f, l, ratio) = (e.follower, e.leader, F::k(e.multiplier));
         let shared = law.stiffness * ratio;
-        hessian[tri(f, f)] = hessian[tri(f, f)] + law.stiffness;
-        hessian[tri(l, l)] = shared.fma(ratio, hessian[tri(l, l)]);
-        let coupling = tri(f.max(l), f.min(l));
+        let (own, others) = (m.pattern.at(f, f), m.pattern.at(l, l));
+        hessian[own] = hessian[own] + law.stiffness;
+        hessian[others] = shared.fma(ratio, hessian[others]);
+        let coupling = m.pattern.at(f.max(l), f.min(l));
         hessian[coupling] = hessian[coupling] - shared;
         rhs[f] = rhs[f] + pull;
         rhs[l] = ratio.fnma(pull, rhs[l]);
@@ -89,14 +99,14 @@ pub(super) fn assemble<F: Num>(
     }
     for f in &m.frictions {
         let law = dry_friction(jar[r], weight[r], F::k(f.zone), F::k(f.loss));
-        let diagonal = tri(f.dof, f.dof);
+        let diagonal = m.pattern.at(f.dof, f.dof);
         hessian[diagonal] = hessian[diagonal] + law.stiffness;
         rhs[f.dof] = rhs[f.dof] + law.stiffness.fma(jar[r] + aref[r], law.force);
         r += 1;
     }
     for (l, side) in m.limits.iter().zip(side) {
         let law = one_sided(jar[r], weight[r]);
-        let diagonal = tri(l.dof, l.dof);
+        let diagonal = m.pattern.at(l.dof, l.dof);
         hessian[diagonal] = hessian[diagonal] + law.stiffness;
         let pull = law.stiffness.fma(jar[r] + aref[r], law.force);
         rhs[l.dof] = side.fma(pull, rhs[l.dof]);
