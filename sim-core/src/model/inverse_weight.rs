@@ -62,7 +62,7 @@ pub(super) fn at_reference(
         mass_matrix[(k, k)] += dof.armature;
     }
     let mean_inertia = (0..n).map(|k| mass_matrix[(k, k)]).sum::<f64>() / n as f64;
-    if let Some(k) = (0..n).find(|&k| !(mass_matrix[(k, k)] > f64::MIN_POSITIVE)) {
+    if let Some(k) = (0..n).find(|&k| mass_matrix[(k, k)].is_nan() || mass_matrix[(k, k)] <= 0.0) {
         return Err(ModelError::NoInertia {
             joint: names[k].clone(),
         });

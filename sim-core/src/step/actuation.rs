@@ -1,7 +1,9 @@
 //! Applied, drive and damping forces, less the bias (MuJoCo: `qfrc_smooth`).
 //!
-//!     drive = clamp(ke (q* - q) + kd (q̇* - q̇), ± effort limit)      q̇* only where the drive follows it
-//!     smooth = joint_f + drive - damping q̇ - bias
+//! ```text
+//! drive = clamp(ke (q* - q) + kd (q̇* - q̇), ± effort limit)      q̇* only where the drive follows it
+//! smooth = joint_f + drive - damping q̇ - bias
+//! ```
 
 use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, Num};

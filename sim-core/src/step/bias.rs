@@ -1,7 +1,9 @@
 //! Bias forces by the recursive Newton-Euler algorithm (Featherstone 2008, section 5.3) at zero joint acceleration.
 //!
-//!     v(j) = v(parent) + S q̇             a(j) = a(parent) + v(parent) × S q̇,   a(base) = -g
-//!     f(j) = I a + v ×* I v + Σ f(child)  c(j) = S · f(j)
+//! ```text
+//! v(j) = v(parent) + S q̇             a(j) = a(parent) + v(parent) × S q̇,   a(base) = -g
+//! f(j) = I a + v ×* I v + Σ f(child)  c(j) = S · f(j)
+//! ```
 
 use super::{BlockOf, ConstantsOf};
 use crate::lane::Cx;

@@ -1,7 +1,9 @@
 //! Constraint rows of joints: stiffness D and reference acceleration of each (Todorov 2014; MuJoCo
 //! documentation, "Computation: constraint model").
 //!
-//!     aref = -b v - k d(r) r          R = (1 - d) / d × inverse weight,  D = 1 / R
+//! ```text
+//! aref = -b v - k d(r) r          R = (1 - d) / d × inverse weight,  D = 1 / R
+//! ```
 //!
 //! Rows stand in MuJoCo's order: equalities, frictions, limits. Their Jacobians have one or two
 //! entries, known when the model is compiled; only the side of a limit is found at run time.

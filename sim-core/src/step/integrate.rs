@@ -1,6 +1,8 @@
 //! Semi-implicit step, implicit in joint damping and drive damping (MuJoCo: `implicitfast`).
 //!
-//!     (M + h diag(damping + kd)) q̈' = smooth + constraint        q̇ += h q̈'        q += h q̇
+//! ```text
+//! (M + h diag(damping + kd)) q̈' = smooth + constraint        q̇ += h q̈'        q += h q̇
+//! ```
 
 use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, Num, Real};

@@ -1,8 +1,10 @@
 //! Forward kinematics (Featherstone 2008, section 4.1): frames, motion axes and inertias of all dofs.
 //!
-//!     R(j) = R(parent) E(j) Rz(q)        p(j) = p(parent) + R(parent) r(j)        for a joint that turns
-//!     R(j) = R(parent) E(j)              p(j) = … + z q                           for one that slides
-//!     S(j) = (p × z, z)  or  (z, 0)      linear, angular, at the robot's base
+//! ```text
+//! R(j) = R(parent) E(j) Rz(q)        p(j) = p(parent) + R(parent) r(j)        for a joint that turns
+//! R(j) = R(parent) E(j)              p(j) = … + z q                           for one that slides
+//! S(j) = (p × z, z)  or  (z, 0)      linear, angular, at the robot's base
+//! ```
 
 use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, Num};

@@ -1,6 +1,8 @@
 //! Joint-space inertia matrix by composite rigid bodies (Featherstone 2008, chapter 6).
 //!
-//!     Iᶜ(b) = I(b) + Σ Iᶜ(child)          H(i,j) = S(j)ᵀ Iᶜ(body of i) S(i),  j on the path from i to the root
+//! ```text
+//! Iᶜ(b) = I(b) + Σ Iᶜ(child)          H(i,j) = S(j)ᵀ Iᶜ(body of i) S(i),  j on the path from i to the root
+//! ```
 
 use crate::batch::Workspace;
 use crate::lane::Num;

@@ -117,19 +117,14 @@ impl<F: Lane> Backend for Cpu<F> {
         );
         let arena = transfer::Arena::new(arena);
         let (run, job) = (self.run, &self.job);
-        // SAFETY: `dispatch` chose `run` for instructions that this processor has; the arena holds the
-        // layout (asserted), outlives the call, and each chunk writes the rows of its own worlds only.
+        let step = |chunk: &mut Chunk<F>| {
+            // SAFETY: `dispatch` chose `run` for instructions that this processor has; the arena holds
+            // the layout (asserted) and outlives the call; each chunk writes its own worlds' rows only.
+            unsafe { run(chunk, job, substeps, arena) }
+        };
         match &self.pool {
-            None => self
-                .chunks
-                .iter_mut()
-                .for_each(|chunk| unsafe { run(chunk, job, substeps, arena) }),
-            Some(pool) => pool.install(|| {
-                self.chunks.par_iter_mut().for_each(|chunk| {
-                    // SAFETY: as above.
-                    unsafe { run(chunk, job, substeps, arena) }
-                });
-            }),
+            None => self.chunks.iter_mut().for_each(step),
+            Some(pool) => pool.install(|| self.chunks.par_iter_mut().for_each(step)),
         }
     }
 }

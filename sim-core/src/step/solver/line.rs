@@ -8,7 +8,9 @@ use crate::{break_if, times};
 
 /// The cost p along the segment from `a` (α = 0) to the minimum of its quadratic model (α = 1).
 ///
-///     p'(α) = -(1 - α) d + Σ (f(model) - f) jv        d = -p'(0) = sᵀ M s + Σ W jv²
+/// ```text
+/// p'(α) = -(1 - α) d + Σ (f(model) - f) jv        d = -p'(0) = sᵀ M s + Σ W jv²
+/// ```
 ///
 /// Rows that stay on their piece of cost follow the model, and add nothing.
 pub(super) struct Line<'a, F> {

@@ -1,11 +1,15 @@
 //! Primal Newton solver for constrained accelerations (Todorov 2014; MuJoCo documentation,
 //! "Computation: solvers").
 //!
-//!     minimise over a    ½ (a - M⁻¹ τ)ᵀ M (a - M⁻¹ τ) + Σ rows s(J a - aref)
+//! ```text
+//! minimise over a    ½ (a - M⁻¹ τ)ᵀ M (a - M⁻¹ τ) + Σ rows s(J a - aref)
+//! ```
 //!
 //! A round solves the quadratic model around `a`, whose minimum is `a⁺`:
 //!
-//!     (M + Jᵀ W J) a⁺ = τ + Jᵀ (f + W J a)        f = -s',  W = s''
+//! ```text
+//! (M + Jᵀ W J) a⁺ = τ + Jᵀ (f + W J a)        f = -s',  W = s''
+//! ```
 //!
 //! If no row changes its state between `a` and `a⁺` the model was exact and `a⁺` is the answer.
 //! Otherwise an exact line search on the segment finds the next `a` (in `f32` only if two whole steps
