@@ -16,6 +16,7 @@ pub(crate) struct Client {
     description: Arc<Description>,
     // None once closed; a step that runs in another thread keeps its own reference until it returns
     connection: Mutex<Option<Arc<Connection>>>,
+    process: u32,
 }
 
 #[pymethods]
@@ -34,6 +35,7 @@ impl Client {
         Ok(Client {
             description: Arc::clone(connection.description()),
             connection: Mutex::new(Some(connection.into())),
+            process: std::process::id(),
         })
     }
 
@@ -99,17 +101,23 @@ impl Client {
 
 impl Client {
     fn connection(&self, py: Python<'_>) -> PyResult<Arc<Connection>> {
+        let name = &self.description.name;
+        if std::process::id() != self.process {
+            // two processes on one connection would take each other's frames
+            let problem = format!(
+                "simulation `{name}` belongs to process {}, which this one was forked from; \
+                 attach to it by name to look on, or launch another",
+                self.process
+            );
+            return Err(raise(py, "LeaseHeld", problem));
+        }
         let connection = self
             .connection
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
         connection.clone().ok_or_else(|| {
-            let name = &self.description.name;
-            raise(
-                py,
-                "SimClosed",
-                format!("simulation `{name}` was closed; launch or attach again"),
-            )
+            let problem = format!("simulation `{name}` was closed; launch or attach again");
+            raise(py, "SimClosed", problem)
         })
     }
 }

@@ -176,6 +176,30 @@ def test_threads_that_share_a_sim_take_turns(pendulum):
         assert sim.step().step[0] == 201
 
 
+FORK = """
+child = os.fork()
+if child == 0:
+    code = 1
+    try:
+        sim.step()
+    except tl.LeaseHeld as error:
+        assert str(os.getppid()) in str(error)
+        assert tl.attach(sim.name).worlds == 8
+        code = 42
+    finally:
+        os._exit(code)
+assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 42
+assert sim.step().step[0] == 2
+"""
+
+
+def test_a_forked_child_cannot_step_what_its_parent_steps(pendulum_urdf):
+    process = caller(pendulum_urdf, FORK)
+    daemon_of(process)
+    _, errors = process.communicate(timeout=20)
+    assert process.returncode == 0, errors
+
+
 def test_a_dropped_sim_ends_its_daemon(pendulum):
     sim = tl.launch(pendulum, worlds=2)
     pid = sim.pid
