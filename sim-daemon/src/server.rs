@@ -13,7 +13,7 @@ pub(crate) fn run(mut simulation: Simulation, mut host: Host) -> Result<(), Daem
     let mut mask = Vec::with_capacity(simulation.worlds());
     let mut scratch = Vec::new();
     loop {
-        match host.next()? {
+        match host.wait()? {
             Next::Command => {
                 let started = Instant::now();
                 match export::apply(&mut simulation, host.inbox(), &mut mask) {

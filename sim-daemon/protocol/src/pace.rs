@@ -17,7 +17,6 @@ const FORESEEN_MAX: Duration = Duration::from_millis(20);
 
 /// Most waits that sleep at once after spinning was in vain.
 const REST_MAX: u32 = 64;
-
 /// What is waited for.
 pub(crate) trait Waiting<T> {
     /// Looks for it; called over and over.
@@ -30,7 +29,8 @@ pub(crate) trait Waiting<T> {
 /// What was learnt about one kind of wait.
 #[derive(Debug, Clone)]
 pub(crate) struct Pace {
-    mean: Duration,
+    /// Moving average of recent waits.
+    typical: Duration,
     free_core: bool,
     /// Waits to sleep through before spinning is tried again, and how many there were the last time.
     resting: u32,
@@ -38,10 +38,10 @@ pub(crate) struct Pace {
 }
 
 impl Pace {
-    /// `free_core`: whether a spinning thread takes a core from nobody.
+    /// `free_core`: whether a spinning thread takes a core from nobody, other programs aside.
     pub(crate) fn new(free_core: bool) -> Pace {
         Pace {
-            mean: SPIN_MAX / 2,
+            typical: SPIN_MAX / 2,
             free_core,
             resting: 0,
             rest: 0,
@@ -58,18 +58,16 @@ impl Pace {
             self.learn(Duration::ZERO);
             return Ok(found);
         }
-        let start = Instant::now();
-        if self.resting > 0 {
-            self.resting -= 1;
-        } else if self.free_core && self.mean < FORESEEN_MAX {
-            if self.mean > SPIN_MAX {
-                park(listener, self.mean - WAKE_MARGIN)?;
+        let mut start = Instant::now();
+        if self.may_spin() {
+            if self.typical > SPIN_MAX {
+                park(listener, self.typical - WAKE_MARGIN)?;
             }
-            let until = start.elapsed() + (2 * self.mean).clamp(SPIN_MIN, SPIN_MAX);
+            let until = start.elapsed() + (2 * self.typical).clamp(SPIN_MIN, SPIN_MAX);
             loop {
                 if let Some(found) = waiting.look()? {
+                    self.rest /= 2;
                     self.learn(start.elapsed());
-                    self.rest = 0;
                     return Ok(found);
                 }
                 if start.elapsed() > until {
@@ -77,9 +75,11 @@ impl Pace {
                 }
                 std::hint::spin_loop();
             }
-            // perhaps the core was not free after all, and the answer could not be computed since we spun
+            // perhaps the core was not free after all, and the answer could not be computed since we spun: then the wait
+            // begins only now, and what was spun must not make the next spin longer
             self.rest = (2 * self.rest).clamp(1, REST_MAX);
             self.resting = self.rest;
+            start = Instant::now();
         }
         loop {
             park(listener, SLICE)?;
@@ -94,8 +94,18 @@ impl Pace {
         }
     }
 
+    fn may_spin(&mut self) -> bool {
+        if self.resting > 0 {
+            self.resting -= 1;
+            return false;
+        }
+        self.free_core && self.typical < FORESEEN_MAX
+    }
+
+    /// An outlier moves the average by at most 30 %.
     fn learn(&mut self, wait: Duration) {
-        self.mean = (9 * self.mean + wait.min(2 * FORESEEN_MAX)) / 10;
+        let ceiling = (4 * self.typical).clamp(SPIN_MIN, 2 * FORESEEN_MAX);
+        self.typical = (9 * self.typical + wait.min(ceiling)) / 10;
     }
 }
 

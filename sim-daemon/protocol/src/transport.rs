@@ -277,7 +277,7 @@ pub(crate) fn attribute<S: Service>(service: &event::PortFactory<S>, key: &str) 
     let found = service
         .attributes()
         .iter()
-        .find(|attribute| attribute.key().to_string() == key);
+        .find(|attribute| attribute.key().as_bytes() == key.as_bytes());
     found.map_or_else(
         || "absent".to_owned(),
         |attribute| attribute.value().to_string(),

@@ -48,7 +48,7 @@ pub struct Host {
     tenancy: Tenancy,
 }
 
-/// What [`Host::next`] has found.
+/// What [`Host::wait`] has found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Next {
     /// A command, in [`Host::inbox`]; it wants [`Host::answer`] or [`Host::refuse`].
@@ -84,7 +84,7 @@ struct State {
 impl Host {
     /// Opens the services of a daemon, takes their memory, and announces it.
     ///
-    /// `frame` is the table of a frame ([`Table::over_arena`]). `stop` ends [`Host::next`] when set. Of `description`, the
+    /// `frame` is the table of a frame ([`Table::over_arena`]). `stop` ends [`Host::wait`] when set. Of `description`, the
     /// host fills in name, session, process, protocol and schema.
     ///
     /// # Errors
@@ -182,7 +182,7 @@ impl Host {
     ///
     /// # Errors
     /// [`ProtocolError::Transport`].
-    pub fn next(&mut self) -> Result<Next, ProtocolError> {
+    pub fn wait(&mut self) -> Result<Next, ProtocolError> {
         if self.state.looked.elapsed() > AROUND_PERIOD
             && let Some(next) = self.state.look_around()?
         {
@@ -191,7 +191,7 @@ impl Host {
         self.pace.wait(&self.listener, &mut self.state)
     }
 
-    /// The command that [`Host::next`] has found.
+    /// The command that [`Host::wait`] has found.
     pub fn inbox(&self) -> &Inbox {
         &self.state.inbox
     }

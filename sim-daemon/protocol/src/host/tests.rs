@@ -7,9 +7,7 @@ use std::thread::JoinHandle;
 use super::*;
 use crate::place::Place;
 use crate::transport::CommandPublisher;
-use crate::{
-    AttachOptions, Client, CommandHeader, Frame, Hook, InputInfo, Op, keep_waiting,
-};
+use crate::{AttachOptions, Client, CommandHeader, Frame, Hook, InputInfo, Op, keep_waiting};
 
 type Clients = iceoryx2::prelude::ipc_threadsafe::Service;
 
@@ -67,7 +65,7 @@ fn serve(place: &Place, stop: Arc<AtomicBool>, ready: Sender<()>) {
     ready.send(()).unwrap();
     let mut count = 0;
     loop {
-        match host.next().unwrap() {
+        match host.wait().unwrap() {
             Next::Command => {
                 count += 1;
                 host.answer(Instant::now(), |arena| arena[..2].fill(count))
