@@ -17,7 +17,10 @@ const ROUNDS: usize = 5;
 const ROUND: Duration = Duration::from_millis(400);
 
 fn main() {
-    let words: Vec<String> = std::env::args().skip(1).map(|word| word.to_lowercase()).collect();
+    let words: Vec<String> = std::env::args()
+        .skip(1)
+        .map(|word| word.to_lowercase())
+        .collect();
     let asked = |word: &str| words.iter().any(|w| w == word);
     let named = |choices: [&str; 3]| choices.iter().any(|c| asked(c));
     let mut sizes: Vec<usize> = words.iter().filter_map(|word| word.parse().ok()).collect();
@@ -48,9 +51,19 @@ fn main() {
 fn steps_per_s(demo: Demo, lanes: Lanes, precision: Precision, worlds: usize, once: bool) -> f64 {
     let model = lesson(demo).compile().expect("the lesson compiles");
     let fields = vec![Field::JointQ, Field::JointQd, Field::BodyQ];
-    let options = Options { worlds, precision, lanes, threads: Some(1), fields };
+    let options = Options {
+        worlds,
+        precision,
+        lanes,
+        threads: Some(1),
+        fields,
+    };
     let mut run = Run::new(&model, options);
-    let (rounds, round) = if once { (1, Duration::ZERO) } else { (ROUNDS, ROUND) };
+    let (rounds, round) = if once {
+        (1, Duration::ZERO)
+    } else {
+        (ROUNDS, ROUND)
+    };
     let mut best = 0.0_f64;
     for _ in 0..rounds {
         let start = Instant::now();

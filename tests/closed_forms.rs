@@ -26,7 +26,11 @@ fn bob(name: &str, m: f64, l: f64) -> Link {
 fn pendulum(dt: f64, count: usize, l: f64) -> Description {
     let mut scene = Description::new(dt, 10);
     scene.gravity = [0.0, 0.0, -GRAVITY];
-    let mut links = vec![Link { name: "base".into(), inertial: None, collisions: Vec::new() }];
+    let mut links = vec![Link {
+        name: "base".into(),
+        inertial: None,
+        collisions: Vec::new(),
+    }];
     let mut joints = Vec::new();
     for k in 0..count {
         links.push(bob(&format!("bob{k}"), 1.0 / (k + 1) as f64, l));
@@ -83,7 +87,10 @@ fn pendulum_period_equals_the_elliptic_integral_within_1e_5() {
     }
     let period = (crossings[4] - crossings[0]) / 4.0;
     // the method is of first order but symplectic: its period is right to order dt²
-    assert!((period / expected - 1.0).abs() < 1e-5, "{period} s, expected {expected} s");
+    assert!(
+        (period / expected - 1.0).abs() < 1e-5,
+        "{period} s, expected {expected} s"
+    );
 }
 
 /// Largest energy error of a free double pendulum over 10 s, as a share of its swing.
@@ -97,7 +104,8 @@ fn energy_error(dt: f64) -> f64 {
     let energy = |run: &Run| {
         let (q, v) = (run.get(Field::JointQ, 0), run.get(Field::JointQd, 0));
         let m = run.get(Field::MassMatrix, 0);
-        let kinetic = 0.5 * (v[0] * (m[0] * v[0] + m[1] * v[1]) + v[1] * (m[2] * v[0] + m[3] * v[1]));
+        let kinetic =
+            0.5 * (v[0] * (m[0] * v[0] + m[1] * v[1]) + v[1] * (m[2] * v[0] + m[3] * v[1]));
         let (first, second) = (-l * q[0].cos(), -l * (q[0] + q[1]).cos());
         kinetic + GRAVITY * (first + 0.5 * (first + second))
     };
@@ -116,7 +124,10 @@ fn energy_of_a_free_double_pendulum_drifts_less_than_2e_3_in_10_s_and_half_that_
     // semi-implicit Euler is of first order, and not symplectic where M depends on q
     let (coarse, fine) = (energy_error(1e-4), energy_error(5e-5));
     assert!(coarse < 2e-3, "{coarse:e}");
-    assert!((fine / coarse - 0.5).abs() < 0.05, "{coarse:e}, at half the step {fine:e}");
+    assert!(
+        (fine / coarse - 0.5).abs() < 0.05,
+        "{coarse:e}, at half the step {fine:e}"
+    );
 }
 
 #[test]
@@ -134,7 +145,10 @@ fn mass_slides_down_a_rail_with_half_g_t_squared() {
     let n = 1000.0;
     let expected = GRAVITY * dt * dt * n * (n + 1.0) / 2.0;
     let q = run.get(Field::JointQ, 0)[0];
-    assert!((q - expected).abs() < 1e-12 * n, "{q} m, expected {expected} m");
+    assert!(
+        (q - expected).abs() < 1e-12 * n,
+        "{q} m, expected {expected} m"
+    );
     assert!((run.get(Field::JointQdd, 0)[0] - GRAVITY).abs() < 1e-12 * m * GRAVITY);
     assert!((run.get(Field::BodyQ, 0)[7 + 2] + expected).abs() < 1e-12 * n);
 }

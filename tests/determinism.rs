@@ -29,20 +29,39 @@ fn noise(seed: usize, k: usize) -> f64 {
 }
 
 /// Bits of all fields of each world after some frames; world w starts and is driven by `seeds[w]`.
-fn run(model: &Arc<Model>, demo: Demo, seeds: &[usize], lanes: Lanes, threads: usize, precision: Precision) -> Vec<Vec<u64>> {
+fn run(
+    model: &Arc<Model>,
+    demo: Demo,
+    seeds: &[usize],
+    lanes: Lanes,
+    threads: usize,
+    precision: Precision,
+) -> Vec<Vec<u64>> {
     let worlds = seeds.len();
-    let options =
-        Options { worlds, precision, threads: Some(threads), lanes, fields: FIELDS.to_vec() };
+    let options = Options {
+        worlds,
+        precision,
+        threads: Some(threads),
+        lanes,
+        fields: FIELDS.to_vec(),
+    };
     let mut run = Run::new(model, options);
     let rows = |scale: f64, base: &dyn Fn(usize) -> f64, salt: usize| -> Vec<f64> {
-        seeds.iter().flat_map(|&s| (0..9).map(move |j| (s, j)))
-            .map(|(s, j)| base(j) + scale * noise(s, salt + j)).collect()
+        seeds
+            .iter()
+            .flat_map(|&s| (0..9).map(move |j| (s, j)))
+            .map(|(s, j)| base(j) + scale * noise(s, salt + j))
+            .collect()
     };
     // starts so far apart that some worlds meet limits, others do not
     let q = rows(0.6, &|j| common::START[j], 0);
-    run.sim.write(Field::JointQ, 0..9, Values::F64(&q), None).unwrap();
+    run.sim
+        .write(Field::JointQ, 0..9, Values::F64(&q), None)
+        .unwrap();
     let qd = rows(1.0, &|_| 0.0, 100);
-    run.sim.write(Field::JointQd, 0..9, Values::F64(&qd), None).unwrap();
+    run.sim
+        .write(Field::JointQd, 0..9, Values::F64(&qd), None)
+        .unwrap();
     for frame in 0..12 {
         let (field, row) = command(demo, frame);
         let values = rows(0.3, &|j| row[j], 1000 * (frame + 1));
@@ -50,20 +69,34 @@ fn run(model: &Arc<Model>, demo: Demo, seeds: &[usize], lanes: Lanes, threads: u
         run.step();
     }
     (0..worlds)
-        .map(|w| FIELDS.iter().flat_map(|&f| run.get(f, w)).map(f64::to_bits).collect())
+        .map(|w| {
+            FIELDS
+                .iter()
+                .flat_map(|&f| run.get(f, w))
+                .map(f64::to_bits)
+                .collect()
+        })
         .collect()
 }
 
 #[test]
 fn world_alone_equals_the_same_world_among_others_at_any_position() {
-    for (demo, precision) in [(Demo::Torque, Precision::F32), (Demo::Target, Precision::F32), (Demo::Target, Precision::F64)] {
+    for (demo, precision) in [
+        (Demo::Torque, Precision::F32),
+        (Demo::Target, Precision::F32),
+        (Demo::Target, Precision::F64),
+    ] {
         let model = lesson(demo).compile().unwrap();
         let many: Vec<usize> = (0..67).collect();
         let together = run(&model, demo, &many, Lanes::Auto, 1, precision);
         let backwards: Vec<usize> = many.iter().rev().copied().collect();
         let moved = run(&model, demo, &backwards, Lanes::Auto, 1, precision);
         for world in 0..67 {
-            assert_eq!(together[world], moved[66 - world], "{demo:?}: world {world} elsewhere");
+            assert_eq!(
+                together[world],
+                moved[66 - world],
+                "{demo:?}: world {world} elsewhere"
+            );
         }
         for world in [0, 15, 16, 66] {
             let alone = run(&model, demo, &[world], Lanes::Auto, 1, precision);
@@ -102,7 +135,11 @@ fn scalar_equals_eight_equals_sixteen_worlds_a_block() {
 fn fields_that_are_asked_for_do_not_change_the_motion() {
     let model = lesson(Demo::Target).compile().unwrap();
     let motion = |fields: &[Field]| {
-        let options = Options { fields: fields.to_vec(), threads: Some(1), ..Options::default() };
+        let options = Options {
+            fields: fields.to_vec(),
+            threads: Some(1),
+            ..Options::default()
+        };
         let mut run = Run::new(&model, options);
         for frame in 0..20 {
             let (field, row) = command(Demo::Target, frame);
@@ -112,7 +149,10 @@ fn fields_that_are_asked_for_do_not_change_the_motion() {
                 run.forward();
             }
         }
-        run.get(Field::JointQ, 0).iter().map(|q| q.to_bits()).collect::<Vec<_>>()
+        run.get(Field::JointQ, 0)
+            .iter()
+            .map(|q| q.to_bits())
+            .collect::<Vec<_>>()
     };
     assert_eq!(motion(&[Field::JointQ]), motion(Field::ALL));
 }

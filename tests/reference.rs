@@ -11,7 +11,11 @@ fn deviations(demo: Demo, file: &str, precision: Precision) -> Vec<f64> {
     let model = lesson(demo).compile().unwrap();
     let options = Options {
         precision,
-        lanes: if precision == Precision::F64 { Lanes::Scalar } else { Lanes::Auto },
+        lanes: if precision == Precision::F64 {
+            Lanes::Scalar
+        } else {
+            Lanes::Auto
+        },
         threads: Some(1),
         fields: vec![Field::JointQ, Field::JointQd],
         ..Options::default()
@@ -24,7 +28,10 @@ fn deviations(demo: Demo, file: &str, precision: Precision) -> Vec<f64> {
         let (field, row) = command(demo, frame);
         run.command(field, &row);
         run.step();
-        found.push(distance(&run.get(Field::JointQ, 0), &recorded[frame + 1][1..10]));
+        found.push(distance(
+            &run.get(Field::JointQ, 0),
+            &recorded[frame + 1][1..10],
+        ));
     }
     found
 }
@@ -47,14 +54,22 @@ fn target_demo_in_f32_stays_within_2e_6_of_mujoco() {
 
 #[test]
 fn free_torque_demo_in_f64_stays_near_mujoco() {
-    let d = deviations(Demo::Torque, "tests/data/mujoco_torque_free.csv", Precision::F64);
+    let d = deviations(
+        Demo::Torque,
+        "tests/data/mujoco_torque_free.csv",
+        Precision::F64,
+    );
     assert!(worst(&d, 60) < 1e-7, "{:e}", worst(&d, 60));
     assert!(worst(&d, 120) < 1e-5, "{:e}", worst(&d, 120));
 }
 
 #[test]
 fn free_torque_demo_in_f32_stays_near_mujoco() {
-    let d = deviations(Demo::Torque, "tests/data/mujoco_torque_free.csv", Precision::F32);
+    let d = deviations(
+        Demo::Torque,
+        "tests/data/mujoco_torque_free.csv",
+        Precision::F32,
+    );
     assert!(worst(&d, 30) < 5e-6, "{:e}", worst(&d, 30));
     assert!(worst(&d, 60) < 5e-5, "{:e}", worst(&d, 60));
     assert!(worst(&d, 120) < 1e-2, "{:e}", worst(&d, 120));

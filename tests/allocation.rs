@@ -1,0 +1,67 @@
+//! A control frame takes no memory.
+
+mod common;
+
+use common::{Demo, Run, command, lesson};
+use sim_core::backend::Values;
+use sim_core::batch::Field;
+use sim_core::simulation::{Options, Precision};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+/// Counts what the thread of a test takes; other threads of the harness do as they please.
+struct Counting;
+
+thread_local! {
+    static TAKEN: Cell<usize> = const { Cell::new(0) };
+}
+
+// SAFETY: all work is the system's allocator's.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        TAKEN.with(|taken| taken.set(taken.get() + 1));
+        // SAFETY: by the caller's contract.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        // SAFETY: by the caller's contract.
+        unsafe { System.dealloc(memory, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn taken(work: impl FnOnce()) -> usize {
+    let before = TAKEN.with(Cell::get);
+    work();
+    TAKEN.with(Cell::get) - before
+}
+
+#[test]
+fn command_step_and_forward_take_no_memory() {
+    assert!(taken(|| drop(vec![1u8])) == 1, "the count works");
+    for precision in [Precision::F32, Precision::F64] {
+        let model = lesson(Demo::Target).compile().unwrap();
+        let options = Options {
+            worlds: 100,
+            precision,
+            threads: Some(1),
+            fields: Field::ALL.to_vec(),
+            ..Options::default()
+        };
+        let mut run = Run::new(&model, options);
+        let (_, row) = command(Demo::Target, 20);
+        let values: Vec<f64> = (0..100).flat_map(|_| row).collect();
+        let count = taken(|| {
+            for _ in 0..3 {
+                run.sim
+                    .command(Field::JointTargetQ, 0..9, Values::F64(&values))
+                    .unwrap();
+                run.step();
+                run.forward();
+            }
+        });
+        assert_eq!(count, 0, "{precision:?}");
+    }
+}
