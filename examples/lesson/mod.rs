@@ -41,12 +41,7 @@ pub fn lesson(demo: Demo) -> Description {
         ..UrdfOptions::default()
     };
     let arm = scene
-        .add_urdf(
-            std::path::PathBuf::from(
-                "../shared/reference/fr3_franka_hand/urdf/fr3_franka_hand.urdf",
-            ),
-            options,
-        )
+        .add_urdf(robot, options)
         .expect("the project's own robot loads");
     // the reference runs start from float32 values
     let start = START.map(|q| f64::from(q as f32));

@@ -4,6 +4,7 @@
 #[path = "../../examples/lesson/mod.rs"]
 mod lesson_scene;
 
+#[allow(unused_imports)] // as above
 pub use lesson_scene::{Demo, FRAMES, START, command, lesson};
 use sim_core::backend::Values;
 use sim_core::batch::Field;

@@ -178,12 +178,19 @@ impl<F: Lane> Chunk<F> {
                 continue;
             }
             let row = outside * columns.len();
-            for (k, dof) in columns.clone().enumerate() {
-                let place = self.place(n, world, target, dof);
-                self.state[place] = match values {
-                    Values::F32(v) => F::Real::of(f64::from(v[row + k])),
-                    Values::F64(v) => F::Real::of(v[row + k]),
-                };
+            let first = self.place(n, world, target, columns.start);
+            let cells = self.state[first..].iter_mut().step_by(F::WIDTH);
+            match values {
+                Values::F32(v) => {
+                    for (cell, x) in cells.zip(&v[row..row + columns.len()]) {
+                        *cell = F::Real::of(f64::from(*x));
+                    }
+                }
+                Values::F64(v) => {
+                    for (cell, x) in cells.zip(&v[row..row + columns.len()]) {
+                        *cell = F::Real::of(*x);
+                    }
+                }
             }
             if writes_state {
                 for dof in 0..n {
