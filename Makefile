@@ -25,6 +25,8 @@ CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D
 
 demo: wheel
 	$(PYTHON) examples/franka_lesson.py --worlds $(WORLDS)
+	@echo && echo "The same in process, without daemon and Python:"
+	@cargo run --release --quiet --example franka_lesson -- $(WORLDS)
 
 test: wheel $(VENV)/.dev
 	cargo fmt --all --check
