@@ -1,34 +1,12 @@
 //! Many worlds of one model: reset, write, step, read.
 
+pub use crate::backend::{Lanes, Precision};
+
 use crate::backend::{Backend, BackendError, Values, cpu};
 use crate::batch::{Dtype, Field, Group, Layout};
 use crate::model::Model;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// Precision of a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Precision {
-    /// Single: SIMD lanes.
-    #[default]
-    F32,
-    /// Double: the reference, scalar.
-    F64,
-}
-
-/// Worlds a block on the CPU.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Lanes {
-    /// As many as the processor can; in `f64` always one.
-    #[default]
-    Auto,
-    /// One.
-    Scalar,
-    /// Eight, AVX2.
-    Eight,
-    /// Sixteen, AVX-512.
-    Sixteen,
-}
 
 /// How to run a model.
 #[derive(Clone, Debug, PartialEq)]

@@ -41,6 +41,30 @@ impl Values<'_> {
     }
 }
 
+/// Precision of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// Single: SIMD lanes.
+    #[default]
+    F32,
+    /// Double: the reference, scalar.
+    F64,
+}
+
+/// Worlds a block on the CPU.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Lanes {
+    /// As many as the processor can; in `f64` always one.
+    #[default]
+    Auto,
+    /// One.
+    Scalar,
+    /// Eight, AVX2.
+    Eight,
+    /// Sixteen, AVX-512.
+    Sixteen,
+}
+
 /// What keeps the worlds. Arguments were checked by [`crate::simulation::Simulation`].
 pub trait Backend: Send {
     /// What it runs on, for people.

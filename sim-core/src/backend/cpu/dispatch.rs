@@ -2,13 +2,12 @@
 
 use super::chunk::{Chunk, Job};
 use super::transfer::Arena;
-use super::{Backend, BackendError, Cpu, Layout};
+use super::{Backend, BackendError, Cpu, Lanes, Layout, Precision};
 use crate::batch::Block;
 use crate::lane::memory::Cpu as Machine;
 use crate::lane::{Lane, Num};
 use crate::model::Model;
 use crate::model::constants::Constants;
-use crate::simulation::{Lanes, Precision};
 use crate::step::Stage;
 
 /// A stage on a block, compiled for an instruction set: a function of its own, so that registers are

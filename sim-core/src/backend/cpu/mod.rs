@@ -8,7 +8,7 @@ mod transfer;
 
 pub use dispatch::{available, create};
 
-use super::{Backend, BackendError, Values};
+use super::{Backend, BackendError, Lanes, Precision, Values};
 use crate::batch::{Field, Layout};
 use crate::lane::Lane;
 use crate::model::Model;

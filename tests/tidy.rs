@@ -1,0 +1,263 @@
+//! The house rules of ARCHITECTURE.md and STYLE.md that a machine can check.
+
+use sim_core::batch::Field;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Longest page of code [lines].
+const LONGEST: usize = 500;
+
+/// Modules of sim-core, each of which may import those before it.
+const ORDER: [&str; 7] = [
+    "lane",
+    "math",
+    "model",
+    "batch",
+    "step",
+    "backend",
+    "simulation",
+];
+
+/// The only door of each heavy package.
+const DOORS: [(&str, &str); 7] = [
+    ("urdf_rs", "sim-core/src/model/urdf"),
+    ("faer", "sim-core/src/model"),
+    ("rayon", "sim-core/src/backend/cpu"),
+    ("iceoryx2", "sim-daemon/protocol/src"),
+    ("clap", "sim-daemon/src/cli.rs"),
+    ("pyo3", "py-client/src"),
+    ("numpy", "py-client/src"),
+];
+
+/// Where `unsafe` may stand, and why.
+const UNSAFE: [&str; 10] = [
+    "py-client/src/frame.rs",                // NumPy views
+    "sim-core/src/backend/cpu/chunk.rs",     // calls the stages of an instruction set
+    "sim-core/src/backend/cpu/dispatch.rs",  // instruction sets
+    "sim-core/src/backend/cpu/mod.rs",       // calls what dispatch chose
+    "sim-core/src/backend/cpu/transfer.rs",  // rows of a frame, written by several threads
+    "sim-core/src/lane/simd.rs",             // intrinsics
+    "sim-daemon/protocol/src/controller.rs", // loans that were filled
+    "sim-daemon/protocol/src/frame.rs",      // views of a sample
+    "sim-daemon/protocol/src/host/mod.rs",   // loans that were filled
+    "sim-daemon/protocol/src/loan.rs",       // loaned samples
+];
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Files below a folder, as paths from the root of the repository.
+fn files(folder: &str, ending: &str) -> Vec<String> {
+    fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
+        for entry in std::fs::read_dir(folder).unwrap_or_else(|e| panic!("{folder:?}: {e}")) {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                walk(&path, found);
+            } else {
+                found.push(path);
+            }
+        }
+    }
+    let mut found = Vec::new();
+    walk(&root().join(folder), &mut found);
+    let mut found: Vec<String> = found
+        .iter()
+        .map(|path| {
+            path.strip_prefix(root())
+                .unwrap()
+                .to_str()
+                .unwrap()
+                .to_owned()
+        })
+        .filter(|path| path.ends_with(ending))
+        .collect();
+    found.sort();
+    assert!(!found.is_empty(), "no {ending} below {folder}");
+    found
+}
+
+fn read(path: &str) -> String {
+    std::fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
+}
+
+/// Lines of code: comments left out.
+fn code(path: &str) -> Vec<String> {
+    let text = read(path);
+    text.lines()
+        .map(str::trim)
+        .filter(|line| !line.starts_with("//"))
+        .map(str::to_owned)
+        .collect()
+}
+
+fn sources() -> Vec<String> {
+    [
+        "sim-core/src",
+        "sim-daemon/src",
+        "sim-daemon/protocol/src",
+        "py-client/src",
+    ]
+    .iter()
+    .flat_map(|folder| files(folder, ".rs"))
+    .collect()
+}
+
+#[test]
+fn modules_of_sim_core_import_only_those_before_them() {
+    let mut wrong = Vec::new();
+    for path in files("sim-core/src", ".rs") {
+        let module = path
+            .trim_start_matches("sim-core/src/")
+            .trim_end_matches(".rs");
+        let module = module.split('/').next().unwrap();
+        let Some(own) = ORDER.iter().position(|&m| m == module) else {
+            continue;
+        };
+        for line in code(&path) {
+            for (place, later) in ORDER.iter().enumerate() {
+                if place > own && line.contains(&format!("crate::{later}")) {
+                    wrong.push(format!("{path}: {line}"));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn crates_know_only_what_they_may() {
+    for (folder, strangers) in [
+        ("sim-core/src", &["sim_protocol", "sim_daemon"][..]),
+        ("sim-daemon/protocol/src", &["sim_core", "sim_daemon"]),
+        ("py-client/src", &["sim_core"]),
+    ] {
+        for path in files(folder, ".rs") {
+            for stranger in strangers {
+                assert!(
+                    !code(&path).iter().any(|l| l.contains(stranger)),
+                    "{path}: {stranger}"
+                );
+            }
+        }
+    }
+    // one file turns fields into samples
+    let both: Vec<String> = files("sim-daemon/src", ".rs")
+        .into_iter()
+        .filter(|path| {
+            let text = code(path).join("\n");
+            text.contains("sim_core::batch") && text.contains("Layout")
+        })
+        .collect();
+    assert_eq!(both, ["sim-daemon/src/export.rs"]);
+}
+
+#[test]
+fn heavy_packages_have_one_door() {
+    for path in sources() {
+        for (package, door) in DOORS {
+            let used = code(&path)
+                .iter()
+                .any(|line| line.contains(&format!("{package}::")));
+            assert!(
+                !used || path.starts_with(door),
+                "{path} uses {package}; its door is {door}"
+            );
+        }
+    }
+}
+
+#[test]
+fn unsafe_stands_where_it_may() {
+    let found: BTreeSet<String> = sources()
+        .into_iter()
+        .filter(|path| !path.ends_with("tests.rs"))
+        .filter(|path| code(path).iter().any(|line| line.contains("unsafe ")))
+        .collect();
+    let listed: BTreeSet<String> = UNSAFE.iter().map(|&path| path.to_owned()).collect();
+    assert_eq!(found, listed);
+}
+
+#[test]
+fn a_step_names_no_backend_returns_no_result_and_takes_no_memory() {
+    for path in files("sim-core/src/step", ".rs") {
+        for line in code(&path) {
+            for word in ["Result<", "Vec<", "vec!", "Box<", "crate::backend"] {
+                assert!(!line.contains(word), "{path}: {line}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_model_cannot_be_changed() {
+    let text = read("sim-core/src/model/compile.rs");
+    let start = text.find("impl Model {").expect("the model has methods");
+    let body = &text[start..start + text[start..].find("\n}").unwrap()];
+    assert!(body.contains("&self") && !body.contains("&mut self"));
+}
+
+#[test]
+fn every_field_has_a_name_a_unit_and_a_line_of_text() {
+    let mut names = BTreeSet::new();
+    for field in Field::ALL {
+        let row = field.row();
+        assert!(names.insert(row.name), "{} stands twice", row.name);
+        assert!(
+            !row.unit.is_empty() && row.doc.ends_with('.'),
+            "{}",
+            row.name
+        );
+        assert_eq!(Field::named(row.name), Some(*field));
+    }
+}
+
+#[test]
+fn pages_of_code_are_at_most_500_lines() {
+    let python = ["py-client/python", "tests/python", "examples", "benches"];
+    let rust = [
+        "tests",
+        "benches",
+        "examples",
+        "sim-core/tests",
+        "sim-daemon/tests",
+    ];
+    let long: Vec<String> = python
+        .iter()
+        .flat_map(|folder| files(folder, ""))
+        .filter(|path| path.ends_with(".py"))
+        .chain(
+            rust.iter()
+                .flat_map(|f| files(f, ""))
+                .filter(|path| path.ends_with(".rs")),
+        )
+        .chain(sources())
+        .filter(|path| read(path).lines().count() > LONGEST)
+        .collect();
+    assert!(long.is_empty(), "{long:?}");
+}
+
+#[test]
+fn paths_named_in_the_documents_exist() {
+    let mut wrong = Vec::new();
+    for document in ["README.md", "ARCHITECTURE.md", "STYLE.md", "CHANGELOG.md"] {
+        for word in read(document).split('`').skip(1).step_by(2) {
+            let looks = word.contains('/')
+                && word
+                    .chars()
+                    .all(|c| c.is_ascii_alphanumeric() || "/_-.".contains(c))
+                && [".rs", ".py", ".md", ".toml", ".urdf", "/"]
+                    .iter()
+                    .any(|e| word.ends_with(e));
+            // other projects' files are named too: ours begin with a folder of the root
+            let ours = word
+                .split('/')
+                .next()
+                .is_some_and(|first| root().join(first).exists());
+            if looks && ours && !root().join(word).exists() {
+                wrong.push(format!("{document}: {word}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
