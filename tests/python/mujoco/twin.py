@@ -23,6 +23,9 @@ LIMIT_KE, LIMIT_KD, IMPEDANCE_MAX = 1e4, 10.0, 0.95
 # A motion is chaotic once a start so far away has moved so much [rad or m]
 PERTURBATION, CHAOS = 1e-12, 1e-9
 
+# Motions that leave all bounds count as chaotic; MuJoCo would write a log into the working directory about each
+mujoco.set_mju_user_warning(lambda _: None)
+
 # Fixed links stay bodies, and figures stay as they are written
 COMPILER = '<mujoco><compiler discardvisual="false" fusestatic="false" balanceinertia="{balance}"/></mujoco>'
 
@@ -94,6 +97,7 @@ class Twin:
         self.dof_names = [model.joint(joint).name for joint in range(model.njnt)]
         self.body_names = [model.body(body).name for body in range(1, model.nbody)]
         self.slides = model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
+        self._set_effort(np.concatenate([robot.joint_effort_limit for robot in scene.robots.values()]))
         self._set_limits()
         self._flatten_mimics()
         self.data = mujoco.MjData(model)
@@ -101,11 +105,7 @@ class Twin:
     @staticmethod
     def _drive(spec: mujoco.MjSpec, robot: tl.Robot, dof: int, name: str) -> None:
         """Two actuators a joint: one pulls to the position target, one to the velocity target."""
-        joint = spec.joint(name)
-        joint.armature = robot.joint_armature[dof]
-        effort = robot.joint_effort_limit[dof]
-        joint.actfrclimited = bool(np.isfinite(effort))
-        joint.actfrcrange = [-effort, effort] if np.isfinite(effort) else [0, 0]
+        spec.joint(name).armature = robot.joint_armature[dof]
         mode, ke, kd = robot.joint_target_mode[dof], robot.joint_target_ke[dof], robot.joint_target_kd[dof]
         spring = ke if mode != "velocity" else 0.0
         follows = kd if mode != "position" else 0.0
@@ -113,6 +113,11 @@ class Twin:
             actuator = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name)
             actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
             actuator.gainprm[0], actuator.biasprm[:3] = gain, bias
+
+    def _set_effort(self, limit: Array) -> None:
+        # after compiling, which refuses a limit of 0
+        self.model.jnt_actfrclimited = np.isfinite(limit)
+        self.model.jnt_actfrcrange = np.where(np.isfinite(limit), limit, 0.0)[:, None] * [-1, 1]
 
     def _set_limits(self) -> None:
         f = self.model.dof_invweight0 * (1 - IMPEDANCE_MAX)
@@ -159,22 +164,22 @@ class Twin:
         n = self.dofs
         assert size == 1 + 2 * n, "time, positions, velocities"
         start = np.hstack([np.zeros((len(q), 1)), q, qd])
-        control = np.concatenate(
-            [interleaved(commands.joint_target_q, commands.joint_target_qd), commands.joint_f], axis=2
-        ).repeat(substeps, axis=1)
+        drives = interleaved(commands.joint_target_q, commands.joint_target_qd)
+        control = np.concatenate([drives, commands.joint_f], axis=2).repeat(substeps, axis=1)
         spec = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED
         state, _ = mujoco.rollout.rollout(self.model, self.data, start, control, control_spec=int(spec))
         ends = state[:, substeps - 1 :: substeps]
         return ends[:, :, 1 : 1 + n], ends[:, :, 1 + n :]
 
-    def calm_frames(self, q: Array, qd: Array, commands: Commands, substeps: int) -> NDArray[np.int64]:
-        """For how many frames a motion is not chaotic, judged by MuJoCo alone. ``(worlds,)``"""
+    def calm_frames(
+        self, positions: Array, q: Array, qd: Array, commands: Commands, substeps: int
+    ) -> NDArray[np.int64]:
+        """For how many frames the motion through these positions is not chaotic, by MuJoCo alone. ``(worlds,)``"""
         nudge = PERTURBATION * np.random.default_rng(0).choice([-1.0, 1.0], q.shape)
-        base, _ = self.trajectory(q, qd, commands, substeps)
         nudged, _ = self.trajectory(q + nudge, qd, commands, substeps)
-        # not a number is far away, too
-        chaotic = ~(np.abs(nudged - base).max(axis=2) <= CHAOS)
-        return np.where(chaotic.any(axis=1), chaotic.argmax(axis=1), base.shape[1])
+        # what is not a number is far away, too
+        chaotic = ~(np.abs(nudged - positions).max(axis=2) <= CHAOS)
+        return np.where(chaotic.any(axis=1), chaotic.argmax(axis=1), positions.shape[1])
 
 
 def interleaved(target_q: Array, target_qd: Array) -> Array:
