@@ -54,7 +54,7 @@ pub enum Precision {
 /// Worlds a block on the CPU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Lanes {
-    /// As many as the processor can; in `f64` always one.
+    /// As many as the processor can; one in `f64`, and for one world.
     #[default]
     Auto,
     /// One.

@@ -126,6 +126,8 @@ pub fn create(
 ) -> Result<Box<dyn Backend>, BackendError> {
     let fused = available(Lanes::Eight);
     let lanes = match lanes {
+        // a register that holds one world takes longer than a scalar, for the same bits
+        Lanes::Auto if worlds == 1 => Lanes::Scalar,
         Lanes::Auto if available(Lanes::Sixteen) => Lanes::Sixteen,
         Lanes::Auto if fused => Lanes::Eight,
         Lanes::Auto => Lanes::Scalar,
