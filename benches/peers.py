@@ -1,97 +1,238 @@
-"""Physics steps per second beside MuJoCo C, one thread each, in one run.
+"""Steps per second beside MuJoCo C, on one thread each, in one run.
 
     python benches/peers.py
 
-Both run the target demo: the same robot, gains, limits, time step, solver options and targets, no contacts. MuJoCo runs
-`mujoco.rollout`, which leaves Python once; tightloop runs through its daemon, a Python call and a frame of views each 8
-steps. They take turns, so that a machine that changes its speed meanwhile changes both.
+The lesson's two demos without contacts: MuJoCo's `rollout`, tightloop through its daemon and Python, and tightloop in
+process (benches/step.rs) with each width of lanes that the processor has. The sides take turns, so that a machine that
+changes its speed meanwhile changes all of them; ratios are taken within a round. Writes
+benches/results/MACHINE/peers.csv, and ends with 1 when the target demo is slower than asked.
+
+Like with like: one model, one time step, one solver, commands of every frame the same on both sides, in all worlds
+("one") or with an amplitude of each world's own ("own"; in process there is only "one"). Not the same: MuJoCo computes
+in double precision, tightloop in single; MuJoCo's worlds are fewer, which its steps do not notice.
 """
 
 from __future__ import annotations
 
+import argparse
+import csv
+import json
+import os
+import re
+import subprocess
 import sys
 import time
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import mujoco
+import mujoco.rollout
 import numpy as np
-from mujoco import rollout
+from numpy.typing import NDArray
+from tqdm import tqdm
 
 import tightloop as tl
 
 REPOSITORY = Path(__file__).parents[1]
-sys.path.insert(0, str(REPOSITORY / "examples"))
-from franka_lesson import FRAMES, START, STIFFNESS, URDF, scene, targets  # noqa: E402  (the examples are no package)
+MODELS = REPOSITORY.parent / "shared/reference/models"
+sys.path[:0] = [str(REPOSITORY / "examples"), str(REPOSITORY / "tests/python/mujoco")]
+from franka_lesson import FRAMES, START, scene, targets, torques  # noqa: E402  (the examples are no package)
+from twin import Twin  # noqa: E402  (nor are the tests)
 
-RECORDED = REPOSITORY.parent / "shared/reference/models/target.mjb"
-SUBSTEPS = 8
 WORLDS = 4096
-PEER_WORLDS = 16  # its speed does not depend on the number
-ROUNDS = 5
+MUJOCO_WORLDS = 16
+DEMOS = {"target": (targets, "joint_target_q", "target"), "torque": (torques, "joint_f", "torque_free")}
+MUJOCO = "MuJoCo C rollout"
+DAEMON = "tightloop, daemon and Python"
+# Steps per second of the target demo over MuJoCo's, by the lanes of a run
+ASKED = {"sixteen": 40.0, "eight": 20.0}
 
 
-def peer() -> mujoco.MjModel:
-    """MuJoCo's model of the lesson: the recorded one where it is present, else one of the same URDF."""
-    if RECORDED.exists():
-        model = mujoco.MjModel.from_binary_path(str(RECORDED))
-    else:
-        spec = mujoco.MjSpec.from_file(str(URDF))
-        for dof, joint in enumerate(spec.joints):
-            joint.armature = [0.195, 0.195, 0.195, 0.195, 0.074, 0.074, 0.074, 0.1, 0.1][dof]
-            drive = spec.add_actuator(name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-            drive.set_to_position(kp=STIFFNESS[dof], kv=STIFFNESS[dof] / 10)
-        follow = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=spec.joints[8].name, name2=spec.joints[7].name)
-        follow.data[:5] = [0, 1, 0, 0, 0]
-        spec.option.timestep = 1 / 480
-        spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-        spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-        spec.option.iterations, spec.option.ls_iterations = 20, 100
-        spec.option.impratio = 1000
-        model = spec.compile()
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    return model
+@dataclass
+class Case:
+    """One side in one demo; rates are steps per second, one a round."""
+
+    demo: str
+    commands: str
+    side: str
+    lanes: str
+    worlds: int
+    precision: str
+    rates: list[float] = field(default_factory=list)
 
 
-def peer_rate(model: mujoco.MjModel, commands: np.ndarray) -> float:
-    """World-steps per second of one thread."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = START
-    full = mujoco.mjtState.mjSTATE_FULLPHYSICS
-    start = np.zeros(mujoco.mj_stateSize(model, full))
-    mujoco.mj_getState(model, data, start, full)
-    control = np.broadcast_to(np.repeat(commands, SUBSTEPS, axis=0), (PEER_WORLDS, FRAMES * SUBSTEPS, 9))
-    began = time.perf_counter()
-    rollout.rollout(model, data, np.tile(start, (PEER_WORLDS, 1)), control.astype(float))
-    return PEER_WORLDS * FRAMES * SUBSTEPS / (time.perf_counter() - began)
+class Rival:
+    """MuJoCo C: the recorded reference's model where it is present, otherwise what it makes of our URDF."""
+
+    def __init__(self, demo: str) -> None:
+        binary = MODELS / f"{DEMOS[demo][2]}.mjb"
+        if binary.exists():
+            self.model, self.origin = mujoco.MjModel.from_binary_path(str(binary)), binary.name
+        else:
+            self.model, self.origin = Twin(scene(driven=demo == "target")).model, "the project's URDF"
+            self.model.opt.iterations, self.model.opt.tolerance = 20, 1e-8
+        self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+        self.data = mujoco.MjData(self.model)
+        self.torque = demo == "torque"
+
+    def rate(self, commands: NDArray[np.float32], substeps: int) -> float:
+        """Steps per second of a demo; commands ``(frames, worlds, dofs)``."""
+        size = mujoco.mj_stateSize(self.model, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        start = np.zeros((commands.shape[1], size))
+        start[:, 1:10] = START
+        control = commands.astype(float).swapaxes(0, 1).repeat(substeps, axis=1)
+        spec = mujoco.mjtState.mjSTATE_QFRC_APPLIED if self.torque else mujoco.mjtState.mjSTATE_CTRL
+        if not self.torque and self.model.nu == 2 * self.model.nv:
+            # a twin has two actuators a joint, and the second takes a velocity target
+            control = np.stack([control, np.zeros_like(control)], axis=-1).reshape(*control.shape[:2], -1)
+        state = np.empty((*control.shape[:2], size))
+        begin = time.perf_counter()
+        mujoco.rollout.rollout(self.model, self.data, start, control, control_spec=int(spec), state=state)
+        return control.shape[0] * control.shape[1] / (time.perf_counter() - begin)
 
 
-def our_rate(sim: tl.Sim, commands: np.ndarray) -> float:
-    """World-steps per second of one thread, through the daemon."""
-    actions = [np.tile(command, (sim.worlds, 1)) for command in commands]
+def daemon_rate(sim: tl.Sim, commands: NDArray[np.float32], name: str) -> float:
+    """Steps per second of a demo through the daemon; commands ``(frames, worlds, dofs)``."""
     sim.reset()
-    began = time.perf_counter()
-    for action in actions:
-        sim.step(joint_target_q=action)
-    return sim.worlds * FRAMES * SUBSTEPS / (time.perf_counter() - began)
+    begin = time.perf_counter()
+    for action in commands:
+        sim.step(**{name: action})
+    return len(commands) * sim.worlds * sim.substeps / (time.perf_counter() - begin)
 
 
-def main() -> None:
-    """Measure in turns and print the medians."""
-    commands = np.array([targets(frame, np.ones(1))[0] for frame in range(FRAMES)])
-    model = peer()
-    theirs, ours = [], []
-    with tl.launch(scene(driven=True), worlds=WORLDS, threads=1) as sim:
-        for _ in range(ROUNDS):
-            theirs.append(peer_rate(model, commands))
-            ours.append(our_rate(sim, commands))
-        device = sim.device
-    them, us = float(np.median(theirs)), float(np.median(ours))
-    source = "the recorded model" if RECORDED.exists() else "a model of the same URDF"
-    print(f"target demo without contacts, one thread, median of {ROUNDS} rounds, world-steps/s")
-    print(f"  MuJoCo C {mujoco.__version__} rollout, {source:<28}{them:>14,.0f}")
-    print(f"  tightloop, {WORLDS} worlds, {device:<37}{us:>14,.0f}")
-    print(f"  ratio {us / them:.1f} (rounds: {', '.join(f'{a / b:.1f}' for a, b in zip(ours, theirs, strict=True))})")
+def step_bench() -> Path:
+    """The built bench of steps in process."""
+    command = ["cargo", "bench", "--quiet", "--package", "tightloop", "--bench", "step", "--no-run"]
+    command += ["--message-format", "json"]
+    lines = subprocess.run(command, cwd=REPOSITORY, stdout=subprocess.PIPE, check=True, text=True).stdout.splitlines()
+    built = [message.get("executable") for message in map(json.loads, lines)]
+    return Path(next(path for path in built if path))
+
+
+def in_process_rates(bench: Path) -> dict[tuple[str, str, str], float]:
+    """Steps per second by demo, lanes and precision, of one pass of each demo."""
+    command = [str(bench), str(WORLDS), "once", "sixteen", "eight"]
+    text = subprocess.run(command, cwd=REPOSITORY, stdout=subprocess.PIPE, check=True, text=True).stdout
+    rows = csv.DictReader(text.splitlines())
+    return {
+        (row["demo"].lower(), row["lanes"].lower(), row["precision"].lower()): float(row["steps_per_s"]) for row in rows
+    }
+
+
+def measure(rounds: int) -> list[Case]:
+    """All sides of all demos, in turns."""
+    bench = step_bench()
+    cases: dict[tuple[str, ...], Case] = {}
+
+    def note(rate: float, *key: str, worlds: int, precision: str) -> None:
+        cases.setdefault(key, Case(*key, worlds=worlds, precision=precision)).rates.append(rate)
+
+    rivals = {demo: Rival(demo) for demo in DEMOS}
+    sims = {demo: tl.launch(scene(driven=demo == "target"), worlds=WORLDS, threads=1) for demo in DEMOS}
+    print(f"MuJoCo {mujoco.__version__}: " + ", ".join(f"{demo} of {rival.origin}" for demo, rival in rivals.items()))
+    print(f"tightloop {tl.__version__}: {sims['target'].device}")
+    amplitudes = {"one": np.ones_like, "own": lambda worlds: np.linspace(1.0, -1.0, len(worlds))}
+    try:
+        # the first round warms caches and clocks, and is dropped
+        for _ in tqdm(range(1 + rounds), desc="rounds", disable=None):
+            for demo, (values, name, _model) in DEMOS.items():
+                for kind, spread in amplitudes.items():
+                    few, many = (
+                        np.array([values(frame, spread(np.empty(worlds))) for frame in range(FRAMES)])
+                        for worlds in (MUJOCO_WORLDS, WORLDS)
+                    )
+                    sim = sims[demo]
+                    rate = rivals[demo].rate(few, sim.substeps)
+                    note(rate, demo, kind, MUJOCO, "–", worlds=MUJOCO_WORLDS, precision="f64")
+                    note(daemon_rate(sim, many, name), demo, kind, DAEMON, "auto", worlds=WORLDS, precision="f32")
+            for (demo, lanes, precision), rate in in_process_rates(bench).items():
+                note(rate, demo, "one", "tightloop, in process", lanes, worlds=WORLDS, precision=precision)
+    finally:
+        for sim in sims.values():
+            sim.close()
+    for case in cases.values():
+        del case.rates[0]
+    return sorted(cases.values(), key=lambda case: (case.demo, case.commands, case.side))
+
+
+def table(cases: list[Case]) -> list[dict[str, str | int]]:
+    """Rows for people and files: best and median rates, and the median of the ratios to MuJoCo, round by round."""
+    rivals = {(case.demo, case.commands): case.rates for case in cases if case.side == MUJOCO}
+    return [
+        {
+            "demo": case.demo,
+            "commands": case.commands,
+            "side": case.side,
+            "lanes": case.lanes,
+            "precision": case.precision,
+            "worlds": case.worlds,
+            "best_steps_per_s": f"{max(case.rates):.0f}",
+            "median_steps_per_s": f"{np.median(case.rates):.0f}",
+            "best_ratio": f"{max(case.rates) / max(rivals[case.demo, case.commands]):.2f}",
+            "median_ratio": f"{np.median(np.divide(case.rates, rivals[case.demo, case.commands])):.2f}",
+        }
+        for case in cases
+    ]
+
+
+def processor() -> str:
+    """Name of the processor, as Linux has it."""
+    return re.findall(r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)[0]
+
+
+def commit() -> str:
+    """What is measured: the commit, with ``-dirty`` for changes since."""
+    command = ["git", "describe", "--always", "--dirty", "--exclude=*"]
+    return subprocess.run(command, cwd=REPOSITORY, stdout=subprocess.PIPE, check=True, text=True).stdout.strip()
+
+
+def write(path: Path, rows: list[dict[str, str | int]], rounds: int) -> None:
+    """Results with what it takes to understand them later."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="") as file:
+        for what, value in {
+            "cpu": f"{processor()}, {os.cpu_count()} cores",
+            "commit": commit(),
+            "command": f"python benches/peers.py --rounds {rounds}",
+            "date": time.strftime("%Y-%m-%d"),
+            "mujoco": mujoco.__version__,
+            "threads": 1,
+        }.items():
+            file.write(f"# {what}: {value}\n")
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def main() -> int:
+    """Measure in turns, print and write the results; 0 when the target demo is as fast as asked."""
+    parser = argparse.ArgumentParser(description="Steps per second beside MuJoCo C, on one thread each.")
+    parser.add_argument("--rounds", type=int, default=5, help="rounds that count (default 5)")
+    rounds = parser.parse_args().rounds
+    cases = measure(rounds)
+    rows = table(cases)
+    machine = re.sub(r"[^a-z0-9]+", "-", f"{processor()} {os.cpu_count()} cores".lower()).strip("-")
+    path = REPOSITORY / "benches/results" / machine / "peers.csv"
+    write(path, rows, rounds)
+    print(f"\n{'demo':<8}{'commands':<10}{'side':<32}{'lanes':<9}{'best steps/s':>14}{'median':>14}{'ratio':>9}")
+    for row in rows:
+        print(
+            f"{row['demo']:<8}{row['commands']:<10}{row['side']:<32}{row['lanes']:<9}"
+            f"{int(row['best_steps_per_s']):>14,}{int(row['median_steps_per_s']):>14,}{row['median_ratio']:>9}"
+        )
+    print(f"\nresults: {path.relative_to(REPOSITORY)}\n")
+
+    widest = "sixteen" if any(row["lanes"] == "sixteen" for row in rows) else "eight"
+    short = False
+    for row in rows:
+        lanes = widest if row["lanes"] == "auto" else row["lanes"]
+        if row["demo"] == "target" and lanes in ASKED:
+            ratio, asked = float(row["median_ratio"]), ASKED[str(lanes)]
+            verdict = "" if ratio >= asked else ", missed"
+            short |= ratio < asked
+            print(f"target, {row['commands']}, {row['side']}, {lanes} lanes: {ratio:.1f} (asked {asked:.0f}{verdict})")
+    return int(short)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
