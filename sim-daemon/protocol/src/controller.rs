@@ -258,6 +258,7 @@ impl Controller {
             seq: self.seq,
             op: op as u32,
             rows: rows as u32,
+            probing: u64::from(self.paces[op as usize - 1].probes()),
         };
         let words = crate::loan::words(loan.payload_mut());
         let (table, data) = words.split_at_mut(head / 8);

@@ -70,8 +70,10 @@ pub struct CommandHeader {
     pub op: u32,
     /// Rows in the field table.
     pub rows: u32,
+    /// 1: the client spins for long now, so that the system gives each side a core; the daemon should spin too. Else 0.
+    pub probing: u64,
 }
-const _: () = assert!(size_of::<CommandHeader>() == 32 && align_of::<CommandHeader>() == 8);
+const _: () = assert!(size_of::<CommandHeader>() == 40 && align_of::<CommandHeader>() == 8);
 
 /// What a command asks for. Every one is answered by a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

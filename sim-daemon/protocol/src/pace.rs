@@ -9,6 +9,7 @@ use crate::ProtocolError;
 use crate::transport::{SLICE, park};
 
 const SPIN_MIN: Duration = Duration::from_micros(5);
+const SPIN_SURE: Duration = Duration::from_micros(40);
 const SPIN_MAX: Duration = Duration::from_micros(200);
 /// Waking takes tens of microseconds: sleep this much less than the expected wait, and spin for the rest.
 const WAKE_MARGIN: Duration = Duration::from_micros(100);
@@ -17,6 +18,12 @@ const FORESEEN_MAX: Duration = Duration::from_millis(20);
 
 /// Most waits that sleep at once after spinning was in vain.
 const REST_MAX: u32 = 64;
+/// The system may have put both sides on one core, since a wake-up looks as if the waker will sleep next. Only when both want
+/// to run for longer than its tick does it move one: so, now and then, spin for that long …
+const PROBE: Duration = Duration::from_millis(9);
+/// … but rarely, since where no core is free it is in vain.
+const PROBE_PERIOD: Duration = Duration::from_millis(250);
+
 /// What is waited for.
 pub(crate) trait Waiting<T> {
     /// Looks for it; called over and over.
@@ -35,6 +42,9 @@ pub(crate) struct Pace {
     /// Waits to sleep through before spinning is tried again, and how many there were the last time.
     resting: u32,
     rest: u32,
+    /// Whether the next wait spins for long, and when one did.
+    probing: bool,
+    probed: Instant,
 }
 
 impl Pace {
@@ -45,6 +55,8 @@ impl Pace {
             free_core,
             resting: 0,
             rest: 0,
+            probing: false,
+            probed: Instant::now(),
         }
     }
 
@@ -63,22 +75,12 @@ impl Pace {
             if self.typical > SPIN_MAX {
                 park(listener, self.typical - WAKE_MARGIN)?;
             }
-            let until = start.elapsed() + (2 * self.typical).clamp(SPIN_MIN, SPIN_MAX);
-            loop {
-                if let Some(found) = waiting.look()? {
-                    self.rest /= 2;
-                    self.learn(start.elapsed());
-                    return Ok(found);
-                }
-                if start.elapsed() > until {
-                    break;
-                }
-                std::hint::spin_loop();
+            if let Some(found) = self.spin(waiting)? {
+                self.learn(start.elapsed());
+                return Ok(found);
             }
-            // perhaps the core was not free after all, and the answer could not be computed since we spun: then the wait
-            // begins only now, and what was spun must not make the next spin longer
-            self.rest = (2 * self.rest).clamp(1, REST_MAX);
-            self.resting = self.rest;
+            // perhaps the other side waited for our core: then the wait begins only now, and what was spun must not make
+            // the next spin longer
             start = Instant::now();
         }
         loop {
@@ -92,6 +94,53 @@ impl Pace {
                 return Ok(found);
             }
         }
+    }
+
+    /// Spins for as long as is worth it.
+    fn spin<T>(&mut self, waiting: &mut impl Waiting<T>) -> Result<Option<T>, ProtocolError> {
+        let start = Instant::now();
+        // while spinning pays, an interrupt of the other side is waited out as well
+        let (times, least) = if self.rest == 0 {
+            (4, SPIN_SURE)
+        } else {
+            (2, SPIN_MIN)
+        };
+        let worthwhile = (times * self.typical).clamp(least, SPIN_MAX);
+        let long = if std::mem::take(&mut self.probing) {
+            PROBE
+        } else {
+            worthwhile
+        };
+        loop {
+            if let Some(found) = waiting.look()? {
+                if start.elapsed() < worthwhile {
+                    self.rest /= 2;
+                }
+                return Ok(Some(found));
+            }
+            if start.elapsed() > long {
+                break;
+            }
+            std::hint::spin_loop();
+        }
+        self.rest = (2 * self.rest).clamp(1, REST_MAX);
+        self.resting = self.rest;
+        Ok(None)
+    }
+
+    /// Whether the next wait should probe for a free core; if so, the other side is told and must [`Pace::encourage`].
+    pub(crate) fn probes(&mut self) -> bool {
+        self.probing =
+            self.resting > 0 && self.rest == REST_MAX && self.probed.elapsed() > PROBE_PERIOD;
+        if self.probing {
+            (self.probed, self.resting) = (Instant::now(), 0);
+        }
+        self.probing
+    }
+
+    /// Tries spinning again: the other side does so too.
+    pub(crate) fn encourage(&mut self) {
+        (self.rest, self.resting) = (0, 0);
     }
 
     fn may_spin(&mut self) -> bool {

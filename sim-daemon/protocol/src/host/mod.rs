@@ -188,7 +188,11 @@ impl Host {
         {
             return Ok(next);
         }
-        self.pace.wait(&self.listener, &mut self.state)
+        let next = self.pace.wait(&self.listener, &mut self.state)?;
+        if next == Next::Command && self.state.inbox.header().probing != 0 {
+            self.pace.encourage();
+        }
+        Ok(next)
     }
 
     /// The command that [`Host::wait`] has found.
