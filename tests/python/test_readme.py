@@ -1,0 +1,27 @@
+"""The README's code runs as it stands."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import tightloop as tl
+from conftest import REPOSITORY
+
+
+def test_the_api_in_twenty_lines_runs(monkeypatch, tmp_path, unique):
+    text = (REPOSITORY / "README.md").read_text()
+    _, _, code = text.partition("```python\n")
+    code, _, _ = code.partition("```")
+    assert len(code.splitlines()) <= 26  # with its blank lines
+    name = unique()
+    # what the reader has at hand: the repository as working directory, arrays, and a daemon to attach to
+    code = code.replace("examples/assets", f"{REPOSITORY}/examples/assets").replace("NAME", name)
+    given = {"q": np.zeros((4096, 9)), "qd": np.zeros(9), "tau": np.zeros((4096, 9)), "goal": np.zeros(9)}
+    monkeypatch.chdir(tmp_path)
+    scene = tl.Scene()
+    scene.add_urdf(REPOSITORY / "examples/assets/fr3/fr3_franka_hand.urdf")
+    with tl.launch(scene, worlds=1, name=name):
+        exec(compile(code, "README.md", "exec"), given)
+        assert given["kept"].joint_q.shape == (4096, 9)
+        assert given["sim"].worlds == 1
+        given["sim"].close()
