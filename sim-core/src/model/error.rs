@@ -202,21 +202,6 @@ pub enum ModelError {
         joint: String,
     },
 
-    /// A revolute or prismatic joint whose range is not given.
-    #[error(
-        "robot `{robot}`: joint `{joint}`: {kind} without a range; add <limit lower=\"…\" upper=\"…\"/>{alternative}"
-    )]
-    NoRange {
-        /// The robot.
-        robot: String,
-        /// The joint.
-        joint: String,
-        /// Its kind.
-        kind: &'static str,
-        /// Another cure, if there is one.
-        alternative: &'static str,
-    },
-
     /// A range that ends before it begins.
     #[error(
         "robot `{robot}`: joint `{joint}`: lower limit {lower} is above upper limit {upper}; exchange them, or make the joint continuous"

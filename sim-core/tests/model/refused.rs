@@ -79,24 +79,6 @@ fn zero_axis_is_refused() {
 }
 
 #[test]
-fn moving_joint_without_a_range_is_refused() {
-    assert_says(
-        &refusal(&one_joint("revolute", "")),
-        &["`elbow`", "<limit", "continuous"],
-    );
-    assert_says(
-        &refusal(&one_joint(
-            "revolute",
-            "<limit effort=\"1\" velocity=\"1\"/>",
-        )),
-        &["`elbow`", "range"],
-    );
-    let message = refusal(&one_joint("prismatic", ""));
-    assert_says(&message, &["`elbow`", "prismatic"]);
-    assert!(!message.contains("continuous"), "{message}");
-}
-
-#[test]
 fn inverted_range_is_refused() {
     let message = refusal(&one_joint(
         "revolute",

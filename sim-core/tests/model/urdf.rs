@@ -64,6 +64,19 @@ fn range_with_one_end_takes_0_for_the_other_and_says_so() {
 }
 
 #[test]
+fn range_that_is_absent_or_of_no_width_is_none_and_says_so() {
+    for limit in [
+        "",
+        "<limit effort=\"1\" velocity=\"1\"/>",
+        "<limit lower=\"0\" upper=\"0\"/>",
+    ] {
+        let robot = read(&one_joint("prismatic", limit)).unwrap();
+        assert_eq!(robot.joints[0].range, None, "{limit}");
+        assert_says(&robot.notes[0], &["`elbow`", "unlimited"]);
+    }
+}
+
+#[test]
 fn range_from_minus_to_plus_infinity_is_none() {
     let joint = elbow(
         "revolute",

@@ -121,17 +121,11 @@ impl<'a, 'input> Reader<'a, 'input> {
             return Ok(());
         }
         if !lower && !upper {
-            let (kind, alternative) = match made.kind {
-                JointKind::Prismatic => ("prismatic", ""),
-                _ => ("revolute", ", or make it continuous"),
-            };
-            let (robot, joint) = (self.robot.clone(), joint.name.clone());
-            return Err(ModelError::NoRange {
-                robot,
-                joint,
-                kind,
-                alternative,
-            });
+            self.notes.push(format!(
+                "joint `{}`: no range is given, taken as unlimited",
+                joint.name
+            ));
+            return Ok(());
         }
         let mut range = [limit.lower, limit.upper];
         if range == [f64::NEG_INFINITY, f64::INFINITY] {
@@ -146,6 +140,13 @@ impl<'a, 'input> Reader<'a, 'input> {
                     joint.name
                 ));
             }
+        }
+        if range[0] == range[1] {
+            self.notes.push(format!(
+                "joint `{}`: lower and upper limit are both {}, taken as unlimited; make it fixed to hold it",
+                joint.name, range[0]
+            ));
+            return Ok(());
         }
         made.range = Some(range);
         Ok(())

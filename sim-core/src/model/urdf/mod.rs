@@ -1,7 +1,8 @@
 //! URDF files: text to `Robot`, with everything that is ignored or mended noted, and the rest refused by name.
 //!
 //! Decisions where files in the wild differ: an absent `effort` or `velocity` is no limit. A revolute or prismatic joint
-//! needs a range; with only one of `lower` and `upper` the other is 0, as URDF has it, and a note says so.
+//! with neither `lower` nor `upper`, or with both the same, is unlimited, as in MuJoCo; with only one of them the other is
+//! 0, as URDF has it. A note says so each time.
 
 mod joints;
 mod mesh;
