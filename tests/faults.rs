@@ -27,7 +27,9 @@ fn daemon_process() {
 /// it, if one does.
 #[test]
 fn client_process() {
-    let Ok(name) = std::env::var(STEP) else { return };
+    let Ok(name) = std::env::var(STEP) else {
+        return;
+    };
     let client = attach(&name).unwrap();
     let mut count = 0;
     let error = loop {
@@ -46,7 +48,9 @@ fn client_process() {
 /// Not a test by itself: a process that starts a daemon as `tightloop.launch` does, and waits to be killed.
 #[test]
 fn parent_process() {
-    let Ok(name) = std::env::var(PARENT) else { return };
+    let Ok(name) = std::env::var(PARENT) else {
+        return;
+    };
     let parent = std::process::id().to_string();
     let daemon = Daemon::start_as(&name, &scene(), &["--parent", &parent]);
     println!("{}", daemon.said);
@@ -57,7 +61,12 @@ fn parent_process() {
 }
 
 /// Starts one of the processes above and waits until it prints `word`.
-fn start(test: &str, variable: &str, name: &str, word: &str) -> (Child, impl Iterator<Item = String>) {
+fn start(
+    test: &str,
+    variable: &str,
+    name: &str,
+    word: &str,
+) -> (Child, impl Iterator<Item = String>) {
     let mut child = Command::new(std::env::current_exe().unwrap())
         .args([test, "--exact", "--nocapture", "--test-threads=1"])
         .env(variable, name)
@@ -65,13 +74,19 @@ fn start(test: &str, variable: &str, name: &str, word: &str) -> (Child, impl Ite
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
-    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines().map_while(Result::ok);
-    assert!(lines.any(|line| line.contains(word)), "{test} ended without {word:?}");
+    let mut lines = BufReader::new(child.stdout.take().unwrap())
+        .lines()
+        .map_while(Result::ok);
+    assert!(
+        lines.any(|line| line.contains(word)),
+        "{test} ended without {word:?}"
+    );
     (child, lines)
 }
 
 fn kill_loops() -> usize {
-    std::env::var("TIGHTLOOP_KILL_LOOPS").map_or(5, |count| count.parse().expect("a number of loops"))
+    std::env::var("TIGHTLOOP_KILL_LOOPS")
+        .map_or(5, |count| count.parse().expect("a number of loops"))
 }
 
 fn step(client: &Client) -> Result<Frame, ProtocolError> {
@@ -90,7 +105,10 @@ fn within_a_second<T>(what: &str, mut attempt: impl FnMut() -> Option<T>) -> T {
         if let Some(done) = attempt() {
             return done;
         }
-        assert!(start.elapsed() < Duration::from_secs(1), "{what} took longer than a second");
+        assert!(
+            start.elapsed() < Duration::from_secs(1),
+            "{what} took longer than a second"
+        );
         std::thread::sleep(Duration::from_millis(2));
     }
 }
@@ -120,8 +138,14 @@ fn a_killed_daemon_is_noticed_within_a_second_and_the_next_one_starts_clean() {
         daemon.kill();
         let killed = Instant::now();
         let (error, noticed) = stepper.join().unwrap();
-        assert!(matches!(error, ProtocolError::DaemonLost { .. }), "round {n}: {error}");
-        assert!(noticed.saturating_duration_since(killed) < Duration::from_secs(1), "round {n}");
+        assert!(
+            matches!(error, ProtocolError::DaemonLost { .. }),
+            "round {n}: {error}"
+        );
+        assert!(
+            noticed.saturating_duration_since(killed) < Duration::from_secs(1),
+            "round {n}"
+        );
         if n % 3 == 0 {
             // the others are left for the next start to clean
             assert!(sim_protocol::cleanup_after_death(None, &name).unwrap());
@@ -173,13 +197,24 @@ fn a_stopped_controller_loses_its_lease_when_another_asks_and_learns_it() {
     let start = Instant::now();
     while let Err(error) = step(&other) {
         assert!(matches!(error, ProtocolError::LeaseHeld { .. }), "{error}");
-        assert!(start.elapsed() < Duration::from_secs(5), "the lease did not expire");
+        assert!(
+            start.elapsed() < Duration::from_secs(5),
+            "the lease did not expire"
+        );
         std::thread::sleep(Duration::from_millis(20));
     }
-    assert!(start.elapsed() > Duration::from_millis(500), "a short pause must not cost the lease");
+    assert!(
+        start.elapsed() > Duration::from_millis(500),
+        "a short pause must not cost the lease"
+    );
     daemon::send(child.id(), Signal::CONT);
-    let error = lines.find(|line| line.contains("error: ")).expect("the stopped client goes on and fails");
-    assert!(error.contains("control of daemon") && error.contains("lost"), "{error}");
+    let error = lines
+        .find(|line| line.contains("error: "))
+        .expect("the stopped client goes on and fails");
+    assert!(
+        error.contains("control of daemon") && error.contains("lost"),
+        "{error}"
+    );
     assert_eq!(child.wait().unwrap().code(), Some(7));
     step(&other).unwrap();
 }
@@ -193,7 +228,10 @@ fn a_stopped_controller_keeps_its_lease_when_nobody_asks() {
     daemon::send(child.id(), Signal::CONT);
     std::thread::sleep(Duration::from_millis(200));
     assert!(child.try_wait().unwrap().is_none(), "the client goes on");
-    assert!(matches!(step(&daemon.attach()), Err(ProtocolError::LeaseHeld { .. })));
+    assert!(matches!(
+        step(&daemon.attach()),
+        Err(ProtocolError::LeaseHeld { .. })
+    ));
     kill(&mut child);
 }
 
@@ -204,7 +242,9 @@ fn a_daemon_ends_when_its_parent_is_killed_and_leaves_nothing() {
         let (mut parent, _lines) = start("parent_process", PARENT, &name, "ready");
         std::thread::sleep(moment(n));
         kill(&mut parent);
-        within_a_second("the end of an orphan", || leftovers(&name).is_empty().then_some(()));
+        within_a_second("the end of an orphan", || {
+            leftovers(&name).is_empty().then_some(())
+        });
     }
 }
 
@@ -217,11 +257,22 @@ fn a_daemon_that_is_asked_to_end_does_so_at_once_and_leaves_nothing() {
         let start = Instant::now();
         daemon.signal(signal);
         assert_eq!(daemon.child.wait().unwrap().code(), Some(0));
-        assert!(start.elapsed() < Duration::from_millis(300), "{:?}", start.elapsed());
-        assert!(matches!(step(&client), Err(ProtocolError::DaemonLost { .. })));
+        assert!(
+            start.elapsed() < Duration::from_millis(300),
+            "{:?}",
+            start.elapsed()
+        );
+        assert!(matches!(
+            step(&client),
+            Err(ProtocolError::DaemonLost { .. })
+        ));
         assert_eq!(daemon.leftovers(), [""; 0]);
         drop((client, frame));
-        assert_eq!(daemon.leftovers(), [""; 0], "an old client must not leave anything either");
+        assert_eq!(
+            daemon.leftovers(),
+            [""; 0],
+            "an old client must not leave anything either"
+        );
     }
 }
 
@@ -237,7 +288,10 @@ fn an_old_client_is_told_of_a_restart_and_does_not_disturb_the_new_daemon() {
     let new = second.attach();
     step(&new).unwrap();
     let error = step(&old).unwrap_err();
-    assert!(matches!(error, ProtocolError::DaemonRestarted { .. }), "{error}");
+    assert!(
+        matches!(error, ProtocolError::DaemonRestarted { .. }),
+        "{error}"
+    );
     drop((old, held));
     for _ in 0..100 {
         step(&new).unwrap();

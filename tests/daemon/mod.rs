@@ -5,7 +5,9 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
-use sim_protocol::{AttachOptions, Client, ProtocolError, cleanup_after_death, keep_waiting, place};
+use sim_protocol::{
+    AttachOptions, Client, ProtocolError, cleanup_after_death, keep_waiting, place,
+};
 
 /// Holds the command line of a daemon, separated by line breaks, in the process that is to be one.
 const COMMAND_LINE: &str = "TIGHTLOOP_TEST_COMMAND_LINE";
@@ -27,7 +29,8 @@ pub struct Daemon {
 
 /// The FR3 with its hand, position-driven, as a scene.
 pub fn scene() -> String {
-    let urdf = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("examples/assets/fr3/fr3_franka_hand.urdf");
+    let urdf =
+        PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("examples/assets/fr3/fr3_franka_hand.urdf");
     format!(
         "dt = {}\nsubsteps = 8\n[[robot]]\nname = \"arm\"\nurdf = {urdf:?}\n\
          joint_target_ke = [4500, 4500, 3500, 3500, 2000, 2000, 2000, 100, 100]\n\
@@ -54,7 +57,12 @@ impl Daemon {
         let mut line = vec!["tightloop", "serve", "-", "--name", name];
         line.extend(flags);
         let mut child = Command::new(std::env::current_exe().unwrap())
-            .args(["daemon_process", "--exact", "--nocapture", "--test-threads=1"])
+            .args([
+                "daemon_process",
+                "--exact",
+                "--nocapture",
+                "--test-threads=1",
+            ])
             .env(COMMAND_LINE, line.join("\n"))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -69,7 +77,11 @@ impl Daemon {
             let line = line.unwrap();
             serde_json::from_str(&line[line.find('{')?..]).ok()
         });
-        Daemon { child, name: name.to_owned(), said: said.unwrap_or_default() }
+        Daemon {
+            child,
+            name: name.to_owned(),
+            said: said.unwrap_or_default(),
+        }
     }
 
     /// Kind and message of the error that kept it from starting.
@@ -122,7 +134,9 @@ pub fn send(pid: u32, signal: rustix::process::Signal) {
 /// Stops a process that the caller started, and returns once it stands.
 pub fn freeze(pid: u32) {
     send(pid, rustix::process::Signal::STOP);
-    let stands = || std::fs::read_to_string(format!("/proc/{pid}/stat")).is_ok_and(|stat| stat.contains(") T "));
+    let stands = || {
+        std::fs::read_to_string(format!("/proc/{pid}/stat")).is_ok_and(|stat| stat.contains(") T "))
+    };
     while !stands() {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
@@ -132,7 +146,11 @@ pub fn freeze(pid: u32) {
 pub fn unique(name: &str) -> String {
     use std::sync::atomic::{AtomicU32, Ordering};
     static COUNT: AtomicU32 = AtomicU32::new(0);
-    format!("{name}-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed))
+    format!(
+        "{name}-{}-{}",
+        std::process::id(),
+        COUNT.fetch_add(1, Ordering::Relaxed)
+    )
 }
 
 /// Files of a name: its lock, and what begins with its stem in shared memory.
@@ -143,6 +161,11 @@ pub fn leftovers(name: &str) -> Vec<String> {
         .filter_map(|entry| entry.unwrap().file_name().into_string().ok())
         .filter(|file| file.starts_with(place.stem()))
         .collect();
-    found.extend(place.lock_path().exists().then(|| place.lock_path().display().to_string()));
+    found.extend(
+        place
+            .lock_path()
+            .exists()
+            .then(|| place.lock_path().display().to_string()),
+    );
     found
 }

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::{Node, ipc_threadsafe};
 
+use crate::command::Call;
 use crate::control::{Request, Response};
 use crate::controller::Controller;
 use crate::liveness::Peer;
@@ -305,7 +306,7 @@ impl Client {
             Some(controller) => controller,
             empty => empty.insert(self.take_lease(hook)?),
         };
-        let result = controller.run(op, arrays, mask, hook);
+        let result = controller.run(&Call { op, arrays, mask }, hook);
         // a lost lease can be asked for again; a lost daemon cannot come back
         if matches!(result, Err(ProtocolError::LeaseLost { .. })) {
             held.take();
@@ -381,7 +382,7 @@ impl Client {
         let start = Instant::now();
         while self.check_alive().is_ok() {
             if start.elapsed() > ANSWER_MAX {
-                return Err(self.link.timeout());
+                return Err(self.link.peer.timeout(ANSWER_MAX));
             }
             if hook().is_break() {
                 return Err(ProtocolError::Interrupted);
@@ -436,7 +437,7 @@ impl Link {
                     return Err(ProtocolError::Interrupted);
                 }
                 if start.elapsed() > ANSWER_MAX {
-                    return Err(self.timeout());
+                    return Err(self.peer.timeout(ANSWER_MAX));
                 }
                 looked = Instant::now();
             }
@@ -462,14 +463,6 @@ impl Link {
 
     pub(crate) fn with_node<T>(&self, call: impl FnOnce(&Node<S>) -> T) -> T {
         call(&lock(&self.node))
-    }
-
-    fn timeout(&self) -> ProtocolError {
-        ProtocolError::Timeout {
-            name: self.peer.place.name().to_owned(),
-            pid: self.peer.beacon.pid,
-            seconds: ANSWER_MAX.as_secs_f64(),
-        }
     }
 }
 

@@ -1,30 +1,26 @@
 //! The controlling end of a client: one lease, one command in flight.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex};
-use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use iceoryx2::port::listener::Listener;
 use iceoryx2::prelude::PortFactory;
 
-use crate::client::{Command, Hook, Link, S, Values, lock, malformed};
+use crate::client::{Hook, Link, S, malformed};
+use crate::command::{Call, command_bytes};
 use crate::control::{Request, Response};
 use crate::frame::FrameSample;
-use crate::header::encode_row;
+use crate::heart::Heart;
 use crate::host::memory::reserve;
 use crate::liveness::Peer;
+use crate::loan;
 use crate::pace::{Pace, Waiting, cores};
 use crate::transport::{self, CommandPublisher, FrameService, FrameSubscriber};
-use crate::{
-    ALIGNMENT, CommandHeader, Description, Dtype, Frame, InputInfo, Op, ProtocolError, ROWS_MAX,
-    RefusalKind, Table,
-};
+use crate::{ALIGNMENT, CommandHeader, Description, Frame, Op, ProtocolError, RefusalKind, Table};
 
-/// Name of the mask in a command.
-pub(crate) const MASK: &str = "mask";
-/// How often the lease is confirmed.
-const HEARTBEAT: Duration = Duration::from_millis(250);
+/// A step that takes longer than this is taken for a daemon that stands.
+const ANSWER_MAX: Duration = Duration::from_secs(120);
 
 /// A held lease.
 #[derive(Debug)]
@@ -117,23 +113,17 @@ impl Controller {
     }
 
     /// Sends one command and waits for its frame.
-    pub(crate) fn run(
-        &mut self,
-        op: Op,
-        arrays: &[Command<'_>],
-        mask: Option<&[bool]>,
-        hook: Hook<'_>,
-    ) -> Result<Frame, ProtocolError> {
-        self.check(op, arrays, mask)?;
+    pub(crate) fn run(&mut self, call: &Call<'_>, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
+        call.check(&self.description)?;
         let held = self.frames.load(Ordering::Acquire);
         if held >= self.description.frames_held {
             return Err(ProtocolError::FramesHeld { held });
         }
         if self.unanswered {
-            drop(self.answer(op, hook)?);
+            drop(self.answer(call.op, hook)?);
         }
-        self.send(op, arrays, mask)?;
-        let sample = self.answer(op, hook)?;
+        self.send(call)?;
+        let sample = self.answer(call.op, hook)?;
         self.open(sample)
     }
 
@@ -150,157 +140,24 @@ impl Controller {
         self.open(sample)
     }
 
-    /// Finds what the daemon would refuse anyway, with the names at hand.
-    fn check(
-        &self,
-        op: Op,
-        arrays: &[Command<'_>],
-        mask: Option<&[bool]>,
-    ) -> Result<(), ProtocolError> {
-        let worlds = self.description.worlds;
-        let (inputs, verb): (&[InputInfo], _) = match op {
-            Op::Write => (&self.description.writes, "written"),
-            _ => (&self.description.commands, "commanded"),
-        };
-        if arrays.len() >= ROWS_MAX {
-            let (expected, got) = (
-                format!("at most {} arrays", ROWS_MAX - 1),
-                arrays.len().to_string(),
-            );
-            return Err(ProtocolError::Shape {
-                field: "command".to_owned(),
-                expected,
-                got,
-            });
-        }
-        for (index, array) in arrays.iter().enumerate() {
-            let Some(input) = inputs.iter().find(|input| input.name == array.field) else {
-                let known = inputs
-                    .iter()
-                    .map(|input| input.name.as_str())
-                    .collect::<Vec<_>>()
-                    .join(", ");
-                return Err(ProtocolError::NotAnInput {
-                    field: array.field.to_owned(),
-                    verb,
-                    known,
-                });
-            };
-            let shape = |expected, got| ProtocolError::Shape {
-                field: array.field.to_owned(),
-                expected,
-                got,
-            };
-            let columns = &array.columns;
-            if columns.start > columns.end || columns.end > input.columns {
-                return Err(shape(
-                    format!("columns within 0..{}", input.columns),
-                    format!("{columns:?}"),
-                ));
-            }
-            if array.values.len() != worlds * columns.len() {
-                let expected = format!(
-                    "{worlds} worlds x {} columns = {}",
-                    columns.len(),
-                    worlds * columns.len()
-                );
-                return Err(shape(
-                    format!("{expected} entries"),
-                    format!("{}", array.values.len()),
-                ));
-            }
-            let overlaps = |other: &&Command<'_>| {
-                other.field == array.field
-                    && other.columns.start < columns.end
-                    && columns.start < other.columns.end
-            };
-            if arrays[..index].iter().find(overlaps).is_some() {
-                return Err(shape(
-                    "each column at most once".to_owned(),
-                    format!("{columns:?} twice"),
-                ));
-            }
-        }
-        match mask {
-            Some(mask) if mask.len() != worlds => Err(ProtocolError::Shape {
-                field: MASK.to_owned(),
-                expected: format!("({worlds},)"),
-                got: format!("({},)", mask.len()),
-            }),
-            _ => Ok(()),
-        }
-    }
-
-    fn send(
-        &mut self,
-        op: Op,
-        arrays: &[Command<'_>],
-        mask: Option<&[bool]>,
-    ) -> Result<(), ProtocolError> {
-        let (worlds, real) = (self.description.worlds, self.description.real());
-        let rows = arrays.len() + usize::from(mask.is_some());
-        let head = Table::head_bytes(rows);
-        let padded =
-            |array: &Command<'_>| (array.values.len() * real.size()).next_multiple_of(ALIGNMENT);
-        let total = head
-            + arrays.iter().map(padded).sum::<usize>()
-            + mask.map_or(0, |_| mask_bytes(worlds));
+    fn send(&mut self, call: &Call<'_>) -> Result<(), ProtocolError> {
         let failed =
             |error: &dyn std::fmt::Debug| ProtocolError::transport("send a command", error);
         let mut loan = self
             .publisher
-            .loan_slice_uninit(total / ALIGNMENT)
+            .loan_slice_uninit(call.bytes(&self.description) / ALIGNMENT)
             .map_err(|error| failed(&error))?;
         self.seq += 1;
         *loan.user_header_mut() = CommandHeader {
             session: self.link.peer.beacon.session,
             epoch: self.epoch,
             seq: self.seq,
-            op: op as u32,
-            rows: rows as u32,
-            probing: u64::from(self.paces[op as usize - 1].probes()),
+            op: call.op as u32,
+            rows: call.rows() as u32,
+            probing: u64::from(self.paces[call.op as usize - 1].probes()),
         };
-        let words = crate::loan::words(loan.payload_mut());
-        let (table, data) = words.split_at_mut(head / 8);
-        let (table, _) = table.as_chunks_mut();
-        let mut offset = 0;
-        for (row, array) in table.iter_mut().zip(arrays) {
-            let shape = [worlds, array.columns.len()];
-            encode_row(
-                row,
-                array.field,
-                real,
-                &shape,
-                array.columns.start,
-                head + offset,
-            );
-            copy_values(
-                array.values,
-                real,
-                &mut data[offset / 8..(offset + padded(array)) / 8],
-            );
-            offset += padded(array);
-        }
-        if let Some(mask) = mask {
-            encode_row(
-                &mut table[arrays.len()],
-                MASK,
-                Dtype::U8,
-                &[worlds],
-                0,
-                head + offset,
-            );
-            let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data[offset / 8..]);
-            bytes
-                .iter_mut()
-                .zip(mask)
-                .for_each(|(byte, &set)| *byte = u8::from(set));
-        }
-        // SAFETY: shared memory is zero or was written, and any bits are a line.
-        let sent = unsafe { loan.assume_init() }
-            .send()
-            .map_err(|error| failed(&error))?;
-        if sent == 0 {
+        call.write(&self.description, loan::words(loan.payload_mut()));
+        if loan::send(loan).map_err(|error| failed(&error))? == 0 {
             self.link.peer.check()?;
             return Err(self.link.peer.lease_lost());
         }
@@ -318,6 +175,7 @@ impl Controller {
             service: &self.service,
             peer: &self.link.peer,
             hook,
+            since: Instant::now(),
         };
         let sample = self.paces[op as usize - 1].wait(&self.listener, &mut waiting)?;
         self.unanswered = false;
@@ -357,6 +215,7 @@ struct Answer<'a> {
     service: &'a FrameService<S>,
     peer: &'a Peer,
     hook: Hook<'a>,
+    since: Instant,
 }
 
 impl Waiting<FrameSample> for Answer<'_> {
@@ -382,6 +241,9 @@ impl Waiting<FrameSample> for Answer<'_> {
         self.peer.check()?;
         if self.service.dynamic_config().number_of_publishers() == 0 {
             return Err(self.peer.lease_lost());
+        }
+        if self.since.elapsed() > ANSWER_MAX {
+            return Err(self.peer.timeout(ANSWER_MAX));
         }
         Ok(None)
     }
@@ -428,78 +290,5 @@ fn refusal(outcome: u32, rows: u32, payload: &[u64]) -> ProtocolError {
             from: "the daemon",
             problem,
         },
-    }
-}
-
-/// Bytes that the largest command of a run takes: every input of a step or of a write, and a mask.
-pub(crate) fn command_bytes(description: &Description) -> usize {
-    let columns = |inputs: &[InputInfo]| inputs.iter().map(|input| input.columns).sum::<usize>();
-    let columns = columns(&description.commands).max(columns(&description.writes));
-    let entries = description.worlds * columns * description.real().size();
-    // an input may come in several pieces, each rounded up
-    let head = Table::head_bytes(ROWS_MAX) + ROWS_MAX * ALIGNMENT;
-    head + entries.next_multiple_of(ALIGNMENT) + mask_bytes(description.worlds)
-}
-
-fn mask_bytes(worlds: usize) -> usize {
-    worlds.next_multiple_of(ALIGNMENT)
-}
-
-/// Copies numbers into words, converting them to `real`.
-fn copy_values(values: Values<'_>, real: Dtype, words: &mut [u64]) {
-    fn into<A: Copy, B: bytemuck::Pod>(values: &[A], words: &mut [u64], convert: impl Fn(A) -> B) {
-        let entries: &mut [B] = bytemuck::cast_slice_mut(words);
-        entries
-            .iter_mut()
-            .zip(values)
-            .for_each(|(entry, &value)| *entry = convert(value));
-    }
-    match (values, real) {
-        (Values::F32(values), Dtype::F64) => into(values, words, f64::from),
-        (Values::F32(values), _) => into(values, words, |value| value),
-        (Values::F64(values), Dtype::F64) => into(values, words, |value| value),
-        (Values::F64(values), _) => into(values, words, |value| value as f32),
-    }
-}
-
-/// The thread that confirms the lease; a stopped process has no heartbeat.
-#[derive(Debug)]
-struct Heart {
-    stop: Arc<(Mutex<bool>, Condvar)>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Heart {
-    fn start(link: &Arc<Link>, epoch: u64) -> Heart {
-        let stop = Arc::new((Mutex::new(false), Condvar::new()));
-        let (link, theirs) = (Arc::clone(link), Arc::clone(&stop));
-        let beat = move || {
-            let (stopped, signal) = &*theirs;
-            let mut guard = lock(stopped);
-            while !*guard {
-                guard = signal
-                    .wait_timeout(guard, HEARTBEAT)
-                    .map_or_else(|poison| poison.into_inner().0, |(guard, _)| guard);
-                if !*guard {
-                    link.tell(&Request::Heartbeat { epoch });
-                }
-            }
-        };
-        // without a thread the lease can be taken over while nobody steps, which is a lesser evil than no lease
-        let thread = std::thread::Builder::new()
-            .name("tightloop-heart".to_owned())
-            .spawn(beat)
-            .ok();
-        Heart { stop, thread }
-    }
-}
-
-impl Drop for Heart {
-    fn drop(&mut self) {
-        *lock(&self.stop.0) = true;
-        self.stop.1.notify_all();
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
     }
 }

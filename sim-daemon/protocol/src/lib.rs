@@ -20,6 +20,7 @@
 //! [`Client`] is one end, [`host::Host`] the other. This crate alone uses iceoryx2.
 
 mod client;
+mod command;
 mod control;
 mod controller;
 mod description;
@@ -27,6 +28,7 @@ mod error;
 mod frame;
 pub mod hash;
 pub mod header;
+mod heart;
 pub mod host;
 mod liveness;
 mod loan;

@@ -1,5 +1,7 @@
 //! Is the daemon that we attached to still there?
 
+use std::time::Duration;
+
 use crate::ProtocolError;
 use crate::place::{Beacon, Place, Presence};
 
@@ -34,6 +36,14 @@ impl Peer {
     pub(crate) fn lease_lost(&self) -> ProtocolError {
         ProtocolError::LeaseLost {
             name: self.place.name().to_owned(),
+        }
+    }
+
+    pub(crate) fn timeout(&self, waited: Duration) -> ProtocolError {
+        ProtocolError::Timeout {
+            name: self.place.name().to_owned(),
+            pid: self.beacon.pid,
+            seconds: waited.as_secs_f64(),
         }
     }
 }

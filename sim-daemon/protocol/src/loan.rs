@@ -1,6 +1,11 @@
-//! Loaned shared memory as plain words.
+//! Loaned shared memory: as plain words, and on its way.
 
+use std::fmt::Debug;
 use std::mem::MaybeUninit;
+
+use iceoryx2::port::SendError;
+use iceoryx2::prelude::{Service, ZeroCopySend};
+use iceoryx2::sample_mut_uninit::SampleMutUninit;
 
 use crate::Line;
 
@@ -9,4 +14,12 @@ pub(crate) fn words(lines: &mut [MaybeUninit<Line>]) -> &mut [u64] {
     // SAFETY: shared memory is zero or was written, never uninitialised, and any bits are a line.
     let lines = unsafe { &mut *(std::ptr::from_mut(lines) as *mut [Line]) };
     bytemuck::cast_slice_mut(lines)
+}
+
+/// Sends a loan as it is; returns to how many.
+pub(crate) fn send<S: Service, H: Debug + ZeroCopySend>(
+    loan: SampleMutUninit<S, [MaybeUninit<Line>], H>,
+) -> Result<usize, SendError> {
+    // SAFETY: as above, whatever was written or not is initialised.
+    unsafe { loan.assume_init() }.send()
 }

@@ -1,6 +1,6 @@
 //! A command at the daemon: copied once, then checked; nothing is read from shared memory twice.
 
-use crate::controller::MASK;
+use crate::command::MASK;
 use crate::{CommandHeader, Dtype, Op, Row, Table};
 
 /// The last command received.

@@ -4,7 +4,7 @@ use std::fs::{self, OpenOptions};
 
 use rustix::fs::{FallocateFlags, fallocate, statvfs};
 
-use crate::controller::command_bytes;
+use crate::command::command_bytes;
 use crate::place::SHARED_MEMORY;
 use crate::transport::{COMMAND_SLOTS, frame_slots, watch_slots};
 use crate::{Description, ProtocolError, Table};

@@ -4,10 +4,14 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 
+use std::sync::atomic::Ordering;
+
 use super::*;
 use crate::place::Place;
 use crate::transport::CommandPublisher;
-use crate::{AttachOptions, Client, CommandHeader, Frame, Hook, InputInfo, Op, keep_waiting};
+use crate::{
+    AttachOptions, Client, CommandHeader, Dtype, Frame, Hook, InputInfo, Op, keep_waiting,
+};
 
 type Clients = iceoryx2::prelude::ipc_threadsafe::Service;
 
@@ -122,8 +126,7 @@ fn send(publisher: &CommandPublisher<Clients>, header: CommandHeader, payload: &
         .unwrap();
     *loan.user_header_mut() = header;
     crate::loan::words(loan.payload_mut())[..payload.len()].copy_from_slice(payload);
-    // SAFETY: shared memory is zero or was written, and any bits are a line.
-    unsafe { loan.assume_init() }.send().unwrap();
+    crate::loan::send(loan).unwrap();
 }
 
 #[test]

@@ -1,0 +1,185 @@
+//! What a command carries, and how it lies in a sample.
+
+use crate::client::{Command, Values};
+use crate::header::encode_row;
+use crate::{ALIGNMENT, Description, Dtype, InputInfo, Op, ProtocolError, ROWS_MAX, Table};
+
+/// Name of the mask in a command.
+pub(crate) const MASK: &str = "mask";
+
+/// One call of a client, as it came.
+pub(crate) struct Call<'a> {
+    pub(crate) op: Op,
+    pub(crate) arrays: &'a [Command<'a>],
+    pub(crate) mask: Option<&'a [bool]>,
+}
+
+impl Call<'_> {
+    /// Finds what the daemon would refuse anyway, with the names at hand.
+    pub(crate) fn check(&self, description: &Description) -> Result<(), ProtocolError> {
+        let (worlds, arrays) = (description.worlds, self.arrays);
+        let (inputs, verb): (&[InputInfo], _) = match self.op {
+            Op::Write => (&description.writes, "written"),
+            _ => (&description.commands, "commanded"),
+        };
+        if arrays.len() >= ROWS_MAX {
+            let (expected, got) = (
+                format!("at most {} arrays", ROWS_MAX - 1),
+                arrays.len().to_string(),
+            );
+            return Err(ProtocolError::Shape {
+                field: "command".to_owned(),
+                expected,
+                got,
+            });
+        }
+        for (index, array) in arrays.iter().enumerate() {
+            let Some(input) = inputs.iter().find(|input| input.name == array.field) else {
+                let known = inputs
+                    .iter()
+                    .map(|input| input.name.as_str())
+                    .collect::<Vec<_>>()
+                    .join(", ");
+                return Err(ProtocolError::NotAnInput {
+                    field: array.field.to_owned(),
+                    verb,
+                    known,
+                });
+            };
+            let shape = |expected, got| ProtocolError::Shape {
+                field: array.field.to_owned(),
+                expected,
+                got,
+            };
+            let columns = &array.columns;
+            if columns.start > columns.end || columns.end > input.columns {
+                return Err(shape(
+                    format!("columns within 0..{}", input.columns),
+                    format!("{columns:?}"),
+                ));
+            }
+            if array.values.len() != worlds * columns.len() {
+                let expected = format!(
+                    "{worlds} worlds x {} columns = {}",
+                    columns.len(),
+                    worlds * columns.len()
+                );
+                return Err(shape(
+                    format!("{expected} entries"),
+                    format!("{}", array.values.len()),
+                ));
+            }
+            let overlaps = |other: &&Command<'_>| {
+                other.field == array.field
+                    && other.columns.start < columns.end
+                    && columns.start < other.columns.end
+            };
+            if arrays[..index].iter().find(overlaps).is_some() {
+                return Err(shape(
+                    "each column at most once".to_owned(),
+                    format!("{columns:?} twice"),
+                ));
+            }
+        }
+        match self.mask {
+            Some(mask) if mask.len() != worlds => Err(ProtocolError::Shape {
+                field: MASK.to_owned(),
+                expected: format!("({worlds},)"),
+                got: format!("({},)", mask.len()),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Rows of the field table.
+    pub(crate) fn rows(&self) -> usize {
+        self.arrays.len() + usize::from(self.mask.is_some())
+    }
+
+    /// Size of the sample.
+    pub(crate) fn bytes(&self, description: &Description) -> usize {
+        let arrays = self
+            .arrays
+            .iter()
+            .map(|array| padded(array, description.real()));
+        let mask = self.mask.map_or(0, |_| mask_bytes(description.worlds));
+        Table::head_bytes(self.rows()) + arrays.sum::<usize>() + mask
+    }
+
+    /// Writes field table and arrays; of `words`, every word that means something.
+    pub(crate) fn write(&self, description: &Description, words: &mut [u64]) {
+        let (worlds, real) = (description.worlds, description.real());
+        let head = Table::head_bytes(self.rows());
+        let (table, data) = words.split_at_mut(head / 8);
+        let (table, _) = table.as_chunks_mut();
+        let mut offset = 0;
+        for (row, array) in table.iter_mut().zip(self.arrays) {
+            let (columns, bytes) = (&array.columns, padded(array, real));
+            encode_row(
+                row,
+                array.field,
+                real,
+                &[worlds, columns.len()],
+                columns.start,
+                head + offset,
+            );
+            copy_values(
+                array.values,
+                real,
+                &mut data[offset / 8..(offset + bytes) / 8],
+            );
+            offset += bytes;
+        }
+        if let Some(mask) = self.mask {
+            encode_row(
+                &mut table[self.arrays.len()],
+                MASK,
+                Dtype::U8,
+                &[worlds],
+                0,
+                head + offset,
+            );
+            let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data[offset / 8..]);
+            bytes
+                .iter_mut()
+                .zip(mask)
+                .for_each(|(byte, &set)| *byte = u8::from(set));
+        }
+    }
+}
+
+/// Bytes of an array in a sample.
+fn padded(array: &Command<'_>, real: Dtype) -> usize {
+    (array.values.len() * real.size()).next_multiple_of(ALIGNMENT)
+}
+
+/// Bytes that the largest command of a run takes: every input of a step or of a write, and a mask.
+pub(crate) fn command_bytes(description: &Description) -> usize {
+    let columns = |inputs: &[InputInfo]| inputs.iter().map(|input| input.columns).sum::<usize>();
+    let columns = columns(&description.commands).max(columns(&description.writes));
+    let entries = description.worlds * columns * description.real().size();
+    // an input may come in several pieces, each rounded up
+    let head = Table::head_bytes(ROWS_MAX) + ROWS_MAX * ALIGNMENT;
+    head + entries.next_multiple_of(ALIGNMENT) + mask_bytes(description.worlds)
+}
+
+fn mask_bytes(worlds: usize) -> usize {
+    worlds.next_multiple_of(ALIGNMENT)
+}
+
+/// Copies numbers into words, converting them to `real`.
+fn copy_values(values: Values<'_>, real: Dtype, words: &mut [u64]) {
+    fn into<A: Copy, B: bytemuck::Pod>(values: &[A], words: &mut [u64], convert: impl Fn(A) -> B) {
+        let entries: &mut [B] = bytemuck::cast_slice_mut(words);
+        entries
+            .iter_mut()
+            .zip(values)
+            .for_each(|(entry, &value)| *entry = convert(value));
+    }
+    match (values, real) {
+        (Values::F32(values), Dtype::F64) => into(values, words, f64::from),
+        (Values::F32(values), _) => into(values, words, |value| value),
+        (Values::F64(values), Dtype::F64) => into(values, words, |value| value),
+        (Values::F64(values), _) => into(values, words, |value| value as f32),
+    }
+}

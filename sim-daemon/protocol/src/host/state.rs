@@ -1,0 +1,347 @@
+//! What a host looks after: leases, control requests, observers, and the answers to commands.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::prelude::{Node, PortFactory};
+
+use super::lane::Lane;
+use super::{Inbox, Janitor, Next, S, memory};
+use crate::control::{Request, Response};
+use crate::loan;
+use crate::pace::Waiting;
+use crate::transport::{FramePublisher, FrameService, Responder};
+use crate::{ALIGNMENT, Description, Dtype, FrameHeader, ProtocolError, RefusalKind, Table};
+
+/// Observers see at most this many frames a second.
+const WATCH_PERIOD: Duration = Duration::from_micros(16_667);
+/// A look around that comes later than this was held up by ourselves, and heartbeats with it.
+const HELD_UP: Duration = Duration::from_millis(200);
+/// Everything of a host but the waiting.
+pub(super) struct State {
+    pub(super) node: Node<S>,
+    pub(super) description: Description,
+    pub(super) description_json: Vec<u8>,
+    pub(super) frame: Table,
+    pub(super) watch_table: Table,
+    pub(super) lane: Option<Lane>,
+    pub(super) epochs: u64,
+    pub(super) responder: Responder<S>,
+    pub(super) watch: FramePublisher<S>,
+    pub(super) watch_service: FrameService<S>,
+    pub(super) watch_notifier: Notifier<S>,
+    pub(super) watchers: usize,
+    /// The state has changed since observers were shown one.
+    pub(super) unseen: bool,
+    pub(super) shown: Instant,
+    pub(super) looked: Instant,
+    pub(super) frames: u64,
+    pub(super) inbox: Inbox,
+    pub(super) stop: Arc<AtomicBool>,
+}
+
+impl State {
+    /// Ends a lease that is over, makes the next one ready.
+    fn renew(&mut self) {
+        // the old slots go first: there may not be room for both
+        self.lane = None;
+        self.epochs += 1;
+        // without room now, the next request for a lease tries again and tells why
+        self.lane = Lane::open(
+            &self.node,
+            self.epochs,
+            &self.frame,
+            self.description.frames_held,
+        )
+        .ok();
+    }
+
+    fn acquire(&mut self, pid: u32) -> Response {
+        if let Some(lane) = &mut self.lane
+            && lane.holder.is_some()
+        {
+            Janitor {
+                config: self.node.config().clone(),
+            }
+            .clean();
+            if lane.is_over() || lane.is_silent() {
+                self.renew();
+            }
+        }
+        if self.lane.is_none() {
+            let needed = memory::lease_bytes(&self.description, &self.frame);
+            match memory::check(needed, "a lease") {
+                Err(ProtocolError::SharedMemory { free, needed, .. }) => {
+                    return Response::NoMemory { free, needed };
+                }
+                Err(error) => {
+                    return Response::Refused {
+                        reason: error.to_string(),
+                    };
+                }
+                Ok(()) => self.renew(),
+            }
+        }
+        match &mut self.lane {
+            None => Response::Refused {
+                reason: "the services of a new lease could not be created".to_owned(),
+            },
+            Some(Lane {
+                holder: Some(holder),
+                ..
+            }) => Response::Held { pid: holder.pid },
+            Some(lane) => {
+                lane.grant(pid);
+                Response::Granted { epoch: lane.epoch }
+            }
+        }
+    }
+
+    /// Answers the control requests that are there.
+    fn control(&mut self) -> Result<Option<Next>, ProtocolError> {
+        let failed = |error: &dyn std::fmt::Debug| {
+            ProtocolError::transport("answer a control request", error)
+        };
+        let mut end = false;
+        while let Some(active) = self.responder.receive().map_err(|error| failed(&error))? {
+            let response = match serde_json::from_slice(active.payload()) {
+                Ok(Request::Describe) => None,
+                Ok(Request::Controller) => Some(Response::Controller {
+                    pid: self
+                        .lane
+                        .as_ref()
+                        .and_then(|lane| Some(lane.holder.as_ref()?.pid)),
+                }),
+                Ok(Request::Acquire { pid }) => Some(self.acquire(pid)),
+                Ok(Request::Heartbeat { epoch }) => {
+                    if let Some(Lane {
+                        holder: Some(holder),
+                        ..
+                    }) = self.lane.as_mut().filter(|lane| lane.epoch == epoch)
+                    {
+                        holder.beat = Instant::now();
+                    }
+                    continue; // nobody waits for an answer
+                }
+                // the ports of the holder go right after this: `is_over` sees that
+                Ok(Request::Release { epoch }) => {
+                    let lane = self.lane.as_mut().filter(|lane| lane.epoch == epoch);
+                    lane.into_iter().for_each(Lane::joined);
+                    continue;
+                }
+                Ok(Request::Shutdown) => {
+                    end = true;
+                    Some(Response::Ending)
+                }
+                Err(error) => Some(Response::Refused {
+                    reason: format!("unreadable control request: {error}"),
+                }),
+            };
+            let response = response
+                .map(|response| serde_json::to_vec(&response).expect("responses are plain data"));
+            let bytes = response.as_ref().unwrap_or(&self.description_json);
+            // a client that died or gave up while it waited is no trouble of ours
+            if let Ok(loan) = active.loan_slice_uninit(bytes.len()) {
+                let _ = loan.write_from_slice(bytes).send();
+            }
+        }
+        Ok(end.then_some(Next::End))
+    }
+
+    pub(super) fn answer(
+        &mut self,
+        started: Instant,
+        fill: impl FnOnce(&mut [u64]),
+    ) -> Result<(), ProtocolError> {
+        let Some(lane) = &mut self.lane else {
+            return Ok(());
+        };
+        let Ok(mut loan) = lane
+            .publisher
+            .loan_slice_uninit(self.frame.total_bytes() / ALIGNMENT)
+        else {
+            // the holder keeps more frames than it said: it is told that its lease is lost
+            self.renew();
+            return Ok(());
+        };
+        let words = loan::words(loan.payload_mut());
+        let (head, arena) = words.split_at_mut(Table::head_bytes(self.frame.rows().len()) / 8);
+        head[..self.frame.words().len()].copy_from_slice(self.frame.words());
+        fill(arena);
+        self.frames += 1;
+        self.unseen = true;
+        let now = Instant::now();
+        let due = self.watchers > 0 && now.duration_since(self.shown) > WATCH_PERIOD;
+        if due {
+            self.show(arena)?;
+        }
+        let Some(lane) = &mut self.lane else {
+            return Ok(());
+        };
+        let busy_ns = now.duration_since(started).as_nanos() as u64;
+        *loan.user_header_mut() = FrameHeader {
+            epoch: lane.epoch,
+            ack_seq: self.inbox.header().seq,
+            busy_ns,
+            ..header(&self.description, &self.frame, self.frames)
+        };
+        if let Some(holder) = &mut lane.holder {
+            holder.beat = now;
+        }
+        loan::send(loan).map_err(|error| ProtocolError::transport("send a frame", error))?;
+        // a holder that cannot be notified looks by itself after 50 ms
+        let _ = lane.notifier.notify();
+        Ok(())
+    }
+
+    /// Shows observers the first worlds of an arena.
+    pub(super) fn show(&mut self, arena: &[u64]) -> Result<(), ProtocolError> {
+        (self.shown, self.unseen) = (Instant::now(), false);
+        let Ok(mut loan) = self
+            .watch
+            .loan_slice_uninit(self.watch_table.total_bytes() / ALIGNMENT)
+        else {
+            return Ok(()); // observers keep every slot: they miss a frame
+        };
+        let words = loan::words(loan.payload_mut());
+        words[..self.watch_table.words().len()].copy_from_slice(self.watch_table.words());
+        let (from, head): (&[u8], _) = (
+            bytemuck::cast_slice(arena),
+            Table::head_bytes(self.frame.rows().len()),
+        );
+        let to: &mut [u8] = bytemuck::cast_slice_mut(words);
+        for (source, target) in self.frame.rows().iter().zip(self.watch_table.rows()) {
+            // worlds come first in every array, so the first worlds are its first bytes
+            to[target.offset..target.offset + target.bytes]
+                .copy_from_slice(&from[source.offset - head..][..target.bytes]);
+        }
+        *loan.user_header_mut() = header(&self.description, &self.watch_table, self.frames);
+        loan::send(loan).map_err(|error| ProtocolError::transport("send a frame", error))?;
+        // an observer that cannot be notified looks by itself after 50 ms
+        let _ = self.watch_notifier.notify();
+        Ok(())
+    }
+
+    pub(super) fn refuse(&mut self, kind: RefusalKind, reason: &str) -> Result<(), ProtocolError> {
+        let Some(lane) = &mut self.lane else {
+            return Ok(());
+        };
+        let room = memory::slot_bytes(&self.frame) - Table::head_bytes(1);
+        let end = reason.floor_char_boundary(room);
+        let reason = &reason.as_bytes()[..end];
+        let table = Table::lay_out([("reason".to_owned(), Dtype::U8, vec![reason.len()], 0)]);
+        let Ok(mut loan) = lane
+            .publisher
+            .loan_slice_uninit(table.total_bytes() / ALIGNMENT)
+        else {
+            self.renew();
+            return Ok(());
+        };
+        let words = loan::words(loan.payload_mut());
+        words[..table.words().len()].copy_from_slice(table.words());
+        let offset = table.rows()[0].offset;
+        bytemuck::cast_slice_mut::<u64, u8>(words)[offset..offset + reason.len()]
+            .copy_from_slice(reason);
+        *loan.user_header_mut() = FrameHeader {
+            epoch: lane.epoch,
+            ack_seq: self.inbox.header().seq,
+            outcome: kind as u32,
+            ..header(&self.description, &table, self.frames)
+        };
+        loan::send(loan).map_err(|error| ProtocolError::transport("send a refusal", error))?;
+        let _ = lane.notifier.notify();
+        Ok(())
+    }
+
+    /// Looks at control requests, leases and observers.
+    pub(super) fn look_around(&mut self) -> Result<Option<Next>, ProtocolError> {
+        let gap = self.looked.elapsed();
+        self.looked = Instant::now();
+        if gap > HELD_UP
+            && let Some(Lane {
+                holder: Some(holder),
+                ..
+            }) = &mut self.lane
+        {
+            holder.beat += gap; // the heartbeats of that time wait unread
+        }
+        if self.stop.load(Ordering::Relaxed) {
+            return Ok(Some(Next::End));
+        }
+        let next = self.control()?;
+        if self.lane.as_mut().is_some_and(Lane::is_over) {
+            self.renew();
+        }
+        self.lane.iter().for_each(Lane::refresh);
+        // new observers get the frame shown last, dead ones give their slots back
+        let _ = self.watch.update_connections();
+        self.watchers = self.watch_service.dynamic_config().number_of_subscribers();
+        Ok(next)
+    }
+}
+
+impl Waiting<Next> for State {
+    fn look(&mut self) -> Result<Option<Next>, ProtocolError> {
+        let Some(lane) = &mut self.lane else {
+            return Ok(None);
+        };
+        let received = lane.subscriber.receive();
+        let Some(sample) =
+            received.map_err(|error| ProtocolError::transport("receive a command", error))?
+        else {
+            return Ok(None);
+        };
+        let header = *sample.user_header();
+        let taken = self
+            .inbox
+            .take(header, bytemuck::cast_slice(sample.payload()));
+        drop(sample);
+        if header.session != self.description.session
+            || header.epoch != lane.epoch
+            || header.seq <= lane.last_seq
+        {
+            let reason = format!(
+                "command {} of session {:016x}, lease {} is stale: session {:016x}, lease {} is at command {}",
+                header.seq,
+                header.session,
+                header.epoch,
+                self.description.session,
+                lane.epoch,
+                lane.last_seq
+            );
+            self.refuse(RefusalKind::Stale, &reason)?;
+            return Ok(None);
+        }
+        lane.last_seq = header.seq;
+        lane.joined();
+        if let Err(problem) = taken {
+            self.refuse(
+                RefusalKind::Malformed,
+                &format!("malformed command: {problem}"),
+            )?;
+            return Ok(None);
+        }
+        Ok(Some(Next::Command))
+    }
+
+    fn around(&mut self) -> Result<Option<Next>, ProtocolError> {
+        let next = self.look_around()?;
+        let due = self.unseen && self.watchers > 0 && self.shown.elapsed() > WATCH_PERIOD;
+        Ok(next.or(due.then_some(Next::Watch)))
+    }
+}
+
+/// What every frame's head has in common.
+fn header(description: &Description, table: &Table, frame: u64) -> FrameHeader {
+    let (session, schema) = (description.session, description.schema);
+    FrameHeader {
+        session,
+        schema,
+        frame,
+        rows: table.rows().len() as u32,
+        ..FrameHeader::default()
+    }
+}
