@@ -48,11 +48,13 @@ check: wheel $(VENV)/.dev
 	$(VENV)/bin/ruff format --check --config py-client/pyproject.toml $(PYTHON_TREES)
 	$(VENV)/bin/pyright --project py-client
 
-# One wheel holds client and daemon. pip would build it in an isolated copy of maturin; the one in the venv is enough.
+# One wheel holds client and daemon. The same as `pip install ./py-client`, but on a terminal it shows how far it is.
 wheel: $(VENV)/.wheel
 $(VENV)/.wheel: $(VENV)/.demo $(RUST_SOURCES) $(PYTHON_SOURCES)
-	@echo "building the wheel (minutes the first time)"
-	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PIP) install --quiet --no-build-isolation --no-deps --force-reinstall ./py-client
+	@rm -rf $(VENV)/wheels
+	$(VENV)/bin/maturin build --release --manifest-path py-client/Cargo.toml --interpreter $(PYTHON) --compatibility off \
+	  --out $(VENV)/wheels $(if $(MAKE_TERMOUT),,--quiet)
+	$(PIP) install --quiet --no-deps --force-reinstall $(VENV)/wheels/*.whl
 	@touch $@
 
 $(VENV)/.demo: py-client/requirements-demo.txt | $(PYTHON)
