@@ -31,7 +31,7 @@ use crate::{Description, ProtocolError, RefusalKind, Table};
 type S = ipc::Service;
 
 /// While commands come without a pause, control requests are looked at this often.
-const AROUND_PERIOD: Duration = Duration::from_millis(2);
+const AROUND_PERIOD: Duration = Duration::from_millis(20);
 /// Room for answers other than the description [bytes].
 const RESPONSE_MIN: usize = 1024;
 
