@@ -17,8 +17,6 @@ from __future__ import annotations
 import argparse
 import csv
 import json
-import os
-import re
 import subprocess
 import sys
 import time
@@ -29,11 +27,11 @@ import mujoco
 import mujoco.rollout
 import numpy as np
 from numpy.typing import NDArray
+from record import REPOSITORY, write_results
 from tqdm import tqdm
 
 import tightloop as tl
 
-REPOSITORY = Path(__file__).parents[1]
 MODELS = REPOSITORY.parent / "shared/reference/models"
 sys.path[:0] = [str(REPOSITORY / "examples"), str(REPOSITORY / "tests/python/mujoco")]
 from franka_lesson import FRAMES, START, scene, targets, torques  # noqa: E402  (the examples are no package)
@@ -175,35 +173,6 @@ def table(cases: list[Case]) -> list[dict[str, str | int]]:
     ]
 
 
-def processor() -> str:
-    """Name of the processor, as Linux has it."""
-    return re.findall(r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)[0]
-
-
-def commit() -> str:
-    """What is measured: the commit, with ``-dirty`` for changes since."""
-    command = ["git", "describe", "--always", "--dirty", "--exclude=*"]
-    return subprocess.run(command, cwd=REPOSITORY, stdout=subprocess.PIPE, check=True, text=True).stdout.strip()
-
-
-def write(path: Path, rows: list[dict[str, str | int]], rounds: int) -> None:
-    """Results with what it takes to understand them later."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="") as file:
-        for what, value in {
-            "cpu": f"{processor()}, {os.cpu_count()} cores",
-            "commit": commit(),
-            "command": f"python benches/peers.py --rounds {rounds}",
-            "date": time.strftime("%Y-%m-%d"),
-            "mujoco": mujoco.__version__,
-            "threads": 1,
-        }.items():
-            file.write(f"# {what}: {value}\n")
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-
-
 def main() -> int:
     """Measure in turns, print and write the results; 0 when the target demo is as fast as asked."""
     parser = argparse.ArgumentParser(description="Steps per second beside MuJoCo C, on one thread each.")
@@ -211,16 +180,14 @@ def main() -> int:
     rounds = parser.parse_args().rounds
     cases = measure(rounds)
     rows = table(cases)
-    machine = re.sub(r"[^a-z0-9]+", "-", f"{processor()} {os.cpu_count()} cores".lower()).strip("-")
-    path = REPOSITORY / "benches/results" / machine / "peers.csv"
-    write(path, rows, rounds)
     print(f"\n{'demo':<8}{'commands':<10}{'side':<32}{'lanes':<9}{'best steps/s':>14}{'median':>14}{'ratio':>9}")
     for row in rows:
         print(
             f"{row['demo']:<8}{row['commands']:<10}{row['side']:<32}{row['lanes']:<9}"
             f"{int(row['best_steps_per_s']):>14,}{int(row['median_steps_per_s']):>14,}{row['median_ratio']:>9}"
         )
-    print(f"\nresults: {path.relative_to(REPOSITORY)}\n")
+    command = f"python benches/peers.py --rounds {rounds}"
+    write_results("peers", rows, {"command": command, "mujoco": mujoco.__version__, "threads": 1})
 
     widest = "sixteen" if any(row["lanes"] == "sixteen" for row in rows) else "eight"
     short = False

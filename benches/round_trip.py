@@ -13,15 +13,14 @@ import os
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
+from record import REPOSITORY, write_results
 
 import tightloop as tl
 
-REPOSITORY = Path(__file__).parents[1]
 sys.path.insert(0, str(REPOSITORY / "examples"))
-from franka_lesson import FRAMES, scene, targets  # noqa: E402  (the examples are no package)
+from franka_lesson import FRAMES, scene, targets
 
 ROUNDS = 5
 WARM_UP = 2_000
@@ -62,12 +61,16 @@ def main() -> int:
                 measured.append(percentiles)
     print(f"one world, {MEASURED} steps, median of {ROUNDS} rounds, {os.cpu_count()} cores [us]")
     print(f"{'':>20}{'p50':>9}{'p99':>9}{'p99.9':>9}")
+    results: list[dict[str, str]] = []
     for what, measured in rows.items():
-        medians = [float(np.median([percentiles[part] for percentiles in measured])) for part in PARTS]
-        print(f"{what:>20}" + "".join(f"{median:9.2f}" for median in medians))
+        medians = {part: f"{np.median([percentiles[part] for percentiles in measured]):.2f}" for part in PARTS}
+        results.append({"side": what} | medians)
+        print(f"{what:>20}" + "".join(f"{median:>9}" for median in medians.values()))
     here, _, there = rows.values()
     added = float(np.median([b["p50_us"] - a["p50_us"] for a, b in zip(here, there, strict=True)]))
     print(f"{'added by Python':>20}{added:9.2f}   (budget {BUDGET_US:.0f} at p50)")
+    facts = {"command": "python benches/round_trip.py", "worlds": 1, "threads": 1, "steps": MEASURED, "rounds": ROUNDS}
+    write_results("round_trip", results, facts)
     return int(added > BUDGET_US)
 
 
