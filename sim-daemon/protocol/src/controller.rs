@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use iceoryx2::port::listener::Listener;
 use iceoryx2::prelude::PortFactory;
 
+use crate::apart::Apart;
 use crate::client::{Hook, Link, S, malformed};
 use crate::command::{Call, command_bytes};
 use crate::control::{Request, Response};
@@ -32,6 +33,7 @@ pub(crate) struct Controller {
     /// A command whose answer was not waited for, since the caller interrupted.
     unanswered: bool,
     paces: [Pace; 4],
+    apart: Apart,
     table: Option<Arc<Table>>,
     frames: Arc<AtomicUsize>,
     publisher: CommandPublisher<S>,
@@ -102,6 +104,7 @@ impl Controller {
             seq: 0,
             unanswered: false,
             paces: std::array::from_fn(|_| Pace::new(free_core)),
+            apart: Apart::new(),
             table: None,
             frames: Arc::clone(frames),
             publisher,
@@ -154,7 +157,7 @@ impl Controller {
             seq: self.seq,
             op: call.op as u32,
             rows: call.rows() as u32,
-            probing: u64::from(self.paces[call.op as usize - 1].probes()),
+            core: self.apart.core(),
         };
         call.write(&self.description, loan::words(loan.payload_mut()));
         if loan::send(loan).map_err(|error| failed(&error))? == 0 {
@@ -179,6 +182,8 @@ impl Controller {
         };
         let sample = self.paces[op as usize - 1].wait(&self.listener, &mut waiting)?;
         self.unanswered = false;
+        let shared = sample.user_header().core == self.apart.core();
+        self.paces.iter_mut().for_each(|pace| pace.share(shared));
         Ok(sample)
     }
 

@@ -50,8 +50,8 @@ pub struct FrameHeader {
     pub outcome: u32,
     /// Rows in the field table.
     pub rows: u32,
-    /// Zero.
-    pub reserved: u64,
+    /// Core that the daemon runs on.
+    pub core: u64,
 }
 const _: () = assert!(size_of::<FrameHeader>() == 64 && align_of::<FrameHeader>() == 8);
 
@@ -70,8 +70,8 @@ pub struct CommandHeader {
     pub op: u32,
     /// Rows in the field table.
     pub rows: u32,
-    /// 1: the client spins for long now, so that the system gives each side a core; the daemon should spin too. Else 0.
-    pub probing: u64,
+    /// Core that the client runs on.
+    pub core: u64,
 }
 const _: () = assert!(size_of::<CommandHeader>() == 40 && align_of::<CommandHeader>() == 8);
 

@@ -19,6 +19,7 @@
 //!
 //! [`Client`] is one end, [`host::Host`] the other. This crate alone uses iceoryx2.
 
+mod apart;
 mod client;
 mod command;
 mod control;

@@ -18,12 +18,6 @@ const FORESEEN_MAX: Duration = Duration::from_millis(20);
 
 /// Most waits that sleep at once after spinning was in vain.
 const REST_MAX: u32 = 64;
-/// The system may have put both sides on one core, since a wake-up looks as if the waker will sleep next. Only when both want
-/// to run for longer than its tick does it move one: so, now and then, spin for that long …
-const PROBE: Duration = Duration::from_millis(9);
-/// … but rarely, since where no core is free it is in vain.
-const PROBE_PERIOD: Duration = Duration::from_millis(250);
-
 /// What is waited for.
 pub(crate) trait Waiting<T> {
     /// Looks for it; called over and over.
@@ -42,9 +36,8 @@ pub(crate) struct Pace {
     /// Waits to sleep through before spinning is tried again, and how many there were the last time.
     resting: u32,
     rest: u32,
-    /// Whether the next wait spins for long, and when one did.
-    probing: bool,
-    probed: Instant,
+    /// Whether both sides run on one core.
+    shared: bool,
 }
 
 impl Pace {
@@ -55,8 +48,7 @@ impl Pace {
             free_core,
             resting: 0,
             rest: 0,
-            probing: false,
-            probed: Instant::now(),
+            shared: false,
         }
     }
 
@@ -106,19 +98,12 @@ impl Pace {
             (2, SPIN_MIN)
         };
         let worthwhile = (times * self.typical).clamp(least, SPIN_MAX);
-        let long = if std::mem::take(&mut self.probing) {
-            PROBE
-        } else {
-            worthwhile
-        };
         loop {
             if let Some(found) = waiting.look()? {
-                if start.elapsed() < worthwhile {
-                    self.rest /= 2;
-                }
+                self.rest /= 2;
                 return Ok(Some(found));
             }
-            if start.elapsed() > long {
+            if start.elapsed() > worthwhile {
                 break;
             }
             std::hint::spin_loop();
@@ -128,19 +113,12 @@ impl Pace {
         Ok(None)
     }
 
-    /// Whether the next wait should probe for a free core; if so, the other side is told and must [`Pace::encourage`].
-    pub(crate) fn probes(&mut self) -> bool {
-        self.probing =
-            self.resting > 0 && self.rest == REST_MAX && self.probed.elapsed() > PROBE_PERIOD;
-        if self.probing {
-            (self.probed, self.resting) = (Instant::now(), 0);
+    /// Says whether both sides were seen on one core: then spinning only keeps the other side from it.
+    pub(crate) fn share(&mut self, shared: bool) {
+        if self.shared && !shared {
+            (self.rest, self.resting) = (0, 0);
         }
-        self.probing
-    }
-
-    /// Tries spinning again: the other side does so too.
-    pub(crate) fn encourage(&mut self) {
-        (self.rest, self.resting) = (0, 0);
+        self.shared = shared;
     }
 
     fn may_spin(&mut self) -> bool {
@@ -148,7 +126,7 @@ impl Pace {
             self.resting -= 1;
             return false;
         }
-        self.free_core && self.typical < FORESEEN_MAX
+        self.free_core && !self.shared && self.typical < FORESEEN_MAX
     }
 
     /// An outlier moves the average by at most 30 %.

@@ -21,6 +21,7 @@ pub use janitor::Janitor;
 
 use self::lane::Lane;
 use self::state::State;
+use crate::apart::Apart;
 use crate::command::command_bytes;
 use crate::control::Response;
 use crate::pace::{Pace, cores};
@@ -120,6 +121,7 @@ impl Host {
             frames: 0,
             inbox,
             stop,
+            apart: Apart::new(),
         };
         // the daemon only waits while nobody steps: its own threads are idle then, the client needs one core
         Ok(Host {
@@ -163,8 +165,10 @@ impl Host {
             return Ok(next);
         }
         let next = self.pace.wait(&self.listener, &mut self.state)?;
-        if next == Next::Command && self.state.inbox.header().probing != 0 {
-            self.pace.encourage();
+        if next == Next::Command {
+            let (theirs, apart) = (self.state.inbox.header().core, &mut self.state.apart);
+            let shared = apart.core() == theirs;
+            self.pace.share(shared && !apart.leave(theirs));
         }
         Ok(next)
     }

@@ -10,6 +10,7 @@ use iceoryx2::prelude::{Node, PortFactory};
 
 use super::lane::Lane;
 use super::{Inbox, Janitor, Next, S, memory};
+use crate::apart::Apart;
 use crate::control::{Request, Response};
 use crate::loan;
 use crate::pace::Waiting;
@@ -41,6 +42,7 @@ pub(super) struct State {
     pub(super) frames: u64,
     pub(super) inbox: Inbox,
     pub(super) stop: Arc<AtomicBool>,
+    pub(super) apart: Apart,
 }
 
 impl State {
@@ -186,6 +188,7 @@ impl State {
             epoch: lane.epoch,
             ack_seq: self.inbox.header().seq,
             busy_ns,
+            core: self.apart.core(),
             ..header(&self.description, &self.frame, self.frames)
         };
         if let Some(holder) = &mut lane.holder {
@@ -249,6 +252,7 @@ impl State {
             epoch: lane.epoch,
             ack_seq: self.inbox.header().seq,
             outcome: kind as u32,
+            core: self.apart.core(),
             ..header(&self.description, &table, self.frames)
         };
         loan::send(loan).map_err(|error| ProtocolError::transport("send a refusal", error))?;

@@ -150,7 +150,7 @@ fn hostile_commands_are_refused_with_a_reason_and_the_host_goes_on() {
         seq: 0,
         op: Op::Step as u32,
         rows: 1,
-        probing: 0,
+        core: 0,
     };
     let cases: [(&str, CommandHeader, Vec<u64>, &str); 9] = [
         (
