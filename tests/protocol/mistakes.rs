@@ -205,3 +205,17 @@ fn another_protocol_version_is_refused_with_both_named() {
     drop(file);
     assert!(sim_protocol::cleanup_after_death(None, &name).unwrap());
 }
+
+#[test]
+fn a_client_too_many_is_told_the_limit_and_may_come_when_another_goes() {
+    let daemon = Daemon::start("many", &[]);
+    let mut clients: Vec<_> = (0..32).map(|_| daemon.attach()).collect();
+    let error = attach(&daemon.name).unwrap_err();
+    assert!(
+        matches!(error, ProtocolError::TooManyClients { max: 32, .. }),
+        "{error}"
+    );
+    assert!(clients.iter().all(|client| client.latest().is_ok()));
+    clients.truncate(31);
+    reset(&daemon.attach());
+}

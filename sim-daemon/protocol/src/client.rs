@@ -2,23 +2,19 @@
 
 use std::ops::{ControlFlow, Range};
 use std::path::PathBuf;
-use std::sync::atomic::AtomicUsize;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
-
-use iceoryx2::port::notifier::Notifier;
-use iceoryx2::prelude::{Node, ipc_threadsafe};
 
 use crate::command::Call;
 use crate::control::{Request, Response};
 use crate::controller::Controller;
+use crate::frame::Alive;
+use crate::link::{ANSWER_MAX, Link, S, lock, malformed};
 use crate::liveness::Peer;
 use crate::observer::Observer;
 use crate::place::{Place, Presence, running};
-use crate::transport::{self, Requester, SLICE, facts};
+use crate::transport::{self, facts};
 use crate::{Description, Frame, Op, PROTOCOL_VERSION, ProtocolError};
-
-pub(crate) type S = ipc_threadsafe::Service;
 
 /// Called at least every 50 ms while a call waits; `Break` ends the call with [`ProtocolError::Interrupted`].
 pub type Hook<'a> = &'a mut dyn FnMut() -> ControlFlow<()>;
@@ -27,9 +23,6 @@ pub type Hook<'a> = &'a mut dyn FnMut() -> ControlFlow<()>;
 pub fn keep_waiting() -> impl FnMut() -> ControlFlow<()> {
     || ControlFlow::Continue(())
 }
-
-/// How long control requests wait for a daemon that lives but is busy or stopped.
-const ANSWER_MAX: Duration = Duration::from_secs(30);
 
 /// Numbers for an input, row-major `(worlds, columns)`. The daemon gets them in the precision of its run.
 #[derive(Debug, Clone, Copy)]
@@ -81,18 +74,9 @@ pub struct Client {
     description: Arc<Description>,
     controller: Mutex<Option<Controller>>,
     observer: Mutex<Option<Observer>>,
-    frames: Arc<AtomicUsize>,
+    frames: Arc<Alive>,
     link: Arc<Link>,
     process: u32,
-}
-
-/// What every part of a client uses to reach the daemon.
-#[derive(Debug)]
-pub(crate) struct Link {
-    pub(crate) peer: Peer,
-    pub(crate) wake: Notifier<S>,
-    requester: Mutex<Requester<S>>,
-    node: Mutex<Node<S>>,
 }
 
 impl Client {
@@ -151,8 +135,8 @@ impl Client {
     fn handshake(peer: Peer, hook: Hook<'_>) -> Result<Client, ProtocolError> {
         let node =
             transport::node::<S>(&peer.place.transport_config(peer.beacon.session), "client")?;
-        let wake = transport::open_event(&node, "wake")?;
         let name = peer.place.name().to_owned();
+        let wake = transport::open_wake(&node, &name)?;
         let announced = transport::attribute(&wake, facts::PROTOCOL);
         if announced != PROTOCOL_VERSION.to_string() {
             let described = PROTOCOL_VERSION.to_string();
@@ -203,7 +187,7 @@ impl Client {
             description: Arc::new(*description),
             controller: Mutex::new(None),
             observer: Mutex::new(None),
-            frames: Arc::new(AtomicUsize::new(0)),
+            frames: Alive::new(),
             link: Arc::new(link),
             process: std::process::id(),
         })
@@ -237,11 +221,21 @@ impl Client {
     /// [`ProtocolError::LeaseHeld`] with the holder's process, [`ProtocolError::SharedMemory`],
     /// [`ProtocolError::DaemonLost`] and its kin.
     pub fn acquire(&self, hook: Hook<'_>) -> Result<(), ProtocolError> {
+        self.check_process()?;
         let mut controller = lock(&self.controller);
         if controller.is_none() {
             *controller = Some(self.take_lease(hook)?);
         }
         Ok(())
+    }
+
+    /// The ports belong to the process that opened them.
+    fn check_process(&self) -> Result<(), ProtocolError> {
+        if std::process::id() == self.process {
+            return Ok(());
+        }
+        let (name, pid) = (self.description.name.clone(), self.process);
+        Err(ProtocolError::Forked { name, pid })
     }
 
     fn take_lease(&self, hook: Hook<'_>) -> Result<Controller, ProtocolError> {
@@ -301,6 +295,7 @@ impl Client {
         mask: Option<&[bool]>,
         hook: Hook<'_>,
     ) -> Result<Frame, ProtocolError> {
+        self.check_process()?;
         let mut held = lock(&self.controller);
         let controller = match &mut *held {
             Some(controller) => controller,
@@ -339,6 +334,7 @@ impl Client {
         &self,
         call: impl FnOnce(&mut Observer) -> Result<T, ProtocolError>,
     ) -> Result<T, ProtocolError> {
+        self.check_process()?;
         let mut observer = lock(&self.observer);
         let observer = match &mut *observer {
             Some(observer) => observer,
@@ -397,83 +393,20 @@ impl Drop for Client {
     fn drop(&mut self) {
         // in a forked child the ports belong to the parent: leave them alone
         if std::process::id() != self.process {
-            std::mem::forget(lock(&self.controller).take());
-            std::mem::forget(lock(&self.observer).take());
+            // another thread may have held the locks when the process forked
+            std::mem::forget(
+                self.controller
+                    .get_mut()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .take(),
+            );
+            std::mem::forget(
+                self.observer
+                    .get_mut()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .take(),
+            );
             std::mem::forget(Arc::clone(&self.link));
         }
-    }
-}
-
-impl Link {
-    /// Asks and waits for the answer; control requests are rare, so waiting is by sleeping.
-    pub(crate) fn ask(&self, request: &Request, hook: Hook<'_>) -> Result<Response, ProtocolError> {
-        let requester = lock(&self.requester);
-        let text = serde_json::to_vec(request).expect("requests are plain data");
-        let failed = |error: &dyn std::fmt::Debug| {
-            ProtocolError::transport(format!("send {request:?}"), error)
-        };
-        let loan = requester
-            .loan_slice_uninit(text.len())
-            .map_err(|error| failed(&error))?;
-        let pending = loan
-            .write_from_slice(&text)
-            .send()
-            .map_err(|error| failed(&error))?;
-        self.notify();
-        let (start, mut nap, mut looked) =
-            (Instant::now(), Duration::from_micros(20), Instant::now());
-        loop {
-            if let Some(response) = pending.receive().map_err(|error| failed(&error))? {
-                return serde_json::from_slice(response.payload()).map_err(|error| {
-                    ProtocolError::Malformed {
-                        from: "the daemon",
-                        problem: format!("answer to {request:?}: {error}"),
-                    }
-                });
-            }
-            if looked.elapsed() > SLICE {
-                self.peer.check()?;
-                if hook().is_break() {
-                    return Err(ProtocolError::Interrupted);
-                }
-                if start.elapsed() > ANSWER_MAX {
-                    return Err(self.peer.timeout(ANSWER_MAX));
-                }
-                looked = Instant::now();
-            }
-            std::thread::sleep(nap);
-            nap = (nap * 3 / 2).min(Duration::from_millis(1));
-        }
-    }
-
-    /// Sends without waiting for an answer; a failure shows at the next step.
-    pub(crate) fn tell(&self, request: &Request) {
-        let requester = lock(&self.requester);
-        let text = serde_json::to_vec(request).expect("requests are plain data");
-        if let Ok(loan) = requester.loan_slice_uninit(text.len()) {
-            let _ = loan.write_from_slice(&text).send();
-        }
-    }
-
-    /// Wakes the daemon if it sleeps.
-    pub(crate) fn notify(&self) {
-        // a daemon that cannot be notified looks by itself after 50 ms
-        let _ = self.wake.notify();
-    }
-
-    pub(crate) fn with_node<T>(&self, call: impl FnOnce(&Node<S>) -> T) -> T {
-        call(&lock(&self.node))
-    }
-}
-
-/// Nothing of ours is left half-written when a thread panics: a poisoned lock is as good as any.
-pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-pub(crate) fn malformed(problem: &str) -> ProtocolError {
-    ProtocolError::Malformed {
-        from: "the daemon",
-        problem: problem.to_owned(),
     }
 }

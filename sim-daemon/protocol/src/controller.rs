@@ -1,19 +1,19 @@
 //! The controlling end of a client: one lease, one command in flight.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::listener::Listener;
 use iceoryx2::prelude::PortFactory;
 
 use crate::apart::Apart;
-use crate::client::{Hook, Link, S, malformed};
+use crate::client::Hook;
 use crate::command::{Call, command_bytes};
 use crate::control::{Request, Response};
-use crate::frame::FrameSample;
+use crate::frame::{Alive, FrameSample};
 use crate::heart::Heart;
 use crate::host::memory::reserve;
+use crate::link::{Link, S, malformed};
 use crate::liveness::Peer;
 use crate::loan;
 use crate::pace::{Pace, Waiting, cores};
@@ -35,7 +35,7 @@ pub(crate) struct Controller {
     paces: [Pace; 4],
     apart: Apart,
     table: Option<Arc<Table>>,
-    frames: Arc<AtomicUsize>,
+    frames: Arc<Alive>,
     publisher: CommandPublisher<S>,
     subscriber: FrameSubscriber<S>,
     listener: Listener<S>,
@@ -48,7 +48,7 @@ impl Controller {
     pub(crate) fn acquire(
         link: &Arc<Link>,
         description: &Arc<Description>,
-        frames: &Arc<AtomicUsize>,
+        frames: &Arc<Alive>,
         hook: Hook<'_>,
     ) -> Result<Controller, ProtocolError> {
         let name = || link.peer.place.name().to_owned();
@@ -118,10 +118,7 @@ impl Controller {
     /// Sends one command and waits for its frame.
     pub(crate) fn run(&mut self, call: &Call<'_>, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
         call.check(&self.description)?;
-        let held = self.frames.load(Ordering::Acquire);
-        if held >= self.description.frames_held {
-            return Err(ProtocolError::FramesHeld { held });
-        }
+        self.frames.check(self.description.frames_held)?;
         if self.unanswered {
             drop(self.answer(call.op, hook)?);
         }
@@ -200,7 +197,6 @@ impl Controller {
             return Err(malformed("the head of a frame: another session or schema"));
         }
         let table = check_table(&mut self.table, payload, header.rows)?;
-        self.frames.fetch_add(1, Ordering::Acquire);
         Ok(Frame::new(sample, table, Arc::clone(&self.frames)))
     }
 }

@@ -165,6 +165,26 @@ pub enum ProtocolError {
         reason: String,
     },
 
+    /// The client was copied into a child process.
+    #[error(
+        "this client of daemon {name:?} belongs to process {pid}, which forked; attach again in this process"
+    )]
+    Forked {
+        /// The daemon's name.
+        name: String,
+        /// The process that attached.
+        pid: u32,
+    },
+
+    /// As many clients are attached as there is room for.
+    #[error("daemon {name:?} has {max} clients, which is the limit; close one of them")]
+    TooManyClients {
+        /// The daemon's name.
+        name: String,
+        /// The limit.
+        max: usize,
+    },
+
     /// Shared memory is too small.
     #[error(
         "{path} has {free} bytes free and {needed} are needed ({what}); use fewer worlds, fewer fields or fewer \

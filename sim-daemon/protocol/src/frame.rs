@@ -21,7 +21,32 @@ pub struct Frame {
     // address of the payload: taken once, since asking the sample locks the subscriber
     base: usize,
     sample: Mutex<Option<FrameSample>>,
-    alive: Arc<AtomicUsize>,
+    alive: Arc<Alive>,
+}
+
+/// Frames of one subscription that are alive.
+#[derive(Debug)]
+pub(crate) struct Alive {
+    count: AtomicUsize,
+    process: u32,
+}
+
+impl Alive {
+    pub(crate) fn new() -> Arc<Alive> {
+        Arc::new(Alive {
+            count: AtomicUsize::new(0),
+            process: std::process::id(),
+        })
+    }
+
+    /// Refuses one more than `limit`.
+    pub(crate) fn check(&self, limit: usize) -> Result<(), ProtocolError> {
+        let held = self.count.load(Ordering::Acquire);
+        if held >= limit {
+            return Err(ProtocolError::FramesHeld { held });
+        }
+        Ok(())
+    }
 }
 
 /// One array of a frame.
@@ -41,8 +66,9 @@ pub struct View<'a> {
 }
 
 impl Frame {
-    /// Wraps a sample whose table was checked against its payload; `alive` already counts this frame.
-    pub(crate) fn new(sample: FrameSample, table: Arc<Table>, alive: Arc<AtomicUsize>) -> Frame {
+    /// Wraps a sample whose table was checked against its payload.
+    pub(crate) fn new(sample: FrameSample, table: Arc<Table>, alive: Arc<Alive>) -> Frame {
+        alive.count.fetch_add(1, Ordering::Acquire);
         let (header, base) = (*sample.user_header(), sample.payload().as_ptr() as usize);
         Frame {
             header,
@@ -112,9 +138,14 @@ impl fmt::Debug for Frame {
 
 impl Drop for Frame {
     fn drop(&mut self) {
+        let sample = self.sample.get_mut().ok().and_then(Option::take);
+        // in a forked child the slot is the parent's to give back
+        if std::process::id() != self.alive.process {
+            return std::mem::forget(sample);
+        }
         // the slot goes back before the count goes down, so that the count never promises a slot that is not there
-        drop(self.sample.get_mut().ok().and_then(Option::take));
-        self.alive.fetch_sub(1, Ordering::Release);
+        drop(sample);
+        self.alive.count.fetch_sub(1, Ordering::Release);
     }
 }
 

@@ -4,8 +4,8 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use crate::client::{Link, lock};
 use crate::control::Request;
+use crate::link::{Link, lock};
 
 /// How often the lease is confirmed.
 const HEARTBEAT: Duration = Duration::from_millis(250);

@@ -31,6 +31,7 @@ pub mod hash;
 pub mod header;
 mod heart;
 pub mod host;
+mod link;
 mod liveness;
 mod loan;
 mod observer;

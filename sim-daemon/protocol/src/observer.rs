@@ -2,14 +2,14 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::listener::Listener;
 
-use crate::client::{Hook, Link, S, malformed};
+use crate::client::Hook;
 use crate::controller::check_table;
-use crate::frame::FrameSample;
+use crate::frame::{Alive, FrameSample};
+use crate::link::{Link, S, malformed};
 use crate::transport::{self, FrameSubscriber, SLICE};
 use crate::{Description, Frame, ProtocolError, Table};
 
@@ -19,7 +19,7 @@ pub(crate) struct Observer {
     link: Arc<Link>,
     description: Arc<Description>,
     table: Option<Arc<Table>>,
-    frames: Arc<AtomicUsize>,
+    frames: Arc<Alive>,
     subscriber: FrameSubscriber<S>,
     listener: Listener<S>,
 }
@@ -49,17 +49,14 @@ impl Observer {
             link: Arc::clone(link),
             description: Arc::clone(description),
             table: None,
-            frames: Arc::new(AtomicUsize::new(0)),
+            frames: Alive::new(),
             subscriber,
             listener,
         })
     }
 
     pub(crate) fn latest(&mut self) -> Result<Option<Frame>, ProtocolError> {
-        let held = self.frames.load(Ordering::Acquire);
-        if held >= self.description.frames_held {
-            return Err(ProtocolError::FramesHeld { held });
-        }
+        self.frames.check(self.description.frames_held)?;
         let Some(sample) = self.receive()? else {
             self.link.peer.check()?;
             return Ok(None);
@@ -75,7 +72,6 @@ impl Observer {
             bytemuck::cast_slice(sample.payload()),
             header.rows,
         )?;
-        self.frames.fetch_add(1, Ordering::Acquire);
         Ok(Some(Frame::new(sample, table, Arc::clone(&self.frames))))
     }
 

@@ -11,6 +11,7 @@ use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::server::Server;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::*;
+use iceoryx2::service::builder::event::EventOpenError;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 
 use crate::{ALIGNMENT, CommandHeader, FrameHeader, Line, ProtocolError};
@@ -270,6 +271,21 @@ pub(crate) fn open_event<S: Service>(
         .event()
         .open()
         .map_err(|error| ProtocolError::transport(format!("open event {name}"), error))
+}
+
+/// Opens the event service that every client needs; the daemon's name is for the error when there are too many of them.
+pub(crate) fn open_wake<S: Service>(
+    node: &Node<S>,
+    name: &str,
+) -> Result<event::PortFactory<S>, ProtocolError> {
+    let service = node.service_builder(&service_name("wake")?).event().open();
+    service.map_err(|error| match error {
+        EventOpenError::ExceedsMaxNumberOfNodes => ProtocolError::TooManyClients {
+            name: name.to_owned(),
+            max: CLIENTS_MAX,
+        },
+        error => ProtocolError::transport("open event wake", error),
+    })
 }
 
 /// An attribute of an event service.

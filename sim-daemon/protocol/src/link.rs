@@ -1,0 +1,102 @@
+//! How every part of a client reaches the daemon: node, control requests, wake-up.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::prelude::{Node, ipc_threadsafe};
+
+use crate::ProtocolError;
+use crate::client::Hook;
+use crate::control::{Request, Response};
+use crate::liveness::Peer;
+use crate::transport::{Requester, SLICE};
+
+/// Clients are used from any thread.
+pub(crate) type S = ipc_threadsafe::Service;
+
+/// How long control requests wait for a daemon that lives but is busy or stopped.
+pub(crate) const ANSWER_MAX: Duration = Duration::from_secs(30);
+
+/// What every part of a client uses to reach the daemon.
+#[derive(Debug)]
+pub(crate) struct Link {
+    pub(crate) peer: Peer,
+    pub(crate) wake: Notifier<S>,
+    pub(crate) requester: Mutex<Requester<S>>,
+    pub(crate) node: Mutex<Node<S>>,
+}
+
+impl Link {
+    /// Asks and waits for the answer; control requests are rare, so waiting is by sleeping.
+    pub(crate) fn ask(&self, request: &Request, hook: Hook<'_>) -> Result<Response, ProtocolError> {
+        let requester = lock(&self.requester);
+        let text = serde_json::to_vec(request).expect("requests are plain data");
+        let failed = |error: &dyn std::fmt::Debug| {
+            ProtocolError::transport(format!("send {request:?}"), error)
+        };
+        let loan = requester
+            .loan_slice_uninit(text.len())
+            .map_err(|error| failed(&error))?;
+        let pending = loan
+            .write_from_slice(&text)
+            .send()
+            .map_err(|error| failed(&error))?;
+        self.notify();
+        let (start, mut nap, mut looked) =
+            (Instant::now(), Duration::from_micros(20), Instant::now());
+        loop {
+            if let Some(response) = pending.receive().map_err(|error| failed(&error))? {
+                return serde_json::from_slice(response.payload()).map_err(|error| {
+                    ProtocolError::Malformed {
+                        from: "the daemon",
+                        problem: format!("answer to {request:?}: {error}"),
+                    }
+                });
+            }
+            if looked.elapsed() > SLICE {
+                self.peer.check()?;
+                if hook().is_break() {
+                    return Err(ProtocolError::Interrupted);
+                }
+                if start.elapsed() > ANSWER_MAX {
+                    return Err(self.peer.timeout(ANSWER_MAX));
+                }
+                looked = Instant::now();
+            }
+            std::thread::sleep(nap);
+            nap = (nap * 3 / 2).min(Duration::from_millis(1));
+        }
+    }
+
+    /// Sends without waiting for an answer; a failure shows at the next step.
+    pub(crate) fn tell(&self, request: &Request) {
+        let requester = lock(&self.requester);
+        let text = serde_json::to_vec(request).expect("requests are plain data");
+        if let Ok(loan) = requester.loan_slice_uninit(text.len()) {
+            let _ = loan.write_from_slice(&text).send();
+        }
+    }
+
+    /// Wakes the daemon if it sleeps.
+    pub(crate) fn notify(&self) {
+        // a daemon that cannot be notified looks by itself after 50 ms
+        let _ = self.wake.notify();
+    }
+
+    pub(crate) fn with_node<T>(&self, call: impl FnOnce(&Node<S>) -> T) -> T {
+        call(&lock(&self.node))
+    }
+}
+
+/// Nothing of ours is left half-written when a thread panics: a poisoned lock is as good as any.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+pub(crate) fn malformed(problem: &str) -> ProtocolError {
+    ProtocolError::Malformed {
+        from: "the daemon",
+        problem: problem.to_owned(),
+    }
+}
