@@ -31,14 +31,14 @@ const DOORS: [(&str, &str); 7] = [
 
 /// Where `unsafe` may stand, and why.
 const UNSAFE: [&str; 8] = [
-    "py-client/src/frame.rs",                // NumPy views
-    "sim-core/src/backend/cpu/chunk.rs",     // calls the stages of an instruction set
-    "sim-core/src/backend/cpu/dispatch.rs",  // instruction sets
-    "sim-core/src/backend/cpu/mod.rs",       // calls what dispatch chose
-    "sim-core/src/backend/cpu/transfer.rs",  // rows of a frame, written by several threads
-    "sim-core/src/lane/simd.rs",             // intrinsics
-    "sim-daemon/protocol/src/frame.rs",      // views of a sample
-    "sim-daemon/protocol/src/loan.rs",       // loaned samples
+    "py-client/src/frame.rs",               // NumPy views
+    "sim-core/src/backend/cpu/chunk.rs",    // calls the stages of an instruction set
+    "sim-core/src/backend/cpu/dispatch.rs", // instruction sets
+    "sim-core/src/backend/cpu/mod.rs",      // calls what dispatch chose
+    "sim-core/src/backend/cpu/transfer.rs", // rows of a frame, written by several threads
+    "sim-core/src/lane/simd.rs",            // intrinsics
+    "sim-daemon/protocol/src/frame.rs",     // views of a sample
+    "sim-daemon/protocol/src/loan.rs",      // loaned samples
 ];
 
 fn root() -> PathBuf {
