@@ -9,7 +9,8 @@ use serde_json::json;
 use sim_core::batch::Field;
 use sim_core::simulation::{Lanes, Options, Precision, Simulation};
 use sim_protocol::host::{Host, check_memory};
-use sim_protocol::place::{Place, Tenancy};
+use sim_protocol::place::Place;
+use sim_protocol::tenancy::Tenancy;
 
 use crate::cli::Serve;
 use crate::config::{self, SceneFile};

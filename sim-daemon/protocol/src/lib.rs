@@ -12,7 +12,7 @@
 //! - Steps are lock-step: the client sends `seq = n`, the daemon answers `ack_seq = n` with a frame or a refusal.
 //! - A lease is one `epoch`, with services of its own; it ends by release, by death, or when another client asks for it
 //!   after the heartbeats stopped. Reset, write and forward travel as commands too, so that they keep their order.
-//! - A daemon's presence is a lock on `ROOT/NAME.lock` ([`place`]); its run is a random `session`.
+//! - A daemon's presence is a lock on `ROOT/NAME.lock` ([`place`], [`tenancy`]); its run is a random `session`.
 //! - Clients know no physics: the [`Description`] names what can be sent and what frames carry.
 //! - Every process here belongs to one user. A hostile process of that user is outside what shared memory can stop; against
 //!   mistakes, the daemon copies a command once and checks the copy, and the client checks each table before reading by it.
@@ -38,6 +38,7 @@ mod observer;
 mod pace;
 pub mod place;
 pub mod table;
+pub mod tenancy;
 mod transport;
 
 pub use client::{AttachOptions, Client, Command, Hook, Values, keep_waiting};
@@ -47,5 +48,6 @@ pub use frame::{Entry, Frame, View};
 pub use header::{
     ALIGNMENT, CommandHeader, Dtype, FrameHeader, Line, Op, PROTOCOL_VERSION, RefusalKind, Row,
 };
-pub use place::{cleanup_after_death, running, sweep};
+pub use place::running;
 pub use table::{ROWS_MAX, Table};
+pub use tenancy::{cleanup_after_death, sweep};

@@ -17,12 +17,11 @@ impl Peer {
     pub(crate) fn check(&self) -> Result<(), ProtocolError> {
         match self.place.presence() {
             Presence::Running(beacon) if beacon.session == self.beacon.session => Ok(()),
-            Presence::Absent => Err(self.lost()),
             Presence::Running(_) => Err(ProtocolError::DaemonRestarted {
                 name: self.place.name().to_owned(),
             }),
-            // somebody looks at the lock of a dead daemon, or a new one begins: the next look tells
-            Presence::Starting => Ok(()),
+            // ours has announced itself: whoever is starting, or cleaning up, is another
+            Presence::Absent | Presence::Starting => Err(self.lost()),
         }
     }
 

@@ -2,23 +2,22 @@
 //!
 //! ```text
 //! ROOT/NAME.lock            held by flock for the daemon's life; one line: protocol version, pid, session
-//! /dev/shm/tl<hash>/        nodes, services and sockets; hash is over ROOT and NAME
+//! /dev/shm/tl<hash>/        nodes, services and sockets; `place`, locked too, names ROOT and NAME; hash is over both
 //! /dev/shm/tl<hash>_*       shared memory; each session has a prefix of its own
 //! ```
 //! So whoever can take the lock may remove the rest. The transport folder is in /dev/shm whatever ROOT is, since the path
 //! of a Unix socket is limited to 107 bytes.
 
-use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
-use std::io::{Read, Seek, Write};
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::fs::{self, DirBuilder, File, TryLockError};
+use std::io::Read;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
 
 use iceoryx2::config::Config;
 use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString};
 
+use crate::ProtocolError;
 use crate::hash::Fnv;
-use crate::{PROTOCOL_VERSION, ProtocolError};
 
 /// Where POSIX shared memory is on Linux.
 pub const SHARED_MEMORY: &str = "/dev/shm";
@@ -119,6 +118,11 @@ impl Place {
         self.root.join(format!("{}.lock", self.name))
     }
 
+    /// The transport's folder.
+    pub(crate) fn shared_folder(&self) -> PathBuf {
+        Path::new(SHARED_MEMORY).join(&self.stem)
+    }
+
     /// What every file of this daemon in [`SHARED_MEMORY`] begins with.
     pub fn stem(&self) -> &str {
         &self.stem
@@ -155,7 +159,7 @@ impl Place {
     }
 
     /// Removes every file in [`SHARED_MEMORY`] that belongs to this name. Only the lock's holder may.
-    fn remove_shared_files(&self) {
+    pub(crate) fn remove_shared_files(&self) {
         let Ok(entries) = fs::read_dir(SHARED_MEMORY) else {
             return;
         };
@@ -175,128 +179,6 @@ impl Place {
     }
 }
 
-/// The lock of a name. Holding it is being the daemon; dropping it removes what is left of the daemon's files.
-#[derive(Debug)]
-pub struct Tenancy {
-    place: Place,
-    file: File,
-}
-
-impl Tenancy {
-    /// Takes the lock and removes what a killed predecessor left.
-    ///
-    /// # Errors
-    /// [`ProtocolError::NameTaken`] when a daemon runs under the name; [`ProtocolError::Root`].
-    pub fn take(place: &Place) -> Result<Tenancy, ProtocolError> {
-        // clients and sweepers hold the lock for microseconds: not worth an error
-        let deadline = Instant::now() + Duration::from_millis(500);
-        loop {
-            if let Some(tenancy) = Tenancy::try_take(place)? {
-                place.remove_shared_files();
-                private_folder(&Path::new(SHARED_MEMORY).join(&place.stem))?;
-                return Ok(tenancy);
-            }
-            if let Presence::Running(beacon) = place.presence() {
-                return Err(ProtocolError::NameTaken {
-                    name: place.name.clone(),
-                    pid: beacon.pid,
-                });
-            }
-            if Instant::now() > deadline {
-                return Err(ProtocolError::NameTaken {
-                    name: place.name.clone(),
-                    pid: 0,
-                });
-            }
-            std::thread::sleep(Duration::from_millis(2));
-        }
-    }
-
-    /// Takes the lock if nobody has it.
-    fn try_take(place: &Place) -> Result<Option<Tenancy>, ProtocolError> {
-        let path = place.lock_path();
-        let root_error = |error: std::io::Error| ProtocolError::Root {
-            path: path.clone(),
-            problem: error.to_string(),
-        };
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .mode(0o600)
-            .open(&path);
-        let file = match file {
-            // the last daemon there took the folder with it
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                private_folder(&place.root)?;
-                return Ok(None);
-            }
-            opened => opened.map_err(root_error)?,
-        };
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => return Ok(None),
-            Err(TryLockError::Error(error)) => return Err(root_error(error)),
-            Ok(()) => {}
-        }
-        // the file may have been removed between open and lock: then the lock is on nothing
-        let ours = file.metadata().map_err(root_error)?.ino();
-        match fs::metadata(&path) {
-            Ok(there) if there.ino() == ours => Ok(Some(Tenancy {
-                place: place.clone(),
-                file,
-            })),
-            _ => Ok(None),
-        }
-    }
-
-    /// Tells clients who we are; until then they see [`Presence::Starting`].
-    ///
-    /// # Errors
-    /// [`ProtocolError::Root`] when the lock file cannot be written.
-    pub fn announce(&mut self, session: u64) -> Result<(), ProtocolError> {
-        let line = format!(
-            "tightloop {PROTOCOL_VERSION} {} {session:016x}\n",
-            std::process::id()
-        );
-        let write = |file: &mut File| {
-            file.set_len(0)?;
-            file.rewind()?;
-            file.write_all(line.as_bytes())
-        };
-        write(&mut self.file).map_err(|error| ProtocolError::Root {
-            path: self.place.lock_path(),
-            problem: error.to_string(),
-        })
-    }
-
-    /// Where this is.
-    pub fn place(&self) -> &Place {
-        &self.place
-    }
-}
-
-impl Drop for Tenancy {
-    fn drop(&mut self) {
-        self.place.remove_shared_files();
-        // the file goes before the lock does, so nobody can lock a file that is about to go
-        let _ = fs::remove_file(self.place.lock_path());
-        // our own folder in shared memory goes with the last daemon; any other is the user's
-        if self.place.root.starts_with(SHARED_MEMORY) && self.place.root == default_root() {
-            let _ = fs::remove_dir(&self.place.root);
-        }
-    }
-}
-
-/// Removes what a dead daemon left. Returns whether there is nothing left, that is, false while one runs.
-///
-/// # Errors
-/// [`ProtocolError::BadName`], [`ProtocolError::Root`].
-pub fn cleanup_after_death(root: Option<&Path>, name: &str) -> Result<bool, ProtocolError> {
-    let place = Place::new(root, name)?;
-    Ok(Tenancy::try_take(&place)?.is_some()) // dropping it cleans
-}
-
 /// Names of the daemons that run under `root`, sorted.
 ///
 /// # Errors
@@ -307,20 +189,7 @@ pub fn running(root: Option<&Path>) -> Result<Vec<String>, ProtocolError> {
     Ok(names.into_iter().map(|place| place.name).collect())
 }
 
-/// Removes what dead daemons of any name left under `root`; every start of a daemon does this.
-///
-/// # Errors
-/// [`ProtocolError::Root`].
-pub fn sweep(root: Option<&Path>) -> Result<(), ProtocolError> {
-    for place in names_with_lock(root)? {
-        if place.presence() == Presence::Absent {
-            drop(Tenancy::try_take(&place)?);
-        }
-    }
-    Ok(())
-}
-
-fn names_with_lock(root: Option<&Path>) -> Result<Vec<Place>, ProtocolError> {
+pub(crate) fn names_with_lock(root: Option<&Path>) -> Result<Vec<Place>, ProtocolError> {
     let root = private_folder(&root.map_or_else(default_root, Path::to_owned))?;
     let entries = fs::read_dir(&root).map_err(|error| ProtocolError::Root {
         path: root.clone(),
@@ -357,7 +226,7 @@ fn read_beacon(file: &mut File) -> Option<Beacon> {
 }
 
 /// Makes a folder that only we may use, and returns it absolute.
-fn private_folder(path: &Path) -> Result<PathBuf, ProtocolError> {
+pub(crate) fn private_folder(path: &Path) -> Result<PathBuf, ProtocolError> {
     let error = |problem: String| ProtocolError::Root {
         path: path.to_owned(),
         problem,
@@ -381,34 +250,6 @@ fn private_folder(path: &Path) -> Result<PathBuf, ProtocolError> {
 mod tests {
     use super::*;
 
-    fn root(test: &str) -> PathBuf {
-        std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()))
-    }
-
-    #[test]
-    fn a_name_is_taken_once_and_leaves_nothing() {
-        let root = root("place");
-        let place = Place::new(Some(&root), "one").unwrap();
-        let mut first = Tenancy::take(&place).unwrap();
-        assert_eq!(place.presence(), Presence::Starting);
-        first.announce(7).unwrap();
-        let beacon = Beacon {
-            protocol: PROTOCOL_VERSION,
-            pid: std::process::id(),
-            session: 7,
-        };
-        assert_eq!(place.presence(), Presence::Running(beacon));
-        assert_eq!(running(Some(&root)).unwrap(), ["one"]);
-        let error = Tenancy::take(&place).unwrap_err().to_string();
-        assert!(error.contains(&std::process::id().to_string()), "{error}");
-        assert!(!cleanup_after_death(Some(&root), "one").unwrap());
-        drop(first);
-        assert_eq!(place.presence(), Presence::Absent);
-        assert!(!Path::new(SHARED_MEMORY).join(place.stem()).exists());
-        assert_eq!(fs::read_dir(&root).unwrap().count(), 0);
-        fs::remove_dir(&root).unwrap();
-    }
-
     #[test]
     fn names_with_slashes_dots_or_nothing_are_refused() {
         for name in ["", "a/b", "..", "a.lock", "ä", &"x".repeat(65)] {
@@ -417,17 +258,5 @@ mod tests {
                 "{name:?}"
             );
         }
-    }
-
-    #[test]
-    fn what_a_killed_daemon_left_is_swept() {
-        let root = root("sweep");
-        let place = Place::new(Some(&root), "dead").unwrap();
-        fs::write(place.lock_path(), "tightloop 1 1 0000000000000001\n").unwrap();
-        let shared = Path::new(SHARED_MEMORY).join(format!("{}_00000001_5.data", place.stem()));
-        fs::write(&shared, "x").unwrap();
-        sweep(Some(&root)).unwrap();
-        assert!(!shared.exists() && !place.lock_path().exists());
-        fs::remove_dir(&root).unwrap();
     }
 }

@@ -25,7 +25,7 @@ use crate::apart::Apart;
 use crate::command::command_bytes;
 use crate::control::Response;
 use crate::pace::{Pace, cores};
-use crate::place::Tenancy;
+use crate::tenancy::Tenancy;
 use crate::transport::{self, facts};
 use crate::{Description, ProtocolError, RefusalKind, Table};
 

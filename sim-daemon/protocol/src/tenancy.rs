@@ -1,0 +1,290 @@
+//! Being the daemon of a name, and cleaning up after one that died.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{Seek, Write};
+use std::os::unix::ffi::{OsStrExt, OsStringExt};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use crate::place::{Place, Presence, SHARED_MEMORY, default_root, names_with_lock, private_folder};
+use crate::{PROTOCOL_VERSION, ProtocolError};
+
+/// Clients and sweepers hold a lock for microseconds; whoever finds it held that long finds a daemon.
+const LOOK_MAX: Duration = Duration::from_millis(500);
+/// File in the transport's folder that names root and daemon, and is locked as long as the daemon lives.
+const PLACE: &str = "place";
+
+/// The lock of a name. Holding it is being the daemon; dropping it removes what is left of the daemon's files.
+#[derive(Debug)]
+pub struct Tenancy {
+    place: Place,
+    file: File,
+    /// The lock that a sweeper finds when our root folder is gone.
+    _mark: Option<File>,
+}
+
+impl Tenancy {
+    /// Takes the lock and removes what a killed predecessor left.
+    ///
+    /// # Errors
+    /// [`ProtocolError::NameTaken`] when a daemon runs under the name; [`ProtocolError::Root`].
+    pub fn take(place: &Place) -> Result<Tenancy, ProtocolError> {
+        let start = Instant::now();
+        loop {
+            if let Some(mut tenancy) = Tenancy::try_take(place)? {
+                place.remove_shared_files();
+                tenancy._mark = Some(mark(place)?);
+                return Ok(tenancy);
+            }
+            let pid = match place.presence() {
+                Presence::Running(beacon) => beacon.pid,
+                _ if start.elapsed() > LOOK_MAX => 0,
+                _ => {
+                    std::thread::sleep(Duration::from_millis(2));
+                    continue;
+                }
+            };
+            let name = place.name().to_owned();
+            return Err(ProtocolError::NameTaken { name, pid });
+        }
+    }
+
+    /// Takes the lock if nobody has it.
+    fn try_take(place: &Place) -> Result<Option<Tenancy>, ProtocolError> {
+        let path = place.lock_path();
+        let root_error = |error: std::io::Error| root_error(&path, &error);
+        let opened = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .mode(0o600)
+            .open(&path);
+        let file = match opened {
+            // the last daemon there took the folder with it
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                private_folder(place.root())?;
+                return Ok(None);
+            }
+            opened => opened.map_err(root_error)?,
+        };
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => return Ok(None),
+            Err(TryLockError::Error(error)) => return Err(root_error(error)),
+            Ok(()) => {}
+        }
+        // the file may have been removed between open and lock: then the lock is on nothing
+        let ours = file.metadata().map_err(root_error)?.ino();
+        if !fs::metadata(&path).is_ok_and(|there| there.ino() == ours) {
+            return Ok(None);
+        }
+        // clients of a dead predecessor see that it is gone as soon as the line is
+        file.set_len(0).map_err(root_error)?;
+        Ok(Some(Tenancy {
+            place: place.clone(),
+            file,
+            _mark: None,
+        }))
+    }
+
+    /// Tells clients who we are; until then they see [`Presence::Starting`].
+    ///
+    /// # Errors
+    /// [`ProtocolError::Root`] when the lock file cannot be written.
+    pub fn announce(&mut self, session: u64) -> Result<(), ProtocolError> {
+        let pid = std::process::id();
+        let line = format!("tightloop {PROTOCOL_VERSION} {pid} {session:016x}\n");
+        self.file
+            .rewind()
+            .and_then(|()| self.file.write_all(line.as_bytes()))
+            .map_err(|error| root_error(&self.place.lock_path(), &error))
+    }
+
+    /// Where this is.
+    pub fn place(&self) -> &Place {
+        &self.place
+    }
+}
+
+impl Drop for Tenancy {
+    fn drop(&mut self) {
+        self.place.remove_shared_files();
+        // the file goes before the lock does, so nobody can lock a file that is about to go
+        let _ = fs::remove_file(self.place.lock_path());
+        // our own folder in shared memory goes with the last daemon; any other is the user's
+        let root = self.place.root();
+        if root.starts_with(SHARED_MEMORY) && root == default_root() {
+            let _ = fs::remove_dir(root);
+        }
+    }
+}
+
+fn root_error(path: &Path, error: &std::io::Error) -> ProtocolError {
+    ProtocolError::Root {
+        path: path.to_owned(),
+        problem: error.to_string(),
+    }
+}
+
+/// Makes the transport's folder with its mark.
+fn mark(place: &Place) -> Result<File, ProtocolError> {
+    let folder = private_folder(&place.shared_folder())?;
+    let (new, path) = (folder.join("place.new"), folder.join(PLACE));
+    let write = || {
+        let mut file = File::create(&new)?;
+        file.write_all(place.root().as_os_str().as_bytes())?;
+        file.write_all(b"\n")?;
+        file.write_all(place.name().as_bytes())?;
+        file.lock()?;
+        // nobody sees it before it is locked
+        fs::rename(&new, &path)?;
+        Ok(file)
+    };
+    write().map_err(|error| root_error(&path, &error))
+}
+
+/// Removes what a dead daemon left. Returns whether there is nothing left, that is, false while one runs.
+///
+/// # Errors
+/// [`ProtocolError::BadName`], [`ProtocolError::Root`].
+pub fn cleanup_after_death(root: Option<&Path>, name: &str) -> Result<bool, ProtocolError> {
+    let place = Place::new(root, name)?;
+    let start = Instant::now();
+    loop {
+        if Tenancy::try_take(&place)?.is_some() {
+            return Ok(true); // dropping it has cleaned
+        }
+        // a client's look at the lock is no daemon
+        if place.presence() != Presence::Absent || start.elapsed() > LOOK_MAX {
+            return Ok(false);
+        }
+        std::thread::yield_now();
+    }
+}
+
+/// Removes what dead daemons of any name left, under `root` and wherever else this user had daemons; every start of a daemon
+/// does this.
+///
+/// # Errors
+/// [`ProtocolError::Root`].
+pub fn sweep(root: Option<&Path>) -> Result<(), ProtocolError> {
+    for place in names_with_lock(root)? {
+        if place.presence() == Presence::Absent {
+            drop(Tenancy::try_take(&place)?);
+        }
+    }
+    let Ok(entries) = fs::read_dir(SHARED_MEMORY) else {
+        return Ok(());
+    };
+    for folder in entries.flatten() {
+        let is_ours = folder.metadata().is_ok_and(|metadata| {
+            metadata.is_dir() && metadata.uid() == rustix::process::geteuid().as_raw()
+        });
+        if is_ours && folder.file_name().as_bytes().starts_with(b"tl") {
+            sweep_folder(&folder.path());
+        }
+    }
+    Ok(())
+}
+
+/// Removes a dead daemon's files, found by the mark in its transport folder. What fails is left to the next sweep.
+fn sweep_folder(folder: &Path) {
+    let Ok(bytes) = fs::read(folder.join(PLACE)) else {
+        return;
+    };
+    let Some(end) = bytes.iter().position(|&byte| byte == b'\n') else {
+        return;
+    };
+    let root = PathBuf::from(std::ffi::OsString::from_vec(bytes[..end].to_vec()));
+    let (Ok(mark), Ok(name)) = (
+        File::open(folder.join(PLACE)),
+        str::from_utf8(&bytes[end + 1..]),
+    ) else {
+        return;
+    };
+    // a daemon whose root folder somebody removed still lives
+    if mark.try_lock().is_err() {
+        return;
+    }
+    let had_root = root.exists();
+    let Ok(place) = Place::new(Some(&root), name) else {
+        return;
+    };
+    if place.shared_folder() == folder {
+        drop(Tenancy::try_take(&place));
+    }
+    if !had_root {
+        let _ = fs::remove_dir(&root);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::place::{Beacon, running};
+
+    fn root(test: &str) -> PathBuf {
+        std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()))
+    }
+
+    #[test]
+    fn a_name_is_taken_once_and_leaves_nothing() {
+        let root = root("place");
+        let place = Place::new(Some(&root), "one").unwrap();
+        let mut first = Tenancy::take(&place).unwrap();
+        assert_eq!(place.presence(), Presence::Starting);
+        first.announce(7).unwrap();
+        let beacon = Beacon {
+            protocol: PROTOCOL_VERSION,
+            pid: std::process::id(),
+            session: 7,
+        };
+        assert_eq!(place.presence(), Presence::Running(beacon));
+        assert_eq!(running(Some(&root)).unwrap(), ["one"]);
+        let error = Tenancy::take(&place).unwrap_err().to_string();
+        assert!(error.contains(&std::process::id().to_string()), "{error}");
+        assert!(!cleanup_after_death(Some(&root), "one").unwrap());
+        drop(first);
+        assert_eq!(place.presence(), Presence::Absent);
+        assert!(!Path::new(SHARED_MEMORY).join(place.stem()).exists());
+        assert_eq!(fs::read_dir(&root).unwrap().count(), 0);
+        fs::remove_dir(&root).unwrap();
+    }
+
+    #[test]
+    fn what_a_killed_daemon_left_is_swept() {
+        let root = root("sweep");
+        let place = Place::new(Some(&root), "dead").unwrap();
+        fs::write(place.lock_path(), "tightloop 1 1 0000000000000001\n").unwrap();
+        let shared = Path::new(SHARED_MEMORY).join(format!("{}_00000001_5.data", place.stem()));
+        fs::write(&shared, "x").unwrap();
+        sweep(Some(&root)).unwrap();
+        assert!(!shared.exists() && !place.lock_path().exists());
+        fs::remove_dir(&root).unwrap();
+    }
+
+    #[test]
+    fn what_is_left_of_a_root_folder_that_is_gone_is_swept_and_the_living_are_spared() {
+        let (gone, living) = (root("gone"), root("living"));
+        let dead = Place::new(Some(&gone), "dead").unwrap();
+        private_folder(&dead.shared_folder()).unwrap();
+        fs::write(
+            dead.shared_folder().join(PLACE),
+            format!("{}\ndead", dead.root().display()),
+        )
+        .unwrap();
+        let shared = Path::new(SHARED_MEMORY).join(format!("{}_00000001_5.data", dead.stem()));
+        fs::write(&shared, "x").unwrap();
+        fs::remove_dir(&gone).unwrap();
+        let place = Place::new(Some(&living), "living").unwrap();
+        let tenancy = Tenancy::take(&place).unwrap();
+        fs::remove_dir_all(&living).unwrap();
+        sweep(Some(&root("other"))).unwrap();
+        assert!(!shared.exists() && !dead.shared_folder().exists() && !gone.exists());
+        assert!(place.shared_folder().exists());
+        drop(tenancy);
+        assert!(!place.shared_folder().exists());
+        fs::remove_dir(root("other")).unwrap();
+    }
+}
