@@ -17,18 +17,16 @@ pub(crate) fn run(mut simulation: Simulation, mut host: Host) -> Result<(), Daem
             Next::Command => {
                 let started = Instant::now();
                 match export::apply(&mut simulation, host.inbox(), &mut mask) {
-                    Ok(Advance::Step) => host.answer(started, |arena| simulation.step(arena))?,
-                    Ok(Advance::Forward) => {
-                        host.answer(started, |arena| simulation.forward(arena))?
-                    }
-                    Err(refusal) => host.refuse(refusal.kind, &refusal.reason)?,
+                    Ok(Advance::Step) => host.answer(started, |arena| simulation.step(arena)),
+                    Ok(Advance::Forward) => host.answer(started, |arena| simulation.forward(arena)),
+                    Err(refusal) => host.refuse(refusal.kind, &refusal.reason),
                 }
             }
             Next::Watch => {
                 // nobody steps now, so there is time to evaluate what observers have not seen
                 scratch.resize(simulation.layout().bytes.div_ceil(8), 0);
                 simulation.forward(&mut scratch);
-                host.show(&scratch)?;
+                host.show(&scratch);
             }
             Next::End => return Ok(()),
         }

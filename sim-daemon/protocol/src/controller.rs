@@ -72,6 +72,10 @@ impl Controller {
                     what,
                 });
             }
+            Response::Refused { reason } => {
+                let kind = RefusalKind::Backend;
+                return Err(ProtocolError::CommandRefused { kind, reason });
+            }
             _ => return Err(malformed("the answer to acquire")),
         };
         let bytes = command_bytes(description);

@@ -160,7 +160,7 @@ impl Host {
     /// [`ProtocolError::Transport`].
     pub fn wait(&mut self) -> Result<Next, ProtocolError> {
         if self.state.looked.elapsed() > AROUND_PERIOD
-            && let Some(next) = self.state.look_around()?
+            && let Some(next) = self.state.look_around()
         {
             return Ok(next);
         }
@@ -181,32 +181,19 @@ impl Host {
     /// Answers the command: `fill` writes the arena of the frame, straight into shared memory.
     ///
     /// `started` is when work on the command began.
-    ///
-    /// # Errors
-    /// [`ProtocolError::Transport`].
-    pub fn answer(
-        &mut self,
-        started: Instant,
-        fill: impl FnOnce(&mut [u64]),
-    ) -> Result<(), ProtocolError> {
-        self.state.answer(started, fill)
+    pub fn answer(&mut self, started: Instant, fill: impl FnOnce(&mut [u64])) {
+        self.state.answer(started, fill);
     }
 
     /// Answers the command with a refusal.
-    ///
-    /// # Errors
-    /// [`ProtocolError::Transport`].
-    pub fn refuse(&mut self, kind: RefusalKind, reason: &str) -> Result<(), ProtocolError> {
-        self.state.refuse(kind, reason)
+    pub fn refuse(&mut self, kind: RefusalKind, reason: &str) {
+        self.state.refuse(kind, reason);
     }
 
     /// Shows observers a frame; `arena` as [`Host::answer`]'s `fill` would write it.
-    ///
-    /// # Errors
-    /// [`ProtocolError::Transport`].
-    pub fn show(&mut self, arena: &[u64]) -> Result<(), ProtocolError> {
+    pub fn show(&mut self, arena: &[u64]) {
         self.state.frames += 1;
-        self.state.show(arena)
+        self.state.show(arena);
     }
 }
 

@@ -103,12 +103,10 @@ impl State {
     }
 
     /// Answers the control requests that are there.
-    fn control(&mut self) -> Result<Option<Next>, ProtocolError> {
-        let failed = |error: &dyn std::fmt::Debug| {
-            ProtocolError::transport("answer a control request", error)
-        };
+    fn control(&mut self) -> Option<Next> {
         let mut end = false;
-        while let Some(active) = self.responder.receive().map_err(|error| failed(&error))? {
+        // as with commands: a client that was killed while it connected is no reason to end
+        while let Ok(Some(active)) = self.responder.receive() {
             let response = match serde_json::from_slice(active.payload()) {
                 Ok(Request::Describe) => None,
                 Ok(Request::Controller) => Some(Response::Controller {
@@ -150,24 +148,19 @@ impl State {
                 let _ = loan.write_from_slice(bytes).send();
             }
         }
-        Ok(end.then_some(Next::End))
+        end.then_some(Next::End)
     }
 
-    pub(super) fn answer(
-        &mut self,
-        started: Instant,
-        fill: impl FnOnce(&mut [u64]),
-    ) -> Result<(), ProtocolError> {
+    pub(super) fn answer(&mut self, started: Instant, fill: impl FnOnce(&mut [u64])) {
         let Some(lane) = &mut self.lane else {
-            return Ok(());
+            return;
         };
         let Ok(mut loan) = lane
             .publisher
             .loan_slice_uninit(self.frame.total_bytes() / ALIGNMENT)
         else {
             // the holder keeps more frames than it said: it is told that its lease is lost
-            self.renew();
-            return Ok(());
+            return self.renew();
         };
         let words = loan::words(loan.payload_mut());
         let (head, arena) = words.split_at_mut(Table::head_bytes(self.frame.rows().len()) / 8);
@@ -178,10 +171,10 @@ impl State {
         let now = Instant::now();
         let due = self.watchers > 0 && now.duration_since(self.shown) > WATCH_PERIOD;
         if due {
-            self.show(arena)?;
+            self.show(arena);
         }
         let Some(lane) = &mut self.lane else {
-            return Ok(());
+            return;
         };
         let busy_ns = now.duration_since(started).as_nanos() as u64;
         *loan.user_header_mut() = FrameHeader {
@@ -194,20 +187,21 @@ impl State {
         if let Some(holder) = &mut lane.holder {
             holder.beat = now;
         }
-        loan::send(loan).map_err(|error| ProtocolError::transport("send a frame", error))?;
+        if loan::send(loan).is_err() {
+            return self.renew(); // the holder cannot be reached: it is told that its lease is lost
+        }
         // a holder that cannot be notified looks by itself after 50 ms
         let _ = lane.notifier.notify();
-        Ok(())
     }
 
     /// Shows observers the first worlds of an arena.
-    pub(super) fn show(&mut self, arena: &[u64]) -> Result<(), ProtocolError> {
+    pub(super) fn show(&mut self, arena: &[u64]) {
         (self.shown, self.unseen) = (Instant::now(), false);
         let Ok(mut loan) = self
             .watch
             .loan_slice_uninit(self.watch_table.total_bytes() / ALIGNMENT)
         else {
-            return Ok(()); // observers keep every slot: they miss a frame
+            return; // observers keep every slot: they miss a frame
         };
         let words = loan::words(loan.payload_mut());
         words[..self.watch_table.words().len()].copy_from_slice(self.watch_table.words());
@@ -222,15 +216,14 @@ impl State {
                 .copy_from_slice(&from[source.offset - head..][..target.bytes]);
         }
         *loan.user_header_mut() = header(&self.description, &self.watch_table, self.frames);
-        loan::send(loan).map_err(|error| ProtocolError::transport("send a frame", error))?;
-        // an observer that cannot be notified looks by itself after 50 ms
+        // an observer that cannot be reached misses a frame; one that cannot be notified looks by itself after 50 ms
+        let _ = loan::send(loan);
         let _ = self.watch_notifier.notify();
-        Ok(())
     }
 
-    pub(super) fn refuse(&mut self, kind: RefusalKind, reason: &str) -> Result<(), ProtocolError> {
+    pub(super) fn refuse(&mut self, kind: RefusalKind, reason: &str) {
         let Some(lane) = &mut self.lane else {
-            return Ok(());
+            return;
         };
         let room = memory::slot_bytes(&self.frame) - Table::head_bytes(1);
         let end = reason.floor_char_boundary(room);
@@ -240,8 +233,7 @@ impl State {
             .publisher
             .loan_slice_uninit(table.total_bytes() / ALIGNMENT)
         else {
-            self.renew();
-            return Ok(());
+            return self.renew();
         };
         let words = loan::words(loan.payload_mut());
         words[..table.words().len()].copy_from_slice(table.words());
@@ -255,13 +247,14 @@ impl State {
             core: self.apart.core(),
             ..header(&self.description, &table, self.frames)
         };
-        loan::send(loan).map_err(|error| ProtocolError::transport("send a refusal", error))?;
+        if loan::send(loan).is_err() {
+            return self.renew();
+        }
         let _ = lane.notifier.notify();
-        Ok(())
     }
 
     /// Looks at control requests, leases and observers.
-    pub(super) fn look_around(&mut self) -> Result<Option<Next>, ProtocolError> {
+    pub(super) fn look_around(&mut self) -> Option<Next> {
         let gap = self.looked.elapsed();
         self.looked = Instant::now();
         if gap > HELD_UP
@@ -273,9 +266,9 @@ impl State {
             holder.beat += gap; // the heartbeats of that time wait unread
         }
         if self.stop.load(Ordering::Relaxed) {
-            return Ok(Some(Next::End));
+            return Some(Next::End);
         }
-        let next = self.control()?;
+        let next = self.control();
         if self.lane.as_mut().is_some_and(Lane::is_over) {
             self.renew();
         }
@@ -283,7 +276,7 @@ impl State {
         // new observers get the frame shown last, dead ones give their slots back
         let _ = self.watch.update_connections();
         self.watchers = self.watch_service.dynamic_config().number_of_subscribers();
-        Ok(next)
+        next
     }
 }
 
@@ -292,10 +285,8 @@ impl Waiting<Next> for State {
         let Some(lane) = &mut self.lane else {
             return Ok(None);
         };
-        let received = lane.subscriber.receive();
-        let Some(sample) =
-            received.map_err(|error| ProtocolError::transport("receive a command", error))?
-        else {
+        // a client that was killed while it connected is an error until it is cleaned up: then as if it were not there
+        let Ok(Some(sample)) = lane.subscriber.receive() else {
             return Ok(None);
         };
         let header = *sample.user_header();
@@ -316,7 +307,7 @@ impl Waiting<Next> for State {
                 lane.epoch,
                 lane.last_seq
             );
-            self.refuse(RefusalKind::Stale, &reason)?;
+            self.refuse(RefusalKind::Stale, &reason);
             return Ok(None);
         }
         lane.last_seq = header.seq;
@@ -325,14 +316,14 @@ impl Waiting<Next> for State {
             self.refuse(
                 RefusalKind::Malformed,
                 &format!("malformed command: {problem}"),
-            )?;
+            );
             return Ok(None);
         }
         Ok(Some(Next::Command))
     }
 
     fn around(&mut self) -> Result<Option<Next>, ProtocolError> {
-        let next = self.look_around()?;
+        let next = self.look_around();
         let due = self.unseen && self.watchers > 0 && self.shown.elapsed() > WATCH_PERIOD;
         Ok(next.or(due.then_some(Next::Watch)))
     }
