@@ -155,8 +155,9 @@ pub fn cleanup_after_death(root: Option<&Path>, name: &str) -> Result<bool, Prot
         if Tenancy::try_take(&place)?.is_some() {
             return Ok(true); // dropping it has cleaned
         }
-        // a client's look at the lock is no daemon
-        if place.presence() != Presence::Absent || start.elapsed() > LOOK_MAX {
+        // a client's look at the lock is no daemon, nor is somebody else's sweep: that one we wait for
+        let runs = matches!(place.presence(), Presence::Running(_));
+        if runs || start.elapsed() > LOOK_MAX {
             return Ok(false);
         }
         std::thread::yield_now();
