@@ -5,7 +5,8 @@
 //! /dev/shm/tl<hash>/        nodes, services and sockets; `place`, locked too, names ROOT and NAME; hash is over both
 //! /dev/shm/tl<hash>_*       shared memory; each session has a prefix of its own
 //! ```
-//! So whoever can take the lock may remove the rest. The transport folder is in /dev/shm whatever ROOT is, since the path
+//! All of it is for one user only. Under systemd, `RemoveIPC=no` keeps a daemon's files when its user logs out.
+//! Whoever can take the lock may remove the rest. The transport folder is in /dev/shm whatever ROOT is, since the path
 //! of a Unix socket is limited to 107 bytes.
 
 use std::fs::{self, DirBuilder, File, TryLockError};

@@ -14,7 +14,7 @@ use crate::{ProtocolError, Table};
 /// A holder whose heartbeats stopped for this long loses the lease when somebody else asks for it.
 const SILENCE_MAX: Duration = Duration::from_secs(2);
 /// A holder that was granted the lease and did not open its services within this time is gone.
-const JOIN_MAX: Duration = Duration::from_secs(5);
+const JOIN_MAX: Duration = Duration::from_millis(800);
 
 /// One lease: free until somebody is granted it.
 #[derive(Debug)]
