@@ -87,6 +87,10 @@ def test_a_property_cannot_be_changed_in_place(arm: tl.Robot):
         ("joint_target_kd", [1, -2], r"joint_target_kd of dof `arm/elbow` is -2\.0"),
         ("joint_target_mode", "force", r"joint_target_mode.*'force'.*'position', 'velocity', 'both'"),
         ("joint_target_mode", ["both"], r"joint_target_mode has 1 values; expected 2"),
+        ("joint_target_mode", None, r"joint_target_mode is None; expected 2"),
+        ("pos", (0, 0), r"robot `arm`: pos has 2 values; give 3"),
+        ("pos", (0, math.nan, 0), r"robot `arm`: pos is nan; give a finite number"),
+        ("quat", (0, 0, 0, 2), r"robot `arm`: quat .* has length 2"),
     ],
 )
 def test_a_wrong_property_names_robot_field_and_dof(arm: tl.Robot, name, value, named):
@@ -108,8 +112,10 @@ def test_a_property_that_does_not_exist_is_an_error(arm: tl.Robot):
         ({"dt": -1}, "dt is -1"),
         ({"dt": math.nan}, "dt is nan"),
         ({"dt": "fast"}, "dt is 'fast'"),
+        ({"dt": 10**400}, "dt is larger than any float"),
         ({"substeps": 0}, "substeps is 0; it must be at least 1"),
         ({"substeps": 1.5}, r"substeps is 1\.5; give a whole number"),
+        ({"substeps": 2**70}, "substeps does not fit into 64 bits"),
         ({"gravity": (0, 0)}, "gravity has 2 values; give 3"),
         ({"gravity": -9.81}, r"gravity is -9\.81; give 3 numbers"),
     ],
@@ -118,6 +124,30 @@ def test_a_property_that_does_not_exist_is_an_error(arm: tl.Robot):
 def test_a_wrong_scene_argument_is_named(arguments, named):
     with pytest.raises(tl.SceneError, match=named):
         tl.Scene(**arguments)
+    scene = tl.Scene()
+    before = scene.to_toml()
+    for name, value in arguments.items():
+        with pytest.raises(tl.SceneError, match=named):
+            setattr(scene, name, value)
+    assert scene.to_toml() == before
+
+
+@pytest.mark.parametrize("wrong", [None, 5, b"arm.urdf", "arm\0.urdf"], ids=repr)
+def test_what_is_no_path_is_named(wrong):
+    scene = tl.Scene()
+    for call in (scene.add_urdf, scene.save, tl.Scene.load):
+        with pytest.raises(tl.SceneError, match=r"path is .*(give a path|no zero byte)"):
+            call(wrong)
+    with pytest.raises(tl.SceneError, match="package_dirs"):
+        scene.add_urdf("arm.urdf", package_dirs="folder")
+
+
+def test_numpy_numbers_are_numbers(arm: tl.Robot):
+    scene = tl.Scene()
+    scene.dt, scene.substeps, scene.gravity = np.float32(0.5), np.int64(3), np.array([0, 0, -1])
+    arm.pos, arm.quat = np.zeros(3), np.array([0, 0, 0, 1])
+    assert "dt = 0.5" in scene.to_toml()
+    assert (scene.substeps, scene.gravity, arm.pos, arm.quat) == (3, (0, 0, -1), (0, 0, 0), (0, 0, 0, 1))
 
 
 @pytest.mark.parametrize(

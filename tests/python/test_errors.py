@@ -61,6 +61,16 @@ def test_a_wrong_urdf_names_the_part(tmp_path, wrong, named):
         ({"worlds": -3}, r"worlds is -3.*at least 1"),
         ({"worlds": 2.5}, r"worlds is 2\.5.*whole number"),
         ({"worlds": 10**12}, r'worlds "1000000000000".*1 to 4294967295'),
+        ({"worlds": 2**63 - 1}, r'worlds "9223372036854775807".*1 to 4294967295'),
+        ({"worlds": 2**64}, r"worlds does not fit into 64 bits"),
+        ({"device": None}, r"device is None; give a string"),
+        ({"precision": 64}, r"precision is 64; give a string"),
+        ({"fields": None}, r"fields is None; give a list"),
+        ({"fields": [1]}, r"fields is 1; give a string"),
+        ({"log": 5}, r"log is 5; give a path"),
+        ({"name": 5}, r"name is 5; give a string"),
+        ({"name": "a\0"}, r"name is 'a\\x00'"),
+        ({"name": "\udc80"}, r"name is '\\udc80'"),
         ({"threads": 0}, r"threads is 0"),
         ({"threads": 10**6}, r'threads "1000000".*1 to 1024'),
         ({"frames_held": 0}, r"frames_held is 0"),
@@ -73,6 +83,12 @@ def test_a_wrong_urdf_names_the_part(tmp_path, wrong, named):
 def test_a_wrong_argument_of_launch_is_named_with_what_is_valid(pendulum, arguments, named):
     with pytest.raises(tl.ArgumentError, match=named):
         tl.launch(pendulum, **({"worlds": 1} | arguments))
+
+
+@pytest.mark.parametrize("name", [None, 5, "", "a/b", "\udc80"], ids=repr)
+def test_a_name_that_no_daemon_can_have_is_refused(name):
+    with pytest.raises(tl.ArgumentError, match="name"):
+        tl.attach(name)
 
 
 def test_a_launch_that_fails_says_so_once(pendulum, capfd):

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import math
 import operator
+import os
 import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, SupportsFloat, SupportsIndex
+
+from numpy.typing import NDArray
 
 from tightloop.errors import SceneError
 
-Vector = Sequence[float]
+Vector = Sequence[float] | NDArray[Any]
 Triple = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]*")
+# The daemon, which knows the real bounds, reads its numbers into 64 bits.
+_INT_MAX = 2**63 - 1
 # A quaternion typed with four digits is off by less; anything further is a slip (degrees, Euler angles).
 _QUAT_NORM_SLACK = 1e-3
 
@@ -25,6 +31,8 @@ def number(what: str, value: SupportsFloat, *, above: float | None = None, least
         checked = float(value)
     except (TypeError, ValueError):
         raise SceneError(f"{what} is {value!r}; give a number") from None
+    except OverflowError:  # a whole number of more than 308 digits
+        raise SceneError(f"{what} is larger than any float; give a finite number") from None
     if not math.isfinite(checked):
         raise SceneError(f"{what} is {checked}; give a finite number")
     if above is not None and checked <= above:
@@ -35,14 +43,38 @@ def number(what: str, value: SupportsFloat, *, above: float | None = None, least
 
 
 def integer(what: str, value: SupportsIndex, *, least: int = 1, error: type[Exception] = SceneError) -> int:
-    """An int, at least a bound; floats are refused even when they are whole."""
+    """An int of 64 bits, at least a bound; floats are refused even when they are whole."""
     try:
         checked = operator.index(value)
     except TypeError:
         raise error(f"{what} is {value!r}; give a whole number") from None
     if checked < least:
         raise error(f"{what} is {checked}; it must be at least {least}")
+    if checked > _INT_MAX:
+        raise error(f"{what} does not fit into 64 bits; give a smaller number")
     return checked
+
+
+def text(what: str, value: str, *, error: type[Exception] = SceneError) -> str:
+    """A string that other programs can read: no lone surrogates, no zero bytes."""
+    if not isinstance(value, str):
+        raise error(f"{what} is {value!r}; give a string")
+    if "\0" in value or any("\ud800" <= letter <= "\udfff" for letter in value):
+        raise error(f"{what} is {value!r}; use letters that can be printed")
+    return value
+
+
+def path(what: str, value: str | os.PathLike[str], *, error: type[Exception] = SceneError) -> Path:
+    """An absolute path; ``~`` is the user's home."""
+    try:
+        given = os.fspath(value)
+    except TypeError:
+        given = None
+    if not isinstance(given, str):
+        raise error(f"{what} is {value!r}; give a path as str or pathlib.Path")
+    if "\0" in given:
+        raise error(f"{what} is {given!r}; a path has no zero byte")
+    return Path(given).expanduser().absolute()
 
 
 def triple(what: str, values: Vector) -> Triple:
@@ -51,13 +83,13 @@ def triple(what: str, values: Vector) -> Triple:
     return x, y, z
 
 
-def pose(what: str, pos: Vector, quat: Vector) -> tuple[Triple, Quaternion]:
-    """A position [m] and a unit quaternion (x, y, z, w)."""
-    x, y, z, w = _numbers(f"{what}: quat", quat, 4)
+def quaternion(what: str, values: Vector) -> Quaternion:
+    """A unit quaternion (x, y, z, w)."""
+    x, y, z, w = _numbers(what, values, 4)
     norm = math.hypot(x, y, z, w)
     if abs(norm - 1.0) > _QUAT_NORM_SLACK:
-        raise SceneError(f"{what}: quat {(x, y, z, w)} has length {norm:.4g}; give a unit quaternion (x, y, z, w)")
-    return triple(f"{what}: pos", pos), (x / norm, y / norm, z / norm, w / norm)
+        raise SceneError(f"{what} {(x, y, z, w)} has length {norm:.4g}; give a unit quaternion (x, y, z, w)")
+    return x / norm, y / norm, z / norm, w / norm
 
 
 def name(what: str, given: str, taken: Sequence[str]) -> str:

@@ -9,7 +9,8 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop.checks import Quaternion, Triple
+from tightloop import checks
+from tightloop.checks import Quaternion, Triple, Vector
 from tightloop.errors import SceneError
 
 MODES = ("position", "velocity", "both")
@@ -80,7 +81,10 @@ class _Modes(_PerDof):
         return self if robot is None else robot._own.get(self.name) or tuple(robot._urdf_values(self.name))
 
     def __set__(self, robot: Robot, values: str | Sequence[str]) -> None:
-        modes = (values,) * robot.dofs if isinstance(values, str) else tuple(values)
+        try:
+            modes = (values,) * robot.dofs if isinstance(values, str) else tuple(values)
+        except TypeError:
+            raise self.error(robot, f"is {values!r}; {self.expected(robot)}") from None
         if len(modes) != robot.dofs:
             raise self.error(robot, f"has {len(modes)} values; {self.expected(robot)}")
         for name, mode in zip(robot.joint_names, modes, strict=True):
@@ -99,13 +103,13 @@ class Robot:
 
     # A misspelt property is an error
     __slots__ = (
+        "_name",
         "_own",
+        "_pos",
+        "_quat",
         "_summary",
         "floating",
-        "name",
         "package_dirs",
-        "pos",
-        "quat",
         "self_collisions",
         "urdf",
     )
@@ -134,13 +138,13 @@ class Robot:
         *,
         urdf: Path,
         package_dirs: list[Path],
-        pos: Triple,
-        quat: Quaternion,
+        pos: Vector,
+        quat: Vector,
         floating: bool,
         self_collisions: bool,
         summary: dict[str, Any],
     ) -> None:
-        self.name = name
+        self._name = name
         self.urdf = urdf
         self.package_dirs = package_dirs
         self.pos = pos
@@ -149,6 +153,29 @@ class Robot:
         self.self_collisions = self_collisions
         self._summary = summary
         self._own: dict[str, Any] = {}
+
+    @property
+    def name(self) -> str:
+        """Its name in the scene, which stands before joint and link names."""
+        return self._name
+
+    @property
+    def pos(self) -> Triple:
+        """Where the root link stands in the world [m]."""
+        return self._pos
+
+    @pos.setter
+    def pos(self, pos: Vector) -> None:
+        self._pos = checks.triple(f"robot `{self.name}`: pos", pos)
+
+    @property
+    def quat(self) -> Quaternion:
+        """Orientation of the root link in the world, unit quaternion (x, y, z, w)."""
+        return self._quat
+
+    @quat.setter
+    def quat(self, quat: Vector) -> None:
+        self._quat = checks.quaternion(f"robot `{self.name}`: quat", quat)
 
     @property
     def joint_names(self) -> list[str]:

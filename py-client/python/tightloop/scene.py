@@ -7,13 +7,13 @@ import os
 import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, SupportsFloat, SupportsIndex
 
 import numpy as np
 
 from tightloop import _core, checks
 from tightloop.checks import Quaternion, Triple, Vector
+from tightloop.errors import SceneError
 from tightloop.robot import PER_DOF, Robot
 
 Cone = Literal["elliptic", "pyramidal"]
@@ -59,15 +59,42 @@ class Scene:
         SceneError: A value is out of range; the message names it.
     """
 
-    __slots__ = ("_solver", "dt", "gravity", "robots", "shapes", "substeps")
+    __slots__ = ("_dt", "_gravity", "_solver", "_substeps", "robots", "shapes")
 
     def __init__(self, *, dt: float = 1 / 480, substeps: int = 8, gravity: Vector = (0.0, 0.0, -9.81)) -> None:
-        self.dt = checks.number("Scene: dt", dt, above=0.0)
-        self.substeps = checks.integer("Scene: substeps", substeps)
-        self.gravity = checks.triple("Scene: gravity", gravity)
+        self.dt = dt
+        self.substeps = substeps
+        self.gravity = gravity
         self.robots: dict[str, Robot] = {}
         self.shapes: dict[str, StaticShape] = {}
         self._solver = Solver()
+
+    @property
+    def dt(self) -> float:
+        """Length of a physics step [s]."""
+        return self._dt
+
+    @dt.setter
+    def dt(self, dt: SupportsFloat) -> None:
+        self._dt = checks.number("Scene: dt", dt, above=0.0)
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps a control frame."""
+        return self._substeps
+
+    @substeps.setter
+    def substeps(self, substeps: SupportsIndex) -> None:
+        self._substeps = checks.integer("Scene: substeps", substeps)
+
+    @property
+    def gravity(self) -> Triple:
+        """Acceleration of gravity [m/s²], world axes."""
+        return self._gravity
+
+    @gravity.setter
+    def gravity(self, gravity: Vector) -> None:
+        self._gravity = checks.triple("Scene: gravity", gravity)
 
     def solver(
         self,
@@ -167,18 +194,19 @@ class Scene:
         Raises:
             UrdfError: The file is missing, is not URDF, or describes a robot that cannot be simulated.
         """
-        urdf = Path(path).expanduser().absolute()
-        packages = [Path(folder).expanduser().absolute() for folder in package_dirs]
+        urdf = checks.path("add_urdf: path", path)
+        if isinstance(package_dirs, str) or not isinstance(package_dirs, Sequence):
+            raise SceneError(f"add_urdf: package_dirs is {package_dirs!r}; give a list of folders")
+        packages = [checks.path("add_urdf: a folder of package_dirs", folder) for folder in package_dirs]
         summary = json.loads(_core.read_urdf(str(urdf), [str(folder) for folder in packages], bool(floating)))
         own_name = re.sub(r"[^A-Za-z0-9_.\-]", "_", summary["name"])
         name = checks.name("robot", own_name if name is None else name, self._names())
-        position, orientation = checks.pose(f"robot `{name}`", pos, quat)
         robot = Robot(
             name,
             urdf=urdf,
             package_dirs=packages,
-            pos=position,
-            quat=orientation,
+            pos=pos,
+            quat=quat,
             floating=bool(floating),
             self_collisions=bool(self_collisions),
             summary=summary,
@@ -187,12 +215,12 @@ class Scene:
         return robot
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the scene as a TOML file; paths inside are relative to that file.
+        """Write the scene as a TOML file; paths inside are relative to that file where they share a folder with it.
 
         Raises:
             SceneError: The file cannot be written.
         """
-        _core.save_scene(self._json(), str(Path(path).expanduser().absolute()))
+        _core.save_scene(self._json(), str(checks.path("save: path", path)))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Scene:
@@ -202,7 +230,7 @@ class Scene:
             SceneError: The file is missing, or an entry in it is wrong.
             UrdfError: A robot in it cannot be read.
         """
-        file = Path(path).expanduser().absolute()
+        file = checks.path("load: path", path)
         data = json.loads(_core.load_scene(str(file)))
         scene = cls(dt=data["dt"], substeps=data["substeps"], gravity=data["gravity"])
         scene.solver(**data["solver"])
@@ -245,7 +273,8 @@ class Scene:
                 checks.number(f"{what}: smallest of {size}", min(checked[size]), above=0.0)
             else:
                 checked[size] = checks.number(f"{what}: {size}", value, above=0.0)
-        shape = StaticShape(name, kind, *checks.pose(what, pos, quat), **checked)
+        position, orientation = checks.triple(f"{what}: pos", pos), checks.quaternion(f"{what}: quat", quat)
+        shape = StaticShape(name, kind, position, orientation, **checked)
         self.shapes[name] = shape
         return shape
 

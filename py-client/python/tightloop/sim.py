@@ -7,8 +7,7 @@ import os
 import secrets
 import warnings
 import weakref
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop import _core, checks
 from tightloop._core import Frame
 from tightloop.daemon import Daemon
-from tightloop.errors import ArgumentError
+from tightloop.errors import ArgumentError, UnknownField
 from tightloop.scene import Scene
 
 #: An array (worlds, dofs) for the whole scene, one (dofs,) for every world, or such arrays by robot name.
@@ -30,7 +29,7 @@ class FrameCopy:
         self.__dict__.update(arrays)
 
     def __getattr__(self, name: str) -> NDArray[Any]:
-        raise AttributeError(f"this frame carries no field {name!r}; it carries: {', '.join(self.__dict__)}")
+        raise UnknownField(f"this frame carries no field {name!r}; it carries: {', '.join(self.__dict__)}")
 
 
 class Sim:
@@ -189,19 +188,23 @@ def launch(
         raise ArgumentError(f"launch: scene is {type(scene).__name__}; give a tightloop.Scene")
     if isinstance(fields, str):
         raise ArgumentError(f"launch: fields is {fields!r}; give a list of names, such as ({fields!r},)")
+    if not isinstance(fields, Iterable):
+        raise ArgumentError(f"launch: fields is {fields!r}; give a list of names, or () for none")
     # Types are checked here, values by the daemon, before it takes anything
     arguments: dict[str, Any] = {
         "worlds": checks.integer("launch: worlds", worlds, error=ArgumentError),
-        "device": device,
-        "precision": precision,
-        "fields": ",".join(fields),
-        "name": f"sim-{os.getpid()}-{secrets.token_hex(4)}" if name is None else name,
+        "device": checks.text("launch: device", device, error=ArgumentError),
+        "precision": checks.text("launch: precision", precision, error=ArgumentError),
+        "fields": ",".join(checks.text("launch: an entry of fields", field, error=ArgumentError) for field in fields),
+        "name": f"sim-{os.getpid()}-{secrets.token_hex(4)}"
+        if name is None
+        else checks.text("launch: name", name, error=ArgumentError),
         "frames-held": checks.integer("launch: frames_held", frames_held, error=ArgumentError),
     }
     if threads is not None:
         arguments["threads"] = checks.integer("launch: threads", threads, error=ArgumentError)
     if log is not None:
-        arguments["log"] = Path(log).expanduser().absolute()
+        arguments["log"] = checks.path("launch: log", log, error=ArgumentError)
     daemon = Daemon.start(scene.to_toml(), arguments)
     try:
         sim = Sim(_core.Client(arguments["name"], lease=True), daemon)
@@ -219,10 +222,11 @@ def attach(name: str) -> Sim:
     The first command makes this client its controller; until it ends, others that try get `LeaseHeld`.
 
     Raises:
+        ArgumentError: No daemon can have that name.
         UnknownDaemon: No daemon of that name is running; the message lists those that are.
         ProtocolMismatch: The daemon is of another release.
     """
-    return Sim(_core.Client(name, lease=False), None)
+    return Sim(_core.Client(checks.text("attach: name", name, error=ArgumentError), lease=False), None)
 
 
 def _end(client: _core.Client, daemon: Daemon | None, name: str, owner: int) -> None:
