@@ -30,7 +30,7 @@ pub(crate) fn protocol(py: Python<'_>, error: &ProtocolError) -> PyErr {
         FramesHeld { .. } => "FramesHeld",
         NoField { .. } => "UnknownField",
         NotAnInput { .. } | Shape { .. } | CommandRefused { .. } => "CommandRefused",
-        SharedMemory { .. } => "ResourceError",
+        SharedMemory { .. } | Memory { .. } => "ResourceError",
         Timeout { .. } => "WaitTimeout",
         Root { .. } | NameTaken { .. } => "LaunchError",
         _ => "TransportError",

@@ -66,7 +66,8 @@ impl DaemonError {
             Backend(
                 BackendError::NoWorlds | BackendError::NoThreads | BackendError::Lanes { .. },
             ) => "ArgumentError",
-            Backend(BackendError::Memory { .. }) | Protocol(ProtocolError::SharedMemory { .. }) => {
+            Backend(BackendError::Memory { .. })
+            | Protocol(ProtocolError::SharedMemory { .. } | ProtocolError::Memory { .. }) => {
                 "ResourceError"
             }
             Read { .. } | Config(_) | Model(_) => "SceneError",

@@ -102,8 +102,8 @@ fn open(serve: &Serve, stop: &Arc<AtomicBool>) -> Result<(Simulation, Host), Dae
         watch_worlds: serve.watch_worlds,
     };
     let mut told = export::description(&model, &options, &layout, facts);
-    // before anything large is taken: shared memory that is missing kills instead of failing
-    check_memory(&told, &table)?;
+    // before anything large is taken: memory that is missing kills instead of failing
+    check_memory(&told, &table, Simulation::memory_of(&model, &options))?;
     let simulation = Simulation::new(model, &options)?;
     (told.device, told.threads) = (simulation.device().to_owned(), simulation.threads());
     let host = Host::open(tenancy, told, table, Arc::clone(stop))?;

@@ -201,6 +201,20 @@ pub enum ProtocolError {
         what: String,
     },
 
+    /// Shared memory and the daemon's own together are more than the machine or its control group has left.
+    #[error(
+        "{free} bytes of memory are free and {needed} are needed ({what}); use fewer worlds, fewer fields or fewer \
+         frames_held"
+    )]
+    Memory {
+        /// Bytes free.
+        free: u64,
+        /// Bytes needed.
+        needed: u64,
+        /// What for.
+        what: String,
+    },
+
     /// Bytes from the other side make no sense.
     #[error(
         "malformed message from {from}: {problem}; use the same tightloop release on both sides"

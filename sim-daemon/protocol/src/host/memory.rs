@@ -44,13 +44,36 @@ pub(crate) fn all_bytes(description: &Description, frame: &Table) -> usize {
     lease_bytes(description, frame) + watch + FIXED
 }
 
-/// Refuses when `bytes`, and 5 % for what is not counted, do not fit; past the end, shared memory kills instead of failing.
-pub(crate) fn check(bytes: usize, what: &str) -> Result<(), ProtocolError> {
-    let (free, needed) = (free_bytes(), (bytes + bytes / 20) as u64);
-    if needed > free {
+/// Bytes that the daemon's process takes itself for commands: the copy of the last one, its mask.
+pub(crate) fn own_bytes(description: &Description) -> usize {
+    command_bytes(description) + description.worlds
+}
+
+/// What can still be taken [bytes].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Free {
+    /// Of the file system that holds shared memory.
+    shared: u64,
+    /// Of the machine and of our control group, whichever has less; shared memory counts there, too.
+    memory: u64,
+}
+
+/// Refuses when `shared` bytes, and 5 % for what is not counted, do not fit, or not together with `own` bytes of the
+/// process: past the end, shared memory kills instead of failing.
+pub(crate) fn check(free: Free, shared: usize, own: u64, what: &str) -> Result<(), ProtocolError> {
+    let needed = shared as u64 + shared as u64 / 20;
+    if needed > free.shared {
         return Err(ProtocolError::SharedMemory {
             path: SHARED_MEMORY.to_owned(),
-            free,
+            free: free.shared,
+            needed,
+            what: what.to_owned(),
+        });
+    }
+    let needed = needed.saturating_add(own);
+    if needed > free.memory {
+        return Err(ProtocolError::Memory {
+            free: free.memory,
             needed,
             what: what.to_owned(),
         });
@@ -58,8 +81,8 @@ pub(crate) fn check(bytes: usize, what: &str) -> Result<(), ProtocolError> {
     Ok(())
 }
 
-/// What can still be taken: of the file system, of the machine and of our control group, whichever is least.
-fn free_bytes() -> u64 {
+/// What can be taken now.
+pub(crate) fn free() -> Free {
     let number = |path: &str| fs::read_to_string(path).ok()?.trim().parse::<u64>().ok();
     let file_system = statvfs(SHARED_MEMORY).map_or(0, |status| status.f_bavail * status.f_frsize);
     let machine = fs::read_to_string("/proc/meminfo").ok().and_then(|text| {
@@ -73,10 +96,13 @@ fn free_bytes() -> u64 {
     let group = limit
         .zip(number("/sys/fs/cgroup/memory.current"))
         .map(|(limit, used)| limit.saturating_sub(used));
-    [machine, group]
-        .into_iter()
-        .flatten()
-        .fold(file_system, u64::min)
+    Free {
+        shared: file_system,
+        memory: [machine, group]
+            .into_iter()
+            .flatten()
+            .fold(u64::MAX, u64::min),
+    }
 }
 
 /// Takes the pages of a port's data segment now, so that nobody else can: later writes cannot fail.
@@ -99,15 +125,12 @@ pub(crate) fn reserve(prefix: &str, port: u128, what: &str) -> Result<(), Protoc
     let needed = file.metadata().map_err(|error| failed(&error))?.len();
     match fallocate(&file, FallocateFlags::empty(), 0, needed) {
         Ok(()) => Ok(()),
-        Err(rustix::io::Errno::NOSPC) => {
-            let free = free_bytes();
-            Err(ProtocolError::SharedMemory {
-                path: SHARED_MEMORY.to_owned(),
-                free,
-                needed,
-                what: what.to_owned(),
-            })
-        }
+        Err(rustix::io::Errno::NOSPC) => Err(ProtocolError::SharedMemory {
+            path: SHARED_MEMORY.to_owned(),
+            free: free().shared,
+            needed,
+            what: what.to_owned(),
+        }),
         Err(error) => Err(failed(&error)),
     }
 }
@@ -127,4 +150,36 @@ pub(crate) fn used(stem: &str) -> u64 {
         })
         .filter_map(|entry| Some(entry.metadata().ok()?.len()))
         .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_fits_each_memory_alone_but_not_both_together_is_refused() {
+        let free = Free {
+            shared: 1000,
+            memory: 1500,
+        };
+        assert!(check(free, 900, 555, "worlds").is_ok());
+        let Err(ProtocolError::Memory {
+            free: left, needed, ..
+        }) = check(free, 900, 556, "worlds")
+        else {
+            panic!("945 shared and 556 of our own are more than 1500");
+        };
+        assert_eq!((left, needed), (1500, 1501));
+        let shared = check(free, 960, 0, "worlds");
+        assert!(matches!(
+            shared,
+            Err(ProtocolError::SharedMemory {
+                free: 1000,
+                needed: 1008,
+                ..
+            })
+        ));
+        let overflowing = check(free, 900, u64::MAX, "worlds");
+        assert!(matches!(overflowing, Err(ProtocolError::Memory { .. })));
+    }
 }

@@ -63,7 +63,8 @@ impl Host {
     /// host fills in name, session, process, protocol and schema.
     ///
     /// # Errors
-    /// [`ProtocolError::SharedMemory`] before anything is taken; [`ProtocolError::Transport`].
+    /// [`ProtocolError::SharedMemory`] and [`ProtocolError::Memory`] before anything is taken;
+    /// [`ProtocolError::Transport`].
     pub fn open(
         mut tenancy: Tenancy,
         mut description: Description,
@@ -78,7 +79,7 @@ impl Host {
         description.pid = std::process::id();
         description.schema = description.schema_hash();
         let watch_table = memory::watch_table(&description, &frame);
-        check_memory(&description, &frame)?;
+        check_memory(&description, &frame, 0)?;
 
         let node = transport::node::<S>(&tenancy.place().transport_config(session), "daemon")?;
         let attributes = [
@@ -197,16 +198,27 @@ impl Host {
     }
 }
 
-/// Refuses a run whose shared memory would not fit, before anything is taken.
+/// Refuses a run whose shared memory would not fit, or not beside the `physics_bytes` of its worlds, before anything is
+/// taken.
 ///
 /// # Errors
-/// [`ProtocolError::SharedMemory`] with the bytes free and needed.
-pub fn check_memory(description: &Description, frame: &Table) -> Result<(), ProtocolError> {
+/// [`ProtocolError::SharedMemory`] or [`ProtocolError::Memory`] with the bytes free and needed.
+pub fn check_memory(
+    description: &Description,
+    frame: &Table,
+    physics_bytes: u64,
+) -> Result<(), ProtocolError> {
     let what = format!(
         "{} worlds, {} frames held",
         description.worlds, description.frames_held
     );
-    memory::check(memory::all_bytes(description, frame), &what)
+    let own = physics_bytes.saturating_add(memory::own_bytes(description) as u64);
+    memory::check(
+        memory::free(),
+        memory::all_bytes(description, frame),
+        own,
+        &what,
+    )
 }
 
 /// Random number of a run: two runs must not be taken for each other, nothing more.

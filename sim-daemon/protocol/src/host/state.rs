@@ -75,8 +75,11 @@ impl State {
         }
         if self.lane.is_none() {
             let needed = memory::lease_bytes(&self.description, &self.frame);
-            match memory::check(needed, "a lease") {
-                Err(ProtocolError::SharedMemory { free, needed, .. }) => {
+            match memory::check(memory::free(), needed, 0, "a lease") {
+                Err(
+                    ProtocolError::SharedMemory { free, needed, .. }
+                    | ProtocolError::Memory { free, needed, .. },
+                ) => {
                     return Response::NoMemory { free, needed };
                 }
                 Err(error) => {
