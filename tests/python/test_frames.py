@@ -178,6 +178,22 @@ def test_commands_of_one_robot_leave_the_other(pendulum, pendulum_urdf):
         assert not np.array_equal(frame.joint_q[:, 0:2], frame.joint_q[:, 2:4])
 
 
+@pytest.mark.parametrize("order", [("post",), ("post", "arm"), ("arm", "post")], ids=str)
+def test_a_robot_without_moving_joints_takes_commands_of_no_columns(tmp_path, pendulum_urdf, order):
+    post = tmp_path / "post.urdf"
+    post.write_text('<robot name="post"><link name="base"/></robot>')
+    scene = tl.Scene()
+    for name in order:
+        scene.add_urdf(post if name == "post" else pendulum_urdf, name=name)
+    with tl.launch(scene, worlds=5, fields=("joint_q", "mass_matrix")) as sim:
+        commands = {name: np.zeros((5, sim.dofs[name].stop - sim.dofs[name].start)) for name in order}
+        sim.step(joint_f=commands, joint_target_q=commands, joint_target_qd=commands)
+        assert sim.step(joint_target_qd={"post": np.zeros((5, 0))}).step.tolist() == [2] * 5
+        frame = sim.write(joint_q=commands, joint_qd=commands, mask=np.arange(5) > 2)
+        assert frame.joint_q.shape == (5, len(sim.dof_names))
+        assert not frame.joint_q[3:].any() and frame.status.tolist() == [0] * 5
+
+
 def sim_alone(urdf):
     """Positions of an undriven pendulum after one frame, two worlds."""
     scene = tl.Scene(dt=1 / 480, substeps=4)

@@ -108,10 +108,9 @@ impl Table {
                     row.name, row.offset, row.bytes
                 ));
             }
-            if rows
-                .iter()
-                .any(|other| other.name == row.name && other.start == row.start)
-            {
+            // arrays without columns, of robots that stand still, begin where their neighbours do
+            let twin = |other: &Row| other.name == row.name && other.start == row.start;
+            if row.bytes > 0 && rows.iter().any(|other| other.bytes > 0 && twin(other)) {
                 return Err(format!("{} comes twice", row.name));
             }
             free = row.offset + row.bytes;
@@ -224,6 +223,19 @@ mod tests {
             }
         }
         assert!(Table::parse(&payload, u32::MAX).is_err());
+    }
+
+    #[test]
+    fn an_array_comes_once_and_one_without_columns_beside_it() {
+        let of = |columns: [usize; 2]| {
+            let array = |columns| ("joint_f".to_owned(), Dtype::F32, vec![3, columns], 0);
+            let table = Table::lay_out(columns.map(array));
+            let mut payload = vec![0; table.total_bytes() / 8];
+            payload[..table.words().len()].copy_from_slice(table.words());
+            Table::parse(&payload, 2)
+        };
+        assert!(of([0, 9]).is_ok() && of([9, 0]).is_ok() && of([0, 0]).is_ok());
+        assert_eq!(of([9, 9]).unwrap_err(), "joint_f comes twice");
     }
 
     #[test]

@@ -169,6 +169,10 @@ impl<F: Lane> Chunk<F> {
         values: Values<'_>,
         mask: Option<&[bool]>,
     ) {
+        // of a robot that stands still; its place may lie behind the last number
+        if columns.is_empty() {
+            return;
+        }
         let n = job.constants.dofs.len();
         let target = StateField::of(field);
         let writes_state = matches!(target, StateField::Q | StateField::Qd);
