@@ -215,6 +215,22 @@ def test_the_working_directory_cannot_shadow_what_the_daemon_imports(pendulum, t
         sim.step()
 
 
+@pytest.mark.parametrize(
+    ("end", "told"),
+    [
+        ("os.kill(os.getpid(), 9)", "killed by signal 9"),
+        ("sys.exit(7)", "exit code 7"),
+        ("print('hello')", "exit code 0"),
+    ],
+)
+def test_a_daemon_that_ends_before_it_is_ready_says_how(pendulum, tmp_path, monkeypatch, end, told):
+    program = tmp_path / "daemon.py"
+    program.write_text(f"import os, sys\n{end}")
+    monkeypatch.setattr("tightloop.daemon._PROGRAM", program)
+    with pytest.raises(tl.LaunchError, match=rf"{told} before it was ready; .*log=FILE"):
+        tl.launch(pendulum, worlds=1)
+
+
 def test_a_log_file_gets_the_news(pendulum, tmp_path, capfd):
     log = tmp_path / "daemon.log"
     with tl.launch(pendulum, worlds=1, log=log) as sim:

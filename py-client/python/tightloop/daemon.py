@@ -65,10 +65,17 @@ class Daemon:
         try:
             answer = json.loads(line)
         except ValueError:
-            code = self.process.wait(_STOP_SECONDS)
-            raise LaunchError(f"the daemon ended with exit code {code} before it was ready; see its log") from None
+            raise LaunchError(f"the daemon {self._end()} before it was ready; launch again with log=FILE") from None
         if "error" in answer:
             raise getattr(errors, answer["error"]["kind"], LaunchError)(answer["error"]["message"])
+
+    def _end(self) -> str:
+        """How a daemon ended that closed its stdout, or wrote into it what it never does."""
+        try:
+            code = self.process.wait(_STOP_SECONDS)
+        except subprocess.TimeoutExpired:
+            return "was not understood"
+        return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
 
     def stop(self) -> None:
         """Wait for the daemon to end, make it end if it does not, and remove what a killed one leaves."""
