@@ -36,12 +36,10 @@ fn pendulum(dt: f64, count: usize, l: f64) -> Description {
         links.push(bob(&format!("bob{k}"), 1.0 / (k + 1) as f64, l));
         let at = if k == 0 { [0.0; 3] } else { [0.0, 0.0, -l] };
         joints.push(Joint {
-            kind: JointKind::Revolute,
             axis: [0.0, 1.0, 0.0],
             origin: Pose::at(at),
-            ..Joint::fixed(&format!("joint{k}"), k, k + 1)
+            ..Joint::new(JointKind::Revolute, &format!("joint{k}"), Some(k), k + 1)
         });
-        joints[k].name = format!("joint{k}");
     }
     scene.robots.push(Robot {
         name: "pendulum".into(),
@@ -135,7 +133,10 @@ fn mass_slides_down_a_rail_with_half_g_t_squared() {
     let (dt, m) = (1e-3, 2.0);
     let mut scene = pendulum(dt, 1, 0.3);
     let joint = &mut scene.robots[0].joints[0];
-    (joint.kind, joint.axis) = (JointKind::Prismatic, [0.0, 0.0, -1.0]);
+    *joint = Joint {
+        axis: [0.0, 0.0, -1.0],
+        ..Joint::new(JointKind::Prismatic, "rail", Some(0), 1)
+    };
     let model = scene.compile().unwrap();
     let mut run = Run::reference(&model, &[Field::JointQ, Field::JointQdd, Field::BodyQ]);
     for _ in 0..100 {

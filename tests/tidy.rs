@@ -189,7 +189,7 @@ fn a_step_names_no_backend_returns_no_result_and_takes_no_memory() {
 
 #[test]
 fn a_model_cannot_be_changed() {
-    let text = read("sim-core/src/model/compile.rs");
+    let text = read("sim-core/src/model/frozen.rs");
     let start = text.find("impl Model {").expect("the model has methods");
     let body = &text[start..start + text[start..].find("\n}").unwrap()];
     assert!(body.contains("&self") && !body.contains("&mut self"));

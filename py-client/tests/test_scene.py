@@ -78,8 +78,8 @@ def test_a_property_cannot_be_changed_in_place(arm: tl.Robot):
     [
         ("joint_q", [1, 2, 3], r"robot `arm`: joint_q has 3 values; expected 2.*shoulder, elbow"),
         ("joint_q", [[1, 2]], r"joint_q has shape \(1, 2\)"),
-        ("joint_q", [1, math.nan], r"joint_q of dof `arm/elbow` is nan"),
-        ("joint_q", [math.inf, 0], r"joint_q of dof `arm/shoulder` is inf; give a finite number$"),
+        ("joint_q", [1, math.nan], r"joint_q of coordinate `arm/elbow` is nan"),
+        ("joint_q", [math.inf, 0], r"joint_q of coordinate `arm/shoulder` is inf; give a finite number$"),
         ("joint_q", ["a", "b"], r"joint_q has dtype <U1"),
         ("joint_q", [1j, 0], r"joint_q has dtype complex128"),
         ("joint_q", [[1], [1, 2]], r"joint_q is no array"),

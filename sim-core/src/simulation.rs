@@ -35,6 +35,9 @@ impl Default for Options {
     }
 }
 
+/// Shortest quaternion that says a rotation.
+const QUATERNION_MIN: f64 = 1e-6;
+
 /// Many worlds of one model.
 pub struct Simulation {
     model: Arc<Model>,
@@ -114,7 +117,7 @@ impl Simulation {
         };
         let worlds = (options.worlds as u64).saturating_add(width);
         // state and commands of a world, its counters; see backend/cpu/chunk.rs
-        worlds.saturating_mul(6 * model.dofs() as u64 * real + 12)
+        worlds.saturating_mul((5 * model.dofs() + model.coords()) as u64 * real + 12)
     }
 
     /// Sets columns of a command; it holds until it is set again or the world is reset.
@@ -228,16 +231,56 @@ impl Simulation {
                 columns: columns.len(),
             });
         }
+        let names = match field {
+            Field::JointQ => self.model.coord_names(),
+            _ => self.model.dof_names(),
+        };
         if let Some(place) = values.first_not_finite() {
             return Err(BackendError::NotFinite {
                 field: row.name,
                 world: place / columns.len(),
-                name: self.model.dof_names()[columns.start + place % columns.len()].clone(),
+                name: names[columns.start + place % columns.len()].clone(),
                 value: match values {
                     Values::F32(v) => f64::from(v[place]),
                     Values::F64(v) => v[place],
                 },
             });
+        }
+        if field == Field::JointQ {
+            self.check_quaternions(columns, values)?;
+        }
+        Ok(())
+    }
+
+    /// Refuses quaternions that are no rotation; those of another length than 1 are made unit.
+    fn check_quaternions(
+        &self,
+        columns: &Range<usize>,
+        values: Values<'_>,
+    ) -> Result<(), BackendError> {
+        for first in self.model.constants().quaternions() {
+            if first + 4 <= columns.start || columns.end <= first {
+                continue;
+            }
+            let name = || self.model.coord_names()[first].clone();
+            if first < columns.start || columns.end < first + 4 {
+                return Err(BackendError::PartOfQuaternion { name: name() });
+            }
+            for world in 0..self.worlds {
+                let place = world * columns.len() + first - columns.start;
+                let square: f64 = (place..place + 4)
+                    .map(|i| match values {
+                        Values::F32(v) => f64::from(v[i]).powi(2),
+                        Values::F64(v) => v[i].powi(2),
+                    })
+                    .sum();
+                if square < QUATERNION_MIN * QUATERNION_MIN {
+                    return Err(BackendError::Quaternion {
+                        name: name(),
+                        world,
+                    });
+                }
+            }
         }
         Ok(())
     }

@@ -31,7 +31,9 @@ fn fr3() -> Constants<f32> {
         .add_urdf(path, UrdfOptions::named("arm"))
         .expect("the FR3 is in the repository");
     for joint in &mut robot.joints {
-        (joint.target_ke, joint.target_kd, joint.armature) = (400.0, 40.0, 0.1);
+        for dof in &mut joint.dofs {
+            (dof.target_ke, dof.target_kd, dof.armature) = (400.0, 40.0, 0.1);
+        }
     }
     scene
         .compile()
@@ -270,6 +272,7 @@ fn what_a_stage_does_not_name_it_neither_reads_nor_writes() {
         JointTargetQd,
         Rotation,
         Origin,
+        Reference,
         Motion,
         Inertia,
         BiasForce,

@@ -86,23 +86,34 @@ fn lesson_becomes_its_description() {
         (arm.name.as_str(), arm.pose.pos),
         ("arm", [-0.5, -0.5, 0.1])
     );
-    let joints: Vec<_> = arm.dofs().into_iter().map(|dof| &arm.joints[dof]).collect();
-    assert_eq!((joints[3].q, joints[8].q), (-2.4, 0.05));
-    assert_eq!(
-        (joints[3].target_q, joints[3].target_kd, joints[3].armature),
-        (None, 0.0, 0.0)
-    );
-    assert!(joints.iter().all(|joint| joint.target_ke == 100.0));
+    let joints: Vec<_> = arm
+        .moving_joints()
+        .into_iter()
+        .map(|dof| &arm.joints[dof])
+        .collect();
+    assert_eq!((joints[3].q[0], joints[8].q[0]), (-2.4, 0.05));
     assert_eq!(
         (
-            joints[0].target_mode,
-            joints[1].target_mode,
-            joints[2].target_mode
+            joints[3].dofs[0].target_q,
+            joints[3].dofs[0].target_kd,
+            joints[3].dofs[0].armature
+        ),
+        (None, 0.0, 0.0)
+    );
+    assert!(joints.iter().all(|joint| joint.dofs[0].target_ke == 100.0));
+    assert_eq!(
+        (
+            joints[0].dofs[0].target_mode,
+            joints[1].dofs[0].target_mode,
+            joints[2].dofs[0].target_mode
         ),
         (TargetMode::Position, TargetMode::Velocity, TargetMode::Both)
     );
     assert_eq!(
-        (joints[0].effort_limit, joints[7].effort_limit),
+        (
+            joints[0].dofs[0].effort_limit,
+            joints[7].dofs[0].effort_limit
+        ),
         (Some(87.0), None)
     );
 }
@@ -116,9 +127,9 @@ fn effort_limits_are_the_robots_unless_given() {
     let scene = parse(&text).describe(&assets()).unwrap();
     let arm = &scene.robots[0];
     let limits: Vec<_> = arm
-        .dofs()
+        .moving_joints()
         .into_iter()
-        .map(|dof| arm.joints[dof].effort_limit.unwrap())
+        .map(|dof| arm.joints[dof].dofs[0].effort_limit.unwrap())
         .collect();
     assert_eq!(
         limits,
@@ -248,7 +259,7 @@ fn values_that_physics_cannot_use_are_refused_by_name() {
     let seven = lesson(", 0.05, 0.05]\njoint_target_mode", "]\njoint_target_mode");
     assert_says(
         &refusal(&seven),
-        &["robot `arm`: joint_q has 7 values, the robot has 9 dofs"],
+        &["robot `arm`: joint_q has 7 values, the robot has 9 coordinates"],
     );
     assert_says(
         &refusal(&lesson("-2.4", "nan")),
@@ -260,7 +271,7 @@ fn values_that_physics_cannot_use_are_refused_by_name() {
     );
     assert_says(
         &refusal(&lesson("urdf =", "floating = true\nurdf =")),
-        &["`arm`", "floating", "not supported yet"],
+        &["robot `arm`: joint_q has 9 values, the robot has 16 coordinates"],
     );
     assert_says(
         &refusal(&lesson("urdf =", "quat = [0.0, 0.0, 0.0, 0.0]\nurdf =")),

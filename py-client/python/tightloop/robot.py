@@ -17,7 +17,9 @@ MODES = ("position", "velocity", "both")
 
 
 class _PerDof:
-    """A property with one entry a dof; a single value is written to every dof."""
+    """A property with one entry a dof; a single value is written to every dof that can be driven."""
+
+    entry = "dof"
 
     def __init__(self, doc: str) -> None:
         self.__doc__ = doc
@@ -28,8 +30,12 @@ class _PerDof:
     def error(self, robot: Robot, problem: str) -> SceneError:
         return SceneError(f"robot `{robot.name}`: {self.name} {problem}")
 
+    def names(self, robot: Robot) -> list[str]:
+        return robot.dof_names
+
     def expected(self, robot: Robot) -> str:
-        return f"expected {robot.dofs}, one a dof ({_some(robot.joint_names)}), or a single one for all"
+        names = self.names(robot)
+        return f"expected {len(names)}, one a {self.entry} ({_some(names)}), or a single one for all"
 
 
 class _Numbers(_PerDof):
@@ -46,7 +52,7 @@ class _Numbers(_PerDof):
             return self
         own = robot._own.get(self.name)
         if own is None and self.otherwise is not None:
-            own = getattr(robot, self.otherwise)
+            own = robot._start_targets()
         values = np.array(robot._urdf_values(self.name) if own is None else own, dtype=np.float64)
         # `arm.joint_q[3] = 1` would change a copy: better an error than silence
         values.flags.writeable = False
@@ -59,17 +65,35 @@ class _Numbers(_PerDof):
             raise self.error(robot, f"is no array: {problem}") from None
         if given.dtype.kind not in "fiu":
             raise self.error(robot, f"has dtype {given.dtype}; give real numbers")
-        if given.ndim != 0 and given.shape != (robot.dofs,):
+        names = self.names(robot)
+        if given.ndim != 0 and given.shape != (len(names),):
             got = f"{given.shape[0]} values" if given.ndim == 1 else f"shape {given.shape}"
             raise self.error(robot, f"has {got}; {self.expected(robot)}")
-        checked = np.full(robot.dofs, given, dtype=np.float64)
-        for name, value in zip(robot.joint_names, checked, strict=True):
+        checked = np.full(len(names), given, dtype=np.float64)
+        if given.ndim == 0:
+            checked[~self.takes_single(robot)] = 0.0
+        for name, value in zip(names, checked, strict=True):
             if not (np.isfinite(value) or (self.limit and value == np.inf)):
                 cure = "a finite number, or inf for no limit" if self.limit else "a finite number"
-                raise self.error(robot, f"of dof `{robot.name}/{name}` is {value}; give {cure}")
+                raise self.error(robot, f"of {self.entry} `{robot.name}/{name}` is {value}; give {cure}")
             if value < 0.0 and not self.signed:
-                raise self.error(robot, f"of dof `{robot.name}/{name}` is {value}; it cannot be negative")
+                raise self.error(robot, f"of {self.entry} `{robot.name}/{name}` is {value}; it cannot be negative")
         robot._own[self.name] = checked
+
+    def takes_single(self, robot: Robot) -> NDArray[np.bool_]:
+        return np.array(robot._summary["dof_driven"], dtype=bool)
+
+
+class _Positions(_Numbers):
+    """One entry a position coordinate; a quaternion where a joint turns freely."""
+
+    entry = "coordinate"
+
+    def names(self, robot: Robot) -> list[str]:
+        return robot.coord_names
+
+    def takes_single(self, robot: Robot) -> NDArray[np.bool_]:
+        return np.ones(len(robot.coord_names), dtype=bool)
 
 
 class _Modes(_PerDof):
@@ -87,7 +111,7 @@ class _Modes(_PerDof):
             raise self.error(robot, f"is {values!r}; {self.expected(robot)}") from None
         if len(modes) != robot.dofs:
             raise self.error(robot, f"has {len(modes)} values; {self.expected(robot)}")
-        for name, mode in zip(robot.joint_names, modes, strict=True):
+        for name, mode in zip(robot.dof_names, modes, strict=True):
             if mode not in MODES:
                 choices = ", ".join(map(repr, MODES))
                 raise self.error(robot, f"of dof `{robot.name}/{name}` is {mode!r}; choose one of {choices}")
@@ -97,8 +121,8 @@ class _Modes(_PerDof):
 class Robot:
     """A robot of a scene, made by `Scene.add_urdf`.
 
-    Properties have one entry a moving joint, in the order of ``joint_names``; a single value is written to all of them.
-    What is not set here is the URDF's.
+    Properties have one entry a dof, in the order of ``dof_names`` (``joint_q``: a coordinate, ``coord_names``). A single
+    value is written to all of them, but for those of a free body, which has no drive. What is not set is the URDF's.
     """
 
     # A misspelt property is an error
@@ -114,7 +138,7 @@ class Robot:
         "urdf",
     )
 
-    joint_q = _Numbers("Start positions [rad or m], shape ``(dofs,)``.")
+    joint_q = _Positions("Start positions [rad or m], shape ``(coords,)``.")
     joint_target_q = _Numbers(
         "Position targets at the start [rad or m], shape ``(dofs,)``; the start positions if not set.",
         otherwise="joint_q",
@@ -183,6 +207,16 @@ class Robot:
         return list(self._summary["joint_names"])
 
     @property
+    def dof_names(self) -> list[str]:
+        """Dofs: the joint, and for one with several ``joint.part``."""
+        return list(self._summary["dof_names"])
+
+    @property
+    def coord_names(self) -> list[str]:
+        """Position coordinates: the joint, and for one with several ``joint.part``."""
+        return list(self._summary["coord_names"])
+
+    @property
     def link_names(self) -> list[str]:
         """Links in the order of their bodies, as the URDF names them."""
         return list(self._summary["link_names"])
@@ -194,8 +228,8 @@ class Robot:
 
     @property
     def dofs(self) -> int:
-        """Number of moving joints."""
-        return len(self._summary["joint_names"])
+        """Number of degrees of freedom."""
+        return len(self._summary["dof_names"])
 
     def table(self) -> dict[str, Any]:
         """The robot as a scene file has it, paths absolute; what was not set is left out."""
@@ -214,7 +248,14 @@ class Robot:
     def _urdf_values(self, name: str) -> Any:
         if name == "joint_target_mode":
             return ["position"] * self.dofs
+        if name == "joint_q" and self.floating:
+            return [*self.pos, *self.quat, *self._summary["joint_q"][7:]]
         return self._summary.get(name, [0.0] * self.dofs)
+
+    def _start_targets(self) -> list[float]:
+        """Targets that hold the start position; those of balls and free bodies are left to the scene's compiler."""
+        start = dict(zip(self.coord_names, self.joint_q, strict=True))
+        return [float(start.get(name, 0.0)) for name in self.dof_names]
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, dofs={self.dofs}, urdf={str(self.urdf)!r})"

@@ -85,6 +85,24 @@ pub enum BackendError {
         /// Worlds of the simulation.
         worlds: usize,
     },
+    /// A quaternion without direction.
+    #[error(
+        "the quaternion that begins at `{name}` is 0 in world {world}; nothing was written, send (x, y, z, w) of length 1"
+    )]
+    Quaternion {
+        /// First coordinate.
+        name: String,
+        /// First world concerned.
+        world: usize,
+    },
+    /// Some entries of a quaternion without the others.
+    #[error(
+        "the columns hold only a part of the quaternion that begins at `{name}`; write all four entries"
+    )]
+    PartOfQuaternion {
+        /// First coordinate.
+        name: String,
+    },
     /// NaN or infinity.
     #[error(
         "`{field}` is {value} in world {world} for `{name}`; nothing was written, send finite numbers"

@@ -26,15 +26,17 @@ pub struct Block<F, V> {
     pub work: Workspace<F>,
 }
 
-/// Results and scratch of the stages. Positions and moments are about the robot's base, in world axes.
+/// Results and scratch of the stages. Positions and moments are about the robot's reference point, in world axes.
 pub struct Workspace<F> {
-    /// Rotation of each dof's frame, by columns. `(dofs, 3, 3)` [–]
+    /// Rotation of each body's frame, by columns. `(bodies, 3, 3)` [–]
     pub rotation: Vec<Mat3<F>>,
-    /// Origin of each dof's frame. `(dofs, 3)` [m]
+    /// Origin of each body's frame. `(bodies, 3)` [m]
     pub origin: Vec<Vec3<F>>,
-    /// Motion axis of each dof at the base, linear then angular. `(dofs, 2, 3)` [–]
+    /// World position of each robot's reference point. `(trees, 3)` [m]
+    pub reference: Vec<Vec3<F>>,
+    /// Motion axis of each dof at the reference point, linear then angular. `(dofs, 2, 3)` [–]
     pub motion: Vec<Spatial<F>>,
-    /// Inertia of each dof's body about the base. `(dofs, 10)` [kg, kg·m, kg·m²]
+    /// Inertia of each body about the reference point. `(bodies, 10)` [kg, kg·m, kg·m²]
     pub inertia: Vec<Inertia<F>>,
     /// Coriolis, centrifugal and gravity forces. `(dofs)` [N·m or N]
     pub bias_force: Vec<F>,
@@ -52,15 +54,15 @@ pub struct Workspace<F> {
     pub efc_force: Vec<F>,
     /// Constraint forces in joint space, Jᵀ f. `(dofs)` [N·m or N]
     pub constraint_force: Vec<F>,
-    /// Orientation of each dof's frame. `(dofs, 4)` [–]
+    /// Orientation of each body's frame. `(bodies, 4)` [–]
     pub orientation: Vec<Quat<F>>,
-    /// Link frames in the world: position, quaternion (x, y, z, w). `(bodies, 7)` [m, –]
+    /// Link frames in the world: position, quaternion (x, y, z, w). `(frames, 7)` [m, –]
     pub body_q: Vec<[F; 7]>,
-    /// Scratch of a stage: velocity of each body. `(dofs, 2, 3)`
+    /// Scratch of a stage: velocity of each body. `(bodies, 2, 3)`
     pub velocity: Vec<Spatial<F>>,
-    /// Scratch of a stage: acceleration, then force of each body. `(dofs, 2, 3)`
+    /// Scratch of a stage: acceleration, then force of each body. `(bodies, 2, 3)`
     pub force: Vec<Spatial<F>>,
-    /// Scratch of a stage: inertia of each subtree. `(dofs, 10)`
+    /// Scratch of a stage: inertia of each subtree. `(bodies, 10)`
     pub composite: Vec<Inertia<F>>,
     /// Scratch of a stage: a matrix to factor. Packed as `mass_matrix`.
     pub hessian: Vec<F>,
@@ -91,6 +93,8 @@ pub enum Slot {
     Rotation,
     /// [`Workspace::origin`]
     Origin,
+    /// [`Workspace::reference`]
+    Reference,
     /// [`Workspace::motion`]
     Motion,
     /// [`Workspace::inertia`]
@@ -126,11 +130,11 @@ pub enum Numbers<'a, F, V> {
 impl<F: Num, V: Copy> Block<F, V> {
     /// Room for a model; every number 0, every cell a copy of `cell`.
     pub fn new<R: Real>(m: &Constants<R>, cell: V) -> Self {
-        let (n, rows) = (m.dofs.len(), m.rows());
+        let (n, bodies, rows) = (m.dofs.len(), m.bodies.len(), m.rows());
         let zero = F::c(0.0);
         let packed = m.pattern.len();
         Block {
-            joint_q: vec![cell; n],
+            joint_q: vec![cell; m.coords],
             joint_qd: vec![cell; n],
             joint_qdd: vec![cell; n],
             unconverged: vec![cell; 1],
@@ -138,10 +142,11 @@ impl<F: Num, V: Copy> Block<F, V> {
             joint_target_q: vec![zero; n],
             joint_target_qd: vec![zero; n],
             work: Workspace {
-                rotation: vec![[[zero; 3]; 3]; n],
-                origin: vec![[zero; 3]; n],
+                rotation: vec![[[zero; 3]; 3]; bodies],
+                origin: vec![[zero; 3]; bodies],
+                reference: vec![[zero; 3]; m.trees.len()],
                 motion: vec![[[zero; 3]; 2]; n],
-                inertia: vec![[zero; 10]; n],
+                inertia: vec![[zero; 10]; bodies],
                 bias_force: vec![zero; n],
                 mass_matrix: vec![zero; packed],
                 smooth_force: vec![zero; n],
@@ -150,11 +155,11 @@ impl<F: Num, V: Copy> Block<F, V> {
                 limit_side: vec![zero; m.limits.len()],
                 efc_force: vec![zero; rows],
                 constraint_force: vec![zero; n],
-                orientation: vec![[zero; 4]; n],
+                orientation: vec![[zero; 4]; bodies],
                 body_q: vec![[zero; 7]; m.frames.len()],
-                velocity: vec![[[zero; 3]; 2]; n],
-                force: vec![[[zero; 3]; 2]; n],
-                composite: vec![[zero; 10]; n],
+                velocity: vec![[[zero; 3]; 2]; bodies],
+                force: vec![[[zero; 3]; 2]; bodies],
+                composite: vec![[zero; 10]; bodies],
                 hessian: vec![zero; packed],
                 vector: [vec![zero; n], vec![zero; n], vec![zero; n], vec![zero; n]],
                 row: [vec![zero; rows], vec![zero; rows]],
@@ -176,6 +181,7 @@ impl<F: Num, V: Copy> Block<F, V> {
             Slot::JointTargetQd => Values(&mut self.joint_target_qd),
             Slot::Rotation => Values(w.rotation.as_flattened_mut().as_flattened_mut()),
             Slot::Origin => Values(w.origin.as_flattened_mut()),
+            Slot::Reference => Values(w.reference.as_flattened_mut()),
             Slot::Motion => Values(w.motion.as_flattened_mut().as_flattened_mut()),
             Slot::Inertia => Values(w.inertia.as_flattened_mut()),
             Slot::BiasForce => Values(&mut w.bias_force),

@@ -1,6 +1,6 @@
 //! Unit quaternions (x, y, z, w).
 
-use super::vec3::Vec3;
+use super::vec3::{Mat3, Vec3, dot, scale};
 use crate::lane::Num;
 
 /// x, y, z, w
@@ -43,4 +43,71 @@ pub fn rotate<F: Num>(q: Quat<F>, v: Vec3<F>) -> Vec3<F> {
     let u = [q[0], q[1], q[2]];
     let t = cross_add(u, v, scale(v, q[3]));
     scale_add(cross(u, t), F::c(2.0), v)
+}
+
+/// The rotation matrix of a unit quaternion, by columns.
+#[inline(always)]
+pub fn matrix<F: Num>(q: Quat<F>) -> Mat3<F> {
+    let [x, y, z, w] = q;
+    let (one, two) = (F::c(1.0), F::c(2.0));
+    let (xx, yy, zz) = (x * x, y * y, z * z);
+    let (xy, xz, yz) = (x * y, x * z, y * z);
+    let (wx, wy, wz) = (w * x, w * y, w * z);
+    [
+        [two.fnma(yy + zz, one), two * (xy + wz), two * (xz - wy)],
+        [two * (xy - wz), two.fnma(xx + zz, one), two * (yz + wx)],
+        [two * (xz + wy), two * (yz - wx), two.fnma(xx + yy, one)],
+    ]
+}
+
+/// The quaternion after turning with angular velocity `spin` (in its own axes) for a time, made unit again.
+#[inline(always)]
+pub fn turned<F: Num>(q: Quat<F>, spin: Vec3<F>, time: F) -> Quat<F> {
+    let r = mul(q, exp(scale(spin, time)));
+    let norm = r[0].fma(r[0], r[1].fma(r[1], r[2].fma(r[2], r[3] * r[3])));
+    let inverse = F::c(1.0).div(norm.sqrt());
+    [
+        r[0] * inverse,
+        r[1] * inverse,
+        r[2] * inverse,
+        r[3] * inverse,
+    ]
+}
+
+/// The inverse of a unit quaternion.
+#[inline(always)]
+pub fn conjugate<F: Num>(q: Quat<F>) -> Quat<F> {
+    [-q[0], -q[1], -q[2], q[3]]
+}
+
+/// The turn by a rotation vector [rad].
+#[inline(always)]
+pub fn exp<F: Num>(turn: Vec3<F>) -> Quat<F> {
+    let half = F::c(0.5);
+    let angle = dot(turn, turn).sqrt();
+    let (sin, cos) = (angle * half).sincos();
+    // sin(θ/2) / θ; where θ is too small for a quotient, its limit 1/2
+    let small = angle.lt(F::c(1e-15));
+    let ratio = F::select(small, half, sin.div(F::select(small, F::c(1.0), angle)));
+    let [x, y, z] = scale(turn, ratio);
+    [x, y, z, cos]
+}
+
+/// The rotation vector of a unit quaternion, at most π long [rad].
+#[inline(always)]
+pub fn log<F: Num>(q: Quat<F>) -> Vec3<F> {
+    let (zero, two) = (F::c(0.0), F::c(2.0));
+    // q and -q are the same turn: take the short way
+    let w = q[3];
+    let sign = F::select(w.lt(zero), -two, two);
+    let axis = [q[0], q[1], q[2]];
+    let sin = dot(axis, axis).sqrt();
+    let small = sin.lt(F::c(1e-15));
+    let angle = sin.atan2_positive(w.abs());
+    let ratio = F::select(
+        small,
+        F::c(1.0),
+        angle.div(F::select(small, F::c(1.0), sin)),
+    );
+    scale(axis, ratio * sign)
 }

@@ -1,124 +1,17 @@
 //! Description → Model: sorted, checked, frozen.
 //!
-//! Links that are fixed to each other become one body; every dof's frame is turned so that its
-//! axis is z; constraint parameters that derive from mass are evaluated at the reference pose q = 0.
+//! Links that are fixed to each other become one body; the frame of a joint with an axis is turned so
+//! that the axis is z; a planar joint becomes two slides and a turn; constraint parameters that derive
+//! from mass are evaluated at the reference pose q = 0.
 
-use super::constants::{Constants, Dof, Equality, Frame, Friction, Impedance, Limit, Newton, Soft};
+use super::constants::{Body, Constants, Dof, Frame, MassEntry, Motion, Newton, Tree};
+use super::frozen::{Model, RobotRange, Start};
+use super::inertia::merge;
 use super::inverse_weight;
-use super::{Description, JointKind, ModelError, Pose, Robot, TargetMode};
+use super::rows::{DofJoint, add_rows};
+use super::{Description, Inertial, Joint, JointKind, ModelError, Pose, Robot, TargetMode};
 use crate::math::factor::Pattern;
-use std::ops::Range;
 use std::sync::Arc;
-
-/// MuJoCo's default `solimp` (0.9, 0.95, 0.001, 0.5, 2).
-const IMPEDANCE: Impedance<f64> = Impedance {
-    d_min: 0.9,
-    d_max: 0.95,
-    inverse_width: 1.0 / 0.001,
-    midpoint: 0.5,
-};
-/// MuJoCo's default `solref`: time constant [s], damping ratio.
-const SOLREF: [f64; 2] = [0.02, 1.0];
-/// Stiffness and damping of joint limits in force space, Newton's `limit_ke`, `limit_kd`.
-const LIMIT_KE: f64 = 1.0e4;
-const LIMIT_KD: f64 = 10.0;
-
-/// Where a robot's rows lie in the arrays of the scene.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RobotRange {
-    /// Name of the robot.
-    pub name: String,
-    /// Its columns of `(worlds, dofs)` arrays.
-    pub dofs: Range<usize>,
-    /// Its columns of `(worlds, coords)` arrays.
-    pub coords: Range<usize>,
-    /// Its columns of `(worlds, bodies, …)` arrays.
-    pub bodies: Range<usize>,
-}
-
-/// A scene that is ready to run: immutable, sorted, hashed.
-#[derive(Clone, Debug)]
-pub struct Model {
-    constants: Constants<f64>,
-    dt: f64,
-    substeps: usize,
-    dof_names: Vec<String>,
-    body_names: Vec<String>,
-    robots: Vec<RobotRange>,
-    start: Start,
-    dof_inverse_weight: Vec<f64>,
-    hash: u64,
-}
-
-/// State and commands after a reset, one entry a dof.
-#[derive(Clone, Debug, Default)]
-pub struct Start {
-    /// [rad or m]
-    pub joint_q: Vec<f64>,
-    /// [rad or m]
-    pub joint_target_q: Vec<f64>,
-    /// [rad/s or m/s]
-    pub joint_target_qd: Vec<f64>,
-}
-
-impl Model {
-    /// Constants of the text, in f64.
-    pub fn constants(&self) -> &Constants<f64> {
-        &self.constants
-    }
-    /// Duration of one substep [s].
-    pub fn dt(&self) -> f64 {
-        self.dt
-    }
-    /// Substeps in a control frame.
-    pub fn substeps(&self) -> usize {
-        self.substeps
-    }
-    /// Names of the dofs, `robot/joint`.
-    pub fn dof_names(&self) -> &[String] {
-        &self.dof_names
-    }
-    /// Names of the position coordinates, `robot/joint`.
-    pub fn coord_names(&self) -> &[String] {
-        &self.dof_names
-    }
-    /// Names of the bodies, `robot/link`.
-    pub fn body_names(&self) -> &[String] {
-        &self.body_names
-    }
-    /// Each robot's part of the arrays.
-    pub fn robots(&self) -> &[RobotRange] {
-        &self.robots
-    }
-    /// Number of degrees of freedom.
-    pub fn dofs(&self) -> usize {
-        self.constants.dofs.len()
-    }
-    /// Number of position coordinates.
-    pub fn coords(&self) -> usize {
-        self.constants.dofs.len()
-    }
-    /// Number of bodies: links of all robots, fixed ones included.
-    pub fn bodies(&self) -> usize {
-        self.constants.frames.len()
-    }
-    /// Number of constraint rows: equalities, frictions, limits.
-    pub fn rows(&self) -> usize {
-        self.constants.rows()
-    }
-    /// State and commands after a reset.
-    pub fn start(&self) -> &Start {
-        &self.start
-    }
-    /// Diagonal of M⁻¹ at q = 0, MuJoCo's `dof_invweight0`. `(dofs)` [1/(kg·m²) or 1/kg]
-    pub fn dof_inverse_weight(&self) -> &[f64] {
-        &self.dof_inverse_weight
-    }
-    /// A number that differs between models that behave differently.
-    pub fn hash(&self) -> u64 {
-        self.hash
-    }
-}
 
 impl Description {
     /// Checks and freezes the scene.
@@ -136,31 +29,18 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     for robot in &scene.robots {
         builder.add(robot);
     }
-    let Builder {
-        dofs,
-        frames,
-        joints,
-        robots,
-        dof_names,
-        body_names,
-        start,
-        couplings,
-    } = builder;
-
-    let mut entries = couplings.clone();
-    for (k, dof) in dofs.iter().enumerate() {
-        let mut carrier = dof.parent;
-        while let Some(i) = carrier {
-            entries.push((k, i));
-            carrier = dofs[i].parent;
-        }
-    }
+    let pattern = builder.pattern();
+    let mass_entries = builder.mass_entries(&pattern);
     let mut constants = Constants {
         dt: scene.dt,
         gravity: scene.gravity,
-        pattern: Pattern::new(dofs.len(), entries),
-        dofs,
-        frames,
+        pattern,
+        bodies: builder.bodies,
+        dofs: builder.dofs,
+        trees: builder.trees,
+        frames: builder.frames,
+        mass_entries,
+        coords: builder.coord_names.len(),
         equalities: Vec::new(),
         frictions: Vec::new(),
         limits: Vec::new(),
@@ -170,20 +50,25 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
             tolerance: 0.0,
         },
     };
-    let reference = inverse_weight::at_reference(&constants, &dof_names)?;
+    let reference = inverse_weight::at_reference(&constants, &builder.dof_names)?;
     // MuJoCo scales costs by 1 / (mean inertia × dofs)
     constants.solver.tolerance =
         scene.solver.tolerance * reference.mean_inertia * constants.dofs.len() as f64;
-    add_rows(&mut constants, &joints, &reference.dof_inverse_weight);
+    add_rows(
+        &mut constants,
+        &builder.joints,
+        &reference.dof_inverse_weight,
+    );
 
     let mut model = Model {
         constants,
         dt: scene.dt,
         substeps: scene.substeps,
-        dof_names,
-        body_names,
-        robots,
-        start,
+        dof_names: builder.dof_names,
+        coord_names: builder.coord_names,
+        body_names: builder.body_names,
+        robots: builder.robots,
+        start: builder.start,
         dof_inverse_weight: reference.dof_inverse_weight,
         hash: 0,
     };
@@ -191,83 +76,24 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     Ok(model)
 }
 
-/// What the rows need of a dof's joint; mimic leaders already as dof numbers.
-struct DofJoint {
-    range: Option<[f64; 2]>,
-    friction: f64,
-    mimic: Option<(usize, f64, f64)>,
-}
-
-/// Constraint rows in MuJoCo's order.
-fn add_rows(constants: &mut Constants<f64>, joints: &[DofJoint], inverse_weight: &[f64]) {
-    let dt = constants.dt;
-    for (dof, joint) in joints.iter().enumerate() {
-        let weight = inverse_weight[dof];
-        if let Some((leader, multiplier, offset)) = joint.mimic {
-            let soft = soft(SOLREF, weight + inverse_weight[leader], dt);
-            constants.equalities.push(Equality {
-                follower: dof,
-                leader,
-                multiplier,
-                offset,
-                soft,
-            });
-        }
-        if joint.friction > 0.0 {
-            let soft = soft(SOLREF, weight, dt);
-            // a friction row has no position: its impedance is d_min, its reference -b v
-            let regularizer = (1.0 - IMPEDANCE.d_min) / IMPEDANCE.d_min * weight;
-            constants.frictions.push(Friction {
-                dof,
-                loss: joint.friction,
-                damping: soft.damping,
-                weight: 1.0 / regularizer,
-                zone: regularizer * joint.friction,
-            });
-        }
-        if let Some([lower, upper]) = joint.range {
-            let f = weight * (1.0 - IMPEDANCE.d_max);
-            let solref = [
-                2.0 / (LIMIT_KD * f),
-                0.5 * LIMIT_KD * f * (1.0 / (LIMIT_KE * f)).sqrt(),
-            ];
-            constants.limits.push(Limit {
-                dof,
-                lower,
-                upper,
-                soft: soft(solref, weight, dt),
-            });
-        }
-    }
-}
-
-/// MuJoCo's stiffness and damping from (time constant, damping ratio), `refsafe` on.
-fn soft(solref: [f64; 2], inverse_weight: f64, dt: f64) -> Soft<f64> {
-    let d_max = IMPEDANCE.d_max;
-    let time_constant = solref[0].max(2.0 * dt);
-    let natural = time_constant * solref[1] * d_max;
-    Soft {
-        stiffness: 1.0 / (natural * natural),
-        damping: 2.0 / (d_max * time_constant),
-        inverse_weight,
-        impedance: IMPEDANCE,
-    }
-}
-
-/// Where a link is carried: by which dof, and how it lies in that dof's frame.
+/// Where a link is carried: by which body and tree, and how it lies in that body's frame.
 #[derive(Clone, Copy)]
 struct Carrier {
-    dof: Option<usize>,
+    body: Option<usize>,
+    tree: usize,
     pose: Pose,
 }
 
 #[derive(Default)]
 struct Builder {
+    bodies: Vec<Body<f64>>,
     dofs: Vec<Dof<f64>>,
+    trees: Vec<Tree<f64>>,
     frames: Vec<Frame<f64>>,
     joints: Vec<DofJoint>,
     robots: Vec<RobotRange>,
     dof_names: Vec<String>,
+    coord_names: Vec<String>,
     body_names: Vec<String>,
     start: Start,
     couplings: Vec<(usize, usize)>,
@@ -275,147 +101,249 @@ struct Builder {
 
 impl Builder {
     fn add(&mut self, robot: &Robot) {
-        let (first_dof, first_body) = (self.dofs.len(), self.frames.len());
-        let order = robot.dofs();
+        let (first_dof, first_coord) = (self.dofs.len(), self.coord_names.len());
+        let (first_frame, first_body) = (self.frames.len(), self.bodies.len());
+        let named = |name: String| format!("{}/{name}", robot.name);
+        self.dof_names
+            .extend(robot.dof_names().into_iter().map(named));
+        self.coord_names
+            .extend(robot.coord_names().into_iter().map(named));
+        self.trees.push(Tree {
+            base: robot.pose.pos,
+            free: None,
+        });
         // the base stands still: its frame has the world's axes and its origin as reference point
-        let mut carriers = vec![
-            Carrier {
-                dof: None,
-                pose: Pose {
-                    pos: [0.0; 3],
-                    quat: robot.pose.quat
-                }
-            };
-            robot.links.len()
-        ];
+        let base = Carrier {
+            body: None,
+            tree: self.trees.len() - 1,
+            pose: Pose {
+                pos: [0.0; 3],
+                quat: robot.pose.quat,
+            },
+        };
+        let mut carriers = vec![base; robot.links.len()];
+        let mut dof_of = vec![0; robot.joints.len()];
         for link in robot.link_order() {
-            if let Some((index, joint)) = robot
-                .joints
-                .iter()
-                .enumerate()
-                .find(|(_, joint)| joint.child == link)
-            {
-                let parent = carriers[joint.parent];
-                let mut pose = parent.pose.mul(&joint.origin);
-                let mut dof = parent.dof;
-                if joint.kind != JointKind::Fixed {
-                    let turn = z_to(joint.axis);
-                    dof = Some(self.dofs.len());
-                    debug_assert_eq!(order[self.dofs.len() - first_dof], index);
-                    self.push_dof(robot, index, parent.dof, pose.mul(&turn));
-                    pose = turn.inverse();
-                }
-                carriers[link] = Carrier { dof, pose };
+            let above = robot.joints.iter().position(|joint| joint.child == link);
+            if let Some(index) = above {
+                let joint = &robot.joints[index];
+                let parent = joint.parent.map_or(base, |parent| carriers[parent]);
+                let at = Carrier {
+                    pose: parent.pose.mul(&joint.origin),
+                    ..parent
+                };
+                dof_of[index] = self.dofs.len();
+                carriers[link] = self.add_joint(joint, at);
             }
             let carrier = carriers[link];
-            self.body_names
-                .push(format!("{}/{}", robot.name, robot.links[link].name));
+            self.body_names.push(named(robot.links[link].name.clone()));
             self.frames.push(Frame {
-                dof: carrier.dof,
+                body: carrier.body,
+                tree: carrier.tree,
                 position: carrier.pose.pos,
                 quat: carrier.pose.quat,
-                base: robot.pose.pos,
             });
         }
-        for (k, &index) in order.iter().enumerate() {
-            let dof = first_dof + k;
-            self.set_mass(robot, &carriers, dof);
-            let joint = &robot.joints[index];
-            let mimic = joint.mimic.map(|mimic| {
-                let leader = order.iter().position(|&j| j == mimic.joint);
-                let leader = first_dof + leader.expect("validated: the leader moves");
-                self.couplings.push((dof, leader));
-                (leader, mimic.multiplier, mimic.offset)
-            });
-            self.joints.push(DofJoint {
-                range: joint.range,
-                friction: joint.friction,
-                mimic,
-            });
+        self.add_masses(robot, &carriers, first_body);
+        for joint in robot.moving_joints() {
+            self.add_followers(robot, joint, &dof_of);
         }
         self.robots.push(RobotRange {
             name: robot.name.clone(),
             dofs: first_dof..self.dofs.len(),
-            coords: first_dof..self.dofs.len(),
-            bodies: first_body..self.frames.len(),
+            coords: first_coord..self.coord_names.len(),
+            bodies: first_frame..self.frames.len(),
         });
     }
 
-    fn push_dof(&mut self, robot: &Robot, index: usize, parent: Option<usize>, pose: Pose) {
-        let joint = &robot.joints[index];
-        let drives_position = joint.target_mode != TargetMode::Velocity;
-        self.dofs.push(Dof {
-            revolute: joint.kind == JointKind::Revolute,
-            parent,
-            rotation: columns(pose.rotation()),
-            quat: pose.quat,
-            position: pose.pos,
+    /// The bodies of a joint whose frame is `at`; returns where they carry its link.
+    fn add_joint(&mut self, joint: &Joint, at: Carrier) -> Carrier {
+        let turn = z_to(joint.axis);
+        let back = turn.inverse();
+        let axis = Carrier {
+            pose: at.pose.mul(&turn),
+            ..at
+        };
+        match joint.kind {
+            JointKind::Fixed => at,
+            JointKind::Revolute => self.add_body(joint, 0, Motion::Revolute, axis, back),
+            JointKind::Prismatic => self.add_body(joint, 0, Motion::Prismatic, axis, back),
+            JointKind::Ball => self.add_body(joint, 0, Motion::Ball, at, Pose::identity()),
+            JointKind::Planar => {
+                // z to x, to y, and back to the normal
+                let (x, y) = (z_to([1.0, 0.0, 0.0]), z_to([0.0, 1.0, 0.0]));
+                let first = Carrier {
+                    pose: axis.pose.mul(&x),
+                    ..axis
+                };
+                let slid = self.add_body(joint, 0, Motion::Prismatic, first, x.inverse().mul(&y));
+                let slid = self.add_body(joint, 1, Motion::Prismatic, slid, y.inverse());
+                self.add_body(joint, 2, Motion::Revolute, slid, back)
+            }
+            JointKind::Free => {
+                self.trees.push(Tree {
+                    base: [0.0; 3],
+                    free: Some(self.bodies.len()),
+                });
+                let world = Carrier {
+                    body: None,
+                    tree: self.trees.len() - 1,
+                    pose: Pose::identity(),
+                };
+                self.add_body(joint, 0, Motion::Free, world, Pose::identity())
+            }
+        }
+    }
+
+    /// A body that is carried at `at` and moves by the dofs of a joint from `first` on; `pose` is what it carries.
+    fn add_body(
+        &mut self,
+        joint: &Joint,
+        first: usize,
+        motion: Motion,
+        at: Carrier,
+        pose: Pose,
+    ) -> Carrier {
+        let (body, coord) = (self.bodies.len(), self.start.joint_q.len());
+        self.bodies.push(Body {
+            motion,
+            parent: at.body,
+            tree: at.tree,
+            dof: self.dofs.len(),
+            coord,
+            rotation: columns(at.pose.rotation()),
+            exchange: exchange(columns(at.pose.rotation())),
+            quat: at.pose.quat,
+            position: at.pose.pos,
             mass: 0.0,
             center: [0.0; 3],
             inertia: [0.0; 6],
-            armature: joint.armature,
-            damping: joint.damping,
-            ke: if drives_position {
-                joint.target_ke
-            } else {
-                0.0
-            },
-            kd: joint.target_kd,
-            follows_velocity: joint.target_mode != TargetMode::Position,
-            effort_limit: joint.effort_limit.filter(|limit| limit.is_finite()),
         });
-        self.dof_names
-            .push(format!("{}/{}", robot.name, joint.name));
-        self.start.joint_q.push(joint.q);
-        self.start
-            .joint_target_q
-            .push(joint.target_q.unwrap_or(joint.q));
-        self.start.joint_target_qd.push(joint.target_qd);
+        let coords = &joint.q[first..first + motion.coords()];
+        self.start.joint_q.extend(coords);
+        for (k, dof) in joint.dofs[first..first + motion.dofs()].iter().enumerate() {
+            let drives_position = dof.target_mode != TargetMode::Velocity;
+            self.dofs.push(Dof {
+                body,
+                coord,
+                entries: (0, 0),
+                armature: dof.armature,
+                damping: dof.damping,
+                ke: if drives_position { dof.target_ke } else { 0.0 },
+                kd: dof.target_kd,
+                follows_velocity: dof.target_mode != TargetMode::Position,
+                effort_limit: dof.effort_limit.filter(|limit| limit.is_finite()),
+            });
+            // a target is where the joint starts; a ball's is a rotation vector, a free body has none
+            let start = match motion {
+                Motion::Revolute | Motion::Prismatic => coords[0],
+                Motion::Ball => rotation_vector(coords)[k],
+                Motion::Free => 0.0,
+            };
+            self.start
+                .joint_target_q
+                .push(dof.target_q.unwrap_or(start));
+            self.start.joint_target_qd.push(dof.target_qd);
+            self.joints.push(DofJoint {
+                range: joint.range,
+                friction: dof.friction,
+                mimic: None,
+            });
+        }
+        Carrier {
+            body: Some(body),
+            tree: at.tree,
+            pose,
+        }
     }
 
-    /// Mass, centre and inertia of all links that move with a dof.
-    fn set_mass(&mut self, robot: &Robot, carriers: &[Carrier], dof: usize) {
-        let parts = || {
-            carriers
-                .iter()
-                .zip(&robot.links)
-                .filter(|(c, _)| c.dof == Some(dof))
-                .filter_map(|(carrier, link)| {
-                    let inertial = link.inertial.as_ref()?;
-                    let center = carrier.pose.transform(inertial.pos);
-                    Some((
-                        inertial.mass,
-                        center,
-                        carrier.pose.rotate_tensor(inertial.inertia),
-                    ))
-                })
-        };
-        let mass: f64 = parts().map(|(mass, _, _)| mass).sum();
-        let mut center = [0.0; 3];
-        if mass > 0.0 {
-            for (part, at, _) in parts() {
-                for i in 0..3 {
-                    center[i] += part / mass * at[i];
-                }
-            }
+    fn add_followers(&mut self, robot: &Robot, index: usize, dof_of: &[usize]) {
+        if let Some(mimic) = &robot.joints[index].mimic {
+            let (dof, leader) = (dof_of[index], dof_of[mimic.joint]);
+            self.couplings.push((dof, leader));
+            self.joints[dof].mimic = Some((leader, mimic.multiplier, mimic.offset));
         }
-        let mut inertia = [0.0; 6];
-        for (part, at, tensor) in parts() {
-            let d = [at[0] - center[0], at[1] - center[1], at[2] - center[2]];
-            let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-            let pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
-            for (entry, (i, j)) in inertia.iter_mut().zip(pairs) {
-                let parallel = if i == j { square } else { 0.0 } - d[i] * d[j];
-                *entry += tensor[i][j] + part * parallel;
-            }
-        }
-        let body = &mut self.dofs[dof];
-        (body.mass, body.center, body.inertia) = (mass, center, inertia);
     }
+
+    /// Mass, centre and inertia of all links that move with each body of a robot.
+    fn add_masses(&mut self, robot: &Robot, carriers: &[Carrier], first_body: usize) {
+        let nothing = Inertial {
+            mass: 0.0,
+            pos: [0.0; 3],
+            inertia: [[0.0; 3]; 3],
+        };
+        for (index, body) in self.bodies.iter_mut().enumerate().skip(first_body) {
+            let carried = carriers.iter().zip(&robot.links);
+            let whole = carried
+                .filter(|(carrier, _)| carrier.body == Some(index))
+                .filter_map(|(carrier, link)| Some((&carrier.pose, link.inertial.as_ref()?)))
+                .fold(nothing, |whole, (pose, part)| merge(&whole, pose, part));
+            let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = whole.inertia;
+            (body.mass, body.center) = (whole.mass, whole.pos);
+            body.inertia = [xx, yy, zz, xy, xz, yz];
+        }
+    }
+
+    /// A dof meets all dofs on its path to the root, and those it is coupled with.
+    fn pattern(&self) -> Pattern {
+        let mut entries = self.couplings.clone();
+        for k in 0..self.dofs.len() {
+            entries.extend(self.path(k).into_iter().map(|i| (k, i)));
+        }
+        Pattern::new(self.dofs.len(), entries)
+    }
+
+    /// The dofs that a dof meets in the mass matrix: those before it on its path to the root, and itself, rising.
+    fn path(&self, dof: usize) -> Vec<usize> {
+        let mut path = Vec::new();
+        let mut body = Some(self.dofs[dof].body);
+        while let Some(b) = body {
+            path.extend(self.bodies[b].dofs().rev().filter(|&i| i <= dof));
+            body = self.bodies[b].parent;
+        }
+        path.reverse();
+        path
+    }
+
+    fn mass_entries(&mut self, pattern: &Pattern) -> Vec<MassEntry> {
+        let mut entries = Vec::new();
+        for k in 0..self.dofs.len() {
+            let first = entries.len();
+            entries.extend(self.path(k).into_iter().map(|other| MassEntry {
+                other,
+                place: pattern.at(k, other),
+            }));
+            self.dofs[k].entries = (first, entries.len());
+        }
+        entries
+    }
+}
+
+/// Axis times angle of a unit quaternion (x, y, z, w) [rad].
+fn rotation_vector(quat: &[f64]) -> [f64; 3] {
+    let [x, y, z, w] = [quat[0], quat[1], quat[2], quat[3]];
+    let sin = (x * x + y * y + z * z).sqrt();
+    let scale = if sin > 0.0 {
+        2.0 * sin.atan2(w) / sin
+    } else {
+        0.0
+    };
+    [x * scale, y * scale, z * scale]
 }
 
 fn columns(rows: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     std::array::from_fn(|c| std::array::from_fn(|r| rows[r][c]))
+}
+
+/// The axes that a rotation exchanges, if that is all it does (to the rounding of angles such as π/2).
+fn exchange(columns: [[f64; 3]; 3]) -> Option<[(usize, bool); 3]> {
+    let axis = |column: [f64; 3]| {
+        let along = |i: usize| (column[i].abs() - 1.0).abs() < 4.0 * f64::EPSILON;
+        let rest = |i: usize| (0..3).all(|j| j == i || column[j].abs() < 4.0 * f64::EPSILON);
+        let i = (0..3).find(|&i| along(i) && rest(i))?;
+        Some((i, column[i] < 0.0))
+    };
+    Some([axis(columns[0])?, axis(columns[1])?, axis(columns[2])?])
 }
 
 /// A rotation that takes z to the given unit vector; none where the axis is z already.

@@ -3,17 +3,25 @@
 use crate::lane::Real;
 use crate::math::factor::Pattern;
 
-/// A model's constants. Dofs are sorted so that parents precede children.
+/// A model's constants. Bodies are sorted so that parents precede children, dofs by their bodies.
 #[derive(Clone, Debug)]
 pub struct Constants<R> {
     /// Duration of one substep [s].
     pub dt: R,
     /// Gravity in world axes [m/s²].
     pub gravity: [R; 3],
-    /// Degrees of freedom, each with the body that it moves.
+    /// Bodies that move, each with the joint that carries it.
+    pub bodies: Vec<Body<R>>,
+    /// Degrees of freedom.
     pub dofs: Vec<Dof<R>>,
+    /// Robots: where their reference points are.
+    pub trees: Vec<Tree<R>>,
     /// Frames of all links, those that move with another included.
     pub frames: Vec<Frame<R>>,
+    /// Entries of the mass matrix, dof by dof, each with the place where it is kept: the dof itself last.
+    pub mass_entries: Vec<MassEntry>,
+    /// Position coordinates of all joints.
+    pub coords: usize,
     /// Soft equality of two joints.
     pub equalities: Vec<Equality<R>>,
     /// Dry friction of a joint.
@@ -26,25 +34,86 @@ pub struct Constants<R> {
     pub solver: Newton<R>,
 }
 
-/// A degree of freedom: a joint whose axis is the z axis of its body's frame.
+/// How a body moves in the frame that carries it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motion {
+    /// Turns about its z axis: 1 coordinate, 1 dof.
+    Revolute,
+    /// Slides along its z axis: 1 coordinate, 1 dof.
+    Prismatic,
+    /// Turns about its origin: a quaternion, and the angular velocity in the body's axes.
+    Ball,
+    /// Moves freely in the world: position and quaternion of its frame; velocity of its centre of mass,
+    /// then angular velocity, in world axes.
+    Free,
+}
+
+impl Motion {
+    /// Number of position coordinates.
+    pub const fn coords(self) -> usize {
+        match self {
+            Motion::Revolute | Motion::Prismatic => 1,
+            Motion::Ball => 4,
+            Motion::Free => 7,
+        }
+    }
+
+    /// Number of degrees of freedom.
+    pub const fn dofs(self) -> usize {
+        match self {
+            Motion::Revolute | Motion::Prismatic => 1,
+            Motion::Ball => 3,
+            Motion::Free => 6,
+        }
+    }
+}
+
+/// A body and its joint. The axis of a joint with one is the z axis of the body's frame.
 #[derive(Clone, Debug)]
-pub struct Dof<R> {
-    /// Does it turn about z, or slide along it?
-    pub revolute: bool,
-    /// The dof that carries this one; none for the base.
+pub struct Body<R> {
+    /// How it moves.
+    pub motion: Motion,
+    /// The body that carries this one; none for the base or the world.
     pub parent: Option<usize>,
-    /// Frame at q = 0 in the carrier's frame: columns of the rotation [–].
+    /// Its robot.
+    pub tree: usize,
+    /// Its first dof.
+    pub dof: usize,
+    /// Its first position coordinate.
+    pub coord: usize,
+    /// Frame at rest in the carrier's frame: columns of the rotation [–].
     pub rotation: [[R; 3]; 3],
+    /// The same rotation, where it only exchanges axes: which of the carrier's each one is, and whether turned round.
+    pub exchange: Option<[(usize, bool); 3]>,
     /// The same rotation as a quaternion (x, y, z, w) [–].
     pub quat: [R; 4],
-    /// Origin of the frame at q = 0 in the carrier's frame [m].
+    /// Origin of the frame at rest in the carrier's frame [m].
     pub position: [R; 3],
-    /// Mass of the body, links fixed to it included [kg].
+    /// Mass, links fixed to it included [kg].
     pub mass: R,
     /// Centre of mass in the body's frame [m].
     pub center: [R; 3],
     /// xx yy zz xy xz yz about the centre of mass, in the body's axes [kg·m²].
     pub inertia: [R; 6],
+}
+
+impl<R> Body<R> {
+    /// Its dofs.
+    #[inline(always)]
+    pub fn dofs(&self) -> std::ops::Range<usize> {
+        self.dof..self.dof + self.motion.dofs()
+    }
+}
+
+/// A degree of freedom.
+#[derive(Clone, Debug)]
+pub struct Dof<R> {
+    /// The body that it moves.
+    pub body: usize,
+    /// The position coordinate that it changes, where there is just one.
+    pub coord: usize,
+    /// Its part of `mass_entries`.
+    pub entries: (usize, usize),
     /// Inertia of the drive, added to the diagonal of the mass matrix [kg·m² or kg].
     pub armature: R,
     /// Passive damping [N·m·s/rad or N·s/m].
@@ -59,17 +128,35 @@ pub struct Dof<R> {
     pub effort_limit: Option<R>,
 }
 
-/// A link's frame: a constant pose in the frame of the dof that carries it.
+/// An entry of the mass matrix: a dof, and one on its path to the root or itself.
+#[derive(Clone, Copy, Debug)]
+pub struct MassEntry {
+    /// The dof that is before it on the path to the root, or itself.
+    pub other: usize,
+    /// Where the entry is kept.
+    pub place: usize,
+}
+
+/// A robot. Its kinematics are about a reference point, so that f32 does not lose what is far from the origin.
+#[derive(Clone, Debug)]
+pub struct Tree<R> {
+    /// World position of the base, the reference point of a robot that is fixed to the world [m].
+    pub base: [R; 3],
+    /// The free body whose centre of mass is the reference point instead.
+    pub free: Option<usize>,
+}
+
+/// A link's frame: a constant pose in the frame of the body that carries it.
 #[derive(Clone, Debug)]
 pub struct Frame<R> {
-    /// The carrying dof; none for what is fixed to the world.
-    pub dof: Option<usize>,
+    /// The carrying body; none for what is fixed to the world.
+    pub body: Option<usize>,
+    /// Its robot.
+    pub tree: usize,
     /// Origin in the carrier's frame, or relative to the base [m].
     pub position: [R; 3],
     /// Orientation in the carrier's frame, (x, y, z, w) [–].
     pub quat: [R; 4],
-    /// Reference point of the robot: the world position of its base [m].
-    pub base: [R; 3],
 }
 
 /// Softness of a constraint row whose impedance depends on its position.
@@ -169,18 +256,31 @@ impl<R: Real> Constants<R> {
         Constants {
             dt: cast(self.dt),
             gravity: self.gravity.map(cast),
+            bodies: self
+                .bodies
+                .iter()
+                .map(|b| Body {
+                    motion: b.motion,
+                    parent: b.parent,
+                    tree: b.tree,
+                    dof: b.dof,
+                    coord: b.coord,
+                    rotation: b.rotation.map(|column| column.map(cast)),
+                    exchange: b.exchange,
+                    quat: b.quat.map(cast),
+                    position: b.position.map(cast),
+                    mass: cast(b.mass),
+                    center: b.center.map(cast),
+                    inertia: b.inertia.map(cast),
+                })
+                .collect(),
             dofs: self
                 .dofs
                 .iter()
                 .map(|d| Dof {
-                    revolute: d.revolute,
-                    parent: d.parent,
-                    rotation: d.rotation.map(|column| column.map(cast)),
-                    quat: d.quat.map(cast),
-                    position: d.position.map(cast),
-                    mass: cast(d.mass),
-                    center: d.center.map(cast),
-                    inertia: d.inertia.map(cast),
+                    body: d.body,
+                    coord: d.coord,
+                    entries: d.entries,
                     armature: cast(d.armature),
                     damping: cast(d.damping),
                     ke: cast(d.ke),
@@ -189,16 +289,26 @@ impl<R: Real> Constants<R> {
                     effort_limit: d.effort_limit.map(cast),
                 })
                 .collect(),
+            trees: self
+                .trees
+                .iter()
+                .map(|t| Tree {
+                    base: t.base.map(cast),
+                    free: t.free,
+                })
+                .collect(),
             frames: self
                 .frames
                 .iter()
                 .map(|f| Frame {
-                    dof: f.dof,
+                    body: f.body,
+                    tree: f.tree,
                     position: f.position.map(cast),
                     quat: f.quat.map(cast),
-                    base: f.base.map(cast),
                 })
                 .collect(),
+            mass_entries: self.mass_entries.clone(),
+            coords: self.coords,
             equalities: self
                 .equalities
                 .iter()
@@ -238,6 +348,15 @@ impl<R: Real> Constants<R> {
                 tolerance: cast(self.solver.tolerance),
             },
         }
+    }
+
+    /// First coordinate of each quaternion.
+    pub fn quaternions(&self) -> impl Iterator<Item = usize> + '_ {
+        self.bodies.iter().filter_map(|body| match body.motion {
+            Motion::Ball => Some(body.coord),
+            Motion::Free => Some(body.coord + 3),
+            Motion::Revolute | Motion::Prismatic => None,
+        })
     }
 
     /// Constraint rows: equalities, then frictions, then limits (MuJoCo's order).

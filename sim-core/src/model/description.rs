@@ -168,31 +168,38 @@ pub struct Joint {
     pub name: String,
     /// What motion it allows.
     pub kind: JointKind,
-    /// Index of the parent link.
-    pub parent: usize,
+    /// Index of the parent link; `None` is the world, for a floating base.
+    pub parent: Option<usize>,
     /// Index of the child link.
     pub child: usize,
     /// Joint frame, which is the child frame at position 0, in the parent frame.
     pub origin: Pose,
-    /// Unit vector of the motion in the joint frame [–].
+    /// Unit vector of the motion in the joint frame, or normal of the plane [–].
     pub axis: [f64; 3],
-    /// Lowest and highest position [rad or m]; `None` is without limits.
+    /// Lowest and highest position [rad or m]; `None` is without limits. Of joints with one dof only.
     pub range: Option<[f64; 2]>,
-    /// Largest drive effort [N·m or N]; `None` is without limit.
-    pub effort_limit: Option<f64>,
     /// Largest speed [rad/s or m/s]; reported, not enforced.
     pub velocity_limit: Option<f64>,
+    /// The joint it follows, if any.
+    pub mimic: Option<Mimic>,
+    /// Position at the start, one entry a coordinate of its kind [rad or m].
+    pub q: Vec<f64>,
+    /// What resists and drives each of its dofs.
+    pub dofs: Vec<JointDof>,
+}
+
+/// What resists and drives a dof of a joint.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointDof {
     /// Viscous damping [N·m·s/rad or N·s/m].
     pub damping: f64,
     /// Dry friction [N·m or N].
     pub friction: f64,
     /// Inertia of the drive seen at the joint [kg·m² or kg].
     pub armature: f64,
-    /// The joint it follows, if any.
-    pub mimic: Option<Mimic>,
-    /// Position at the start [rad or m].
-    pub q: f64,
-    /// Position target at the start [rad or m]; `None` is the start position.
+    /// Largest drive effort [N·m or N]; `None` is without limit.
+    pub effort_limit: Option<f64>,
+    /// Position target at the start [rad or m]; `None` is the start position. A ball's is a rotation vector.
     pub target_q: Option<f64>,
     /// Velocity target at the start [rad/s or m/s].
     pub target_qd: f64,
@@ -214,6 +221,47 @@ pub enum JointKind {
     Revolute,
     /// Translation along the axis.
     Prismatic,
+    /// Any rotation about the joint frame's origin. Its velocity is in the child's axes.
+    Ball,
+    /// Two translations across the axis, then a rotation about it. They are along the joint frame's x and y,
+    /// turned as its z is turned to the axis the short way (where that points down, after half a turn about x).
+    Planar,
+    /// Any motion in the world. Position and quaternion of the child's frame; velocity of its centre of
+    /// mass, then angular velocity, in world axes.
+    Free,
+}
+
+impl JointKind {
+    /// Names of its position coordinates; empty where there is just one.
+    pub const fn coord_names(self) -> &'static [&'static str] {
+        match self {
+            JointKind::Fixed => &[],
+            JointKind::Revolute | JointKind::Prismatic => &[""],
+            JointKind::Ball => &["qx", "qy", "qz", "qw"],
+            JointKind::Planar => &["x", "y", "angle"],
+            JointKind::Free => &["x", "y", "z", "qx", "qy", "qz", "qw"],
+        }
+    }
+
+    /// Names of its dofs; empty where there is just one.
+    pub const fn dof_names(self) -> &'static [&'static str] {
+        match self {
+            JointKind::Fixed => &[],
+            JointKind::Revolute | JointKind::Prismatic => &[""],
+            JointKind::Ball => &["wx", "wy", "wz"],
+            JointKind::Planar => &["x", "y", "angle"],
+            JointKind::Free => &["vx", "vy", "vz", "wx", "wy", "wz"],
+        }
+    }
+
+    /// Its position at rest: zeros, and the unit quaternion.
+    pub fn rest(self) -> Vec<f64> {
+        let mut q = vec![0.0; self.coord_names().len()];
+        if let (JointKind::Ball | JointKind::Free, Some(w)) = (self, q.last_mut()) {
+            *w = 1.0;
+        }
+        q
+    }
 }
 
 /// Errors a drive acts on.
@@ -240,32 +288,29 @@ pub struct Mimic {
 }
 
 impl Joint {
-    /// A fixed joint between two links, to be refined by struct update syntax.
-    pub fn fixed(name: &str, parent: usize, child: usize) -> Joint {
+    /// A joint between two links, at rest in the parent's frame, about or along x.
+    pub fn new(kind: JointKind, name: &str, parent: Option<usize>, child: usize) -> Joint {
         Joint {
             name: name.to_owned(),
-            kind: JointKind::Fixed,
+            kind,
             parent,
             child,
             origin: Pose::identity(),
             axis: [1.0, 0.0, 0.0],
             range: None,
-            effort_limit: None,
             velocity_limit: None,
-            damping: 0.0,
-            friction: 0.0,
-            armature: 0.0,
             mimic: None,
-            q: 0.0,
-            target_q: None,
-            target_qd: 0.0,
-            target_mode: TargetMode::Position,
-            target_ke: 0.0,
-            target_kd: 0.0,
+            q: kind.rest(),
+            dofs: vec![JointDof::default(); kind.dof_names().len()],
         }
     }
 
-    /// Whether it has a dof.
+    /// A fixed joint between two links.
+    pub fn fixed(name: &str, parent: usize, child: usize) -> Joint {
+        Joint::new(JointKind::Fixed, name, Some(parent), child)
+    }
+
+    /// Whether it has dofs.
     pub fn moves(&self) -> bool {
         self.kind != JointKind::Fixed
     }

@@ -73,8 +73,10 @@ pub enum ModelError {
     },
 
     /// An array of another length than the robot's number of dofs.
-    #[error("robot `{robot}`: {field} has {got} values, the robot has {expected} dofs")]
+    #[error("robot `{robot}`: {field} has {got} values, the robot has {expected} {entries}")]
     JointValues {
+        /// What has an entry each: `dofs` or `coordinates`.
+        entries: &'static str,
         /// The robot.
         robot: String,
         /// The array.
@@ -167,30 +169,6 @@ pub enum ModelError {
         links: Vec<String>,
     },
 
-    /// A joint of a kind that is not simulated.
-    #[error(
-        "robot `{robot}`: joint `{joint}`: type `{kind}` is not supported yet; use revolute, continuous, prismatic or fixed"
-    )]
-    JointKind {
-        /// The robot.
-        robot: String,
-        /// The joint.
-        joint: String,
-        /// The kind asked for.
-        kind: String,
-    },
-
-    /// An argument whose feature does not exist yet.
-    #[error("robot `{robot}`: {argument} is not supported yet; {cure}")]
-    NotSupported {
-        /// The robot.
-        robot: String,
-        /// The argument, as a user writes it.
-        argument: &'static str,
-        /// What to do instead.
-        cure: &'static str,
-    },
-
     /// A joint axis without direction.
     #[error(
         "robot `{robot}`: joint `{joint}`: axis is zero; give it a direction in <axis xyz=\"…\"/>"
@@ -281,6 +259,45 @@ pub enum ModelError {
         "the mass matrix at q = 0 is singular; give every moving link a positive mass and inertia, or its joint an armature"
     )]
     SingularMass,
+
+    /// A joint made by hand whose lists do not fit its kind.
+    #[error(
+        "{what}: a {kind:?} joint has {coords} positions in `q` and {dofs} dofs in `dofs`; make it with Joint::new"
+    )]
+    JointParts {
+        /// The joint.
+        what: String,
+        /// Its kind.
+        kind: super::JointKind,
+        /// Positions that it has.
+        coords: usize,
+        /// Dofs that it has.
+        dofs: usize,
+    },
+
+    /// A free joint that hangs from something that moves.
+    #[error(
+        "robot `{robot}`: joint `{joint}` is floating, but joint `{carrier}` above it moves; a free body is carried by the world alone"
+    )]
+    FreeBelow {
+        /// The robot.
+        robot: String,
+        /// The free joint.
+        joint: String,
+        /// A moving joint above it.
+        carrier: String,
+    },
+
+    /// Gains on a free joint.
+    #[error(
+        "robot `{robot}`: joint `{joint}` is free and cannot be driven; leave its joint_target_ke and joint_target_kd at 0, and push it with joint_f"
+    )]
+    FreeDrive {
+        /// The robot.
+        robot: String,
+        /// The free joint.
+        joint: String,
+    },
 
     /// A mimic joint whose leader does not exist or does not move.
     #[error(

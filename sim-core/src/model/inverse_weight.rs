@@ -1,7 +1,7 @@
 //! What derives from mass at the reference pose q = 0, in f64.
 
 use super::ModelError;
-use super::constants::Constants;
+use super::constants::{Constants, Motion};
 use crate::math::spatial::{Spatial, momentum, place, power};
 use crate::math::vec3::{cross, transform, transform_add};
 use faer::linalg::solvers::DenseSolveCore;
@@ -27,38 +27,8 @@ pub(super) fn at_reference(
             mean_inertia: 1.0,
         });
     }
-    let mut frames: Vec<([[f64; 3]; 3], [f64; 3])> = Vec::with_capacity(n);
-    let mut motions: Vec<Spatial<f64>> = Vec::with_capacity(n);
-    let mut mass_matrix = faer::Mat::<f64>::zeros(n, n);
+    let mut mass_matrix = mass_matrix(constants);
     for (k, dof) in constants.dofs.iter().enumerate() {
-        let (rotation, origin) = match dof.parent {
-            Some(p) => {
-                let (r, o) = &frames[p];
-                (
-                    dof.rotation.map(|c| transform(r, c)),
-                    transform_add(r, dof.position, *o),
-                )
-            }
-            None => (dof.rotation, dof.position),
-        };
-        let z = rotation[2];
-        motions.push(if dof.revolute {
-            [cross(origin, z), z]
-        } else {
-            [z, [0.0; 3]]
-        });
-        let inertia = place::<f64>(dof.mass, dof.center, dof.inertia, &rotation, origin);
-        frames.push((rotation, origin));
-        let mut i = Some(k);
-        while let Some(a) = i {
-            let force = momentum(&inertia, &motions[a]);
-            let mut j = Some(k);
-            while let Some(b) = j {
-                mass_matrix[(a, b)] += power(&motions[b], &force);
-                j = constants.dofs[b].parent;
-            }
-            i = constants.dofs[a].parent;
-        }
         mass_matrix[(k, k)] += dof.armature;
     }
     let mean_inertia = (0..n).map(|k| mass_matrix[(k, k)]).sum::<f64>() / n as f64;
@@ -71,8 +41,73 @@ pub(super) fn at_reference(
         .llt(faer::Side::Lower)
         .map_err(|_| ModelError::SingularMass)?;
     let inverse = factor.inverse();
+    let mut dof_inverse_weight: Vec<f64> = (0..n).map(|k| inverse[(k, k)]).collect();
+    // the dofs of a ball, and the translations and rotations of a free body, share their mean
+    for body in constants
+        .bodies
+        .iter()
+        .filter(|body| body.motion.dofs() > 1)
+    {
+        for part in dof_inverse_weight[body.dofs()].chunks_exact_mut(3) {
+            let mean = part.iter().sum::<f64>() / 3.0;
+            part.fill(mean);
+        }
+    }
     Ok(Reference {
-        dof_inverse_weight: (0..n).map(|k| inverse[(k, k)]).collect(),
+        dof_inverse_weight,
         mean_inertia,
     })
+}
+
+fn mass_matrix(constants: &Constants<f64>) -> faer::Mat<f64> {
+    let n = constants.dofs.len();
+    let mut mass_matrix = faer::Mat::<f64>::zeros(n, n);
+    let mut frames: Vec<([[f64; 3]; 3], [f64; 3])> = Vec::new();
+    let mut motions: Vec<Spatial<f64>> = Vec::with_capacity(n);
+    for body in &constants.bodies {
+        let (rotation, mut origin) = match body.parent {
+            Some(p) => {
+                let (r, o) = &frames[p];
+                (
+                    body.rotation.map(|c| transform(r, c)),
+                    transform_add(r, body.position, *o),
+                )
+            }
+            None => (body.rotation, body.position),
+        };
+        let turn = |axis| [cross(origin, axis), axis];
+        let z = rotation[2];
+        match body.motion {
+            Motion::Revolute => motions.push(turn(z)),
+            Motion::Prismatic => motions.push([z, [0.0; 3]]),
+            Motion::Ball => motions.extend(rotation.map(turn)),
+            Motion::Free => {
+                // about its centre of mass; how it lies in the world changes no inverse weight below it
+                origin = body.center.map(|x| -x);
+                motions.extend(rotation.map(|axis| [axis, [0.0; 3]]));
+                motions.extend(rotation.map(|axis| [[0.0; 3], axis]));
+            }
+        }
+        let inertia = place::<f64>(body.mass, body.center, body.inertia, &rotation, origin);
+        frames.push((rotation, origin));
+        let path = path(constants, frames.len() - 1);
+        for &a in &path {
+            let force = momentum(&inertia, &motions[a]);
+            for &b in &path {
+                mass_matrix[(a, b)] += power(&motions[b], &force);
+            }
+        }
+    }
+    mass_matrix
+}
+
+/// The dofs that move a body.
+fn path(constants: &Constants<f64>, body: usize) -> Vec<usize> {
+    let mut dofs = Vec::new();
+    let mut next = Some(body);
+    while let Some(b) = next {
+        dofs.extend(constants.bodies[b].dofs());
+        next = constants.bodies[b].parent;
+    }
+    dofs
 }

@@ -6,19 +6,21 @@ mod compile;
 pub mod constants;
 mod description;
 mod error;
+mod frozen;
 mod inertia;
 mod inverse_weight;
 mod pose;
 mod robot;
+mod rows;
 mod tree;
 mod urdf;
 mod validate;
 
-pub use compile::{Model, RobotRange, Start};
 pub use description::{
-    Collision, Cone, Description, Inertial, Joint, JointKind, Link, Mimic, Robot, Shape, Solver,
-    StaticShape, TargetMode,
+    Collision, Cone, Description, Inertial, Joint, JointDof, JointKind, Link, Mimic, Robot, Shape,
+    Solver, StaticShape, TargetMode,
 };
 pub use error::ModelError;
+pub use frozen::{Model, RobotRange, Start};
 pub use pose::Pose;
 pub use urdf::UrdfOptions;

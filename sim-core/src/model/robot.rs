@@ -1,6 +1,6 @@
 //! The dofs of a robot: their order, and setting their start state and drives.
 
-use super::description::{Joint, Robot, TargetMode};
+use super::description::{Joint, JointDof, JointKind, Robot, TargetMode};
 use super::error::ModelError;
 use super::validate::{finite, not_negative};
 
@@ -12,8 +12,9 @@ impl Robot {
         let mut children = vec![Vec::new(); self.links.len()];
         let mut has_parent = vec![false; self.links.len()];
         for joint in &self.joints {
-            if joint.parent < self.links.len() && joint.child < self.links.len() {
-                children[joint.parent].push(joint.child);
+            let Some(parent) = joint.parent else { continue };
+            if parent < self.links.len() && joint.child < self.links.len() {
+                children[parent].push(joint.child);
                 has_parent[joint.child] = true;
             }
         }
@@ -33,8 +34,8 @@ impl Robot {
         order
     }
 
-    /// Joint indices of the moving joints in the order of their dofs, which is that of their child links.
-    pub fn dofs(&self) -> Vec<usize> {
+    /// Joint indices of the moving joints in the order of their child links, which is that of their dofs.
+    pub fn moving_joints(&self) -> Vec<usize> {
         let mut joint_of = vec![None; self.links.len()];
         for (index, joint) in self.joints.iter().enumerate() {
             if let Some(slot) = joint_of.get_mut(joint.child) {
@@ -48,12 +49,77 @@ impl Robot {
             .collect()
     }
 
-    /// Sets the start positions [rad or m], one a dof.
+    /// Frees the root link from the world: adds the joint `floating_base`, which starts at the robot's pose.
+    pub fn float(&mut self) {
+        let root = self.link_order().first().copied().unwrap_or(0);
+        let mut base = Joint::new(JointKind::Free, "floating_base", None, root);
+        base.q[..3].copy_from_slice(&self.pose.pos);
+        base.q[3..].copy_from_slice(&self.pose.quat);
+        self.floating = true;
+        self.joints.insert(0, base);
+        for mimic in self
+            .joints
+            .iter_mut()
+            .filter_map(|joint| joint.mimic.as_mut())
+        {
+            mimic.joint += 1;
+        }
+    }
+
+    /// Starts the free bodies where their joints are, from the robot's pose down: their state is in the world.
+    pub(super) fn place_free_bodies(&mut self) {
+        let mut poses = vec![self.pose; self.links.len()];
+        for link in self.link_order() {
+            let above = self.joints.iter_mut().find(|joint| joint.child == link);
+            if let Some((joint, parent)) = above.and_then(|joint| {
+                let parent = joint.parent?;
+                Some((joint, parent))
+            }) {
+                poses[link] = poses[parent].mul(&joint.origin);
+                if joint.kind == JointKind::Free {
+                    joint.q[..3].copy_from_slice(&poses[link].pos);
+                    joint.q[3..].copy_from_slice(&poses[link].quat);
+                }
+            }
+        }
+    }
+
+    /// Names of its dofs in order: the joint's, and what it is of it where there are several.
+    pub fn dof_names(&self) -> Vec<String> {
+        self.names(JointKind::dof_names)
+    }
+
+    /// Names of its position coordinates in order.
+    pub fn coord_names(&self) -> Vec<String> {
+        self.names(JointKind::coord_names)
+    }
+
+    fn names(&self, parts: impl Fn(JointKind) -> &'static [&'static str]) -> Vec<String> {
+        let mut names = Vec::new();
+        for index in self.moving_joints() {
+            let joint = &self.joints[index];
+            names.extend(parts(joint.kind).iter().map(|part| match part.is_empty() {
+                true => joint.name.clone(),
+                false => format!("{}.{part}", joint.name),
+            }));
+        }
+        names
+    }
+
+    /// Sets the start positions [rad or m], one a coordinate.
     ///
     /// # Errors
-    /// Another number of values than dofs, or a value that is not finite.
+    /// Another number of values than coordinates, a value that is not finite, or a quaternion that is no rotation.
     pub fn set_joint_q(&mut self, values: &[f64]) -> Result<(), ModelError> {
-        self.set("joint_q", values, finite, |joint, value| joint.q = value)
+        let names = self.coord_names();
+        self.check("joint_q", &names, values, finite)?;
+        let mut rest = values;
+        for index in self.moving_joints() {
+            let q;
+            (q, rest) = rest.split_at(self.joints[index].q.len());
+            self.joints[index].q.copy_from_slice(q);
+        }
+        Ok(())
     }
 
     /// Sets the position targets [rad or m] at the start, one a dof.
@@ -61,8 +127,8 @@ impl Robot {
     /// # Errors
     /// Another number of values than dofs, or a value that is not finite.
     pub fn set_joint_target_q(&mut self, values: &[f64]) -> Result<(), ModelError> {
-        self.set("joint_target_q", values, finite, |joint, value| {
-            joint.target_q = Some(value)
+        self.set("joint_target_q", values, finite, |dof, value| {
+            dof.target_q = Some(value)
         })
     }
 
@@ -71,8 +137,8 @@ impl Robot {
     /// # Errors
     /// Another number of values than dofs, or a value that is not finite.
     pub fn set_joint_target_qd(&mut self, values: &[f64]) -> Result<(), ModelError> {
-        self.set("joint_target_qd", values, finite, |joint, value| {
-            joint.target_qd = value
+        self.set("joint_target_qd", values, finite, |dof, value| {
+            dof.target_qd = value
         })
     }
 
@@ -85,7 +151,7 @@ impl Robot {
             "joint_target_mode",
             modes,
             |_, _| Ok(()),
-            |joint, mode| joint.target_mode = mode,
+            |dof, mode| dof.target_mode = mode,
         )
     }
 
@@ -94,8 +160,8 @@ impl Robot {
     /// # Errors
     /// Another number of values than dofs, or a value that is negative or not finite.
     pub fn set_joint_target_ke(&mut self, values: &[f64]) -> Result<(), ModelError> {
-        self.set("joint_target_ke", values, not_negative, |joint, value| {
-            joint.target_ke = value
+        self.set("joint_target_ke", values, not_negative, |dof, value| {
+            dof.target_ke = value
         })
     }
 
@@ -104,8 +170,8 @@ impl Robot {
     /// # Errors
     /// Another number of values than dofs, or a value that is negative or not finite.
     pub fn set_joint_target_kd(&mut self, values: &[f64]) -> Result<(), ModelError> {
-        self.set("joint_target_kd", values, not_negative, |joint, value| {
-            joint.target_kd = value
+        self.set("joint_target_kd", values, not_negative, |dof, value| {
+            dof.target_kd = value
         })
     }
 
@@ -121,8 +187,8 @@ impl Robot {
                 not_negative(what, value)
             }
         };
-        self.set("joint_effort_limit", values, check, |joint, value| {
-            joint.effort_limit = value.is_finite().then_some(value);
+        self.set("joint_effort_limit", values, check, |dof, value| {
+            dof.effort_limit = value.is_finite().then_some(value);
         })
     }
 
@@ -131,8 +197,8 @@ impl Robot {
     /// # Errors
     /// Another number of values than dofs, or a value that is negative or not finite.
     pub fn set_joint_armature(&mut self, values: &[f64]) -> Result<(), ModelError> {
-        self.set("joint_armature", values, not_negative, |joint, value| {
-            joint.armature = value
+        self.set("joint_armature", values, not_negative, |dof, value| {
+            dof.armature = value
         })
     }
 
@@ -142,28 +208,44 @@ impl Robot {
         field: &'static str,
         values: &[T],
         check: impl Fn(&str, T) -> Result<(), ModelError>,
-        write: impl Fn(&mut Joint, T),
+        write: impl Fn(&mut JointDof, T),
     ) -> Result<(), ModelError> {
-        let dofs = self.dofs();
-        if values.len() != dofs.len() {
+        let names = self.dof_names();
+        self.check(field, &names, values, check)?;
+        let mut values = values.iter();
+        for index in self.moving_joints() {
+            for (dof, &value) in self.joints[index].dofs.iter_mut().zip(&mut values) {
+                write(dof, value);
+            }
+        }
+        Ok(())
+    }
+
+    fn check<T: Copy>(
+        &self,
+        field: &'static str,
+        names: &[String],
+        values: &[T],
+        check: impl Fn(&str, T) -> Result<(), ModelError>,
+    ) -> Result<(), ModelError> {
+        if values.len() != names.len() {
+            let entries = match field {
+                "joint_q" => "coordinates",
+                _ => "dofs",
+            };
             return Err(ModelError::JointValues {
+                entries,
                 robot: self.name.clone(),
                 field,
-                expected: dofs.len(),
+                expected: names.len(),
                 got: values.len(),
             });
         }
-        for (&dof, &value) in dofs.iter().zip(values) {
+        for (name, &value) in names.iter().zip(values) {
             check(
-                &format!(
-                    "robot `{}`: {field} of joint `{}`",
-                    self.name, self.joints[dof].name
-                ),
+                &format!("robot `{}`: {field} of joint `{name}`", self.name),
                 value,
             )?;
-        }
-        for (&dof, &value) in dofs.iter().zip(values) {
-            write(&mut self.joints[dof], value);
         }
         Ok(())
     }

@@ -19,8 +19,8 @@ impl Robot {
         }
         let mut parent_joint: Vec<Option<&Joint>> = vec![None; self.links.len()];
         for joint in &self.joints {
-            for (role, link) in [("parent", joint.parent), ("child", joint.child)] {
-                if link >= self.links.len() {
+            for (role, link) in [("parent", joint.parent), ("child", Some(joint.child))] {
+                if let Some(link) = link.filter(|&link| link >= self.links.len()) {
                     return Err(ModelError::UnknownLink {
                         robot: robot(),
                         joint: joint.name.clone(),
@@ -40,7 +40,7 @@ impl Robot {
             }
         }
         let roots: Vec<usize> = (0..self.links.len())
-            .filter(|&link| parent_joint[link].is_none())
+            .filter(|&link| parent_joint[link].is_none_or(|joint| joint.parent.is_none()))
             .collect();
         if roots.len() > 1 {
             let roots = roots
@@ -57,7 +57,11 @@ impl Robot {
             return Ok(());
         };
         // upwards from a link that hangs from no root, the first one met twice lies on the loop
-        let up = |link: usize| parent_joint[link].map_or(link, |joint| joint.parent);
+        let up = |link: usize| {
+            parent_joint[link]
+                .and_then(|joint| joint.parent)
+                .unwrap_or(link)
+        };
         let mut met = HashSet::new();
         let mut link = lost;
         while met.insert(link) {
@@ -96,8 +100,9 @@ impl Robot {
         let mut bodies = vec![nothing; self.links.len()];
         let order = self.link_order();
         for &link in &order {
-            if let Some(joint) = parent_joint[link].filter(|joint| !joint.moves()) {
-                let (body, frame) = carrier[joint.parent];
+            let fixed = parent_joint[link].filter(|joint| !joint.moves());
+            if let Some((joint, parent)) = fixed.and_then(|joint| Some((joint, joint.parent?))) {
+                let (body, frame) = carrier[parent];
                 carrier[link] = (body, frame.mul(&joint.origin));
             }
             if let Some(inertial) = &self.links[link].inertial {

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::description::{Description, Joint, Link, Robot, Shape};
+use super::description::{Description, Joint, JointDof, JointKind, Link, Robot, Shape};
 use super::error::ModelError;
 use super::inertia::{negative_moment, triangle_excess};
 use super::pose::{Pose, QUAT_SLACK};
@@ -91,13 +91,6 @@ impl Robot {
         }
         let owner = format!("robot `{}`", self.name);
         pose(&owner, &self.pose)?;
-        if self.floating {
-            return Err(ModelError::NotSupported {
-                robot: self.name.clone(),
-                argument: "floating=True",
-                cure: "leave it False to fix the root link in the world",
-            });
-        }
         unique(
             &owner,
             "link",
@@ -155,10 +148,63 @@ impl Robot {
     fn validate_joint(&self, owner: &str, joint: &Joint) -> Result<(), ModelError> {
         name("joint", &joint.name)?;
         let what = format!("{owner}: joint `{}`", joint.name);
+        let (coords, dofs) = (joint.kind.coord_names().len(), joint.kind.dof_names().len());
+        if joint.q.len() != coords || joint.dofs.len() != dofs {
+            return Err(ModelError::JointParts {
+                what,
+                kind: joint.kind,
+                coords,
+                dofs,
+            });
+        }
         pose(&what, &joint.origin)?;
         if !joint.moves() {
             return Ok(());
         }
+        if !matches!(joint.kind, JointKind::Ball | JointKind::Free) {
+            self.validate_axis(&what, joint)?;
+        }
+        if let Some([lower, upper]) = joint.range {
+            finite(&format!("{what}: lower limit"), lower)?;
+            finite(&format!("{what}: upper limit"), upper)?;
+            if lower > upper {
+                let (robot, joint) = (self.name.clone(), joint.name.clone());
+                return Err(ModelError::EmptyRange {
+                    robot,
+                    joint,
+                    lower,
+                    upper,
+                });
+            }
+        }
+        not_negative(
+            &format!("{what}: velocity limit"),
+            joint.velocity_limit.unwrap_or(0.0),
+        )?;
+        for (dof, part) in joint.dofs.iter().zip(joint.kind.dof_names()) {
+            let what = match part.is_empty() {
+                true => what.clone(),
+                false => format!("{what}, {part}"),
+            };
+            validate_dof(&what, dof)?;
+        }
+        for &value in &joint.q {
+            finite(&format!("{what}: joint_q"), value)?;
+        }
+        if let (JointKind::Ball | JointKind::Free, Some(quat)) = (joint.kind, joint.q.last_chunk())
+        {
+            let start = Pose {
+                pos: [0.0; 3],
+                quat: *quat,
+            };
+            pose(&format!("{what}: joint_q"), &start)?;
+        }
+        self.validate_free(joint)?;
+        self.validate_mimic(&what, joint)
+    }
+
+    /// A joint's axis is a unit vector.
+    fn validate_axis(&self, what: &str, joint: &Joint) -> Result<(), ModelError> {
         for value in joint.axis {
             finite(&format!("{what}: axis"), value)?;
         }
@@ -181,38 +227,33 @@ impl Robot {
             is_unit,
             "it must be 1",
         )?;
-        if let Some([lower, upper]) = joint.range {
-            finite(&format!("{what}: lower limit"), lower)?;
-            finite(&format!("{what}: upper limit"), upper)?;
-            if lower > upper {
-                let (robot, joint) = (self.name.clone(), joint.name.clone());
-                return Err(ModelError::EmptyRange {
+        Ok(())
+    }
+
+    /// A free body is carried by the world, and nothing drives it.
+    fn validate_free(&self, joint: &Joint) -> Result<(), ModelError> {
+        if joint.kind != JointKind::Free {
+            return Ok(());
+        }
+        let (robot, name) = (self.name.clone(), joint.name.clone());
+        let mut above = joint.parent;
+        while let Some(link) = above {
+            let carrier = self.joints.iter().find(|joint| joint.child == link);
+            if let Some(carrier) = carrier.filter(|carrier| carrier.moves()) {
+                let carrier = carrier.name.clone();
+                return Err(ModelError::FreeBelow {
                     robot,
-                    joint,
-                    lower,
-                    upper,
+                    joint: name,
+                    carrier,
                 });
             }
+            above = carrier.and_then(|carrier| carrier.parent);
         }
-        let not_negatives = [
-            ("effort limit", joint.effort_limit.unwrap_or(0.0)),
-            ("velocity limit", joint.velocity_limit.unwrap_or(0.0)),
-            ("damping", joint.damping),
-            ("friction", joint.friction),
-            ("joint_armature", joint.armature),
-            ("joint_target_ke", joint.target_ke),
-            ("joint_target_kd", joint.target_kd),
-        ];
-        for (field, value) in not_negatives {
-            not_negative(&format!("{what}: {field}"), value)?;
+        let drives = |dof: &JointDof| dof.target_ke > 0.0 || dof.target_kd > 0.0;
+        if joint.dofs.iter().any(drives) {
+            return Err(ModelError::FreeDrive { robot, joint: name });
         }
-        finite(&format!("{what}: joint_q"), joint.q)?;
-        finite(
-            &format!("{what}: joint_target_q"),
-            joint.target_q.unwrap_or(0.0),
-        )?;
-        finite(&format!("{what}: joint_target_qd"), joint.target_qd)?;
-        self.validate_mimic(&what, joint)
+        Ok(())
     }
 
     fn validate_mimic(&self, what: &str, joint: &Joint) -> Result<(), ModelError> {
@@ -236,12 +277,36 @@ impl Robot {
         if !leader.moves() {
             return refuse(leader.name.clone(), "is fixed");
         }
+        if joint.kind.dof_names().len() > 1 || leader.kind.dof_names().len() > 1 {
+            return refuse(
+                leader.name.clone(),
+                "cannot be followed, since one of them has several dofs",
+            );
+        }
         if leader.mimic.is_some() {
             return refuse(leader.name.clone(), "follows another joint itself");
         }
         finite(&format!("{what}: mimic multiplier"), mimic.multiplier)?;
         finite(&format!("{what}: mimic offset"), mimic.offset)
     }
+}
+
+/// What resists and drives a dof is finite and not negative.
+fn validate_dof(what: &str, dof: &JointDof) -> Result<(), ModelError> {
+    let not_negatives = [
+        ("effort limit", dof.effort_limit.unwrap_or(0.0)),
+        ("damping", dof.damping),
+        ("friction", dof.friction),
+        ("joint_armature", dof.armature),
+        ("joint_target_ke", dof.target_ke),
+        ("joint_target_kd", dof.target_kd),
+    ];
+    for (field, value) in not_negatives {
+        not_negative(&format!("{what}: {field}"), value)?;
+    }
+    let target_q = dof.target_q.unwrap_or(0.0);
+    finite(&format!("{what}: joint_target_q"), target_q)?;
+    finite(&format!("{what}: joint_target_qd"), dof.target_qd)
 }
 
 /// Refuses a frame with a number that is not finite, or a quaternion that is no rotation.

@@ -1,16 +1,19 @@
 //! Bias forces by the recursive Newton-Euler algorithm (Featherstone 2008, section 5.3) at zero joint acceleration.
 //!
 //! ```text
-//! v(j) = v(parent) + S q̇             a(j) = a(parent) + v(parent) × S q̇,   a(base) = -g
-//! f(j) = I a + v ×* I v + Σ f(child)  c(j) = S · f(j)
+//! v(b) = v(parent) + Σ S q̇            a(b) = a(parent) + v(parent) × Σ S q̇,   a(base) = -g
+//! f(b) = I a + v ×* I v + Σ f(child)   c(dof) = S · f(b)
 //! ```
+//!
+//! The axes of a free body stand still, but those of its rotation follow its centre of mass: a = v × ω.
 
 use super::{BlockOf, ConstantsOf};
 use crate::lane::Cx;
 use crate::math::spatial::{
     ANGULAR, LINEAR, Spatial, cross_force_add, cross_motion, momentum, power, scale_sum, sum,
 };
-use crate::math::vec3::{constant, scale, zero};
+use crate::math::vec3::{constant, cross_add, scale, zero};
+use crate::model::constants::Motion;
 
 #[inline(always)]
 pub(super) fn bias_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
@@ -18,29 +21,38 @@ pub(super) fn bias_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
     let gravity = constant::<C::F>(m.gravity);
     let base: Spatial<C::F> = [[-gravity[0], -gravity[1], -gravity[2]], zero()];
     // `force` holds the acceleration of a body until the backward pass
-    for (j, dof) in m.dofs.iter().enumerate() {
-        let qd = cx.get(&b.joint_qd[j]);
-        let s = w.motion[j];
-        let (velocity, acceleration) = match dof.parent {
-            Some(parent) => {
-                let v = w.velocity[parent];
-                let a = scale_sum(cross_motion(&v, &s), qd, w.force[parent]);
-                (scale_sum(s, qd, v), a)
+    for (k, body) in m.bodies.iter().enumerate() {
+        let s = w.motion[body.dof];
+        let qd = cx.get(&b.joint_qd[body.dof]);
+        let mut own: Spatial<C::F> = [scale(s[LINEAR], qd), scale(s[ANGULAR], qd)];
+        for d in body.dof + 1..body.dof + body.motion.dofs() {
+            own = scale_sum(w.motion[d], cx.get(&b.joint_qd[d]), own);
+        }
+        let (velocity, acceleration) = match (body.parent, body.motion) {
+            (_, Motion::Free) => {
+                let swing = cross_add(own[LINEAR], own[ANGULAR], base[LINEAR]);
+                (own, [swing, base[ANGULAR]])
             }
-            None => ([scale(s[LINEAR], qd), scale(s[ANGULAR], qd)], base),
+            (Some(parent), _) => {
+                let v = w.velocity[parent];
+                (sum(v, own), sum(w.force[parent], cross_motion(&v, &own)))
+            }
+            (None, _) => (own, base),
         };
-        w.velocity[j] = velocity;
-        w.force[j] = acceleration;
+        w.velocity[k] = velocity;
+        w.force[k] = acceleration;
     }
-    for j in 0..m.dofs.len() {
-        let v = w.velocity[j];
-        let inertial = momentum(&w.inertia[j], &w.force[j]);
-        w.force[j] = cross_force_add(&v, &momentum(&w.inertia[j], &v), inertial);
+    for k in 0..m.bodies.len() {
+        let v = w.velocity[k];
+        let inertial = momentum(&w.inertia[k], &w.force[k]);
+        w.force[k] = cross_force_add(&v, &momentum(&w.inertia[k], &v), inertial);
     }
-    for (j, dof) in m.dofs.iter().enumerate().rev() {
-        let force = w.force[j];
-        w.bias_force[j] = power(&w.motion[j], &force);
-        if let Some(parent) = dof.parent {
+    for (k, body) in m.bodies.iter().enumerate().rev() {
+        let force = w.force[k];
+        for d in body.dofs() {
+            w.bias_force[d] = power(&w.motion[d], &force);
+        }
+        if let Some(parent) = body.parent {
             w.force[parent] = sum(w.force[parent], force);
         }
     }

@@ -19,7 +19,8 @@ pub(super) fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     for equality in &m.equalities {
         let multiplier = C::F::k(equality.multiplier);
         let (f, l) = (equality.follower, equality.leader);
-        let position = multiplier.fnma(cx.get(&b.joint_q[l]), cx.get(&b.joint_q[f]))
+        let (led, own) = (m.dofs[l].coord, m.dofs[f].coord);
+        let position = multiplier.fnma(cx.get(&b.joint_q[led]), cx.get(&b.joint_q[own]))
             - C::F::k(equality.offset);
         let velocity = multiplier.fnma(cx.get(&b.joint_qd[l]), cx.get(&b.joint_qd[f]));
         (w.efc_weight[row], w.efc_aref[row]) = soft_row(&equality.soft, position, velocity);
@@ -32,7 +33,7 @@ pub(super) fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     }
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     for (n, limit) in m.limits.iter().enumerate() {
-        let q = cx.get(&b.joint_q[limit.dof]);
+        let q = cx.get(&b.joint_q[m.dofs[limit.dof].coord]);
         let (above, below) = (q - C::F::k(limit.lower), C::F::k(limit.upper) - q);
         let side = C::F::select(above.lt(below), one, -one);
         let distance = above.min(below);

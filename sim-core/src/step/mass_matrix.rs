@@ -11,20 +11,20 @@ use crate::model::constants::Constants;
 
 #[inline(always)]
 pub(super) fn mass_matrix<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
-    for j in 0..m.dofs.len() {
-        w.composite[j] = w.inertia[j];
-    }
+    w.composite.copy_from_slice(&w.inertia);
     // entries off the paths to the root stay 0, as the workspace was made
-    for (i, dof) in m.dofs.iter().enumerate().rev() {
-        let composite = w.composite[i];
-        let force = momentum(&composite, &w.motion[i]);
-        w.mass_matrix[m.pattern.at(i, i)] = power(&w.motion[i], &force) + F::k(dof.armature);
-        let mut ancestor = dof.parent;
-        while let Some(j) = ancestor {
-            w.mass_matrix[m.pattern.at(i, j)] = power(&w.motion[j], &force);
-            ancestor = m.dofs[j].parent;
+    for (k, body) in m.bodies.iter().enumerate().rev() {
+        let composite = w.composite[k];
+        for i in body.dofs() {
+            let dof = &m.dofs[i];
+            let force = momentum(&composite, &w.motion[i]);
+            for entry in &m.mass_entries[dof.entries.0..dof.entries.1] {
+                w.mass_matrix[entry.place] = power(&w.motion[entry.other], &force);
+            }
+            let own = m.mass_entries[dof.entries.1 - 1].place;
+            w.mass_matrix[own] = w.mass_matrix[own] + F::k(dof.armature);
         }
-        if let Some(parent) = dof.parent {
+        if let Some(parent) = body.parent {
             for e in 0..10 {
                 w.composite[parent][e] = w.composite[parent][e] + composite[e];
             }

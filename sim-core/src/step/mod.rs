@@ -117,6 +117,7 @@ impl Stage {
                 LimitSide,
             ],
             Stage::Integrate => &[
+                Rotation,
                 JointQ,
                 JointQd,
                 JointQdd,
@@ -124,7 +125,7 @@ impl Stage {
                 SmoothForce,
                 ConstraintForce,
             ],
-            Stage::Poses => &[JointQ, Rotation, Origin],
+            Stage::Poses => &[JointQ, Rotation, Origin, Reference],
         }
     }
 
@@ -132,7 +133,7 @@ impl Stage {
     pub fn writes(self) -> &'static [Slot] {
         use Slot::*;
         match self {
-            Stage::Kinematics => &[Rotation, Origin, Motion, Inertia],
+            Stage::Kinematics => &[Rotation, Origin, Reference, Motion, Inertia],
             Stage::Bias => &[BiasForce],
             Stage::MassMatrix => &[MassMatrix],
             Stage::Actuation => &[SmoothForce],

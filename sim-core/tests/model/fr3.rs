@@ -43,7 +43,7 @@ fn bodies_and_dofs_are_in_the_published_order() {
         ]
     );
     assert_eq!(
-        names(&robot.dofs(), &robot.joints, |joint| &joint.name),
+        names(&robot.moving_joints(), &robot.joints, |joint| &joint.name),
         [
             "fr3_joint1",
             "fr3_joint2",
@@ -62,7 +62,7 @@ fn bodies_and_dofs_are_in_the_published_order() {
 fn figures_are_the_published_ones() {
     let robot = own();
     let joints: Vec<_> = robot
-        .dofs()
+        .moving_joints()
         .into_iter()
         .map(|dof| &robot.joints[dof])
         .collect();
@@ -81,7 +81,7 @@ fn figures_are_the_published_ones() {
     assert_eq!(ranges, expected);
     let efforts: Vec<_> = joints
         .iter()
-        .map(|joint| joint.effort_limit.unwrap())
+        .map(|joint| joint.dofs[0].effort_limit.unwrap())
         .collect();
     assert_eq!(
         efforts,
@@ -98,13 +98,13 @@ fn figures_are_the_published_ones() {
             _ => (JointKind::Prismatic, 0.3, 0.0),
         };
         assert_eq!(
-            (joint.kind, joint.damping, joint.friction),
+            (joint.kind, joint.dofs[0].damping, joint.dofs[0].friction),
             (kind, damping, friction),
             "{}",
             joint.name
         );
     }
-    let leader = robot.dofs()[7];
+    let leader = robot.moving_joints()[7];
     assert_eq!(
         joints[8].mimic,
         Some(Mimic {
@@ -179,7 +179,9 @@ fn own_dynamics_equal_the_references_to_the_bit() {
     for (a, b) in own.joints.iter().zip(&reference.joints) {
         let links = |robot: &Robot, joint: &sim_core::model::Joint| {
             (
-                robot.links[joint.parent].name.clone(),
+                robot.links[joint.parent.expect("the FR3 is fixed")]
+                    .name
+                    .clone(),
                 robot.links[joint.child].name.clone(),
             )
         };

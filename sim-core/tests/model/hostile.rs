@@ -65,7 +65,7 @@ fn chain_of_10_000_links_that_follow_one_another_is_read_within_5_s() {
         "{:?}",
         start.elapsed()
     );
-    assert_eq!(robot.dofs().len(), 10_000);
+    assert_eq!(robot.moving_joints().len(), 10_000);
     let first = robot.joints[0].mimic.unwrap();
     assert_eq!((first.joint, first.multiplier), (9_999, -1.0));
 }
@@ -85,7 +85,7 @@ proptest! {
         let end = (start + length).min(text.len());
         let damaged = format!("{}{patch}{}", &text[..start], &text[end..]);
         match Robot::from_urdf_text(&damaged, path, UrdfOptions::default()) {
-            Ok(robot) => prop_assert!(robot.dofs().len() <= 9),
+            Ok(robot) => prop_assert!(robot.moving_joints().len() <= 9),
             Err(error) => prop_assert!(!error.to_string().is_empty()),
         }
     }

@@ -38,21 +38,7 @@ fn another_root_element_is_refused() {
 }
 
 #[test]
-fn joints_that_are_not_simulated_are_refused_by_name_and_type() {
-    for kind in ["floating", "planar", "spherical"] {
-        assert_says(
-            &refusal(&one_joint(kind, "")),
-            &["`elbow`", kind, "not supported yet"],
-        );
-    }
-    assert_says(
-        &refusal(&one_joint("hinge", "")),
-        &["`elbow`", "hinge", "revolute"],
-    );
-}
-
-#[test]
-fn floating_base_is_refused_by_the_argument() {
+fn floating_base_without_mass_is_refused() {
     let options = UrdfOptions {
         floating: true,
         ..UrdfOptions::named("dog")
@@ -63,10 +49,7 @@ fn floating_base_is_refused_by_the_argument() {
         options,
     )
     .unwrap_err();
-    assert_says(
-        &error.to_string(),
-        &["`dog`", "floating=True", "not supported yet"],
-    );
+    assert_says(&error.to_string(), &["`dog`", "`a`", "no mass"]);
 }
 
 #[test]

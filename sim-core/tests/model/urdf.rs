@@ -14,21 +14,27 @@ fn elbow(kind: &str, inside: &str) -> sim_core::model::Joint {
 #[test]
 fn absent_effort_and_velocity_are_no_limit_and_zero_is_zero() {
     let joint = elbow("revolute", "<limit lower=\"-1\" upper=\"1\"/>");
-    assert_eq!((joint.effort_limit, joint.velocity_limit), (None, None));
+    assert_eq!(
+        (joint.dofs[0].effort_limit, joint.velocity_limit),
+        (None, None)
+    );
     let joint = elbow(
         "revolute",
         "<limit lower=\"-1\" upper=\"1\" effort=\"0\" velocity=\"0\"/>",
     );
     assert_eq!(
-        (joint.effort_limit, joint.velocity_limit),
+        (joint.dofs[0].effort_limit, joint.velocity_limit),
         (Some(0.0), Some(0.0))
     );
     let joint = elbow(
         "revolute",
         "<limit lower=\"-1\" upper=\"1\" effort=\"inf\" velocity=\"inf\"/>",
     );
-    assert_eq!((joint.effort_limit, joint.velocity_limit), (None, None));
-    assert_eq!(elbow("continuous", "").effort_limit, None);
+    assert_eq!(
+        (joint.dofs[0].effort_limit, joint.velocity_limit),
+        (None, None)
+    );
+    assert_eq!(elbow("continuous", "").dofs[0].effort_limit, None);
 }
 
 #[test]
@@ -40,13 +46,16 @@ fn limits_dynamics_and_kinds_are_read() {
     assert_eq!(joint.kind, JointKind::Prismatic);
     assert_eq!(joint.range, Some([-0.5, 2.0]));
     assert_eq!(
-        (joint.effort_limit, joint.velocity_limit),
+        (joint.dofs[0].effort_limit, joint.velocity_limit),
         (Some(7.0), Some(3.0))
     );
-    assert_eq!((joint.damping, joint.friction), (0.25, 0.125));
+    assert_eq!(
+        (joint.dofs[0].damping, joint.dofs[0].friction),
+        (0.25, 0.125)
+    );
     let joint = elbow("continuous", LIMIT);
     assert_eq!(
-        (joint.kind, joint.range, joint.effort_limit),
+        (joint.kind, joint.range, joint.dofs[0].effort_limit),
         (JointKind::Revolute, None, Some(1.0))
     );
     assert_eq!(elbow("fixed", "").kind, JointKind::Fixed);
@@ -206,7 +215,7 @@ fn bodies_and_dofs_come_depth_first_in_the_order_of_the_joints() {
             .collect();
         assert_eq!(names, bodies);
         let names: Vec<&str> = robot
-            .dofs()
+            .moving_joints()
             .iter()
             .map(|&dof| robot.joints[dof].name.as_str())
             .collect();
@@ -303,7 +312,7 @@ fn what_is_ignored_is_noted_once_each_by_name() {
     );
     assert_eq!(robot.notes.len(), 6);
     assert_eq!((robot.links.len(), robot.joints.len()), (2, 1));
-    assert_eq!(robot.joints[0].damping, 2.0);
+    assert_eq!(robot.joints[0].dofs[0].damping, 2.0);
 }
 
 #[test]

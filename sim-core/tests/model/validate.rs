@@ -130,15 +130,15 @@ fn robots_need_names_of_their_own() {
 #[test]
 fn joint_values_are_checked() {
     assert_says(
-        &joint_refusal(|joint| joint.q = f64::NAN),
+        &joint_refusal(|joint| joint.q[0] = f64::NAN),
         &["`elbow`", "joint_q", "NaN"],
     );
     assert_says(
-        &joint_refusal(|joint| joint.armature = -1.0),
+        &joint_refusal(|joint| joint.dofs[0].armature = -1.0),
         &["`elbow`", "joint_armature", "-1"],
     );
     assert_says(
-        &joint_refusal(|joint| joint.target_ke = f64::INFINITY),
+        &joint_refusal(|joint| joint.dofs[0].target_ke = f64::INFINITY),
         &["`elbow`", "joint_target_ke", "inf"],
     );
     assert_says(
@@ -189,7 +189,7 @@ fn setters_refuse_wrong_lengths_and_values_and_then_change_nothing() {
     let error = robot.set_joint_q(&[1.0, 2.0]).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "robot `r`: joint_q has 2 values, the robot has 1 dofs"
+        "robot `r`: joint_q has 2 values, the robot has 1 coordinates"
     );
     assert_says(
         &robot
@@ -236,14 +236,8 @@ fn setters_write_in_dof_order() {
             .into(),
         // the joint of the second dof comes first
         joints: vec![
-            Joint {
-                kind: JointKind::Revolute,
-                ..Joint::fixed("second", 1, 2)
-            },
-            Joint {
-                kind: JointKind::Revolute,
-                ..Joint::fixed("first", 0, 1)
-            },
+            Joint::new(JointKind::Revolute, "second", Some(1), 2),
+            Joint::new(JointKind::Revolute, "first", Some(0), 1),
         ],
         notes: vec![],
         urdf: None,
@@ -253,13 +247,19 @@ fn setters_write_in_dof_order() {
     robot
         .set_joint_target_mode(&[TargetMode::Both, TargetMode::Velocity])
         .unwrap();
-    assert_eq!((robot.joints[1].q, robot.joints[0].q), (1.0, 2.0));
+    assert_eq!((robot.joints[1].q[0], robot.joints[0].q[0]), (1.0, 2.0));
     assert_eq!(
-        (robot.joints[1].effort_limit, robot.joints[0].effort_limit),
+        (
+            robot.joints[1].dofs[0].effort_limit,
+            robot.joints[0].dofs[0].effort_limit
+        ),
         (None, Some(5.0))
     );
     assert_eq!(
-        (robot.joints[1].target_mode, robot.joints[0].target_mode),
+        (
+            robot.joints[1].dofs[0].target_mode,
+            robot.joints[0].dofs[0].target_mode
+        ),
         (TargetMode::Both, TargetMode::Velocity)
     );
 }

@@ -398,8 +398,7 @@ impl ShapeTable {
 impl RobotTable {
     fn set_joints(&self, robot: &mut Robot) -> Result<(), ModelError> {
         type Setter = fn(&mut Robot, &[f64]) -> Result<(), ModelError>;
-        let fields: [(&Option<PerDof<Number>>, Setter); 7] = [
-            (&self.joint_q, Robot::set_joint_q),
+        let fields: [(&Option<PerDof<Number>>, Setter); 6] = [
             (&self.joint_target_q, Robot::set_joint_target_q),
             (&self.joint_target_qd, Robot::set_joint_target_qd),
             (&self.joint_target_ke, Robot::set_joint_target_ke),
@@ -407,17 +406,23 @@ impl RobotTable {
             (&self.joint_effort_limit, Robot::set_joint_effort_limit),
             (&self.joint_armature, Robot::set_joint_armature),
         ];
-        let dofs = robot.dofs().len();
+        let driven = summary::driven(robot);
+        let coords = vec![true; robot.coord_names().len()];
+        if let Some(values) = &self.joint_q {
+            robot.set_joint_q(&values.spread(&coords, 0.0, |value| value.0))?;
+        }
         for (values, set) in fields {
             if let Some(values) = values {
-                set(robot, &values.spread(dofs, |value| value.0))?;
+                set(robot, &values.spread(&driven, 0.0, |value| value.0))?;
             }
         }
         if let Some(modes) = &self.joint_target_mode {
-            robot.set_joint_target_mode(&modes.spread(dofs, |mode| match mode {
-                ModeName::Position => TargetMode::Position,
-                ModeName::Velocity => TargetMode::Velocity,
-                ModeName::Both => TargetMode::Both,
+            robot.set_joint_target_mode(&modes.spread(&driven, TargetMode::Position, |mode| {
+                match mode {
+                    ModeName::Position => TargetMode::Position,
+                    ModeName::Velocity => TargetMode::Velocity,
+                    ModeName::Both => TargetMode::Both,
+                }
             }))?;
         }
         Ok(())

@@ -75,10 +75,14 @@ pub enum PerDof<T> {
 }
 
 impl<T: Copy> PerDof<T> {
-    /// The values of a robot with this many dofs; the length of a list is not checked here.
-    pub fn spread<V>(&self, dofs: usize, value: impl Fn(T) -> V) -> Vec<V> {
+    /// The values of a robot's dofs, a single one for all that are `driven`, `else_` for the others; the length
+    /// of a list is not checked here.
+    pub fn spread<V: Copy>(&self, driven: &[bool], else_: V, value: impl Fn(T) -> V) -> Vec<V> {
         match self {
-            PerDof::All(all) => (0..dofs).map(|_| value(*all)).collect(),
+            PerDof::All(all) => driven
+                .iter()
+                .map(|&driven| if driven { value(*all) } else { else_ })
+                .collect(),
             PerDof::Each(each) => each.iter().map(|&one| value(one)).collect(),
         }
     }

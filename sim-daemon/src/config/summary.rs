@@ -3,49 +3,55 @@
 use std::path::Path;
 
 use serde_json::{Value, json};
-use sim_core::model::{Robot, UrdfOptions};
+use sim_core::model::{Joint, JointDof, JointKind, Robot, UrdfOptions};
 
 use super::{ConfigError, Number};
 
-/// Names, defaults and notes of a URDF file, arrays in dof order; no limit is `null` for ranges, `"inf"` otherwise.
+/// Names, defaults and notes of a URDF file; no limit is `null` for ranges, `"inf"` otherwise.
 ///
-/// Keys: `name`, `joint_names`, `joint_types`, `joint_q`, `joint_range` (pairs), `joint_effort_limit`,
-/// `joint_velocity_limit`, `joint_damping`, `joint_friction`, `joint_armature`, `joint_mimic` (`null`, or an object with `joint`,
-/// `multiplier`, `offset`), `link_names` (in body order), `notes`.
+/// Keys: `name`; one entry a moving joint: `joint_names`, `joint_types`, `joint_range` (pairs), `joint_velocity_limit`,
+/// `joint_mimic` (`null`, or an object with `joint`, `multiplier`, `offset`); one entry a coordinate: `coord_names`, `joint_q`;
+/// one entry a dof: `dof_names`, `dof_driven`, `joint_effort_limit`, `joint_damping`, `joint_friction`, `joint_armature`;
+/// `link_names` (in body order), `notes`.
 ///
 /// # Errors
 /// What is wrong with the file, by name.
 pub fn urdf_summary(path: &Path, options: UrdfOptions) -> Result<Value, ConfigError> {
     let robot = Robot::from_urdf(path, options)?;
-    let joints: Vec<_> = robot
-        .dofs()
+    let joints: Vec<&Joint> = robot
+        .moving_joints()
         .into_iter()
-        .map(|dof| &robot.joints[dof])
+        .map(|joint| &robot.joints[joint])
         .collect();
     let links: Vec<_> = robot
         .link_order()
         .into_iter()
         .map(|link| &robot.links[link].name)
         .collect();
-    let each = |value: &dyn Fn(&sim_core::model::Joint) -> Value| -> Value {
+    let each = |value: &dyn Fn(&Joint) -> Value| -> Value {
         joints.iter().map(|joint| value(joint)).collect()
     };
+    let dofs = |value: &dyn Fn(&JointDof) -> Value| -> Value {
+        let all = joints.iter().flat_map(|joint| &joint.dofs);
+        all.map(value).collect()
+    };
     let limit = |limit: Option<f64>| json!(Number(limit.unwrap_or(f64::INFINITY)));
+    let start: Vec<f64> = joints.iter().flat_map(|joint| joint.q.clone()).collect();
+    let driven: Vec<bool> = driven(&robot);
     Ok(json!({
         "name": robot.name,
         "joint_names": each(&|joint| json!(joint.name)),
         "joint_types": each(&|joint| json!(match joint.kind {
-            sim_core::model::JointKind::Prismatic => "prismatic",
-            _ if joint.range.is_none() => "continuous",
-            _ => "revolute",
+            JointKind::Fixed => "fixed",
+            JointKind::Prismatic => "prismatic",
+            JointKind::Ball => "spherical",
+            JointKind::Planar => "planar",
+            JointKind::Free => "floating",
+            JointKind::Revolute if joint.range.is_none() => "continuous",
+            JointKind::Revolute => "revolute",
         })),
-        "joint_q": each(&|joint| json!(joint.q)),
         "joint_range": each(&|joint| json!(joint.range)),
-        "joint_effort_limit": each(&|joint| limit(joint.effort_limit)),
         "joint_velocity_limit": each(&|joint| limit(joint.velocity_limit)),
-        "joint_damping": each(&|joint| json!(joint.damping)),
-        "joint_friction": each(&|joint| json!(joint.friction)),
-        "joint_armature": each(&|joint| json!(joint.armature)),
         "joint_mimic": each(&|joint| match joint.mimic {
             None => Value::Null,
             Some(mimic) => json!({
@@ -54,7 +60,26 @@ pub fn urdf_summary(path: &Path, options: UrdfOptions) -> Result<Value, ConfigEr
                 "offset": mimic.offset,
             }),
         }),
+        "coord_names": robot.coord_names(),
+        "joint_q": start,
+        "dof_names": robot.dof_names(),
+        "dof_driven": driven,
+        "joint_effort_limit": dofs(&|dof| limit(dof.effort_limit)),
+        "joint_damping": dofs(&|dof| json!(dof.damping)),
+        "joint_friction": dofs(&|dof| json!(dof.friction)),
+        "joint_armature": dofs(&|dof| json!(dof.armature)),
         "link_names": links,
         "notes": robot.notes,
     }))
+}
+
+/// Whether each dof can have a drive: those of a free body cannot.
+pub(super) fn driven(robot: &Robot) -> Vec<bool> {
+    let joints = robot
+        .moving_joints()
+        .into_iter()
+        .map(|joint| &robot.joints[joint]);
+    joints
+        .flat_map(|joint| vec![joint.kind != JointKind::Free; joint.dofs.len()])
+        .collect()
 }

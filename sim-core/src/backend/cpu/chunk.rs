@@ -25,17 +25,38 @@ pub(super) struct Job<F: Lane> {
     start: Vec<F::Real>,
 }
 
-/// State and commands of a block: `COUNT` groups of one number a dof.
+/// State and commands of a block: groups of one number a dof, and last the positions, one a coordinate.
 #[derive(Clone, Copy)]
 enum StateField {
-    Q,
     Qd,
     Qdd,
     F,
     TargetQ,
     TargetQd,
+    Q,
 }
-const COUNT: usize = 6;
+
+/// Numbers of a world's state and commands.
+#[derive(Clone, Copy)]
+struct Shape {
+    dofs: usize,
+    coords: usize,
+}
+
+impl Shape {
+    fn of<R: Real>(m: &Constants<R>) -> Shape {
+        Shape {
+            dofs: m.dofs.len(),
+            coords: m.coords,
+        }
+    }
+    fn start(self, field: StateField) -> usize {
+        field as usize * self.dofs
+    }
+    fn total(self) -> usize {
+        self.start(StateField::Q) + self.coords
+    }
+}
 
 impl StateField {
     fn of(field: Field) -> StateField {
@@ -52,13 +73,17 @@ impl StateField {
 
 impl<F: Lane> Job<F> {
     pub fn new(model: &Model, layout: Layout, stages: [RunStage<F>; Stage::ALL.len()]) -> Job<F> {
-        let n = model.dofs();
+        let shape = Shape::of(model.constants());
         let start = model.start();
-        let mut reset = vec![F::Real::default(); COUNT * n];
-        for j in 0..n {
-            reset[StateField::Q as usize * n + j] = F::Real::of(start.joint_q[j]);
-            reset[StateField::TargetQ as usize * n + j] = F::Real::of(start.joint_target_q[j]);
-            reset[StateField::TargetQd as usize * n + j] = F::Real::of(start.joint_target_qd[j]);
+        let mut reset = vec![F::Real::default(); shape.total()];
+        for (field, values) in [
+            (StateField::Q, &start.joint_q),
+            (StateField::TargetQ, &start.joint_target_q),
+            (StateField::TargetQd, &start.joint_target_qd),
+        ] {
+            for (to, from) in reset[shape.start(field)..].iter_mut().zip(values) {
+                *to = F::Real::of(*from);
+            }
         }
         Job {
             constants: model.constants().cast(),
@@ -99,7 +124,7 @@ fn stages_for(layout: &Layout) -> Vec<Stage> {
 
 pub(super) struct Chunk<F: Lane> {
     worlds: Range<usize>,
-    /// `(blocks, COUNT, dofs, WIDTH)`
+    /// `(blocks, numbers of a world, WIDTH)`
     state: Vec<F::Real>,
     /// Control frames since the reset of each world.
     steps: Vec<u64>,
@@ -113,7 +138,6 @@ pub(super) struct Chunk<F: Lane> {
 
 impl<F: Lane> Chunk<F> {
     pub fn new(job: &Job<F>, worlds: Range<usize>) -> Self {
-        let n = job.constants.dofs.len();
         let blocks = worlds.len().div_ceil(F::WIDTH);
         let elements = job
             .layout
@@ -122,7 +146,7 @@ impl<F: Lane> Chunk<F> {
             .map(|slot| slot.shape[1..].iter().product());
         let elements: usize = elements.max().unwrap_or(1);
         let mut chunk = Chunk {
-            state: vec![F::Real::default(); blocks * COUNT * n * F::WIDTH],
+            state: vec![F::Real::default(); blocks * Shape::of(&job.constants).total() * F::WIDTH],
             steps: vec![0; worlds.len()],
             status: vec![0; worlds.len()],
             block: Block::new(&job.constants, F::default()),
@@ -138,14 +162,13 @@ impl<F: Lane> Chunk<F> {
     }
 
     /// Place of a number of a world (counted from the chunk's first) in `state`.
-    fn place(&self, n: usize, world: usize, field: StateField, dof: usize) -> usize {
+    fn place(&self, shape: Shape, world: usize, field: StateField, k: usize) -> usize {
         let (block, lane) = (world / F::WIDTH, world % F::WIDTH);
-        ((block * COUNT + field as usize) * n + dof) * F::WIDTH + lane
+        (block * shape.total() + shape.start(field) + k) * F::WIDTH + lane
     }
 
     fn reset_lane(&mut self, job: &Job<F>, world: usize) {
-        let n = job.constants.dofs.len();
-        let first = self.place(n, world, StateField::Q, 0);
+        let first = self.place(Shape::of(&job.constants), world, StateField::Qd, 0);
         for (k, &x) in job.start.iter().enumerate() {
             self.state[first + k * F::WIDTH] = x;
         }
@@ -173,7 +196,7 @@ impl<F: Lane> Chunk<F> {
         if columns.is_empty() {
             return;
         }
-        let n = job.constants.dofs.len();
+        let shape = Shape::of(&job.constants);
         let target = StateField::of(field);
         let writes_state = matches!(target, StateField::Q | StateField::Qd);
         for world in 0..self.worlds.len() {
@@ -182,7 +205,7 @@ impl<F: Lane> Chunk<F> {
                 continue;
             }
             let row = outside * columns.len();
-            let first = self.place(n, world, target, columns.start);
+            let first = self.place(shape, world, target, columns.start);
             let cells = self.state[first..].iter_mut().step_by(F::WIDTH);
             match values {
                 Values::F32(v) => {
@@ -197,9 +220,28 @@ impl<F: Lane> Chunk<F> {
                 }
             }
             if writes_state {
-                for dof in 0..n {
-                    let place = self.place(n, world, StateField::Qdd, dof);
+                for dof in 0..shape.dofs {
+                    let place = self.place(shape, world, StateField::Qdd, dof);
                     self.state[place] = F::Real::default();
+                }
+            }
+            if matches!(target, StateField::Q) {
+                self.normalize(job, world);
+            }
+        }
+    }
+
+    /// Makes the quaternions of a world unit.
+    fn normalize(&mut self, job: &Job<F>, world: usize) {
+        let shape = Shape::of(&job.constants);
+        for first in job.constants.quaternions() {
+            let place = self.place(shape, world, StateField::Q, first);
+            let at = |i: usize| place + i * F::WIDTH;
+            let square: f64 = (0..4).map(|i| self.state[at(i)].to_f64().powi(2)).sum();
+            // one that is unit to the last bits stays as it was written
+            if (square - 1.0).abs() > 4.0 * F::Real::EPSILON {
+                for i in 0..4 {
+                    self.state[at(i)] = F::Real::of(self.state[at(i)].to_f64() / square.sqrt());
                 }
             }
         }
@@ -211,17 +253,17 @@ impl<F: Lane> Chunk<F> {
     /// The processor has the instructions of `F`; the arena holds the job's layout.
     #[inline(always)]
     pub unsafe fn run(&mut self, job: &Job<F>, substeps: usize, arena: Arena) {
-        let n = job.constants.dofs.len();
-        let stride = COUNT * n * F::WIDTH;
+        let shape = Shape::of(&job.constants);
+        let stride = shape.total() * F::WIDTH;
         for block in 0..self.worlds.len().div_ceil(F::WIDTH) {
             let state = block * stride..(block + 1) * stride;
-            self.load(n, state.clone());
+            self.load(state.clone());
             let mut machine = Machine::<F>::new(&mut []);
             for pass in 0..=substeps {
                 let evaluates = pass == substeps;
                 if evaluates {
                     // before the evaluation, which moves the warm start: what is read must not change the run
-                    self.store(n, state.clone());
+                    self.store(shape, state.clone());
                     self.count(block, substeps > 0);
                 }
                 let stages = if evaluates {
@@ -259,19 +301,19 @@ impl<F: Lane> Chunk<F> {
 
     /// State and commands of a block into its workspace.
     #[inline(always)]
-    fn load(&mut self, n: usize, state: Range<usize>) {
+    fn load(&mut self, state: Range<usize>) {
         let b = &mut self.block;
         let groups = [
-            &mut b.joint_q,
             &mut b.joint_qd,
             &mut b.joint_qdd,
             &mut b.joint_f,
             &mut b.joint_target_q,
             &mut b.joint_target_qd,
+            &mut b.joint_q,
         ];
         let mut from = self.state[state].chunks_exact(F::WIDTH);
         for group in groups {
-            for x in group[..n].iter_mut() {
+            for x in group.iter_mut() {
                 *x = F::load(from.next().expect("a register for every number"));
             }
         }
@@ -280,12 +322,18 @@ impl<F: Lane> Chunk<F> {
 
     /// The state of a block out of its workspace; commands did not change.
     #[inline(always)]
-    fn store(&mut self, n: usize, state: Range<usize>) {
+    fn store(&mut self, shape: Shape, state: Range<usize>) {
         let b = &self.block;
-        let mut to = self.state[state].chunks_exact_mut(F::WIDTH);
-        for group in [&b.joint_q, &b.joint_qd, &b.joint_qdd] {
-            for x in &group[..n] {
-                x.store(to.next().expect("a register for every number"));
+        let groups = [
+            (StateField::Qd, &b.joint_qd),
+            (StateField::Qdd, &b.joint_qdd),
+            (StateField::Q, &b.joint_q),
+        ];
+        for (field, group) in groups {
+            let first = state.start + shape.start(field) * F::WIDTH;
+            let to = self.state[first..].chunks_exact_mut(F::WIDTH);
+            for (x, to) in group.iter().zip(to) {
+                x.store(to);
             }
         }
     }

@@ -34,23 +34,33 @@ impl<'a, 'input> Reader<'a, 'input> {
                         known: first_few(&link_names),
                     })
             };
-            let mut made = Joint::fixed(
-                &joint.name,
-                find("parent", &joint.parent.link)?,
-                find("child", &joint.child.link)?,
-            );
-            made.origin = pose(&joint.origin);
-            made.kind = match joint.joint_type {
+            let kind = match joint.joint_type {
                 JointType::Revolute | JointType::Continuous => JointKind::Revolute,
                 JointType::Prismatic => JointKind::Prismatic,
-                _ => JointKind::Fixed,
+                JointType::Spherical => JointKind::Ball,
+                JointType::Planar => JointKind::Planar,
+                JointType::Floating => JointKind::Free,
+                JointType::Fixed => JointKind::Fixed,
             };
+            let parent = find("parent", &joint.parent.link)?;
+            let child = find("child", &joint.child.link)?;
+            let mut made = Joint::new(kind, &joint.name, Some(parent), child);
+            made.origin = pose(&joint.origin);
             if made.moves() {
-                made.axis = self.axis(joint)?;
-                self.limits(joint, node, &mut made)?;
+                if !matches!(kind, JointKind::Ball | JointKind::Free) {
+                    made.axis = self.axis(joint)?;
+                }
+                if made.dofs.len() == 1 {
+                    self.limits(joint, node, &mut made)?;
+                } else if let Some(limit) = children(node, "limit").next() {
+                    self.scan
+                        .ignore(limit, "<limit> of a joint with several dofs".to_owned());
+                }
                 if let Some(dynamics) = &joint.dynamics {
-                    made.damping = dynamics.damping;
-                    made.friction = dynamics.friction;
+                    for dof in &mut made.dofs {
+                        dof.damping = dynamics.damping;
+                        dof.friction = dynamics.friction;
+                    }
                 }
             } else {
                 for name in ["limit", "dynamics", "mimic"] {
@@ -105,9 +115,9 @@ impl<'a, 'input> Reader<'a, 'input> {
         let finite = |name: &str, value: f64| {
             (has(node, "limit", name) && value != f64::INFINITY).then_some(value)
         };
-        made.effort_limit = finite("effort", limit.effort);
+        made.dofs[0].effort_limit = finite("effort", limit.effort);
         made.velocity_limit = finite("velocity", limit.velocity);
-        if made.effort_limit == Some(0.0) {
+        if made.dofs[0].effort_limit == Some(0.0) {
             self.notes.push(format!(
                 "joint `{}`: effort limit 0 leaves its drive without effect",
                 joint.name
@@ -183,6 +193,9 @@ impl<'a, 'input> Reader<'a, 'input> {
             }
             if !joints[leader].moves() {
                 return refuse("is fixed");
+            }
+            if joint.dofs.len() > 1 || joints[leader].dofs.len() > 1 {
+                return refuse("cannot be followed, since one of them has several dofs");
             }
             let (multiplier, offset) =
                 (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));

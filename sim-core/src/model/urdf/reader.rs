@@ -47,7 +47,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         let joints = self.joints(&urdf)?;
         let mut notes = self.scan.notes();
         notes.append(&mut self.notes);
-        Ok(Robot {
+        let mut robot = Robot {
             name: self.robot.clone(),
             pose: self.options.pose.normalized(),
             floating: self.options.floating,
@@ -56,26 +56,23 @@ impl<'a, 'input> Reader<'a, 'input> {
             joints,
             notes,
             urdf: Some(self.path.to_owned()),
-        })
+        };
+        robot.place_free_bodies();
+        if self.options.floating {
+            robot.float();
+        }
+        Ok(robot)
     }
 
     /// urdf-rs names neither the joint nor the line of a kind it does not know.
     fn refuse_joint_kinds(&self) -> Result<(), ModelError> {
         for &node in &self.scan.joints {
             match node.attribute("type").unwrap_or_default() {
-                "revolute" | "continuous" | "prismatic" | "fixed" => {}
-                kind @ ("floating" | "planar" | "spherical" | "ball") => {
-                    let root = node.document().root_element();
-                    let name = root.attribute("name").unwrap_or("robot");
-                    return Err(ModelError::JointKind {
-                        robot: self.options.name.clone().unwrap_or_else(|| name.to_owned()),
-                        joint: node.attribute("name").unwrap_or_default().to_owned(),
-                        kind: kind.to_owned(),
-                    });
-                }
+                "revolute" | "continuous" | "prismatic" | "fixed" | "planar" | "floating"
+                | "spherical" => {}
                 kind => {
                     let reason = format!(
-                        "type `{kind}` is unknown; use revolute, continuous, prismatic or fixed"
+                        "type `{kind}` is unknown; use revolute, continuous, prismatic, spherical, planar, floating or fixed"
                     );
                     return Err(self.scan.fault(node, reason));
                 }

@@ -1,0 +1,102 @@
+//! The frozen model.
+
+use super::constants::Constants;
+use std::ops::Range;
+
+/// Where a robot's rows lie in the arrays of the scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RobotRange {
+    /// Name of the robot.
+    pub name: String,
+    /// Its columns of `(worlds, dofs)` arrays.
+    pub dofs: Range<usize>,
+    /// Its columns of `(worlds, coords)` arrays.
+    pub coords: Range<usize>,
+    /// Its columns of `(worlds, bodies, …)` arrays.
+    pub bodies: Range<usize>,
+}
+
+/// A scene that is ready to run: immutable, sorted, hashed.
+#[derive(Clone, Debug)]
+pub struct Model {
+    pub(super) constants: Constants<f64>,
+    pub(super) dt: f64,
+    pub(super) substeps: usize,
+    pub(super) dof_names: Vec<String>,
+    pub(super) coord_names: Vec<String>,
+    pub(super) body_names: Vec<String>,
+    pub(super) robots: Vec<RobotRange>,
+    pub(super) start: Start,
+    pub(super) dof_inverse_weight: Vec<f64>,
+    pub(super) hash: u64,
+}
+
+/// State and commands after a reset: positions one entry a coordinate, targets one a dof.
+#[derive(Clone, Debug, Default)]
+pub struct Start {
+    /// [rad or m]
+    pub joint_q: Vec<f64>,
+    /// [rad or m]
+    pub joint_target_q: Vec<f64>,
+    /// [rad/s or m/s]
+    pub joint_target_qd: Vec<f64>,
+}
+
+impl Model {
+    /// Constants of the text, in f64.
+    pub fn constants(&self) -> &Constants<f64> {
+        &self.constants
+    }
+    /// Duration of one substep [s].
+    pub fn dt(&self) -> f64 {
+        self.dt
+    }
+    /// Substeps in a control frame.
+    pub fn substeps(&self) -> usize {
+        self.substeps
+    }
+    /// Names of the dofs, `robot/joint` or `robot/joint.part`.
+    pub fn dof_names(&self) -> &[String] {
+        &self.dof_names
+    }
+    /// Names of the position coordinates, `robot/joint` or `robot/joint.part`.
+    pub fn coord_names(&self) -> &[String] {
+        &self.coord_names
+    }
+    /// Names of the bodies, `robot/link`.
+    pub fn body_names(&self) -> &[String] {
+        &self.body_names
+    }
+    /// Each robot's part of the arrays.
+    pub fn robots(&self) -> &[RobotRange] {
+        &self.robots
+    }
+    /// Number of degrees of freedom.
+    pub fn dofs(&self) -> usize {
+        self.constants.dofs.len()
+    }
+    /// Number of position coordinates.
+    pub fn coords(&self) -> usize {
+        self.constants.coords
+    }
+    /// Number of bodies: links of all robots, fixed ones included.
+    pub fn bodies(&self) -> usize {
+        self.constants.frames.len()
+    }
+    /// Number of constraint rows: equalities, frictions, limits.
+    pub fn rows(&self) -> usize {
+        self.constants.rows()
+    }
+    /// State and commands after a reset.
+    pub fn start(&self) -> &Start {
+        &self.start
+    }
+    /// Diagonal of M⁻¹ at q = 0, MuJoCo's `dof_invweight0`. `(dofs)` [1/(kg·m²) or 1/kg]
+    pub fn dof_inverse_weight(&self) -> &[f64] {
+        &self.dof_inverse_weight
+    }
+    /// A number that differs between models that behave differently.
+    pub fn hash(&self) -> u64 {
+        self.hash
+    }
+}
