@@ -18,6 +18,7 @@ const FORESEEN_MAX: Duration = Duration::from_millis(20);
 
 /// Most waits that sleep at once after spinning was in vain.
 const REST_MAX: u32 = 64;
+
 /// What is waited for.
 pub(crate) trait Waiting<T> {
     /// Looks for it; called over and over.
