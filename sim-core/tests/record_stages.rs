@@ -284,6 +284,9 @@ fn what_a_stage_does_not_name_it_neither_reads_nor_writes() {
         EfcForce,
         ConstraintForce,
         BodyQ,
+        Velocity,
+        LinkCenter,
+        BodyQd,
     ];
     let m = fr3();
     let mut start = random_state(&m, &mut toy::Random(3));

@@ -58,7 +58,11 @@ pub struct Workspace<F> {
     pub orientation: Vec<Quat<F>>,
     /// Link frames in the world: position, quaternion (x, y, z, w). `(frames, 7)` [m, –]
     pub body_q: Vec<[F; 7]>,
-    /// Scratch of a stage: velocity of each body. `(bodies, 2, 3)`
+    /// Centre of mass of each link from the reference point. `(frames, 3)` [m]
+    pub link_center: Vec<Vec3<F>>,
+    /// Velocity of each link's centre of mass, then angular velocity. `(frames, 2, 3)` [m/s, rad/s]
+    pub body_qd: Vec<Spatial<F>>,
+    /// Velocity of each body at the reference point. `(bodies, 2, 3)`
     pub velocity: Vec<Spatial<F>>,
     /// Scratch of a stage: acceleration, then force of each body. `(bodies, 2, 3)`
     pub force: Vec<Spatial<F>>,
@@ -115,8 +119,14 @@ pub enum Slot {
     EfcForce,
     /// [`Workspace::constraint_force`]
     ConstraintForce,
+    /// [`Workspace::velocity`]
+    Velocity,
     /// [`Workspace::body_q`]
     BodyQ,
+    /// [`Workspace::link_center`]
+    LinkCenter,
+    /// [`Workspace::body_qd`]
+    BodyQd,
 }
 
 /// The numbers of a slot, flat.
@@ -157,6 +167,8 @@ impl<F: Num, V: Copy> Block<F, V> {
                 constraint_force: vec![zero; n],
                 orientation: vec![[zero; 4]; bodies],
                 body_q: vec![[zero; 7]; m.frames.len()],
+                link_center: vec![[zero; 3]; m.frames.len()],
+                body_qd: vec![[[zero; 3]; 2]; m.frames.len()],
                 velocity: vec![[[zero; 3]; 2]; bodies],
                 force: vec![[[zero; 3]; 2]; bodies],
                 composite: vec![[zero; 10]; bodies],
@@ -192,6 +204,9 @@ impl<F: Num, V: Copy> Block<F, V> {
             Slot::LimitSide => Values(&mut w.limit_side),
             Slot::EfcForce => Values(&mut w.efc_force),
             Slot::ConstraintForce => Values(&mut w.constraint_force),
+            Slot::Velocity => Values(w.velocity.as_flattened_mut().as_flattened_mut()),
+            Slot::LinkCenter => Values(w.link_center.as_flattened_mut()),
+            Slot::BodyQd => Values(w.body_qd.as_flattened_mut().as_flattened_mut()),
             Slot::BodyQ => Values(w.body_q.as_flattened_mut()),
         }
     }

@@ -157,6 +157,8 @@ fields! {
     JointTargetQ "joint_target_q" Command [Dofs] "rad or m" REAL, "Position targets of the drives.";
     JointTargetQd "joint_target_qd" Command [Dofs] "rad/s or m/s" REAL, "Velocity targets of the drives.";
     BodyQ "body_q" Derived [Bodies, Size(7)] "m, –" REAL, "Link frames in the world: position, then quaternion (x, y, z, w).";
+    BodyQd "body_qd" Derived [Bodies, Size(6)] "m/s, rad/s" REAL, "Velocity of each link's centre of mass, then its angular velocity, in world axes.";
+    BodyJacobian "body_jacobian" Derived [Bodies, Size(6), Dofs] "m/s or rad/s per rad/s or m/s" REAL, "What takes joint_qd to body_qd.";
     MassMatrix "mass_matrix" Derived [Dofs, Dofs] "kg·m², kg·m or kg" REAL, "Joint-space inertia, armature included.";
     BiasForce "bias_force" Derived [Dofs] "N·m or N" REAL, "Coriolis, centrifugal and gravity forces: what holds the joints at zero acceleration.";
     SmoothForce "smooth_force" Derived [Dofs] "N·m or N" REAL, "Applied, drive and damping forces less the bias: all but constraint forces.";

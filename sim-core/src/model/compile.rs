@@ -142,6 +142,10 @@ impl Builder {
                 tree: carrier.tree,
                 position: carrier.pose.pos,
                 quat: carrier.pose.quat,
+                center: match &robot.links[link].inertial {
+                    Some(inertial) => carrier.pose.transform(inertial.pos),
+                    None => carrier.pose.pos,
+                },
             });
         }
         self.add_masses(robot, &carriers, first_body);

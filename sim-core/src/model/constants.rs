@@ -157,6 +157,8 @@ pub struct Frame<R> {
     pub position: [R; 3],
     /// Orientation in the carrier's frame, (x, y, z, w) [–].
     pub quat: [R; 4],
+    /// The link's own centre of mass in the carrier's frame, or relative to the base; its origin if it weighs nothing [m].
+    pub center: [R; 3],
 }
 
 /// Softness of a constraint row whose impedance depends on its position.
@@ -305,6 +307,7 @@ impl<R: Real> Constants<R> {
                     tree: f.tree,
                     position: f.position.map(cast),
                     quat: f.quat.map(cast),
+                    center: f.center.map(cast),
                 })
                 .collect(),
             mass_entries: self.mass_entries.clone(),

@@ -11,6 +11,7 @@ mod kinematics;
 mod mass_matrix;
 mod poses;
 mod solver;
+mod velocities;
 
 use crate::batch::{Block, WorkSlot as Slot};
 use crate::lane::{Cx, Num};
@@ -40,6 +41,8 @@ pub enum Stage {
     Integrate,
     /// Link frames for output.
     Poses,
+    /// Link velocities for output.
+    Velocities,
 }
 
 /// The order of a step.
@@ -54,7 +57,7 @@ pub const STAGES: [Stage; 7] = [
 ];
 
 /// What evaluates a state without stepping: all derived fields.
-pub const FORWARD: [Stage; 7] = [
+pub const FORWARD: [Stage; 8] = [
     Stage::Kinematics,
     Stage::Bias,
     Stage::MassMatrix,
@@ -62,11 +65,12 @@ pub const FORWARD: [Stage; 7] = [
     Stage::Constraint,
     Stage::Solver,
     Stage::Poses,
+    Stage::Velocities,
 ];
 
 impl Stage {
     /// Every stage.
-    pub const ALL: [Stage; 8] = [
+    pub const ALL: [Stage; 9] = [
         Stage::Kinematics,
         Stage::Bias,
         Stage::MassMatrix,
@@ -75,6 +79,7 @@ impl Stage {
         Stage::Solver,
         Stage::Integrate,
         Stage::Poses,
+        Stage::Velocities,
     ];
 
     /// Its name, for timers and reports.
@@ -88,6 +93,7 @@ impl Stage {
             Stage::Solver => "solver",
             Stage::Integrate => "integrate",
             Stage::Poses => "poses",
+            Stage::Velocities => "velocities",
         }
     }
 
@@ -126,6 +132,7 @@ impl Stage {
                 ConstraintForce,
             ],
             Stage::Poses => &[JointQ, Rotation, Origin, Reference],
+            Stage::Velocities => &[Rotation, Origin, Velocity],
         }
     }
 
@@ -134,13 +141,14 @@ impl Stage {
         use Slot::*;
         match self {
             Stage::Kinematics => &[Rotation, Origin, Reference, Motion, Inertia],
-            Stage::Bias => &[BiasForce],
+            Stage::Bias => &[BiasForce, Velocity],
             Stage::MassMatrix => &[MassMatrix],
             Stage::Actuation => &[SmoothForce],
             Stage::Constraint => &[EfcWeight, EfcAref, LimitSide],
             Stage::Solver => &[JointQdd, Unconverged, EfcForce, ConstraintForce],
             Stage::Integrate => &[JointQ, JointQd],
             Stage::Poses => &[BodyQ],
+            Stage::Velocities => &[LinkCenter, BodyQd],
         }
     }
 
@@ -156,6 +164,7 @@ impl Stage {
             Stage::Solver => solver::solve(cx, m, b),
             Stage::Integrate => integrate::implicit_fast(cx, m, b),
             Stage::Poses => poses::body_q(cx, m, b),
+            Stage::Velocities => velocities::body_qd(m, &mut b.work),
         }
     }
 }

@@ -168,7 +168,7 @@ def launch(folder: Path, seed: int, precision: str) -> tuple[tl.Sim, mujoco.MjMo
     turn = rng.normal(size=4)
     pose = {"pos": tuple(rng.uniform(-2, 2, 3)), "quat": tuple(turn / np.linalg.norm(turn))}
     robot = scene.add_urdf(folder / "tree.urdf", name="r", floating=seed % 3 != 1, **pose)
-    fields = ("joint_q", "joint_qd", "joint_qdd", "mass_matrix", "bias_force", "body_q")
+    fields = ("joint_q", "joint_qd", "joint_qdd", "mass_matrix", "bias_force", "body_q", "body_qd", "body_jacobian")
     sim = tl.launch(scene, worlds=1, precision=precision, threads=1, fields=fields)
     return sim, judge_of(text, made, robot), rng
 
@@ -202,6 +202,11 @@ def test_dynamics_of_every_joint_are_mujocos(tmp_path, seed, precision):
             theirs = np.hstack([data.xpos[1:], np.roll(data.xquat[1:], -1, axis=1)])
             order = [sim.body_names.index(f"r/{model.body(i).name}") for i in range(1, model.nbody)]
             assert_link_frames(frame.body_q[:, order].astype(float), theirs[None], tolerances.pose)
+            jacobian = np.zeros((len(order), 6, model.nv))
+            for body, rows in enumerate(jacobian, 1):
+                mujoco.mj_jacBodyCom(model, data, rows[:3], rows[3:], body)
+            assert off(frame.body_jacobian[0, order], jacobian @ convert) < tolerances.dynamics
+            assert off(frame.body_qd[0, order], jacobian @ data.qvel) < tolerances.dynamics
 
 
 @pytest.mark.parametrize("seed", range(TREES))

@@ -96,29 +96,26 @@ impl<F: Lane> Job<F> {
     }
 }
 
-/// The leading stages of [`FORWARD`] that the fields need, and the poses where they are asked for.
+/// The leading stages of [`FORWARD`] that the fields need, and link frames and velocities where they are asked for.
 fn stages_for(layout: &Layout) -> Vec<Stage> {
     let mut last = None;
-    let mut poses = false;
+    let mut output = Vec::new();
     for slot in &layout.slots {
-        let needs = match slot.field {
-            Field::BodyQ => {
-                poses = true;
-                Stage::Kinematics
-            }
-            Field::BiasForce => Stage::Bias,
-            Field::MassMatrix => Stage::MassMatrix,
-            Field::SmoothForce => Stage::Actuation,
-            Field::EfcJ | Field::EfcD | Field::EfcAref => Stage::Constraint,
-            Field::JointQdd | Field::ConstraintForce | Field::EfcForce => Stage::Solver,
+        let (needs, shows) = match slot.field {
+            Field::BodyQ => (Stage::Kinematics, Some(Stage::Poses)),
+            Field::BodyQd | Field::BodyJacobian => (Stage::Bias, Some(Stage::Velocities)),
+            Field::BiasForce => (Stage::Bias, None),
+            Field::MassMatrix => (Stage::MassMatrix, None),
+            Field::SmoothForce => (Stage::Actuation, None),
+            Field::EfcJ | Field::EfcD | Field::EfcAref => (Stage::Constraint, None),
+            Field::JointQdd | Field::ConstraintForce | Field::EfcForce => (Stage::Solver, None),
             _ => continue,
         };
         last = last.max(FORWARD.iter().position(|&stage| stage == needs));
+        output.extend(shows.filter(|stage| !output.contains(stage)));
     }
     let mut stages = FORWARD[..last.map_or(0, |last| last + 1)].to_vec();
-    if poses {
-        stages.push(Stage::Poses);
-    }
+    stages.extend(output);
     stages
 }
 

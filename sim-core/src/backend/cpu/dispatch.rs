@@ -67,6 +67,7 @@ macro_rules! compiled {
                         stage::<F, 5>,
                         stage::<F, 6>,
                         stage::<F, 7>,
+                        stage::<F, 8>,
                     ],
                     chunk: chunk::<F>,
                 }

@@ -1,8 +1,9 @@
 //! Out of a block, into the arena: the one place where lane order becomes world-major.
 
 use super::chunk::Chunk;
-use crate::batch::{Field, Slot};
+use crate::batch::{Field, Slot, Workspace};
 use crate::lane::{Lane, Num};
+use crate::math::vec3::cross_add;
 use crate::model::constants::Constants;
 use std::ops::Range;
 
@@ -104,6 +105,8 @@ fn stage<F: Lane>(chunk: &mut Chunk<F>, m: &Constants<F::Real>, field: Field, n:
         Field::JointTargetQ => to.copy_from_slice(&b.joint_target_q),
         Field::JointTargetQd => to.copy_from_slice(&b.joint_target_qd),
         Field::BodyQ => to.copy_from_slice(w.body_q.as_flattened()),
+        Field::BodyQd => to.copy_from_slice(w.body_qd.as_flattened().as_flattened()),
+        Field::BodyJacobian => body_jacobian(m, w, to),
         Field::BiasForce => to.copy_from_slice(&w.bias_force),
         Field::SmoothForce => to.copy_from_slice(&w.smooth_force),
         Field::ConstraintForce => to.copy_from_slice(&w.constraint_force),
@@ -123,6 +126,28 @@ fn stage<F: Lane>(chunk: &mut Chunk<F>, m: &Constants<F::Real>, field: Field, n:
         }
         Field::EfcJ => jacobian(m, &w.efc_weight, &w.limit_side, to),
         Field::Time | Field::Step | Field::Status => unreachable!("counters are not staged"),
+    }
+}
+
+/// Link Jacobians in full, `(bodies, 6, dofs)`: the motion of each dof on the path to the root, at the link's centre of mass.
+#[inline(always)]
+fn body_jacobian<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, to: &mut [F]) {
+    let dofs = m.dofs.len();
+    to.fill(F::c(0.0));
+    for (k, frame) in m.frames.iter().enumerate() {
+        let rows = &mut to[k * 6 * dofs..(k + 1) * 6 * dofs];
+        let mut next = frame.body;
+        while let Some(b) = next {
+            for d in m.bodies[b].dofs() {
+                let [linear, angular] = w.motion[d];
+                let moved = cross_add(angular, w.link_center[k], linear);
+                for i in 0..3 {
+                    rows[i * dofs + d] = moved[i];
+                    rows[(3 + i) * dofs + d] = angular[i];
+                }
+            }
+            next = m.bodies[b].parent;
+        }
     }
 }
 
