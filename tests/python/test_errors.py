@@ -191,6 +191,20 @@ def test_a_state_that_is_not_finite_is_refused(pendulum):
         assert np.isfinite(sim.step().joint_q).all()
 
 
+@pytest.mark.parametrize("gain", ["joint_target_ke", "joint_target_kd"])
+def test_a_drive_on_a_free_body_is_refused_and_a_single_gain_spares_it(tmp_path, gain):
+    path = tmp_path / "free.urdf"
+    path.write_text(f'<robot name="free"><link name="body">{GOOD}</link></robot>')
+    scene = tl.Scene()
+    body = scene.add_urdf(path, floating=True)
+    setattr(body, gain, 100.0)
+    with tl.launch(scene, worlds=1) as sim:
+        sim.step()
+    setattr(body, gain, [100.0] * 6)
+    with pytest.raises(tl.SceneError, match=r"`floating_base` is free and cannot be driven.*joint_f"):
+        tl.launch(scene, worlds=1)
+
+
 def test_a_wrong_keyword_is_a_type_error(pendulum):
     with tl.launch(pendulum, worlds=1) as sim, pytest.raises(TypeError, match="joint_g"):
         sim.step(joint_g=[0, 0])  # pyright: ignore[reportCallIssue]

@@ -121,8 +121,9 @@ class _Modes(_PerDof):
 class Robot:
     """A robot of a scene, made by `Scene.add_urdf`.
 
-    Properties have one entry a dof, in the order of ``dof_names`` (``joint_q``: a coordinate, ``coord_names``). A single
-    value is written to all of them, but for those of a free body, which has no drive. What is not set is the URDF's.
+    Properties have one entry a dof, in the order of ``dof_names`` (``joint_q``: a coordinate, ``coord_names``). A
+    single value is written to all of them, but for those of a free body, which has no drive. What is not set is the
+    URDF's.
     """
 
     # A misspelt property is an error
@@ -233,7 +234,12 @@ class Robot:
 
     def table(self) -> dict[str, Any]:
         """The robot as a scene file has it, paths absolute; what was not set is left out."""
-        own = {name: values if isinstance(values, tuple) else _portable(values) for name, values in self._own.items()}
+        # one value would spare a free body, and what was set on its drive must be refused, not lost
+        single = all(self._summary["dof_driven"])
+        own = {
+            name: values if isinstance(values, tuple) else _portable(values, single=single)
+            for name, values in self._own.items()
+        }
         packages = [str(folder) for folder in self.package_dirs]
         return {
             "name": self.name,
@@ -264,10 +270,10 @@ class Robot:
 PER_DOF = tuple(name for name, value in vars(Robot).items() if isinstance(value, _PerDof))
 
 
-def _portable(values: NDArray[np.float64]) -> float | str | list[float | str]:
-    """As JSON, which has no infinity; one value where all dofs have the same."""
+def _portable(values: NDArray[np.float64], *, single: bool) -> float | str | list[float | str]:
+    """As JSON, which has no infinity; if ``single``, one value where all dofs have the same."""
     entries = ["inf" if np.isinf(value) else float(value) for value in values]
-    return entries[0] if entries and len(set(entries)) == 1 else entries
+    return entries[0] if single and entries and len(set(entries)) == 1 else entries
 
 
 def _some(names: list[str], most: int = 3) -> str:
