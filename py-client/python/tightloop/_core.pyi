@@ -37,6 +37,11 @@ class Frame:
     """Velocity targets of the drives [rad/s or m/s], ``(worlds, dofs)``."""
     body_q: NDArray[Any]
     """Link frames in the world: position [m], then quaternion (x, y, z, w), ``(worlds, bodies, 7)``."""
+    body_qd: NDArray[Any]
+    """Velocity of each link's centre of mass [m/s], then its angular velocity [rad/s], in world axes,
+    ``(worlds, bodies, 6)``."""
+    body_jacobian: NDArray[Any]
+    """What takes ``joint_qd`` to ``body_qd``, ``(worlds, bodies, 6, dofs)``."""
     mass_matrix: NDArray[Any]
     """Joint-space inertia, armature included [kg·m², kg·m or kg], ``(worlds, dofs, dofs)``."""
     bias_force: NDArray[Any]
@@ -58,7 +63,11 @@ class Frame:
     step: NDArray[np.uint64]
     """Control frames since the world's reset [–], ``(worlds,)``."""
     status: NDArray[np.uint32]
-    """Trouble of the world, as bits; 0 is none [–], ``(worlds,)``."""
+    """Trouble of the world, as bits [–], ``(worlds,)``; 0 is none.
+
+    1: positions or velocities are not finite; reset or write the world. 2: the solver used up its iterations in some
+    physics step of the last frame.
+    """
 
     @property
     def fields(self) -> list[str]:

@@ -169,7 +169,7 @@ fields! {
     EfcForce "efc_force" Derived [Rows] "N·m or N" REAL, "Force of a constraint row.";
     Time "time" Counter [] "s" F64, "Simulated time since the world's reset.";
     Step "step" Counter [] "–" U64, "Control frames since the world's reset.";
-    Status "status" Counter [] "–" U32, "Trouble of the world, as bits; 0 = none.";
+    Status "status" Counter [] "–" U32, "Trouble of the world, as bits: 1 = not finite, 2 = the solver used up its iterations; 0 = none.";
 }
 
 impl Field {
