@@ -5,6 +5,7 @@ pub use crate::backend::{Lanes, Precision};
 use crate::backend::{Backend, BackendError, Values, cpu};
 use crate::batch::{Dtype, Field, Group, Layout};
 use crate::model::Model;
+use crate::model::constants::Motion;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -246,8 +247,44 @@ impl Simulation {
                 },
             });
         }
-        if field == Field::JointQ {
-            self.check_quaternions(columns, values)?;
+        match field {
+            Field::JointQ => self.check_quaternions(columns, values)?,
+            Field::JointTargetQ | Field::JointTargetQd => {
+                self.check_targets(field, columns, values)?;
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Refuses targets of a free body: nothing drives it, and nothing is dropped in silence.
+    fn check_targets(
+        &self,
+        field: Field,
+        columns: &Range<usize>,
+        values: Values<'_>,
+    ) -> Result<(), BackendError> {
+        let bodies = &self.model.constants().bodies;
+        let free = bodies.iter().filter(|body| body.motion == Motion::Free);
+        for dof in free
+            .flat_map(|body| body.dofs())
+            .filter(|dof| columns.contains(dof))
+        {
+            for world in 0..self.worlds {
+                let place = world * columns.len() + dof - columns.start;
+                let value = match values {
+                    Values::F32(v) => f64::from(v[place]),
+                    Values::F64(v) => v[place],
+                };
+                if value.abs() > 0.0 {
+                    return Err(BackendError::FreeTarget {
+                        field: field.row().name,
+                        world,
+                        name: self.model.dof_names()[dof].clone(),
+                        value,
+                    });
+                }
+            }
         }
         Ok(())
     }
@@ -274,7 +311,7 @@ impl Simulation {
                         Values::F64(v) => v[i].powi(2),
                     })
                     .sum();
-                if square < QUATERNION_MIN * QUATERNION_MIN {
+                if !square.is_finite() || square < QUATERNION_MIN * QUATERNION_MIN {
                     return Err(BackendError::Quaternion {
                         name: name(),
                         world,

@@ -85,9 +85,23 @@ pub enum BackendError {
         /// Worlds of the simulation.
         worlds: usize,
     },
+    /// A target of a free body.
+    #[error(
+        "`{field}` is {value} in world {world} for `{name}`, which is free and has no drive; nothing was written, send 0 and push it with joint_f"
+    )]
+    FreeTarget {
+        /// The field.
+        field: &'static str,
+        /// First world concerned.
+        world: usize,
+        /// `robot/joint.part`.
+        name: String,
+        /// The value.
+        value: f64,
+    },
     /// A quaternion without direction.
     #[error(
-        "the quaternion that begins at `{name}` is 0 in world {world}; nothing was written, send (x, y, z, w) of length 1"
+        "the quaternion that begins at `{name}` has no direction in world {world}; nothing was written, send (x, y, z, w) of length 1"
     )]
     Quaternion {
         /// First coordinate.

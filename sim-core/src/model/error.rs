@@ -290,7 +290,7 @@ pub enum ModelError {
 
     /// Gains on a free joint.
     #[error(
-        "robot `{robot}`: joint `{joint}` is free and cannot be driven; leave its joint_target_ke and joint_target_kd at 0, and push it with joint_f"
+        "robot `{robot}`: joint `{joint}` is free and cannot be driven; leave its gains and targets at 0, and push it with joint_f"
     )]
     FreeDrive {
         /// The robot.

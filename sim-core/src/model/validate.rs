@@ -249,7 +249,10 @@ impl Robot {
             }
             above = carrier.and_then(|carrier| carrier.parent);
         }
-        let drives = |dof: &JointDof| dof.target_ke > 0.0 || dof.target_kd > 0.0;
+        let drives = |dof: &JointDof| {
+            let targets = [dof.target_q.unwrap_or(0.0), dof.target_qd];
+            dof.target_ke > 0.0 || dof.target_kd > 0.0 || targets.iter().any(|x| x.abs() > 0.0)
+        };
         if joint.dofs.iter().any(drives) {
             return Err(ModelError::FreeDrive { robot, joint: name });
         }

@@ -2,17 +2,19 @@
 //!
 //! Elimination runs from the last dof to the first, so that a tree makes no fill. The pattern is fixed
 //! when the model is compiled: independent parts of the scene are blocks of their own, each a packed
-//! lower triangle. Small full blocks, such as an arm, run unrolled ([`dense`]); the others follow the
-//! runs of their rows ([`general`]). Both do the same operations in the same order.
+//! lower triangle, or the paths of a tree. Small full blocks, such as an arm, run unrolled ([`dense`]), as
+//! do trees ([`tree`]); the others follow the runs of their rows ([`general`]). All do the same operations
+//! in the same order.
 
 mod dense;
 mod general;
 mod pattern;
+mod tree;
 
 pub use pattern::Pattern;
 
 use crate::lane::Num;
-use pattern::Block;
+use pattern::{Block, Kind};
 
 /// Place of entry (row, column) with column ≤ row in a packed lower triangle.
 #[inline(always)]
@@ -25,10 +27,10 @@ const fn tri(row: usize, column: usize) -> usize {
 pub fn factor<F: Num>(pattern: &Pattern, a: &mut [F]) {
     for block in pattern.blocks() {
         let a = block.of_matrix(a);
-        if block.dense {
-            dense::factor(block.size, a);
-        } else {
-            general::factor(pattern, block, a);
+        match block.kind {
+            Kind::Dense => dense::factor(block.size, a),
+            Kind::Tree => tree::factor(pattern, block, a),
+            Kind::General => general::factor(pattern, block, a),
         }
     }
 }
@@ -38,10 +40,10 @@ pub fn factor<F: Num>(pattern: &Pattern, a: &mut [F]) {
 pub fn solve<F: Num>(pattern: &Pattern, factor: &[F], x: &mut [F]) {
     for block in pattern.blocks() {
         let (factor, x) = (block.of_matrix_ref(factor), &mut x[block.range()]);
-        if block.dense {
-            dense::solve(block.size, factor, x);
-        } else {
-            general::solve(pattern, block, factor, x);
+        match block.kind {
+            Kind::Dense => dense::solve(block.size, factor, x),
+            Kind::Tree => tree::solve(pattern, block, factor, x),
+            Kind::General => general::solve(pattern, block, factor, x),
         }
     }
 }
@@ -55,10 +57,10 @@ pub fn multiply<F: Num>(pattern: &Pattern, a: &[F], x: &[F], y: &mut [F]) {
             &x[block.range()],
             &mut y[block.range()],
         );
-        if block.dense {
-            dense::multiply(block.size, a, x, y);
-        } else {
-            general::multiply(pattern, block, a, x, y);
+        match block.kind {
+            Kind::Dense => dense::multiply(block.size, a, x, y),
+            Kind::Tree => tree::multiply(pattern, block, a, x, y),
+            Kind::General => general::multiply(pattern, block, a, x, y),
         }
     }
 }
@@ -70,11 +72,11 @@ impl Block {
     }
     #[inline(always)]
     fn of_matrix<'a, F>(&self, a: &'a mut [F]) -> &'a mut [F] {
-        &mut a[self.offset..self.offset + tri(self.size, 0)]
+        &mut a[self.offset..self.offset + self.len]
     }
     #[inline(always)]
     fn of_matrix_ref<'a, F>(&self, a: &'a [F]) -> &'a [F] {
-        &a[self.offset..self.offset + tri(self.size, 0)]
+        &a[self.offset..self.offset + self.len]
     }
 }
 
@@ -141,6 +143,29 @@ mod tests {
     }
 
     #[test]
+    fn trees_solve_and_are_kept_without_their_zeros() {
+        // a trunk of 3, legs of 2 and 20 on it, and another tree
+        let mut entries = full(3);
+        let legs = [vec![3, 4], (5..25).collect::<Vec<usize>>()];
+        for leg in &legs {
+            for (n, &k) in leg.iter().enumerate() {
+                entries.extend((0..3).map(|i| (k, i)));
+                entries.extend(leg[..n].iter().map(|&i| (k, i)));
+            }
+        }
+        entries.extend([(26, 25), (27, 25)]);
+        let pattern = Pattern::new(28, entries.iter().copied());
+        assert!(
+            pattern
+                .blocks()
+                .iter()
+                .all(|block| block.kind == Kind::Tree)
+        );
+        assert_eq!(pattern.len(), entries.len() + 28);
+        check(28, &entries);
+    }
+
+    #[test]
     fn unrolled_equals_general_bit_for_bit() {
         for size in 1..=dense::LARGEST {
             let entries = full(size);
@@ -150,7 +175,7 @@ mod tests {
                 a[pattern.at(k, k)] = 10.0;
             }
             let block = &pattern.blocks()[0];
-            assert!(block.dense);
+            assert_eq!(block.kind, Kind::Dense);
             let (mut unrolled, mut looped) = (a.clone(), a.clone());
             dense::factor(size, &mut unrolled);
             general::factor(&pattern, block, &mut looped);

@@ -1,4 +1,4 @@
-//! Which entries of a symmetric matrix may differ from zero.
+//! Which entries of a symmetric matrix may differ from zero, and where they are kept.
 
 use super::{dense, tri};
 use std::collections::BTreeSet;
@@ -7,11 +7,23 @@ use std::collections::BTreeSet;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Pattern {
     blocks: Vec<Block>,
+    /// Where each row begins.
+    starts: Vec<usize>,
+    /// Where each column stands in the rows that have it.
+    places: Vec<usize>,
+    /// Numbers that a matrix takes.
+    len: usize,
     /// Block of each row.
     block_of: Vec<usize>,
-    /// Runs of row k, columns counted from the block's first: `runs[starts[k]..starts[k + 1]]`.
-    starts: Vec<usize>,
+    /// Part of `runs` that is a row's; columns counted from the block's first.
+    run_starts: Vec<usize>,
     runs: Vec<Run>,
+    /// Part of `path_rows` and `path_starts` that is a row's.
+    path_bounds: Vec<usize>,
+    /// Rows on the path to the root, root first, counted from the block's first.
+    path_rows: Vec<usize>,
+    /// Where they begin, counted from the block's first number.
+    path_starts: Vec<usize>,
 }
 
 /// A part of the matrix that nothing couples to the rest.
@@ -21,17 +33,40 @@ pub(super) struct Block {
     pub first: usize,
     /// Its number of rows.
     pub size: usize,
-    /// Where its triangle begins.
+    /// Where its numbers begin.
     pub offset: usize,
-    /// No zeros, and small enough to be unrolled.
-    pub dense: bool,
+    /// How many they are.
+    pub len: usize,
+    /// What it looks like.
+    pub kind: Kind,
 }
 
-/// Columns `start..end` of a row: the path from a dof to the root of its tree makes few of them.
+/// What a block looks like, and so how it is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// No zeros, and small: a packed triangle.
+    Dense,
+    /// Each row couples to the rows on its path to the root: paths one after another.
+    Tree,
+    /// Anything else: a packed triangle, with zeros.
+    General,
+}
+
+/// Columns `start..end` of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Run {
     pub start: usize,
     pub end: usize,
+}
+
+/// A row of a tree.
+pub(super) struct Path<'a> {
+    /// Where the row begins, counted from the block's first number.
+    pub start: usize,
+    /// Rows on the path to the root, root first, counted from the block's first.
+    pub rows: &'a [usize],
+    /// Where they begin.
+    pub starts: &'a [usize],
 }
 
 impl Pattern {
@@ -54,55 +89,72 @@ impl Pattern {
             }
         }
         let mut pattern = Pattern {
-            starts: vec![0],
+            run_starts: vec![0],
+            path_bounds: vec![0],
             ..Pattern::default()
         };
-        pattern.add_blocks(&rows);
-        for (k, row) in rows.iter().enumerate() {
-            let block = &pattern.blocks[pattern.block_of[k]];
-            let first = pattern.runs.len();
-            for column in row.iter().map(|column| column - block.first) {
-                match pattern.runs[first..].last_mut() {
-                    Some(run) if run.end == column => run.end += 1,
-                    _ => pattern.runs.push(Run {
-                        start: column,
-                        end: column + 1,
-                    }),
-                }
-            }
-            pattern.starts.push(pattern.runs.len());
+        let mut first = 0;
+        while first < size {
+            let end = block_end(&rows, first);
+            pattern.add_block(&rows[first..end], first);
+            first = end;
         }
         pattern
     }
 
-    /// A block ends where no later row reaches back across.
-    fn add_blocks(&mut self, rows: &[BTreeSet<usize>]) {
-        let mut reach: Vec<usize> = rows
-            .iter()
-            .enumerate()
-            .map(|(k, row)| *row.first().unwrap_or(&k))
-            .collect();
-        for k in (1..rows.len()).rev() {
-            reach[k - 1] = reach[k - 1].min(if reach[k] < k { reach[k] } else { k - 1 });
+    fn add_block(&mut self, rows: &[BTreeSet<usize>], first: usize) {
+        let (size, offset) = (rows.len(), self.len);
+        let full = (0..size).all(|k| rows[k].len() == k);
+        // the path of a row is that of the last row on it, and that row
+        let is_path = |row: &BTreeSet<usize>| match row.last() {
+            None => true,
+            Some(&last) => {
+                let above = &rows[last - first];
+                row.len() == above.len() + 1 && above.is_subset(row)
+            }
+        };
+        let kind = match (full && size <= dense::LARGEST, rows.iter().all(is_path)) {
+            (true, _) => Kind::Dense,
+            (false, true) => Kind::Tree,
+            (false, false) => Kind::General,
+        };
+        for (k, row) in rows.iter().enumerate() {
+            let (start, place) = match kind {
+                Kind::Tree => (self.len, row.len()),
+                Kind::Dense | Kind::General => (offset + tri(k, 0), k),
+            };
+            self.starts.push(start);
+            self.places.push(place);
+            self.len = start + place + 1;
+            self.block_of.push(self.blocks.len());
+            self.add_runs(row, first);
+            for &column in row {
+                self.path_rows.push(column - first);
+                self.path_starts.push(self.starts[column] - offset);
+            }
+            self.path_bounds.push(self.path_rows.len());
         }
-        let (mut first, mut offset) = (0, 0);
-        while first < rows.len() {
-            let next = |k: &usize| reach[*k] == *k;
-            let end = (first + 1..rows.len()).find(next).unwrap_or(rows.len());
-            let size = end - first;
-            let full = (first..end).all(|k| rows[k].len() == k - first);
-            let dense = full && size <= dense::LARGEST;
-            self.block_of
-                .extend(std::iter::repeat_n(self.blocks.len(), size));
-            self.blocks.push(Block {
-                first,
-                size,
-                offset,
-                dense,
-            });
-            offset += tri(size, 0);
-            first = end;
+        self.blocks.push(Block {
+            first,
+            size,
+            offset,
+            len: self.len - offset,
+            kind,
+        });
+    }
+
+    fn add_runs(&mut self, row: &BTreeSet<usize>, first: usize) {
+        let begin = self.runs.len();
+        for column in row.iter().map(|column| column - first) {
+            match self.runs[begin..].last_mut() {
+                Some(run) if run.end == column => run.end += 1,
+                _ => self.runs.push(Run {
+                    start: column,
+                    end: column + 1,
+                }),
+            }
         }
+        self.run_starts.push(self.runs.len());
     }
 
     /// Number of rows.
@@ -112,9 +164,7 @@ impl Pattern {
 
     /// Numbers that a matrix of this pattern takes.
     pub fn len(&self) -> usize {
-        self.blocks
-            .last()
-            .map_or(0, |block| block.offset + tri(block.size, 0))
+        self.len
     }
 
     /// No rows?
@@ -122,17 +172,26 @@ impl Pattern {
         self.block_of.is_empty()
     }
 
-    /// Where entry (row, column) is kept; column ≤ row, both in one block.
+    /// Where entry (row, column) is kept; column ≤ row, and the pattern has it.
     #[inline(always)]
     pub fn at(&self, row: usize, column: usize) -> usize {
-        let block = &self.blocks[self.block_of[row]];
-        block.offset + tri(row - block.first, column - block.first)
+        self.starts[row] + self.places[column]
     }
 
     /// Where entry (row, column) of either triangle is kept, if it is.
     pub fn find(&self, row: usize, column: usize) -> Option<usize> {
         let (row, column) = (row.max(column), row.min(column));
-        (self.block_of[row] == self.block_of[column]).then(|| self.at(row, column))
+        let block = &self.blocks[self.block_of[row]];
+        let kept = match block.kind {
+            Kind::Dense | Kind::General => column >= block.first,
+            Kind::Tree => {
+                let bounds = self.path_bounds[row]..self.path_bounds[row + 1];
+                column == row
+                    || (column >= block.first
+                        && self.path_rows[bounds].contains(&(column - block.first)))
+            }
+        };
+        kept.then(|| self.at(row, column))
     }
 
     #[inline(always)]
@@ -144,6 +203,29 @@ impl Pattern {
     #[inline(always)]
     pub(super) fn runs(&self, block: &Block, row: usize) -> &[Run] {
         let k = block.first + row;
-        &self.runs[self.starts[k]..self.starts[k + 1]]
+        &self.runs[self.run_starts[k]..self.run_starts[k + 1]]
     }
+
+    /// Path of a row of a tree, counted from the block's first.
+    #[inline(always)]
+    pub(super) fn path(&self, block: &Block, row: usize) -> Path<'_> {
+        let k = block.first + row;
+        let bounds = self.path_bounds[k]..self.path_bounds[k + 1];
+        Path {
+            start: self.starts[k] - block.offset,
+            rows: &self.path_rows[bounds.clone()],
+            starts: &self.path_starts[bounds],
+        }
+    }
+}
+
+/// A block ends where no later row reaches back across.
+fn block_end(rows: &[BTreeSet<usize>], first: usize) -> usize {
+    let mut end = first + 1;
+    for k in first + 1..rows.len() {
+        if rows[k].first().is_some_and(|&column| column < end) {
+            end = k + 1;
+        }
+    }
+    end
 }
