@@ -111,3 +111,52 @@ pub fn log<F: Num>(q: Quat<F>) -> Vec3<F> {
     );
     scale(axis, ratio * sign)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_libms_to_two_ulps_of_half_pi() {
+        for k in 0..=10_000 {
+            let angle = k as f64 / 10_000.0 * std::f64::consts::FRAC_PI_2;
+            for length in [1e-3, 1.0, 40.0] {
+                let (sin, cos) = (length * angle.sin(), length * angle.cos());
+                assert!(
+                    (sin.atan2_positive(cos) - sin.atan2(cos)).abs() < 4.5e-16,
+                    "{angle}"
+                );
+                let (sin, cos) = (sin as f32, cos as f32);
+                assert!(
+                    (sin.atan2_positive(cos) - sin.atan2(cos)).abs() < 2.4e-7,
+                    "{angle}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn rotation_vector_of_a_turn_is_that_turn() {
+        for angle in [0.0, 1e-16, 1e-9, 1e-3, 1.0, 2.0, 3.1] {
+            let turn = [angle * 0.6, angle * -0.64, angle * 0.48];
+            let back = log(exp(turn));
+            let error = (0..3)
+                .map(|i| (back[i] - turn[i]).abs())
+                .fold(0.0, f64::max);
+            // near a half turn the angle is that of a small cosine
+            assert!(
+                error <= 4.0 * f64::EPSILON * angle.max(1e-16),
+                "{angle}: {back:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn turns_past_half_a_circle_are_taken_the_short_way() {
+        let back = log(exp([0.0, 0.0, 4.0]));
+        assert!(
+            (back[2] - (4.0 - std::f64::consts::TAU)).abs() < 1e-14,
+            "{back:?}"
+        );
+    }
+}
