@@ -47,6 +47,7 @@ def test_free_fall_keeps_spin_about_the_vertical_and_follows_the_parabola(sim):
     qd[:, :] = [0.5, 0, 2, 0, 0, 3]
     start = sim.write(joint_q=q, joint_qd=qd)
     center = start.joint_q[0, :3] + [0.1, 0, 0]
+    frame = start
     for _ in range(50):
         frame = sim.step()
     # the centre of mass falls by semi-implicit Euler: g h² n (n + 1) / 2
