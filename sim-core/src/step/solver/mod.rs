@@ -12,7 +12,7 @@
 //! ```
 //!
 //! If no row changes its state between `a` and `a⁺` the model was exact and `a⁺` is the answer.
-//! Otherwise an exact line search on the segment finds the next `a` (in `f32` only if two whole steps
+//! Otherwise an exact line search on the segment finds the next `a` (in `f32` only if three whole steps
 //! did not get there). The start is the last step's
 //! result, which mostly makes the first round the only one; in `f64`, the reference, it is chosen as
 //! MuJoCo does (see [`choose_start`]).
