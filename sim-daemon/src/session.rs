@@ -124,11 +124,11 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
         return wrong("worlds", &serve.worlds, format!("ask for 1 to {COUNT_MAX}"));
     }
     if !matches!(serve.device.as_str(), "auto" | "cpu") {
-        return wrong(
-            "device",
-            &serve.device,
-            "unknown; use auto or cpu".to_owned(),
-        );
+        let problem = match serve.device.as_str() {
+            "gpu" => "there is no GPU backend yet; use auto or cpu",
+            _ => "unknown; use auto or cpu",
+        };
+        return wrong("device", &serve.device, problem.to_owned());
     }
     let precision = match serve.precision.as_str() {
         "f32" => Precision::F32,

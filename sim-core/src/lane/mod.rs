@@ -331,11 +331,3 @@ macro_rules! break_if {
         }
     };
 }
-
-/// New variables from values.
-#[inline(always)]
-pub fn set_all<C: Cx>(cx: &mut C, to: &mut [C::V], from: &[C::F]) {
-    for (v, x) in to.iter_mut().zip(from) {
-        cx.set(v, *x);
-    }
-}

@@ -36,15 +36,6 @@ pub fn turn_z<F: Num>(a: Quat<F>, sin_half: F, cos_half: F) -> Quat<F> {
     ]
 }
 
-/// The rotated vector: v + 2 u × (u × v + w v), u the imaginary part.
-#[inline(always)]
-pub fn rotate<F: Num>(q: Quat<F>, v: Vec3<F>) -> Vec3<F> {
-    use super::vec3::{cross, cross_add, scale, scale_add};
-    let u = [q[0], q[1], q[2]];
-    let t = cross_add(u, v, scale(v, q[3]));
-    scale_add(cross(u, t), F::c(2.0), v)
-}
-
 /// The rotation matrix of a unit quaternion, by columns.
 #[inline(always)]
 pub fn matrix<F: Num>(q: Quat<F>) -> Mat3<F> {

@@ -15,12 +15,6 @@ pub const ANGULAR: usize = 1;
 /// Inertia about the reference point: mass, first moment m c, then xx yy zz xy xz yz of the second moment.
 pub type Inertia<F> = [F; 10];
 
-/// No motion.
-#[inline(always)]
-pub fn zero<F: Num>() -> Spatial<F> {
-    [[F::c(0.0); 3]; 2]
-}
-
 /// a + b
 #[inline(always)]
 pub fn sum<F: Num>(a: Spatial<F>, b: Spatial<F>) -> Spatial<F> {

@@ -157,11 +157,6 @@ impl Pattern {
         self.run_starts.push(self.runs.len());
     }
 
-    /// Number of rows.
-    pub fn size(&self) -> usize {
-        self.block_of.len()
-    }
-
     /// Numbers that a matrix of this pattern takes.
     pub fn len(&self) -> usize {
         self.len
