@@ -49,6 +49,7 @@ fn pendulum(dt: f64, count: usize, l: f64) -> Description {
         links,
         joints,
         notes: Vec::new(),
+        warnings: Vec::new(),
         urdf: None,
     });
     scene

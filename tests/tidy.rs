@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 const LONGEST: usize = 500;
 
 /// Modules of sim-core, each of which may import those before it.
-const ORDER: [&str; 7] = [
+const ORDER: [&str; 8] = [
     "lane",
     "math",
     "model",
@@ -16,6 +16,7 @@ const ORDER: [&str; 7] = [
     "step",
     "backend",
     "simulation",
+    "dynamics",
 ];
 
 /// The only door of each heavy package.

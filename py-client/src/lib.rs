@@ -4,6 +4,7 @@
 //! to be fast (a step) or has to be Rust (views of shared memory, scene files, the command line).
 
 mod client;
+mod dynamics;
 mod errors;
 mod frame;
 mod input;
@@ -27,6 +28,8 @@ mod core {
     use super::client::{Client, sweep};
     #[pymodule_export]
     use super::command_line;
+    #[pymodule_export]
+    use super::dynamics::Dynamics;
     #[pymodule_export]
     use super::frame::{Frame, Sample};
     #[pymodule_export]

@@ -14,10 +14,12 @@ pub(crate) fn read_urdf(
     path: PathBuf,
     package_dirs: Vec<PathBuf>,
     floating: bool,
+    strict: bool,
 ) -> PyResult<String> {
     let options = UrdfOptions {
         package_dirs,
         floating,
+        strict,
         ..UrdfOptions::default()
     };
     let summary = config::urdf_summary(&path, options);

@@ -108,6 +108,7 @@ pub(crate) fn description(
         writes: input(Group::State),
         scene: facts.scene_text,
         scene_folder: facts.scene_folder,
+        model_hash: model.hash(),
         notes: notes(facts.scene),
         frames_held: facts.frames_held,
         watch_worlds: facts.watch_worlds.min(options.worlds),

@@ -138,6 +138,8 @@ def test_a_name_can_be_used_again_after_its_daemon_was_killed(pendulum, unique):
 
 
 def test_a_stopped_daemon_can_be_interrupted(pendulum):
+    # a shell that runs the tests in the background has it ignored
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     with tl.launch(pendulum, worlds=2) as sim:
         sim.step()
         os.kill(sim.pid, signal.SIGSTOP)

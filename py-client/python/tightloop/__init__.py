@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tightloop._core import Frame, __version__
+    from tightloop.dynamics import Dynamics
     from tightloop.errors import (
         ArgumentError,
         CommandRefused,
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "tightloop._core": ("Frame", "__version__"),
+    "tightloop.dynamics": ("Dynamics",),
     "tightloop.errors": (
         "ArgumentError",
         "CommandRefused",
@@ -73,6 +75,7 @@ __all__ = [
     "CommandRefused",
     "DaemonLost",
     "DaemonRestarted",
+    "Dynamics",
     "Frame",
     "FrameCopy",
     "FramesHeld",

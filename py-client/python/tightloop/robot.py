@@ -167,6 +167,7 @@ class Robot:
         quat: Vector,
         floating: bool,
         self_collisions: bool,
+        strict: bool,
         summary: dict[str, Any],
     ) -> None:
         self._name = name
@@ -176,6 +177,7 @@ class Robot:
         self.quat = quat
         self.floating = floating
         self.self_collisions = self_collisions
+        self.strict = strict
         self._summary = summary
         self._own: dict[str, Any] = {}
 
@@ -249,6 +251,7 @@ class Robot:
             "quat": self.quat,
             "floating": self.floating,
             "self_collisions": self.self_collisions,
+            "strict": self.strict,
         } | own
 
     def _urdf_values(self, name: str) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, SupportsFloat, SupportsIndex
@@ -175,6 +176,7 @@ class Scene:
         quat: Vector = _UPRIGHT,
         floating: bool = False,
         self_collisions: bool = False,
+        strict: bool = False,
         package_dirs: Sequence[str | os.PathLike[str]] = (),
     ) -> Robot:
         """Add a robot from a URDF file, which is read and checked at once.
@@ -186,10 +188,15 @@ class Scene:
             quat: Its orientation (x, y, z, w).
             floating: Whether the root link moves freely.
             self_collisions: Whether links of this robot touch each other (neighbours never do).
+            strict: Whether an inertia that no body can have (A + B < C) is refused. Otherwise it is balanced as MuJoCo
+                does, with a warning.
             package_dirs: Folders that hold the packages of ``package://`` paths; those above the file if left out.
 
         Returns:
             The robot, to set start state, drives and limits.
+
+        Warns:
+            UserWarning: Inertias were balanced, or visual meshes are missing; ``Robot.notes`` has everything.
 
         Raises:
             UrdfError: The file is missing, is not URDF, or describes a robot that cannot be simulated.
@@ -198,7 +205,8 @@ class Scene:
         if isinstance(package_dirs, str) or not isinstance(package_dirs, Sequence):
             raise SceneError(f"add_urdf: package_dirs is {package_dirs!r}; give a list of folders")
         packages = [checks.path("add_urdf: a folder of package_dirs", folder) for folder in package_dirs]
-        summary = json.loads(_core.read_urdf(str(urdf), [str(folder) for folder in packages], bool(floating)))
+        folders = [str(folder) for folder in packages]
+        summary = json.loads(_core.read_urdf(str(urdf), folders, bool(floating), bool(strict)))
         own_name = re.sub(r"[^A-Za-z0-9_.\-]", "_", summary["name"])
         name = checks.name("robot", own_name if name is None else name, self._names())
         robot = Robot(
@@ -209,9 +217,12 @@ class Scene:
             quat=quat,
             floating=bool(floating),
             self_collisions=bool(self_collisions),
+            strict=bool(strict),
             summary=summary,
         )
         self.robots[name] = robot
+        for warning in summary["warnings"]:
+            warnings.warn(f"robot `{name}`: {warning}", stacklevel=2)
         return robot
 
     def save(self, path: str | os.PathLike[str]) -> None:

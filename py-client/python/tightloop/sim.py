@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import secrets
@@ -10,11 +11,13 @@ import weakref
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core, checks
 from tightloop._core import Frame
 from tightloop.daemon import Daemon
+from tightloop.dynamics import Dynamics
 from tightloop.errors import ArgumentError, UnknownField
 from tightloop.scene import Scene
 
@@ -137,6 +140,30 @@ class Sim:
     def forward(self) -> Frame:
         """Evaluate every field at the present state and commands, without stepping. Raises as `step` does."""
         return self._client.forward()
+
+    @functools.cached_property
+    def dynamics(self) -> Dynamics:
+        """The scene's kinematics and dynamics as functions of a state; they touch no world.
+
+        Raises:
+            SceneError: A robot's file cannot be read here, or is no longer what the daemon read.
+        """
+        return Dynamics.of_daemon(self.info)
+
+    def forward_kinematics(self, joint_q: ArrayLike) -> NDArray[np.float64]:
+        """Link frames at given positions; see `Dynamics.forward_kinematics`."""
+        return self.dynamics.forward_kinematics(joint_q)
+
+    def inverse_dynamics(
+        self,
+        joint_q: ArrayLike,
+        joint_qd: ArrayLike | None = None,
+        joint_qdd: ArrayLike | None = None,
+        *,
+        damping: bool = True,
+    ) -> NDArray[np.float64]:
+        """Joint forces that give accelerations at given states; see `Dynamics.inverse_dynamics`."""
+        return self.dynamics.inverse_dynamics(joint_q, joint_qd, joint_qdd, damping=damping)
 
     def close(self) -> None:
         """End the simulation: a launched daemon stops, an attached one is released. Frames stay valid."""

@@ -88,6 +88,8 @@ pub struct Robot {
     pub joints: Vec<Joint>,
     /// What was ignored or mended, one sentence each.
     pub notes: Vec<String>,
+    /// What of the notes a user should hear at once, since it changes what moves or what is seen; one sentence each.
+    pub warnings: Vec<String>,
     /// The file it was read from.
     pub urdf: Option<PathBuf>,
 }

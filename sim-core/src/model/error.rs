@@ -219,7 +219,7 @@ pub enum ModelError {
 
     /// Principal moments that no distribution of mass can have.
     #[error(
-        "robot `{robot}`: link `{link}`: its largest principal moment of inertia is {ratio:.4} times the sum of the other two, which no body can have; mend <inertia>, or call balance_inertias()"
+        "robot `{robot}`: link `{link}`: its largest principal moment of inertia is {ratio:.4} times the sum of the other two, which no body can have; mend <inertia>, or let it be balanced (strict off, or balance_inertias())"
     )]
     InertiaTriangle {
         /// The robot.

@@ -80,8 +80,9 @@ pub(super) fn merge(body: &Inertial, pose: &Pose, other: &Inertial) -> Inertial 
 
 impl Robot {
     /// Replaces each inertia whose principal moments break A + B >= C by a sphere's of the same trace, as MuJoCo's
-    /// `balanceinertia` does, and notes link and ratio.
+    /// `balanceinertia` does, notes link and ratio, and warns of all of them together.
     pub fn balance_inertias(&mut self) {
+        let mut balanced = Vec::new();
         for link in &mut self.links {
             let Some(inertial) = &mut link.inertial else {
                 continue;
@@ -97,7 +98,15 @@ impl Robot {
                      can have; all three are now their mean, {mean:e} kg·m²",
                     link.name
                 ));
+                balanced.push(format!("`{}` ({ratio:.4})", link.name));
             }
+        }
+        if !balanced.is_empty() {
+            self.warnings.push(format!(
+                "principal moments of inertia break A + B >= C and were balanced, as MuJoCo does, at the links (largest over the \
+                 sum of the others): {}; mend <inertia> there, or refuse such files by strict=True",
+                balanced.join(", ")
+            ));
         }
     }
 }

@@ -275,9 +275,24 @@ fn impossible_inertia_becomes_its_mean_with_one_note() {
     );
     assert_eq!(robot.notes.len(), 1);
     assert_says(&robot.notes[0], &["`base`", "1.5000"]);
+    assert_eq!(robot.warnings.len(), 1);
+    assert_says(&robot.warnings[0], &["`base` (1.5000)", "strict"]);
     // a flat plate, whose moments just fulfil A + B = C, stays
     let plate = read(&link("base", &INERTIAL.replace("izz=\"1\"", "izz=\"2\""))).unwrap();
     assert!(plate.notes.is_empty(), "{:?}", plate.notes);
+    assert!(plate.warnings.is_empty(), "{:?}", plate.warnings);
+}
+
+#[test]
+fn impossible_inertia_is_an_error_if_strict() {
+    let impossible = link("base", &INERTIAL.replace("izz=\"1\"", "izz=\"3\""));
+    let text = format!("<robot name=\"r\">{impossible}</robot>");
+    let strict = UrdfOptions {
+        strict: true,
+        ..UrdfOptions::default()
+    };
+    let error = Robot::from_urdf_text(&text, "r.urdf", strict).unwrap_err();
+    assert_says(&error.to_string(), &["link `base`", "1.5000"]);
 }
 
 #[test]

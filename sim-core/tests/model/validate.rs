@@ -240,6 +240,7 @@ fn setters_write_in_dof_order() {
             Joint::new(JointKind::Revolute, "first", Some(0), 1),
         ],
         notes: vec![],
+        warnings: vec![],
         urdf: None,
     };
     robot.set_joint_q(&[1.0, 2.0]).unwrap();

@@ -51,6 +51,8 @@ pub struct Description {
     pub scene: String,
     /// Folder to which paths in the scene are relative.
     pub scene_folder: String,
+    /// Hash of the model, for a client that evaluates the scene itself.
+    pub model_hash: u64,
     /// What was ignored or mended while the scene was read, one sentence each.
     pub notes: Vec<String>,
     /// Frames that the controller, or one observer, may hold at once.

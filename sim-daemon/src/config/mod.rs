@@ -12,6 +12,9 @@ use serde::{Deserialize, Serialize};
 use sim_core::model::{Cone, Description, ModelError, Pose, Robot, Shape, Solver, TargetMode};
 
 pub use number::{Number, PerDof};
+pub use sim_core::backend::BackendError;
+pub use sim_core::batch::Field;
+pub use sim_core::dynamics::Dynamics;
 pub use sim_core::model::UrdfOptions;
 pub use summary::urdf_summary;
 
@@ -184,9 +187,12 @@ pub struct RobotTable {
     /// Orientation of the root link in the world, unit quaternion (x, y, z, w) [–].
     #[serde(default = "no_rotation")]
     pub quat: [Number; 4],
-    /// Whether the root link moves freely; not supported yet.
+    /// Whether the root link moves freely.
     #[serde(default)]
     pub floating: bool,
+    /// Whether an inertia that no body can have is refused; otherwise it is balanced, with a warning.
+    #[serde(default)]
+    pub strict: bool,
     /// Whether its own links touch each other.
     #[serde(default)]
     pub self_collisions: bool,
@@ -330,6 +336,7 @@ impl SceneFile {
                 name: table.name.clone(),
                 pose: pose(&table.pos, &table.quat),
                 floating: table.floating,
+                strict: table.strict,
                 self_collisions: table.self_collisions,
                 package_dirs: table
                     .package_dirs
@@ -342,6 +349,14 @@ impl SceneFile {
         }
         description.validate()?;
         Ok(description)
+    }
+
+    /// Kinematics and dynamics of the scene at states that a caller gives; paths as in [`SceneFile::describe`].
+    ///
+    /// # Errors
+    /// As [`SceneFile::describe`], and a mass matrix that cannot be factored.
+    pub fn dynamics(&self, base_dir: &Path) -> Result<Dynamics, ConfigError> {
+        Ok(Dynamics::new(self.describe(base_dir)?.compile()?))
     }
 }
 

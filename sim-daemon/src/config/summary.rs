@@ -12,7 +12,7 @@ use super::{ConfigError, Number};
 /// Keys: `name`; one entry a moving joint: `joint_names`, `joint_types`, `joint_range` (pairs), `joint_velocity_limit`,
 /// `joint_mimic` (`null`, or an object with `joint`, `multiplier`, `offset`); one entry a coordinate: `coord_names`, `joint_q`;
 /// one entry a dof: `dof_names`, `dof_driven`, `joint_effort_limit`, `joint_damping`, `joint_friction`, `joint_armature`;
-/// `link_names` (in body order), `notes`.
+/// `link_names` (in body order), `notes`, `warnings`.
 ///
 /// # Errors
 /// What is wrong with the file, by name.
@@ -70,6 +70,7 @@ pub fn urdf_summary(path: &Path, options: UrdfOptions) -> Result<Value, ConfigEr
         "joint_armature": dofs(&|dof| json!(dof.armature)),
         "link_names": links,
         "notes": robot.notes,
+        "warnings": robot.warnings,
     }))
 }
 

@@ -30,10 +30,12 @@ pub struct UrdfOptions {
     pub name: Option<String>,
     /// Frame of the root link in the world.
     pub pose: Pose,
-    /// Whether the root link moves freely; not supported yet.
+    /// Whether the root link moves freely.
     pub floating: bool,
     /// Whether its own links touch each other.
     pub self_collisions: bool,
+    /// Whether an inertia that no body can have is refused; otherwise it is balanced, with a warning.
+    pub strict: bool,
     /// Folders that hold the packages of `package://` paths.
     pub package_dirs: Vec<PathBuf>,
 }
@@ -100,9 +102,12 @@ impl Robot {
             options,
             robot: String::new(),
             notes: Vec::new(),
+            missing_visuals: Vec::new(),
         };
         let mut robot = reader.robot()?;
-        robot.balance_inertias();
+        if !reader.options.strict {
+            robot.balance_inertias();
+        }
         robot.validate()?;
         Ok(robot)
     }

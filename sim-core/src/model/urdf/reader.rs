@@ -20,6 +20,8 @@ pub(super) struct Reader<'a, 'input> {
     /// Name of the robot, for messages.
     pub robot: String,
     pub notes: Vec<String>,
+    /// `link`: file, of visual meshes that are not there.
+    pub missing_visuals: Vec<String>,
 }
 
 impl<'a, 'input> Reader<'a, 'input> {
@@ -55,6 +57,7 @@ impl<'a, 'input> Reader<'a, 'input> {
             links,
             joints,
             notes,
+            warnings: self.missing_visuals(),
             urdf: Some(self.path.to_owned()),
         };
         robot.place_free_bodies();
@@ -165,8 +168,20 @@ impl<'a, 'input> Reader<'a, 'input> {
             ) {
                 self.notes
                     .push(format!("link `{link}`: visual mesh `{uri}` is missing"));
+                self.missing_visuals.push(format!("`{link}`: {uri}"));
             }
         }
+    }
+
+    /// One warning for all of them.
+    fn missing_visuals(&self) -> Vec<String> {
+        if self.missing_visuals.is_empty() {
+            return Vec::new();
+        }
+        let files = self.missing_visuals.join(", ");
+        vec![format!(
+            "visual meshes are missing, which only a picture would show: {files}; give package_dirs= or mend the paths"
+        )]
     }
 
     fn folder(&self) -> &'a Path {

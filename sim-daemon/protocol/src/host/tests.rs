@@ -53,6 +53,7 @@ fn description() -> Description {
         writes: vec![input("joint_q")],
         scene: String::new(),
         scene_folder: String::new(),
+        model_hash: 0,
         notes: Vec::new(),
         frames_held: 2,
         watch_worlds: 1,
