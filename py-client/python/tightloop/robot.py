@@ -136,6 +136,7 @@ class Robot:
         "floating",
         "package_dirs",
         "self_collisions",
+        "strict",
         "urdf",
     )
 
