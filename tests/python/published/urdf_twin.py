@@ -1,0 +1,155 @@
+"""A URDF file as MuJoCo reads it: an independent judge of how tightloop reads and moves a robot.
+
+MuJoCo's own reader makes bodies and dofs of links and joints; nothing of tightloop's has a part in it. The XML is only
+made digestible. Links get a prefix (one named `world` would vanish into MuJoCo's). Visuals and collisions go, since
+contacts are not compared. Joints that MuJoCo's reader lacks (ball, planar, floating) are built by hand.
+"""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from test_every_joint import Coordinates, in_plane
+from twin import IMPEDANCE_MAX, ITERATIONS, LIMIT_KD, LIMIT_KE, Array
+
+import tightloop as tl
+
+# Bodies stay the links they are; inertias that no body can have become spheres' on both sides
+COMPILER = '<mujoco><compiler discardvisual="false" fusestatic="false" balanceinertia="true"/></mujoco>'
+PREFIX = "r/"
+FLOATING_BASE = "floating_base"
+# MuJoCo refuses moments below 1e-14 kg m², even those of frames that are fixed to a link of 1e-2
+MOMENT_MIN = 2e-14
+
+
+def parse(path: Path) -> ET.Element:
+    """The file's XML. Blanks before its declaration and NULs behind its end are no part of it."""
+    text = path.read_bytes().decode("utf-8-sig").strip("\0 \t\r\n")
+    return ET.fromstring(re.sub(r"^<\?xml.*?\?>", "", text))
+
+
+def model_of(path: Path, *, floating: bool, dt: float) -> mujoco.MjModel:
+    """MuJoCo's model of a file, links prefixed, solved to the end as in the other live tests."""
+    robot = parse(path)
+    by_hand = digest(robot)
+    robot.insert(0, ET.fromstring(COMPILER))
+    spec = mujoco.MjSpec.from_string(ET.tostring(robot, encoding="unicode"))
+    for joint in by_hand:
+        add_joint(spec, joint)
+    if floating:
+        (root,) = spec.worldbody.bodies
+        root.add_freejoint(name=FLOATING_BASE)
+    option = spec.option
+    option.timestep = dt
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    option.iterations, option.ls_iterations, option.tolerance = ITERATIONS, ITERATIONS, 0.0
+    # a start that is far outside its limits is no reason to start again
+    option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    model = spec.compile()
+    set_limits(model)
+    flatten_mimics(model)
+    return model
+
+
+def digest(robot: ET.Element) -> list[ET.Element]:
+    """Leave what MuJoCo's reader takes, and give back the joints to be built by hand."""
+    for link in robot.findall("link"):
+        link.set("name", PREFIX + link.get("name", ""))
+        for child in [*link.findall("visual"), *link.findall("collision")]:
+            link.remove(child)
+        inertia = link.find("inertial/inertia")
+        if inertia is not None:
+            raise_moments(inertia)
+    by_hand = []
+    for joint in robot.findall("joint"):
+        for role in ("parent", "child"):
+            for end in joint.findall(role):
+                end.set("link", PREFIX + end.get("link", ""))
+        if joint.get("type") in ("spherical", "planar", "floating"):
+            by_hand.append(ET.fromstring(ET.tostring(joint)))
+            joint.set("type", "fixed")
+        if joint.get("type") == "continuous":
+            # it has no range, whatever its limit says; MuJoCo would take one
+            for limit in joint.findall("limit"):
+                limit.attrib.pop("lower", None)
+                limit.attrib.pop("upper", None)
+        if joint.get("type") == "fixed":
+            for child in [child for name in ("limit", "dynamics", "mimic") for child in joint.findall(name)]:
+                joint.remove(child)
+    return by_hand
+
+
+def raise_moments(inertia: ET.Element) -> None:
+    """Moments of a frame that weighs next to nothing, as small as MuJoCo takes them; a zero stays, and is refused."""
+    moments = {name: float(inertia.get(name, 0)) for name in ("ixx", "iyy", "izz")}
+    if 0 < max(moments.values()) < MOMENT_MIN:
+        for name in moments:
+            inertia.set(name, repr(MOMENT_MIN))
+
+
+def add_joint(spec: mujoco.MjSpec, joint: ET.Element) -> None:
+    """A ball, a free joint, or the slide, slide, hinge that make a planar one."""
+    name, kind = joint.get("name", ""), joint.get("type")
+    child, axis, dynamics = joint.find("child"), joint.find("axis"), joint.find("dynamics")
+    assert child is not None, f"joint `{name}` has no child"
+    body = spec.body(child.get("link", ""))
+    if kind == "floating":
+        body.add_freejoint(name=name)
+        return
+    if kind == "spherical":
+        parts = [body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_BALL)]
+    else:
+        normal = np.array("1 0 0".split() if axis is None else axis.get("xyz", "").split(), dtype=float)
+        normal /= np.linalg.norm(normal)
+        x, y = in_plane(normal)
+        slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+        shapes = (("x", x, slide), ("y", y, slide), ("angle", normal, hinge))
+        parts = [body.add_joint(name=f"{name}.{part}", type=motion, axis=along) for part, along, motion in shapes]
+    for part in parts:
+        if dynamics is not None:
+            part.damping[0], part.frictionloss = float(dynamics.get("damping", 0)), float(dynamics.get("friction", 0))
+
+
+def set_limits(model: mujoco.MjModel) -> None:
+    """Joint limits in force space, of which MuJoCo's reader knows nothing."""
+    softness = model.dof_invweight0[model.jnt_dofadr] * (1 - IMPEDANCE_MAX)
+    model.jnt_solref[:, 0] = 2 / (LIMIT_KD * softness)
+    model.jnt_solref[:, 1] = LIMIT_KD * softness / 2 * np.sqrt(1 / (LIMIT_KE * softness))
+
+
+def flatten_mimics(model: mujoco.MjModel) -> None:
+    """A follower of a follower comes to follow the first leader, as tightloop has it."""
+    row_of = {model.eq_obj1id[row]: row for row in range(model.neq)}
+    for row in range(model.neq):
+        while (leading := row_of.get(model.eq_obj2id[row])) is not None:
+            offset, ratio = model.eq_data[row, :2]
+            model.eq_data[row, :2] = offset + ratio * model.eq_data[leading, 0], ratio * model.eq_data[leading, 1]
+            model.eq_obj2id[row] = model.eq_obj2id[leading]
+
+
+def root_bodies(model: mujoco.MjModel) -> Array:
+    """The root link and what is fixed to it."""
+    return np.flatnonzero(model.body_weldid == model.body_weldid[1])[int(model.body_weldid[1] == 0) :]
+
+
+class RobotCoordinates(Coordinates):
+    """Our positions and velocities as MuJoCo's; a free base has the velocity of all that is fixed to its root link."""
+
+    def __init__(self, model: mujoco.MjModel, sim: tl.Sim) -> None:
+        super().__init__(model, sim)
+        for number, (kind, at, dof, coords, dofs, _) in enumerate(self.joints):
+            if kind == mujoco.mjtJoint.mjJNT_FREE:
+                self.joints[number] = (kind, at, dof, coords, dofs, self.center(model.jnt_bodyid[number]))
+
+    def center(self, root: int) -> Array:
+        """Centre of mass [m] of a body and those fixed to it, in the body's frame."""
+        data = mujoco.MjData(self.model)
+        mujoco.mj_kinematics(self.model, data)
+        fixed = np.flatnonzero(self.model.body_weldid == root)
+        center = np.average(data.xipos[fixed], axis=0, weights=self.model.body_mass[fixed])
+        return data.xmat[root].reshape(3, 3).T @ (center - data.xpos[root])
