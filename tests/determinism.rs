@@ -5,7 +5,7 @@ mod common;
 use common::{Demo, Run, command, lesson};
 use sim_core::backend::{Values, cpu};
 use sim_core::batch::Field;
-use sim_core::model::Model;
+use sim_core::model::{Description, Model, UrdfOptions};
 use sim_core::simulation::{Lanes, Options, Precision};
 use std::sync::Arc;
 
@@ -128,6 +128,80 @@ fn scalar_equals_eight_equals_sixteen_worlds_a_block() {
                 println!("skipped: this processor has no {lanes:?}");
             }
         }
+    }
+}
+
+/// Bits of the state of each world of a robot of every joint, whose accelerations are refined.
+fn run_every_joint(seeds: &[usize], lanes: Lanes) -> Vec<Vec<u64>> {
+    let mut scene = Description::new(1.0 / 480.0, 8);
+    let options = UrdfOptions {
+        floating: true,
+        ..UrdfOptions::named("r")
+    };
+    let urdf = common::repo("sim-core/tests/record_stages/every_joint.urdf");
+    scene.add_urdf(urdf, options).unwrap();
+    let model = scene.compile().unwrap();
+    assert!(model.constants().solver.refinements > 0);
+    let fields = vec![
+        Field::JointQ,
+        Field::JointQd,
+        Field::JointQdd,
+        Field::EfcForce,
+    ];
+    let options = Options {
+        worlds: seeds.len(),
+        precision: Precision::F32,
+        threads: Some(1),
+        lanes,
+        fields: fields.clone(),
+    };
+    let mut run = Run::new(&model, options);
+    for (field, columns) in [
+        (Field::JointQ, model.coords()),
+        (Field::JointQd, model.dofs()),
+    ] {
+        let rows = seeds
+            .iter()
+            .flat_map(|&s| (0..columns).map(move |k| noise(s, k)));
+        let rows: Vec<f64> = rows.collect();
+        run.sim
+            .write(field, 0..columns, Values::F64(&rows), None)
+            .unwrap();
+    }
+    for _ in 0..6 {
+        run.step();
+    }
+    (0..seeds.len())
+        .map(|world| {
+            let numbers = fields.iter().flat_map(|&field| run.get(field, world));
+            numbers.map(f64::to_bits).collect()
+        })
+        .collect()
+}
+
+#[test]
+fn robot_of_every_joint_moves_alike_in_every_lane_and_width() {
+    let seeds: Vec<usize> = (0..40).collect();
+    let scalar = run_every_joint(&seeds, Lanes::Scalar);
+    assert!(
+        scalar
+            .iter()
+            .flatten()
+            .all(|&bits| f64::from_bits(bits).is_finite())
+    );
+    for lanes in [Lanes::Eight, Lanes::Sixteen] {
+        if cpu::available(lanes) {
+            assert!(scalar == run_every_joint(&seeds, lanes), "{lanes:?}");
+        } else {
+            println!("skipped: this processor has no {lanes:?}");
+        }
+    }
+    for world in [0, 17, 39] {
+        assert_eq!(
+            scalar[world],
+            run_every_joint(&[world], Lanes::Auto)[0],
+            "world {world} alone"
+        );
     }
 }
 

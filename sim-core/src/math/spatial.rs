@@ -71,6 +71,18 @@ pub fn momentum<F: Num>(i: &Inertia<F>, v: &Spatial<F>) -> Spatial<F> {
     ]
 }
 
+/// A symmetric constant, xx yy zz xy xz yz, times a vector.
+#[inline(always)]
+pub fn symmetric<F: Num>(i: [F::Real; 6], a: Vec3<F>) -> Vec3<F> {
+    let [xx, yy, zz, xy, xz, yz] = i;
+    let columns = [
+        constant([xx, xy, xz]),
+        constant([xy, yy, yz]),
+        constant([xz, yz, zz]),
+    ];
+    transform(&columns, a)
+}
+
 /// Inertia about the reference point of a body whose frame has this rotation and origin.
 ///
 /// `inertia` is xx yy zz xy xz yz about the centre of mass, in the body's axes [kg·m²];

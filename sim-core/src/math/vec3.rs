@@ -75,6 +75,12 @@ pub fn transform<F: Num>(m: &Mat3<F>, a: Vec3<F>) -> Vec3<F> {
     scale_add(m[0], a[0], scale_add(m[1], a[1], scale(m[2], a[2])))
 }
 
+/// mᵀ a
+#[inline(always)]
+pub fn transform_back<F: Num>(m: &Mat3<F>, a: Vec3<F>) -> Vec3<F> {
+    [dot(m[0], a), dot(m[1], a), dot(m[2], a)]
+}
+
 /// m a + b
 #[inline(always)]
 pub fn transform_add<F: Num>(m: &Mat3<F>, a: Vec3<F>, b: Vec3<F>) -> Vec3<F> {

@@ -24,6 +24,10 @@ impl Description {
     }
 }
 
+/// Past this `f32` accelerations are refined. Rounding moved them by at most 5e-5 of their largest in 1400 states of
+/// random trees below it, by up to 6e-4 between it and 1000, and by 1e-3 at 4000.
+const LOCKED_OVER_FREE_MAX: f64 = 100.0;
+
 fn compile(scene: &Description) -> Result<Model, ModelError> {
     let mut builder = Builder::default();
     for robot in &scene.robots {
@@ -48,12 +52,18 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
             iterations: scene.solver.iterations,
             ls_iterations: scene.solver.ls_iterations,
             tolerance: 0.0,
+            refinements: 0,
         },
     };
     let reference = inverse_weight::at_reference(&constants, &builder.dof_names)?;
     // MuJoCo scales costs by 1 / (mean inertia × dofs)
     constants.solver.tolerance =
         scene.solver.tolerance * reference.mean_inertia * constants.dofs.len() as f64;
+    // a pass takes an error of 1e-3 to 1e-6
+    constants.solver.refinements = [1.0, 10.0]
+        .iter()
+        .filter(|&times| reference.locked_over_free > times * LOCKED_OVER_FREE_MAX)
+        .count();
     add_rows(
         &mut constants,
         &builder.joints,

@@ -239,6 +239,8 @@ pub struct Newton<R> {
     pub ls_iterations: usize,
     /// Improvement of the cost below which the solver stops: the option × mean inertia × dofs.
     pub tolerance: R,
+    /// How often `f32` corrects its accelerations (`step/solver/refine.rs`).
+    pub refinements: usize,
 }
 
 impl<R: Real> Constants<R> {
@@ -349,6 +351,7 @@ impl<R: Real> Constants<R> {
                 iterations: self.solver.iterations,
                 ls_iterations: self.solver.ls_iterations,
                 tolerance: cast(self.solver.tolerance),
+                refinements: self.solver.refinements,
             },
         }
     }

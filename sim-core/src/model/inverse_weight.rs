@@ -12,6 +12,9 @@ pub(super) struct Reference {
     pub dof_inverse_weight: Vec<f64>,
     /// Mean of the diagonal of M, MuJoCo's `stat.meaninertia`.
     pub mean_inertia: f64,
+    /// Largest ratio over the dofs of the inertia while all others are locked to that while they are free: how
+    /// many digits of M cancel in a solve.
+    pub locked_over_free: f64,
 }
 
 /// M = Σ over bodies of Jᵀ I J, from its definition: the recursion of `step/mass_matrix.rs` is
@@ -25,6 +28,7 @@ pub(super) fn at_reference(
         return Ok(Reference {
             dof_inverse_weight: Vec::new(),
             mean_inertia: 1.0,
+            locked_over_free: 1.0,
         });
     }
     let mut mass_matrix = mass_matrix(constants);
@@ -42,6 +46,9 @@ pub(super) fn at_reference(
         .map_err(|_| ModelError::SingularMass)?;
     let inverse = factor.inverse();
     let mut dof_inverse_weight: Vec<f64> = (0..n).map(|k| inverse[(k, k)]).collect();
+    let locked_over_free = (0..n)
+        .map(|k| mass_matrix[(k, k)] * inverse[(k, k)])
+        .fold(1.0, f64::max);
     // the dofs of a ball, and the translations and rotations of a free body, share their mean
     for body in constants
         .bodies
@@ -56,6 +63,7 @@ pub(super) fn at_reference(
     Ok(Reference {
         dof_inverse_weight,
         mean_inertia,
+        locked_over_free,
     })
 }
 

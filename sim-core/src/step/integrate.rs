@@ -17,7 +17,9 @@ use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, Num, Real};
 use crate::math::factor::{factor, solve};
 use crate::math::quat::{self, Quat};
-use crate::math::vec3::{Mat3, Vec3, add, constant, cross, dot, scale_add, sub, transform, zero};
+use crate::math::vec3::{
+    Mat3, add, constant, cross, scale_add, sub, transform, transform_back, zero,
+};
 use crate::model::constants::{Body, Motion};
 
 #[inline(always)]
@@ -102,7 +104,11 @@ fn free<C: Cx>(
     let origin = sub(velocity, swing);
     let pull = sub(sub(linear, cross(angular, arm)), cross(spin, swing));
     let origin = scale_add(pull, dt, origin);
-    let own = scale_add(turn_back(rotation, angular), dt, turn_back(rotation, spin));
+    let own = scale_add(
+        transform_back(rotation, angular),
+        dt,
+        transform_back(rotation, spin),
+    );
     for i in 0..3 {
         let position = dt.fma(origin[i], cx.get(&joint_q[c + i]));
         cx.set(&mut joint_q[c + i], position);
@@ -119,12 +125,6 @@ fn free<C: Cx>(
         cx.set(&mut joint_qd[d + i], velocity[i]);
         cx.set(&mut joint_qd[d + 3 + i], spin[i]);
     }
-}
-
-/// Rᵀ a
-#[inline(always)]
-fn turn_back<F: Num>(r: &Mat3<F>, a: Vec3<F>) -> Vec3<F> {
-    [dot(r[0], a), dot(r[1], a), dot(r[2], a)]
 }
 
 #[inline(always)]

@@ -7,6 +7,7 @@ mod actuation;
 mod bias;
 mod constraint;
 mod integrate;
+mod inverse_dynamics;
 mod kinematics;
 mod mass_matrix;
 mod poses;
@@ -37,6 +38,8 @@ pub enum Stage {
     Constraint,
     /// Accelerations and constraint forces.
     Solver,
+    /// Accelerations and constraint forces, corrected where `f32` needs it.
+    Refine,
     /// The next state.
     Integrate,
     /// Link frames for output.
@@ -46,37 +49,40 @@ pub enum Stage {
 }
 
 /// The order of a step.
-pub const STAGES: [Stage; 7] = [
+pub const STAGES: [Stage; 8] = [
     Stage::Kinematics,
     Stage::Bias,
     Stage::MassMatrix,
     Stage::Actuation,
     Stage::Constraint,
     Stage::Solver,
+    Stage::Refine,
     Stage::Integrate,
 ];
 
 /// What evaluates a state without stepping: all derived fields.
-pub const FORWARD: [Stage; 8] = [
+pub const FORWARD: [Stage; 9] = [
     Stage::Kinematics,
     Stage::Bias,
     Stage::MassMatrix,
     Stage::Actuation,
     Stage::Constraint,
     Stage::Solver,
+    Stage::Refine,
     Stage::Poses,
     Stage::Velocities,
 ];
 
 impl Stage {
     /// Every stage.
-    pub const ALL: [Stage; 9] = [
+    pub const ALL: [Stage; 10] = [
         Stage::Kinematics,
         Stage::Bias,
         Stage::MassMatrix,
         Stage::Actuation,
         Stage::Constraint,
         Stage::Solver,
+        Stage::Refine,
         Stage::Integrate,
         Stage::Poses,
         Stage::Velocities,
@@ -91,6 +97,7 @@ impl Stage {
             Stage::Actuation => "actuation",
             Stage::Constraint => "constraint",
             Stage::Solver => "solver",
+            Stage::Refine => "refine",
             Stage::Integrate => "integrate",
             Stage::Poses => "poses",
             Stage::Velocities => "velocities",
@@ -122,6 +129,21 @@ impl Stage {
                 EfcAref,
                 LimitSide,
             ],
+            Stage::Refine => &[
+                JointQ,
+                JointQd,
+                JointQdd,
+                Rotation,
+                Velocity,
+                BiasForce,
+                MassMatrix,
+                SmoothForce,
+                EfcWeight,
+                EfcAref,
+                LimitSide,
+                EfcForce,
+                ConstraintForce,
+            ],
             Stage::Integrate => &[
                 Rotation,
                 JointQ,
@@ -146,6 +168,7 @@ impl Stage {
             Stage::Actuation => &[SmoothForce],
             Stage::Constraint => &[EfcWeight, EfcAref, LimitSide],
             Stage::Solver => &[JointQdd, Unconverged, EfcForce, ConstraintForce],
+            Stage::Refine => &[JointQdd, EfcForce, ConstraintForce],
             Stage::Integrate => &[JointQ, JointQd],
             Stage::Poses => &[BodyQ],
             Stage::Velocities => &[LinkCenter, BodyQd],
@@ -162,6 +185,7 @@ impl Stage {
             Stage::Actuation => actuation::smooth_force(cx, m, b),
             Stage::Constraint => constraint::rows(cx, m, b),
             Stage::Solver => solver::solve(cx, m, b),
+            Stage::Refine => solver::refine(cx, m, b),
             Stage::Integrate => integrate::implicit_fast(cx, m, b),
             Stage::Poses => poses::body_q(cx, m, b),
             Stage::Velocities => velocities::body_qd(m, &mut b.work),

@@ -108,7 +108,7 @@ fn stages_for(layout: &Layout) -> Vec<Stage> {
             Field::MassMatrix => (Stage::MassMatrix, None),
             Field::SmoothForce => (Stage::Actuation, None),
             Field::EfcJ | Field::EfcD | Field::EfcAref => (Stage::Constraint, None),
-            Field::JointQdd | Field::ConstraintForce | Field::EfcForce => (Stage::Solver, None),
+            Field::JointQdd | Field::ConstraintForce | Field::EfcForce => (Stage::Refine, None),
             _ => continue,
         };
         last = last.max(FORWARD.iter().position(|&stage| stage == needs));

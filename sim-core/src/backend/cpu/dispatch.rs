@@ -68,6 +68,7 @@ macro_rules! compiled {
                         stage::<F, 6>,
                         stage::<F, 7>,
                         stage::<F, 8>,
+                        stage::<F, 9>,
                     ],
                     chunk: chunk::<F>,
                 }

@@ -18,7 +18,10 @@
 //! MuJoCo does (see [`choose_start`]).
 
 mod line;
+mod refine;
 mod rows;
+
+pub(super) use refine::refine;
 
 use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, Num, Real};

@@ -1,0 +1,143 @@
+//! Forces that make given accelerations: Newton's and Euler's equations of each body about its own frame's origin
+//! (Featherstone 2008, section 5.4), so that rounding is relative to what a joint carries, not to how far
+//! it is from the robot's reference point.
+//!
+//! ```text
+//! ω(b) = ω(parent) + z q̇              α(b) = α(parent) + z q̈ + ω(parent) × z q̇          a joint that turns
+//! a(b) = a(parent) + α × r + ω × (ω × r)  … + z q̈ + 2 ω × z q̇                           one that slides
+//! F = m (a + α × c + ω × (ω × c))     N = I α + ω × I ω + c × F
+//! f(b) = F + Σ f(child)               n(b) = N + Σ n(child) + r × f(child)
+//! τ = z · n  or  z · f
+//! ```
+
+use super::{BlockOf, ConstantsOf};
+use crate::lane::{Cx, Num};
+use crate::math::spatial::{ANGULAR, LINEAR, Spatial, sum, symmetric};
+use crate::math::vec3::{
+    Vec3, add, constant, cross, cross_add, dot, scale, scale_add, sub, transform, transform_add,
+    transform_back, zero,
+};
+use crate::model::constants::{Body, Motion};
+
+/// The forces of `joint_qdd` at this state, into `vector[0]`.
+#[inline(always)]
+pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let gravity = constant::<C::F>(m.gravity);
+    let base: Spatial<C::F> = [[-gravity[0], -gravity[1], -gravity[2]], zero()];
+    // `force` holds the acceleration of a body's origin until its force is known
+    for (k, body) in m.bodies.iter().enumerate() {
+        let arm = arm(cx, b, k, body);
+        let w = &mut b.work;
+        let (above, spin) = match body.parent {
+            Some(parent) => (w.force[parent], w.velocity[parent][ANGULAR]),
+            None => (base, zero()),
+        };
+        let carried = [carried_along(above, spin, arm), above[ANGULAR]];
+        let [x, y, z] = w.rotation[k];
+        let d = body.dof;
+        w.force[k] = match body.motion {
+            Motion::Revolute => {
+                let turn = scale(z, cx.get(&b.joint_qd[d]));
+                let own = scale_add(z, cx.get(&b.joint_qdd[d]), cross(spin, turn));
+                [carried[LINEAR], add(carried[ANGULAR], own)]
+            }
+            Motion::Prismatic => {
+                let slide = scale(z, cx.get(&b.joint_qd[d]) * C::F::c(2.0));
+                let own = scale_add(z, cx.get(&b.joint_qdd[d]), cross(spin, slide));
+                [add(carried[LINEAR], own), carried[ANGULAR]]
+            }
+            Motion::Ball => {
+                let axes = [x, y, z];
+                let turn = transform(&axes, read::<C>(cx, &b.joint_qd, d));
+                let own = transform_add(&axes, read::<C>(cx, &b.joint_qdd, d), cross(spin, turn));
+                [carried[LINEAR], add(carried[ANGULAR], own)]
+            }
+            Motion::Free => {
+                let (linear, angular) = (
+                    read::<C>(cx, &b.joint_qdd, d),
+                    read::<C>(cx, &b.joint_qdd, d + 3),
+                );
+                let center = [add(base[LINEAR], linear), angular];
+                let back = sub(zero(), transform(&[x, y, z], constant(body.center)));
+                let omega = w.velocity[k][ANGULAR];
+                [carried_along(center, omega, back), angular]
+            }
+        };
+    }
+    for (k, body) in m.bodies.iter().enumerate() {
+        let w = &mut b.work;
+        let (axes, omega) = (&w.rotation[k], w.velocity[k][ANGULAR]);
+        let center = transform(axes, constant(body.center));
+        let force = scale(carried_along(w.force[k], omega, center), C::F::k(body.mass));
+        let (spin, turn) = (
+            transform_back(axes, omega),
+            transform_back(axes, w.force[k][ANGULAR]),
+        );
+        let own = cross_add(
+            spin,
+            symmetric(body.inertia, spin),
+            symmetric(body.inertia, turn),
+        );
+        w.force[k] = [force, transform_add(axes, own, cross(center, force))];
+    }
+    for (k, body) in m.bodies.iter().enumerate().rev() {
+        let arm = arm(cx, b, k, body);
+        let w = &mut b.work;
+        let [force, moment] = w.force[k];
+        let (axes, d) = (w.rotation[k], body.dof);
+        let [torque, ..] = &mut w.vector;
+        match body.motion {
+            Motion::Revolute => torque[d] = dot(axes[2], moment),
+            Motion::Prismatic => torque[d] = dot(axes[2], force),
+            Motion::Ball => torque[d..d + 3].copy_from_slice(&transform_back(&axes, moment)),
+            Motion::Free => {
+                let center = transform(&axes, constant(body.center));
+                torque[d..d + 3].copy_from_slice(&force);
+                torque[d + 3..d + 6].copy_from_slice(&sub(moment, cross(center, force)));
+            }
+        }
+        if let Some(parent) = body.parent {
+            w.force[parent] = sum(w.force[parent], [force, cross_add(arm, force, moment)]);
+        }
+    }
+    for (j, dof) in m.dofs.iter().enumerate() {
+        let driven = C::F::k(dof.armature);
+        b.work.vector[0][j] = driven.fma(cx.get(&b.joint_qdd[j]), b.work.vector[0][j]);
+    }
+}
+
+/// Acceleration of a point `arm` away on a body that moves so: a + α × r + ω × (ω × r).
+#[inline(always)]
+fn carried_along<F: Num>(origin: Spatial<F>, omega: Vec3<F>, arm: Vec3<F>) -> Vec3<F> {
+    let swing = cross_add(origin[ANGULAR], arm, origin[LINEAR]);
+    cross_add(omega, cross(omega, arm), swing)
+}
+
+/// From the origin of the carrier to that of body `k`; the difference of their origins would round as these do.
+#[inline(always)]
+fn arm<C: Cx>(
+    cx: &mut C,
+    b: &BlockOf<C>,
+    k: usize,
+    body: &Body<<C::F as Num>::Real>,
+) -> Vec3<C::F> {
+    let w = &b.work;
+    let rest = match body.parent {
+        Some(parent) => transform(&w.rotation[parent], constant(body.position)),
+        None => constant(body.position),
+    };
+    match body.motion {
+        Motion::Prismatic => scale_add(w.rotation[k][2], cx.get(&b.joint_q[body.coord]), rest),
+        Motion::Revolute | Motion::Ball | Motion::Free => rest,
+    }
+}
+
+/// Three cells from `first` on.
+#[inline(always)]
+fn read<C: Cx>(cx: &mut C, cells: &[C::V], first: usize) -> Vec3<C::F> {
+    [
+        cx.get(&cells[first]),
+        cx.get(&cells[first + 1]),
+        cx.get(&cells[first + 2]),
+    ]
+}
