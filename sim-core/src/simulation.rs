@@ -134,18 +134,18 @@ impl Simulation {
         columns: Range<usize>,
         values: Values<'_>,
     ) -> Result<(), BackendError> {
-        self.check(field, Group::Command, &columns, values)?;
+        self.check(field, Group::Command, &columns, values, None)?;
         self.backend.write(field, columns, values, None);
         Ok(())
     }
 
     /// Sets columns of the state in the worlds of the mask (none = all), and clears their warm start.
     ///
-    /// `values` is `(worlds, columns)`, world-major; rows of other worlds are not read into the state.
+    /// `values` is `(worlds, columns)`, world-major; rows of other worlds are not looked at.
     ///
     /// # Errors
-    /// A field that is no state, columns, length or mask that do not fit, a value that is not finite;
-    /// nothing is written then.
+    /// A field that is no state, columns, length or mask that do not fit, a value that is not finite or a
+    /// quaternion without direction; nothing is written then.
     pub fn write(
         &mut self,
         field: Field,
@@ -153,8 +153,7 @@ impl Simulation {
         values: Values<'_>,
         mask: Option<&[bool]>,
     ) -> Result<(), BackendError> {
-        self.check(field, Group::State, &columns, values)?;
-        self.check_mask(mask)?;
+        self.check(field, Group::State, &columns, values, mask)?;
         self.backend.write(field, columns, values, mask);
         Ok(())
     }
@@ -189,14 +188,16 @@ impl Simulation {
     /// so that of several arrays none is set when one is wrong.
     ///
     /// # Errors
-    /// As theirs; `group` is the one the field must be of.
+    /// As theirs; `group` is the one the field must be of. Rows of worlds outside the mask are not looked at.
     pub fn check(
         &self,
         field: Field,
         group: Group,
         columns: &Range<usize>,
         values: Values<'_>,
+        mask: Option<&[bool]>,
     ) -> Result<(), BackendError> {
+        self.check_mask(mask)?;
         let row = field.row();
         if row.group != group {
             let choices = Field::ALL
@@ -236,7 +237,14 @@ impl Simulation {
             Field::JointQ => self.model.coord_names(),
             _ => self.model.dof_names(),
         };
-        if let Some(place) = values.first_not_finite() {
+        let row_of = |world: usize| world * columns.len()..(world + 1) * columns.len();
+        let not_finite = match mask {
+            None => values.first_not_finite(0..values.len()),
+            Some(mask) => (0..self.worlds)
+                .filter(|&world| mask[world])
+                .find_map(|world| values.first_not_finite(row_of(world))),
+        };
+        if let Some(place) = not_finite {
             return Err(BackendError::NotFinite {
                 field: row.name,
                 world: place / columns.len(),
@@ -248,7 +256,7 @@ impl Simulation {
             });
         }
         match field {
-            Field::JointQ => self.check_quaternions(columns, values)?,
+            Field::JointQ => self.check_quaternions(columns, values, mask)?,
             Field::JointTargetQ | Field::JointTargetQd => {
                 self.check_targets(field, columns, values)?;
             }
@@ -294,6 +302,7 @@ impl Simulation {
         &self,
         columns: &Range<usize>,
         values: Values<'_>,
+        mask: Option<&[bool]>,
     ) -> Result<(), BackendError> {
         for first in self.model.constants().quaternions() {
             if first + 4 <= columns.start || columns.end <= first {
@@ -303,7 +312,7 @@ impl Simulation {
             if first < columns.start || columns.end < first + 4 {
                 return Err(BackendError::PartOfQuaternion { name: name() });
             }
-            for world in 0..self.worlds {
+            for world in (0..self.worlds).filter(|&world| mask.is_none_or(|mask| mask[world])) {
                 let place = world * columns.len() + first - columns.start;
                 let square: f64 = (place..place + 4)
                     .map(|i| match values {

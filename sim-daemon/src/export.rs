@@ -203,6 +203,7 @@ pub(crate) fn apply(
     };
     match inbox.op() {
         Op::Step | Op::Write => {
+            simulation.check_mask(masked)?;
             // one array is checked as it is set; of several, none may be set before all are checked
             let alone = inbox.arrays().nth(1).is_none();
             for row in inbox.arrays().filter(|_| !alone) {
@@ -212,10 +213,7 @@ pub(crate) fn apply(
                 } else {
                     Group::State
                 };
-                simulation.check(field, group, &columns, values)?;
-            }
-            if let Some(mask) = masked {
-                simulation.check_mask(Some(mask))?;
+                simulation.check(field, group, &columns, values, masked)?;
             }
             for row in inbox.arrays() {
                 let (field, columns, values) = input(simulation, inbox, row)?;

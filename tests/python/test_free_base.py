@@ -71,6 +71,20 @@ def test_quaternions_are_made_unit_and_those_without_direction_refused(sim):
     np.testing.assert_array_equal(sim.forward().joint_q[1, 3:], [0, 0, 0, 1])
 
 
+@pytest.mark.parametrize("nothing", [0.0, np.nan])
+def test_what_stands_in_worlds_outside_the_mask_is_not_looked_at(sim, nothing):
+    before = np.array(sim.reset().joint_q)
+    q = np.full_like(before, nothing)
+    q[1] = [7, 8, 9, 0, 0, 0, 1]
+    after = sim.write(joint_q=q, joint_qd=np.zeros((3, 6)), mask=[False, True, False])
+    np.testing.assert_array_equal(after.joint_q[1], q[1])
+    np.testing.assert_array_equal(after.joint_q[[0, 2]], before[[0, 2]])
+    with pytest.raises(tl.CommandRefused, match="in world 2"):
+        sim.write(joint_q=q, mask=[False, True, True])
+    with pytest.raises(tl.CommandRefused, match="in world 0"):
+        sim.write(joint_q=q)
+
+
 def test_targets_of_a_free_body_are_refused_and_the_daemon_serves_on(scene, sim):
     targets = np.zeros((3, 6))
     sim.step(joint_target_q=targets, joint_target_qd=targets)

@@ -32,12 +32,14 @@ impl Values<'_> {
         self.len() == 0
     }
 
-    /// The first that is not finite.
-    pub fn first_not_finite(&self) -> Option<usize> {
-        match self {
-            Values::F32(v) => v.iter().position(|x| !x.is_finite()),
-            Values::F64(v) => v.iter().position(|x| !x.is_finite()),
-        }
+    /// The first of a part that is not finite, counted from the first of all.
+    pub fn first_not_finite(&self, part: Range<usize>) -> Option<usize> {
+        let first = part.start;
+        let place = match self {
+            Values::F32(v) => v[part].iter().position(|x| !x.is_finite()),
+            Values::F64(v) => v[part].iter().position(|x| !x.is_finite()),
+        };
+        place.map(|place| first + place)
     }
 }
 
