@@ -1,12 +1,9 @@
-//! Motions that are known without any simulator.
+//! Motions in one plane: pendulums, and a mass on a rail.
 
-mod common;
-
-use common::Run;
+use crate::GRAVITY;
+use crate::common::Run;
 use sim_core::batch::Field;
 use sim_core::model::{Description, Inertial, Joint, JointKind, Link, Pose, Robot};
-
-const GRAVITY: f64 = 9.81;
 
 /// A link with its mass `m` [kg] at distance `l` [m] below the joint, and a small inertia about it.
 fn bob(name: &str, m: f64, l: f64) -> Link {
