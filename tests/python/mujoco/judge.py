@@ -35,8 +35,8 @@ class Tolerances:
 
 # What the project asks for. Rounding is a million times smaller: what is near these bounds is a difference of meaning.
 DOUBLE = Tolerances(dynamics=1e-8, acceleration=1e-8, pose=1e-12, over_worlds=False)
-# 24 bits leave 6e-8, and the recursions over a dozen links ten times that. A solve multiplies it by the condition of
-# the mass matrix, some 1e3 in these trees. Forces that cancel in one world keep the rounding of what they are sums of.
+# 24 bits leave 6e-8, and the recursions over a dozen links ten times that. A solve multiplies it by as much as inertias
+# of locked and of free joints differ, or is refined. Forces that cancel in one world keep the rounding of their parts.
 SINGLE = Tolerances(dynamics=1e-5, acceleration=1e-4, pose=1e-5, over_worlds=True)
 
 

@@ -1,7 +1,6 @@
-"""Random trees of every kind of joint, on a fixed or floating base, against MuJoCo.
+"""Random robots of 1 to 64 dofs with every kind of joint, on a fixed or floating base, against MuJoCo.
 
-MuJoCo's free joint has the velocity of its frame's origin and the angular velocity in its own axes, ours those of its
-centre of mass in world axes: `Coordinates` converts. MuJoCo has no planar joint: it is built as slide, slide, hinge.
+TIGHTLOOP_LIVE_TREES sets how many.
 """
 
 from __future__ import annotations
@@ -14,137 +13,68 @@ import numpy as np
 import pytest
 from judge import DOUBLE, MOTION, NOTHING, SINGLE, assert_link_frames
 from numpy.random import Generator
-from trees import link, origin, words
-from twin import CHAOS, COMPILER, ITERATIONS, PERTURBATION, Array
+from robots import KINDS, SCALARS, Coordinates, Tree, judge_of, random_tree
+from twin import CHAOS, ITERATIONS, PERTURBATION, Array
 
 import tightloop as tl
 
 TREES = int(os.environ.get("TIGHTLOOP_LIVE_TREES", "48"))
-KINDS = ("continuous", "prismatic", "spherical", "planar")
 STEPS = 200
-FREE, BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
+# Every size up to 40 within 40 seeds, and a few beyond
+SIZES = [1 + 17 * seed % 40 for seed in range(TREES)]
+LARGE = [41, 52, 58, 64]
+SCENES = pytest.mark.parametrize(("seed", "dofs"), list(enumerate(SIZES + LARGE)))
 
 
-def random_tree(rng: Generator, joints: int, kinds: tuple[str, ...]) -> tuple[str, dict[str, tuple[str, Array]]]:
-    """A robot as URDF text, and the kind and axis of each joint by its child link."""
-    parts, made = [link(rng, "l0", True)], {}
-    for number in range(1, joints + 1):
-        child, parent = f"l{number}", f"l{rng.integers(max(0, number - 3), number)}"
-        kind, axis = str(rng.choice(kinds)), rng.normal(size=3)
-        axis /= np.linalg.norm(axis)
-        made[child] = (kind, axis)
-        parts.append(link(rng, child, True))
-        parts.append(
-            f'<joint name="j_{child}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-            f'{origin(rng, 0.3)}<axis xyz="{words(axis)}"/><limit lower="-1e3" upper="1e3"/></joint>'
-        )
-    return "\n".join(['<robot name="tree">', *parts, "</robot>"]), made
+def random_scene(folder: Path, seed: int, dofs: int) -> tuple[tl.Scene, dict[str, Tree], Generator]:
+    """So many dofs in all, in one robot or two, one of them with a loose part; half of the scenes are rich."""
+    rng = np.random.default_rng([seed, dofs])
+    rich = seed % 2 == 1
+    scene = tl.Scene(dt=1e-3, substeps=1)
+    scene.solver(iterations=ITERATIONS, tolerance=0.0)
+    left, trees = dofs, {}
+    while left:
+        name = f"r{len(trees)}"
+        floating = left > 6 and bool(rng.random() < 0.6)
+        own = left - 6 * floating
+        part = own if trees or seed % 4 else int(rng.integers(1, own + 1))
+        kinds = KINDS if seed % 5 else SCALARS
+        tree = random_tree(rng, part, kinds=kinds, rich=rich)
+        left -= part + 6 * floating
+        if left >= 6 and seed % 3 == 0 and not floating:
+            tree.loose = random_tree(rng, (left - 6) // 2, kinds=kinds, rich=rich, name="k")
+            left -= 6 + (left - 6) // 2
+        (folder / f"{name}.urdf").write_text(tree.text())
+        turn = rng.normal(size=4)
+        pose = {"pos": tuple(rng.uniform(-2, 2, 3)), "quat": tuple(turn / np.linalg.norm(turn))}
+        robot = scene.add_urdf(folder / f"{name}.urdf", name=name, floating=floating, **pose)
+        if rich:
+            drive_some(rng, robot)
+        trees[name] = tree
+    return scene, trees, rng
 
 
-def in_plane(normal: Array) -> tuple[Array, Array]:
-    """The axes along which a planar joint slides: x and y, turned as z is turned to the normal the short way.
-
-    For a normal that points down they are first turned by half a turn about x.
-    """
-    x, y, z = normal
-    if z < -0.5:
-        along, across = in_plane(np.array([x, -y, -z]))
-        return along * [1, -1, -1], across * [1, -1, -1]
-    turn = np.array([-y, x, 0.0, 1.0 + z])
-    rotation = matrix(turn / np.linalg.norm(turn))
-    return rotation[:, 0], rotation[:, 1]
-
-
-def judge_of(text: str, made: dict[str, tuple[str, Array]], robot: tl.Robot) -> mujoco.MjModel:
-    """MuJoCo's model: its URDF reader knows neither balls nor planes, so these joints are made by hand."""
-    head = text.index(">") + 1
-    plain = text[:head] + COMPILER.format(balance="false") + text[head:]
-    plain = plain.replace('type="spherical"', 'type="fixed"').replace('type="planar"', 'type="fixed"')
-    spec = mujoco.MjSpec.from_string(plain)
-    for child, (kind, axis) in made.items():
-        body = spec.body(child)
-        if kind == "spherical":
-            body.add_joint(name=f"j_{child}", type=mujoco.mjtJoint.mjJNT_BALL)
-        elif kind == "planar":
-            x, y = in_plane(axis)
-            for part, along, motion in (("x", x, "SLIDE"), ("y", y, "SLIDE"), ("angle", axis, "HINGE")):
-                body.add_joint(name=f"j_{child}.{part}", type=getattr(mujoco.mjtJoint, f"mjJNT_{motion}"), axis=along)
-    root, (x, y, z, w) = spec.body("l0"), robot.quat
-    root.pos, root.quat = robot.pos, (w, x, y, z)
-    if robot.floating:
-        root.add_freejoint(name="floating_base")
-    model = spec.compile()
-    option = model.opt
-    option.timestep, option.integrator = 1e-3, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    option.tolerance, option.iterations = 0.0, ITERATIONS
-    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
-    return model
+def drive_some(rng: Generator, robot: tl.Robot) -> None:
+    """Armatures, gains, modes and effort limits on what may be driven; balls only have armatures."""
+    names = robot.dof_names
+    turns = np.array([name.rsplit(".", 1)[-1] in ("wx", "wy", "wz") for name in names])
+    free = turns | np.array([name.rsplit(".", 1)[-1] in ("vx", "vy", "vz") for name in names])
+    balls = turns & np.array([".".join([name.rsplit(".", 1)[0], "vx"]) not in names for name in names])
+    # one armature a ball, as in MuJoCo
+    armature = {name: rng.uniform(0, 0.2) for name in {name.rsplit(".", 1)[0] for name in names}}
+    robot.joint_armature = [
+        armature[name.rsplit(".", 1)[0]] * (ball or not off) for name, off, ball in zip(names, free, balls, strict=True)
+    ]
+    robot.joint_target_ke = rng.uniform(0, 100, len(names)) * ~free
+    robot.joint_target_kd = rng.uniform(0, 10, len(names)) * ~free
+    robot.joint_target_mode = [str(mode) for mode in rng.choice(["position", "velocity", "both"], len(names))]
+    robot.joint_effort_limit = np.where(~free & (rng.random(len(names)) < 0.5), rng.uniform(1, 20, len(names)), np.inf)
 
 
-def matrix(quat: Array) -> Array:
-    """Rotation of a quaternion (x, y, z, w)."""
-    rotation = np.zeros(9)
-    mujoco.mju_quat2Mat(rotation, np.roll(quat, 1))
-    return rotation.reshape(3, 3)
-
-
-class Coordinates:
-    """Our positions and velocities as MuJoCo's, by the names of the joints."""
-
-    def __init__(self, model: mujoco.MjModel, sim: tl.Sim) -> None:
-        self.model = model
-        self.joints = []
-        for number in range(model.njnt):
-            joint, name = model.joint(number), f"r/{model.joint(number).name}"
-            coords, dofs = (
-                [i for i, own in enumerate(names) if own == name or own.startswith(f"{name}.")]
-                for names in (sim.coord_names, sim.dof_names)
-            )
-            center = model.body_ipos[model.jnt_bodyid[number]]
-            self.joints.append((int(model.jnt_type[number]), joint.qposadr[0], joint.dofadr[0], coords, dofs, center))
-
-    def positions(self, q: Array) -> Array:
-        """Ours ``(coords,)`` as qpos."""
-        qpos = np.empty(self.model.nq)
-        for kind, at, _, coords, _, _ in self.joints:
-            own = q[coords].copy()
-            if kind in (FREE, BALL):
-                own[-4:] = np.roll(own[-4:], 1)
-            qpos[at : at + len(own)] = own
-        return qpos
-
-    def to_qvel(self, q: Array) -> Array:
-        """The matrix that takes our velocities at `q` to qvel, ``(dofs, dofs)``."""
-        convert = np.zeros((self.model.nv, self.model.nv))
-        for kind, _, at, coords, dofs, center in self.joints:
-            block = np.eye(len(dofs))
-            if kind == FREE:
-                rotation = matrix(q[coords[3:]])
-                x, y, z = rotation @ center
-                # the origin moves with v - ω × r = v + r × ω
-                block[:3, 3:] = [[0, -z, y], [z, 0, -x], [-y, x, 0]]
-                block[3:, 3:] = rotation.T
-            convert[np.ix_(range(at, at + len(dofs)), dofs)] = block
-        return convert
-
-    def drift(self, q: Array, qd: Array) -> Array:
-        """What qacc has beside the converted accelerations: -ω × (ω × r) of a free body."""
-        out = np.zeros(self.model.nv)
-        for kind, _, at, coords, dofs, center in self.joints:
-            if kind == FREE:
-                spin = qd[dofs[3:]]
-                out[at : at + 3] = -np.cross(spin, np.cross(spin, matrix(q[coords[3:]]) @ center))
-        return out
-
-    def distance(self, q: Array, qpos: Array) -> float:
-        """Largest difference of positions; quaternions but for their sign."""
-        off = self.positions(q) - qpos
-        for kind, at, _, coords, _, _ in self.joints:
-            if kind in (FREE, BALL):
-                four = slice(at + len(coords) - 4, at + len(coords))
-                other = off[four] + 2 * qpos[four]
-                off[four] = min(off[four], other, key=np.linalg.norm)
-        return float(np.abs(off).max())
+def launch(scene: tl.Scene, precision: str) -> tl.Sim:
+    """One world with every field that is compared."""
+    fields = ("joint_q", "joint_qd", "joint_qdd", "mass_matrix", "bias_force", "body_q", "body_qd", "body_jacobian")
+    return tl.launch(scene, worlds=1, precision=precision, threads=1, fields=fields)
 
 
 def random_state(rng: Generator, sim: tl.Sim) -> tuple[Array, Array]:
@@ -157,20 +87,12 @@ def random_state(rng: Generator, sim: tl.Sim) -> tuple[Array, Array]:
     return q, rng.normal(size=len(sim.dof_names))
 
 
-def launch(folder: Path, seed: int, precision: str) -> tuple[tl.Sim, mujoco.MjModel, Generator]:
-    """A random tree with its judge; every third is plain, two of three float."""
-    rng = np.random.default_rng([seed, 7])
-    kinds = KINDS if seed % 3 else KINDS[:2]
-    text, made = random_tree(rng, int(rng.integers(1, 11)), kinds)
-    (folder / "tree.urdf").write_text(text)
-    scene = tl.Scene(dt=1e-3, substeps=1)
-    scene.solver(iterations=ITERATIONS, tolerance=0.0)
-    turn = rng.normal(size=4)
-    pose = {"pos": tuple(rng.uniform(-2, 2, 3)), "quat": tuple(turn / np.linalg.norm(turn))}
-    robot = scene.add_urdf(folder / "tree.urdf", name="r", floating=seed % 3 != 1, **pose)
-    fields = ("joint_q", "joint_qd", "joint_qdd", "mass_matrix", "bias_force", "body_q", "body_qd", "body_jacobian")
-    sim = tl.launch(scene, worlds=1, precision=precision, threads=1, fields=fields)
-    return sim, judge_of(text, made, robot), rng
+def random_commands(rng: Generator, sim: tl.Sim) -> dict[str, Array]:
+    """Forces, and targets of what may be driven."""
+    last = [name.rsplit(".", 1)[-1] for name in sim.dof_names]
+    drivable = np.array([part not in ("vx", "vy", "vz", "wx", "wy", "wz") for part in last])
+    scales = {"joint_f": 0.3, "joint_target_q": 0.3 * drivable, "joint_target_qd": drivable}
+    return {name: rng.normal(size=len(last)) * scale for name, scale in scales.items()}
 
 
 def off(ours: Array, theirs: Array) -> float:
@@ -178,18 +100,30 @@ def off(ours: Array, theirs: Array) -> float:
     return float(np.abs(ours - theirs).max() / max(np.abs(theirs).max(), NOTHING))
 
 
+def command(to: Coordinates, data: mujoco.MjData, q: Array, commands: dict[str, Array]) -> None:
+    """Gives MuJoCo what our commands mean at a state: the same power on the same motion."""
+    data.qfrc_applied[:] = np.linalg.solve(to.to_qvel(q).T, commands["joint_f"])
+    data.ctrl[:] = to.control(commands["joint_target_q"], commands["joint_target_qd"])
+
+
 @pytest.mark.parametrize("precision", ["f64", "f32"])
-@pytest.mark.parametrize("seed", range(TREES))
-def test_dynamics_of_every_joint_are_mujocos(tmp_path, seed, precision):
+@SCENES
+def test_dynamics_of_every_joint_are_mujocos(tmp_path, seed, dofs, precision):
     tolerances = DOUBLE if precision == "f64" else SINGLE
-    sim, model, rng = launch(tmp_path, seed, precision)
-    with sim:
+    scene, trees, rng = random_scene(tmp_path, seed, dofs)
+    model = judge_of(scene, trees)
+    with launch(scene, precision) as sim:
+        assert len(sim.dof_names) == dofs
         to, data = Coordinates(model, sim), mujoco.MjData(model)
         for _ in range(4):
             q, qd = random_state(rng, sim)
+            commands = random_commands(rng, sim)
+            sim.step(**{name: values[None] for name, values in commands.items()})
             frame = sim.write(joint_q=q[None], joint_qd=qd[None])
-            # what the run's precision made of the state
+            # what the run's precision made of them
             q, qd = frame.joint_q[0].astype(float), frame.joint_qd[0].astype(float)
+            dtype = frame.joint_q.dtype
+            command(to, data, q, {name: values.astype(dtype).astype(float) for name, values in commands.items()})
             convert = to.to_qvel(q)
             data.qpos[:], data.qvel[:] = to.positions(q), convert @ qd
             mujoco.mj_forward(model, data)
@@ -198,9 +132,9 @@ def test_dynamics_of_every_joint_are_mujocos(tmp_path, seed, precision):
             bias = convert.T @ (data.qfrc_bias + mass_matrix @ to.drift(q, qd))
             assert off(frame.mass_matrix[0], convert.T @ mass_matrix @ convert) < tolerances.dynamics
             assert off(frame.bias_force[0], bias) < tolerances.dynamics
-            assert off(convert @ frame.joint_qdd[0] + to.drift(q, qd), data.qacc) < 10 * tolerances.acceleration
+            assert off(convert @ frame.joint_qdd[0] + to.drift(q, qd), data.qacc) < tolerances.acceleration
             theirs = np.hstack([data.xpos[1:], np.roll(data.xquat[1:], -1, axis=1)])
-            order = [sim.body_names.index(f"r/{model.body(i).name}") for i in range(1, model.nbody)]
+            order = [sim.body_names.index(model.body(i).name) for i in range(1, model.nbody)]
             assert_link_frames(frame.body_q[:, order].astype(float), theirs[None], tolerances.pose)
             jacobian = np.zeros((len(order), 6, model.nv))
             for body, rows in enumerate(jacobian, 1):
@@ -209,10 +143,31 @@ def test_dynamics_of_every_joint_are_mujocos(tmp_path, seed, precision):
             assert off(frame.body_qd[0, order], jacobian @ data.qvel) < tolerances.dynamics
 
 
-@pytest.mark.parametrize("seed", range(TREES))
-def test_two_hundred_steps_of_every_joint_follow_mujoco(tmp_path, seed):
-    sim, model, rng = launch(tmp_path, seed, "f64")
-    with sim:
+@pytest.mark.parametrize("seed", range(4))
+def test_single_precision_holds_along_a_chain_of_forty_dofs(tmp_path, seed):
+    # there the factor of a mass matrix of 24 bits leaves 1e-3; the corrections must come near the rounding of q̈ itself
+    rng = np.random.default_rng(seed)
+    tree = random_tree(rng, 40, width=1)
+    (tmp_path / "chain.urdf").write_text(tree.text())
+    scene = tl.Scene(dt=1e-3, substeps=1)
+    scene.add_urdf(tmp_path / "chain.urdf", name="r")
+    model = judge_of(scene, {"r": tree})
+    with launch(scene, "f32") as sim:
+        to, data = Coordinates(model, sim), mujoco.MjData(model)
+        for _ in range(20):
+            q, qd = random_state(rng, sim)
+            frame = sim.write(joint_q=q[None], joint_qd=qd[None])
+            q, data.qvel[:] = frame.joint_q[0].astype(float), frame.joint_qd[0]
+            data.qpos[:] = to.positions(q)
+            mujoco.mj_forward(model, data)
+            assert off(frame.joint_qdd[0], data.qacc) < SINGLE.acceleration / 5
+
+
+@SCENES
+def test_two_hundred_steps_of_every_joint_follow_mujoco(tmp_path, seed, dofs):
+    scene, trees, rng = random_scene(tmp_path, seed, dofs)
+    model = judge_of(scene, trees)
+    with launch(scene, "f64") as sim:
         to, data, nudged = Coordinates(model, sim), mujoco.MjData(model), mujoco.MjData(model)
         q, qd = random_state(rng, sim)
         sim.write(joint_q=q[None], joint_qd=qd[None])
@@ -220,11 +175,10 @@ def test_two_hundred_steps_of_every_joint_follow_mujoco(tmp_path, seed):
             side.qpos[:], side.qvel[:] = to.positions(q) + nudge, to.to_qvel(q) @ qd
         calm = 0
         for _ in range(STEPS):
-            force = rng.normal(0, 0.3, len(qd))
-            frame = sim.step(joint_f=force[None])
+            commands = random_commands(rng, sim)
+            frame = sim.step(**{name: values[None] for name, values in commands.items()})
             for side in (data, nudged):
-                # the same power on the same motion
-                side.qfrc_applied[:] = np.linalg.solve(to.to_qvel(q).T, force)
+                command(to, side, q, commands)
                 mujoco.mj_step(model, side)
             if np.abs(data.qpos - nudged.qpos).max() > CHAOS:
                 break

@@ -91,49 +91,22 @@ class Twin:
             frame = spec.worldbody.add_frame(pos=robot.pos, quat=(w, x, y, z))
             spec.attach(child, prefix=f"{robot.name}/", frame=frame)
             for dof, name in enumerate(robot.joint_names):
-                self._drive(spec, robot, dof, f"{robot.name}/{name}")
+                drive(spec, robot, dof, f"{robot.name}/{name}")
         self.model = model = spec.compile()
         self.dofs = model.nv
         self.dof_names = [model.joint(joint).name for joint in range(model.njnt)]
         self.body_names = [model.body(body).name for body in range(1, model.nbody)]
         self.slides = model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
         self._set_effort(np.concatenate([robot.joint_effort_limit for robot in scene.robots.values()]))
-        self._set_limits()
-        self._flatten_mimics()
+        limits_in_force_space(model)
+        flatten_mimics(model)
+        self.followers = model.eq_obj1id.copy()
         self.data = mujoco.MjData(model)
-
-    @staticmethod
-    def _drive(spec: mujoco.MjSpec, robot: tl.Robot, dof: int, name: str) -> None:
-        """Two actuators a joint: one pulls to the position target, one to the velocity target."""
-        spec.joint(name).armature = robot.joint_armature[dof]
-        mode, ke, kd = robot.joint_target_mode[dof], robot.joint_target_ke[dof], robot.joint_target_kd[dof]
-        spring = ke if mode != "velocity" else 0.0
-        follows = kd if mode != "position" else 0.0
-        for gain, bias in ((spring, (0, -spring, 0)), (follows, (0, 0, -kd))):
-            actuator = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name)
-            actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
-            actuator.gainprm[0], actuator.biasprm[:3] = gain, bias
 
     def _set_effort(self, limit: Array) -> None:
         # after compiling, which refuses a limit of 0
         self.model.jnt_actfrclimited = np.isfinite(limit)
         self.model.jnt_actfrcrange = np.where(np.isfinite(limit), limit, 0.0)[:, None] * [-1, 1]
-
-    def _set_limits(self) -> None:
-        f = self.model.dof_invweight0 * (1 - IMPEDANCE_MAX)
-        self.model.jnt_solref[:, 0] = 2 / (LIMIT_KD * f)
-        self.model.jnt_solref[:, 1] = LIMIT_KD * f / 2 * np.sqrt(1 / (LIMIT_KE * f))
-
-    def _flatten_mimics(self) -> None:
-        """MuJoCo ties a follower of a follower to it; the project ties both to the first leader."""
-        model = self.model
-        by_follower = {model.eq_obj1id[row]: row for row in range(model.neq)}
-        for row in range(model.neq):
-            while (leading := by_follower.get(model.eq_obj2id[row])) is not None:
-                offset, ratio = model.eq_data[row, :2]
-                model.eq_data[row, :2] = offset + ratio * model.eq_data[leading, 0], ratio * model.eq_data[leading, 1]
-                model.eq_obj2id[row] = model.eq_obj2id[leading]
-        self.followers = model.eq_obj1id.copy()
 
     def evaluate(self, q: Array, qd: Array, joint_f: Array, target_q: Array, target_qd: Array) -> Evaluation:
         """Forward dynamics of every world's state; all arguments ``(worlds, dofs)``."""
@@ -185,3 +158,32 @@ class Twin:
 def interleaved(target_q: Array, target_qd: Array) -> Array:
     """Controls in the order of the actuators: position, velocity, dof by dof."""
     return np.stack([target_q, target_qd], axis=-1).reshape(*target_q.shape[:-1], -1)
+
+
+def drive(spec: mujoco.MjSpec, robot: tl.Robot, dof: int, name: str) -> None:
+    """Armature, and two actuators for a joint of one dof: one pulls to the position target, one to the velocity's."""
+    spec.joint(name).armature = robot.joint_armature[dof]
+    mode, ke, kd = robot.joint_target_mode[dof], robot.joint_target_ke[dof], robot.joint_target_kd[dof]
+    spring = ke if mode != "velocity" else 0.0
+    follows = kd if mode != "position" else 0.0
+    for gain, bias in ((spring, (0, -spring, 0)), (follows, (0, 0, -kd))):
+        actuator = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name)
+        actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+        actuator.gainprm[0], actuator.biasprm[:3] = gain, bias
+
+
+def limits_in_force_space(model: mujoco.MjModel) -> None:
+    """Softness of the joint limits from Newton's limit_ke and limit_kd."""
+    f = model.dof_invweight0[model.jnt_dofadr] * (1 - IMPEDANCE_MAX)
+    model.jnt_solref[:, 0] = 2 / (LIMIT_KD * f)
+    model.jnt_solref[:, 1] = LIMIT_KD * f / 2 * np.sqrt(1 / (LIMIT_KE * f))
+
+
+def flatten_mimics(model: mujoco.MjModel) -> None:
+    """MuJoCo ties a follower of a follower to it; the project ties both to the first leader."""
+    by_follower = {model.eq_obj1id[row]: row for row in range(model.neq)}
+    for row in range(model.neq):
+        while (leading := by_follower.get(model.eq_obj2id[row])) is not None:
+            offset, ratio = model.eq_data[row, :2]
+            model.eq_data[row, :2] = offset + ratio * model.eq_data[leading, 0], ratio * model.eq_data[leading, 1]
+            model.eq_obj2id[row] = model.eq_obj2id[leading]
