@@ -59,8 +59,8 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     // MuJoCo scales costs by 1 / (mean inertia × dofs)
     constants.solver.tolerance =
         scene.solver.tolerance * reference.mean_inertia * constants.dofs.len() as f64;
-    // a pass takes an error of 1e-3 to 1e-6
-    constants.solver.refinements = [1.0, 10.0]
+    // a pass takes an error of 1e-3 to 1e-6, one of 1e-1 to 1e-2 or 1e-3
+    constants.solver.refinements = [1.0, 100.0, 1000.0]
         .iter()
         .filter(|&times| reference.locked_over_free > times * LOCKED_OVER_FREE_MAX)
         .count();

@@ -163,6 +163,39 @@ def test_single_precision_holds_along_a_chain_of_forty_dofs(tmp_path, seed):
             assert off(frame.joint_qdd[0], data.qacc) < SINGLE.acceleration / 5
 
 
+def light_chain(dofs: int, load: float) -> Tree:
+    """Hinges one behind the other, of links that grow so much heavier to the last."""
+    tree = Tree("l0", parts=['<link name="l0"/>'])
+    for number in range(dofs):
+        mass = float(load ** (number / (dofs - 1)))
+        moments = " ".join(f'i{axis}{axis}="{1e-3 * mass!r}"' for axis in "xyz")
+        inertial = f'<origin xyz="0.1 0 0"/><mass value="{mass!r}"/><inertia {moments} ixy="0" ixz="0" iyz="0"/>'
+        axis = "0 0 1" if number % 3 == 0 else "0 1 0"
+        tree.parts += [
+            f'<link name="l{number + 1}"><inertial>{inertial}</inertial></link>',
+            f'<joint name="j{number}" type="continuous"><parent link="l{number}"/><child link="l{number + 1}"/>'
+            f'<origin xyz="{0.2 if number else 0} 0 0" rpy="{0.3 * (number % 2)!r} 0 0"/><axis xyz="{axis}"/></joint>',
+        ]
+    return tree
+
+
+@pytest.mark.parametrize(("dofs", "load"), [(7, 100), (12, 100), (20, 1), (20, 100), (40, 1)])
+def test_single_precision_carries_a_heavy_load_on_a_light_chain(tmp_path, dofs, load):
+    # unrefined, accelerations are off by up to 4e-2
+    tree, rng = light_chain(dofs, load), np.random.default_rng(0)
+    (tmp_path / "chain.urdf").write_text(tree.text())
+    scene = tl.Scene(dt=1e-3, substeps=1)
+    scene.add_urdf(tmp_path / "chain.urdf", name="r")
+    model = judge_of(scene, {"r": tree})
+    with launch(scene, "f32") as sim:
+        data = mujoco.MjData(model)
+        for _ in range(20):
+            data.qpos[:] = rng.uniform(-0.5, 0.5, dofs).astype(np.float32)
+            frame = sim.write(joint_q=data.qpos[None])
+            mujoco.mj_forward(model, data)
+            assert off(frame.joint_qdd[0], data.qacc) < SINGLE.acceleration
+
+
 @SCENES
 def test_two_hundred_steps_of_every_joint_follow_mujoco(tmp_path, seed, dofs):
     scene, trees, rng = random_scene(tmp_path, seed, dofs)
