@@ -20,9 +20,13 @@ const ORDER: [&str; 8] = [
 ];
 
 /// The only door of each heavy package.
-const DOORS: [(&str, &str); 7] = [
+const DOORS: [(&str, &str); 11] = [
     ("urdf_rs", "sim-core/src/model/urdf"),
     ("faer", "sim-core/src/model"),
+    ("parry3d_f64", "sim-core/src/model/geometry"),
+    ("robust", "sim-core/src/model/geometry"),
+    ("gltf", "sim-core/src/model/geometry/load"),
+    ("base64", "sim-core/src/model/geometry/load"),
     ("rayon", "sim-core/src/backend/cpu"),
     ("iceoryx2", "sim-daemon/protocol/src"),
     ("clap", "sim-daemon/src/cli.rs"),

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
-use sim_daemon::config::{self, ConfigError, SceneFile, UrdfOptions};
+use sim_daemon::config::{self, ConfigError, MeshOptions, SceneFile, UrdfOptions};
 
 use crate::errors::raise;
 
@@ -15,11 +15,17 @@ pub(crate) fn read_urdf(
     package_dirs: Vec<PathBuf>,
     floating: bool,
     strict: bool,
+    mesh_max_hull_vertices: usize,
+    convex_decomposition: bool,
 ) -> PyResult<String> {
     let options = UrdfOptions {
         package_dirs,
         floating,
         strict,
+        meshes: MeshOptions {
+            max_hull_vertices: mesh_max_hull_vertices,
+            convex_decomposition,
+        },
         ..UrdfOptions::default()
     };
     let summary = config::urdf_summary(&path, options);

@@ -133,7 +133,9 @@ class Robot:
         "_pos",
         "_quat",
         "_summary",
+        "convex_decomposition",
         "floating",
+        "mesh_max_hull_vertices",
         "package_dirs",
         "self_collisions",
         "strict",
@@ -169,6 +171,8 @@ class Robot:
         floating: bool,
         self_collisions: bool,
         strict: bool,
+        mesh_max_hull_vertices: int,
+        convex_decomposition: bool,
         summary: dict[str, Any],
     ) -> None:
         self._name = name
@@ -179,6 +183,8 @@ class Robot:
         self.floating = floating
         self.self_collisions = self_collisions
         self.strict = strict
+        self.mesh_max_hull_vertices = mesh_max_hull_vertices
+        self.convex_decomposition = convex_decomposition
         self._summary = summary
         self._own: dict[str, Any] = {}
 
@@ -253,6 +259,8 @@ class Robot:
             "floating": self.floating,
             "self_collisions": self.self_collisions,
             "strict": self.strict,
+            "mesh_max_hull_vertices": self.mesh_max_hull_vertices,
+            "convex_decomposition": self.convex_decomposition,
         } | own
 
     def _urdf_values(self, name: str) -> Any:

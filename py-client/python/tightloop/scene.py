@@ -177,6 +177,8 @@ class Scene:
         floating: bool = False,
         self_collisions: bool = False,
         strict: bool = False,
+        mesh_max_hull_vertices: int = 64,
+        convex_decomposition: bool = False,
         package_dirs: Sequence[str | os.PathLike[str]] = (),
     ) -> Robot:
         """Add a robot from a URDF file, which is read and checked at once.
@@ -190,6 +192,9 @@ class Scene:
             self_collisions: Whether links of this robot touch each other (neighbours never do).
             strict: Whether an inertia that no body can have (A + B < C) is refused. Otherwise it is balanced as MuJoCo
                 does, with a warning.
+            mesh_max_hull_vertices: Most vertices of the convex hull that stands for a collision mesh in contacts, 8 to 1024.
+                Its error is noted where it exceeds 1 mm or 1% of the mesh.
+            convex_decomposition: Whether a concave collision mesh becomes several convex hulls rather than one.
             package_dirs: Folders that hold the packages of ``package://`` paths; those above the file if left out.
 
         Returns:
@@ -206,7 +211,9 @@ class Scene:
             raise SceneError(f"add_urdf: package_dirs is {package_dirs!r}; give a list of folders")
         packages = [checks.path("add_urdf: a folder of package_dirs", folder) for folder in package_dirs]
         folders = [str(folder) for folder in packages]
-        summary = json.loads(_core.read_urdf(str(urdf), folders, bool(floating), bool(strict)))
+        vertices = checks.integer("add_urdf: mesh_max_hull_vertices", mesh_max_hull_vertices)
+        decompose = bool(convex_decomposition)
+        summary = json.loads(_core.read_urdf(str(urdf), folders, bool(floating), bool(strict), vertices, decompose))
         own_name = re.sub(r"[^A-Za-z0-9_.\-]", "_", summary["name"])
         name = checks.name("robot", own_name if name is None else name, self._names())
         robot = Robot(
@@ -218,6 +225,8 @@ class Scene:
             floating=bool(floating),
             self_collisions=bool(self_collisions),
             strict=bool(strict),
+            mesh_max_hull_vertices=vertices,
+            convex_decomposition=decompose,
             summary=summary,
         )
         self.robots[name] = robot

@@ -3,7 +3,9 @@
 //! SI units, radians, z up, quaternions (x, y, z, w).
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
+use super::geometry::Mesh;
 use super::pose::Pose;
 
 /// Everything a simulation starts from.
@@ -155,12 +157,7 @@ pub enum Shape {
         half_height: f64,
     },
     /// Triangles of a file.
-    Mesh {
-        /// The file, as resolved.
-        path: PathBuf,
-        /// Factor on each axis [–].
-        scale: [f64; 3],
-    },
+    Mesh(Arc<Mesh>),
 }
 
 /// What connects a link to its parent.
@@ -369,7 +366,7 @@ impl Shape {
             Shape::Sphere { .. } => "sphere",
             Shape::Cylinder { .. } => "cylinder",
             Shape::Capsule { .. } => "capsule",
-            Shape::Mesh { .. } => "mesh",
+            Shape::Mesh(_) => "mesh",
         }
     }
 }

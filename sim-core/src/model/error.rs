@@ -326,6 +326,17 @@ pub enum ModelError {
         joints: Vec<String>,
     },
 
+    /// A mesh file that cannot be used.
+    #[error("{owner}mesh {}: {reason}", path.display())]
+    Mesh {
+        /// What has it, such as ``robot `arm`: link `hand`: ``; empty for a mesh on its own.
+        owner: String,
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and the cure.
+        reason: String,
+    },
+
     /// A collision mesh that is not there.
     #[error(
         "robot `{robot}`: link `{link}`: collision mesh `{uri}` is missing: looked for {}; copy it there or mend the path",

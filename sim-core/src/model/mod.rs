@@ -7,6 +7,7 @@ pub mod constants;
 mod description;
 mod error;
 mod frozen;
+pub mod geometry;
 mod inertia;
 mod inverse_weight;
 mod pose;

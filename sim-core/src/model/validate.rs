@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::description::{Description, Joint, JointDof, JointKind, Link, Robot, Shape};
+use super::description::{Collision, Description, Joint, JointDof, JointKind, Link, Robot, Shape};
 use super::error::ModelError;
 use super::inertia::{negative_moment, triangle_excess};
 use super::pose::{Pose, QUAT_SLACK};
@@ -68,7 +68,7 @@ impl Description {
             name("shape", &shape.name)?;
             let what = format!("shape `{}`", shape.name);
             pose(&what, &shape.pose)?;
-            geometry(&what, &shape.shape)?;
+            shape_sizes(&what, &shape.shape)?;
         }
         self.robots.iter().try_for_each(Robot::validate)
     }
@@ -135,12 +135,9 @@ impl Robot {
             }
         }
         for (index, collision) in link.collisions.iter().enumerate() {
-            let what = match &collision.name {
-                Some(name) => format!("{what}: collision `{name}`"),
-                None => format!("{what}: collision {index}"),
-            };
+            let what = collision_name(&what, index, collision);
             pose(&what, &collision.pose)?;
-            geometry(&what, &collision.shape)?;
+            shape_sizes(&what, &collision.shape)?;
         }
         Ok(())
     }
@@ -330,8 +327,16 @@ fn pose(what: &str, pose: &Pose) -> Result<(), ModelError> {
     Ok(())
 }
 
+/// A collision by its name, or by its place in its link.
+pub(super) fn collision_name(owner: &str, index: usize, collision: &Collision) -> String {
+    match &collision.name {
+        Some(name) => format!("{owner}: collision `{name}`"),
+        None => format!("{owner}: collision {index}"),
+    }
+}
+
 /// Refuses sizes that are not positive.
-fn geometry(what: &str, shape: &Shape) -> Result<(), ModelError> {
+pub(super) fn shape_sizes(what: &str, shape: &Shape) -> Result<(), ModelError> {
     match *shape {
         Shape::Box { half_extents } => half_extents
             .iter()
@@ -351,11 +356,8 @@ fn geometry(what: &str, shape: &Shape) -> Result<(), ModelError> {
                 half_height,
             )
         }
-        Shape::Mesh { scale, .. } => scale.iter().try_for_each(|&value| {
-            let what = format!("{what}: scale of the mesh");
-            finite(&what, value)?;
-            in_range(&what, value, value != 0.0, "it must not be 0")
-        }),
+        // checked when it was read
+        Shape::Mesh(_) => Ok(()),
     }
 }
 

@@ -7,6 +7,14 @@ use sim_core::model::{ModelError, Robot, Shape, UrdfOptions};
 
 use crate::build::assert_says;
 
+/// Half a unit square pyramid, as text.
+const TETRAHEDRON: &str = "solid t
+outer loop\n vertex 0 0 0\n vertex 0 1 0\n vertex 1 0 0\n endloop
+outer loop\n vertex 0 0 0\n vertex 1 0 0\n vertex 0 0 1\n endloop
+outer loop\n vertex 0 0 0\n vertex 0 0 1\n vertex 0 1 0\n endloop
+outer loop\n vertex 1 0 0\n vertex 0 1 0\n vertex 0 0 1\n endloop
+endsolid";
+
 /// A folder of its own for each test, removed at the end: `pkg/urdf`, `pkg/meshes/hand.stl`.
 struct Package {
     root: PathBuf,
@@ -18,7 +26,7 @@ impl Package {
             std::env::temp_dir().join(format!("tightloop-meshes-{}-{test}", std::process::id()));
         fs::create_dir_all(root.join("pkg/urdf")).unwrap();
         fs::create_dir_all(root.join("pkg/meshes")).unwrap();
-        fs::write(root.join("pkg/meshes/hand.stl"), b"").unwrap();
+        fs::write(root.join("pkg/meshes/hand.stl"), TETRAHEDRON).unwrap();
         Package { root }
     }
 
@@ -51,9 +59,12 @@ impl Drop for Package {
 #[track_caller]
 fn assert_leads_to(robot: Result<Robot, ModelError>, mesh: &Path) {
     match &robot.unwrap().links[0].collisions[0].shape {
-        Shape::Mesh { path, scale } => {
-            assert_eq!(path.canonicalize().unwrap(), mesh.canonicalize().unwrap());
-            assert_eq!(*scale, [1.0, 2.0, 3.0]);
+        Shape::Mesh(found) => {
+            assert_eq!(
+                found.path.canonicalize().unwrap(),
+                mesh.canonicalize().unwrap()
+            );
+            assert_eq!(found.scale, [1.0, 2.0, 3.0]);
         }
         other => panic!("{other:?}"),
     }
@@ -173,4 +184,56 @@ fn paths_out_of_their_package_and_other_protocols_are_refused() {
         )
         .unwrap_err();
     assert_says(&error.to_string(), &["`hand`", "http://x/y.stl", "file://"]);
+}
+
+#[test]
+fn relative_paths_climb_within_the_robots_folder_only() {
+    let package = Package::new("climb");
+    let none = UrdfOptions::default;
+    fs::create_dir_all(package.root.join("pkg/robots/arm/urdf")).unwrap();
+    let deep = |uri: &str, options| package.read("pkg/robots/arm/urdf", "collision", uri, options);
+    let uri = "../../../meshes/hand.stl";
+    // the file's folder is urdf, the robot's arm: two above is outside, however it is written
+    for uri in [
+        uri,
+        "x/../../../../meshes/hand.stl",
+        "file://../../../meshes/hand.stl",
+    ] {
+        let error = deep(uri, none()).unwrap_err();
+        assert_says(
+            &error.to_string(),
+            &["`hand`", uri, "leaves the robot's folder", "package_dirs"],
+        );
+    }
+    // a folder above both says that it belongs together
+    let options = UrdfOptions {
+        package_dirs: vec![package.root.join("pkg")],
+        ..none()
+    };
+    assert_leads_to(deep(uri, options), &package.mesh());
+    // so does a package's own mark
+    fs::write(package.root.join("pkg/package.xml"), "<package/>").unwrap();
+    assert_leads_to(deep(uri, none()), &package.mesh());
+    let above = deep("../../../../pkg/meshes/../../x.stl", none()).unwrap_err();
+    assert_says(&above.to_string(), &["leaves the robot's folder"]);
+    // from anywhere, the classic
+    let error = package
+        .read(
+            "pkg/urdf",
+            "collision",
+            "../../../../../../../etc/passwd",
+            none(),
+        )
+        .unwrap_err();
+    assert_says(&error.to_string(), &["leaves the robot's folder"]);
+}
+
+#[test]
+fn symbolic_links_are_followed_as_installed_workspaces_need() {
+    let package = Package::new("links");
+    fs::create_dir_all(package.root.join("install/pkg")).unwrap();
+    std::os::unix::fs::symlink(package.mesh(), package.root.join("install/pkg/hand.stl")).unwrap();
+    let uri = "package://pkg/hand.stl";
+    let robot = package.read("install/pkg", "collision", uri, UrdfOptions::default());
+    assert_leads_to(robot, &package.mesh());
 }

@@ -16,6 +16,7 @@ pub use sim_core::backend::BackendError;
 pub use sim_core::batch::Field;
 pub use sim_core::dynamics::Dynamics;
 pub use sim_core::model::UrdfOptions;
+pub use sim_core::model::geometry::MeshOptions;
 pub use summary::urdf_summary;
 
 /// Why a scene cannot be used.
@@ -155,6 +156,10 @@ fn no_rotation() -> [Number; 4] {
     Pose::identity().quat.map(Number)
 }
 
+fn hull_vertices() -> usize {
+    MeshOptions::default().max_hull_vertices
+}
+
 /// Type of a static shape, by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -193,6 +198,12 @@ pub struct RobotTable {
     /// Whether an inertia that no body can have is refused; otherwise it is balanced, with a warning.
     #[serde(default)]
     pub strict: bool,
+    /// Most vertices of the convex hull of a collision mesh, 8 to 1024.
+    #[serde(default = "hull_vertices")]
+    pub mesh_max_hull_vertices: usize,
+    /// Whether a concave collision mesh becomes several convex hulls.
+    #[serde(default)]
+    pub convex_decomposition: bool,
     /// Whether its own links touch each other.
     #[serde(default)]
     pub self_collisions: bool,
@@ -338,6 +349,10 @@ impl SceneFile {
                 floating: table.floating,
                 strict: table.strict,
                 self_collisions: table.self_collisions,
+                meshes: MeshOptions {
+                    max_hull_vertices: table.mesh_max_hull_vertices,
+                    convex_decomposition: table.convex_decomposition,
+                },
                 package_dirs: table
                     .package_dirs
                     .iter()

@@ -15,7 +15,11 @@ pub(super) enum Found {
 /// Resolves a path of a URDF file that lies in `folder`.
 ///
 /// `package://name/rest` is looked for in each package folder, then in the folders above the file that bear or hold that
-/// name; `file://` and plain paths are taken as they are, relative ones from `folder`.
+/// name; `rest` stays inside. A relative path is looked for from the file's folder and may climb, but only within what
+/// belongs to the robot: the nearest folder above the file with a `package.xml`, else the folder above the file's own (files
+/// lie in `urdf/` beside `meshes/`), and any package folder that holds the file. An absolute path, plain or `file://`, says
+/// openly where it leads and is taken as it is; only regular files of a mesh format are ever opened. Symbolic links are
+/// followed wherever they lead: a URDF file cannot make one, and workspaces are installed as links to their sources.
 pub(super) fn resolve(uri: &str, folder: &Path, package_dirs: &[PathBuf]) -> Found {
     let packaged = uri
         .strip_prefix("package://")
@@ -26,17 +30,61 @@ pub(super) fn resolve(uri: &str, folder: &Path, package_dirs: &[PathBuf]) -> Fou
             return Found::Refused("it leaves its package by `..`; keep it inside");
         }
         package_candidates(package, rest, folder, package_dirs)
-    } else if let Some(path) = uri.strip_prefix("file://") {
-        vec![folder.join(path)]
-    } else if uri.contains("://") {
-        return Found::Refused("it must be package://, file:// or a path");
     } else {
-        vec![folder.join(uri)]
+        let path = match uri.strip_prefix("file://") {
+            Some(path) => Path::new(path),
+            None if uri.contains("://") => {
+                return Found::Refused("it must be package://, file:// or a path");
+            }
+            None => Path::new(uri),
+        };
+        if path.is_relative() && leaves_robot(path, folder, package_dirs) {
+            return Found::Refused(
+                "it leaves the robot's folder by `..`; give a folder above both in package_dirs, or an absolute path",
+            );
+        }
+        vec![folder.join(path)]
     };
     match candidates.iter().find(|candidate| candidate.is_file()) {
         Some(file) => Found::File(file.clone()),
         None => Found::Missing(candidates),
     }
+}
+
+/// Whether a relative path climbs out of every folder that belongs to the robot.
+fn leaves_robot(path: &Path, folder: &Path, package_dirs: &[PathBuf]) -> bool {
+    if !escapes(path) {
+        return false;
+    }
+    let folder = absolute(folder);
+    let target = absolute(&folder.join(path));
+    let package = folder
+        .ancestors()
+        .find(|above| above.join("package.xml").is_file())
+        .or(folder.parent());
+    let given = package_dirs.iter().map(|dir| absolute(dir));
+    let mut homes = given
+        .filter(|dir| folder.starts_with(dir))
+        .chain(package.map(Path::to_owned));
+    !homes.any(|home| target.starts_with(home))
+}
+
+/// The path from the root, `.` and `..` taken out as text.
+fn absolute(path: &Path) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for part in std::path::absolute(path)
+        .unwrap_or_else(|_| path.to_owned())
+        .components()
+    {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir => {
+                plain.pop();
+            }
+            part => plain.push(part),
+        }
+    }
+    plain
 }
 
 fn package_candidates(
@@ -58,7 +106,7 @@ fn package_candidates(
         }
     }
     // a relative folder has no ancestors to walk
-    let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+    let folder = absolute(folder);
     for ancestor in folder.ancestors() {
         if ancestor.file_name().is_some_and(|name| name == package) {
             add(ancestor.join(rest));

@@ -10,12 +10,14 @@ mod reader;
 mod scan;
 mod table;
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use super::description::{Description, Robot};
 use super::error::ModelError;
+use super::geometry::MeshOptions;
 use super::pose::Pose;
 use reader::Reader;
 use scan::Scan;
@@ -36,6 +38,8 @@ pub struct UrdfOptions {
     pub self_collisions: bool,
     /// Whether an inertia that no body can have is refused; otherwise it is balanced, with a warning.
     pub strict: bool,
+    /// How collision meshes become convex hulls.
+    pub meshes: MeshOptions,
     /// Folders that hold the packages of `package://` paths.
     pub package_dirs: Vec<PathBuf>,
 }
@@ -93,6 +97,7 @@ impl Robot {
         path: impl AsRef<Path>,
         options: UrdfOptions,
     ) -> Result<Robot, ModelError> {
+        options.meshes.validate()?;
         let path = path.as_ref();
         let document = scan::parse(text, path)?;
         let scan = Scan::new(&document, path)?;
@@ -103,6 +108,7 @@ impl Robot {
             robot: String::new(),
             notes: Vec::new(),
             missing_visuals: Vec::new(),
+            meshes: HashMap::new(),
         };
         let mut robot = reader.robot()?;
         if !reader.options.strict {

@@ -1,13 +1,18 @@
 //! Links of a URDF file, and the robot as a whole.
 
-use std::path::Path;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use roxmltree::Node;
 use urdf_rs::Geometry;
 
 use super::super::description::{Collision, Inertial, Link, Robot, Shape};
 use super::super::error::ModelError;
+use super::super::geometry::{self, Mesh};
+use super::super::inertia::merge;
 use super::super::pose::Pose;
+use super::super::validate::{collision_name, shape_sizes};
 use super::UrdfOptions;
 use super::mesh::{self, Found};
 use super::scan::{Scan, children};
@@ -22,6 +27,8 @@ pub(super) struct Reader<'a, 'input> {
     pub notes: Vec<String>,
     /// `link`: file, of visual meshes that are not there.
     pub missing_visuals: Vec<String>,
+    /// Meshes read so far, by file and the bits of their scale.
+    pub meshes: HashMap<(PathBuf, [u64; 3]), Arc<Mesh>>,
 }
 
 impl<'a, 'input> Reader<'a, 'input> {
@@ -98,23 +105,93 @@ impl<'a, 'input> Reader<'a, 'input> {
                     shape: self.shape(&link.name, &collision.geometry, node)?,
                 });
             }
-            if !has_inertial && !collisions.is_empty() {
-                let name = &link.name;
-                self.notes.push(format!(
-                    "link `{name}` has collisions but no <inertial>; its mass is taken as 0"
-                ));
-            }
             self.note_missing_visuals(&link.name, node);
+            let inertial = if has_inertial {
+                Some(inertial(&link.inertial))
+            } else {
+                self.inertial_of(&link.name, &collisions)?
+            };
             links.push(Link {
                 name: link.name.clone(),
-                inertial: has_inertial.then(|| inertial(&link.inertial)),
+                inertial,
                 collisions,
             });
         }
         Ok(links)
     }
 
-    fn shape(&self, link: &str, geometry: &Geometry, node: Node) -> Result<Shape, ModelError> {
+    /// Mass of a link without `<inertial>`: its collisions at one density, overlaps counted as often as they are covered.
+    fn inertial_of(
+        &mut self,
+        link: &str,
+        collisions: &[Collision],
+    ) -> Result<Option<Inertial>, ModelError> {
+        let mut whole: Option<Inertial> = None;
+        let owner = format!("robot `{}`: link `{link}`", self.robot);
+        for (index, collision) in collisions.iter().enumerate() {
+            let what = collision_name(&owner, index, collision);
+            shape_sizes(&what, &collision.shape)?;
+            let part = geometry::mass_properties(&collision.shape, geometry::DENSITY)
+                .map_err(|error| self.of_link(link, error))?;
+            let nothing = Inertial {
+                mass: 0.0,
+                pos: [0.0; 3],
+                inertia: [[0.0; 3]; 3],
+            };
+            whole = Some(merge(&whole.unwrap_or(nothing), &collision.pose, &part));
+        }
+        if let Some(Inertial { mass, .. }) = whole {
+            let density = geometry::DENSITY;
+            self.notes.push(format!(
+                "link `{link}` has no <inertial>; its collisions at {density} kg/m³ give it {mass:.4e} kg"
+            ));
+            for collision in collisions {
+                if let Shape::Mesh(mesh) = &collision.shape
+                    && !mesh.closed
+                {
+                    let file = mesh.path.display();
+                    self.notes.push(format!(
+                        "link `{link}`: mesh {file} is not closed, so its mass is that of its convex hull"
+                    ));
+                }
+            }
+        }
+        Ok(whole)
+    }
+
+    /// Says whose mesh an error is about.
+    fn of_link(&self, link: &str, error: ModelError) -> ModelError {
+        match error {
+            ModelError::Mesh { path, reason, .. } => ModelError::Mesh {
+                owner: format!("robot `{}`: link `{link}`: ", self.robot),
+                path,
+                reason,
+            },
+            other => other,
+        }
+    }
+
+    /// A collision mesh, which the same file and scale share.
+    fn mesh(
+        &mut self,
+        link: &str,
+        path: PathBuf,
+        scale: [f64; 3],
+    ) -> Result<Arc<Mesh>, ModelError> {
+        let key = (path, scale.map(f64::to_bits));
+        if let Some(mesh) = self.meshes.get(&key) {
+            return Ok(mesh.clone());
+        }
+        let mesh = Mesh::load(&key.0, scale, &self.options.meshes)
+            .map_err(|error| self.of_link(link, error))?;
+        for note in &mesh.notes {
+            self.notes
+                .push(format!("link `{link}`: mesh {} {note}", key.0.display()));
+        }
+        Ok(self.meshes.entry(key).or_insert(Arc::new(mesh)).clone())
+    }
+
+    fn shape(&mut self, link: &str, geometry: &Geometry, node: Node) -> Result<Shape, ModelError> {
         Ok(match geometry {
             Geometry::Box { size } => Shape::Box {
                 half_extents: size.map(|edge| 0.5 * edge),
@@ -147,10 +224,12 @@ impl<'a, 'input> Reader<'a, 'input> {
                             .fault(node, format!("collision mesh `{filename}`: {rule}")));
                     }
                 };
-                Shape::Mesh {
-                    path,
-                    scale: scale.map_or([1.0; 3], |scale| *scale),
+                let scale = scale.map_or([1.0; 3], |scale| *scale);
+                if scale.contains(&0.0) {
+                    let reason = format!("attribute `scale` is {scale:?}; no factor must be 0");
+                    return Err(self.scan.fault(node, reason));
                 }
+                Shape::Mesh(self.mesh(link, path, scale)?)
             }
         })
     }

@@ -1,0 +1,20 @@
+//! What shapes are made of: mesh files, mass properties, convex hulls, triangles for a picture.
+//!
+//! Everything is f64 and happens when a description is made; `step/` knows nothing of it.
+
+mod decompose;
+mod hull;
+mod load;
+mod mass;
+mod mesh;
+mod quickhull;
+mod tessellate;
+mod trimesh;
+mod vector;
+
+pub use hull::{Edge, Face, Hull};
+pub use load::{FILE_MAX, TRIANGLES_MAX};
+pub use mass::{DENSITY, mass_properties};
+pub use mesh::{Mesh, MeshOptions};
+pub use tessellate::triangles;
+pub use trimesh::TriMesh;

@@ -1,0 +1,71 @@
+//! Arithmetic of points in f64, without fused operations: a result is the same on every machine, and fast on those
+//! where a fused operation would be a library call.
+
+/// A point or direction.
+pub(super) type Vector = [f64; 3];
+
+pub(super) fn add(a: Vector, b: Vector) -> Vector {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+pub(super) fn sub(a: Vector, b: Vector) -> Vector {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(super) fn scale(a: Vector, s: f64) -> Vector {
+    [a[0] * s, a[1] * s, a[2] * s]
+}
+
+pub(super) fn dot(a: Vector, b: Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(super) fn cross(a: Vector, b: Vector) -> Vector {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+pub(super) fn norm(a: Vector) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// The direction of `a`; of nothing, nothing.
+pub(super) fn unit(a: Vector) -> Vector {
+    let length = norm(a);
+    if length > 0.0 {
+        scale(a, 1.0 / length)
+    } else {
+        [0.0; 3]
+    }
+}
+
+/// Twice the area of a triangle, along its normal.
+pub(super) fn area_vector([a, b, c]: [Vector; 3]) -> Vector {
+    cross(sub(b, a), sub(c, a))
+}
+
+/// Lowest and highest coordinates of points; both infinite where there is none.
+pub(super) fn extent(points: &[Vector]) -> [Vector; 2] {
+    let mut low = [f64::INFINITY; 3];
+    let mut high = [f64::NEG_INFINITY; 3];
+    for point in points {
+        for axis in 0..3 {
+            low[axis] = low[axis].min(point[axis]);
+            high[axis] = high[axis].max(point[axis]);
+        }
+    }
+    [low, high]
+}
+
+/// Diagonal of the box around points [as the points].
+pub(super) fn size(points: &[Vector]) -> f64 {
+    let [low, high] = extent(points);
+    if points.is_empty() {
+        0.0
+    } else {
+        norm(sub(high, low))
+    }
+}
