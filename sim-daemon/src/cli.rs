@@ -8,7 +8,7 @@ use clap::{Args, Parser, Subcommand};
 use sim_protocol::{AttachOptions, Client, keep_waiting};
 
 use crate::error::DaemonError;
-use crate::session;
+use crate::{inspect, session};
 
 /// Batched robot simulation, served over shared memory.
 #[derive(Debug, Parser)]
@@ -26,6 +26,12 @@ enum Command {
     ///
     /// Example: tightloop serve scene.toml --worlds 4096 --name franka
     Serve(Serve),
+    /// Show what a URDF file means: its tree, dofs, masses, limits, what was ignored or mended, and a picture.
+    ///
+    /// The picture shows the collision shapes; it is written as ROBOT.png into the working folder.
+    ///
+    /// Example: tightloop inspect robot.urdf --package-dir ~/robots
+    Inspect(Inspect),
     /// List the daemons that run, one name a line.
     ///
     /// Example: tightloop list
@@ -86,6 +92,50 @@ pub(crate) struct Serve {
     pub(crate) log: Option<PathBuf>,
 }
 
+/// Arguments of `inspect` as given; `inspect` checks them.
+#[derive(Debug, Args)]
+pub(crate) struct Inspect {
+    /// URDF file of the robot.
+    pub(crate) urdf: PathBuf,
+
+    /// Let the root link move freely.
+    #[arg(long)]
+    pub(crate) floating: bool,
+
+    /// Refuse an inertia that no body can have, instead of balancing it.
+    #[arg(long)]
+    pub(crate) strict: bool,
+
+    /// Folder that holds the packages of package:// paths; may be given several times.
+    #[arg(long = "package-dir", value_name = "DIR")]
+    pub(crate) package_dirs: Vec<PathBuf>,
+
+    /// Joint positions of the picture, one a coordinate [rad or m], separated by commas; 0 if left out.
+    #[arg(
+        long,
+        value_name = "Q",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    pub(crate) joint_q: Option<Vec<f64>>,
+
+    /// Print frames, inertias and the places of shapes, too.
+    #[arg(long)]
+    pub(crate) long: bool,
+
+    /// Print JSON, and write no picture unless --png says where.
+    #[arg(long, conflicts_with = "long")]
+    pub(crate) json: bool,
+
+    /// Write the picture to this file.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) png: Option<PathBuf>,
+
+    /// Write no picture.
+    #[arg(long, conflicts_with = "png")]
+    pub(crate) no_png: bool,
+}
+
 /// Runs a command line; the exit code is 0 done, 1 failed, 2 misused.
 pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
     let cli = match Cli::try_parse_from(args) {
@@ -98,6 +148,7 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
     };
     let result = match &cli.command {
         Command::Serve(serve) => session::run(serve),
+        Command::Inspect(args) => inspect::run(args),
         Command::List => list(),
         Command::Stop { name } => stop(name),
     };
@@ -142,18 +193,22 @@ mod tests {
 
     #[test]
     fn help_says_what_it_said() {
-        let mut command = Cli::command().term_width(100);
-        command.build(); // so that usage lines begin with `tightloop`
-        let serve = command
-            .find_subcommand_mut("serve")
-            .expect("serve is a command");
-        let help = serve.render_long_help().to_string();
-        // where help has spaces at the end of a line, the snapshot has none
-        let lines: Vec<_> = help.lines().map(str::trim_end).collect();
-        let said: Vec<_> = include_str!("serve_help.txt").lines().collect();
-        assert_eq!(
-            lines, said,
-            "if the change is wanted, change serve_help.txt"
-        );
+        for (name, file, said) in [
+            ("serve", "serve_help.txt", include_str!("serve_help.txt")),
+            (
+                "inspect",
+                "inspect_help.txt",
+                include_str!("inspect_help.txt"),
+            ),
+        ] {
+            let mut command = Cli::command().term_width(100);
+            command.build(); // so that usage lines begin with `tightloop`
+            let command = command.find_subcommand_mut(name).expect("it is a command");
+            let help = command.render_long_help().to_string();
+            // where help has spaces at the end of a line, the snapshot has none
+            let lines: Vec<_> = help.lines().map(str::trim_end).collect();
+            let said: Vec<_> = said.lines().collect();
+            assert_eq!(lines, said, "if the change is wanted, change {file}");
+        }
     }
 }

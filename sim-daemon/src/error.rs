@@ -47,6 +47,14 @@ pub enum DaemonError {
         /// What the system says.
         problem: String,
     },
+    /// The picture cannot be written.
+    #[error("picture {}: {problem}", path.display())]
+    Picture {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What is wrong, and the cure.
+        problem: String,
+    },
     /// The system refuses something that every system has.
     #[error("{action}: {problem}")]
     System {
@@ -71,7 +79,7 @@ impl DaemonError {
                 "ResourceError"
             }
             Read { .. } | Config(_) | Model(_) => "SceneError",
-            Backend(_) | Protocol(_) | Log { .. } | System { .. } => "LaunchError",
+            Backend(_) | Protocol(_) | Log { .. } | Picture { .. } | System { .. } => "LaunchError",
         }
     }
 

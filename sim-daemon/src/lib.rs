@@ -1,4 +1,5 @@
-//! The process that keeps the worlds: it reads a scene, builds a simulation, and serves it to clients until stopped.
+//! The process that keeps the worlds: it reads a scene, builds a simulation, and serves it to clients until stopped. It also tells what a
+//! robot file means.
 //!
 //! [`serve`] is the whole command line as one function, so that a Python wheel can carry it.
 
@@ -6,6 +7,7 @@ mod cli;
 pub mod config;
 mod error;
 mod export;
+mod inspect;
 mod news;
 mod server;
 mod session;

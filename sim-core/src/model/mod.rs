@@ -23,5 +23,6 @@ pub use description::{
 };
 pub use error::ModelError;
 pub use frozen::{Model, RobotRange, Start};
+pub use inertia::principal_moments;
 pub use pose::Pose;
 pub use urdf::UrdfOptions;

@@ -3,7 +3,7 @@
 //! Paths in a file are relative to it; relative paths in a text are relative to the folder given with it.
 
 mod number;
-mod paths;
+pub(crate) mod paths;
 mod summary;
 
 use std::path::{Path, PathBuf};
@@ -18,6 +18,7 @@ pub use sim_core::dynamics::Dynamics;
 pub use sim_core::model::UrdfOptions;
 pub use sim_core::model::geometry::MeshOptions;
 pub use summary::urdf_summary;
+pub(crate) use summary::{joint_type, robot_summary};
 
 /// Why a scene cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

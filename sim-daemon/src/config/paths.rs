@@ -5,7 +5,7 @@ use std::path::{Component, Path, PathBuf};
 /// The way from `folder` to `path`, both absolute or relative to the working directory.
 ///
 /// Symbolic links are not followed, so the result is right where `..` is.
-pub(super) fn relative_to(folder: &Path, path: &Path) -> PathBuf {
+pub(crate) fn relative_to(folder: &Path, path: &Path) -> PathBuf {
     let (from, to) = (lexical(folder), lexical(path));
     let shared = from
         .components()

@@ -17,7 +17,11 @@ use super::{ConfigError, Number};
 /// # Errors
 /// What is wrong with the file, by name.
 pub fn urdf_summary(path: &Path, options: UrdfOptions) -> Result<Value, ConfigError> {
-    let robot = Robot::from_urdf(path, options)?;
+    Ok(robot_summary(&Robot::from_urdf(path, options)?))
+}
+
+/// What a scene's robot is, as [`urdf_summary`] has it.
+pub(crate) fn robot_summary(robot: &Robot) -> Value {
     let joints: Vec<&Joint> = robot
         .moving_joints()
         .into_iter()
@@ -37,19 +41,11 @@ pub fn urdf_summary(path: &Path, options: UrdfOptions) -> Result<Value, ConfigEr
     };
     let limit = |limit: Option<f64>| json!(Number(limit.unwrap_or(f64::INFINITY)));
     let start: Vec<f64> = joints.iter().flat_map(|joint| joint.q.clone()).collect();
-    let driven: Vec<bool> = driven(&robot);
-    Ok(json!({
+    let driven: Vec<bool> = driven(robot);
+    json!({
         "name": robot.name,
         "joint_names": each(&|joint| json!(joint.name)),
-        "joint_types": each(&|joint| json!(match joint.kind {
-            JointKind::Fixed => "fixed",
-            JointKind::Prismatic => "prismatic",
-            JointKind::Ball => "spherical",
-            JointKind::Planar => "planar",
-            JointKind::Free => "floating",
-            JointKind::Revolute if joint.range.is_none() => "continuous",
-            JointKind::Revolute => "revolute",
-        })),
+        "joint_types": each(&|joint| json!(joint_type(joint))),
         "joint_range": each(&|joint| json!(joint.range)),
         "joint_velocity_limit": each(&|joint| limit(joint.velocity_limit)),
         "joint_mimic": each(&|joint| match joint.mimic {
@@ -71,7 +67,20 @@ pub fn urdf_summary(path: &Path, options: UrdfOptions) -> Result<Value, ConfigEr
         "link_names": links,
         "notes": robot.notes,
         "warnings": robot.warnings,
-    }))
+    })
+}
+
+/// URDF's word for a joint's motion.
+pub(crate) fn joint_type(joint: &Joint) -> &'static str {
+    match joint.kind {
+        JointKind::Fixed => "fixed",
+        JointKind::Prismatic => "prismatic",
+        JointKind::Ball => "spherical",
+        JointKind::Planar => "planar",
+        JointKind::Free => "floating",
+        JointKind::Revolute if joint.range.is_none() => "continuous",
+        JointKind::Revolute => "revolute",
+    }
 }
 
 /// Whether each dof can have a drive: those of a free body cannot.

@@ -1,0 +1,88 @@
+//! The report as JSON.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+use sim_core::model::{Collision, Pose, Shape, principal_moments};
+
+use super::facts::Facts;
+use crate::config::{joint_type, robot_summary};
+
+/// All there is to say of a robot: what [`crate::config::urdf_summary`] has, and `file`, `floating`, `mass`, `links`,
+/// `picture`.
+///
+/// A link, in body order: `name`, `parent`, `merged_into`, `joint` (`name`, `type`, `axis`, `pos`, `quat`), `mass`, `center`,
+/// `inertia`, `principal_moments`, `collisions` (`type`, sizes, `pos`, `quat`). What is absent is `null`; SI units.
+pub(super) fn document(facts: &Facts, picture: Option<&Path>) -> Value {
+    let robot = facts.robot;
+    let mut document = robot_summary(robot);
+    let mut add = |key: &str, value: Value| document[key] = value;
+    add("file", path(robot.urdf.as_deref()));
+    add("floating", json!(robot.floating));
+    add("mass", json!(facts.mass()));
+    add(
+        "links",
+        facts.order.iter().map(|&l| link(facts, l)).collect(),
+    );
+    add("picture", path(picture));
+    document
+}
+
+fn path(path: Option<&Path>) -> Value {
+    path.map_or(Value::Null, |path| json!(path.to_string_lossy()))
+}
+
+fn link(facts: &Facts, index: usize) -> Value {
+    let robot = facts.robot;
+    let link = &robot.links[index];
+    let joint = facts.joint(index);
+    let parent = joint.and_then(|joint| joint.parent);
+    let inertial = link.inertial.as_ref();
+    json!({
+        "name": link.name,
+        "parent": parent.map(|parent| &robot.links[parent].name),
+        "merged_into": facts.merged_into(index),
+        "joint": joint.map(|joint| placed(&joint.origin, json!({
+            "name": joint.name,
+            "type": joint_type(joint),
+            "axis": joint.axis,
+        }))),
+        "mass": inertial.map(|inertial| inertial.mass),
+        "center": inertial.map(|inertial| inertial.pos),
+        "inertia": inertial.map(|inertial| inertial.inertia),
+        "principal_moments": inertial.map(|inertial| principal_moments(inertial.inertia)),
+        "collisions": link.collisions.iter().map(collision).collect::<Value>(),
+    })
+}
+
+fn collision(collision: &Collision) -> Value {
+    let mut value = match &collision.shape {
+        Shape::Box { half_extents } => json!({ "half_extents": half_extents }),
+        Shape::Sphere { radius } => json!({ "radius": radius }),
+        Shape::Cylinder {
+            radius,
+            half_height,
+        }
+        | Shape::Capsule {
+            radius,
+            half_height,
+        } => json!({ "radius": radius, "half_height": half_height }),
+        Shape::Mesh(mesh) => json!({
+            "file": path(Some(&mesh.path)),
+            "scale": mesh.scale,
+            "triangles": mesh.triangles.triangles.len(),
+            "closed": mesh.closed,
+            "extent": mesh.triangles.extent(),
+        }),
+    };
+    value["name"] = json!(collision.name);
+    value["type"] = json!(collision.shape.kind());
+    placed(&collision.pose, value)
+}
+
+/// With the place of its frame in the frame above.
+fn placed(pose: &Pose, mut value: Value) -> Value {
+    value["pos"] = json!(pose.pos);
+    value["quat"] = json!(pose.quat);
+    value
+}

@@ -1,0 +1,147 @@
+//! `tightloop inspect`: what a URDF file means, as text, as JSON, and as a picture of its collision shapes.
+
+mod facts;
+mod json;
+mod picture;
+mod table;
+mod text;
+mod tree;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use sim_core::dynamics::Dynamics;
+use sim_core::model::geometry::triangles;
+use sim_core::model::{Description, ModelError, Pose, Robot, UrdfOptions};
+
+use crate::cli::Inspect;
+use crate::error::DaemonError;
+use facts::Facts;
+use picture::Drawing;
+
+/// Runs the command.
+pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
+    // nothing moves here: any step does
+    let mut scene = Description::new(1e-3, 1);
+    let robot = scene.add_urdf(
+        &args.urdf,
+        UrdfOptions {
+            floating: args.floating,
+            strict: args.strict,
+            package_dirs: args.package_dirs.clone(),
+            ..UrdfOptions::default()
+        },
+    )?;
+    if let Some(joint_q) = &args.joint_q {
+        let wrong = |error: ModelError| DaemonError::Argument {
+            argument: "--joint-q",
+            value: commas(joint_q),
+            problem: error.to_string(),
+        };
+        robot.set_joint_q(joint_q).map_err(wrong)?;
+    }
+    // what a simulation would refuse is refused here
+    let model = scene.compile()?;
+    let start = model.start().joint_q.clone();
+    let frames = Dynamics::new(model).forward_kinematics(&start)?;
+    let facts = Facts::new(&scene.robots[0]);
+    let path = destination(args, facts.robot);
+    let drawn = path.as_deref().map_or(Ok(()), |path| {
+        // a name that we chose must not cost somebody a file
+        if args.png.is_none() && path.exists() && !picture::is_ours(path) {
+            let problem = "it is there already and no picture of ours; say with --png FILE where to write, or --no-png";
+            return Err(failed(path, problem.to_owned()));
+        }
+        let drawing = drawing(&facts, &frames, args.joint_q.as_deref());
+        picture::write(&drawing.render(), path).map_err(|error| {
+            failed(path, format!("{error}; say with --png FILE where to write, or --no-png"))
+        })
+    });
+    let said = match (args.json, &drawn, &path) {
+        (true, Err(_), _) => String::new(),
+        (true, Ok(()), _) => format!("{:#}\n", json::document(&facts, path.as_deref())),
+        (false, Ok(()), Some(path)) => {
+            let picture = path.display();
+            format!(
+                "{}\nPicture    {picture}\n",
+                text::document(&facts, args.long)
+            )
+        }
+        (false, _, _) => text::document(&facts, args.long),
+    };
+    // whoever reads us may stop reading
+    let _ = std::io::stdout().write_all(said.as_bytes());
+    drawn
+}
+
+fn failed(path: &Path, problem: String) -> DaemonError {
+    DaemonError::Picture {
+        path: path.to_owned(),
+        problem,
+    }
+}
+
+/// Where the picture goes, if anywhere.
+fn destination(args: &Inspect, robot: &Robot) -> Option<PathBuf> {
+    match &args.png {
+        Some(path) => Some(path.clone()),
+        None if args.no_png || args.json => None,
+        None => {
+            let plain = |letter: char| letter.is_alphanumeric() || "-_+.".contains(letter);
+            let name: String = robot
+                .name
+                .chars()
+                .map(|letter| if plain(letter) { letter } else { '_' })
+                .collect();
+            // a name that begins with a dot would hide the file
+            let name = name.trim_start_matches('.');
+            let name = if name.is_empty() { "robot" } else { name };
+            Some(Path::new(&format!("{name}.png")).to_owned())
+        }
+    }
+}
+
+/// What the picture shows. `frames` are position and quaternion of each link, in body order. `(bodies, 7)` [m, –]
+fn drawing(facts: &Facts, frames: &[f64], joint_q: Option<&[f64]>) -> Drawing {
+    let robot = facts.robot;
+    let pose = |frame: &[f64]| Pose {
+        pos: std::array::from_fn(|axis| frame[axis]),
+        quat: std::array::from_fn(|part| frame[3 + part]),
+    };
+    let poses: Vec<Pose> = frames.chunks_exact(7).map(pose).collect();
+    let mut shapes = Vec::new();
+    for (place, (&link, pose)) in facts.order.iter().zip(&poses).enumerate() {
+        for collision in &robot.links[link].collisions {
+            let frame = pose.mul(&collision.pose);
+            shapes.push((place as u32, frame, triangles(&collision.shape)));
+        }
+    }
+    let outside = facts.outside_range();
+    let mut caption = match joint_q {
+        Some(joint_q) => format!("joint_q = {}", commas(joint_q)),
+        None => "joint_q = 0".to_owned(),
+    };
+    match outside.as_slice() {
+        [] => {}
+        [one] => caption += &format!(", outside the range of {one}"),
+        [one, rest @ ..] => {
+            caption += &format!(", outside the ranges of {one} and {} more", rest.len());
+        }
+    }
+    Drawing {
+        title: robot.name.clone(),
+        facts: facts.in_a_line(),
+        caption,
+        links: facts.names(),
+        frames: poses.into_iter().zip(facts.parent_places()).collect(),
+        shapes,
+    }
+}
+
+fn commas(values: &[f64]) -> String {
+    values
+        .iter()
+        .map(f64::to_string)
+        .collect::<Vec<_>>()
+        .join(",")
+}

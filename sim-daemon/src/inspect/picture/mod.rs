@@ -1,0 +1,46 @@
+//! A picture of a robot's collision shapes: three-quarter view, side, front and top on one page.
+//!
+//! A renderer of our own: the page needs no window, no graphics driver and no font file, and the same robot gives the
+//! same bytes. surface (triangles) → view (cameras) → raster (pixels) over backdrop, then marks on a canvas.
+
+mod backdrop;
+mod canvas;
+mod file;
+mod legend;
+mod page;
+mod raster;
+mod surface;
+#[cfg(test)]
+mod tests;
+mod vector;
+mod view;
+
+use sim_core::model::Pose;
+use sim_core::model::geometry::TriMesh;
+
+pub(super) use canvas::Canvas;
+pub(super) use file::{is_ours, write};
+
+/// What a picture shows.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Drawing {
+    /// Name of the robot.
+    pub title: String,
+    /// What it is, in a line.
+    pub facts: String,
+    /// At which joint positions it is drawn.
+    pub caption: String,
+    /// Names of the links, in body order.
+    pub links: Vec<String>,
+    /// Frame of each link in the world, in body order, and the place of its parent in that order.
+    pub frames: Vec<(Pose, Option<usize>)>,
+    /// Collision shapes: place of their link in body order, frame in the world, triangles in that frame.
+    pub shapes: Vec<(u32, Pose, TriMesh)>,
+}
+
+impl Drawing {
+    /// Draws it.
+    pub fn render(&self) -> Canvas {
+        page::render(self)
+    }
+}

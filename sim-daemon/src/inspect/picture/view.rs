@@ -1,0 +1,157 @@
+//! Cameras: a direction to look along, and where a point of the world lies in the picture.
+
+use super::vector::{Vector, along, cross, dot, sub, unit};
+
+/// Half the angle of view of the perspective, its tangent: 14°, as of a long lens.
+const HALF_ANGLE: f64 = 0.25;
+
+/// A camera for a panel of the page.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    /// Unit vectors of the camera in the world: to the right, up, and into the picture.
+    pub right: Vector,
+    pub up: Vector,
+    pub into: Vector,
+    /// Where the camera is; without perspective, any point on the line of sight of the panel's middle [m].
+    pub eye: Vector,
+    pub perspective: bool,
+    /// Size of the panel [pixels].
+    pub width: f64,
+    pub height: f64,
+    /// Pixels a metre; in perspective, at a distance of 1 m.
+    pub scale: f64,
+}
+
+impl View {
+    /// A camera that looks along `into` and sees all points, with a margin around them [pixels].
+    ///
+    /// `up` is what should be up; it must not be along `into`. All points in one place are shown as if 1 m wide.
+    pub fn fitted(
+        into: Vector,
+        up: Vector,
+        perspective: bool,
+        [width, height]: [usize; 2],
+        margin: f64,
+        points: impl Iterator<Item = Vector> + Clone,
+    ) -> View {
+        let into = unit(into);
+        let right = unit(cross(into, up));
+        let mut view = View {
+            right,
+            up: cross(right, into),
+            into,
+            eye: [0.0; 3],
+            perspective,
+            width: width as f64,
+            height: height as f64,
+            scale: 1.0,
+        };
+        let half = [0.5 * view.width - margin, 0.5 * view.height - margin];
+        if perspective {
+            view.scale = 0.5 * view.width.min(view.height) / HALF_ANGLE;
+            view.eye = view.stand_back(half.map(|half| half / view.scale), points);
+        } else {
+            let [low, high] = super::surface::extent(points.map(|point| view.place(point)));
+            let size = [high[0] - low[0], high[1] - low[1]];
+            let scale = |axis: usize| 2.0 * half[axis] / size[axis];
+            view.scale = scale(0).min(scale(1));
+            if !view.scale.is_finite() {
+                view.scale = 2.0 * half[0].min(half[1]);
+            }
+            let centre = super::surface::middle([low, high]);
+            view.eye = view.world(centre);
+        }
+        view
+    }
+
+    /// The nearest place from which all points are within these tangents of the line of sight.
+    ///
+    /// With a point at (r, u, f) in camera axes and the eye at (x, y, z), |r − x| ≤ t (f − z) is r − t f ≤ x − t z and
+    /// −r − t f ≤ −x − t z. The largest of each left side, A and B, give z ≤ −(A + B) / 2t and x = (A − B) / 2.
+    fn stand_back(
+        &self,
+        tangents: [f64; 2],
+        points: impl Iterator<Item = Vector> + Clone,
+    ) -> Vector {
+        let mut bounds = [[f64::NEG_INFINITY; 2]; 2];
+        let mut nearest = f64::INFINITY;
+        for point in points {
+            let point = self.place(point);
+            for axis in 0..2 {
+                let forth = tangents[axis] * point[2];
+                bounds[axis][0] = bounds[axis][0].max(point[axis] - forth);
+                bounds[axis][1] = bounds[axis][1].max(-point[axis] - forth);
+            }
+            nearest = nearest.min(point[2]);
+        }
+        let back = |axis: usize| -(bounds[axis][0] + bounds[axis][1]) / (2.0 * tangents[axis]);
+        let aside = |axis: usize| 0.5 * (bounds[axis][0] - bounds[axis][1]);
+        let depth = back(0).min(back(1));
+        if !depth.is_finite() {
+            return self.world([0.0, 0.0, -0.5 / HALF_ANGLE]);
+        }
+        // a single point, or several behind each other, would be at the eye
+        let room = if nearest - depth > 1e-9 {
+            0.0
+        } else {
+            0.5 / HALF_ANGLE
+        };
+        self.world([aside(0), aside(1), depth - room])
+    }
+
+    /// A point in camera axes, from the world's origin: right, up, into.
+    fn place(&self, point: Vector) -> Vector {
+        [
+            dot(point, self.right),
+            dot(point, self.up),
+            dot(point, self.into),
+        ]
+    }
+
+    /// A point given in camera axes, in the world.
+    fn world(&self, [right, up, into]: Vector) -> Vector {
+        let point = self.right.map(|part| part * right);
+        along(along(point, up, self.up), into, self.into)
+    }
+
+    /// Where a point lies in the panel [pixels from the upper left], and how near it is: a number that is linear over
+    /// the panel on any plane, larger where nearer.
+    pub fn project(&self, point: Vector) -> [f64; 3] {
+        let [right, up, into] = self.place(sub(point, self.eye));
+        let (scale, near) = if self.perspective {
+            (self.scale / into, 1.0 / into)
+        } else {
+            (self.scale, -into)
+        };
+        [
+            0.5 * self.width + scale * right,
+            0.5 * self.height - scale * up,
+            near,
+        ]
+    }
+
+    /// What a step in `near` of [`View::project`] is worth in depth, where `near` has this value.
+    pub fn depth_of_near(&self, near: f64) -> f64 {
+        if self.perspective {
+            1.0 / (near * near)
+        } else {
+            1.0
+        }
+    }
+
+    /// Where the line of sight through a place of the panel [pixels] meets the horizontal plane at `z` [m], if ahead.
+    pub fn on_plane(&self, x: f64, y: f64, z: f64) -> Option<[f64; 2]> {
+        let right = (x - 0.5 * self.width) / self.scale;
+        let up = (0.5 * self.height - y) / self.scale;
+        let (from, ray) = if self.perspective {
+            (self.eye, self.world([right, up, 1.0]))
+        } else {
+            let aside = self.world([right, up, 0.0]);
+            (along(self.eye, 1.0, aside), self.into)
+        };
+        let time = (z - from[2]) / ray[2];
+        let point = along(from, time, ray);
+        // a plane that is seen edge-on has no place, and one behind the eye is not seen
+        (time.is_finite() && (time > 0.0 || !self.perspective)).then_some([point[0], point[1]])
+    }
+}

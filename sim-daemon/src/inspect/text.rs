@@ -1,0 +1,146 @@
+//! The report as text.
+
+use std::fmt::Write as _;
+
+use sim_core::model::{JointKind, Shape};
+
+use super::facts::{Facts, count, short};
+use super::{table, tree};
+use crate::config::joint_type;
+
+/// Columns of a line that need not be longer.
+pub(super) const COLUMNS: usize = 100;
+
+/// All there is to say of a robot.
+pub(super) fn document(facts: &Facts, long: bool) -> String {
+    let mut text = head(facts);
+    text += "\nTree (● moves by itself, ○ is part of the link it is fixed to)\n";
+    text += &tree::tree(facts, long);
+    text += "\n";
+    text += &table::dofs(facts);
+    text += "\n";
+    text += &notes(facts);
+    text
+}
+
+fn head(facts: &Facts) -> String {
+    let robot = facts.robot;
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        let _ = writeln!(text, "{name:<10} {value}");
+    };
+    line("Robot", robot.name.clone());
+    if let Some(file) = &robot.urdf {
+        line("File", file.display().to_string());
+    }
+    let base = if robot.floating {
+        "moves freely"
+    } else {
+        "fixed to the world"
+    };
+    line("Base", base.to_owned());
+    let merged = (0..robot.links.len())
+        .filter(|&link| facts.merged_into(link).is_some())
+        .count();
+    let mut links = robot.links.len().to_string();
+    if merged > 0 {
+        links += &format!(", of which {merged} merged into the one it is fixed to");
+    }
+    line("Links", links);
+    let kinds = tally(robot.joints.iter().map(joint_type));
+    let kinds = kinds.iter().map(|(kind, n)| format!("{n} {kind}"));
+    line("Joints", with_kinds(robot.joints.len(), kinds));
+    let coords = count(facts.coords(), "coordinate");
+    line("Dofs", format!("{}, {coords}", facts.dofs()));
+    line("Mass", format!("{} kg", short(facts.mass())));
+    let shapes = robot.links.iter().flat_map(|link| &link.collisions);
+    let kinds = tally(shapes.map(|collision| Shape::kind(&collision.shape)));
+    let all = kinds.iter().map(|(_, count)| count).sum();
+    let kinds = kinds.iter().map(|(kind, n)| match (*kind, n) {
+        ("box" | "mesh", 2..) => format!("{n} {kind}es"),
+        _ => count(*n, kind),
+    });
+    let mut shapes = with_kinds(all, kinds);
+    if all == 0 {
+        shapes += ", so the picture shows the frames of the links";
+    }
+    line("Collisions", shapes);
+    text
+}
+
+/// How often each word comes, in the order in which they come first.
+fn tally<'a>(words: impl Iterator<Item = &'a str>) -> Vec<(&'a str, usize)> {
+    let mut found: Vec<(&str, usize)> = Vec::new();
+    for word in words {
+        match found.iter_mut().find(|(other, _)| *other == word) {
+            Some((_, count)) => *count += 1,
+            None => found.push((word, 1)),
+        }
+    }
+    found
+}
+
+fn with_kinds(all: usize, kinds: impl Iterator<Item = String>) -> String {
+    let kinds: Vec<String> = kinds.collect();
+    match kinds.len() {
+        0 => all.to_string(),
+        _ => format!("{all}: {}", kinds.join(", ")),
+    }
+}
+
+/// What was ignored or mended, warnings first.
+fn notes(facts: &Facts) -> String {
+    let robot = facts.robot;
+    let mut text = "Ignored or mended\n".to_owned();
+    let rest = robot
+        .notes
+        .iter()
+        .filter(|note| !robot.warnings.contains(note));
+    let all: Vec<(char, &String)> = (robot.warnings.iter().map(|warning| ('!', warning)))
+        .chain(rest.map(|note| ('-', note)))
+        .collect();
+    if all.is_empty() {
+        text += "  nothing\n";
+    }
+    for (mark, note) in all {
+        text += &wrapped(&format!("  {mark} "), "    ", note);
+    }
+    text
+}
+
+/// A text in lines of at most [`COLUMNS`], broken at spaces; the first begins with `first`, others with `next`.
+pub(super) fn wrapped(first: &str, next: &str, text: &str) -> String {
+    let mut lines = String::new();
+    let mut line = first.to_owned();
+    let mut empty = true;
+    for word in text.split(' ') {
+        let fits = line.chars().count() + 1 + word.chars().count() <= COLUMNS;
+        if !empty && !fits {
+            lines += line.trim_end();
+            lines.push('\n');
+            line = next.to_owned();
+            empty = true;
+        }
+        if !empty {
+            line.push(' ');
+        }
+        line += word;
+        empty = false;
+    }
+    lines += line.trim_end();
+    lines.push('\n');
+    lines
+}
+
+/// What a joint lets its link do.
+pub(super) fn motion(kind: JointKind, axis: &str, limited: bool) -> String {
+    match kind {
+        JointKind::Fixed => "fixed".to_owned(),
+        JointKind::Revolute if limited => format!("revolute about {axis}"),
+        JointKind::Revolute => format!("continuous about {axis}"),
+        JointKind::Prismatic => format!("prismatic along {axis}"),
+        JointKind::Ball => "spherical".to_owned(),
+        JointKind::Planar => format!("planar across {axis}"),
+        JointKind::Free => "floating".to_owned(),
+    }
+}

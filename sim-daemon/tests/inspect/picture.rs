@@ -1,0 +1,193 @@
+//! What is drawn.
+
+use std::path::Path;
+
+use super::{FR3, Folder, inspect, one_link, root};
+
+/// Size of the page, and where its parts lie [pixels].
+const PAGE: [usize; 2] = [1600, 1200];
+/// Middle of the view from the side.
+const SIDE: [usize; 2] = [1330, 259];
+/// Radius of a ball that fills that view up to its margins.
+const RADIUS: usize = 139;
+
+type Rgb = [u8; 3];
+
+struct Picture(Vec<Rgb>);
+
+impl Picture {
+    fn read(path: &Path) -> Picture {
+        let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
+        let mut reader = png::Decoder::new(file).read_info().unwrap();
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut bytes).unwrap();
+        assert_eq!([info.width as usize, info.height as usize], PAGE);
+        assert_eq!(info.color_type, png::ColorType::Rgb);
+        let (pixels, rest) = bytes.as_chunks::<3>();
+        assert!(rest.is_empty());
+        Picture(pixels.to_vec())
+    }
+
+    fn at(&self, x: usize, y: usize) -> Rgb {
+        self.0[y * PAGE[0] + x]
+    }
+
+    fn colours(&self) -> usize {
+        let mut colours = self.0.clone();
+        colours.sort_unstable();
+        colours.dedup();
+        colours.len()
+    }
+}
+
+/// The first link's colour in some light.
+fn is_blue([red, _, blue]: Rgb) -> bool {
+    blue > red.saturating_add(30) && blue > 90
+}
+
+/// Paper, with or without a line of its grid.
+fn is_paper(colour: Rgb) -> bool {
+    colour.iter().all(|&part| part > 215)
+}
+
+fn ball(radius: f64) -> String {
+    format!("<collision><geometry><sphere radius=\"{radius}\"/></geometry></collision>")
+}
+
+#[test]
+fn by_default_a_picture_is_written_into_the_working_folder() {
+    let folder = Folder::new("default");
+    folder.file("a.urdf", &one_link(".my robot:2", &ball(1.0)));
+    let said = inspect(&folder.0, &["a.urdf"]);
+    assert_eq!((said.code, said.err.as_str()), (0, ""));
+    assert_eq!(folder.files(), ["a.urdf", "my_robot_2.png"]);
+    assert_eq!(said.out.lines().last(), Some("Picture    my_robot_2.png"));
+    // again, over the old one
+    assert_eq!(inspect(&folder.0, &["a.urdf"]).code, 0);
+    for option in ["--no-png", "--json"] {
+        let folder = Folder::new(option);
+        folder.file("a.urdf", &one_link("r", &ball(1.0)));
+        assert_eq!(inspect(&folder.0, &["a.urdf", option]).code, 0);
+        assert_eq!(folder.files(), ["a.urdf"]);
+    }
+}
+
+#[test]
+fn a_file_that_is_not_ours_stays_as_it_is() {
+    let folder = Folder::new("precious");
+    folder.file("a.urdf", &one_link("r", &ball(1.0)));
+    let precious = folder.file("r.png", "\u{89}PNG of somebody else");
+    let said = inspect(&folder.0, &["a.urdf"]);
+    assert_eq!(said.code, 1);
+    assert!(
+        said.err.contains("r.png") && said.err.contains("--png FILE"),
+        "{}",
+        said.err
+    );
+    assert_eq!(
+        std::fs::read_to_string(precious).unwrap(),
+        "\u{89}PNG of somebody else"
+    );
+    // who names it means it
+    assert_eq!(inspect(&folder.0, &["a.urdf", "--png", "r.png"]).code, 0);
+    Picture::read(&folder.0.join("r.png"));
+}
+
+#[test]
+fn a_picture_that_cannot_be_written_is_an_error_with_the_cure() {
+    let folder = Folder::new("nowhere");
+    folder.file("a.urdf", &one_link("r", &ball(1.0)));
+    let said = inspect(&folder.0, &["a.urdf", "--png", "no/such/r.png"]);
+    assert_eq!(said.code, 1);
+    // the rest is told all the same
+    assert!(said.out.starts_with("Robot      r\n") && !said.out.contains("Picture"));
+    assert!(
+        said.err.contains("no/such/r.png") && said.err.contains("--no-png"),
+        "{}",
+        said.err
+    );
+}
+
+#[test]
+fn a_ball_is_a_disc_of_its_size() {
+    let folder = Folder::new("ball");
+    for radius in [1e-3, 1.0, 300.0] {
+        folder.file("a.urdf", &one_link("r", &ball(radius)));
+        assert_eq!(inspect(&folder.0, &["a.urdf"]).code, 0);
+        let picture = Picture::read(&folder.0.join("r.png"));
+        let [x, y] = SIDE;
+        assert!(
+            is_blue(picture.at(x + 3, y + 3)),
+            "{:?}",
+            picture.at(x + 3, y + 3)
+        );
+        // 45° off the grid's lines through the middle
+        let diagonal = |away: usize| (away as f64 / f64::sqrt(2.0)) as usize;
+        let (inside, outside) = (diagonal(RADIUS - 4), diagonal(RADIUS + 6));
+        assert!(is_blue(picture.at(x + inside, y - inside)));
+        assert!(is_blue(picture.at(x - inside, y - inside)));
+        assert!(is_paper(picture.at(x + outside, y - outside)));
+        assert!(is_paper(picture.at(x - outside, y + outside)));
+    }
+}
+
+#[test]
+fn joints_are_drawn_where_they_are() {
+    let folder = Folder::new("slide");
+    let inertial = "<inertial><mass value=\"1\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial>";
+    let ball = ball(0.5);
+    let text = format!(
+        "<robot name=\"r\"><link name=\"a\">{ball}</link><link name=\"b\">{inertial}{ball}</link><joint name=\"j\" type=\"prismatic\"><parent link=\"a\"/><child link=\"b\"/><axis xyz=\"1 0 0\"/><limit lower=\"-5\" upper=\"5\"/></joint></robot>"
+    );
+    folder.file("a.urdf", &text);
+    let [x, y] = SIDE;
+    let middle = |q: &str| {
+        assert_eq!(inspect(&folder.0, &["a.urdf", "--joint-q", q]).code, 0);
+        Picture::read(&folder.0.join("r.png")).at(x + 3, y + 3)
+    };
+    assert!(!is_paper(middle("0")));
+    // 4 m apart they leave the middle empty, whichever way
+    assert!(is_paper(middle("4")));
+    assert!(is_paper(middle("-4")));
+    let one = inspect(
+        &folder.0,
+        &["a.urdf", "--joint-q", "6", "--json", "--png", "q.png"],
+    );
+    assert!(one.out.contains("\"picture\": \"q.png\""), "{}", one.out);
+}
+
+#[test]
+fn the_fr3_is_drawn_in_colours_and_the_same_each_time() {
+    let folder = Folder::new("fr3");
+    let urdf = root().join(FR3);
+    let bytes = |name: &str| {
+        let said = inspect(&folder.0, &[urdf.to_str().unwrap(), "--png", name]);
+        assert_eq!((said.code, said.err.as_str()), (0, ""));
+        std::fs::read(folder.0.join(name)).unwrap()
+    };
+    assert_eq!(bytes("one.png"), bytes("two.png"));
+    let picture = Picture::read(&folder.0.join("one.png"));
+    assert!(picture.colours() > 5000, "{}", picture.colours());
+}
+
+#[test]
+fn without_collisions_the_frames_are_drawn() {
+    let folder = Folder::new("frames");
+    folder.file("a.urdf", &one_link("r", ""));
+    let said = inspect(&folder.0, &["a.urdf"]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(
+        said.out
+            .contains("Collisions 0, so the picture shows the frames of the links"),
+        "{}",
+        said.out
+    );
+    let picture = Picture::read(&folder.0.join("r.png"));
+    // a red arrow, a green and a blue one
+    for part in 0..3 {
+        let pure = |colour: &&Rgb| {
+            (0..3).all(|other| other == part || colour[other].saturating_add(60) < colour[part])
+        };
+        assert!(picture.0.iter().filter(pure).count() > 100, "{part}");
+    }
+}
