@@ -20,7 +20,7 @@ const ORDER: [&str; 8] = [
 ];
 
 /// The only door of each heavy package.
-const DOORS: [(&str, &str); 11] = [
+const DOORS: [(&str, &str); 13] = [
     ("urdf_rs", "sim-core/src/model/urdf"),
     ("faer", "sim-core/src/model"),
     ("parry3d_f64", "sim-core/src/model/geometry"),
@@ -30,6 +30,8 @@ const DOORS: [(&str, &str); 11] = [
     ("rayon", "sim-core/src/backend/cpu"),
     ("iceoryx2", "sim-daemon/protocol/src"),
     ("clap", "sim-daemon/src/cli.rs"),
+    ("noto_sans_mono_bitmap", "sim-daemon/src/inspect/picture"),
+    ("png", "sim-daemon/src/inspect/picture"),
     ("pyo3", "py-client/src"),
     ("numpy", "py-client/src"),
 ];

@@ -43,9 +43,11 @@ fn head(facts: &Facts) -> String {
         .filter(|&link| facts.merged_into(link).is_some())
         .count();
     let mut links = robot.links.len().to_string();
-    if merged > 0 {
-        links += &format!(", of which {merged} merged into the one it is fixed to");
-    }
+    links += &match merged {
+        0 => String::new(),
+        1 => ", of which 1 is merged into the link it is fixed to".to_owned(),
+        _ => format!(", of which {merged} are merged into the link they are fixed to"),
+    };
     line("Links", links);
     let kinds = tally(robot.joints.iter().map(joint_type));
     let kinds = kinds.iter().map(|(kind, n)| format!("{n} {kind}"));
