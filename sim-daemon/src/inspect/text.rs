@@ -110,13 +110,17 @@ fn notes(facts: &Facts) -> String {
     text
 }
 
+/// Least room for text beside what stands before it, however wide that is.
+const ROOM: usize = 40;
+
 /// A text in lines of at most [`COLUMNS`], broken at spaces; the first begins with `first`, others with `next`.
 pub(super) fn wrapped(first: &str, next: &str, text: &str) -> String {
     let mut lines = String::new();
+    let columns = COLUMNS.max(next.chars().count() + ROOM);
     let mut line = first.to_owned();
     let mut empty = true;
     for word in text.split(' ') {
-        let fits = line.chars().count() + 1 + word.chars().count() <= COLUMNS;
+        let fits = line.chars().count() + 1 + word.chars().count() <= columns;
         if !empty && !fits {
             lines += line.trim_end();
             lines.push('\n');

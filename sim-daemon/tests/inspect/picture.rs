@@ -9,7 +9,7 @@ const PAGE: [usize; 2] = [1600, 1200];
 /// Middle of the view from the side.
 const SIDE: [usize; 2] = [1330, 259];
 /// Radius of a ball that fills that view up to its margins.
-const RADIUS: usize = 139;
+const RADIUS: usize = 143;
 
 type Rgb = [u8; 3];
 

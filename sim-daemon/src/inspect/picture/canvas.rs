@@ -70,15 +70,6 @@ impl Canvas {
         }
     }
 
-    /// A rectangle through which what is below is hardly seen.
-    pub(super) fn veil(&mut self, x: i64, y: i64, width: i64, height: i64) {
-        for row in y..y + height {
-            for column in x..x + width {
-                self.blend(column, row, PAPER, 0.8);
-            }
-        }
-    }
-
     /// Another image, its upper left corner at (x, y).
     pub(super) fn paste(&mut self, x: usize, y: usize, image: &Canvas) {
         for (row, pixels) in image.pixels.chunks_exact(image.width).enumerate() {
@@ -131,8 +122,17 @@ impl Canvas {
         };
         let along = [to[0] - from[0], to[1] - from[1]];
         let square = along[0] * along[0] + along[1] * along[1];
+        let wide = span(0, self.width);
         for y in span(1, self.height) {
-            for x in span(0, self.width) {
+            // where the line crosses this row, and how far it reaches to both sides
+            let across = from[0] + (y as f64 + 0.5 - from[1]) * along[0] / along[1];
+            let beside = reach * square.sqrt() / along[1].abs();
+            let row = if (across - beside).is_finite() && (across + beside).is_finite() {
+                wide.start.max((across - beside) as i64)..wide.end.min((across + beside) as i64 + 1)
+            } else {
+                wide.clone()
+            };
+            for x in row {
                 let point = [x as f64 + 0.5 - from[0], y as f64 + 0.5 - from[1]];
                 let foot = if square > 0.0 {
                     ((point[0] * along[0] + point[1] * along[1]) / square).clamp(0.0, 1.0)

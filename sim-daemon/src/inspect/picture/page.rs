@@ -99,7 +99,14 @@ impl<'a> Scene<'a> {
     /// The robot in perspective on its floor.
     fn oblique(&self, size: [usize; 2], caption: &str) -> Canvas {
         let up = [0.0, 0.0, 1.0];
-        let view = View::fitted(OBLIQUE, up, true, size, 90.0, self.points.iter().copied());
+        let view = View::fitted(
+            OBLIQUE,
+            up,
+            true,
+            size,
+            [90.0; 2],
+            self.points.iter().copied(),
+        );
         let size = self.surface.size();
         // a robot that stands at 0, to a rounding of its shapes, stands on 0
         let floor = if self.lowest.abs() < 0.02 * size {
@@ -129,7 +136,14 @@ impl<'a> Scene<'a> {
         (name, into, up, axes): &(&str, Vector, Vector, [usize; 2]),
         size: [usize; 2],
     ) -> Canvas {
-        let view = View::fitted(*into, *up, false, size, 48.0, self.points.iter().copied());
+        let view = View::fitted(
+            *into,
+            *up,
+            false,
+            size,
+            [84.0, 44.0],
+            self.points.iter().copied(),
+        );
         let spacing = round_spacing(view.width / view.scale, 9.0);
         let backdrop = Backdrop::Paper {
             spacing,
@@ -143,7 +157,6 @@ impl<'a> Scene<'a> {
         let letters = ["x", "y", "z"];
         let label = format!("{name} [m]");
         canvas.text(14, 10, &label, Size::Small, TEXT);
-        canvas.veil(size[0] as i64 - 80, 0, 80, 76);
         let (corner, reach) = ([size[0] as f64 - 62.0, 58.0], 34.0);
         for (axis, [x, y]) in axes.iter().zip([[1.0, 0.0], [0.0, -1.0]]) {
             let tip = [corner[0] + reach * x, corner[1] + reach * y];

@@ -32,7 +32,14 @@ fn a_fitted_view_holds_all_points_and_wastes_no_room() {
             let into = [-0.6, 0.7, -0.4];
             let size = [800, 600];
             let up = [0.0, 0.0, 1.0];
-            let view = View::fitted(into, up, perspective, size, 50.0, points.iter().copied());
+            let view = View::fitted(
+                into,
+                up,
+                perspective,
+                size,
+                [50.0; 2],
+                points.iter().copied(),
+            );
             let mut room = f64::INFINITY;
             for &point in &points {
                 let [x, y, near] = view.project(point);
@@ -64,7 +71,7 @@ fn a_single_point_is_seen_in_the_middle() {
             [0.0, 0.0, 1.0],
             perspective,
             [400, 300],
-            20.0,
+            [20.0; 2],
             only,
         );
         let [x, y, near] = view.project(point);
@@ -81,7 +88,7 @@ fn a_place_on_the_floor_is_seen_where_it_is() {
             [0.0, 0.0, 1.0],
             perspective,
             [640, 480],
-            40.0,
+            [40.0; 2],
             box_.iter().copied(),
         );
         let [x, y, _] = view.project([1.5, 2.5, 2.0]);
@@ -158,7 +165,7 @@ fn a_picture_is_the_same_on_any_number_of_threads() {
         [0.0, 0.0, 1.0],
         true,
         [200, 150],
-        20.0,
+        [20.0; 2],
         points([0.0, 0.0, 0.3], [0.5, 0.3, 0.3]).into_iter(),
     );
     let shadow = Shadow::new(&surface, 0.0);

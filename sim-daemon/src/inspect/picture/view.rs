@@ -23,7 +23,7 @@ pub(super) struct View {
 }
 
 impl View {
-    /// A camera that looks along `into` and sees all points, with a margin around them [pixels].
+    /// A camera that looks along `into` and sees all points, with margins beside and above them [pixels].
     ///
     /// `up` is what should be up; it must not be along `into`. All points in one place are shown as if 1 m wide.
     pub fn fitted(
@@ -31,7 +31,7 @@ impl View {
         up: Vector,
         perspective: bool,
         [width, height]: [usize; 2],
-        margin: f64,
+        margin: [f64; 2],
         points: impl Iterator<Item = Vector> + Clone,
     ) -> View {
         let into = unit(into);
@@ -46,7 +46,7 @@ impl View {
             height: height as f64,
             scale: 1.0,
         };
-        let half = [0.5 * view.width - margin, 0.5 * view.height - margin];
+        let half = [0.5 * view.width - margin[0], 0.5 * view.height - margin[1]];
         if perspective {
             view.scale = 0.5 * view.width.min(view.height) / HALF_ANGLE;
             view.eye = view.stand_back(half.map(|half| half / view.scale), points);
