@@ -16,7 +16,7 @@ pub enum ModelError {
     },
 
     /// A file beyond a limit of this program.
-    #[error("{}: {what} exceeds the limit of {limit}", path.display())]
+    #[error("{}: {what} exceeds the limit of {limit}; delete what is not the robot", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
@@ -52,6 +52,17 @@ pub enum ModelError {
         reason: String,
     },
 
+    /// What is wrong with a robot that a file describes.
+    #[error("{}:{line}: {error}", path.display())]
+    InFile {
+        /// The file.
+        path: PathBuf,
+        /// Line of the link or joint, from 1.
+        line: u32,
+        /// What is wrong with it.
+        error: Box<ModelError>,
+    },
+
     /// A number that is not a number, or not finite.
     #[error("{what} is {value}; give a finite number")]
     NotFinite {
@@ -62,7 +73,7 @@ pub enum ModelError {
     },
 
     /// A number outside what is meaningful.
-    #[error("{what} is {value}; {rule}")]
+    #[error("{what} is {}; {rule}", number(*value))]
     OutOfRange {
         /// Whose number it is.
         what: String,
@@ -70,6 +81,19 @@ pub enum ModelError {
         value: f64,
         /// What it must be.
         rule: &'static str,
+    },
+
+    /// More dofs than a model can have.
+    #[error(
+        "{owner} has {dofs} dofs, more than the {most} that are supported; fix joints that need not move, or split it"
+    )]
+    TooManyDofs {
+        /// The robot, or the scene.
+        owner: String,
+        /// Its dofs.
+        dofs: usize,
+        /// The most it may have.
+        most: usize,
     },
 
     /// An array of another length than the robot's number of dofs.
@@ -144,7 +168,7 @@ pub enum ModelError {
 
     /// A link that is the child of two joints.
     #[error(
-        "robot `{robot}`: link `{link}` is the child of joints `{first}` and `{second}`; a link has one parent, closed loops are not part of URDF"
+        "robot `{robot}`: link `{link}` is the child of joints `{first}` and `{second}`; a link has one parent, so delete one of the two joints: URDF has no closed loops"
     )]
     TwoParents {
         /// The robot.
@@ -159,7 +183,7 @@ pub enum ModelError {
 
     /// Links that follow one another in a circle.
     #[error(
-        "robot `{robot}`: links {} hang from one another in a loop; a robot is a tree with one root",
+        "robot `{robot}`: links {} hang from one another in a loop; delete one of their joints: a robot is a tree",
         list(links)
     )]
     LinkLoop {
@@ -182,7 +206,9 @@ pub enum ModelError {
 
     /// A range that ends before it begins.
     #[error(
-        "robot `{robot}`: joint `{joint}`: lower limit {lower} is above upper limit {upper}; exchange them, or make the joint continuous"
+        "robot `{robot}`: joint `{joint}`: lower limit {} is above upper limit {}; exchange them, or make the joint continuous",
+        number(*lower),
+        number(*upper)
     )]
     EmptyRange {
         /// The robot.
@@ -206,7 +232,8 @@ pub enum ModelError {
 
     /// An inertia with a principal moment below zero.
     #[error(
-        "robot `{robot}`: link `{link}`: inertia has a negative principal moment, {moment} kg·m²; give a positive definite <inertia>"
+        "robot `{robot}`: link `{link}`: inertia has a negative principal moment, {} kg·m²; give a positive definite <inertia>",
+        number(*moment)
     )]
     NegativeInertia {
         /// The robot.
@@ -277,7 +304,7 @@ pub enum ModelError {
 
     /// A free joint that hangs from something that moves.
     #[error(
-        "robot `{robot}`: joint `{joint}` is floating, but joint `{carrier}` above it moves; a free body is carried by the world alone"
+        "robot `{robot}`: joint `{joint}` is floating, but joint `{carrier}` above it moves; let it hang from the root, since a free body is carried by the world alone"
     )]
     FreeBelow {
         /// The robot.
@@ -354,10 +381,28 @@ pub enum ModelError {
     },
 }
 
+/// Most names in a message: enough to see the slip, not a page of them.
+const LISTED_MAX: usize = 8;
+
 /// Names in quotes, joined by commas.
 fn list(names: &[String]) -> String {
-    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
-    quoted.join(", ")
+    let shown = names.iter().take(LISTED_MAX);
+    let quoted: Vec<String> = shown.map(|name| format!("`{name}`")).collect();
+    let more = if names.len() > LISTED_MAX {
+        ", …"
+    } else {
+        ""
+    };
+    quoted.join(", ") + more
+}
+
+/// A number as people write it: `1e200` is not spelled out.
+fn number(value: f64) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-4..1e7).contains(&value.abs());
+    match plain {
+        true => format!("{value}"),
+        false => format!("{value:e}"),
+    }
 }
 
 /// Paths in quotes, joined by commas.

@@ -101,7 +101,8 @@ fn mass_matrix(constants: &Constants<f64>) -> faer::Mat<f64> {
         let path = path(constants, frames.len() - 1);
         for &a in &path {
             let force = momentum(&inertia, &motions[a]);
-            for &b in &path {
+            // the factor reads the lower triangle
+            for &b in path.iter().filter(|&&b| b <= a) {
                 mass_matrix[(a, b)] += power(&motions[b], &force);
             }
         }

@@ -2,6 +2,7 @@
 //!
 //! `Description` is named, f64 and editable; it is checked, then compiled.
 
+mod checks;
 mod compile;
 pub mod constants;
 mod description;

@@ -1,8 +1,8 @@
 //! The dofs of a robot: their order, and setting their start state and drives.
 
+use super::checks::{finite, not_negative};
 use super::description::{Joint, JointDof, JointKind, Robot, TargetMode};
 use super::error::ModelError;
-use super::validate::{finite, not_negative};
 
 impl Robot {
     /// Link indices, parents before children: depth first, children in the order of their joints in the file.
@@ -69,12 +69,13 @@ impl Robot {
     /// Starts the free bodies where their joints are, from the robot's pose down: their state is in the world.
     pub(super) fn place_free_bodies(&mut self) {
         let mut poses = vec![self.pose; self.links.len()];
+        let mut above = vec![None; self.links.len()];
+        for (index, joint) in self.joints.iter().enumerate() {
+            above[joint.child] = joint.parent.map(|parent| (index, parent));
+        }
         for link in self.link_order() {
-            let above = self.joints.iter_mut().find(|joint| joint.child == link);
-            if let Some((joint, parent)) = above.and_then(|joint| {
-                let parent = joint.parent?;
-                Some((joint, parent))
-            }) {
+            if let Some((index, parent)) = above[link] {
+                let joint = &mut self.joints[index];
                 poses[link] = poses[parent].mul(&joint.origin);
                 if joint.kind == JointKind::Free {
                     joint.q[..3].copy_from_slice(&poses[link].pos);

@@ -2,55 +2,51 @@
 
 use std::collections::HashSet;
 
-use super::description::{Inertial, Joint, Robot};
+use super::description::{Inertial, Joint, JointDof, JointKind, Robot};
 use super::error::ModelError;
 use super::inertia::{merge, principal_moments};
 use super::pose::Pose;
+use super::validate::{Culprit, Fault};
 
 /// Smallest mass [kg] and principal moment [kg·m²] of a moving body, MuJoCo's mjMINVAL.
 const INERTIA_MIN: f64 = 1e-15;
 
 impl Robot {
     /// One root, one parent each, no loop.
-    pub(super) fn validate_tree(&self) -> Result<(), ModelError> {
+    pub(super) fn validate_tree(&self) -> Result<(), Fault> {
         let robot = || self.name.clone();
         if self.links.is_empty() {
-            return Err(ModelError::NoLinks { robot: robot() });
+            return Err(Culprit::Robot.blame(ModelError::NoLinks { robot: robot() }));
         }
         let mut parent_joint: Vec<Option<&Joint>> = vec![None; self.links.len()];
-        for joint in &self.joints {
+        for (index, joint) in self.joints.iter().enumerate() {
             for (role, link) in [("parent", joint.parent), ("child", Some(joint.child))] {
                 if let Some(link) = link.filter(|&link| link >= self.links.len()) {
-                    return Err(ModelError::UnknownLink {
+                    return Err(Culprit::Joint(index).blame(ModelError::UnknownLink {
                         robot: robot(),
                         joint: joint.name.clone(),
                         role,
                         link: format!("#{link}"),
                         known: format!("#0 to #{}", self.links.len() - 1),
-                    });
+                    }));
                 }
             }
             if let Some(first) = parent_joint[joint.child].replace(joint) {
-                return Err(ModelError::TwoParents {
+                return Err(Culprit::Joint(index).blame(ModelError::TwoParents {
                     robot: robot(),
                     link: self.links[joint.child].name.clone(),
                     first: first.name.clone(),
                     second: joint.name.clone(),
-                });
+                }));
             }
         }
         let roots: Vec<usize> = (0..self.links.len())
             .filter(|&link| parent_joint[link].is_none_or(|joint| joint.parent.is_none()))
             .collect();
-        if roots.len() > 1 {
-            let roots = roots
-                .into_iter()
-                .map(|link| self.links[link].name.clone())
-                .collect();
-            return Err(ModelError::SeveralRoots {
-                robot: robot(),
-                roots,
-            });
+        if let [_, second, ..] = roots[..] {
+            let names = roots.iter().map(|&link| self.links[link].name.clone());
+            let (robot, roots) = (robot(), names.collect());
+            return Err(Culprit::Link(second).blame(ModelError::SeveralRoots { robot, roots }));
         }
         let reached: HashSet<usize> = self.link_order().into_iter().collect();
         let Some(lost) = (0..self.links.len()).find(|link| !reached.contains(link)) else {
@@ -76,14 +72,49 @@ impl Robot {
             .into_iter()
             .map(|link| self.links[link].name.clone())
             .collect();
-        Err(ModelError::LinkLoop {
-            robot: robot(),
-            links,
-        })
+        let robot = robot();
+        Err(Culprit::Link(link).blame(ModelError::LinkLoop { robot, links }))
+    }
+
+    /// Free bodies are carried by the world, and nothing drives them.
+    pub(super) fn validate_free(&self) -> Result<(), Fault> {
+        let mut above = vec![None; self.links.len()];
+        for joint in &self.joints {
+            above[joint.child] = Some(joint);
+        }
+        // the nearest moving joint at or above each link
+        let mut carrier: Vec<Option<&Joint>> = vec![None; self.links.len()];
+        for link in self.link_order() {
+            carrier[link] = above[link].and_then(|joint| match joint.moves() {
+                true => Some(joint),
+                false => carrier[joint.parent?],
+            });
+        }
+        let drives = |dof: &JointDof| {
+            let targets = [dof.target_q.unwrap_or(0.0), dof.target_qd];
+            dof.target_ke > 0.0 || dof.target_kd > 0.0 || targets.iter().any(|x| x.abs() > 0.0)
+        };
+        let free = |joint: &&Joint| joint.kind == JointKind::Free;
+        for (index, joint) in self.joints.iter().enumerate().filter(|(_, j)| free(j)) {
+            let (robot, name) = (self.name.clone(), joint.name.clone());
+            if let Some(carrier) = joint.parent.and_then(|parent| carrier[parent]) {
+                return Err(Culprit::Joint(index).blame(ModelError::FreeBelow {
+                    robot,
+                    joint: name,
+                    carrier: carrier.name.clone(),
+                }));
+            }
+            if joint.dofs.iter().any(drives) {
+                return Err(
+                    Culprit::Joint(index).blame(ModelError::FreeDrive { robot, joint: name })
+                );
+            }
+        }
+        Ok(())
     }
 
     /// Each moving link weighs something, together with the links fixed to it.
-    pub(super) fn validate_moving_mass(&self) -> Result<(), ModelError> {
+    pub(super) fn validate_moving_mass(&self) -> Result<(), Fault> {
         let nothing = Inertial {
             mass: 0.0,
             pos: [0.0; 3],
@@ -121,12 +152,12 @@ impl Robot {
             } else {
                 continue;
             };
-            return Err(ModelError::Massless {
+            return Err(Culprit::Link(link).blame(ModelError::Massless {
                 robot: self.name.clone(),
                 link: self.links[link].name.clone(),
                 joint: joint.name.clone(),
                 lacks,
-            });
+            }));
         }
         Ok(())
     }

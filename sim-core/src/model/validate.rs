@@ -1,7 +1,6 @@
 //! Checks of a description: everything a model relies on, refused by name.
 
-use std::collections::HashSet;
-
+use super::checks::{count, finite, in_range, name, not_negative, positive, unique, within};
 use super::description::{Collision, Description, Joint, JointDof, JointKind, Link, Robot, Shape};
 use super::error::ModelError;
 use super::inertia::{negative_moment, triangle_excess};
@@ -13,6 +12,20 @@ const DT_MAX: f64 = 1.0;
 const SUBSTEPS_MAX: usize = 10_000;
 /// Most iterations of the solver or its line search.
 const ITERATIONS_MAX: usize = 10_000;
+/// Most dofs of one robot: a chain of them compiles in half a second.
+const ROBOT_DOFS_MAX: usize = 512;
+/// Most dofs of all robots of a scene: its dense inverse at the reference pose takes a second.
+const SCENE_DOFS_MAX: usize = 2048;
+/// Largest length [m]: f32 keeps a tenth of a metre there.
+const LENGTH_MAX: f64 = 1e6;
+/// Largest mass [kg]: ten of the largest ships.
+const MASS_MAX: f64 = 1e10;
+/// Largest entry of an inertia [kg·m²]: a kilometre of them.
+const INERTIA_MAX: f64 = 1e16;
+/// Largest gain, damping, friction, armature, and entry of a mimic, each in its unit: products of three stay within f32.
+const FACTOR_MAX: f64 = 1e12;
+/// Largest end of a range [rad or m]: its square stays within f32.
+const RANGE_MAX: f64 = 1e18;
 /// How far an axis' length may be from 1: roundings only, the reader normalises.
 const AXIS_SLACK: f64 = 1e-6;
 
@@ -54,23 +67,46 @@ impl Description {
         not_negative("solver tolerance", solver.tolerance)?;
         positive("solver impratio", solver.impratio)?;
 
-        unique(
-            "scene",
-            "robot",
-            self.robots.iter().map(|robot| robot.name.as_str()),
-        )?;
-        unique(
-            "scene",
-            "shape",
-            self.shapes.iter().map(|shape| shape.name.as_str()),
-        )?;
+        let robots = self.robots.iter().map(|robot| robot.name.as_str());
+        unique("scene", "robot", robots).map_err(|(_, error)| error)?;
+        let shapes = self.shapes.iter().map(|shape| shape.name.as_str());
+        unique("scene", "shape", shapes).map_err(|(_, error)| error)?;
         for shape in &self.shapes {
             name("shape", &shape.name)?;
             let what = format!("shape `{}`", shape.name);
             pose(&what, &shape.pose)?;
             shape_sizes(&what, &shape.shape)?;
         }
+        let dofs = self.robots.iter().map(Robot::dof_count).sum();
+        few("the scene".to_owned(), dofs, SCENE_DOFS_MAX)?;
         self.robots.iter().try_for_each(Robot::validate)
+    }
+}
+
+/// What a fault of a robot is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Culprit {
+    Robot,
+    /// By its index.
+    Link(usize),
+    /// By its index.
+    Joint(usize),
+}
+
+/// What is wrong with a robot, and where.
+#[derive(Debug)]
+pub(super) struct Fault {
+    pub culprit: Culprit,
+    pub error: Box<ModelError>,
+}
+
+impl Culprit {
+    /// An error as a fault of this.
+    pub fn blame(self, error: ModelError) -> Fault {
+        Fault {
+            culprit: self,
+            error: Box::new(error),
+        }
     }
 }
 
@@ -80,6 +116,37 @@ impl Robot {
     /// # Errors
     /// The first thing that is wrong, by name, with the cure.
     pub fn validate(&self) -> Result<(), ModelError> {
+        self.find_fault().map_err(|fault| *fault.error)
+    }
+
+    /// The first thing that is wrong, and where.
+    pub(super) fn find_fault(&self) -> Result<(), Fault> {
+        self.validate_whole()
+            .map_err(|error| Culprit::Robot.blame(error))?;
+        let owner = format!("robot `{}`", self.name);
+        let links = self.links.iter().map(|link| link.name.as_str());
+        unique(&owner, "link", links).map_err(|(i, error)| Culprit::Link(i).blame(error))?;
+        let joints = self.joints.iter().map(|joint| joint.name.as_str());
+        unique(&owner, "joint", joints).map_err(|(i, error)| Culprit::Joint(i).blame(error))?;
+        for (i, link) in self.links.iter().enumerate() {
+            self.validate_link(&owner, link)
+                .map_err(|error| Culprit::Link(i).blame(error))?;
+        }
+        self.validate_tree()?;
+        for (i, joint) in self.joints.iter().enumerate() {
+            self.validate_joint(&owner, joint)
+                .map_err(|error| Culprit::Joint(i).blame(error))?;
+        }
+        self.validate_free()?;
+        self.validate_moving_mass()?;
+        // joints `a.x` and the x of a planar joint `a` would be one
+        let dofs = self.dof_names();
+        unique(&owner, "dof", dofs.iter().map(String::as_str))
+            .map_err(|(_, error)| Culprit::Robot.blame(error))
+    }
+
+    /// Name, place and number of dofs.
+    fn validate_whole(&self) -> Result<(), ModelError> {
         name("robot", &self.name)?;
         if self.name.contains('/') {
             let rule = "a slash separates robot and joint in `robot/joint`; leave it out";
@@ -91,36 +158,25 @@ impl Robot {
         }
         let owner = format!("robot `{}`", self.name);
         pose(&owner, &self.pose)?;
-        unique(
-            &owner,
-            "link",
-            self.links.iter().map(|link| link.name.as_str()),
-        )?;
-        unique(
-            &owner,
-            "joint",
-            self.joints.iter().map(|joint| joint.name.as_str()),
-        )?;
-        self.links
-            .iter()
-            .try_for_each(|link| self.validate_link(&owner, link))?;
-        self.validate_tree()?;
-        self.joints
-            .iter()
-            .try_for_each(|joint| self.validate_joint(&owner, joint))?;
-        self.validate_moving_mass()
+        few(owner, self.dof_count(), ROBOT_DOFS_MAX)
+    }
+
+    fn dof_count(&self) -> usize {
+        let dofs = |joint: &Joint| joint.kind.dof_names().len();
+        self.joints.iter().map(dofs).sum()
     }
 
     fn validate_link(&self, owner: &str, link: &Link) -> Result<(), ModelError> {
         name("link", &link.name)?;
         let what = format!("{owner}: link `{}`", link.name);
         if let Some(inertial) = &link.inertial {
-            not_negative(&format!("{what}: mass"), inertial.mass)?;
-            for value in inertial.pos {
-                finite(&format!("{what}: centre of mass"), value)?;
-            }
+            let mass = format!("{what}: mass");
+            not_negative(&mass, inertial.mass)?;
+            within(&mass, inertial.mass, MASS_MAX, "give at most 1e10 kg")?;
+            length(&format!("{what}: centre of mass"), inertial.pos)?;
             for value in inertial.inertia.into_iter().flatten() {
-                finite(&format!("{what}: inertia"), value)?;
+                let rule = "give at most 1e16 kg·m²";
+                within(&format!("{what}: inertia"), value, INERTIA_MAX, rule)?;
             }
             let (robot, link) = (self.name.clone(), link.name.clone());
             if let Some(moment) = negative_moment(inertial.inertia) {
@@ -162,8 +218,9 @@ impl Robot {
             self.validate_axis(&what, joint)?;
         }
         if let Some([lower, upper]) = joint.range {
-            finite(&format!("{what}: lower limit"), lower)?;
-            finite(&format!("{what}: upper limit"), upper)?;
+            let rule = "give at most 1e18, or delete both ends where there is no limit";
+            within(&format!("{what}: lower limit"), lower, RANGE_MAX, rule)?;
+            within(&format!("{what}: upper limit"), upper, RANGE_MAX, rule)?;
             if lower > upper {
                 let (robot, joint) = (self.name.clone(), joint.name.clone());
                 return Err(ModelError::EmptyRange {
@@ -196,7 +253,6 @@ impl Robot {
             };
             pose(&format!("{what}: joint_q"), &start)?;
         }
-        self.validate_free(joint)?;
         self.validate_mimic(&what, joint)
     }
 
@@ -224,35 +280,6 @@ impl Robot {
             is_unit,
             "it must be 1",
         )?;
-        Ok(())
-    }
-
-    /// A free body is carried by the world, and nothing drives it.
-    fn validate_free(&self, joint: &Joint) -> Result<(), ModelError> {
-        if joint.kind != JointKind::Free {
-            return Ok(());
-        }
-        let (robot, name) = (self.name.clone(), joint.name.clone());
-        let mut above = joint.parent;
-        while let Some(link) = above {
-            let carrier = self.joints.iter().find(|joint| joint.child == link);
-            if let Some(carrier) = carrier.filter(|carrier| carrier.moves()) {
-                let carrier = carrier.name.clone();
-                return Err(ModelError::FreeBelow {
-                    robot,
-                    joint: name,
-                    carrier,
-                });
-            }
-            above = carrier.and_then(|carrier| carrier.parent);
-        }
-        let drives = |dof: &JointDof| {
-            let targets = [dof.target_q.unwrap_or(0.0), dof.target_qd];
-            dof.target_ke > 0.0 || dof.target_kd > 0.0 || targets.iter().any(|x| x.abs() > 0.0)
-        };
-        if joint.dofs.iter().any(drives) {
-            return Err(ModelError::FreeDrive { robot, joint: name });
-        }
         Ok(())
     }
 
@@ -286,23 +313,35 @@ impl Robot {
         if leader.mimic.is_some() {
             return refuse(leader.name.clone(), "follows another joint itself");
         }
-        finite(&format!("{what}: mimic multiplier"), mimic.multiplier)?;
-        finite(&format!("{what}: mimic offset"), mimic.offset)
+        let rule = "give at most 1e12, followed leaders multiplied in";
+        let multiplier = format!("{what}: mimic multiplier");
+        within(&multiplier, mimic.multiplier, FACTOR_MAX, rule)?;
+        within(
+            &format!("{what}: mimic offset"),
+            mimic.offset,
+            FACTOR_MAX,
+            rule,
+        )
     }
 }
 
 /// What resists and drives a dof is finite and not negative.
 fn validate_dof(what: &str, dof: &JointDof) -> Result<(), ModelError> {
-    let not_negatives = [
-        ("effort limit", dof.effort_limit.unwrap_or(0.0)),
+    not_negative(
+        &format!("{what}: effort limit"),
+        dof.effort_limit.unwrap_or(0.0),
+    )?;
+    let factors = [
         ("damping", dof.damping),
         ("friction", dof.friction),
         ("joint_armature", dof.armature),
         ("joint_target_ke", dof.target_ke),
         ("joint_target_kd", dof.target_kd),
     ];
-    for (field, value) in not_negatives {
-        not_negative(&format!("{what}: {field}"), value)?;
+    for (field, value) in factors {
+        let field = format!("{what}: {field}");
+        not_negative(&field, value)?;
+        within(&field, value, FACTOR_MAX, "give at most 1e12")?;
     }
     let target_q = dof.target_q.unwrap_or(0.0);
     finite(&format!("{what}: joint_target_q"), target_q)?;
@@ -311,9 +350,7 @@ fn validate_dof(what: &str, dof: &JointDof) -> Result<(), ModelError> {
 
 /// Refuses a frame with a number that is not finite, or a quaternion that is no rotation.
 fn pose(what: &str, pose: &Pose) -> Result<(), ModelError> {
-    for value in pose.pos {
-        finite(&format!("{what}: position"), value)?;
-    }
+    length(&format!("{what}: position"), pose.pos)?;
     for value in pose.quat {
         finite(&format!("{what}: quaternion"), value)?;
     }
@@ -335,13 +372,36 @@ pub(super) fn collision_name(owner: &str, index: usize, collision: &Collision) -
     }
 }
 
+/// Refuses more dofs than a model can have.
+fn few(owner: String, dofs: usize, most: usize) -> Result<(), ModelError> {
+    if dofs > most {
+        return Err(ModelError::TooManyDofs { owner, dofs, most });
+    }
+    Ok(())
+}
+
+/// Refuses lengths beyond what a scene can hold.
+fn length<const N: usize>(what: &str, values: [f64; N]) -> Result<(), ModelError> {
+    let rule = "give at most 1e6 m";
+    let mut values = values.into_iter();
+    values.try_for_each(|value| within(what, value, LENGTH_MAX, rule))
+}
+
 /// Refuses sizes that are not positive.
+fn size<const N: usize>(what: &str, values: [f64; N]) -> Result<(), ModelError> {
+    values
+        .into_iter()
+        .try_for_each(|value| positive(what, value))?;
+    length(what, values)
+}
+
+/// Refuses sizes that are not positive or too large.
 pub(super) fn shape_sizes(what: &str, shape: &Shape) -> Result<(), ModelError> {
     match *shape {
-        Shape::Box { half_extents } => half_extents
-            .iter()
-            .try_for_each(|&value| positive(&format!("{what}: half extent of the box"), value)),
-        Shape::Sphere { radius } => positive(&format!("{what}: radius of the sphere"), radius),
+        Shape::Box { half_extents } => {
+            size(&format!("{what}: half extent of the box"), half_extents)
+        }
+        Shape::Sphere { radius } => size(&format!("{what}: radius of the sphere"), [radius]),
         Shape::Cylinder {
             radius,
             half_height,
@@ -350,86 +410,11 @@ pub(super) fn shape_sizes(what: &str, shape: &Shape) -> Result<(), ModelError> {
             radius,
             half_height,
         } => {
-            positive(&format!("{what}: radius of the {}", shape.kind()), radius)?;
-            positive(
-                &format!("{what}: half height of the {}", shape.kind()),
-                half_height,
-            )
+            let kind = shape.kind();
+            size(&format!("{what}: radius of the {kind}"), [radius])?;
+            size(&format!("{what}: half height of the {kind}"), [half_height])
         }
         // checked when it was read
         Shape::Mesh(_) => Ok(()),
-    }
-}
-
-/// Refuses an empty name, or one with a control character.
-fn name(what: &'static str, name: &str) -> Result<(), ModelError> {
-    if name.is_empty() || name.chars().any(char::is_control) {
-        let rule = "give it one or more printable characters";
-        return Err(ModelError::BadName {
-            what,
-            name: name.to_owned(),
-            rule,
-        });
-    }
-    Ok(())
-}
-
-/// Refuses a name that comes twice.
-fn unique<'a>(
-    owner: &str,
-    what: &'static str,
-    names: impl Iterator<Item = &'a str>,
-) -> Result<(), ModelError> {
-    let mut seen = HashSet::new();
-    for name in names {
-        if !seen.insert(name) {
-            return Err(ModelError::DuplicateName {
-                owner: owner.to_owned(),
-                what,
-                name: name.to_owned(),
-            });
-        }
-    }
-    Ok(())
-}
-
-/// Refuses a count outside 1 to `most`.
-fn count(what: &str, value: usize, most: usize, rule: &'static str) -> Result<(), ModelError> {
-    in_range(what, value as f64, (1..=most).contains(&value), rule)
-}
-
-/// Refuses a number that is not finite.
-pub(super) fn finite(what: &str, value: f64) -> Result<(), ModelError> {
-    if value.is_finite() {
-        Ok(())
-    } else {
-        Err(ModelError::NotFinite {
-            what: what.to_owned(),
-            value,
-        })
-    }
-}
-
-/// Refuses a number that is negative or not finite.
-pub(super) fn not_negative(what: &str, value: f64) -> Result<(), ModelError> {
-    in_range(what, value, value >= 0.0, "it must not be negative")
-}
-
-/// Refuses a number that is 0, negative or not finite.
-fn positive(what: &str, value: f64) -> Result<(), ModelError> {
-    in_range(what, value, value > 0.0, "it must be above 0")
-}
-
-/// Refuses a number that is not finite, or for which `holds` is false.
-fn in_range(what: &str, value: f64, holds: bool, rule: &'static str) -> Result<(), ModelError> {
-    finite(what, value)?;
-    if holds {
-        Ok(())
-    } else {
-        Err(ModelError::OutOfRange {
-            what: what.to_owned(),
-            value,
-            rule,
-        })
     }
 }

@@ -34,14 +34,6 @@ pub fn read(inside: &str) -> Result<Robot, ModelError> {
     )
 }
 
-/// The message with which this robot is refused.
-pub fn refusal(inside: &str) -> String {
-    match read(inside) {
-        Ok(robot) => panic!("accepted: {robot:#?}"),
-        Err(error) => error.to_string(),
-    }
-}
-
 /// Asserts that a message holds every one of these parts.
 #[track_caller]
 pub fn assert_says(message: &str, parts: &[&str]) {

@@ -2,7 +2,6 @@
 
 mod build;
 mod fr3;
-mod hostile;
 mod meshes;
 mod mimic;
 mod pose;

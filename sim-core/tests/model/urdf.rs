@@ -332,10 +332,10 @@ fn what_is_ignored_is_noted_once_each_by_name() {
 
 #[test]
 fn elements_of_another_vocabulary_are_noted_with_their_prefix() {
-    let text = "<robot name=\"r\" xmlns:xacro=\"http://ros.org/wiki/xacro\"><link name=\"a\"/><xacro:link name=\"b\"/></robot>";
+    let text = "<robot name=\"r\" xmlns:xacro=\"http://ros.org/wiki/xacro\"><link name=\"a\"/><xacro:macro name=\"b\"/></robot>";
     let robot = Robot::from_urdf_text(text, "x.urdf", UrdfOptions::default()).unwrap();
     assert_eq!(robot.links.len(), 1);
-    assert_says(&robot.notes[0], &["<xacro:link>"]);
+    assert_says(&robot.notes[0], &["<xacro:macro>"]);
     let text = "<robot name=\"r\" xmlns=\"http://www.ros.org\"><link name=\"a\"/></robot>";
     let robot = Robot::from_urdf_text(text, "x.urdf", UrdfOptions::default()).unwrap();
     assert_eq!(robot.links.len(), 1);

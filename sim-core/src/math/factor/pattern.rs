@@ -83,9 +83,10 @@ impl Pattern {
             }
         }
         for k in (0..size).rev() {
-            let row: Vec<usize> = rows[k].iter().copied().collect();
-            for (n, &i) in row.iter().enumerate() {
-                rows[i].extend(&row[..n]);
+            // the last of a row hands the others on, to its own last in turn
+            let mut row = rows[k].clone();
+            if let Some(last) = row.pop_last() {
+                rows[last].append(&mut row);
             }
         }
         let mut pattern = Pattern {

@@ -10,9 +10,17 @@ use super::super::error::ModelError;
 use super::reader::{Reader, pose};
 use super::scan::{children, has};
 
+/// A range that goes this far both ways is another way to write that there is none, such as 1e16 in SDFormat [rad or m].
+const RANGE_FAR: f64 = 1e9;
+
 impl<'a, 'input> Reader<'a, 'input> {
     /// All joints, in file order.
     pub(super) fn joints(&mut self, urdf: &urdf_rs::Robot) -> Result<Vec<Joint>, ModelError> {
+        if urdf.links.is_empty() {
+            let robot = self.robot.clone();
+            let root = self.scan.root();
+            return Err(self.scan.place(root, ModelError::NoLinks { robot }));
+        }
         let link_names: Vec<&str> = urdf.links.iter().map(|link| link.name.as_str()).collect();
         let link_index: HashMap<&str, usize> = link_names
             .iter()
@@ -23,16 +31,16 @@ impl<'a, 'input> Reader<'a, 'input> {
         for (index, joint) in urdf.joints.iter().enumerate() {
             let node = self.scan.joints[index];
             let find = |role, name: &str| {
-                link_index
-                    .get(name)
-                    .copied()
-                    .ok_or_else(|| ModelError::UnknownLink {
+                link_index.get(name).copied().ok_or_else(|| {
+                    let error = ModelError::UnknownLink {
                         robot: self.robot.clone(),
                         joint: joint.name.clone(),
                         role,
                         link: name.to_owned(),
                         known: first_few(&link_names),
-                    })
+                    };
+                    self.scan.place(node, error)
+                })
             };
             let kind = match joint.joint_type {
                 JointType::Revolute | JointType::Continuous => JointKind::Revolute,
@@ -48,7 +56,7 @@ impl<'a, 'input> Reader<'a, 'input> {
             made.origin = pose(&joint.origin);
             if made.moves() {
                 if !matches!(kind, JointKind::Ball | JointKind::Free) {
-                    made.axis = self.axis(joint)?;
+                    made.axis = self.axis(joint, node)?;
                 }
                 if made.dofs.len() == 1 {
                     self.limits(joint, node, &mut made)?;
@@ -76,17 +84,19 @@ impl<'a, 'input> Reader<'a, 'input> {
         Ok(joints)
     }
 
-    fn axis(&mut self, joint: &urdf_rs::Joint) -> Result<[f64; 3], ModelError> {
+    fn axis(
+        &mut self,
+        joint: &urdf_rs::Joint,
+        node: Node<'a, 'input>,
+    ) -> Result<[f64; 3], ModelError> {
         let axis = *joint.axis.xyz;
         // scaled first, so that neither a tiny nor a huge axis is lost in the squares
         let largest = axis
             .iter()
             .fold(0.0_f64, |largest, part| largest.max(part.abs()));
         if largest == 0.0 {
-            return Err(ModelError::ZeroAxis {
-                robot: self.robot.clone(),
-                joint: joint.name.clone(),
-            });
+            let (robot, joint) = (self.robot.clone(), joint.name.clone());
+            return Err(self.scan.place(node, ModelError::ZeroAxis { robot, joint }));
         }
         let scaled = axis.map(|part| part / largest);
         let scaled_length = scaled.iter().map(|part| part * part).sum::<f64>().sqrt();
@@ -138,7 +148,13 @@ impl<'a, 'input> Reader<'a, 'input> {
             return Ok(());
         }
         let mut range = [limit.lower, limit.upper];
-        if range == [f64::NEG_INFINITY, f64::INFINITY] {
+        if lower && upper && range[0] <= -RANGE_FAR && range[1] >= RANGE_FAR {
+            if range[0].is_finite() || range[1].is_finite() {
+                self.notes.push(format!(
+                    "joint `{}`: the range from {:e} to {:e} is taken as unlimited",
+                    joint.name, range[0], range[1]
+                ));
+            }
             return Ok(());
         }
         for (given, name, side) in [(lower, "lower", 0), (upper, "upper", 1)] {
@@ -178,12 +194,13 @@ impl<'a, 'input> Reader<'a, 'input> {
             let refuse = |reason| {
                 let (robot, joint, leader) =
                     (self.robot.clone(), joint.name.clone(), mimic.joint.clone());
-                Err(ModelError::MimicLeader {
+                let error = ModelError::MimicLeader {
                     robot,
                     joint,
                     leader,
                     reason,
-                })
+                };
+                Err(self.scan.place(self.scan.joints[i], error))
             };
             let Some(&leader) = index.get(mimic.joint.as_str()) else {
                 return refuse("does not exist");
@@ -216,10 +233,9 @@ impl<'a, 'input> Reader<'a, 'input> {
                     let joints = circle
                         .map(|&(member, _)| joints[member].name.clone())
                         .collect();
-                    return Err(ModelError::MimicLoop {
-                        robot: self.robot.clone(),
-                        joints,
-                    });
+                    let robot = self.robot.clone();
+                    let error = ModelError::MimicLoop { robot, joints };
+                    return Err(self.scan.place(self.scan.joints[joint], error));
                 }
                 chain.push((joint, mimic));
                 joint = mimic.joint;

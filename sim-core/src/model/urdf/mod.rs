@@ -8,22 +8,21 @@ mod joints;
 mod mesh;
 mod reader;
 mod scan;
+mod source;
 mod table;
+mod value;
+mod xml;
 
 use std::collections::HashMap;
-use std::fs::File;
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use super::description::{Description, Robot};
 use super::error::ModelError;
 use super::geometry::MeshOptions;
 use super::pose::Pose;
+use super::validate::{Culprit, Fault};
 use reader::Reader;
 use scan::Scan;
-
-/// Largest file [bytes]: published robots have some hundred kilobytes.
-const FILE_MAX: u64 = 64 << 20;
 
 /// How a URDF file joins a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -85,7 +84,9 @@ impl Robot {
     /// What is wrong with the file or the options, by name.
     pub fn from_urdf(path: impl AsRef<Path>, options: UrdfOptions) -> Result<Robot, ModelError> {
         let path = path.as_ref();
-        Robot::from_urdf_text(&read(path)?, path, options)
+        let mut notes = Vec::new();
+        let text = source::read(path, &mut notes)?;
+        Robot::from_text(&text, path, options, notes)
     }
 
     /// Reads a robot from the text of a URDF file that lies, or would lie, at `path`.
@@ -97,16 +98,25 @@ impl Robot {
         path: impl AsRef<Path>,
         options: UrdfOptions,
     ) -> Result<Robot, ModelError> {
+        Robot::from_text(text, path.as_ref(), options, Vec::new())
+    }
+
+    fn from_text(
+        text: &str,
+        path: &Path,
+        options: UrdfOptions,
+        mut notes: Vec<String>,
+    ) -> Result<Robot, ModelError> {
         options.meshes.validate()?;
-        let path = path.as_ref();
-        let document = scan::parse(text, path)?;
+        let text = source::prepare(text, path, &mut notes)?;
+        let document = xml::parse(&text, path)?;
         let scan = Scan::new(&document, path)?;
         let mut reader = Reader {
             scan,
             path,
             options,
             robot: String::new(),
-            notes: Vec::new(),
+            notes,
             missing_visuals: Vec::new(),
             meshes: HashMap::new(),
         };
@@ -114,38 +124,23 @@ impl Robot {
         if !reader.options.strict {
             robot.balance_inertias();
         }
-        robot.validate()?;
+        robot.find_fault().map_err(|fault| reader.place(fault))?;
         Ok(robot)
     }
 }
 
-/// The text of a file, if it is a file, in UTF-8 and not too large.
-fn read(path: &Path) -> Result<String, ModelError> {
-    let fault = |reason: String| ModelError::File {
-        path: path.to_owned(),
-        reason,
-    };
-    let metadata = std::fs::metadata(path).map_err(|error| fault(error.to_string()))?;
-    // a pipe or a device may never end
-    if !metadata.is_file() {
-        return Err(fault("it is not a file".to_owned()));
+impl Reader<'_, '_> {
+    /// A fault with the file and the line of its culprit.
+    fn place(&self, fault: Fault) -> ModelError {
+        let scan = &self.scan;
+        let node = match fault.culprit {
+            Culprit::Robot => None,
+            Culprit::Link(link) => scan.links.get(link),
+            // a floating base is the first joint, and no element
+            Culprit::Joint(joint) => joint
+                .checked_sub(usize::from(self.options.floating))
+                .and_then(|joint| scan.joints.get(joint)),
+        };
+        scan.place(node.copied().unwrap_or(scan.root()), *fault.error)
     }
-    let mut bytes = Vec::new();
-    let file = File::open(path).map_err(|error| fault(error.to_string()))?;
-    file.take(FILE_MAX + 1)
-        .read_to_end(&mut bytes)
-        .map_err(|error| fault(error.to_string()))?;
-    if bytes.len() as u64 > FILE_MAX {
-        let limit = format!("{} MiB", FILE_MAX >> 20);
-        return Err(ModelError::TooLarge {
-            path: path.to_owned(),
-            what: "the size of the file",
-            limit,
-        });
-    }
-    let text = String::from_utf8(bytes).map_err(|_| fault("it is not UTF-8 text".to_owned()))?;
-    Ok(text
-        .strip_prefix('\u{feff}')
-        .map(str::to_owned)
-        .unwrap_or(text))
 }

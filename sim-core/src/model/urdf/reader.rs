@@ -102,7 +102,9 @@ impl<'a, 'input> Reader<'a, 'input> {
                 collisions.push(Collision {
                     name: collision.name.clone(),
                     pose: pose(&collision.origin),
-                    shape: self.shape(&link.name, &collision.geometry, node)?,
+                    shape: self
+                        .shape(&link.name, &collision.geometry, node)
+                        .map_err(|error| self.scan.place(node, error))?,
                 });
             }
             self.note_missing_visuals(&link.name, node);

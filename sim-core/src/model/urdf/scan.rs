@@ -1,64 +1,27 @@
 //! What a URDF file says and what it leaves out, before urdf-rs reads the values.
 //!
 //! urdf-rs gives 0 for an absent `effort` and passes over unknown tags. So the XML is walked along a table of what URDF
-//! knows: presence is kept, the unknown is noted, a bad number is refused with its line, and only what the table knows is
+//! knows: presence is kept, the unknown is noted, a bad value is refused with its line, and only what the table knows is
 //! handed on as text. The walk is as deep as the table, however deep a file nests.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use roxmltree::{Document, Node, ParsingOptions};
+use roxmltree::{Document, Node};
 
 use super::super::error::ModelError;
-use super::table::{Attribute, Count, GEOMETRY, Kind, Need, ROBOT, Tag};
+use super::table::{Attribute, Count, GEOMETRY, Need, ORIGIN, PLACES, ROBOT, Tag};
+use super::value;
+pub(super) use super::xml::{children, has};
+use super::xml::{describe, escape, name_of, prefix_of, same, short};
 
-/// Elements, texts and comments in a file: a robot of a thousand links has some twenty thousand.
-const NODES_MAX: u32 = 1_000_000;
 /// Notes on ignored things: more than a person reads.
 const IGNORED_MAX: usize = 200;
-
-/// A file's XML, well formed and within limits.
-///
-/// # Errors
-/// Broken XML with line and column; entity definitions and too many nodes are refused.
-pub(super) fn parse<'a>(text: &'a str, path: &Path) -> Result<Document<'a>, ModelError> {
-    // without a document type there are no entities, so nothing to expand a small file into a large one
-    let options = ParsingOptions {
-        allow_dtd: false,
-        nodes_limit: NODES_MAX,
-        ..ParsingOptions::default()
-    };
-    Document::parse_with_options(text, options).map_err(|error| match error {
-        roxmltree::Error::NodesLimitReached => ModelError::TooLarge {
-            path: path.to_owned(),
-            what: "the number of XML nodes",
-            limit: NODES_MAX.to_string(),
-        },
-        roxmltree::Error::DtdDetected => ModelError::Xml {
-            path: path.to_owned(),
-            line: 1,
-            column: 1,
-            reason: "<!DOCTYPE> is refused, since entities can expand without bound; delete it"
-                .to_owned(),
-        },
-        error => {
-            let place = error.pos();
-            // roxmltree ends its messages with the place, which this error states already
-            let text = error.to_string();
-            let reason = text
-                .strip_suffix(&format!(" at {place}"))
-                .unwrap_or(&text)
-                .to_owned();
-            ModelError::Xml {
-                path: path.to_owned(),
-                line: place.row,
-                column: place.col,
-                reason,
-            }
-        }
-    })
-}
+/// Most links and most joints of a robot: reading them stays below a second.
+const LINKS_MAX: usize = 4096;
+/// Most collisions of a robot, for the same reason.
+const COLLISIONS_MAX: usize = 10_000;
 
 /// What the walk found.
 pub(super) struct Scan<'a, 'input> {
@@ -68,8 +31,14 @@ pub(super) struct Scan<'a, 'input> {
     pub links: Vec<Node<'a, 'input>>,
     /// `<joint>` elements in file order.
     pub joints: Vec<Node<'a, 'input>>,
+    /// Number of `<collision>` elements.
+    collisions: usize,
     /// The elements and attributes that URDF knows, as XML for urdf-rs.
     pub text: String,
+    /// Whether `quat_xyzw` counts: from URDF 1.1 on.
+    has_quaternions: bool,
+    /// Whether xacro would have found something to do.
+    has_definitions: bool,
     ignored: Vec<Ignored>,
     ignored_at: HashMap<String, usize>,
     /// How often something was ignored that no longer got a note of its own.
@@ -79,7 +48,8 @@ pub(super) struct Scan<'a, 'input> {
 struct Ignored {
     what: String,
     count: usize,
-    line: u32,
+    /// From the start of the text [bytes].
+    at: usize,
 }
 
 impl<'a, 'input> Scan<'a, 'input> {
@@ -94,19 +64,48 @@ impl<'a, 'input> Scan<'a, 'input> {
             document,
             links: Vec::new(),
             joints: Vec::new(),
+            collisions: 0,
             text: String::new(),
+            has_quaternions: false,
+            has_definitions: false,
             ignored: Vec::new(),
             ignored_at: HashMap::new(),
             ignored_more: 0,
         };
         if root.tag_name().name() != ROBOT.name {
-            return Err(scan.fault(
-                root,
-                "the outermost element of a URDF file is <robot>".to_owned(),
-            ));
+            let cure = match root.tag_name().name() {
+                "sdf" => "this is SDFormat; convert it to URDF first",
+                "mujoco" | "mujocoinclude" => "this is MuJoCo's MJCF; give the URDF file",
+                "COLLADA" => "this is a COLLADA mesh; give the URDF file that names it",
+                "launch" | "package" => "this is a file of ROS; give the URDF file",
+                _ if is_xacro(root) => {
+                    "is an element of xacro; run `xacro` on the file and load what it prints"
+                }
+                _ => {
+                    "a URDF file holds one <robot>, and all else in it; write <robot name=\"…\"> around"
+                }
+            };
+            return Err(scan.fault(root, cure.to_owned()));
         }
+        scan.version(root);
         scan.walk(root, &ROBOT)?;
+        if scan.links.is_empty() && scan.has_definitions {
+            let reason = "holds definitions of xacro and no links; run `xacro` on the file that uses them and load what it prints";
+            return Err(scan.fault(root, reason.to_owned()));
+        }
         Ok(scan)
+    }
+
+    /// URDF 1.1 and 1.2 add to 1.0, which stands where no version is given.
+    fn version(&mut self, root: Node<'a, 'input>) {
+        let Some(version) = root.attribute("version").map(str::trim) else {
+            return;
+        };
+        self.has_quaternions = matches!(version, "1.1" | "1.2");
+        if !matches!(version, "1" | "1.0" | "1.1" | "1.2") {
+            let version = short(version);
+            self.ignore(root, format!("unknown version `{version}` of URDF"));
+        }
     }
 
     fn walk(&mut self, node: Node<'a, 'input>, tag: &'static Tag) -> Result<(), ModelError> {
@@ -116,27 +115,111 @@ impl<'a, 'input> Scan<'a, 'input> {
         match tag.name {
             "link" => self.links.push(node),
             "joint" => self.joints.push(node),
+            "collision" => self.collisions += 1,
             _ => {}
+        }
+        let limits = [
+            ("the number of links", self.links.len(), LINKS_MAX),
+            ("the number of joints", self.joints.len(), LINKS_MAX),
+            ("the number of collisions", self.collisions, COLLISIONS_MAX),
+        ];
+        if let Some((what, _, most)) = limits.iter().find(|(_, found, most)| found > most) {
+            return Err(ModelError::TooLarge {
+                path: self.path.to_owned(),
+                what,
+                limit: most.to_string(),
+            });
         }
         self.text.push('<');
         self.text.push_str(tag.name);
         self.attributes(node, tag)?;
         self.text.push('>');
+        let mut first: Vec<Option<Node>> = vec![None; tag.children.len()];
         for child in node.children().filter(Node::is_element) {
             // a prefix makes it another vocabulary's element, such as xacro's
             let own = child.tag_name().namespace() == node.tag_name().namespace();
             let known = tag
                 .children
                 .iter()
-                .find(|(known, _)| own && known.name == child.tag_name().name());
-            match known {
-                Some((known, _)) => self.walk(child, known)?,
-                None => self.ignore(child, format!("<{}>", name_of(child))),
+                .position(|(known, _)| own && known.name == child.tag_name().name());
+            let Some(place) = known else {
+                self.unknown(node, child, own)?;
+                continue;
+            };
+            let (known, count) = tag.children[place];
+            match first[place] {
+                Some(earlier) if count != Count::Any => {
+                    if !same(earlier, child) {
+                        let (name, line) = (known.name, self.line(earlier));
+                        let reason =
+                            format!("another <{name}> stands in line {line}; leave one of the two");
+                        return Err(self.fault(child, reason));
+                    }
+                    self.ignore(child, format!("second <{}>, the same again,", known.name));
+                }
+                _ => {
+                    first[place] = Some(child);
+                    self.walk(child, known)?;
+                }
             }
         }
-        self.count(node, tag)?;
+        for ((known, count), found) in tag.children.iter().zip(&first) {
+            if *count == Count::One && found.is_none() {
+                let reason = format!("<{}> is missing; add it", known.name);
+                return Err(self.fault(node, reason));
+            }
+        }
+        if tag.name == GEOMETRY.name {
+            self.shapes(node, first.iter().flatten().count())?;
+        }
         let _ = write!(self.text, "</{}>", tag.name);
         Ok(())
+    }
+
+    /// Refuses a geometry that is not one shape.
+    fn shapes(&self, node: Node, found: usize) -> Result<(), ModelError> {
+        if found == 1 {
+            return Ok(());
+        }
+        let cure = "give one <box>, <sphere>, <cylinder>, <capsule> or <mesh>";
+        let unknown = node.children().find(Node::is_element);
+        let reason = match unknown.filter(|_| found == 0) {
+            Some(shape) => format!("<{}> is no shape that is known; {cure}", name_of(shape)),
+            None => format!("{found} shapes; {cure}"),
+        };
+        Err(self.fault(node, reason))
+    }
+
+    /// Notes an element that URDF does not have here, or refuses it if the robot would lack something.
+    fn unknown(
+        &mut self,
+        parent: Node<'a, 'input>,
+        child: Node<'a, 'input>,
+        own: bool,
+    ) -> Result<(), ModelError> {
+        let name = child.tag_name().name();
+        // definitions do nothing by themselves; what xacro would have put in place of the others is missing
+        let xacro = !own && is_xacro(child);
+        self.has_definitions |= xacro;
+        if xacro && !matches!(name, "property" | "macro" | "arg") {
+            let reason = "is left from xacro; run `xacro` on the file and load what it prints";
+            return Err(self.fault(child, reason.to_owned()));
+        }
+        let place = PLACES
+            .iter()
+            .find(|(known, _)| known.eq_ignore_ascii_case(name));
+        let Some((known, place)) = place.filter(|_| own) else {
+            self.ignore(child, format!("<{}>", name_of(child)));
+            return Ok(());
+        };
+        let parent = name_of(parent);
+        Err(self.fault(
+            child,
+            match *known == name {
+                true => format!("has no place in <{parent}>; move it into {place}"),
+                false => format!("is not an element of URDF; write <{known}>"),
+            },
+        ))
     }
 
     fn attributes(&mut self, node: Node<'a, 'input>, tag: &'static Tag) -> Result<(), ModelError> {
@@ -147,94 +230,70 @@ impl<'a, 'input> Scan<'a, 'input> {
                     .iter()
                     .any(|known| known.name == attribute.name());
             if !known {
-                self.ignore(
-                    node,
-                    format!("attribute `{}` of <{}>", attribute.name(), tag.name),
-                );
+                let name = short(attribute.name());
+                self.ignore(node, format!("attribute `{name}` of <{}>", tag.name));
             }
         }
         for known in tag.attributes {
-            let value = match (node.attribute(known.name), known.need) {
+            let text = match (node.attribute(known.name), known.need) {
                 (Some(value), _) => {
-                    self.check(node, known, value)?;
-                    value
+                    let value =
+                        value::read(known, value).map_err(|reason| self.fault(node, reason))?;
+                    if value.commas {
+                        let name = known.name;
+                        self.ignore(
+                            node,
+                            format!("comma in attribute `{name}` of <{}>", tag.name),
+                        );
+                    }
+                    value.text
                 }
-                (None, Need::Otherwise(value)) => value,
+                (None, Need::Otherwise(value)) => value.to_owned(),
                 (None, Need::Optional) => continue,
                 (None, Need::Required) => {
-                    return Err(self.fault(
-                        node,
-                        format!("attribute `{}` is missing; add it", known.name),
-                    ));
+                    let end = if tag.children.is_empty() { "/" } else { "" };
+                    let (name, tag) = (known.name, tag.name);
+                    let reason =
+                        format!("attribute `{name}` is missing; write <{tag} {name}=\"…\"{end}>");
+                    return Err(self.fault(node, reason));
                 }
             };
-            let _ = write!(self.text, " {}=\"", known.name);
-            escape(value, &mut self.text);
-            self.text.push('"');
+            match known.name {
+                // the reader knows all versions that urdf-rs would tell apart
+                "version" => {}
+                "quat_xyzw" => self.quaternion(node, &text)?,
+                _ => self.write(known, &text),
+            }
         }
         Ok(())
     }
 
-    /// Refuses an attribute that is not what its kind asks for.
-    fn check(&self, node: Node, attribute: &Attribute, value: &str) -> Result<(), ModelError> {
-        let (numbers, shape) = match attribute.kind {
-            Kind::Text if value.trim().is_empty() && attribute.need == Need::Required => {
-                return Err(self.fault(
-                    node,
-                    format!("attribute `{}` is empty; fill it in", attribute.name),
-                ));
-            }
-            Kind::Text => return Ok(()),
-            Kind::Number | Kind::Limit => (1, "one number"),
-            Kind::Vector(4) => (4, "four numbers separated by spaces"),
-            Kind::Vector(numbers) => (numbers, "three numbers separated by spaces"),
-        };
-        let parsed: Vec<Option<f64>> = value
-            .split_whitespace()
-            .map(|part| part.parse().ok())
-            .collect();
-        let usable = |part: &Option<f64>| {
-            part.is_some_and(|part| {
-                part.is_finite() || attribute.kind == Kind::Limit && !part.is_nan()
-            })
-        };
-        if parsed.len() == numbers && parsed.iter().all(usable) {
-            return Ok(());
-        }
-        let cure = if value.contains("${") {
-            "; expand the file with xacro first"
-        } else {
-            ""
-        };
-        let reason = format!(
-            "attribute `{}` is \"{value}\", not {shape}, finite{cure}",
-            attribute.name
-        );
-        Err(self.fault(node, reason))
+    fn write(&mut self, attribute: &Attribute, value: &str) {
+        let _ = write!(self.text, " {}=\"", attribute.name);
+        escape(value, &mut self.text);
+        self.text.push('"');
     }
 
-    /// Refuses children that are missing or repeated.
-    fn count(&self, node: Node<'a, 'input>, tag: &'static Tag) -> Result<(), ModelError> {
-        let mut found = 0;
-        for (known, count) in tag.children {
-            let times = children(node, known.name).count();
-            found += times;
-            if times > 1 && *count != Count::Any {
-                return Err(self.fault(
-                    node,
-                    format!("<{}> comes {times} times; leave one", known.name),
-                ));
-            }
-            if times == 0 && *count == Count::One {
-                return Err(self.fault(node, format!("<{}> is missing; add it", known.name)));
-            }
+    /// Hands an origin's quaternion on as angles, right to rounding; urdf-rs' own are not near a pitch of 90°.
+    fn quaternion(&mut self, node: Node<'a, 'input>, text: &str) -> Result<(), ModelError> {
+        if !self.has_quaternions {
+            let what = "attribute `quat_xyzw` of <origin>, without version=\"1.1\" of <robot>,";
+            self.ignore(node, what.to_owned());
+            return Ok(());
         }
-        if tag.name == GEOMETRY.name && found != 1 {
-            let reason = format!(
-                "{found} shapes; give one <box>, <sphere>, <cylinder>, <capsule> or <mesh>"
-            );
-            return Err(self.fault(node, reason));
+        if node.has_attribute("rpy") {
+            let reason = "attributes `rpy` and `quat_xyzw` are both given; leave one";
+            return Err(self.fault(node, reason.to_owned()));
         }
+        let mut numbers = text.split(' ').filter_map(|part| part.parse::<f64>().ok());
+        let quat = std::array::from_fn(|_| numbers.next().unwrap_or(0.0));
+        let Some([roll, pitch, yaw]) = value::rpy_of_quat(quat) else {
+            let reason = "attribute `quat_xyzw` is zero; give x, y, z, w of length 1";
+            return Err(self.fault(node, reason.to_owned()));
+        };
+        let rpy = ORIGIN.attributes.iter().find(|known| known.name == "rpy");
+        let rpy = rpy.expect("an origin has rpy");
+        self.write(rpy, &format!("{roll} {pitch} {yaw}"));
         Ok(())
     }
 
@@ -244,21 +303,18 @@ impl<'a, 'input> Scan<'a, 'input> {
             self.ignored[index].count += 1;
         } else if self.ignored.len() < IGNORED_MAX {
             self.ignored_at.insert(what.clone(), self.ignored.len());
-            let line = self.line(node);
-            self.ignored.push(Ignored {
-                what,
-                count: 1,
-                line,
-            });
+            let at = node.range().start;
+            self.ignored.push(Ignored { what, count: 1, at });
         } else {
             self.ignored_more += 1;
         }
     }
 
-    /// One sentence for each thing that was ignored, in the order of the file.
+    /// One sentence for each thing that was ignored, in the order in which it was met.
     pub fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = Vec::new();
-        for Ignored { what, count, line } in &self.ignored {
+        let lines = self.lines(self.ignored.iter().map(|ignored| ignored.at).collect());
+        for (Ignored { what, count, .. }, line) in self.ignored.iter().zip(lines) {
             notes.push(match count {
                 1 => format!("{what} is ignored (line {line})"),
                 _ => format!("{what} is ignored ({count} times, first in line {line})"),
@@ -273,6 +329,22 @@ impl<'a, 'input> Scan<'a, 'input> {
         notes
     }
 
+    /// The lines of these places, in one pass over the text.
+    fn lines(&self, places: Vec<usize>) -> Vec<usize> {
+        let text = self.document.input_text().as_bytes();
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_by_key(|&index| places[index]);
+        let mut lines = vec![0; places.len()];
+        let (mut line, mut from) = (1, 0);
+        for index in order {
+            let passed = &text[from..places[index]];
+            line += passed.iter().filter(|&&byte| byte == b'\n').count();
+            from = places[index];
+            lines[index] = line;
+        }
+        lines
+    }
+
     /// An error about one element.
     pub fn fault(&self, node: Node, reason: String) -> ModelError {
         ModelError::Urdf {
@@ -283,70 +355,29 @@ impl<'a, 'input> Scan<'a, 'input> {
         }
     }
 
+    /// An error about the robot, with the file and the line of the element that it is about.
+    pub fn place(&self, node: Node, error: ModelError) -> ModelError {
+        match error {
+            error @ (ModelError::Urdf { .. } | ModelError::InFile { .. }) => error,
+            error => ModelError::InFile {
+                path: self.path.to_owned(),
+                line: self.line(node),
+                error: Box::new(error),
+            },
+        }
+    }
+
+    /// The outermost element.
+    pub fn root(&self) -> Node<'a, 'input> {
+        self.document.root_element()
+    }
+
     fn line(&self, node: Node) -> u32 {
         self.document.text_pos_at(node.range().start).row
     }
 }
 
-/// Child elements of this name in the same vocabulary.
-pub(super) fn children<'a, 'input>(
-    node: Node<'a, 'input>,
-    name: &'static str,
-) -> impl Iterator<Item = Node<'a, 'input>> {
-    let namespace = node.tag_name().namespace();
-    node.children().filter(move |child| {
-        child.is_element()
-            && child.tag_name().name() == name
-            && child.tag_name().namespace() == namespace
-    })
-}
-
-/// Whether an element has a child with this attribute.
-pub(super) fn has(node: Node, child: &'static str, attribute: &str) -> bool {
-    children(node, child).any(|child| child.has_attribute(attribute))
-}
-
-/// Such as ``<limit> of joint `elbow` ``.
-fn describe(node: Node) -> String {
-    let own = format!("<{}>", name_of(node));
-    for ancestor in node.ancestors() {
-        let kind = ancestor.tag_name().name();
-        if let Some(name) = ancestor
-            .attribute("name")
-            .filter(|_| kind == "link" || kind == "joint")
-        {
-            return if ancestor == node {
-                format!("{own} `{name}`")
-            } else {
-                format!("{own} of {kind} `{name}`")
-            };
-        }
-    }
-    own
-}
-
-/// The element's name with the prefix it is written with.
-fn name_of<'a>(node: Node<'a, '_>) -> String {
-    let name = node.tag_name().name();
-    let prefix = node
-        .tag_name()
-        .namespace()
-        .and_then(|namespace| node.lookup_prefix(namespace));
-    match prefix {
-        Some(prefix) if !prefix.is_empty() => format!("{prefix}:{name}"),
-        _ => name.to_owned(),
-    }
-}
-
-fn escape(value: &str, text: &mut String) {
-    for character in value.chars() {
-        match character {
-            '&' => text.push_str("&amp;"),
-            '<' => text.push_str("&lt;"),
-            '>' => text.push_str("&gt;"),
-            '"' => text.push_str("&quot;"),
-            '\'' => text.push_str("&apos;"),
-            character => text.push(character),
-        }
-    }
+fn is_xacro(node: Node) -> bool {
+    let namespace = node.tag_name().namespace().unwrap_or_default();
+    prefix_of(node) == Some("xacro") || namespace.contains("xacro")
 }

@@ -14,16 +14,48 @@ pub(super) struct Attribute {
     pub name: &'static str,
     pub kind: Kind,
     pub need: Need,
+    pub sign: Sign,
+}
+
+/// Which signs its numbers may have.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Sign {
+    Any,
+    NotNegative,
+    Positive,
+}
+
+impl Attribute {
+    const fn not_negative(self) -> Attribute {
+        Attribute {
+            sign: Sign::NotNegative,
+            ..self
+        }
+    }
+
+    const fn positive(self) -> Attribute {
+        Attribute {
+            sign: Sign::Positive,
+            ..self
+        }
+    }
 }
 
 /// What an attribute holds.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Kind {
-    Text,
+    /// What something is called.
+    Name,
+    Path,
     Number,
     /// A number that may be infinite, which then is the absence of a limit.
     Limit,
-    Vector(usize),
+    /// Three numbers.
+    Vector,
+    /// Three angles [rad].
+    Angles,
+    /// Four numbers, x, y, z, w.
+    Quaternion,
 }
 
 /// Whether an attribute must be there.
@@ -48,6 +80,7 @@ const fn required(name: &'static str, kind: Kind) -> Attribute {
         name,
         kind,
         need: Need::Required,
+        sign: Sign::Any,
     }
 }
 
@@ -56,6 +89,7 @@ const fn optional(name: &'static str, kind: Kind) -> Attribute {
         name,
         kind,
         need: Need::Optional,
+        sign: Sign::Any,
     }
 }
 
@@ -84,8 +118,8 @@ const fn opaque(name: &'static str) -> Tag {
 pub(super) static ROBOT: Tag = tag(
     "robot",
     &[
-        optional("name", Kind::Text),
-        optional("version", Kind::Text),
+        optional("name", Kind::Name),
+        optional("version", Kind::Name),
     ],
     &[
         (&LINK, Count::Any),
@@ -95,7 +129,7 @@ pub(super) static ROBOT: Tag = tag(
 );
 static LINK: Tag = tag(
     "link",
-    &[required("name", Kind::Text)],
+    &[required("name", Kind::Name)],
     &[
         (&INERTIAL, Count::AtMostOne),
         (&VISUAL, Count::Any),
@@ -111,7 +145,11 @@ static INERTIAL: Tag = tag(
         (&INERTIA, Count::One),
     ],
 );
-static MASS: Tag = tag("mass", &[required("value", Kind::Number)], &[]);
+static MASS: Tag = tag(
+    "mass",
+    &[required("value", Kind::Number).not_negative()],
+    &[],
+);
 static INERTIA: Tag = tag(
     "inertia",
     &[
@@ -124,12 +162,12 @@ static INERTIA: Tag = tag(
     ],
     &[],
 );
-static ORIGIN: Tag = tag(
+pub(super) static ORIGIN: Tag = tag(
     "origin",
     &[
-        optional("xyz", Kind::Vector(3)),
-        optional("rpy", Kind::Vector(3)),
-        optional("quat_xyzw", Kind::Vector(4)),
+        optional("xyz", Kind::Vector),
+        optional("rpy", Kind::Angles),
+        optional("quat_xyzw", Kind::Quaternion),
     ],
     &[],
 );
@@ -137,7 +175,7 @@ static VISUAL: Tag = opaque("visual");
 static MATERIAL: Tag = opaque("material");
 static COLLISION: Tag = tag(
     "collision",
-    &[optional("name", Kind::Text)],
+    &[optional("name", Kind::Name)],
     &[
         (&ORIGIN, Count::AtMostOne),
         (&GEOMETRY, Count::One),
@@ -155,35 +193,39 @@ pub(super) static GEOMETRY: Tag = tag(
         (&MESH, Count::AtMostOne),
     ],
 );
-static BOX: Tag = tag("box", &[required("size", Kind::Vector(3))], &[]);
-static SPHERE: Tag = tag("sphere", &[required("radius", Kind::Number)], &[]);
+static BOX: Tag = tag("box", &[required("size", Kind::Vector).positive()], &[]);
+static SPHERE: Tag = tag(
+    "sphere",
+    &[required("radius", Kind::Number).positive()],
+    &[],
+);
 static CYLINDER: Tag = tag(
     "cylinder",
     &[
-        required("radius", Kind::Number),
-        required("length", Kind::Number),
+        required("radius", Kind::Number).positive(),
+        required("length", Kind::Number).positive(),
     ],
     &[],
 );
 static CAPSULE: Tag = tag(
     "capsule",
     &[
-        required("radius", Kind::Number),
-        required("length", Kind::Number),
+        required("radius", Kind::Number).positive(),
+        required("length", Kind::Number).positive(),
     ],
     &[],
 );
 static MESH: Tag = tag(
     "mesh",
     &[
-        required("filename", Kind::Text),
-        optional("scale", Kind::Vector(3)),
+        required("filename", Kind::Path),
+        optional("scale", Kind::Vector),
     ],
     &[],
 );
 static JOINT: Tag = tag(
     "joint",
-    &[required("name", Kind::Text), required("type", Kind::Text)],
+    &[required("name", Kind::Name), required("type", Kind::Name)],
     &[
         (&ORIGIN, Count::AtMostOne),
         (&PARENT, Count::One),
@@ -194,19 +236,20 @@ static JOINT: Tag = tag(
         (&MIMIC, Count::AtMostOne),
     ],
 );
-static PARENT: Tag = tag("parent", &[required("link", Kind::Text)], &[]);
-static CHILD: Tag = tag("child", &[required("link", Kind::Text)], &[]);
-static AXIS: Tag = tag("axis", &[required("xyz", Kind::Vector(3))], &[]);
+static PARENT: Tag = tag("parent", &[required("link", Kind::Name)], &[]);
+static CHILD: Tag = tag("child", &[required("link", Kind::Name)], &[]);
+static AXIS: Tag = tag("axis", &[required("xyz", Kind::Vector)], &[]);
 static LIMIT: Tag = tag(
     "limit",
     &[
         optional("lower", Kind::Limit),
         optional("upper", Kind::Limit),
-        optional("effort", Kind::Limit),
+        optional("effort", Kind::Limit).not_negative(),
         Attribute {
             name: "velocity",
             kind: Kind::Limit,
             need: Need::Otherwise("0"),
+            sign: Sign::NotNegative,
         },
     ],
     &[],
@@ -214,17 +257,39 @@ static LIMIT: Tag = tag(
 static DYNAMICS: Tag = tag(
     "dynamics",
     &[
-        optional("damping", Kind::Number),
-        optional("friction", Kind::Number),
+        optional("damping", Kind::Number).not_negative(),
+        optional("friction", Kind::Number).not_negative(),
     ],
     &[],
 );
 static MIMIC: Tag = tag(
     "mimic",
     &[
-        required("joint", Kind::Text),
+        required("joint", Kind::Name),
         optional("multiplier", Kind::Number),
         optional("offset", Kind::Number),
     ],
     &[],
 );
+
+/// Elements that weigh, touch or move, and the one that holds each: anywhere else they would be lost.
+pub(super) const PLACES: [(&str, &str); 18] = [
+    ("link", "<robot>"),
+    ("joint", "<robot>"),
+    ("inertial", "<link>"),
+    ("collision", "<link>"),
+    ("mass", "<inertial>"),
+    ("inertia", "<inertial>"),
+    ("geometry", "<collision> or <visual>"),
+    ("box", "<geometry>"),
+    ("sphere", "<geometry>"),
+    ("cylinder", "<geometry>"),
+    ("capsule", "<geometry>"),
+    ("mesh", "<geometry>"),
+    ("parent", "<joint>"),
+    ("child", "<joint>"),
+    ("axis", "<joint>"),
+    ("limit", "<joint>"),
+    ("dynamics", "<joint>"),
+    ("mimic", "<joint>"),
+];
