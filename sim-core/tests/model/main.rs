@@ -1,9 +1,11 @@
 //! Descriptions and URDF files: what is read, what is mended, what is refused.
 
 mod build;
+mod conventions;
 mod fr3;
 mod meshes;
 mod mimic;
+mod oddities;
 mod pose;
 mod refused;
 mod urdf;
