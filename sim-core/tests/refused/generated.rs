@@ -256,6 +256,8 @@ fn robots_of_too_many_links_joints_and_dofs_are_refused() {
     let shape = "<collision><geometry><sphere radius=\"1\"/></geometry></collision>";
     let shapes = format!("<link name=\"l\">{}</link>", shape.repeat(40_000));
     assert_refused(&robot(&shapes), &too_many("collisions", 10_000));
+    let visuals = shapes.replace("collision", "visual");
+    assert_refused(&robot(&visuals), &too_many("visuals", 10_000));
     assert_refused(
         &chain(2_000, "continuous"),
         ":1: robot `r` has 2000 dofs, more than the 512 that are supported; fix joints that need not move, or split it",
@@ -336,6 +338,22 @@ fn many_shapes_in_one_link_are_read_in_time() {
         read_in_bounds(&text).unwrap().links[1].collisions.len(),
         10_000
     );
+}
+
+#[test]
+fn many_missing_visuals_are_noted_in_time_and_warned_of_in_short() {
+    let mesh = format!("package://absent/{}.dae", "m".repeat(1_000));
+    let visuals: String = (0..9_900)
+        .map(|i| format!("<visual><geometry><mesh filename=\"{mesh}{i}\"/></geometry></visual>"))
+        .collect();
+    let robot = read_in_bounds(&robot(&format!(
+        "<link name=\"l\">{visuals}</link>{}",
+        joint("j", "fixed", "base", "l", "")
+    )))
+    .unwrap();
+    assert_eq!(robot.notes.len(), 9_900);
+    assert_eq!(robot.warnings.len(), 1);
+    assert!(robot.warnings[0].len() < 2_000, "{}", robot.warnings[0]);
 }
 
 #[test]

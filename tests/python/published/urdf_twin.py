@@ -27,8 +27,9 @@ MOMENT_MIN = 2e-14
 
 
 def parse(path: Path) -> ET.Element:
-    """The file's XML. Blanks before its declaration and NULs behind its end are no part of it."""
+    """The file's XML. Blanks before its declaration, NULs behind its end and commas behind numbers are no part of it."""
     text = path.read_bytes().decode("utf-8-sig").strip("\0 \t\r\n")
+    text = re.sub(r"(?<=[0-9]),(?= )", "", text)
     return ET.fromstring(re.sub(r"^<\?xml.*?\?>", "", text))
 
 
@@ -70,6 +71,8 @@ def digest(robot: ET.Element) -> list[ET.Element]:
         for role in ("parent", "child"):
             for end in joint.findall(role):
                 end.set("link", PREFIX + end.get("link", ""))
+        for again in joint.findall("axis")[1:]:
+            joint.remove(again)
         if joint.get("type") in ("spherical", "planar", "floating"):
             by_hand.append(ET.fromstring(ET.tostring(joint)))
             joint.set("type", "fixed")

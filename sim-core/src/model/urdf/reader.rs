@@ -16,6 +16,10 @@ use super::super::validate::{collision_name, shape_sizes};
 use super::UrdfOptions;
 use super::mesh::{self, Found};
 use super::scan::{Scan, children};
+use super::xml::short;
+
+/// Most files in a warning; each has a note of its own.
+const LISTED_MAX: usize = 8;
 
 /// Turns what urdf-rs read, and what the scan knows of presence, into a robot.
 pub(super) struct Reader<'a, 'input> {
@@ -247,6 +251,7 @@ impl<'a, 'input> Reader<'a, 'input> {
                 mesh::resolve(uri, self.folder(), &self.options.package_dirs),
                 Found::File(_)
             ) {
+                let uri = short(uri);
                 self.notes
                     .push(format!("link `{link}`: visual mesh `{uri}` is missing"));
                 self.missing_visuals.push(format!("`{link}`: {uri}"));
@@ -259,7 +264,11 @@ impl<'a, 'input> Reader<'a, 'input> {
         if self.missing_visuals.is_empty() {
             return Vec::new();
         }
-        let files = self.missing_visuals.join(", ");
+        let shown = &self.missing_visuals[..self.missing_visuals.len().min(LISTED_MAX)];
+        let mut files = shown.join(", ");
+        if shown.len() < self.missing_visuals.len() {
+            files += ", …";
+        }
         vec![format!(
             "visual meshes are missing, which only a picture would show: {files}; give package_dirs= or mend the paths"
         )]

@@ -20,8 +20,8 @@ use super::xml::{describe, escape, name_of, prefix_of, same, short};
 const IGNORED_MAX: usize = 200;
 /// Most links and most joints of a robot: reading them stays below a second.
 const LINKS_MAX: usize = 4096;
-/// Most collisions of a robot, for the same reason.
-const COLLISIONS_MAX: usize = 10_000;
+/// Most collisions and most visuals of a robot, for the same reason.
+const SHAPES_MAX: usize = 10_000;
 
 /// What the walk found.
 pub(super) struct Scan<'a, 'input> {
@@ -33,6 +33,8 @@ pub(super) struct Scan<'a, 'input> {
     pub joints: Vec<Node<'a, 'input>>,
     /// Number of `<collision>` elements.
     collisions: usize,
+    /// Number of `<visual>` elements.
+    visuals: usize,
     /// The elements and attributes that URDF knows, as XML for urdf-rs.
     pub text: String,
     /// Whether `quat_xyzw` counts: from URDF 1.1 on.
@@ -65,6 +67,7 @@ impl<'a, 'input> Scan<'a, 'input> {
             links: Vec::new(),
             joints: Vec::new(),
             collisions: 0,
+            visuals: 0,
             text: String::new(),
             has_quaternions: false,
             has_definitions: false,
@@ -109,19 +112,18 @@ impl<'a, 'input> Scan<'a, 'input> {
     }
 
     fn walk(&mut self, node: Node<'a, 'input>, tag: &'static Tag) -> Result<(), ModelError> {
-        if tag.opaque {
-            return Ok(());
-        }
         match tag.name {
             "link" => self.links.push(node),
             "joint" => self.joints.push(node),
             "collision" => self.collisions += 1,
+            "visual" => self.visuals += 1,
             _ => {}
         }
         let limits = [
             ("the number of links", self.links.len(), LINKS_MAX),
             ("the number of joints", self.joints.len(), LINKS_MAX),
-            ("the number of collisions", self.collisions, COLLISIONS_MAX),
+            ("the number of collisions", self.collisions, SHAPES_MAX),
+            ("the number of visuals", self.visuals, SHAPES_MAX),
         ];
         if let Some((what, _, most)) = limits.iter().find(|(_, found, most)| found > most) {
             return Err(ModelError::TooLarge {
@@ -129,6 +131,9 @@ impl<'a, 'input> Scan<'a, 'input> {
                 what,
                 limit: most.to_string(),
             });
+        }
+        if tag.opaque {
+            return Ok(());
         }
         self.text.push('<');
         self.text.push_str(tag.name);
