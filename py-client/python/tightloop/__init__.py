@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tightloop._core import Frame, __version__
+    from tightloop.body import Body
     from tightloop.dynamics import Dynamics
     from tightloop.errors import (
         ArgumentError,
@@ -38,11 +39,13 @@ if TYPE_CHECKING:
         WaitTimeout,
     )
     from tightloop.robot import Robot
-    from tightloop.scene import Scene, StaticShape
+    from tightloop.scene import Scene
+    from tightloop.shapes import Shape
     from tightloop.sim import FrameCopy, Sim, attach, launch
 
 _HOMES = {
     "tightloop._core": ("Frame", "__version__"),
+    "tightloop.body": ("Body",),
     "tightloop.dynamics": ("Dynamics",),
     "tightloop.errors": (
         "ArgumentError",
@@ -65,13 +68,15 @@ _HOMES = {
         "WaitTimeout",
     ),
     "tightloop.robot": ("Robot",),
-    "tightloop.scene": ("Scene", "StaticShape"),
+    "tightloop.scene": ("Scene",),
+    "tightloop.shapes": ("Shape",),
     "tightloop.sim": ("FrameCopy", "Sim", "attach", "launch"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "ArgumentError",
+    "Body",
     "CommandRefused",
     "DaemonLost",
     "DaemonRestarted",
@@ -87,9 +92,9 @@ __all__ = [
     "Robot",
     "Scene",
     "SceneError",
+    "Shape",
     "Sim",
     "SimClosed",
-    "StaticShape",
     "TightloopError",
     "TransportError",
     "UnknownDaemon",

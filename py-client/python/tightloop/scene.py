@@ -1,4 +1,4 @@
-"""What is simulated: robots, static shapes, time step and solver. A scene is data; `tightloop.launch` runs it."""
+"""What is simulated: robots, bodies, shapes, time step and solver. A scene is data; `tightloop.launch` runs it."""
 
 from __future__ import annotations
 
@@ -11,31 +11,16 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal, SupportsFloat, SupportsIndex
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tightloop import _core, checks
-from tightloop.checks import Quaternion, Triple, Vector
+from tightloop.body import Body
+from tightloop.checks import Triple, Vector
 from tightloop.errors import SceneError
 from tightloop.robot import PER_DOF, Robot
+from tightloop.shapes import ORIGIN, UPRIGHT, Shape, ShapeType, checked
 
 Cone = Literal["elliptic", "pyramidal"]
-ShapeType = Literal["box", "sphere", "cylinder", "capsule"]
-
-_ORIGIN = (0.0, 0.0, 0.0)
-_UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-
-
-@dataclass(frozen=True)
-class StaticShape:
-    """A shape that never moves: ``pos`` [m] and ``quat`` (x, y, z, w) of its centre in the world, and its sizes [m]."""
-
-    name: str
-    type: ShapeType
-    pos: Triple
-    quat: Quaternion
-    half_extents: Triple | None = None
-    radius: float | None = None
-    half_height: float | None = None
-
 
 @dataclass(frozen=True)
 class Solver:
@@ -49,7 +34,9 @@ class Solver:
 
 
 class Scene:
-    """Robots and static shapes, and how time advances.
+    """Robots, bodies and shapes, and how time advances.
+
+    In the arrays of a frame robots come first, then bodies, each in the order they were added.
 
     Args:
         dt: Length of a physics step [s], above 0.
@@ -60,14 +47,15 @@ class Scene:
         SceneError: A value is out of range; the message names it.
     """
 
-    __slots__ = ("_dt", "_gravity", "_solver", "_substeps", "robots", "shapes")
+    __slots__ = ("_dt", "_gravity", "_solver", "_substeps", "bodies", "robots", "shapes")
 
     def __init__(self, *, dt: float = 1 / 480, substeps: int = 8, gravity: Vector = (0.0, 0.0, -9.81)) -> None:
         self.dt = dt
         self.substeps = substeps
         self.gravity = gravity
         self.robots: dict[str, Robot] = {}
-        self.shapes: dict[str, StaticShape] = {}
+        self.bodies: dict[str, Body] = {}
+        self.shapes: dict[str, Shape] = {}
         self._solver = Solver()
 
     @property
@@ -125,55 +113,79 @@ class Scene:
         )
 
     def add_box(
-        self, *, half_extents: Vector, pos: Vector = _ORIGIN, quat: Vector = _UPRIGHT, name: str | None = None
-    ) -> StaticShape:
-        """Add a static box.
+        self,
+        *,
+        half_extents: Vector,
+        pos: Vector = ORIGIN,
+        quat: Vector = UPRIGHT,
+        body: Body | str | None = None,
+        density: float | None = None,
+        name: str | None = None,
+    ) -> Shape:
+        """Add a box, which stands still or moves with a body.
 
         Args:
             half_extents: Half the length of each side [m], above 0.
-            pos: Centre in the world [m].
-            quat: Orientation (x, y, z, w).
+            pos: Its centre in the world, or in the body's frame [m].
+            quat: Its orientation there (x, y, z, w).
+            body: The body that bears it, or its name; none for a static box.
+            density: Density of a body's box [kg/m³], 1000 if left out. Where the body's mass is given, only the ratios
+                of its shapes' densities matter.
             name: Unique name; ``box``, ``box_2``, … if left out.
+
+        Raises:
+            SceneError: A value is out of range; the message names it.
         """
-        return self._add_shape("box", name, pos, quat, half_extents=half_extents)
+        return self._add_shape("box", name, pos, quat, body, density, half_extents=half_extents)
 
     def add_sphere(
-        self, *, radius: float, pos: Vector = _ORIGIN, quat: Vector = _UPRIGHT, name: str | None = None
-    ) -> StaticShape:
-        """Add a static sphere of that radius [m]; the rest as in `add_box`."""
-        return self._add_shape("sphere", name, pos, quat, radius=radius)
+        self,
+        *,
+        radius: float,
+        pos: Vector = ORIGIN,
+        quat: Vector = UPRIGHT,
+        body: Body | str | None = None,
+        density: float | None = None,
+        name: str | None = None,
+    ) -> Shape:
+        """Add a sphere of that radius [m]; the rest as in `add_box`."""
+        return self._add_shape("sphere", name, pos, quat, body, density, radius=radius)
 
     def add_cylinder(
         self,
         *,
         radius: float,
         half_height: float,
-        pos: Vector = _ORIGIN,
-        quat: Vector = _UPRIGHT,
+        pos: Vector = ORIGIN,
+        quat: Vector = UPRIGHT,
+        body: Body | str | None = None,
+        density: float | None = None,
         name: str | None = None,
-    ) -> StaticShape:
-        """Add a static cylinder along its z axis, sizes [m]; the rest as in `add_box`."""
-        return self._add_shape("cylinder", name, pos, quat, radius=radius, half_height=half_height)
+    ) -> Shape:
+        """Add a cylinder along its z axis, sizes [m]; the rest as in `add_box`."""
+        return self._add_shape("cylinder", name, pos, quat, body, density, radius=radius, half_height=half_height)
 
     def add_capsule(
         self,
         *,
         radius: float,
         half_height: float,
-        pos: Vector = _ORIGIN,
-        quat: Vector = _UPRIGHT,
+        pos: Vector = ORIGIN,
+        quat: Vector = UPRIGHT,
+        body: Body | str | None = None,
+        density: float | None = None,
         name: str | None = None,
-    ) -> StaticShape:
-        """Add a static capsule along its z axis, sizes [m]; ``half_height`` is that between the caps' centres."""
-        return self._add_shape("capsule", name, pos, quat, radius=radius, half_height=half_height)
+    ) -> Shape:
+        """Add a capsule along its z axis, sizes [m]; ``half_height`` is that between the caps' centres."""
+        return self._add_shape("capsule", name, pos, quat, body, density, radius=radius, half_height=half_height)
 
     def add_urdf(
         self,
         path: str | os.PathLike[str],
         *,
         name: str | None = None,
-        pos: Vector = _ORIGIN,
-        quat: Vector = _UPRIGHT,
+        pos: Vector = ORIGIN,
+        quat: Vector = UPRIGHT,
         floating: bool = False,
         self_collisions: bool = False,
         strict: bool = False,
@@ -234,6 +246,42 @@ class Scene:
             warnings.warn(f"robot `{name}`: {warning}", stacklevel=2)
         return robot
 
+    def add_body(
+        self,
+        *,
+        pos: Vector = ORIGIN,
+        quat: Vector = UPRIGHT,
+        mass: float | None = None,
+        com: Vector | None = None,
+        inertia: ArrayLike | None = None,
+        fixed: bool = False,
+        name: str | None = None,
+    ) -> Body:
+        """Add a rigid body, such as a cube to be grasped; ``add_box(body=…)`` and the like give it shapes.
+
+        Without ``mass`` it weighs what its shapes do. With ``mass`` and no ``inertia`` it has the inertia of its shapes
+        at that mass, or, without any shape, that of a solid ball of water (1000 kg/m³).
+
+        Args:
+            pos: Where its frame stands at the start [m].
+            quat: Orientation of its frame at the start (x, y, z, w).
+            mass: Mass [kg], above 0.
+            com: Centre of mass in the body's frame [m]; that of its shapes, or the origin, if left out.
+            inertia: Inertia about the centre of mass in body axes [kg·m²], shape ``(3, 3)``, or ``(3,)`` for a diagonal.
+            fixed: Whether it stands still; otherwise it moves freely.
+            name: Unique name; ``body``, ``body_2``, … if left out.
+
+        Returns:
+            The body, to give it shapes.
+
+        Raises:
+            SceneError: A value is out of range; the message names it.
+        """
+        name = checks.name("body", self._free_name("body") if name is None else name, self._names())
+        body = Body(name, pos=pos, quat=quat, mass=mass, com=com, inertia=inertia, fixed=fixed)
+        self.bodies[name] = body
+        return body
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the scene as a TOML file; paths inside are relative to that file where they share a folder with it.
 
@@ -254,14 +302,16 @@ class Scene:
         data = json.loads(_core.load_scene(str(file)))
         scene = cls(dt=data["dt"], substeps=data["substeps"], gravity=data["gravity"])
         scene.solver(**data["solver"])
-        for shape in data.get("shape", ()):
-            getattr(scene, f"add_{shape.pop('type')}")(**shape)
         for table in data.get("robot", ()):
             joints = {name: table.pop(name) for name in PER_DOF if name in table}
             packages = [file.parent / folder for folder in table.pop("package_dirs", ())]
             robot = scene.add_urdf(file.parent / table.pop("urdf"), package_dirs=packages, **table)
             for name, values in joints.items():
                 setattr(robot, name, values if name == "joint_target_mode" else np.array(values, dtype=float))
+        for table in data.get("body", ()):
+            scene.add_body(**table)
+        for shape in data.get("shape", ()):
+            getattr(scene, f"add_{shape.pop('type')}")(**shape)
         return scene
 
     def to_toml(self) -> str:
@@ -269,7 +319,7 @@ class Scene:
         return _core.scene_to_toml(self._json())
 
     def __repr__(self) -> str:
-        return f"Scene(dt={self.dt:.6g}, substeps={self.substeps}, robots={[*self.robots]}, shapes={[*self.shapes]})"
+        return f"Scene(dt={self.dt:.6g}, substeps={self.substeps}, robots={[*self.robots]}, bodies={[*self.bodies]}, shapes={[*self.shapes]})"
 
     def _json(self) -> str:
         return json.dumps(
@@ -280,26 +330,36 @@ class Scene:
                 "solver": asdict(self._solver),
                 "shape": [asdict(shape) for shape in self.shapes.values()],
                 "robot": [robot.table() for robot in self.robots.values()],
+                "body": [body.table() for body in self.bodies.values()],
             }
         )
 
-    def _add_shape(self, kind: ShapeType, name: str | None, pos: Vector, quat: Vector, **sizes: Any) -> StaticShape:
+    def _add_shape(
+        self,
+        kind: ShapeType,
+        name: str | None,
+        pos: Vector,
+        quat: Vector,
+        body: Body | str | None,
+        density: float | None,
+        **sizes: Any,
+    ) -> Shape:
         name = checks.name(kind, self._free_name(kind) if name is None else name, self._names())
         what = f"{kind} `{name}`"
-        checked: dict[str, Any] = {}
-        for size, value in sizes.items():
-            if size == "half_extents":
-                checked[size] = checks.triple(f"{what}: {size}", value)
-                checks.number(f"{what}: smallest of {size}", min(checked[size]), above=0.0)
-            else:
-                checked[size] = checks.number(f"{what}: {size}", value, above=0.0)
-        position, orientation = checks.triple(f"{what}: pos", pos), checks.quaternion(f"{what}: quat", quat)
-        shape = StaticShape(name, kind, position, orientation, **checked)
+        bearer = body.name if isinstance(body, Body) else body
+        if bearer is not None and bearer not in self.bodies:
+            known = ", ".join(f"`{body}`" for body in self.bodies) or "none yet; add_body makes one"
+            raise SceneError(f"{what}: body is {bearer!r}, which is no body of this scene; there are: {known}")
+        if density is not None:
+            if bearer is None:
+                raise SceneError(f"{what} is static and has no density; leave it out, or give body=")
+            density = checks.number(f"{what}: density", density, above=0.0)
+        shape = Shape(name, kind, body=bearer, density=density, **checked(what, pos, quat, **sizes))
         self.shapes[name] = shape
         return shape
 
     def _names(self) -> list[str]:
-        return [*self.robots, *self.shapes]
+        return [*self.robots, *self.bodies, *self.shapes]
 
     def _free_name(self, kind: str) -> str:
         names = self._names()

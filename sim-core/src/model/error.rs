@@ -272,6 +272,15 @@ pub enum ModelError {
         lacks: &'static str,
     },
 
+    /// A body of the scene without mass.
+    #[error("body `{body}` {problem}")]
+    BodyMass {
+        /// The body.
+        body: String,
+        /// What is wrong, and the cure.
+        problem: &'static str,
+    },
+
     /// A joint that meets no inertia at the reference pose.
     #[error(
         "joint `{joint}`: what it moves has no inertia about its axis at q = 0; give its links mass away from the axis, or the joint an armature"

@@ -5,6 +5,8 @@ use super::pose::Pose;
 
 /// Roundings of an eigenvalue, relative to the largest; published figures err by more than this or not at all.
 const ROUNDING: f64 = 1e-12;
+/// What is smaller is zero [kg·m²]: exporters leave such dust in tensors that should be 0. MuJoCo's mjMINVAL.
+const DUST: f64 = 1e-15;
 
 /// Eigenvalues of a symmetric tensor `(3, 3)`, ascending, by cyclic Jacobi rotations [as the tensor].
 ///
@@ -41,13 +43,13 @@ pub fn principal_moments(tensor: [[f64; 3]; 3]) -> [f64; 3] {
 /// The lowest principal moment if it is negative beyond rounding.
 pub(super) fn negative_moment(inertia: [[f64; 3]; 3]) -> Option<f64> {
     let [low, _, high] = principal_moments(inertia);
-    (low < -ROUNDING * high.abs()).then_some(low)
+    (low < -(ROUNDING * high.abs()).max(DUST)).then_some(low)
 }
 
 /// Largest principal moment over the sum of the others, if above 1 beyond rounding.
 pub(super) fn triangle_excess(inertia: [[f64; 3]; 3]) -> Option<f64> {
     let [a, b, c] = principal_moments(inertia);
-    (c - (a + b) > ROUNDING * c).then(|| c / (a + b))
+    (c - (a + b) > (ROUNDING * c).max(DUST)).then(|| c / (a + b))
 }
 
 /// Two bodies that are fixed to each other as one; `other` is given in the frame `pose` of the first.

@@ -2,6 +2,7 @@
 //!
 //! `Description` is named, f64 and editable; it is checked, then compiled.
 
+mod body;
 mod checks;
 mod compile;
 pub mod constants;
@@ -18,6 +19,7 @@ mod tree;
 mod urdf;
 mod validate;
 
+pub use body::Body;
 pub use description::{
     Collision, Cone, Description, Inertial, Joint, JointDof, JointKind, Link, Mimic, Robot, Shape,
     Solver, StaticShape, TargetMode,

@@ -51,8 +51,13 @@ impl Robot {
 
     /// Frees the root link from the world: adds the joint `floating_base`, which starts at the robot's pose.
     pub fn float(&mut self) {
+        self.free_root("floating_base");
+    }
+
+    /// Carries the root link by a free joint of this name, which starts at the robot's pose.
+    pub(super) fn free_root(&mut self, joint: &str) {
         let root = self.link_order().first().copied().unwrap_or(0);
-        let mut base = Joint::new(JointKind::Free, "floating_base", None, root);
+        let mut base = Joint::new(JointKind::Free, joint, None, root);
         base.q[..3].copy_from_slice(&self.pose.pos);
         base.q[3..].copy_from_slice(&self.pose.quat);
         self.floating = true;

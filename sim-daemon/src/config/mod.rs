@@ -2,16 +2,20 @@
 //!
 //! Paths in a file are relative to it; relative paths in a text are relative to the folder given with it.
 
+mod bodies;
 mod number;
 pub(crate) mod paths;
+mod shapes;
 mod summary;
 
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sim_core::model::{Cone, Description, ModelError, Pose, Robot, Shape, Solver, TargetMode};
+use sim_core::model::{Cone, Description, ModelError, Pose, Robot, Solver, TargetMode};
 
+pub use bodies::BodyTable;
 pub use number::{Number, PerDof};
+pub use shapes::{ShapeName, ShapeTable};
 pub use sim_core::backend::BackendError;
 pub use sim_core::batch::Field;
 pub use sim_core::dynamics::Dynamics;
@@ -75,12 +79,15 @@ pub struct SceneFile {
     /// Options of the constraint solver.
     #[serde(default)]
     pub solver: SolverTable,
-    /// Static shapes.
+    /// Shapes: static ones, and those of bodies.
     #[serde(default, rename = "shape", skip_serializing_if = "Vec::is_empty")]
     pub shapes: Vec<ShapeTable>,
     /// Robots, in the order of their dofs.
     #[serde(default, rename = "robot", skip_serializing_if = "Vec::is_empty")]
     pub robots: Vec<RobotTable>,
+    /// Rigid bodies, in the order of their dofs, after all robots.
+    #[serde(default, rename = "body", skip_serializing_if = "Vec::is_empty")]
+    pub bodies: Vec<BodyTable>,
 }
 
 fn gravity() -> [Number; 3] {
@@ -126,53 +133,12 @@ pub enum ConeName {
     Pyramidal,
 }
 
-/// A static shape; which sizes it has depends on its type.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ShapeTable {
-    /// Its name; left out, it is named after its type.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
-    /// Its type.
-    #[serde(rename = "type")]
-    pub kind: ShapeName,
-    /// Half of each edge of a box [m].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub half_extents: Option<[Number; 3]>,
-    /// Radius of a sphere, cylinder or capsule [m].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub radius: Option<Number>,
-    /// Half of the height of a cylinder, or of that between the half spheres of a capsule [m].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub half_height: Option<Number>,
-    /// Position in the world [m].
-    #[serde(default)]
-    pub pos: [Number; 3],
-    /// Orientation in the world, unit quaternion (x, y, z, w) [–].
-    #[serde(default = "no_rotation")]
-    pub quat: [Number; 4],
-}
-
 fn no_rotation() -> [Number; 4] {
     Pose::identity().quat.map(Number)
 }
 
 fn hull_vertices() -> usize {
     MeshOptions::default().max_hull_vertices
-}
-
-/// Type of a static shape, by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ShapeName {
-    /// A cuboid.
-    Box,
-    /// A ball.
-    Sphere,
-    /// A cylinder along its z.
-    Cylinder,
-    /// A capsule along its z.
-    Capsule,
 }
 
 /// A robot from a URDF file. Joint values are one number for all dofs, or a list with one a dof.
@@ -340,8 +306,11 @@ impl SceneFile {
             impratio: self.solver.impratio.0,
         };
         for (index, shape) in self.shapes.iter().enumerate() {
-            let name = shape.name.as_deref().unwrap_or_default();
-            description.add_shape(name, shape.shape(index)?, pose(&shape.pos, &shape.quat));
+            shape.check_body(index, &self.bodies)?;
+            if shape.body.is_none() {
+                let name = shape.name.as_deref().unwrap_or_default();
+                description.add_shape(name, shape.shape(index)?, shape.pose());
+            }
         }
         for table in &self.robots {
             let options = UrdfOptions {
@@ -363,6 +332,9 @@ impl SceneFile {
             let robot = description.add_urdf(base_dir.join(&table.urdf), options)?;
             table.set_joints(robot)?;
         }
+        for table in &self.bodies {
+            description.add_body(table.body(&self.shapes)?)?;
+        }
         description.validate()?;
         Ok(description)
     }
@@ -382,48 +354,6 @@ fn pose(pos: &[Number; 3], quat: &[Number; 4]) -> Pose {
         quat: quat.map(|part| part.0),
     }
     .normalized()
-}
-
-impl ShapeTable {
-    fn shape(&self, index: usize) -> Result<Shape, ConfigError> {
-        let (kind, sizes): (_, &[&str]) = match self.kind {
-            ShapeName::Box => ("box", &["half_extents"]),
-            ShapeName::Sphere => ("sphere", &["radius"]),
-            ShapeName::Cylinder => ("cylinder", &["radius", "half_height"]),
-            ShapeName::Capsule => ("capsule", &["radius", "half_height"]),
-        };
-        let given = [
-            ("half_extents", self.half_extents.is_some()),
-            ("radius", self.radius.is_some()),
-            ("half_height", self.half_height.is_some()),
-        ];
-        for (size, given) in given {
-            if given != sizes.contains(&size) {
-                let shape = self.name.clone().unwrap_or_else(|| format!("#{index}"));
-                let reason = match given {
-                    true => format!("a {kind} has no {size}; give {}", sizes.join(" and ")),
-                    false => format!("{size} is missing; a {kind} needs {}", sizes.join(" and ")),
-                };
-                return Err(ConfigError::Shape { shape, reason });
-            }
-        }
-        let radius = self.radius.unwrap_or_default().0;
-        let half_height = self.half_height.unwrap_or_default().0;
-        Ok(match self.kind {
-            ShapeName::Box => Shape::Box {
-                half_extents: self.half_extents.unwrap_or_default().map(|half| half.0),
-            },
-            ShapeName::Sphere => Shape::Sphere { radius },
-            ShapeName::Cylinder => Shape::Cylinder {
-                radius,
-                half_height,
-            },
-            ShapeName::Capsule => Shape::Capsule {
-                radius,
-                half_height,
-            },
-        })
-    }
 }
 
 impl RobotTable {

@@ -63,17 +63,7 @@ impl Description {
         path: impl AsRef<Path>,
         options: UrdfOptions,
     ) -> Result<&mut Robot, ModelError> {
-        let robot = Robot::from_urdf(path, options)?;
-        if self.robots.iter().any(|other| other.name == robot.name) {
-            let owner = "scene".to_owned();
-            return Err(ModelError::DuplicateName {
-                owner,
-                what: "robot",
-                name: robot.name,
-            });
-        }
-        self.robots.push(robot);
-        Ok(self.robots.last_mut().expect("a robot was just added"))
+        self.add_robot(Robot::from_urdf(path, options)?)
     }
 }
 

@@ -1,0 +1,105 @@
+"""A rigid body of a scene: free in the world or fixed in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tightloop import checks
+from tightloop.checks import Quaternion, Triple, Vector
+from tightloop.errors import SceneError
+
+
+class Body:
+    """A rigid body; made by `Scene.add_body`. ``scene.add_box(body=…)`` and the like give it shapes.
+
+    Attributes:
+        name: Its name in the scene. ``sim.bodies[name]`` is its place in ``body_q``, ``sim.dofs[name]`` in ``joint_qd``.
+        fixed: Whether it stands still; otherwise it has the six dofs ``name/free.vx`` … ``name/free.wz``.
+        mass: Mass [kg]; None takes it from the shapes.
+        com: Centre of mass in the body's frame [m]; None takes it from the shapes.
+        inertia: Inertia about the centre of mass, in body axes [kg·m²], 3 rows; None takes it from the shapes.
+    """
+
+    # A misspelt property is an error
+    __slots__ = ("_name", "_pos", "_quat", "com", "fixed", "inertia", "mass")
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        pos: Vector,
+        quat: Vector,
+        mass: float | None,
+        com: Vector | None,
+        inertia: ArrayLike | None,
+        fixed: bool,
+    ) -> None:
+        what = f"body `{name}`"
+        self._name = name
+        self.pos = pos
+        self.quat = quat
+        self.fixed = bool(fixed)
+        self.mass = None if mass is None else checks.number(f"{what}: mass", mass, above=0.0)
+        self.com: Triple | None = None if com is None else checks.triple(f"{what}: com", com)
+        self.inertia = None if inertia is None else _tensor(f"{what}: inertia", inertia)
+        if inertia is not None and mass is None:
+            raise SceneError(f"{what} has an inertia but no mass; give mass= too")
+
+    @property
+    def name(self) -> str:
+        """Its name in the scene."""
+        return self._name
+
+    @property
+    def pos(self) -> Triple:
+        """Where its frame stands at the start, in the world [m]."""
+        return self._pos
+
+    @pos.setter
+    def pos(self, pos: Vector) -> None:
+        self._pos = checks.triple(f"body `{self.name}`: pos", pos)
+
+    @property
+    def quat(self) -> Quaternion:
+        """Orientation of its frame at the start, unit quaternion (x, y, z, w)."""
+        return self._quat
+
+    @quat.setter
+    def quat(self, quat: Vector) -> None:
+        self._quat = checks.quaternion(f"body `{self.name}`: quat", quat)
+
+    def table(self) -> dict[str, Any]:
+        """The body as a scene file has it."""
+        return {
+            "name": self.name,
+            "pos": self.pos,
+            "quat": self.quat,
+            "fixed": self.fixed,
+            "mass": self.mass,
+            "com": self.com,
+            "inertia": self.inertia,
+        }
+
+    def __repr__(self) -> str:
+        return f"Body({self.name!r}, fixed={self.fixed}, mass={self.mass})"
+
+
+def _tensor(what: str, values: ArrayLike) -> list[Sequence[float]]:
+    """A symmetric tensor from its 3 rows or from its diagonal."""
+    try:
+        given = np.asarray(values, dtype=float)
+    except (TypeError, ValueError) as problem:
+        raise SceneError(f"{what} is no array: {problem}") from None
+    if given.shape == (3,):
+        given = np.diag(given)
+    if given.shape != (3, 3):
+        raise SceneError(f"{what} has shape {given.shape}; give 3 principal moments or a (3, 3) tensor")
+    if not np.isfinite(given).all():
+        raise SceneError(f"{what} is not finite; give finite numbers")
+    if not np.allclose(given, given.T, rtol=1e-9, atol=0.0):
+        raise SceneError(f"{what} is not symmetric; give a symmetric tensor")
+    return given.tolist()

@@ -1,0 +1,139 @@
+//! Rigid bodies of a scene: robots of one link, free in the world or fixed in it.
+
+use super::description::{Collision, Description, Inertial, Link, Robot};
+use super::error::ModelError;
+use super::geometry::{DENSITY, mass_properties};
+use super::inertia::merge;
+use super::pose::Pose;
+
+/// A rigid body as users describe it; what is left out comes from its shapes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    /// Its name, unique in the scene.
+    pub name: String,
+    /// Its frame in the world, at the start.
+    pub pose: Pose,
+    /// Whether it stands still.
+    pub fixed: bool,
+    /// Mass [kg]; `None` is that of its shapes.
+    pub mass: Option<f64>,
+    /// Centre of mass in its frame [m]; `None` is that of its shapes, or the origin.
+    pub com: Option<[f64; 3]>,
+    /// Inertia about the centre of mass, in body axes `(3, 3)` [kg·m²]; `None` is that of its shapes at its mass, or,
+    /// without any, that of a solid ball of water.
+    pub inertia: Option<[[f64; 3]; 3]>,
+    /// Its shapes, each with its density [kg/m³].
+    pub shapes: Vec<(Collision, f64)>,
+}
+
+impl Body {
+    /// A free body without mass and shapes.
+    pub fn new(name: &str, pose: Pose) -> Body {
+        Body {
+            name: name.to_owned(),
+            pose,
+            fixed: false,
+            mass: None,
+            com: None,
+            inertia: None,
+            shapes: Vec::new(),
+        }
+    }
+
+    /// Mass, centre and inertia; `None` for nothing at all.
+    fn inertial(&self) -> Result<Option<Inertial>, ModelError> {
+        let mut shapes: Option<Inertial> = None;
+        for (collision, density) in &self.shapes {
+            let part = mass_properties(&collision.shape, *density)?;
+            let whole = shapes.unwrap_or(Inertial {
+                mass: 0.0,
+                pos: [0.0; 3],
+                inertia: [[0.0; 3]; 3],
+            });
+            shapes = Some(merge(&whole, &collision.pose, &part));
+        }
+        if let (None, Some(_)) = (self.mass, self.inertia) {
+            return Err(ModelError::BodyMass {
+                body: self.name.clone(),
+                problem: "has an inertia but no mass; give its mass too",
+            });
+        }
+        let Some(mass) = self.mass.or(shapes.map(|shapes| shapes.mass)) else {
+            if self.fixed {
+                return Ok(None);
+            }
+            return Err(ModelError::BodyMass {
+                body: self.name.clone(),
+                problem: "weighs nothing; give its mass, give it a shape, or fix it",
+            });
+        };
+        let inertia = match (self.inertia, shapes) {
+            (Some(inertia), _) => inertia,
+            (None, Some(shapes)) => shapes
+                .inertia
+                .map(|row| row.map(|entry| entry * mass / shapes.mass)),
+            (None, None) => ball(mass),
+        };
+        Ok(Some(Inertial {
+            mass,
+            pos: self
+                .com
+                .or(shapes.map(|shapes| shapes.pos))
+                .unwrap_or([0.0; 3]),
+            inertia,
+        }))
+    }
+}
+
+/// Inertia of a solid ball of water, 2/5 m r². `(3, 3)` [kg·m²]
+fn ball(mass: f64) -> [[f64; 3]; 3] {
+    let radius = (mass / (DENSITY * 4.0 / 3.0 * std::f64::consts::PI)).cbrt();
+    let moment = 0.4 * mass * radius * radius;
+    [[moment, 0.0, 0.0], [0.0, moment, 0.0], [0.0, 0.0, moment]]
+}
+
+impl Description {
+    /// Adds a rigid body: a robot of one link, `body`, that joint `free` carries if it is not fixed.
+    ///
+    /// # Errors
+    /// A body that weighs nothing, or a value that is out of range, by name; the scene is then unchanged.
+    pub fn add_body(&mut self, body: Body) -> Result<&mut Robot, ModelError> {
+        let link = Link {
+            name: "body".to_owned(),
+            inertial: body.inertial()?,
+            collisions: body.shapes.into_iter().map(|(shape, _)| shape).collect(),
+        };
+        let mut robot = Robot {
+            name: body.name,
+            pose: body.pose.normalized(),
+            floating: false,
+            self_collisions: false,
+            links: vec![link],
+            joints: Vec::new(),
+            notes: Vec::new(),
+            warnings: Vec::new(),
+            urdf: None,
+        };
+        if !body.fixed {
+            robot.free_root("free");
+        }
+        robot.validate()?;
+        self.add_robot(robot)
+    }
+
+    /// Adds a robot whose name is still free.
+    ///
+    /// # Errors
+    /// A name that another robot or body has.
+    pub fn add_robot(&mut self, robot: Robot) -> Result<&mut Robot, ModelError> {
+        if self.robots.iter().any(|other| other.name == robot.name) {
+            return Err(ModelError::DuplicateName {
+                owner: "scene".to_owned(),
+                what: "robot",
+                name: robot.name,
+            });
+        }
+        self.robots.push(robot);
+        Ok(self.robots.last_mut().expect("a robot was just added"))
+    }
+}
