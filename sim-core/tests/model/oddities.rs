@@ -150,6 +150,28 @@ fn leftovers_of_xacro_are_noted() {
 }
 
 #[test]
+fn calls_of_macros_that_are_nowhere_defined_are_warned_of() {
+    let text = with(
+        "<link name=\"base\"/>",
+        "<link name=\"base\"><xacro:look/></link><xacro:sensors_usb/><xacro:sensors_usb/>",
+    );
+    reads_as_plain(
+        &text,
+        &[
+            "<xacro:look> is ignored (line 2)",
+            "<xacro:sensors_usb> is ignored (2 times, first in line 2)",
+            "the XML prefix `xacro` is not declared",
+        ],
+    );
+    let warnings = read(&text).warnings;
+    assert_eq!(warnings.len(), 1);
+    assert!(
+        warnings[0].contains("<xacro:look>, <xacro:sensors_usb>"),
+        "{warnings:?}"
+    );
+}
+
+#[test]
 fn prefixes_that_nobody_declared_are_noted() {
     let text = with(
         "<link name=\"base\"/>",

@@ -68,7 +68,7 @@ impl<'a, 'input> Reader<'a, 'input> {
             links,
             joints,
             notes,
-            warnings: self.missing_visuals(),
+            warnings: [self.scan.warnings(), self.missing_visuals()].concat(),
             urdf: Some(self.path.to_owned()),
         };
         robot.place_free_bodies();

@@ -4,7 +4,7 @@
 //! knows: presence is kept, the unknown is noted, a bad value is refused with its line, and only what the table knows is
 //! handed on as text. The walk is as deep as the table, however deep a file nests.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -18,6 +18,8 @@ use super::xml::{describe, escape, name_of, prefix_of, same, short};
 
 /// Notes on ignored things: more than a person reads.
 const IGNORED_MAX: usize = 200;
+/// Most elements in a warning.
+const LISTED_MAX: usize = 8;
 /// Most links and most joints of a robot: reading them stays below a second.
 const LINKS_MAX: usize = 4096;
 /// Most collisions and most visuals of a robot, for the same reason.
@@ -39,8 +41,12 @@ pub(super) struct Scan<'a, 'input> {
     pub text: String,
     /// Whether `quat_xyzw` counts: from URDF 1.1 on.
     has_quaternions: bool,
-    /// Whether xacro would have found something to do.
-    has_definitions: bool,
+    /// Names of the macros of xacro that the file defines.
+    macros: BTreeSet<&'a str>,
+    /// Whether there are elements of xacro.
+    has_xacro: bool,
+    /// Elements that call a macro that is not defined.
+    undefined: BTreeSet<String>,
     ignored: Vec<Ignored>,
     ignored_at: HashMap<String, usize>,
     /// How often something was ignored that no longer got a note of its own.
@@ -70,7 +76,9 @@ impl<'a, 'input> Scan<'a, 'input> {
             visuals: 0,
             text: String::new(),
             has_quaternions: false,
-            has_definitions: false,
+            macros: macros(document),
+            has_xacro: false,
+            undefined: BTreeSet::new(),
             ignored: Vec::new(),
             ignored_at: HashMap::new(),
             ignored_more: 0,
@@ -92,8 +100,8 @@ impl<'a, 'input> Scan<'a, 'input> {
         }
         scan.version(root);
         scan.walk(root, &ROBOT)?;
-        if scan.links.is_empty() && scan.has_definitions {
-            let reason = "holds definitions of xacro and no links; run `xacro` on the file that uses them and load what it prints";
+        if scan.links.is_empty() && scan.has_xacro {
+            let reason = "holds elements of xacro and no links; run `xacro` on the file that uses them and load what it prints";
             return Err(scan.fault(root, reason.to_owned()));
         }
         Ok(scan)
@@ -203,12 +211,8 @@ impl<'a, 'input> Scan<'a, 'input> {
         own: bool,
     ) -> Result<(), ModelError> {
         let name = child.tag_name().name();
-        // definitions do nothing by themselves; what xacro would have put in place of the others is missing
-        let xacro = !own && is_xacro(child);
-        self.has_definitions |= xacro;
-        if xacro && !matches!(name, "property" | "macro" | "arg") {
-            let reason = "is left from xacro; run `xacro` on the file and load what it prints";
-            return Err(self.fault(child, reason.to_owned()));
+        if !own && is_xacro(child) {
+            return self.leftover(child);
         }
         let place = PLACES
             .iter()
@@ -225,6 +229,51 @@ impl<'a, 'input> Scan<'a, 'input> {
                 false => format!("is not an element of URDF; write <{known}>"),
             },
         ))
+    }
+
+    /// Notes an element of xacro that does nothing, or refuses one in whose place xacro would have put something.
+    fn leftover(&mut self, node: Node<'a, 'input>) -> Result<(), ModelError> {
+        self.has_xacro = true;
+        let name = node.tag_name().name();
+        let is_definition = matches!(name, "property" | "macro" | "arg");
+        let is_builtin = [
+            "include",
+            "if",
+            "unless",
+            "call",
+            "insert_block",
+            "element",
+            "attribute",
+        ]
+        .contains(&name);
+        if is_builtin || self.macros.contains(name) {
+            let reason = "is left from xacro; run `xacro` on the file and load what it prints";
+            return Err(self.fault(node, reason.to_owned()));
+        }
+        let called = name_of(node);
+        self.ignore(node, format!("<{called}>"));
+        // xacro itself could make nothing of it
+        if !is_definition && self.undefined.len() < LISTED_MAX {
+            self.undefined.insert(called);
+        }
+        Ok(())
+    }
+
+    /// One warning of all macros that are called but nowhere defined.
+    pub fn warnings(&self) -> Vec<String> {
+        if self.undefined.is_empty() {
+            return Vec::new();
+        }
+        let names: Vec<String> = self
+            .undefined
+            .iter()
+            .map(|name| format!("<{name}>"))
+            .collect();
+        vec![format!(
+            "macros of xacro are called but nowhere defined, so what they would make is missing: {}; delete the calls, or \
+             expand the file with xacro where their definitions are",
+            names.join(", ")
+        )]
     }
 
     fn attributes(&mut self, node: Node<'a, 'input>, tag: &'static Tag) -> Result<(), ModelError> {
@@ -385,4 +434,13 @@ impl<'a, 'input> Scan<'a, 'input> {
 fn is_xacro(node: Node) -> bool {
     let namespace = node.tag_name().namespace().unwrap_or_default();
     prefix_of(node) == Some("xacro") || namespace.contains("xacro")
+}
+
+/// Names of the macros that a document defines.
+fn macros<'a>(document: &'a Document) -> BTreeSet<&'a str> {
+    let nodes = document.descendants();
+    nodes
+        .filter(|node| node.tag_name().name() == "macro" && is_xacro(*node))
+        .filter_map(|node| node.attribute("name"))
+        .collect()
 }
