@@ -35,7 +35,7 @@ FRAMES_MIN = 20
 ACCELERATION = 4.0
 # Beyond this condition of the mass matrix nobody's accelerations have eight digits
 SINGULAR = 1e8
-FIELDS = "joint_q joint_qd joint_qdd body_q mass_matrix bias_force".split()
+FIELDS = "joint_q joint_qd joint_qdd body_q body_qd mass_matrix bias_force".split()
 # A thousand blobs of one link, whose inertia is zero: nobody can move them
 BLOBS = "random_urdfs"
 # What the paths in the wheels have in common is left out of names
@@ -121,13 +121,13 @@ def case(request: pytest.FixtureRequest) -> Iterator[Case]:
     scene = tl.Scene(dt=DT, substeps=SUBSTEPS)
     scene.solver(iterations=ITERATIONS, tolerance=0.0)
     add = {"name": PREFIX.rstrip("/"), "floating": floating, "package_dirs": file.package_dirs}
-    fixed = model_of(file.path, floating=False, dt=DT)
+    fixed = model_of(file.path, floating=False, dt=DT, package_dirs=file.package_dirs)
     if floating and not fixed.body_mass[root_bodies(fixed)].sum() > 0:
         with pytest.raises(tl.UrdfError, match="moved by joint `floating_base` but has no mass"):
             scene.add_urdf(file.path, **add)
         pytest.skip("its root link weighs nothing, and cannot float")
     robot = scene.add_urdf(file.path, **add)
-    model = model_of(file.path, floating=True, dt=DT) if floating else fixed
+    model = model_of(file.path, floating=True, dt=DT, package_dirs=file.package_dirs) if floating else fixed
     assert robot.dofs == model.nv
     if not model.nv:
         pytest.skip("nothing moves on a fixed base")
@@ -181,6 +181,12 @@ def test_dynamics_at_random_states_are_mujocos(case):
         condition = max(condition, float(np.linalg.cond(mass_matrix)))
         theirs = np.hstack([data.xpos[1:], np.roll(data.xquat[1:], -1, axis=1)])
         assert_link_frames(frame.body_q[world : world + 1, order], theirs[None], DOUBLE.pose)
+        jacobian = np.zeros((len(order), 6, model.nv))
+        for body, rows in enumerate(jacobian, 1):
+            # what weighs nothing has the velocity of its frame
+            at = mujoco.mj_jacBodyCom if model.body_mass[body] > 0 else mujoco.mj_jacBody
+            at(model, data, rows[:3], rows[3:], body)
+        assert off(frame.body_qd[world, order], jacobian @ data.qvel) <= DOUBLE.dynamics, f"body_qd of state {world}"
     case.row |= dict(zip(("M", "bias", "qacc"), (f"{error:.0e}" for error in errors.max(axis=0)), strict=True))
     assert errors[:, 0].max() <= DOUBLE.dynamics, f"mass matrix of state {errors[:, 0].argmax()}"
     assert errors[:, 1].max() <= DOUBLE.dynamics, f"bias force of state {errors[:, 1].argmax()}"

@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 from test_every_joint import Coordinates, in_plane
 from twin import IMPEDANCE_MAX, ITERATIONS, LIMIT_KD, LIMIT_KE, Array
+from weigh import add_inertial
 
 import tightloop as tl
 
@@ -33,9 +34,12 @@ def parse(path: Path) -> ET.Element:
     return ET.fromstring(re.sub(r"^<\?xml.*?\?>", "", text))
 
 
-def model_of(path: Path, *, floating: bool, dt: float) -> mujoco.MjModel:
+def model_of(path: Path, *, floating: bool, dt: float = 1e-3, package_dirs: tuple[Path, ...] = ()) -> mujoco.MjModel:
     """MuJoCo's model of a file, links prefixed, solved to the end as in the other live tests."""
     robot = parse(path)
+    for link in robot.findall("link"):
+        if link.find("inertial") is None and link.find("collision") is not None:
+            add_inertial(link, path, package_dirs)
     by_hand = digest(robot)
     robot.insert(0, ET.fromstring(COMPILER))
     spec = mujoco.MjSpec.from_string(ET.tostring(robot, encoding="unicode"))
