@@ -27,6 +27,9 @@ from urdf_twin import FLOATING_BASE, PREFIX, RobotCoordinates, model_of, root_bo
 
 import tightloop as tl
 
+# What is mended and noted in these files is not the matter here
+pytestmark = pytest.mark.filterwarnings("ignore:robot `:UserWarning")
+
 STATES = 20
 FRAMES, SUBSTEPS, DT = 100, 4, 1 / 480
 # Frames that motions are compared on average, until they are chaotic; with fewer a comparison says little
