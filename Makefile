@@ -37,11 +37,11 @@ test: wheel $(VENV)/.dev
 	else set -x; cargo test --release --workspace --exclude py-client --lib --bins --tests; fi
 	$(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . py-client/tests tests/python
 
-# Kept out of `test`: the wheels are 260 MB. They go to out/published, once.
+# Kept out of `test`: 260 MB of wheels, which go to out/published once, and some ten minutes.
 published: wheel $(VENV)/.dev
-	$(PYTHON) tests/python/published/fetch.py
+	$(if $(TIGHTLOOP_URDF),,$(PYTHON) tests/python/published/fetch.py)
 	PYTHONPATH=tests/python/published:tests/python/mujoco $(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . \
-	  -p robots tests/python/published/agree.py
+	  -p options tests/python/published/agree.py
 
 bench: wheel $(VENV)/.dev
 	cargo bench --package tightloop --bench step

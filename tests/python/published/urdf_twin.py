@@ -13,16 +13,13 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from test_every_joint import Coordinates, in_plane
-from twin import IMPEDANCE_MAX, ITERATIONS, LIMIT_KD, LIMIT_KE, Array
+from numpy.typing import NDArray
+from robots import in_plane
+from twin import COMPILER, ITERATIONS, flatten_mimics, limits_in_force_space
 from weigh import add_inertial
 
-import tightloop as tl
-
-# Bodies stay the links they are; inertias that no body can have become spheres' on both sides
-COMPILER = '<mujoco><compiler discardvisual="false" fusestatic="false" balanceinertia="true"/></mujoco>'
 PREFIX = "r/"
-FLOATING_BASE = "floating_base"
+FLOATING_BASE = f"{PREFIX}floating_base"
 # MuJoCo refuses moments below 1e-14 kg m², even those of frames that are fixed to a link of 1e-2
 MOMENT_MIN = 2e-14
 
@@ -34,14 +31,14 @@ def parse(path: Path) -> ET.Element:
     return ET.fromstring(re.sub(r"^<\?xml.*?\?>", "", text))
 
 
-def model_of(path: Path, *, floating: bool, dt: float = 1e-3, package_dirs: tuple[Path, ...] = ()) -> mujoco.MjModel:
+def model_of(path: Path, *, floating: bool, dt: float, package_dirs: tuple[Path, ...] = ()) -> mujoco.MjModel:
     """MuJoCo's model of a file, links prefixed, solved to the end as in the other live tests."""
     robot = parse(path)
     for link in robot.findall("link"):
         if link.find("inertial") is None and link.find("collision") is not None:
             add_inertial(link, path, package_dirs)
     by_hand = digest(robot)
-    robot.insert(0, ET.fromstring(COMPILER))
+    robot.insert(0, ET.fromstring(COMPILER.format(balance="true")))
     spec = mujoco.MjSpec.from_string(ET.tostring(robot, encoding="unicode"))
     for joint in by_hand:
         add_joint(spec, joint)
@@ -56,7 +53,9 @@ def model_of(path: Path, *, floating: bool, dt: float = 1e-3, package_dirs: tupl
     # a start that is far outside its limits is no reason to start again
     option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
     model = spec.compile()
-    set_limits(model)
+    # MuJoCo gives what weighs nothing the centre of what it carries; ours is the origin of its frame
+    model.body_ipos[model.body_mass == 0] = 0.0
+    limits_in_force_space(model)
     flatten_mimics(model)
     return model
 
@@ -72,6 +71,9 @@ def digest(robot: ET.Element) -> list[ET.Element]:
             raise_moments(inertia)
     by_hand = []
     for joint in robot.findall("joint"):
+        joint.set("name", PREFIX + joint.get("name", ""))
+        for mimic in joint.findall("mimic"):
+            mimic.set("joint", PREFIX + mimic.get("joint", ""))
         for role in ("parent", "child"):
             for end in joint.findall(role):
                 end.set("link", PREFIX + end.get("link", ""))
@@ -122,41 +124,7 @@ def add_joint(spec: mujoco.MjSpec, joint: ET.Element) -> None:
             part.damping[0], part.frictionloss = float(dynamics.get("damping", 0)), float(dynamics.get("friction", 0))
 
 
-def set_limits(model: mujoco.MjModel) -> None:
-    """Joint limits in force space, of which MuJoCo's reader knows nothing."""
-    softness = model.dof_invweight0[model.jnt_dofadr] * (1 - IMPEDANCE_MAX)
-    model.jnt_solref[:, 0] = 2 / (LIMIT_KD * softness)
-    model.jnt_solref[:, 1] = LIMIT_KD * softness / 2 * np.sqrt(1 / (LIMIT_KE * softness))
-
-
-def flatten_mimics(model: mujoco.MjModel) -> None:
-    """A follower of a follower comes to follow the first leader, as tightloop has it."""
-    row_of = {model.eq_obj1id[row]: row for row in range(model.neq)}
-    for row in range(model.neq):
-        while (leading := row_of.get(model.eq_obj2id[row])) is not None:
-            offset, ratio = model.eq_data[row, :2]
-            model.eq_data[row, :2] = offset + ratio * model.eq_data[leading, 0], ratio * model.eq_data[leading, 1]
-            model.eq_obj2id[row] = model.eq_obj2id[leading]
-
-
-def root_bodies(model: mujoco.MjModel) -> Array:
-    """The root link and what is fixed to it."""
-    return np.flatnonzero(model.body_weldid == model.body_weldid[1])[int(model.body_weldid[1] == 0) :]
-
-
-class RobotCoordinates(Coordinates):
-    """Our positions and velocities as MuJoCo's; a free base has the velocity of all that is fixed to its root link."""
-
-    def __init__(self, model: mujoco.MjModel, sim: tl.Sim) -> None:
-        super().__init__(model, sim)
-        for number, (kind, at, dof, coords, dofs, _) in enumerate(self.joints):
-            if kind == mujoco.mjtJoint.mjJNT_FREE:
-                self.joints[number] = (kind, at, dof, coords, dofs, self.center(model.jnt_bodyid[number]))
-
-    def center(self, root: int) -> Array:
-        """Centre of mass [m] of a body and those fixed to it, in the body's frame."""
-        data = mujoco.MjData(self.model)
-        mujoco.mj_kinematics(self.model, data)
-        fixed = np.flatnonzero(self.model.body_weldid == root)
-        center = np.average(data.xipos[fixed], axis=0, weights=self.model.body_mass[fixed])
-        return data.xmat[root].reshape(3, 3).T @ (center - data.xpos[root])
+def root_bodies(model: mujoco.MjModel) -> NDArray[np.int64]:
+    """The first link and all that is fixed to it, or to a base that does not move."""
+    bodies = np.arange(model.nbody)
+    return bodies[(bodies > 0) & (model.body_weldid == model.body_weldid[1])]
