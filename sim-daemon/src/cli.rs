@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use sim_protocol::{AttachOptions, Client, keep_waiting};
 
+use crate::config::MeshOptions;
 use crate::error::DaemonError;
 use crate::{inspect, session};
 
@@ -109,6 +110,18 @@ pub(crate) struct Inspect {
     /// Folder that holds the packages of package:// paths; may be given several times.
     #[arg(long = "package-dir", value_name = "DIR")]
     pub(crate) package_dirs: Vec<PathBuf>,
+
+    /// Most vertices of the convex hull of a collision mesh.
+    #[arg(long, value_name = "COUNT", default_value_t = MeshOptions::default().max_hull_vertices)]
+    pub(crate) mesh_max_hull_vertices: usize,
+
+    /// Make several convex hulls of a concave collision mesh.
+    #[arg(long)]
+    pub(crate) convex_decomposition: bool,
+
+    /// Draw the convex hulls that stand for meshes in contacts, not the meshes.
+    #[arg(long)]
+    pub(crate) hulls: bool,
 
     /// Joint positions of the picture, one a coordinate [rad or m], separated by commas; 0 if left out.
     #[arg(

@@ -22,7 +22,9 @@ pub(crate) fn relative_to(folder: &Path, path: &Path) -> PathBuf {
 
 /// Absolute, without `.` and `..`.
 fn lexical(path: &Path) -> PathBuf {
-    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    // the folder of `robot.urdf` is the empty path, which has no absolute form
+    let path = Path::new(".").join(path);
+    let absolute = std::path::absolute(&path).unwrap_or(path);
     let mut clean = PathBuf::new();
     for component in absolute.components() {
         match component {

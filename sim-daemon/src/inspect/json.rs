@@ -72,6 +72,7 @@ fn collision(collision: &Collision) -> Value {
             "scale": mesh.scale,
             "triangles": mesh.triangles.triangles.len(),
             "closed": mesh.closed,
+            "hull_vertices": mesh.hulls.iter().map(|hull| hull.vertices.len()).collect::<Value>(),
             "extent": mesh.triangles.extent(),
         }),
     };

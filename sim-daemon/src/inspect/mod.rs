@@ -11,8 +11,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use sim_core::dynamics::Dynamics;
-use sim_core::model::geometry::triangles;
-use sim_core::model::{Description, ModelError, Pose, Robot, UrdfOptions};
+use sim_core::model::geometry::{Hull, MeshOptions, TriMesh, triangles};
+use sim_core::model::{Description, ModelError, Pose, Robot, Shape, UrdfOptions};
 
 use crate::cli::Inspect;
 use crate::error::DaemonError;
@@ -21,6 +21,15 @@ use picture::Drawing;
 
 /// Runs the command.
 pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
+    let meshes = MeshOptions {
+        max_hull_vertices: args.mesh_max_hull_vertices,
+        convex_decomposition: args.convex_decomposition,
+    };
+    meshes.validate().map_err(|error| DaemonError::Argument {
+        argument: "--mesh-max-hull-vertices",
+        value: args.mesh_max_hull_vertices.to_string(),
+        problem: error.to_string(),
+    })?;
     // nothing moves here: any step does
     let mut scene = Description::new(1e-3, 1);
     let robot = scene.add_urdf(
@@ -28,6 +37,7 @@ pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
         UrdfOptions {
             floating: args.floating,
             strict: args.strict,
+            meshes,
             package_dirs: args.package_dirs.clone(),
             ..UrdfOptions::default()
         },
@@ -52,7 +62,7 @@ pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
             let problem = "it is there already and no picture of ours; say with --png FILE where to write, or --no-png";
             return Err(failed(path, problem.to_owned()));
         }
-        let drawing = drawing(&facts, &frames, args.joint_q.as_deref());
+        let drawing = drawing(&facts, &frames, args);
         picture::write(&drawing.render(), path).map_err(|error| {
             failed(path, format!("{error}; say with --png FILE where to write, or --no-png"))
         })
@@ -81,6 +91,18 @@ fn failed(path: &Path, problem: String) -> DaemonError {
     }
 }
 
+/// The sides of a hull.
+fn sides(hull: &Hull) -> TriMesh {
+    let sides = hull.faces.iter().flat_map(|face| {
+        let fan = face.corners.windows(2).skip(1);
+        fan.map(|edge| [face.corners[0], edge[0], edge[1]])
+    });
+    TriMesh {
+        vertices: hull.vertices.clone(),
+        triangles: sides.collect(),
+    }
+}
+
 /// Where the picture goes, if anywhere.
 fn destination(args: &Inspect, robot: &Robot) -> Option<PathBuf> {
     match &args.png {
@@ -102,7 +124,7 @@ fn destination(args: &Inspect, robot: &Robot) -> Option<PathBuf> {
 }
 
 /// What the picture shows. `frames` are position and quaternion of each link, in body order. `(bodies, 7)` [m, –]
-fn drawing(facts: &Facts, frames: &[f64], joint_q: Option<&[f64]>) -> Drawing {
+fn drawing(facts: &Facts, frames: &[f64], args: &Inspect) -> Drawing {
     let robot = facts.robot;
     let pose = |frame: &[f64]| Pose {
         pos: std::array::from_fn(|axis| frame[axis]),
@@ -113,11 +135,15 @@ fn drawing(facts: &Facts, frames: &[f64], joint_q: Option<&[f64]>) -> Drawing {
     for (place, (&link, pose)) in facts.order.iter().zip(&poses).enumerate() {
         for collision in &robot.links[link].collisions {
             let frame = pose.mul(&collision.pose);
-            shapes.push((place as u32, frame, triangles(&collision.shape)));
+            let mut draw = |surface| shapes.push((place as u32, frame, surface));
+            match &collision.shape {
+                Shape::Mesh(mesh) if args.hulls => mesh.hulls.iter().map(sides).for_each(draw),
+                shape => draw(triangles(shape)),
+            }
         }
     }
     let outside = facts.outside_range();
-    let mut caption = match joint_q {
+    let mut caption = match &args.joint_q {
         Some(joint_q) => format!("joint_q = {}", commas(joint_q)),
         None => "joint_q = 0".to_owned(),
     };
@@ -127,6 +153,16 @@ fn drawing(facts: &Facts, frames: &[f64], joint_q: Option<&[f64]>) -> Drawing {
         [one, rest @ ..] => {
             caption += &format!(", outside the ranges of {one} and {} more", rest.len());
         }
+    }
+    let meshes = facts.robot.links.iter().flat_map(|link| &link.collisions);
+    if meshes
+        .into_iter()
+        .any(|c| matches!(c.shape, Shape::Mesh(_)))
+    {
+        caption += match args.hulls {
+            true => "; convex hulls of meshes",
+            false => "; meshes as their files have them",
+        };
     }
     Drawing {
         title: robot.name.clone(),

@@ -113,6 +113,9 @@ fn notes(facts: &Facts) -> String {
 /// Least room for text beside what stands before it, however wide that is.
 const ROOM: usize = 40;
 
+/// A space that a line is not broken at; it is printed as any other.
+pub(super) const NO_BREAK: &str = "\u{a0}";
+
 /// A text in lines of at most [`COLUMNS`], broken at spaces; the first begins with `first`, others with `next`.
 pub(super) fn wrapped(first: &str, next: &str, text: &str) -> String {
     let mut lines = String::new();
@@ -135,7 +138,7 @@ pub(super) fn wrapped(first: &str, next: &str, text: &str) -> String {
     }
     lines += line.trim_end();
     lines.push('\n');
-    lines
+    lines.replace(NO_BREAK, " ")
 }
 
 /// What a joint lets its link do.

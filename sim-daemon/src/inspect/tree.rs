@@ -7,7 +7,7 @@ use std::path::Path;
 use sim_core::model::{Collision, Joint, JointKind, Link, Pose, Shape, principal_moments};
 
 use super::facts::{Facts, axis, count, rounded, short, triple, unit};
-use super::text::{COLUMNS, motion, wrapped};
+use super::text::{COLUMNS, NO_BREAK, motion, wrapped};
 use crate::config::paths::relative_to;
 
 /// Widest column of names; longer ones push what follows to the right.
@@ -171,10 +171,14 @@ fn place(pose: &Pose) -> String {
 
 /// A collision shape and its sizes.
 fn shape(facts: &Facts, collision: &Collision) -> String {
-    let edges = |edges: [f64; 3]| edges.map(short).join(" × ");
+    // a size stays in one line
+    let edges = |edges: [f64; 3]| {
+        let edges = edges.map(|edge| rounded(edge, 4));
+        format!("{} m", edges.join(" × ")).replace(' ', NO_BREAK)
+    };
     let mut text = match &collision.shape {
         Shape::Box { half_extents } => {
-            format!("box {} m", edges(half_extents.map(|half| 2.0 * half)))
+            format!("box {}", edges(half_extents.map(|half| 2.0 * half)))
         }
         Shape::Sphere { radius } => format!("sphere of radius {} m", short(*radius)),
         Shape::Cylinder {
@@ -197,11 +201,17 @@ fn shape(facts: &Facts, collision: &Collision) -> String {
             let folder = facts.robot.urdf.as_deref().and_then(|urdf| urdf.parent());
             let file = relative_to(folder.unwrap_or(Path::new("")), &mesh.path);
             let [low, high] = mesh.triangles.extent();
-            let size = [0, 1, 2].map(|axis| rounded(high[axis] - low[axis], 3));
-            let size = size.join(" × ");
+            let size = edges([0, 1, 2].map(|axis| high[axis] - low[axis]));
             let facets = count(mesh.triangles.triangles.len(), "triangle");
             let closed = if mesh.closed { "closed" } else { "open" };
-            let mut text = format!("mesh {}: {facets}, {closed}, {size} m", file.display());
+            let corners = || mesh.hulls.iter().map(|hull| hull.vertices.len());
+            let (least, most) = (corners().min().unwrap_or(0), corners().max().unwrap_or(0));
+            let hulls = match mesh.hulls.len() {
+                1 => format!("hull of {most} vertices"),
+                several => format!("{several} hulls of {least} to {most} vertices"),
+            };
+            let file = file.display();
+            let mut text = format!("mesh {file}: {size}, {facets}, {closed}, {hulls}");
             if mesh.scale != [1.0; 3] {
                 text += &format!(", scale {}", mesh.scale.map(short).join(" "));
             }

@@ -191,3 +191,53 @@ fn without_collisions_the_frames_are_drawn() {
         assert!(picture.0.iter().filter(pure).count() > 100, "{part}");
     }
 }
+
+/// An L of 2 m by 2 m in x and z as an OBJ file, its notch at the upper right.
+fn corner_piece() -> String {
+    let outline = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)];
+    let mut text = String::new();
+    for y in [-0.5, 0.5] {
+        for (x, z) in outline {
+            text += &format!("v {x} {y} {z}\n");
+        }
+    }
+    for k in 1..5 {
+        // all of it is seen from its first corner
+        text += &format!("f 1 {} {}\nf 7 {} {}\n", k + 1, k + 2, k + 8, k + 7);
+    }
+    for k in 0..6 {
+        let (a, b) = (k + 1, (k + 1) % 6 + 1);
+        text += &format!("f {a} {} {b}\nf {b} {} {}\n", a + 6, a + 6, b + 6);
+    }
+    text
+}
+
+#[test]
+fn a_mesh_is_drawn_as_it_is_or_as_what_stands_for_it_in_contacts() {
+    let folder = Folder::new("hulls");
+    folder.file("l.obj", &corner_piece());
+    let mesh = "<collision><geometry><mesh filename=\"l.obj\"/></geometry></collision>";
+    folder.file("a.urdf", &one_link("r", mesh));
+    let [x, y] = SIDE;
+    let notch = |options: &[&str], hulls: &str| {
+        let said = inspect(&folder.0, &[&["a.urdf"], options].concat());
+        assert_eq!(said.code, 0, "{}", said.err);
+        let line = said
+            .out
+            .lines()
+            .find(|line| line.contains("l.obj"))
+            .unwrap();
+        let expected = format!("mesh l.obj: 2 × 1 × 2 m, 20 triangles, closed, {hulls}");
+        assert_eq!(line.trim_start(), expected);
+        let picture = Picture::read(&folder.0.join("r.png"));
+        assert!(is_blue(picture.at(x - 43, y + 43)));
+        picture.at(x + 43, y - 43)
+    };
+    // 0.3 m to the right of the inner corner and above it: in the hull, not in the mesh
+    assert!(is_paper(notch(&[], "hull of 10 vertices")));
+    assert!(is_blue(notch(&["--hulls"], "hull of 10 vertices")));
+    let json = inspect(&folder.0, &["a.urdf", "--json"]).out;
+    let all: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(all["links"][0]["collisions"][0]["hull_vertices"][0], 10);
+    assert_eq!(all["links"][0]["collisions"][0]["triangles"], 20);
+}

@@ -156,6 +156,7 @@ fn a_misused_command_line_is_told_so() {
         (&["--joint-q", "1,2"][..], "has 2 values"),
         (&["--joint-q", "0,0,0,0,0,0,0,0,NaN"], "NaN"),
         (&["--joint-q", "a"], "invalid value 'a'"),
+        (&["--mesh-max-hull-vertices", "3"], "between 8 and 1024"),
         (&["--json", "--long"], "cannot be used with"),
         (&["--png", "a.png", "--no-png"], "cannot be used with"),
         (&["--colour"], "unexpected argument"),
