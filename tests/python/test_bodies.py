@@ -7,6 +7,9 @@ import pytest
 
 import tightloop as tl
 
+# shapes have no contacts yet, which launch says
+pytestmark = pytest.mark.filterwarnings("ignore:contacts are not simulated yet")
+
 TURN = (0.0, 0.6, 0.0, 0.8)
 FIELDS = ("joint_q", "joint_qd", "body_q", "body_qd", "mass_matrix")
 
@@ -80,7 +83,8 @@ def test_free_bodies_fall_and_fixed_ones_stand():
         assert sim.body_names == ["cube/body", "post/body"]
         assert sim.dofs == {"cube": slice(0, 6), "post": slice(6, 6)}
         np.testing.assert_allclose(sim.reset().joint_q, [[1, 2, 3, *TURN]] * 3, atol=1e-15)
-        for _ in range(10):
+        frame = sim.step()
+        for _ in range(9):
             frame = sim.step()
         # semi-implicit Euler: g h² n (n + 1) / 2
         np.testing.assert_allclose(frame.body_q[:, 0, 2], 3 - 9.81e-6 * 100 * 101 / 2, rtol=1e-12)
