@@ -172,7 +172,7 @@ def test_a_shape_of_a_body_is_refused_by_name():
         scene.add_box(body=body, half_extents=(0.1, 0.0, 0.1))
     with pytest.raises(tl.SceneError, match="sphere `sphere`: density is -1"):
         scene.add_sphere(body="cube", radius=0.1, density=-1)
-    with pytest.raises(tl.SceneError, match="sphere `sphere`: body is 'cub', which is no body .* there are: `cube`"):
+    with pytest.raises(tl.SceneError, match=r"sphere `sphere`: body is 'cub', which is no body .* there are: `cube`"):
         scene.add_sphere(body="cub", radius=0.1)
     with pytest.raises(tl.SceneError, match="sphere `sphere` is static and has no density"):
         scene.add_sphere(radius=0.1, density=400)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 import tightloop as tl
@@ -16,7 +18,9 @@ def test_the_api_in_twenty_lines_runs(monkeypatch, tmp_path, unique):
     name = unique()
     # what the reader has at hand: the repository as working directory, arrays, and a daemon to attach to
     code = code.replace("examples/assets", f"{REPOSITORY}/examples/assets").replace("NAME", name)
-    given = {name: np.zeros((4096, 9)) for name in ("q", "tau")} | {name: np.zeros(9) for name in ("qd", "qdd", "goal")}
+    given: dict[str, Any] = {name: np.zeros((4096, 9)) for name in ("q", "tau")} | {
+        name: np.zeros(9) for name in ("qd", "qdd", "goal")
+    }
     monkeypatch.chdir(tmp_path)
     scene = tl.Scene()
     scene.add_urdf(REPOSITORY / "examples/assets/fr3/fr3_franka_hand.urdf")

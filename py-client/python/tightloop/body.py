@@ -17,7 +17,7 @@ class Body:
     """A rigid body; made by `Scene.add_body`. ``scene.add_box(body=…)`` and the like give it shapes.
 
     Attributes:
-        name: Its name in the scene. ``sim.bodies[name]`` is its place in ``body_q``, ``sim.dofs[name]`` in ``joint_qd``.
+        name: Name in the scene. ``sim.bodies[name]`` is its place in ``body_q``, ``sim.dofs[name]`` in ``joint_qd``.
         fixed: Whether it stands still; otherwise it has the six dofs ``name/free.vx`` … ``name/free.wz``.
         mass: Mass [kg]; None takes it from the shapes.
         com: Centre of mass in the body's frame [m]; None takes it from the shapes.

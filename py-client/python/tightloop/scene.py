@@ -22,6 +22,7 @@ from tightloop.shapes import ORIGIN, UPRIGHT, Shape, ShapeType, checked
 
 Cone = Literal["elliptic", "pyramidal"]
 
+
 @dataclass(frozen=True)
 class Solver:
     """Options of the constraint solver; see `Scene.solver`."""
@@ -136,7 +137,7 @@ class Scene:
         Raises:
             SceneError: A value is out of range; the message names it.
         """
-        return self._add_shape("box", name, pos, quat, body, density, half_extents=half_extents)
+        return self._add_shape("box", name, body, density, pos=pos, quat=quat, half_extents=half_extents)
 
     def add_sphere(
         self,
@@ -149,7 +150,7 @@ class Scene:
         name: str | None = None,
     ) -> Shape:
         """Add a sphere of that radius [m]; the rest as in `add_box`."""
-        return self._add_shape("sphere", name, pos, quat, body, density, radius=radius)
+        return self._add_shape("sphere", name, body, density, pos=pos, quat=quat, radius=radius)
 
     def add_cylinder(
         self,
@@ -163,7 +164,9 @@ class Scene:
         name: str | None = None,
     ) -> Shape:
         """Add a cylinder along its z axis, sizes [m]; the rest as in `add_box`."""
-        return self._add_shape("cylinder", name, pos, quat, body, density, radius=radius, half_height=half_height)
+        return self._add_shape(
+            "cylinder", name, body, density, pos=pos, quat=quat, radius=radius, half_height=half_height
+        )
 
     def add_capsule(
         self,
@@ -177,7 +180,9 @@ class Scene:
         name: str | None = None,
     ) -> Shape:
         """Add a capsule along its z axis, sizes [m]; ``half_height`` is that between the caps' centres."""
-        return self._add_shape("capsule", name, pos, quat, body, density, radius=radius, half_height=half_height)
+        return self._add_shape(
+            "capsule", name, body, density, pos=pos, quat=quat, radius=radius, half_height=half_height
+        )
 
     def add_urdf(
         self,
@@ -204,7 +209,8 @@ class Scene:
             self_collisions: Whether links of this robot touch each other (neighbours never do).
             strict: Whether an inertia that no body can have (A + B < C) is refused. Otherwise it is balanced as MuJoCo
                 does, with a warning.
-            mesh_max_hull_vertices: Most vertices of the convex hull that stands for a collision mesh in contacts, 8 to 1024.
+            mesh_max_hull_vertices: Most vertices of the convex hull that stands for a collision mesh in contacts,
+                8 to 1024.
                 Its error is noted where it exceeds 1 mm or 1% of the mesh.
             convex_decomposition: Whether a concave collision mesh becomes several convex hulls rather than one.
             package_dirs: Folders that hold the packages of ``package://`` paths; those above the file if left out.
@@ -267,7 +273,7 @@ class Scene:
             quat: Orientation of its frame at the start (x, y, z, w).
             mass: Mass [kg], above 0.
             com: Centre of mass in the body's frame [m]; that of its shapes, or the origin, if left out.
-            inertia: Inertia about the centre of mass in body axes [kg·m²], shape ``(3, 3)``, or ``(3,)`` for a diagonal.
+            inertia: Inertia about the centre of mass in body axes [kg·m²], shape ``(3, 3)``, or a diagonal's ``(3,)``.
             fixed: Whether it stands still; otherwise it moves freely.
             name: Unique name; ``body``, ``body_2``, … if left out.
 
@@ -319,7 +325,8 @@ class Scene:
         return _core.scene_to_toml(self._json())
 
     def __repr__(self) -> str:
-        return f"Scene(dt={self.dt:.6g}, substeps={self.substeps}, robots={[*self.robots]}, bodies={[*self.bodies]}, shapes={[*self.shapes]})"
+        parts = f"robots={[*self.robots]}, bodies={[*self.bodies]}, shapes={[*self.shapes]}"
+        return f"Scene(dt={self.dt:.6g}, substeps={self.substeps}, {parts})"
 
     def _json(self) -> str:
         return json.dumps(
@@ -338,11 +345,9 @@ class Scene:
         self,
         kind: ShapeType,
         name: str | None,
-        pos: Vector,
-        quat: Vector,
         body: Body | str | None,
         density: float | None,
-        **sizes: Any,
+        **frame_and_sizes: Any,
     ) -> Shape:
         name = checks.name(kind, self._free_name(kind) if name is None else name, self._names())
         what = f"{kind} `{name}`"
@@ -354,7 +359,7 @@ class Scene:
             if bearer is None:
                 raise SceneError(f"{what} is static and has no density; leave it out, or give body=")
             density = checks.number(f"{what}: density", density, above=0.0)
-        shape = Shape(name, kind, body=bearer, density=density, **checked(what, pos, quat, **sizes))
+        shape = Shape(name, kind, body=bearer, density=density, **checked(what, **frame_and_sizes))
         self.shapes[name] = shape
         return shape
 

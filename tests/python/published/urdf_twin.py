@@ -25,7 +25,7 @@ MOMENT_MIN = 2e-14
 
 
 def parse(path: Path) -> ET.Element:
-    """The file's XML. Blanks before its declaration, NULs behind its end and commas behind numbers are no part of it."""
+    """The file's XML. Blanks before its declaration, NULs behind its end, commas behind numbers are no part of it."""
     text = path.read_bytes().decode("utf-8-sig").strip("\0 \t\r\n")
     text = re.sub(r"(?<=[0-9]),(?= )", "", text)
     return ET.fromstring(re.sub(r"^<\?xml.*?\?>", "", text))
@@ -71,12 +71,7 @@ def digest(robot: ET.Element) -> list[ET.Element]:
             raise_moments(inertia)
     by_hand = []
     for joint in robot.findall("joint"):
-        joint.set("name", PREFIX + joint.get("name", ""))
-        for mimic in joint.findall("mimic"):
-            mimic.set("joint", PREFIX + mimic.get("joint", ""))
-        for role in ("parent", "child"):
-            for end in joint.findall(role):
-                end.set("link", PREFIX + end.get("link", ""))
+        prefix(joint)
         for again in joint.findall("axis")[1:]:
             joint.remove(again)
         if joint.get("type") in ("spherical", "planar", "floating"):
@@ -91,6 +86,14 @@ def digest(robot: ET.Element) -> list[ET.Element]:
             for child in [child for name in ("limit", "dynamics", "mimic") for child in joint.findall(name)]:
                 joint.remove(child)
     return by_hand
+
+
+def prefix(joint: ET.Element) -> None:
+    """The robot's name before those of the joint, of what it connects and of what it follows."""
+    joint.set("name", PREFIX + joint.get("name", ""))
+    for child in joint:
+        for attribute in {"mimic": ("joint",), "parent": ("link",), "child": ("link",)}.get(child.tag, ()):
+            child.set(attribute, PREFIX + child.get(attribute, ""))
 
 
 def raise_moments(inertia: ET.Element) -> None:
