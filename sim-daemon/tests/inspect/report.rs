@@ -109,7 +109,7 @@ fn what_a_simulation_would_refuse_is_refused() {
                 "n",
                 "<inertial><mass value=\"-1\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial>",
             )),
-            "link `only`: mass is -1",
+            "negative.urdf:1: <mass> of link `only`",
         ),
         (
             "light.urdf",
