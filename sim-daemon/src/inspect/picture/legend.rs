@@ -5,9 +5,10 @@ use super::canvas::{Canvas, Rgb, Size, mix};
 
 /// Height of a line [pixels].
 const LINE: usize = 22;
-/// Most lines, and columns.
-const LINES: usize = 9;
-const COLUMNS: usize = 3;
+/// Most entries in three columns; more are set in four.
+const WIDE: usize = 27;
+/// Most lines: the strip then takes a third of the page.
+const LINES: usize = 15;
 
 pub(super) const TEXT: Rgb = [32, 36, 44];
 pub(super) const QUIET: Rgb = [112, 118, 130];
@@ -30,7 +31,7 @@ impl<'a> Legend<'a> {
             .into_iter()
             .map(|link| (drawing.links[link].as_str(), colours[link]))
             .collect();
-        let most = LINES * COLUMNS;
+        let most = LINES * columns(entries.len());
         let rest = if entries.is_empty() {
             Some("no collision shapes: link frames, x red, y green, z blue".to_owned())
         } else if entries.len() > most {
@@ -47,9 +48,12 @@ impl<'a> Legend<'a> {
         }
     }
 
+    fn cells(&self) -> usize {
+        self.entries.len() + usize::from(self.rest.is_some())
+    }
+
     fn lines(&self) -> usize {
-        let cells = self.entries.len() + usize::from(self.rest.is_some());
-        cells.div_ceil(COLUMNS).max(1)
+        self.cells().div_ceil(columns(self.cells())).max(1)
     }
 
     /// Height of the strip [pixels].
@@ -61,7 +65,7 @@ impl<'a> Legend<'a> {
     pub fn draw(&self, page: &mut Canvas, top: i64) {
         page.rectangle(0, top, self.width as i64, 1, RULE);
         let lines = self.lines();
-        let column = (self.width - 48) / COLUMNS;
+        let column = (self.width - 48) / columns(self.cells());
         let place = |index: usize| {
             let x = 24 + (index / lines * column) as i64;
             (x, top + 14 + (index % lines * LINE) as i64)
@@ -76,6 +80,11 @@ impl<'a> Legend<'a> {
             page.text(x, y, rest, Size::Small, QUIET);
         }
     }
+}
+
+/// In how many columns so many entries are set.
+fn columns(entries: usize) -> usize {
+    if entries > WIDE { 4 } else { 3 }
 }
 
 /// A colour a link, in body order; grey for those without shapes.
