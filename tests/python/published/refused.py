@@ -1,6 +1,7 @@
 """Files in the wheels that tightloop does not load, and why. Whatever else is there loads, and is compared.
 
-MuJoCo refuses the same files, and two that `urdf_twin.py` mends for it, but for those whose collision meshes are missing: it is given no collisions.
+MuJoCo refuses the same files, and two more that `urdf_twin.py` mends for it; but not those whose collision meshes are
+missing, since it is given no collisions.
 """
 
 from __future__ import annotations
