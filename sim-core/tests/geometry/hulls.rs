@@ -221,7 +221,7 @@ fn a_flat_cloud_becomes_a_plate_and_a_line_nothing() {
 }
 
 #[test]
-fn a_million_points_take_seconds() {
+fn a_million_points_on_a_ball_take_no_minute() {
     let points: Vec<[f64; 3]> = (0..1_000_000)
         .map(|i| {
             let (a, b) = (
@@ -235,7 +235,7 @@ fn a_million_points_take_seconds() {
     let start = Instant::now();
     let hull = Hull::of(&points, 64).unwrap();
     assert!(
-        start.elapsed() < Duration::from_secs(10),
+        start.elapsed() < Duration::from_secs(60),
         "{:?}",
         start.elapsed()
     );

@@ -232,8 +232,10 @@ fn broken_gltf_is_refused() {
     assert_refused(
         "boast.glb",
         glb(&count, &buffer),
-        &["shorter than it tells"],
+        &["more than 12000000 vertices"],
     );
+    let nine = json.replace("\"count\":8", "\"count\":9");
+    assert_refused("nine.glb", glb(&nine, &buffer), &["shorter than it tells"]);
     let view = json.replace("\"byteOffset\":96", "\"byteOffset\":200");
     assert_refused("view.glb", glb(&view, &buffer), &["shorter than it tells"]);
     let mut index = buffer.clone();

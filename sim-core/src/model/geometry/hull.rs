@@ -1,7 +1,10 @@
 //! Convex polyhedra for contacts: few vertices, and faces that are polygons rather than triangles.
 
-use super::quickhull::{NoHull, quickhull};
-use super::vector::{Vector, add, area_vector, cross, dot, extent, norm, scale, size, sub, unit};
+use super::parry;
+use super::quickhull::{NoHull, quickhull, simplex};
+use super::vector::{
+    Vector, add, area_vector, cross, dot, extent, longest, norm, scale, size, sub, unit,
+};
 
 /// How far corners may be off a face's plane, relative to the hull's size: far above roundings of f32 files.
 const COPLANAR: f64 = 1e-5;
@@ -52,7 +55,7 @@ impl Hull {
             return None;
         }
         let size = size(points);
-        let mut hull = match quickhull(points, vertices_max, TOLERANCE * size) {
+        let mut hull = match triangles_around(points, vertices_max, TOLERANCE * size) {
             Ok(triangles) => Hull::new(points, &triangles, COPLANAR * size),
             Err(NoHull::Thin) => return None,
             Err(NoHull::Flat { normal }) => {
@@ -62,7 +65,7 @@ impl Hull {
                     .flat_map(|&point| [add(point, half), sub(point, half)]);
                 let plate: Vec<Vector> = both.collect();
                 let tolerance = TOLERANCE * PLATE * size;
-                let triangles = quickhull(&plate, vertices_max, tolerance).ok()?;
+                let triangles = triangles_around(&plate, vertices_max, tolerance).ok()?;
                 Hull::new(&plate, &triangles, COPLANAR * PLATE * size)
             }
         };
@@ -154,6 +157,24 @@ impl Hull {
     }
 }
 
+/// Triangles around points, as indices of the points: parry3d's where these have few enough corners and are sound, else
+/// at most `vertices_max` corners, farthest first, with points nearer than `tolerance` [m] left out.
+///
+/// # Errors
+/// Points without extent in all three directions.
+pub(super) fn triangles_around(
+    points: &[Vector],
+    vertices_max: usize,
+    tolerance: f64,
+) -> Result<Vec<[u32; 3]>, NoHull> {
+    simplex(points)?;
+    // by Euler's formula, n corners have 2 n − 4 triangles
+    match parry::hull(points).filter(|triangles| triangles.len() / 2 + 2 <= vertices_max) {
+        Some(triangles) => Ok(triangles),
+        None => quickhull(points, vertices_max, tolerance),
+    }
+}
+
 /// Normal of a polygon, by the sum of its triangles' areas.
 fn normal_of(places: &[Vector]) -> Vector {
     let mut sum = [0.0; 3];
@@ -161,11 +182,6 @@ fn normal_of(places: &[Vector]) -> Vector {
         sum = add(sum, area_vector([places[0], pair[0], pair[1]]));
     }
     unit(sum)
-}
-
-/// Length of a triangle's longest edge.
-fn longest([a, b, c]: [Vector; 3]) -> f64 {
-    norm(sub(a, b)).max(norm(sub(b, c))).max(norm(sub(c, a)))
 }
 
 /// Outlines of the faces that triangles of a convex surface make together.

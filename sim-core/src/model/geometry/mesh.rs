@@ -4,10 +4,10 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use super::super::error::ModelError;
-use super::decompose::decompose;
-use super::hull::Hull;
+use super::hull::{Hull, triangles_around};
 use super::load::load;
-use super::quickhull::{NoHull, quickhull};
+use super::parry::convex_parts;
+use super::quickhull::NoHull;
 use super::trimesh::TriMesh;
 use super::vector::size;
 
@@ -22,6 +22,8 @@ const MASS_VERTICES_MAX: usize = 8192;
 /// How near to that hull a vertex is left out, relative to the size.
 const MASS_TOLERANCE: f64 = 1e-10;
 
+/// Share of the hull's volume that a mesh may lack and still count as convex [–].
+const CONVEX: f64 = 1e-3;
 /// Error of a hull that is worth a note [m].
 const NOTED_ERROR: f64 = 1e-3;
 /// The same, relative to the size [–].
@@ -144,7 +146,7 @@ impl Mesh {
             ));
         }
         self.hulls = if options.convex_decomposition && !flat {
-            let parts = decompose(&self.triangles, self.closed, whole, most).ok_or_else(|| {
+            let parts = self.convex_parts(whole, most).ok_or_else(|| {
                 let cure = "mend the mesh, or leave convex_decomposition off";
                 fault(
                     &self.path,
@@ -162,6 +164,20 @@ impl Mesh {
         Ok(())
     }
 
+    /// Hulls that cover the mesh together, its own where it is convex; `None` where none can be made.
+    fn convex_parts(&self, whole: Hull, vertices_max: usize) -> Option<Vec<Hull>> {
+        // measured on the hull of all points: that of few vertices is smaller
+        let full = Hull::of(&self.triangles.vertices, usize::MAX)?.volume();
+        if self.closed && self.triangles.signed_volume() >= (1.0 - CONVEX) * full {
+            return Some(vec![whole]);
+        }
+        // a part without surface is inside others; a thin one adds nothing to its neighbours
+        let parts = convex_parts(&self.triangles)?;
+        let hulls = parts.iter().filter_map(|part| Hull::of(part, vertices_max));
+        let hulls: Vec<Hull> = hulls.collect();
+        (!hulls.is_empty()).then_some(hulls)
+    }
+
     /// The surface of the body that the mesh stands for: its own if closed, else that of its convex hull.
     ///
     /// # Errors
@@ -171,7 +187,7 @@ impl Mesh {
             return Ok(Cow::Borrowed(&self.triangles));
         }
         let vertices = &self.triangles.vertices;
-        let hull = quickhull(vertices, MASS_VERTICES_MAX, MASS_TOLERANCE * size(vertices));
+        let hull = triangles_around(vertices, MASS_VERTICES_MAX, MASS_TOLERANCE * size(vertices));
         let hull = hull.map_err(|why| {
             let flat = match why {
                 NoHull::Flat { .. } => "lies in a plane",

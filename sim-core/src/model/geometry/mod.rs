@@ -2,11 +2,11 @@
 //!
 //! Everything is f64 and happens when a description is made; `step/` knows nothing of it.
 
-mod decompose;
 mod hull;
 mod load;
 mod mass;
 mod mesh;
+mod parry;
 mod quickhull;
 mod tessellate;
 mod trimesh;

@@ -2,8 +2,8 @@
 //!
 //! Whether a point sees a facet is decided exactly (Shewchuk 1997), so that what is visible is always one patch and any
 //! finite points that are not flat have a closed, convex hull: coplanar, doubled and nearly equal points included. As the
-//! farthest point comes first, stopping early leaves the best few vertices that a greedy choice can find. (parry3d's hull takes
-//! facets in turn, works in the points' rounding and copies their number at every step.)
+//! farthest point comes first, stopping early leaves the best few vertices that a greedy choice can find. So this makes the
+//! hulls of fewer vertices than the points ask for, and those that parry3d fails at (`super::parry::hull`).
 
 use robust::{Coord3D, orient3d};
 
@@ -247,7 +247,7 @@ fn sees(points: &[Vector], triangle: [u32; 3], point: u32) -> bool {
 }
 
 /// Four points far apart: the ends of the longest axis, then the farthest from their line, then from that plane.
-fn simplex(points: &[Vector]) -> Result<[u32; 4], NoHull> {
+pub(super) fn simplex(points: &[Vector]) -> Result<[u32; 4], NoHull> {
     let least = FLAT * size(points);
     let farthest = |measure: &dyn Fn(Vector) -> f64| {
         let values = points.iter().map(|&point| measure(point)).enumerate();

@@ -42,6 +42,11 @@ pub(super) fn unit(a: Vector) -> Vector {
     }
 }
 
+/// Length of a triangle's longest edge.
+pub(super) fn longest([a, b, c]: [Vector; 3]) -> f64 {
+    norm(sub(a, b)).max(norm(sub(b, c))).max(norm(sub(c, a)))
+}
+
 /// Twice the area of a triangle, along its normal.
 pub(super) fn area_vector([a, b, c]: [Vector; 3]) -> Vector {
     cross(sub(b, a), sub(c, a))

@@ -3,7 +3,9 @@
 //! The format is in metres and y up; it is turned to z up as Blender, Drake and, since 2025, RViz do. The gltf crate reads
 //! the JSON; the numbers are read here, since its readers trust strides and counts.
 
+use std::collections::HashMap;
 use std::path::{Component, Path};
+use std::rc::Rc;
 
 use base64::Engine as _;
 use gltf::accessor::{DataType, Dimensions};
@@ -16,7 +18,7 @@ use super::{FILE_MAX, Limits, RawMesh, bytes_of};
 /// Deepest nesting of scene nodes.
 const DEPTH_MAX: usize = 100;
 /// Most scene nodes visited: those that refer to one another can stand for billions.
-const VISITS_MAX: usize = 100_000;
+const VISITS_MAX: usize = 10_000;
 
 pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMesh, String> {
     let Gltf { document, mut blob } = Gltf::from_slice(bytes)
@@ -54,6 +56,7 @@ pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMes
         buffers,
         limits,
         mesh: RawMesh::default(),
+        read: HashMap::new(),
         visits: 0,
     };
     scene.whole(&document)?;
@@ -86,6 +89,8 @@ struct Scene {
     buffers: Vec<Vec<u8>>,
     limits: Limits,
     mesh: RawMesh,
+    /// Meshes that were shown before, by index.
+    read: HashMap<usize, Rc<RawMesh>>,
     visits: usize,
 }
 
@@ -121,7 +126,22 @@ impl Scene {
             .try_for_each(|child| self.node(&child, frame, depth + 1))
     }
 
+    /// Shows a mesh, which is read when it is met first.
     fn mesh(&mut self, mesh: &gltf::Mesh, frame: Affine) -> Result<(), String> {
+        let part = match self.read.get(&mesh.index()) {
+            Some(part) => part.clone(),
+            None => {
+                let part = Rc::new(self.read(mesh)?);
+                self.read.insert(mesh.index(), part.clone());
+                part
+            }
+        };
+        self.mesh.place(&part, &frame, self.limits)
+    }
+
+    /// The triangles of a mesh in its own frame.
+    fn read(&self, mesh: &gltf::Mesh) -> Result<RawMesh, String> {
+        let mut raw = RawMesh::default();
         for primitive in mesh.primitives() {
             let Some(positions) = primitive.get(&Semantic::Positions) else {
                 continue;
@@ -131,21 +151,23 @@ impl Scene {
                 Mode::TriangleStrip | Mode::TriangleFan => 1,
                 Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => continue,
             };
-            let first = self.mesh.vertices.len() as u32;
-            let count = positions.count();
-            let points: Vec<[f64; 3]> = self.rows(&positions, Dimensions::Vec3, |bytes| {
-                [0, 4, 8].map(|at| {
-                    f64::from(f32::from_le_bytes([
-                        bytes[at],
-                        bytes[at + 1],
-                        bytes[at + 2],
-                        bytes[at + 3],
-                    ]))
-                })
-            })?;
-            self.mesh
-                .vertices
-                .extend(points.into_iter().map(|point| frame.apply(point)));
+            let (first, count) = (raw.vertices.len() as u32, positions.count());
+            // several primitives may tell of the same numbers, so the limits come before reading
+            let corners = primitive.indices().map_or(count, |indices| indices.count());
+            self.limits.vertices(raw.vertices.len() + count)?;
+            self.limits
+                .triangles(raw.triangles.len() + corners / step)?;
+            let number = |bytes: &[u8], at: usize| {
+                f64::from(f32::from_le_bytes([
+                    bytes[at],
+                    bytes[at + 1],
+                    bytes[at + 2],
+                    bytes[at + 3],
+                ]))
+            };
+            let point = |bytes: &[u8]| [0, 4, 8].map(|at| number(bytes, at));
+            raw.vertices
+                .append(&mut self.rows(&positions, Dimensions::Vec3, point)?);
             let indices: Vec<u32> = match primitive.indices() {
                 Some(indices) => self.indices(&indices)?,
                 None => (0..count as u32).collect(),
@@ -155,31 +177,16 @@ impl Scene {
                     "an index is {wrong}, but there are {count} vertices; export it again"
                 ));
             }
-            self.limits
-                .triangles(self.mesh.triangles.len() + indices.len() / step)?;
-            let before = self.mesh.triangles.len();
             let corners: Vec<u32> = indices.into_iter().map(|index| first + index).collect();
             match primitive.mode() {
-                Mode::TriangleStrip => {
-                    for (index, corners) in corners.windows(3).enumerate() {
-                        // every other triangle of a strip runs the other way
-                        let swap = index % 2;
-                        self.mesh
-                            .polygon(&[corners[0], corners[1 + swap], corners[2 - swap]]);
-                    }
-                }
-                Mode::TriangleFan => self.mesh.polygon(&corners),
+                Mode::TriangleStrip => raw.strip(&corners),
+                Mode::TriangleFan => raw.polygon(&corners),
                 _ => corners
                     .chunks_exact(3)
-                    .for_each(|corners| self.mesh.polygon(corners)),
-            }
-            if frame.mirrors() {
-                for triangle in &mut self.mesh.triangles[before..] {
-                    triangle.swap(1, 2);
-                }
+                    .for_each(|corners| raw.polygon(corners)),
             }
         }
-        Ok(())
+        Ok(raw)
     }
 
     fn indices(&self, accessor: &Accessor) -> Result<Vec<u32>, String> {

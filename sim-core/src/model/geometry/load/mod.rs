@@ -4,6 +4,7 @@
 //! finite. STL and OBJ say nothing of units and axes and are taken as they are; COLLADA and glTF say both.
 
 mod dae;
+mod dae_mesh;
 mod gltf;
 mod obj;
 mod scene;
@@ -15,6 +16,7 @@ use std::path::Path;
 
 use super::trimesh::TriMesh;
 use super::vector::Vector;
+use scene::Affine;
 
 /// Largest file [bytes].
 pub const FILE_MAX: u64 = 256 << 20;
@@ -40,6 +42,17 @@ impl Limits {
         }
         Ok(())
     }
+
+    /// Refuses more vertices than so many triangles can have.
+    fn vertices(self, count: usize) -> Result<(), String> {
+        let most = 3 * self.triangles;
+        if count > most {
+            return Err(format!(
+                "it has more than {most} vertices; simplify the mesh"
+            ));
+        }
+        Ok(())
+    }
 }
 
 /// Triangles as a file gives them.
@@ -59,7 +72,31 @@ impl RawMesh {
         self.triangles.push([first, first + 1, first + 2]);
     }
 
-    /// Adds a polygon as a fan around its first corner, where it has three or more.
+    /// Adds a part of a scene where this map puts it; a map that mirrors keeps the outside outside.
+    fn place(&mut self, part: &RawMesh, map: &Affine, limits: Limits) -> Result<(), String> {
+        limits.triangles(self.triangles.len() + part.triangles.len())?;
+        limits.vertices(self.vertices.len() + part.vertices.len())?;
+        let first = self.vertices.len() as u32;
+        let places = part.vertices.iter().map(|&vertex| map.apply(vertex));
+        self.vertices.extend(places);
+        let mirrors = map.mirrors();
+        self.triangles.extend(part.triangles.iter().map(|corners| {
+            let [a, b, c] = corners.map(|corner| first + corner);
+            if mirrors { [a, c, b] } else { [a, b, c] }
+        }));
+        Ok(())
+    }
+
+    /// Adds a strip of triangles, every other of which runs the other way.
+    fn strip(&mut self, corners: &[u32]) {
+        for (index, corners) in corners.windows(3).enumerate() {
+            let swap = index % 2;
+            self.polygon(&[corners[0], corners[1 + swap], corners[2 - swap]]);
+        }
+    }
+
+    /// Adds a polygon as a fan around its first corner, where it has three or more; integrals over it come out right even
+    /// where it is concave.
     fn polygon(&mut self, corners: &[u32]) {
         for pair in corners.windows(2).skip(1) {
             self.triangles.push([corners[0], pair[0], pair[1]]);
