@@ -24,7 +24,7 @@ fn a_mesh_that_cannot_be_used_names_robot_link_and_file() {
     folder.put("hand.stl", b"");
     let message = folder.robot("hand.stl", "").unwrap_err().to_string();
     assert!(
-        message.starts_with("robot `r`: link `hand`: mesh "),
+        message.contains("r.urdf") && message.contains("robot `r`: link `hand`: mesh "),
         "{message}"
     );
     assert!(
