@@ -121,6 +121,34 @@ fn packages_are_found_above_the_file_and_in_package_dirs() {
 }
 
 #[test]
+fn a_copy_of_a_package_under_another_name_is_taken_for_it_with_a_note() {
+    let package = Package::new("renamed");
+    fs::write(package.root.join("pkg/urdf/wheel.stl"), TETRAHEDRON).unwrap();
+    for (uri, file) in [
+        ("package://published_name/meshes/hand.stl", package.mesh()),
+        (
+            "package://wheel.stl",
+            package.root.join("pkg/urdf/wheel.stl"),
+        ),
+    ] {
+        let robot = package.read("pkg/urdf", "collision", uri, UrdfOptions::default());
+        let notes = robot.as_ref().unwrap().notes.join("\n");
+        assert_says(&notes, &["is not found by its name", "are taken from"]);
+        assert_leads_to(robot, &file);
+    }
+    // one folder further up is no longer the robot's
+    let error = package
+        .read(
+            "pkg/urdf/deep/er",
+            "collision",
+            "package://published_name/meshes/hand.stl",
+            UrdfOptions::default(),
+        )
+        .unwrap_err();
+    assert_says(&error.to_string(), &["is missing"]);
+}
+
+#[test]
 fn missing_collision_mesh_is_refused_with_link_and_path() {
     let package = Package::new("missing");
     let error = package

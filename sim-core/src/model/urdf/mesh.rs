@@ -6,6 +6,15 @@ use std::path::{Component, Path, PathBuf};
 pub(super) enum Found {
     /// The file.
     File(PathBuf),
+    /// The file, in a folder that stands for a package of another name.
+    Renamed {
+        /// The file.
+        path: PathBuf,
+        /// The package that the path names.
+        package: String,
+        /// The folder taken for it.
+        home: PathBuf,
+    },
     /// No file at any of these places.
     Missing(Vec<PathBuf>),
     /// A path that is not followed, and why.
@@ -15,7 +24,8 @@ pub(super) enum Found {
 /// Resolves a path of a URDF file that lies in `folder`.
 ///
 /// `package://name/rest` is looked for in each package folder, then in the folders above the file that bear or hold that
-/// name; `rest` stays inside. A relative path is looked for from the file's folder and may climb, but only within what
+/// name; `rest` stays inside. Copies of a package often bear another name: where none of those is found, the file's own folder
+/// and the one above it stand for the package. A relative path is looked for from the file's folder and may climb, but only within what
 /// belongs to the robot: the nearest folder above the file with a `package.xml`, else the folder above the file's own (files
 /// lie in `urdf/` beside `meshes/`), and any package folder that holds the file. An absolute path, plain or `file://`, says
 /// openly where it leads and is taken as it is; only regular files of a mesh format are ever opened. Symbolic links are
@@ -29,7 +39,11 @@ pub(super) fn resolve(uri: &str, folder: &Path, package_dirs: &[PathBuf]) -> Fou
         if escapes(Path::new(rest)) || package == ".." {
             return Found::Refused("it leaves its package by `..`; keep it inside");
         }
-        package_candidates(package, rest, folder, package_dirs)
+        let candidates = package_candidates(package, rest, folder, package_dirs);
+        if let Some(renamed) = renamed(package, rest, folder).filter(|_| !any_file(&candidates)) {
+            return renamed;
+        }
+        candidates
     } else {
         let path = match uri.strip_prefix("file://") {
             Some(path) => Path::new(path),
@@ -49,6 +63,26 @@ pub(super) fn resolve(uri: &str, folder: &Path, package_dirs: &[PathBuf]) -> Fou
         Some(file) => Found::File(file.clone()),
         None => Found::Missing(candidates),
     }
+}
+
+fn any_file(candidates: &[PathBuf]) -> bool {
+    candidates.iter().any(|candidate| candidate.is_file())
+}
+
+/// A file of a package whose folder bears another name, or of a path without a package, such as `package://wheel.obj`.
+fn renamed(package: &str, rest: &str, folder: &Path) -> Option<Found> {
+    let inside = if rest.is_empty() { package } else { rest };
+    let folder = absolute(folder);
+    let homes = [Some(folder.as_path()), folder.parent()];
+    let home = homes
+        .into_iter()
+        .flatten()
+        .find(|home| home.join(inside).is_file())?;
+    Some(Found::Renamed {
+        path: home.join(inside),
+        package: package.to_owned(),
+        home: home.to_owned(),
+    })
 }
 
 /// Whether a relative path climbs out of every folder that belongs to the robot.

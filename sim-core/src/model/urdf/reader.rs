@@ -215,6 +215,20 @@ impl<'a, 'input> Reader<'a, 'input> {
                 let path = match mesh::resolve(filename, self.folder(), &self.options.package_dirs)
                 {
                     Found::File(path) => path,
+                    Found::Renamed {
+                        path,
+                        package,
+                        home,
+                    } => {
+                        let note = format!(
+                            "package `{package}` is not found by its name; its files are taken from {}",
+                            home.display()
+                        );
+                        if !self.notes.contains(&note) {
+                            self.notes.push(note);
+                        }
+                        path
+                    }
                     Found::Missing(tried) => {
                         let (robot, link) = (self.robot.clone(), link.to_owned());
                         return Err(ModelError::MissingMesh {
@@ -249,7 +263,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         for uri in meshes {
             if !matches!(
                 mesh::resolve(uri, self.folder(), &self.options.package_dirs),
-                Found::File(_)
+                Found::File(_) | Found::Renamed { .. }
             ) {
                 let uri = short(uri);
                 self.notes
