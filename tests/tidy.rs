@@ -20,11 +20,10 @@ const ORDER: [&str; 8] = [
 ];
 
 /// The only door of each heavy package.
-const DOORS: [(&str, &str); 13] = [
+const DOORS: [(&str, &str); 12] = [
     ("urdf_rs", "sim-core/src/model/urdf"),
     ("faer", "sim-core/src/model"),
     ("parry3d_f64", "sim-core/src/model/geometry"),
-    ("robust", "sim-core/src/model/geometry"),
     ("gltf", "sim-core/src/model/geometry/load"),
     ("base64", "sim-core/src/model/geometry/load"),
     ("rayon", "sim-core/src/backend/cpu"),

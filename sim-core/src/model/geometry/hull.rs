@@ -1,15 +1,14 @@
 //! Convex polyhedra for contacts: few vertices, and faces that are polygons rather than triangles.
 
-use super::parry;
-use super::quickhull::{NoHull, quickhull, simplex};
+use super::polytope::{NoHull, triangles_around};
 use super::vector::{
     Vector, add, area_vector, cross, dot, extent, longest, norm, scale, size, sub, unit,
 };
 
 /// How far corners may be off a face's plane, relative to the hull's size: far above roundings of f32 files.
 const COPLANAR: f64 = 1e-5;
-/// How near to the hull a point is left out, relative to the size.
-const TOLERANCE: f64 = 1e-6;
+/// Largest coordinate [m]: its cube, a volume, is still far from the largest number.
+const COORDINATE_MAX: f64 = 1e100;
 /// Thickness of the plate that stands for a flat mesh, relative to its size.
 const PLATE: f64 = 1e-3;
 
@@ -24,6 +23,8 @@ pub struct Hull {
     pub edges: Vec<Edge>,
     /// Largest height above the faces of a point that was left out [m].
     pub error: f64,
+    /// Whether it is a plate that stands for points in a plane.
+    pub flat: bool,
 }
 
 /// A side of a hull.
@@ -47,30 +48,35 @@ pub struct Edge {
 }
 
 impl Hull {
-    /// The hull of points, with at most `vertices_max` vertices (at least 4); `None` where all points lie on a line.
+    /// The hull of points, with at most `vertices_max` corners (at least 8 where it is to be a good one).
     ///
     /// The farthest points become corners first. Points in one plane get a plate as thick as a thousandth of their size.
-    pub fn of(points: &[[f64; 3]], vertices_max: usize) -> Option<Hull> {
-        if !points.iter().flatten().all(|x| x.is_finite()) {
-            return None;
+    ///
+    /// # Errors
+    /// Points that are on a line or not finite, and hulls that rounding spoils.
+    pub fn of(points: &[[f64; 3]], vertices_max: usize) -> Result<Hull, NoHull> {
+        if !points.iter().flatten().all(|x| x.abs() <= COORDINATE_MAX) {
+            return Err(NoHull::Thin);
         }
         let size = size(points);
-        let mut hull = match triangles_around(points, vertices_max, TOLERANCE * size) {
+        let mut hull = match triangles_around(points, vertices_max) {
             Ok(triangles) => Hull::new(points, &triangles, COPLANAR * size),
-            Err(NoHull::Thin) => return None,
             Err(NoHull::Flat { normal }) => {
                 let half = scale(normal, 0.5 * PLATE * size);
                 let both = points
                     .iter()
                     .flat_map(|&point| [add(point, half), sub(point, half)]);
                 let plate: Vec<Vector> = both.collect();
-                let tolerance = TOLERANCE * PLATE * size;
-                let triangles = triangles_around(&plate, vertices_max, tolerance).ok()?;
-                Hull::new(&plate, &triangles, COPLANAR * PLATE * size)
+                let triangles = triangles_around(&plate, vertices_max)?;
+                Hull {
+                    flat: true,
+                    ..Hull::new(&plate, &triangles, COPLANAR * PLATE * size)
+                }
             }
+            Err(none) => return Err(none),
         };
         hull.error = hull.height(points);
-        Some(hull)
+        Ok(hull)
     }
 
     /// Largest height of a point above the faces' planes; 0 if all lie inside.
@@ -154,24 +160,6 @@ impl Hull {
         }
         hull.edges = edges(&hull.faces);
         hull
-    }
-}
-
-/// Triangles around points, as indices of the points: parry3d's where these have few enough corners and are sound, else
-/// at most `vertices_max` corners, farthest first, with points nearer than `tolerance` [m] left out.
-///
-/// # Errors
-/// Points without extent in all three directions.
-pub(super) fn triangles_around(
-    points: &[Vector],
-    vertices_max: usize,
-    tolerance: f64,
-) -> Result<Vec<[u32; 3]>, NoHull> {
-    simplex(points)?;
-    // by Euler's formula, n corners have 2 n − 4 triangles
-    match parry::hull(points).filter(|triangles| triangles.len() / 2 + 2 <= vertices_max) {
-        Some(triangles) => Ok(triangles),
-        None => quickhull(points, vertices_max, tolerance),
     }
 }
 

@@ -4,10 +4,10 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use super::super::error::ModelError;
-use super::hull::{Hull, triangles_around};
+use super::hull::Hull;
 use super::load::load;
 use super::parry::convex_parts;
-use super::quickhull::NoHull;
+use super::polytope::triangles_around;
 use super::trimesh::TriMesh;
 use super::vector::size;
 
@@ -17,11 +17,6 @@ const SIZE_MIN: f64 = 1e-6;
 const SIZE_MAX: f64 = 1e6;
 /// Least volume of a solid over the cube of its size: a folded sheet is closed and holds roundings only [–].
 const FILL_MIN: f64 = 1e-12;
-/// Most vertices of the hull that stands for an open mesh's mass: its volume is then exact to 1e-4 even on a ball.
-const MASS_VERTICES_MAX: usize = 8192;
-/// How near to that hull a vertex is left out, relative to the size.
-const MASS_TOLERANCE: f64 = 1e-10;
-
 /// Share of the hull's volume that a mesh may lack and still count as convex [–].
 const CONVEX: f64 = 1e-3;
 /// Error of a hull that is worth a note [m].
@@ -127,13 +122,9 @@ impl Mesh {
     fn make_hulls(&mut self, size: f64, options: &MeshOptions) -> Result<(), ModelError> {
         let most = options.max_hull_vertices;
         let vertices = &self.triangles.vertices;
-        let whole = Hull::of(vertices, most).ok_or_else(|| {
-            fault(
-                &self.path,
-                "its vertices lie on a line; give it an area".to_owned(),
-            )
-        })?;
-        let flat = self.solid().is_err();
+        let whole = Hull::of(vertices, most)
+            .map_err(|why| fault(&self.path, format!("{why}; give it an area, or mend it")))?;
+        let flat = whole.flat;
         if flat {
             let thickness = size / 1000.0;
             self.notes.push(format!(
@@ -167,13 +158,17 @@ impl Mesh {
     /// Hulls that cover the mesh together, its own where it is convex; `None` where none can be made.
     fn convex_parts(&self, whole: Hull, vertices_max: usize) -> Option<Vec<Hull>> {
         // measured on the hull of all points: that of few vertices is smaller
-        let full = Hull::of(&self.triangles.vertices, usize::MAX)?.volume();
+        let full = Hull::of(&self.triangles.vertices, usize::MAX)
+            .ok()?
+            .volume();
         if self.closed && self.triangles.signed_volume() >= (1.0 - CONVEX) * full {
             return Some(vec![whole]);
         }
         // a part without surface is inside others; a thin one adds nothing to its neighbours
         let parts = convex_parts(&self.triangles)?;
-        let hulls = parts.iter().filter_map(|part| Hull::of(part, vertices_max));
+        let hulls = parts
+            .iter()
+            .filter_map(|part| Hull::of(part, vertices_max).ok());
         let hulls: Vec<Hull> = hulls.collect();
         (!hulls.is_empty()).then_some(hulls)
     }
@@ -187,22 +182,13 @@ impl Mesh {
             return Ok(Cow::Borrowed(&self.triangles));
         }
         let vertices = &self.triangles.vertices;
-        let hull = triangles_around(vertices, MASS_VERTICES_MAX, MASS_TOLERANCE * size(vertices));
-        let hull = hull.map_err(|why| {
-            let flat = match why {
-                NoHull::Flat { .. } => "lies in a plane",
-                NoHull::Thin => "lies on a line",
-            };
-            fault(
-                &self.path,
-                format!(
-                    "it {flat}, so it has no volume; give it thickness, or the link an <inertial>"
-                ),
-            )
+        let triangles = triangles_around(vertices, usize::MAX).map_err(|why| {
+            let cure = "so it has no volume; give it thickness, or the link an <inertial>";
+            fault(&self.path, format!("{why}, {cure}"))
         })?;
         Ok(Cow::Owned(TriMesh {
             vertices: vertices.clone(),
-            triangles: hull,
+            triangles,
         }))
     }
 }
