@@ -45,6 +45,14 @@ pub(super) fn triangles_around(
     vertices_max: usize,
 ) -> Result<Vec<[u32; 3]>, NoHull> {
     let start = simplex(points)?;
+    // few corners of a large cloud are found without the hull of all
+    let work = points
+        .len()
+        .saturating_mul(vertices_max.saturating_mul(vertices_max));
+    if points.len() > POINTS_MAX && work <= REFINE_MAX {
+        let all = (0..points.len() as u32).collect();
+        return farthest_first(points, start, all, vertices_max).ok_or(NoHull::Failed);
+    }
     let mut some = outermost(points);
     let mut all = parry::hull(points, &some).ok_or(NoHull::Failed)?;
     // a thinned cloud gets back what stands out of its hull
