@@ -157,7 +157,7 @@ pub struct Frame<R> {
     pub position: [R; 3],
     /// Orientation in the carrier's frame, (x, y, z, w) [–].
     pub quat: [R; 4],
-    /// The link's own centre of mass in the carrier's frame, or relative to the base; its origin if it weighs nothing [m].
+    /// The link's own centre of mass in the carrier's frame, or relative to the base; its origin if nothing says where that is [m].
     pub center: [R; 3],
 }
 

@@ -50,8 +50,18 @@ impl Robot {
     }
 
     /// Frees the root link from the world: adds the joint `floating_base`, which starts at the robot's pose.
+    ///
+    /// Where a joint of the robot has that name, it is `floating_base_2`, and so on.
     pub fn float(&mut self) {
-        self.free_root("floating_base");
+        let taken = |name: &String| self.joints.iter().any(|joint| joint.name == *name);
+        let name = (1..)
+            .map(|count| match count {
+                1 => "floating_base".to_owned(),
+                _ => format!("floating_base_{count}"),
+            })
+            .find(|name| !taken(name))
+            .expect("there are more names than joints");
+        self.free_root(&name);
     }
 
     /// Carries the root link by a free joint of this name, which starts at the robot's pose.

@@ -372,3 +372,17 @@ fn name_comes_from_the_options_or_the_file() {
         ("left", true, false)
     );
 }
+
+#[test]
+fn a_floating_base_gets_a_name_that_no_joint_of_the_file_has() {
+    let body = link("trunk", INERTIAL)
+        + &link("mount", INERTIAL)
+        + &joint("floating_base", "fixed", "trunk", "mount", "");
+    let text = format!("<robot name=\"r\">{body}</robot>");
+    let floating = UrdfOptions {
+        floating: true,
+        ..UrdfOptions::default()
+    };
+    let robot = Robot::from_urdf_text(&text, "r.urdf", floating).unwrap();
+    assert_eq!(robot.dof_names()[0], "floating_base_2.vx");
+}
