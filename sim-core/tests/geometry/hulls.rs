@@ -221,6 +221,29 @@ fn a_flat_cloud_becomes_a_plate_and_a_line_nothing() {
 }
 
 #[test]
+fn balls_by_latitude_and_longitude_whose_points_are_a_little_off_have_sound_hulls() {
+    let mut seed = 1_u64;
+    let mut random = move || {
+        seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    };
+    for _ in 0..2000 {
+        let rings = 3 + (4.0 * (random() + 1.0)) as u32;
+        let off = 10_f64.powf(-10.0 + 6.0 * random());
+        let points: Vec<[f64; 3]> = (0..12 * rings)
+            .map(|i| {
+                let (sin, cos) = (TAU * f64::from(i % 12) / 12.0).sin_cos();
+                let (out, up) = (TAU * 0.5 * f64::from(i / 12) / f64::from(rings - 1)).sin_cos();
+                [out * cos, out * sin, up].map(|x| x + off * random())
+            })
+            .collect();
+        hull(&points);
+    }
+}
+
+#[test]
 fn a_million_points_on_a_ball_take_no_minute() {
     let points: Vec<[f64; 3]> = (0..1_000_000)
         .map(|i| {
