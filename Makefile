@@ -46,6 +46,7 @@ published: wheel $(VENV)/.dev
 bench: wheel $(VENV)/.dev
 	cargo bench --package tightloop --bench step
 	$(PYTHON) benches/peers.py
+	$(PYTHON) benches/legged.py
 	$(PYTHON) benches/round_trip.py
 
 check: wheel $(VENV)/.dev

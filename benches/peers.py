@@ -109,12 +109,10 @@ def step_bench() -> Path:
 
 def in_process_rates(bench: Path) -> dict[tuple[str, str, str], float]:
     """Steps per second by demo, lanes and precision, of one pass of each demo."""
-    command = [str(bench), str(WORLDS), "once", "sixteen", "eight"]
+    command = [str(bench), str(WORLDS), "once", "sixteen", "eight", *DEMOS]
     text = subprocess.run(command, cwd=REPOSITORY, stdout=subprocess.PIPE, check=True, text=True).stdout
     rows = csv.DictReader(text.splitlines())
-    return {
-        (row["demo"].lower(), row["lanes"].lower(), row["precision"].lower()): float(row["steps_per_s"]) for row in rows
-    }
+    return {(row["demo"], row["lanes"].lower(), row["precision"].lower()): float(row["steps_per_s"]) for row in rows}
 
 
 def measure(rounds: int) -> list[Case]:

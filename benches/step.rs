@@ -1,14 +1,18 @@
-//! Steps per second of the lesson's demos without contacts, in process: one line a case.
+//! Steps per second without contacts, in process: one line a case.
 //!
-//! `cargo bench --bench step -- [worlds …] [torque|target] [sixteen|eight|scalar] [once]`; `once` runs each
-//! case for one pass of the demo, for profilers. Columns: demo, lanes, precision, worlds, threads, steps/s.
+//! `cargo bench --bench step -- [worlds …] [torque|target|quadruped|humanoid_23|humanoid_29]
+//! [sixteen|eight|scalar] [once]`; `once` runs each case for one pass of the demo, for profilers. Columns: demo,
+//! lanes, precision, worlds, threads, steps/s.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
+mod robots;
 
 use common::{Demo, Run, command, lesson};
+use robots::Case;
 use sim_core::backend::cpu;
 use sim_core::batch::Field;
+use sim_core::model::Description;
 use sim_core::simulation::{Lanes, Options, Precision};
 use std::time::{Duration, Instant};
 
@@ -18,28 +22,80 @@ const SCALAR_WORLDS: usize = 64;
 const ROUNDS: usize = 3;
 const ROUND: Duration = Duration::from_millis(400);
 
+/// What moves.
+#[derive(Clone, Copy)]
+enum Motion {
+    Lesson(Demo),
+    Robot(Case),
+}
+
+const MOTIONS: [Motion; 5] = [
+    Motion::Lesson(Demo::Torque),
+    Motion::Lesson(Demo::Target),
+    Motion::Robot(Case::Quadruped),
+    Motion::Robot(Case::Humanoid23),
+    Motion::Robot(Case::Humanoid29),
+];
+
+impl Motion {
+    fn name(self) -> &'static str {
+        match self {
+            Motion::Lesson(Demo::Torque) => "torque",
+            Motion::Lesson(Demo::Target) => "target",
+            Motion::Robot(case) => case.name(),
+        }
+    }
+
+    fn scene(self) -> Description {
+        match self {
+            Motion::Lesson(demo) => lesson(demo),
+            Motion::Robot(case) => case.scene(),
+        }
+    }
+
+    /// The command of every frame.
+    fn commands(self, scene: &Description) -> Vec<(Field, Vec<f64>)> {
+        match self {
+            Motion::Lesson(demo) => (0..common::FRAMES)
+                .map(|frame| command(demo, frame))
+                .map(|(field, row)| (field, row.to_vec()))
+                .collect(),
+            Motion::Robot(_) => (0..robots::FRAMES)
+                .map(|frame| {
+                    (
+                        Field::JointTargetQ,
+                        robots::targets(&scene.robots[0], frame),
+                    )
+                })
+                .collect(),
+        }
+    }
+}
+
 fn main() {
     let words: Vec<String> = std::env::args()
         .skip(1)
         .map(|word| word.to_lowercase())
         .collect();
     let asked = |word: &str| words.iter().any(|w| w == word);
-    let named = |choices: [&str; 3]| choices.iter().any(|c| asked(c));
+    let named = |choices: &[&str]| choices.iter().any(|c| asked(c));
     let mut sizes: Vec<usize> = words.iter().filter_map(|word| word.parse().ok()).collect();
     let all_sizes = sizes.is_empty();
     if all_sizes {
         sizes = vec![1, 64, 1024, 4096, 16384];
     }
     println!("demo,lanes,precision,worlds,threads,steps_per_s");
-    for (demo, name) in [(Demo::Torque, "torque"), (Demo::Target, "target")] {
+    let names = MOTIONS.map(Motion::name);
+    for motion in MOTIONS {
+        let name = motion.name();
         for (lanes, precision, lanes_name) in [
             (Lanes::Sixteen, Precision::F32, "sixteen"),
             (Lanes::Eight, Precision::F32, "eight"),
             (Lanes::Scalar, Precision::F32, "scalar"),
             (Lanes::Scalar, Precision::F64, "scalar"),
         ] {
-            let left_out = (named(["torque", "target", ""]) && !asked(name))
-                || (named(["sixteen", "eight", "scalar"]) && !asked(lanes_name));
+            let left_out = (named(&names) && !asked(name))
+                || (named(&["sixteen", "eight", "scalar"]) && !asked(lanes_name));
             if left_out || !cpu::available(lanes) {
                 continue;
             }
@@ -47,15 +103,23 @@ fn main() {
                 if all_sizes && lanes == Lanes::Scalar && worlds > SCALAR_WORLDS {
                     continue;
                 }
-                let rate = steps_per_s(demo, lanes, precision, worlds, asked("once"));
-                println!("{demo:?},{lanes:?},{precision:?},{worlds},1,{rate:.0}");
+                let rate = steps_per_s(motion, lanes, precision, worlds, asked("once"));
+                println!("{name},{lanes:?},{precision:?},{worlds},1,{rate:.0}");
             }
         }
     }
 }
 
-fn steps_per_s(demo: Demo, lanes: Lanes, precision: Precision, worlds: usize, once: bool) -> f64 {
-    let model = lesson(demo).compile().expect("the lesson compiles");
+fn steps_per_s(
+    motion: Motion,
+    lanes: Lanes,
+    precision: Precision,
+    worlds: usize,
+    once: bool,
+) -> f64 {
+    let scene = motion.scene();
+    let commands = motion.commands(&scene);
+    let model = scene.compile().expect("the scene compiles");
     let fields = vec![Field::JointQ, Field::JointQd, Field::BodyQ];
     let options = Options {
         worlds,
@@ -77,12 +141,11 @@ fn steps_per_s(demo: Demo, lanes: Lanes, precision: Precision, worlds: usize, on
         // whole demos from their start, again and again
         while frames == 0 || start.elapsed() < round {
             run.sim.reset(None).expect("a reset without a mask fits");
-            for frame in 0..common::FRAMES {
-                let (field, row) = command(demo, frame);
-                run.command(field, &row);
+            for (field, row) in &commands {
+                run.command(*field, row);
                 run.step();
             }
-            frames += common::FRAMES;
+            frames += commands.len();
         }
         let steps = (frames * worlds * model.substeps()) as f64;
         best = best.max(steps / start.elapsed().as_secs_f64());

@@ -28,6 +28,28 @@ fn noise(seed: usize, k: usize) -> f64 {
     (x >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
+/// The lesson, and the same with a narrow range of the first joint as its only constraint: some worlds are
+/// within it, for whom the solver does nothing, while others beside them bounce off its ends.
+fn models(demo: Demo) -> [Arc<Model>; 2] {
+    let mut limited = lesson(demo);
+    let mut half_range = Some(0.2);
+    for joint in &mut limited.robots[0].joints {
+        if joint.range.is_some() {
+            joint.range = half_range.take().map(|x| [joint.q[0] - x, joint.q[0] + x]);
+            joint.mimic = None;
+            joint.dofs[0].friction = 0.0;
+        }
+    }
+    [lesson(demo), limited].map(|scene| scene.compile().unwrap())
+}
+
+/// Does a constraint act in the last frame of a run? Its last field is the forces of the rows.
+fn is_constrained(model: &Model, bits: &[u64]) -> bool {
+    bits[bits.len() - model.rows()..]
+        .iter()
+        .any(|&force| f64::from_bits(force) != 0.0)
+}
+
 /// Bits of all fields of each world after some frames; world w starts and is driven by `seeds[w]`.
 fn run(
     model: &Arc<Model>,
@@ -86,22 +108,35 @@ fn world_alone_equals_the_same_world_among_others_at_any_position() {
         (Demo::Target, Precision::F32),
         (Demo::Target, Precision::F64),
     ] {
-        let model = lesson(demo).compile().unwrap();
-        let many: Vec<usize> = (0..67).collect();
-        let together = run(&model, demo, &many, Lanes::Auto, 1, precision);
-        let backwards: Vec<usize> = many.iter().rev().copied().collect();
-        let moved = run(&model, demo, &backwards, Lanes::Auto, 1, precision);
-        for world in 0..67 {
-            assert_eq!(
-                together[world],
-                moved[66 - world],
-                "{demo:?}: world {world} elsewhere"
-            );
+        for model in models(demo) {
+            let many: Vec<usize> = (0..67).collect();
+            let together = run(&model, demo, &many, Lanes::Auto, 1, precision);
+            let backwards: Vec<usize> = many.iter().rev().copied().collect();
+            let moved = run(&model, demo, &backwards, Lanes::Auto, 1, precision);
+            for world in 0..67 {
+                assert_eq!(
+                    together[world],
+                    moved[66 - world],
+                    "{demo:?}: world {world} elsewhere"
+                );
+            }
+            for world in [0, 15, 16, 66] {
+                let alone = run(&model, demo, &[world], Lanes::Auto, 1, precision);
+                assert_eq!(together[world], alone[0], "{demo:?}: world {world} alone");
+            }
         }
-        for world in [0, 15, 16, 66] {
-            let alone = run(&model, demo, &[world], Lanes::Auto, 1, precision);
-            assert_eq!(together[world], alone[0], "{demo:?}: world {world} alone");
-        }
+    }
+}
+
+#[test]
+fn worlds_with_and_without_active_constraints_run_side_by_side_here() {
+    for demo in [Demo::Torque, Demo::Target] {
+        let [_, limited] = models(demo);
+        let seeds: Vec<usize> = (0..16).collect();
+        let block = run(&limited, demo, &seeds, Lanes::Auto, 1, Precision::F32);
+        let constrained = block.iter().filter(|bits| is_constrained(&limited, bits));
+        let constrained = constrained.count();
+        assert!(0 < constrained && constrained < 16, "{constrained} of 16");
     }
 }
 
@@ -118,14 +153,15 @@ fn two_threads_equal_one() {
 fn scalar_equals_eight_equals_sixteen_worlds_a_block() {
     let seeds: Vec<usize> = (0..40).collect();
     for demo in [Demo::Torque, Demo::Target] {
-        let model = lesson(demo).compile().unwrap();
-        let scalar = run(&model, demo, &seeds, Lanes::Scalar, 1, Precision::F32);
-        for lanes in [Lanes::Eight, Lanes::Sixteen] {
-            if cpu::available(lanes) {
-                let wide = run(&model, demo, &seeds, lanes, 1, Precision::F32);
-                assert!(scalar == wide, "{demo:?} {lanes:?}");
-            } else {
-                println!("skipped: this processor has no {lanes:?}");
+        for model in models(demo) {
+            let scalar = run(&model, demo, &seeds, Lanes::Scalar, 1, Precision::F32);
+            for lanes in [Lanes::Eight, Lanes::Sixteen] {
+                if cpu::available(lanes) {
+                    let wide = run(&model, demo, &seeds, lanes, 1, Precision::F32);
+                    assert!(scalar == wide, "{demo:?} {lanes:?}");
+                } else {
+                    println!("skipped: this processor has no {lanes:?}");
+                }
             }
         }
     }
@@ -207,14 +243,14 @@ fn robot_of_every_joint_moves_alike_in_every_lane_and_width() {
 
 #[test]
 fn fields_that_are_asked_for_do_not_change_the_motion() {
-    let model = lesson(Demo::Target).compile().unwrap();
-    let motion = |fields: &[Field]| {
+    let [lesson, limited] = models(Demo::Target);
+    let motion = |model: &Arc<Model>, fields: &[Field]| {
         let options = Options {
             fields: fields.to_vec(),
             threads: Some(1),
             ..Options::default()
         };
-        let mut run = Run::new(&model, options);
+        let mut run = Run::new(model, options);
         for frame in 0..20 {
             let (field, row) = command(Demo::Target, frame);
             run.command(field, &row);
@@ -228,5 +264,7 @@ fn fields_that_are_asked_for_do_not_change_the_motion() {
             .map(|q| q.to_bits())
             .collect::<Vec<_>>()
     };
-    assert_eq!(motion(&[Field::JointQ]), motion(Field::ALL));
+    for model in [lesson, limited] {
+        assert_eq!(motion(&model, &[Field::JointQ]), motion(&model, Field::ALL));
+    }
 }

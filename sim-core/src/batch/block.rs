@@ -16,6 +16,14 @@ pub struct Block<F, V> {
     pub joint_qdd: Vec<V>,
     /// 1 where the solver used up its iterations since this was cleared, else 0. `(1)` [–]
     pub unconverged: Vec<V>,
+    /// Regularised stiffness D = 1/R of each constraint row; 0 where it is not active. `(rows)` [kg·m² or kg]
+    pub efc_weight: Vec<V>,
+    /// Reference acceleration of each row. `(rows)` [rad/s² or m/s²]
+    pub efc_aref: Vec<V>,
+    /// Force of each row. `(rows)` [N·m or N]
+    pub efc_force: Vec<V>,
+    /// Constraint forces in joint space, Jᵀ f. `(dofs)` [N·m or N]
+    pub constraint_force: Vec<V>,
     /// Joint torques applied. `(dofs)` [N·m or N]
     pub joint_f: Vec<F>,
     /// Position targets. `(dofs)` [rad or m]
@@ -36,7 +44,8 @@ pub struct Workspace<F> {
     pub reference: Vec<Vec3<F>>,
     /// Motion axis of each dof at the reference point, linear then angular. `(dofs, 2, 3)` [–]
     pub motion: Vec<Spatial<F>>,
-    /// Inertia of each body about the reference point. `(bodies, 10)` [kg, kg·m, kg·m²]
+    /// Inertia of each body about the reference point; the mass matrix makes it that of the subtree.
+    /// `(bodies, 10)` [kg, kg·m, kg·m²]
     pub inertia: Vec<Inertia<F>>,
     /// Coriolis, centrifugal and gravity forces. `(dofs)` [N·m or N]
     pub bias_force: Vec<F>,
@@ -44,16 +53,8 @@ pub struct Workspace<F> {
     pub mass_matrix: Vec<F>,
     /// All forces but those of constraints. `(dofs)` [N·m or N]
     pub smooth_force: Vec<F>,
-    /// Regularised stiffness D = 1/R of each row; 0 where it is not active. `(rows)` [kg·m² or kg]
-    pub efc_weight: Vec<F>,
-    /// Reference acceleration. `(rows)` [rad/s² or m/s²]
-    pub efc_aref: Vec<F>,
     /// +1 where the lower bound is the nearer, -1 where the upper is. `(limits)` [–]
     pub limit_side: Vec<F>,
-    /// Force of each row. `(rows)` [N·m or N]
-    pub efc_force: Vec<F>,
-    /// Constraint forces in joint space, Jᵀ f. `(dofs)` [N·m or N]
-    pub constraint_force: Vec<F>,
     /// Orientation of each body's frame. `(bodies, 4)` [–]
     pub orientation: Vec<Quat<F>>,
     /// Link frames in the world: position, quaternion (x, y, z, w). `(frames, 7)` [m, –]
@@ -66,14 +67,12 @@ pub struct Workspace<F> {
     pub velocity: Vec<Spatial<F>>,
     /// Scratch of a stage: acceleration, then force of each body. `(bodies, 2, 3)`
     pub force: Vec<Spatial<F>>,
-    /// Scratch of a stage: inertia of each subtree. `(bodies, 10)`
-    pub composite: Vec<Inertia<F>>,
     /// Scratch of a stage: a matrix to factor. Packed as `mass_matrix`.
     pub hessian: Vec<F>,
     /// Scratch of a stage. `(4, dofs)`
     pub vector: [Vec<F>; 4],
-    /// Scratch of a stage. `(2, rows)`
-    pub row: [Vec<F>; 2],
+    /// Scratch of a stage. `(4, rows)`
+    pub row: [Vec<F>; 4],
 }
 
 /// An array that stages read or write; the order of a step is checked against these.
@@ -109,15 +108,15 @@ pub enum Slot {
     MassMatrix,
     /// [`Workspace::smooth_force`]
     SmoothForce,
-    /// [`Workspace::efc_weight`]
+    /// [`Block::efc_weight`]
     EfcWeight,
-    /// [`Workspace::efc_aref`]
+    /// [`Block::efc_aref`]
     EfcAref,
     /// [`Workspace::limit_side`]
     LimitSide,
-    /// [`Workspace::efc_force`]
+    /// [`Block::efc_force`]
     EfcForce,
-    /// [`Workspace::constraint_force`]
+    /// [`Block::constraint_force`]
     ConstraintForce,
     /// [`Workspace::velocity`]
     Velocity,
@@ -148,6 +147,10 @@ impl<F: Num, V: Copy> Block<F, V> {
             joint_qd: vec![cell; n],
             joint_qdd: vec![cell; n],
             unconverged: vec![cell; 1],
+            efc_weight: vec![cell; rows],
+            efc_aref: vec![cell; rows],
+            efc_force: vec![cell; rows],
+            constraint_force: vec![cell; n],
             joint_f: vec![zero; n],
             joint_target_q: vec![zero; n],
             joint_target_qd: vec![zero; n],
@@ -160,21 +163,21 @@ impl<F: Num, V: Copy> Block<F, V> {
                 bias_force: vec![zero; n],
                 mass_matrix: vec![zero; packed],
                 smooth_force: vec![zero; n],
-                efc_weight: vec![zero; rows],
-                efc_aref: vec![zero; rows],
                 limit_side: vec![zero; m.limits.len()],
-                efc_force: vec![zero; rows],
-                constraint_force: vec![zero; n],
                 orientation: vec![[zero; 4]; bodies],
                 body_q: vec![[zero; 7]; m.frames.len()],
                 link_center: vec![[zero; 3]; m.frames.len()],
                 body_qd: vec![[[zero; 3]; 2]; m.frames.len()],
                 velocity: vec![[[zero; 3]; 2]; bodies],
                 force: vec![[[zero; 3]; 2]; bodies],
-                composite: vec![[zero; 10]; bodies],
                 hessian: vec![zero; packed],
                 vector: [vec![zero; n], vec![zero; n], vec![zero; n], vec![zero; n]],
-                row: [vec![zero; rows], vec![zero; rows]],
+                row: [
+                    vec![zero; rows],
+                    vec![zero; rows],
+                    vec![zero; rows],
+                    vec![zero; rows],
+                ],
             },
         }
     }
@@ -199,11 +202,11 @@ impl<F: Num, V: Copy> Block<F, V> {
             Slot::BiasForce => Values(&mut w.bias_force),
             Slot::MassMatrix => Values(&mut w.mass_matrix),
             Slot::SmoothForce => Values(&mut w.smooth_force),
-            Slot::EfcWeight => Values(&mut w.efc_weight),
-            Slot::EfcAref => Values(&mut w.efc_aref),
+            Slot::EfcWeight => Cells(&mut self.efc_weight),
+            Slot::EfcAref => Cells(&mut self.efc_aref),
             Slot::LimitSide => Values(&mut w.limit_side),
-            Slot::EfcForce => Values(&mut w.efc_force),
-            Slot::ConstraintForce => Values(&mut w.constraint_force),
+            Slot::EfcForce => Cells(&mut self.efc_force),
+            Slot::ConstraintForce => Cells(&mut self.constraint_force),
             Slot::Velocity => Values(w.velocity.as_flattened_mut().as_flattened_mut()),
             Slot::LinkCenter => Values(w.link_center.as_flattened_mut()),
             Slot::BodyQd => Values(w.body_qd.as_flattened_mut().as_flattened_mut()),

@@ -200,6 +200,8 @@ pub trait Lane: Num + Default + Send + Sync + 'static {
     fn load(from: &[Self::Real]) -> Self;
     /// Writes `WIDTH` neighbouring values.
     fn store(self, to: &mut [Self::Real]);
+    /// Writes four numbers of every world side by side: those of world w from `w * stride` on.
+    fn store_rows(numbers: [Self; 4], to: &mut [Self::Real], stride: usize);
     /// The mask that holds in every world.
     fn all() -> Self::Mask;
     /// Does the mask hold in any world?

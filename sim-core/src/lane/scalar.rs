@@ -77,6 +77,10 @@ macro_rules! scalar {
                 to[0] = self;
             }
             #[inline(always)]
+            fn store_rows(numbers: [Self; 4], to: &mut [$real], _stride: usize) {
+                to[..4].copy_from_slice(&numbers);
+            }
+            #[inline(always)]
             fn all() -> bool {
                 true
             }

@@ -15,7 +15,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 macro_rules! register {
     ($(#[$doc:meta])* $name:ident($reg:ty), width $width:literal, mask $mask:ty,
      arithmetic [$add:ident $sub:ident $mul:ident $div:ident $fma:ident $fnma:ident $sqrt:ident $min:ident $max:ident],
-     memory [$splat:ident $load:ident $store:ident],
+     memory [$splat:ident $load:ident $store:ident $transpose:ident $block:ident],
      bits [$neg:ident $abs:ident $round:ident $lt:ident $select:ident],
      masks [$and:ident $or:ident $not:ident $any:ident $all:ident]) => {
         $(#[$doc])*
@@ -134,6 +134,23 @@ macro_rules! register {
                 unsafe { $store(to.as_mut_ptr(), self.0) }
             }
             #[inline(always)]
+            fn store_rows(numbers: [Self; 4], to: &mut [f32], stride: usize) {
+                let [a, b, c, d] = numbers;
+                // blocks of four worlds; world 4 l + r of a register stands in block l of `worlds[r]`
+                let worlds = unsafe { $transpose([a.0, b.0, c.0, d.0]) };
+                let mut rows = to;
+                for l in 0..$width / 4 {
+                    for r in 0..4 {
+                        let block = unsafe { $block(worlds[r], l) };
+                        // the row holds four numbers (the index is checked)
+                        unsafe { _mm_storeu_ps(rows[..4].as_mut_ptr(), block) };
+                        if 4 * l + r + 1 < $width {
+                            rows = &mut rows[stride..];
+                        }
+                    }
+                }
+            }
+            #[inline(always)]
             fn all() -> $mask {
                 unsafe { $all() }
             }
@@ -150,7 +167,7 @@ register!(
     F32x8(__m256), width 8, mask __m256,
     arithmetic [_mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_fmadd_ps _mm256_fnmadd_ps
         _mm256_sqrt_ps _mm256_min_ps _mm256_max_ps],
-    memory [_mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps],
+    memory [_mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps transpose8 block8],
     bits [neg8 abs8 round8 lt8 select8],
     masks [_mm256_and_ps _mm256_or_ps not8 any8 all8]
 );
@@ -160,7 +177,7 @@ register!(
     F32x16(__m512), width 16, mask __mmask16,
     arithmetic [_mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_fmadd_ps _mm512_fnmadd_ps
         _mm512_sqrt_ps _mm512_min_ps _mm512_max_ps],
-    memory [_mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps],
+    memory [_mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps transpose16 block16],
     bits [neg16 _mm512_abs_ps round16 lt16 select16],
     masks [and16 or16 not16 any16 all16]
 );
@@ -198,6 +215,30 @@ unsafe fn any8(a: __m256) -> bool {
     unsafe { _mm256_movemask_ps(a) != 0 }
 }
 
+/// In each block of four worlds: from numbers by world to worlds by number.
+#[inline(always)]
+unsafe fn transpose8([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
+    unsafe {
+        let (ab, ab_high) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+        let (cd, cd_high) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+        [
+            _mm256_shuffle_ps::<0x44>(ab, cd),
+            _mm256_shuffle_ps::<0xee>(ab, cd),
+            _mm256_shuffle_ps::<0x44>(ab_high, cd_high),
+            _mm256_shuffle_ps::<0xee>(ab_high, cd_high),
+        ]
+    }
+}
+#[inline(always)]
+unsafe fn block8(a: __m256, block: usize) -> __m128 {
+    unsafe {
+        match block {
+            0 => _mm256_castps256_ps128(a),
+            _ => _mm256_extractf128_ps::<1>(a),
+        }
+    }
+}
+
 #[inline(always)]
 unsafe fn neg16(a: __m512) -> __m512 {
     unsafe { _mm512_xor_ps(a, _mm512_set1_ps(-0.0)) }
@@ -233,4 +274,29 @@ unsafe fn any16(a: __mmask16) -> bool {
 #[inline(always)]
 unsafe fn all16() -> __mmask16 {
     0xffff
+}
+/// As [`transpose8`].
+#[inline(always)]
+unsafe fn transpose16([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
+    unsafe {
+        let (ab, ab_high) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+        let (cd, cd_high) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+        [
+            _mm512_shuffle_ps::<0x44>(ab, cd),
+            _mm512_shuffle_ps::<0xee>(ab, cd),
+            _mm512_shuffle_ps::<0x44>(ab_high, cd_high),
+            _mm512_shuffle_ps::<0xee>(ab_high, cd_high),
+        ]
+    }
+}
+#[inline(always)]
+unsafe fn block16(a: __m512, block: usize) -> __m128 {
+    unsafe {
+        match block {
+            0 => _mm512_castps512_ps128(a),
+            1 => _mm512_extractf32x4_ps::<1>(a),
+            2 => _mm512_extractf32x4_ps::<2>(a),
+            _ => _mm512_extractf32x4_ps::<3>(a),
+        }
+    }
 }

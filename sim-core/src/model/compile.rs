@@ -11,6 +11,7 @@ use super::inverse_weight;
 use super::rows::{DofJoint, add_rows};
 use super::{Description, Inertial, Joint, JointKind, ModelError, Pose, Robot, TargetMode};
 use crate::math::factor::Pattern;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 impl Description {
@@ -35,15 +36,20 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     }
     let pattern = builder.pattern();
     let mass_entries = builder.mass_entries(&pattern);
+    let kept: BTreeSet<usize> = mass_entries.iter().map(|entry| entry.place).collect();
+    let mass_zeros = (0..pattern.len()).filter(|place| !kept.contains(place));
+    let mass_zeros = mass_zeros.collect();
     let mut constants = Constants {
         dt: scene.dt,
         gravity: scene.gravity,
         pattern,
         bodies: builder.bodies,
+        damped: builder.dofs.iter().any(|d| d.damping + d.kd > 0.0),
         dofs: builder.dofs,
         trees: builder.trees,
         frames: builder.frames,
         mass_entries,
+        mass_zeros,
         coords: builder.coord_names.len(),
         equalities: Vec::new(),
         frictions: Vec::new(),

@@ -18,8 +18,12 @@ pub struct Constants<R> {
     pub trees: Vec<Tree<R>>,
     /// Frames of all links, those that move with another included.
     pub frames: Vec<Frame<R>>,
+    /// Does any joint or drive have damping?
+    pub damped: bool,
     /// Entries of the mass matrix, dof by dof, each with the place where it is kept: the dof itself last.
     pub mass_entries: Vec<MassEntry>,
+    /// Places of the pattern that are 0 in the mass matrix.
+    pub mass_zeros: Vec<usize>,
     /// Position coordinates of all joints.
     pub coords: usize,
     /// Soft equality of two joints.
@@ -312,7 +316,9 @@ impl<R: Real> Constants<R> {
                     center: f.center.map(cast),
                 })
                 .collect(),
+            damped: self.damped,
             mass_entries: self.mass_entries.clone(),
+            mass_zeros: self.mass_zeros.clone(),
             coords: self.coords,
             equalities: self
                 .equalities

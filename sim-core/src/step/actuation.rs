@@ -31,7 +31,9 @@ pub(super) fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
             }
             Motion::Free => {
                 for j in body.dofs() {
-                    drive(cx, &m.dofs[j], b, j, C::F::c(0.0));
+                    let damping = C::F::k(m.dofs[j].damping);
+                    let applied = cx.get(&b.joint_qd[j]).fnma(damping, b.joint_f[j]);
+                    b.work.smooth_force[j] = applied - b.work.bias_force[j];
                 }
             }
         }

@@ -5,7 +5,7 @@
 //! f(b) = I a + v ×* I v + Σ f(child)   c(dof) = S · f(b)
 //! ```
 //!
-//! The axes of a free body stand still, but those of its rotation follow its centre of mass: a = v × ω.
+//! A free body has S = 1. Its axes stand still, but those of its rotation follow its centre of mass: a = v × ω.
 
 use super::{BlockOf, ConstantsOf};
 use crate::lane::Cx;
@@ -25,8 +25,14 @@ pub(super) fn bias_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
         let s = w.motion[body.dof];
         let qd = cx.get(&b.joint_qd[body.dof]);
         let mut own: Spatial<C::F> = [scale(s[LINEAR], qd), scale(s[ANGULAR], qd)];
-        for d in body.dof + 1..body.dof + body.motion.dofs() {
-            own = scale_sum(w.motion[d], cx.get(&b.joint_qd[d]), own);
+        if body.motion == Motion::Free {
+            for (x, d) in own.as_flattened_mut().iter_mut().zip(body.dofs()) {
+                *x = cx.get(&b.joint_qd[d]);
+            }
+        } else {
+            for d in body.dof + 1..body.dof + body.motion.dofs() {
+                own = scale_sum(w.motion[d], cx.get(&b.joint_qd[d]), own);
+            }
         }
         let (velocity, acceleration) = match (body.parent, body.motion) {
             (_, Motion::Free) => {
@@ -49,6 +55,10 @@ pub(super) fn bias_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
     }
     for (k, body) in m.bodies.iter().enumerate().rev() {
         let force = w.force[k];
+        if body.motion == Motion::Free {
+            w.bias_force[body.dofs()].copy_from_slice(force.as_flattened());
+            continue;
+        }
         for d in body.dofs() {
             w.bias_force[d] = power(&w.motion[d], &force);
         }

@@ -11,10 +11,12 @@
 use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, Num, Real};
 use crate::model::constants::{Impedance, Soft};
+use crate::when;
 
 #[inline(always)]
 pub(super) fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let w = &mut b.work;
+    let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     let mut row = 0;
     for equality in &m.equalities {
         let multiplier = C::F::k(equality.multiplier);
@@ -23,28 +25,40 @@ pub(super) fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let position = multiplier.fnma(cx.get(&b.joint_q[led]), cx.get(&b.joint_q[own]))
             - C::F::k(equality.offset);
         let velocity = multiplier.fnma(cx.get(&b.joint_qd[l]), cx.get(&b.joint_qd[f]));
-        (w.efc_weight[row], w.efc_aref[row]) = soft_row(&equality.soft, position, velocity);
+        let (weight, aref) = soft_row(&equality.soft, position, velocity);
+        cx.set(&mut b.efc_weight[row], weight);
+        cx.set(&mut b.efc_aref[row], aref);
         row += 1;
     }
     for friction in &m.frictions {
-        w.efc_weight[row] = C::F::k(friction.weight);
-        w.efc_aref[row] = -(cx.get(&b.joint_qd[friction.dof]) * C::F::k(friction.damping));
+        let aref = -(cx.get(&b.joint_qd[friction.dof]) * C::F::k(friction.damping));
+        cx.set(&mut b.efc_weight[row], C::F::k(friction.weight));
+        cx.set(&mut b.efc_aref[row], aref);
         row += 1;
     }
-    let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+    let [distance, ..] = &mut w.row;
+    let mut nearest = zero;
     for (n, limit) in m.limits.iter().enumerate() {
         let q = cx.get(&b.joint_q[m.dofs[limit.dof].coord]);
         let (above, below) = (q - C::F::k(limit.lower), C::F::k(limit.upper) - q);
-        let side = C::F::select(above.lt(below), one, -one);
-        let distance = above.min(below);
-        let velocity = side * cx.get(&b.joint_qd[limit.dof]);
-        let (weight, aref) = soft_row(&limit.soft, distance, velocity);
-        let active = distance.lt(zero);
-        w.efc_weight[row] = C::F::select(active, weight, zero);
-        w.efc_aref[row] = C::F::select(active, aref, zero);
-        w.limit_side[n] = side;
-        row += 1;
+        w.limit_side[n] = C::F::select(above.lt(below), one, -one);
+        distance[n] = above.min(below);
+        nearest = nearest.min(distance[n]);
+        cx.set(&mut b.efc_weight[row + n], zero);
+        cx.set(&mut b.efc_aref[row + n], zero);
     }
+    when!(cx, nearest.lt(zero), {
+        for (n, limit) in m.limits.iter().enumerate() {
+            let velocity = w.limit_side[n] * cx.get(&b.joint_qd[limit.dof]);
+            let (weight, aref) = soft_row(&limit.soft, distance[n], velocity);
+            let active = distance[n].lt(zero);
+            cx.set(
+                &mut b.efc_weight[row + n],
+                C::F::select(active, weight, zero),
+            );
+            cx.set(&mut b.efc_aref[row + n], C::F::select(active, aref, zero));
+        }
+    });
 }
 
 /// (D, aref) of a row at this position and velocity.

@@ -14,8 +14,8 @@
 
 use super::kinematics::read_quat;
 use super::{BlockOf, ConstantsOf};
-use crate::lane::{Cx, Num, Real};
-use crate::math::factor::{factor, solve};
+use crate::lane::{Cx, Num};
+use crate::math::factor::solve;
 use crate::math::quat::{self, Quat};
 use crate::math::vec3::{
     Mat3, add, constant, cross, scale_add, sub, transform, transform_back, zero,
@@ -27,21 +27,16 @@ pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
     let w = &mut b.work;
     let dt = C::F::k(m.dt);
     let [acceleration, ..] = &mut w.vector;
-    let damps = m
-        .dofs
-        .iter()
-        .any(|dof| dof.damping.to_f64() + dof.kd.to_f64() > 0.0);
-    if damps {
-        w.hessian.copy_from_slice(&w.mass_matrix);
+    if m.damped {
+        // the last stage: nobody needs the mass matrix after it
         for (j, dof) in m.dofs.iter().enumerate() {
             // a clamped drive keeps its damping here, as under MuJoCo's `actfrcrange`
             let damping = C::F::k(dof.damping) + C::F::k(dof.kd);
             let diagonal = m.pattern.at(j, j);
-            w.hessian[diagonal] = dt.fma(damping, w.hessian[diagonal]);
-            acceleration[j] = w.smooth_force[j] + w.constraint_force[j];
+            w.mass_matrix[diagonal] = dt.fma(damping, w.mass_matrix[diagonal]);
+            acceleration[j] = w.smooth_force[j] + cx.get(&b.constraint_force[j]);
         }
-        factor(&m.pattern, &mut w.hessian);
-        solve(&m.pattern, &w.hessian, acceleration);
+        solve(&m.pattern, &mut w.mass_matrix, acceleration);
     } else {
         for j in 0..m.dofs.len() {
             acceleration[j] = cx.get(&b.joint_qdd[j]);
@@ -61,21 +56,17 @@ pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
             );
             continue;
         }
-        for d in body.dofs() {
-            let qd = dt.fma(w.vector[0][d], cx.get(&b.joint_qd[d]));
-            cx.set(&mut b.joint_qd[d], qd);
+        let c = body.coord;
+        let mut qd = zero();
+        for (qd, d) in qd.iter_mut().zip(body.dofs()) {
+            *qd = dt.fma(w.vector[0][d], cx.get(&b.joint_qd[d]));
+            cx.set(&mut b.joint_qd[d], *qd);
         }
-        let (c, d) = (body.coord, body.dof);
         if body.motion == Motion::Ball {
-            let spin = [
-                cx.get(&b.joint_qd[d]),
-                cx.get(&b.joint_qd[d + 1]),
-                cx.get(&b.joint_qd[d + 2]),
-            ];
-            let turned = quat::turned(read_quat(cx, &b.joint_q, c), spin, dt);
+            let turned = quat::turned(read_quat(cx, &b.joint_q, c), qd, dt);
             write_quat(cx, &mut b.joint_q, c, turned);
         } else {
-            let q = dt.fma(cx.get(&b.joint_qd[d]), cx.get(&b.joint_q[c]));
+            let q = dt.fma(qd[0], cx.get(&b.joint_q[c]));
             cx.set(&mut b.joint_q[c], q);
         }
     }

@@ -46,6 +46,8 @@ pub enum Stage {
     Poses,
     /// Link velocities for output.
     Velocities,
+    /// Accelerations for output, where the solver left them out.
+    Accelerations,
 }
 
 /// The order of a step.
@@ -61,7 +63,7 @@ pub const STAGES: [Stage; 8] = [
 ];
 
 /// What evaluates a state without stepping: all derived fields.
-pub const FORWARD: [Stage; 9] = [
+pub const FORWARD: [Stage; 10] = [
     Stage::Kinematics,
     Stage::Bias,
     Stage::MassMatrix,
@@ -69,13 +71,14 @@ pub const FORWARD: [Stage; 9] = [
     Stage::Constraint,
     Stage::Solver,
     Stage::Refine,
+    Stage::Accelerations,
     Stage::Poses,
     Stage::Velocities,
 ];
 
 impl Stage {
     /// Every stage.
-    pub const ALL: [Stage; 10] = [
+    pub const ALL: [Stage; 11] = [
         Stage::Kinematics,
         Stage::Bias,
         Stage::MassMatrix,
@@ -86,6 +89,7 @@ impl Stage {
         Stage::Integrate,
         Stage::Poses,
         Stage::Velocities,
+        Stage::Accelerations,
     ];
 
     /// Its name, for timers and reports.
@@ -101,6 +105,7 @@ impl Stage {
             Stage::Integrate => "integrate",
             Stage::Poses => "poses",
             Stage::Velocities => "velocities",
+            Stage::Accelerations => "accelerations",
         }
     }
 
@@ -129,7 +134,7 @@ impl Stage {
                 EfcAref,
                 LimitSide,
             ],
-            Stage::Refine => &[
+            Stage::Refine | Stage::Accelerations => &[
                 JointQ,
                 JointQd,
                 JointQdd,
@@ -164,12 +169,12 @@ impl Stage {
         match self {
             Stage::Kinematics => &[Rotation, Origin, Reference, Motion, Inertia],
             Stage::Bias => &[BiasForce, Velocity],
-            Stage::MassMatrix => &[MassMatrix],
+            Stage::MassMatrix => &[MassMatrix, Inertia],
             Stage::Actuation => &[SmoothForce],
             Stage::Constraint => &[EfcWeight, EfcAref, LimitSide],
             Stage::Solver => &[JointQdd, Unconverged, EfcForce, ConstraintForce],
-            Stage::Refine => &[JointQdd, EfcForce, ConstraintForce],
-            Stage::Integrate => &[JointQ, JointQd],
+            Stage::Refine | Stage::Accelerations => &[JointQdd, EfcForce, ConstraintForce],
+            Stage::Integrate => &[JointQ, JointQd, MassMatrix],
             Stage::Poses => &[BodyQ],
             Stage::Velocities => &[LinkCenter, BodyQd],
         }
@@ -189,6 +194,7 @@ impl Stage {
             Stage::Integrate => integrate::implicit_fast(cx, m, b),
             Stage::Poses => poses::body_q(cx, m, b),
             Stage::Velocities => velocities::body_qd(m, &mut b.work),
+            Stage::Accelerations => solver::accelerations(cx, m, b),
         }
     }
 }

@@ -4,7 +4,7 @@ mod models;
 #[path = "../toy/mod.rs"]
 mod toy;
 
-use models::{every_joint, fr3, random_state};
+use models::{every_joint, fr3, limits_only, random_state};
 use sim_core::backend::gpu::program::{ProgramOptions, wgsl};
 use sim_core::batch::{Block, Numbers, WorkSlot};
 use sim_core::lane::memory::Cpu;
@@ -47,6 +47,10 @@ fn given(cx: &mut Recorder, m: &Constants<f32>, slots: &[WorkSlot], x: &[Recorde
         WorkSlot::JointQd,
         WorkSlot::JointQdd,
         WorkSlot::Unconverged,
+        WorkSlot::EfcWeight,
+        WorkSlot::EfcAref,
+        WorkSlot::EfcForce,
+        WorkSlot::ConstraintForce,
     ];
     for slot in cells {
         if let Numbers::Cells(cells) = block.numbers(slot) {
@@ -139,7 +143,7 @@ fn every_stage_is_recorded_and_its_program_is_valid() {
 
 #[test]
 fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
-    for m in [fr3(), every_joint()] {
+    for m in [fr3(), every_joint(), limits_only()] {
         let mut random = toy::Random(1);
         let recordings: Vec<Recording> = Stage::ALL
             .iter()
@@ -149,10 +153,11 @@ fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
             let mut block = random_state(&m, &mut random);
             let cx = &mut Cpu::new(&mut []);
             // poses belong to the state before it moves on
-            for stage in STAGES[..BEFORE_INTEGRATE]
-                .iter()
-                .chain(&[Stage::Poses, Stage::Integrate])
-            {
+            for stage in STAGES[..BEFORE_INTEGRATE].iter().chain(&[
+                Stage::Accelerations,
+                Stage::Poses,
+                Stage::Integrate,
+            ]) {
                 let recording = &recordings[Stage::ALL.iter().position(|s| s == stage).unwrap()];
                 let inputs = gathered(&mut block, stage.reads());
                 stage.run(cx, &m, &mut block);
@@ -179,7 +184,7 @@ fn the_random_states_of_these_tests_take_every_path() {
                 stage.run(cx, &m, &mut block);
                 stage.run(cx, &one_round, &mut hurried);
             }
-            let limits = &block.work.efc_weight[m.rows() - m.limits.len()..];
+            let limits = &block.efc_weight[m.rows() - m.limits.len()..];
             active += usize::from(limits.iter().any(|weight| *weight > 0.0));
             hard += usize::from(block.joint_qdd != hurried.joint_qdd);
         }

@@ -27,6 +27,15 @@ pub fn every_joint() -> Constants<f32> {
     m
 }
 
+/// The FR3 with limits as its only constraints: the solver passes over states within them.
+pub fn limits_only() -> Constants<f32> {
+    let mut m = fr3();
+    m.equalities.clear();
+    m.frictions.clear();
+    m.solver.refinements = 1;
+    m
+}
+
 fn robot(file: &str, armature: f64, floating: bool) -> Constants<f32> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     let mut scene = Description::new(1.0 / 480.0, SUBSTEPS);

@@ -4,7 +4,6 @@ use super::dispatch::RunStage;
 use super::transfer::{self, Arena};
 use crate::backend::Values;
 use crate::batch::{Block, Field, Layout, status};
-use crate::lane::memory::Cpu as Machine;
 use crate::lane::{Lane, Real};
 use crate::model::Model;
 use crate::model::constants::Constants;
@@ -108,7 +107,8 @@ fn stages_for(layout: &Layout) -> Vec<Stage> {
             Field::MassMatrix => (Stage::MassMatrix, None),
             Field::SmoothForce => (Stage::Actuation, None),
             Field::EfcJ | Field::EfcD | Field::EfcAref => (Stage::Constraint, None),
-            Field::JointQdd | Field::ConstraintForce | Field::EfcForce => (Stage::Refine, None),
+            Field::ConstraintForce | Field::EfcForce => (Stage::Refine, None),
+            Field::JointQdd => (Stage::Accelerations, None),
             _ => continue,
         };
         last = last.max(FORWARD.iter().position(|&stage| stage == needs));
@@ -255,7 +255,6 @@ impl<F: Lane> Chunk<F> {
         for block in 0..self.worlds.len().div_ceil(F::WIDTH) {
             let state = block * stride..(block + 1) * stride;
             self.load(state.clone());
-            let mut machine = Machine::<F>::new(&mut []);
             for pass in 0..=substeps {
                 let evaluates = pass == substeps;
                 if evaluates {
@@ -271,7 +270,7 @@ impl<F: Lane> Chunk<F> {
                 for stage in stages {
                     // SAFETY: by contract the processor has the instructions of the job's stages.
                     unsafe {
-                        job.stages[*stage as usize](&mut machine, &job.constants, &mut self.block);
+                        job.stages[*stage as usize](&job.constants, &mut self.block);
                     }
                 }
             }

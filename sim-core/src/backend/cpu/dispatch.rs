@@ -15,8 +15,7 @@ use crate::step::Stage;
 ///
 /// # Safety
 /// The processor has the instructions that it was compiled for.
-pub(super) type RunStage<F> =
-    unsafe fn(&mut Machine<'_, F>, &Constants<<F as Num>::Real>, &mut Block<F, F>);
+pub(super) type RunStage<F> = unsafe fn(&Constants<<F as Num>::Real>, &mut Block<F, F>);
 
 /// A chunk, compiled for an instruction set.
 ///
@@ -38,11 +37,13 @@ macro_rules! compiled {
 
             $(#[target_feature(enable = $features)])?
             unsafe fn stage<F: Lane, const S: usize>(
-                machine: &mut Machine<'_, F>,
                 constants: &Constants<F::Real>,
                 block: &mut Block<F, F>,
             ) {
-                Stage::ALL[S].run(machine, constants, block);
+                // made here, so that the compiler sees that every world is active: what is set outside of
+                // blocks and loops is then a plain store, which the next load need not wait for
+                let mut machine = Machine::new(&mut []);
+                Stage::ALL[S].run(&mut machine, constants, block);
             }
 
             $(#[target_feature(enable = $features)])?
@@ -69,6 +70,7 @@ macro_rules! compiled {
                         stage::<F, 7>,
                         stage::<F, 8>,
                         stage::<F, 9>,
+                        stage::<F, 10>,
                     ],
                     chunk: chunk::<F>,
                 }

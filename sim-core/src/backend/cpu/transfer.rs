@@ -79,15 +79,23 @@ pub(super) unsafe fn export<F: Lane>(
     stage(chunk, m, slot.field, n);
     // SAFETY: by contract.
     let rows = unsafe { arena.rows::<F::Real>(slot, &worlds) };
-    let lanes = &mut chunk.lanes[..n * F::WIDTH];
-    for (x, lanes) in chunk.staging[..n]
+    // four numbers at a time where every lane is a world; number by number this took a twelfth of a step
+    let mut first = 0;
+    if worlds.len() == F::WIDTH {
+        for four in chunk.staging[..n].as_chunks().0 {
+            F::store_rows(*four, &mut rows[first..], n);
+            first += 4;
+        }
+    }
+    let lanes = &mut chunk.lanes[..(n - first) * F::WIDTH];
+    for (x, lanes) in chunk.staging[first..n]
         .iter()
         .zip(lanes.chunks_exact_mut(F::WIDTH))
     {
         x.store(lanes);
     }
     for (lane, row) in rows.chunks_exact_mut(n.max(1)).enumerate() {
-        for (x, lanes) in row.iter_mut().zip(lanes.chunks_exact(F::WIDTH)) {
+        for (x, lanes) in row[first..].iter_mut().zip(lanes.chunks_exact(F::WIDTH)) {
             *x = lanes[lane];
         }
     }
@@ -109,10 +117,10 @@ fn stage<F: Lane>(chunk: &mut Chunk<F>, m: &Constants<F::Real>, field: Field, n:
         Field::BodyJacobian => body_jacobian(m, w, to),
         Field::BiasForce => to.copy_from_slice(&w.bias_force),
         Field::SmoothForce => to.copy_from_slice(&w.smooth_force),
-        Field::ConstraintForce => to.copy_from_slice(&w.constraint_force),
-        Field::EfcD => to.copy_from_slice(&w.efc_weight),
-        Field::EfcAref => to.copy_from_slice(&w.efc_aref),
-        Field::EfcForce => to.copy_from_slice(&w.efc_force),
+        Field::ConstraintForce => to.copy_from_slice(&b.constraint_force),
+        Field::EfcD => to.copy_from_slice(&b.efc_weight),
+        Field::EfcAref => to.copy_from_slice(&b.efc_aref),
+        Field::EfcForce => to.copy_from_slice(&b.efc_force),
         Field::MassMatrix => {
             let dofs = m.dofs.len();
             for i in 0..dofs {
@@ -124,7 +132,7 @@ fn stage<F: Lane>(chunk: &mut Chunk<F>, m: &Constants<F::Real>, field: Field, n:
                 }
             }
         }
-        Field::EfcJ => jacobian(m, &w.efc_weight, &w.limit_side, to),
+        Field::EfcJ => jacobian(m, &b.efc_weight, &w.limit_side, to),
         Field::Time | Field::Step | Field::Status => unreachable!("counters are not staged"),
     }
 }

@@ -1,21 +1,88 @@
 //! Small full blocks, unrolled.
 //!
-//! A loop over a short row costs more than its numbers, so every row number has its own body: rows
-//! and columns are constants of the functions, and only the first of them is chosen at run time.
+//! A full block is a single path ([`super::tree`]) whose rows stand at known places: taken [`TILE`] at a time,
+//! rows and columns are constants of the functions, and only how many there are is known at run time.
 
+use super::tree::{self, Removed};
 use super::tri;
 use crate::lane::Num;
 
 /// Rows of the largest block that is unrolled.
 pub(super) const LARGEST: usize = 12;
+/// Rows that are eliminated together.
+const TILE: usize = 3;
 
-/// `f::<F, K>(…)` for every K below `n`, rising or falling; `n` may be known at run time.
-macro_rules! rows {
-    (rising, $n:expr, $f:ident($($arg:expr),*)) => {
-        rows!(@ $n, $f($($arg),*), 0 1 2 3 4 5 6 7 8 9 10 11)
+/// Places of the rows of a full block.
+const ROWS: [usize; LARGEST] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+
+/// `f::<F, S>(P, …)` for the tile of S rows that begins at P.
+macro_rules! tile {
+    ($n:expr, $p:literal, $f:ident($($arg:expr),*)) => {
+        match usize::saturating_sub($n, $p) {
+            0 => {}
+            1 => $f::<F, 1>($p, $($arg),*),
+            2 => $f::<F, 2>($p, $($arg),*),
+            _ => $f::<F, TILE>($p, $($arg),*),
+        }
     };
-    (falling, $n:expr, $f:ident($($arg:expr),*)) => {
-        rows!(@ $n, $f($($arg),*), 11 10 9 8 7 6 5 4 3 2 1 0)
+}
+
+/// A := its factor, x := D⁻¹ L⁻ᵀ x
+#[inline(always)]
+pub(super) fn factor<F: Num>(size: usize, a: &mut [F], x: &mut [F]) {
+    tile!(size, 9, eliminate_9(a, x));
+    tile!(size, 6, eliminate_6(a, x));
+    tile!(size, 3, eliminate_3(a, x));
+    tile!(size, 0, eliminate_0(a, x));
+}
+
+/// Functions that remove the S rows from P on from those above, one by one.
+macro_rules! eliminate {
+    ($($name:ident $($i:literal)*;)*) => {
+        $(
+            #[inline(always)]
+            fn $name<F: Num, const S: usize>(p: usize, a: &mut [F], x: &mut [F]) {
+                let (above, own) = a[..tri(p + S, 0)].split_at_mut(tri(p, 0));
+                let (x_above, x) = x[..p + S].split_at_mut(p);
+                let mut tile = Removed::<F, S>::new(own, p, x);
+                $(tile.subtract_from(&mut above[tri($i, 0)..tri($i + 1, 0)], &mut x_above[$i]);)*
+            }
+        )*
+    };
+}
+
+eliminate!(
+    eliminate_9 8 7 6 5 4 3 2 1 0;
+    eliminate_6 5 4 3 2 1 0;
+    eliminate_3 2 1 0;
+);
+
+/// The S rows of the first tile, which has none above it.
+#[inline(always)]
+fn eliminate_0<F: Num, const S: usize>(p: usize, a: &mut [F], x: &mut [F]) {
+    Removed::<F, S>::new(&mut a[..tri(S, 0)], p, &mut x[..S]);
+}
+
+/// x := L⁻¹ x
+#[inline(always)]
+pub(super) fn forward<F: Num>(size: usize, factor: &[F], x: &mut [F]) {
+    tile!(size, 0, forward_tile(factor, x));
+    tile!(size, 3, forward_tile(factor, x));
+    tile!(size, 6, forward_tile(factor, x));
+    tile!(size, 9, forward_tile(factor, x));
+}
+
+#[inline(always)]
+fn forward_tile<F: Num, const S: usize>(p: usize, factor: &[F], x: &mut [F]) {
+    let own = &factor[tri(p, 0)..tri(p + S, 0)];
+    let (x_above, x) = x[..p + S].split_at_mut(p);
+    tree::forward::<F, S>(own, &ROWS[..p], x_above, x);
+}
+
+/// `f::<F, K>(…)` for every row K below `n`: a loop over a short row costs more than its numbers.
+macro_rules! rows {
+    ($n:expr, $f:ident($($arg:expr),*)) => {
+        rows!(@ $n, $f($($arg),*), 0 1 2 3 4 5 6 7 8 9 10 11)
     };
     (@ $n:expr, $f:ident $args:tt, $($k:literal)*) => {
         $(rows!(@one $n, $f $args, $k);)*
@@ -28,62 +95,8 @@ macro_rules! rows {
 }
 
 #[inline(always)]
-pub(super) fn factor<F: Num>(size: usize, a: &mut [F]) {
-    rows!(falling, size, eliminate(a));
-}
-
-/// Removes row K from all rows above it.
-#[inline(always)]
-fn eliminate<F: Num, const K: usize>(a: &mut [F]) {
-    let (above, rest) = a.split_at_mut(tri(K, 0));
-    let row = &mut rest[..K + 1];
-    let inverse = F::c(1.0).div(row[K]);
-    row[K] = inverse;
-    rows!(falling, K, subtract(above, row, inverse));
-}
-
-/// Row I less its share of `row`.
-#[inline(always)]
-fn subtract<F: Num, const I: usize>(above: &mut [F], row: &mut [F], inverse: F) {
-    let target = &mut above[tri(I, 0)..tri(I, 0) + I + 1];
-    let l = row[I] * inverse;
-    for j in 0..I + 1 {
-        target[j] = l.fnma(row[j], target[j]);
-    }
-    row[I] = l;
-}
-
-#[inline(always)]
-pub(super) fn solve<F: Num>(size: usize, factor: &[F], x: &mut [F]) {
-    rows!(falling, size, back(factor, x));
-    rows!(rising, size, forward(factor, x));
-}
-
-#[inline(always)]
-fn back<F: Num, const K: usize>(factor: &[F], x: &mut [F]) {
-    let row = &factor[tri(K, 0)..tri(K, 0) + K + 1];
-    let x = &mut x[..K + 1];
-    let xk = x[K];
-    for i in 0..K {
-        x[i] = xk.fnma(row[i], x[i]);
-    }
-    x[K] = xk * row[K];
-}
-
-#[inline(always)]
-fn forward<F: Num, const K: usize>(factor: &[F], x: &mut [F]) {
-    let row = &factor[tri(K, 0)..tri(K, 0) + K + 1];
-    let x = &mut x[..K + 1];
-    let mut xk = x[K];
-    for i in 0..K {
-        xk = row[i].fnma(x[i], xk);
-    }
-    x[K] = xk;
-}
-
-#[inline(always)]
 pub(super) fn multiply<F: Num>(size: usize, a: &[F], x: &[F], y: &mut [F]) {
-    rows!(rising, size, add_row(a, x, y));
+    rows!(size, add_row(a, x, y));
 }
 
 #[inline(always)]

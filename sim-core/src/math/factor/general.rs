@@ -13,7 +13,7 @@ fn subtract<F: Num>(y: &mut [F], s: F, x: &[F]) {
 }
 
 #[inline(always)]
-pub(super) fn factor<F: Num>(pattern: &Pattern, block: &Block, a: &mut [F]) {
+fn factor<F: Num>(pattern: &Pattern, block: &Block, a: &mut [F]) {
     let one = F::c(1.0);
     for k in (0..block.size).rev() {
         let (above, rest) = a.split_at_mut(tri(k, 0));
@@ -36,7 +36,9 @@ pub(super) fn factor<F: Num>(pattern: &Pattern, block: &Block, a: &mut [F]) {
 }
 
 #[inline(always)]
-pub(super) fn solve<F: Num>(pattern: &Pattern, block: &Block, factor: &[F], x: &mut [F]) {
+pub(super) fn solve<F: Num>(pattern: &Pattern, block: &Block, a: &mut [F], x: &mut [F]) {
+    factor(pattern, block, a);
+    let factor = &*a;
     for k in (0..block.size).rev() {
         let row = &factor[tri(k, 0)..tri(k, 0) + k + 1];
         let (before, rest) = x.split_at_mut(k);

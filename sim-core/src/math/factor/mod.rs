@@ -2,7 +2,7 @@
 //!
 //! Elimination runs from the last dof to the first, so that a tree makes no fill. The pattern is fixed
 //! when the model is compiled: independent parts of the scene are blocks of their own, each a packed
-//! lower triangle, or the paths of a tree. Small full blocks, such as an arm, run unrolled ([`dense`]), as
+//! lower triangle, or the paths of a tree. A solve eliminates the right-hand side along with the matrix. Small full blocks, such as an arm, run unrolled ([`dense`]), as
 //! do trees ([`tree`]); the others follow the runs of their rows ([`general`]). All do the same operations
 //! in the same order.
 
@@ -22,28 +22,14 @@ const fn tri(row: usize, column: usize) -> usize {
     row * (row + 1) / 2 + column
 }
 
-/// Replaces A by its factor: L below the diagonal, 1/D on it.
+/// Replaces x by A⁻¹ x, and A by its factor: L below the diagonal, 1/D on it.
 #[inline(always)]
-pub fn factor<F: Num>(pattern: &Pattern, a: &mut [F]) {
+pub fn solve<F: Num>(pattern: &Pattern, a: &mut [F], x: &mut [F]) {
     for block in pattern.blocks() {
-        let a = block.of_matrix(a);
+        let (a, x) = (block.of_matrix(a), &mut x[block.range()]);
         match block.kind {
-            Kind::Dense => dense::factor(block.size, a),
-            Kind::Tree => tree::factor(pattern, block, a),
-            Kind::General => general::factor(pattern, block, a),
-        }
-    }
-}
-
-/// Replaces x by A⁻¹ x, from the factor.
-#[inline(always)]
-pub fn solve<F: Num>(pattern: &Pattern, factor: &[F], x: &mut [F]) {
-    for block in pattern.blocks() {
-        let (factor, x) = (block.of_matrix_ref(factor), &mut x[block.range()]);
-        match block.kind {
-            Kind::Dense => dense::solve(block.size, factor, x),
-            Kind::Tree => tree::solve(pattern, block, factor, x),
-            Kind::General => general::solve(pattern, block, factor, x),
+            Kind::Dense | Kind::Tree => tree::solve(pattern, block, a, x),
+            Kind::General => general::solve(pattern, block, a, x),
         }
     }
 }
@@ -101,8 +87,7 @@ mod tests {
             let row = (0..size).filter_map(|j| pattern.find(i, j).map(|at| a[at] * x[j]));
             assert!((row.sum::<f64>() - b[i]).abs() < 1e-12, "row {i} of A x");
         }
-        factor(&pattern, &mut a);
-        solve(&pattern, &a, &mut b);
+        solve(&pattern, &mut a, &mut b);
         for (got, expected) in b.iter().zip(&x) {
             assert!((got - expected).abs() < 1e-13, "{got}, expected {expected}");
         }
@@ -142,27 +127,63 @@ mod tests {
         );
     }
 
+    /// A trunk of 3 with legs of 1 to 4 and of 20, and another tree.
+    fn two_trees() -> (usize, Vec<(usize, usize)>) {
+        let mut entries = full(3);
+        let mut size = 3;
+        for length in [1, 2, 3, 4, 20] {
+            for k in size..size + length {
+                entries.extend((0..3).chain(size..k).map(|i| (k, i)));
+            }
+            size += length;
+        }
+        entries.extend([(size + 1, size), (size + 2, size)]);
+        (size + 3, entries)
+    }
+
     #[test]
     fn trees_solve_and_are_kept_without_their_zeros() {
-        // a trunk of 3, legs of 2 and 20 on it, and another tree
-        let mut entries = full(3);
-        let legs = [vec![3, 4], (5..25).collect::<Vec<usize>>()];
-        for leg in &legs {
-            for (n, &k) in leg.iter().enumerate() {
-                entries.extend((0..3).map(|i| (k, i)));
-                entries.extend(leg[..n].iter().map(|&i| (k, i)));
-            }
-        }
-        entries.extend([(26, 25), (27, 25)]);
-        let pattern = Pattern::new(28, entries.iter().copied());
+        let (size, entries) = two_trees();
+        let pattern = Pattern::new(size, entries.iter().copied());
         assert!(
             pattern
                 .blocks()
                 .iter()
                 .all(|block| block.kind == Kind::Tree)
         );
-        assert_eq!(pattern.len(), entries.len() + 28);
-        check(28, &entries);
+        assert_eq!(pattern.len(), entries.len() + size);
+        check(size, &entries);
+    }
+
+    #[test]
+    fn trees_equal_general_bit_for_bit() {
+        let (size, entries) = two_trees();
+        let pattern = Pattern::new(size, entries.iter().copied());
+        let value = |i: usize, j: usize| match i == j {
+            true => 40.0 + i as f64,
+            false => ((i * 7 + j * 3) as f64).sin(),
+        };
+        for block in pattern.blocks() {
+            let mut kept = vec![0.0; block.len];
+            let mut packed = vec![0.0; tri(block.size, 0)];
+            let rows = || (0..block.size).flat_map(|i| (0..=i).map(move |j| (i, j)));
+            let place = |i, j| Some(pattern.find(block.first + i, block.first + j)? - block.offset);
+            for (i, j) in rows() {
+                if let Some(at) = place(i, j) {
+                    (kept[at], packed[tri(i, j)]) = (value(i, j), value(i, j));
+                }
+            }
+            let b: Vec<f64> = (0..block.size).map(|k| k as f64 + 0.3).collect();
+            let (mut x, mut y) = (b.clone(), b);
+            tree::solve(&pattern, block, &mut kept, &mut x);
+            general::solve(&pattern, block, &mut packed, &mut y);
+            assert_eq!(x, y);
+            for (i, j) in rows() {
+                if let Some(at) = place(i, j) {
+                    assert_eq!(kept[at], packed[tri(i, j)], "({i}, {j})");
+                }
+            }
+        }
     }
 
     #[test]
@@ -177,13 +198,11 @@ mod tests {
             let block = &pattern.blocks()[0];
             assert_eq!(block.kind, Kind::Dense);
             let (mut unrolled, mut looped) = (a.clone(), a.clone());
-            dense::factor(size, &mut unrolled);
-            general::factor(&pattern, block, &mut looped);
-            assert_eq!(unrolled, looped);
             let b: Vec<f64> = (0..size).map(|k| k as f64 + 0.3).collect();
             let (mut x, mut y) = (b.clone(), b);
-            dense::solve(size, &unrolled, &mut x);
-            general::solve(&pattern, block, &looped, &mut y);
+            tree::solve(&pattern, block, &mut unrolled, &mut x);
+            general::solve(&pattern, block, &mut looped, &mut y);
+            assert_eq!(unrolled, looped);
             assert_eq!(x, y);
             let (mut p, mut q) = (vec![0.0; size], vec![0.0; size]);
             dense::multiply(size, &a, &x, &mut p);

@@ -1,6 +1,6 @@
 //! Which entries of a symmetric matrix may differ from zero, and where they are kept.
 
-use super::{dense, tri};
+use super::{dense, tree, tri};
 use std::collections::BTreeSet;
 
 /// Entries that may differ from zero, fill included, and where they are kept.
@@ -24,6 +24,8 @@ pub struct Pattern {
     path_rows: Vec<usize>,
     /// Where they begin, counted from the block's first number.
     path_starts: Vec<usize>,
+    /// Segments of the trees.
+    segments: Vec<Segment>,
 }
 
 /// A part of the matrix that nothing couples to the rest.
@@ -39,6 +41,8 @@ pub(super) struct Block {
     pub len: usize,
     /// What it looks like.
     pub kind: Kind,
+    /// Its part of the segments, if it is no general one.
+    segments: (usize, usize),
 }
 
 /// What a block looks like, and so how it is kept.
@@ -57,6 +61,37 @@ pub(super) enum Kind {
 pub(super) struct Run {
     pub start: usize,
     pub end: usize,
+}
+
+/// Rows of a tree that follow each other on a path, kept one after another.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Segment {
+    /// Its first row, counted from the block's first.
+    pub first: usize,
+    /// Its number of rows.
+    pub size: usize,
+    /// Where its numbers begin, counted from the block's first.
+    pub start: usize,
+    /// Where they end.
+    end: usize,
+}
+
+impl Segment {
+    /// Its rows, counted from the block's first.
+    #[inline(always)]
+    pub fn rows(&self) -> std::ops::Range<usize> {
+        self.first..self.first + self.size
+    }
+    /// Its numbers, counted from the block's first.
+    #[inline(always)]
+    pub fn range(&self) -> std::ops::Range<usize> {
+        self.start..self.end
+    }
+    /// Does it begin at the root? It is a full triangle then.
+    #[inline(always)]
+    pub fn is_root(&self) -> bool {
+        self.start == 0
+    }
 }
 
 /// A row of a tree.
@@ -135,13 +170,47 @@ impl Pattern {
             }
             self.path_bounds.push(self.path_rows.len());
         }
+        let segments = self.segments.len();
+        if kind != Kind::General {
+            self.add_segments(rows, first, offset);
+        }
         self.blocks.push(Block {
             first,
             size,
             offset,
             len: self.len - offset,
             kind,
+            segments: (segments, self.segments.len()),
         });
+    }
+
+    /// Cuts a tree where it branches, and its branches into even parts of at most [`tree::SEGMENT`] rows.
+    fn add_segments(&mut self, rows: &[BTreeSet<usize>], first: usize, offset: usize) {
+        let parent = |k: usize| rows[k].last().map(|&row| row - first);
+        let children = |k: usize| (0..rows.len()).filter(|&i| parent(i) == Some(k)).count();
+        let mut begin = 0;
+        while begin < rows.len() {
+            let mut end = begin + 1;
+            while end < rows.len() && parent(end) == Some(end - 1) && children(end - 1) == 1 {
+                end += 1;
+            }
+            while begin < end {
+                let left = end - begin;
+                let size = match begin {
+                    0 => left.min(dense::LARGEST),
+                    _ => left.div_ceil(left.div_ceil(tree::SEGMENT)),
+                };
+                let last =
+                    self.starts[first + begin + size - 1] + self.places[first + begin + size - 1];
+                self.segments.push(Segment {
+                    first: begin,
+                    size,
+                    start: self.starts[first + begin] - offset,
+                    end: last + 1 - offset,
+                });
+                begin += size;
+            }
+        }
     }
 
     fn add_runs(&mut self, row: &BTreeSet<usize>, first: usize) {
@@ -200,6 +269,12 @@ impl Pattern {
     pub(super) fn runs(&self, block: &Block, row: usize) -> &[Run] {
         let k = block.first + row;
         &self.runs[self.run_starts[k]..self.run_starts[k + 1]]
+    }
+
+    /// Segments of a tree, in the order of their rows.
+    #[inline(always)]
+    pub(super) fn segments(&self, block: &Block) -> &[Segment] {
+        &self.segments[block.segments.0..block.segments.1]
     }
 
     /// Path of a row of a tree, counted from the block's first.

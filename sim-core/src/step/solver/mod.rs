@@ -21,11 +21,11 @@ mod line;
 mod refine;
 mod rows;
 
-pub(super) use refine::refine;
+pub(super) use refine::{accelerations, refine};
 
 use super::{BlockOf, ConstantsOf};
-use crate::lane::{Cx, Num, Real};
-use crate::math::factor::{factor, multiply, solve as back_substitute};
+use crate::lane::{Cx, MaskOf, Num, Real};
+use crate::math::factor::{multiply, solve as solve_linear};
 use crate::{break_if, times, when};
 use line::{Line, search};
 use rows::{assemble, changes, cost, forces, residual};
@@ -39,31 +39,28 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         choose_start(cx, m, b);
     }
     let w = &mut b.work;
-    let mut busy = cx.var(one);
+    let acts = acts(cx, m, &b.efc_weight);
+    let mut busy = cx.var(C::F::select(acts, one, zero));
     let mut round = cx.var(zero);
     times!(cx, m.solver.iterations, {
+        if may_idle::<C>(m) {
+            break_if!(cx, C::F::not(acts));
+        }
         let [a, minimum, step, pull] = &mut w.vector;
-        let [jar, jar_minimum] = &mut w.row;
+        let [jar, jar_minimum, weight, aref] = &mut w.row;
+        gather(cx, &b.efc_weight, weight);
+        gather(cx, &b.efc_aref, aref);
         for j in 0..n {
             a[j] = cx.get(&b.joint_qdd[j]);
             minimum[j] = w.smooth_force[j];
         }
         w.hessian.copy_from_slice(&w.mass_matrix);
-        residual(m, &w.limit_side, &w.efc_aref, a, jar);
-        assemble(
-            m,
-            &w.limit_side,
-            &w.efc_weight,
-            &w.efc_aref,
-            jar,
-            &mut w.hessian,
-            minimum,
-        );
-        factor(&m.pattern, &mut w.hessian);
-        back_substitute(&m.pattern, &w.hessian, minimum);
-        residual(m, &w.limit_side, &w.efc_aref, minimum, jar_minimum);
+        residual(m, &w.limit_side, aref, a, jar);
+        assemble(m, &w.limit_side, weight, aref, jar, &mut w.hessian, minimum);
+        solve_linear(&m.pattern, &mut w.hessian, minimum);
+        residual(m, &w.limit_side, aref, minimum, jar_minimum);
 
-        let changed = half.lt(changes(m, &w.efc_weight, jar, jar_minimum));
+        let changed = half.lt(changes(m, weight, jar, jar_minimum));
         let later = half.lt(cx.get(&round));
         let trusted = cx.get(&round).lt(C::F::c(trusted_rounds::<C::F>()));
         let searches = C::F::and(C::F::or(changed, later), C::F::not(trusted));
@@ -81,7 +78,7 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             for r in 0..m.rows() {
                 jar_minimum[r] = jar_minimum[r] - jar[r];
             }
-            let line = Line::new(m, curvature, &w.efc_weight, jar, jar_minimum);
+            let line = Line::new(m, curvature, weight, jar, jar_minimum);
             search::<C>(cx, m, &line, &mut length);
             // The model promises a gain of ½ |p'(0)|. Below the tolerance the step is not taken, as in
             // MuJoCo, but for the first; below the rounding of p' it is the last that can help.
@@ -109,22 +106,71 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let unconverged = cx.get(&b.unconverged[0]).max(cx.get(&busy));
     cx.set(&mut b.unconverged[0], unconverged);
 
-    let [a, force, ..] = &mut w.vector;
-    for j in 0..n {
-        a[j] = cx.get(&b.joint_qdd[j]);
-        force[j] = zero;
+    if may_idle::<C>(m) {
+        for force in b.efc_force.iter_mut().chain(&mut b.constraint_force) {
+            cx.set(force, zero);
+        }
+        when!(cx, acts, {
+            constraint_forces(cx, m, b);
+        });
+    } else {
+        constraint_forces(cx, m, b);
     }
-    let [jar, _] = &mut w.row;
-    residual(m, &w.limit_side, &w.efc_aref, a, jar);
-    forces(
-        m,
-        &w.limit_side,
-        &w.efc_weight,
-        jar,
-        &mut w.efc_force,
-        force,
-    );
-    w.constraint_force.copy_from_slice(force);
+}
+
+/// Forces of the rows at the accelerations found.
+#[inline(always)]
+fn constraint_forces<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let w = &mut b.work;
+    let [a, joint, ..] = &mut w.vector;
+    let [jar, force, weight, aref] = &mut w.row;
+    gather(cx, &b.efc_weight, weight);
+    gather(cx, &b.efc_aref, aref);
+    for j in 0..m.dofs.len() {
+        a[j] = cx.get(&b.joint_qdd[j]);
+        joint[j] = C::F::c(0.0);
+    }
+    residual(m, &w.limit_side, aref, a, jar);
+    forces(m, &w.limit_side, weight, jar, force, joint);
+    for r in 0..m.rows() {
+        cx.set(&mut b.efc_force[r], force[r]);
+    }
+    for j in 0..m.dofs.len() {
+        cx.set(&mut b.constraint_force[j], joint[j]);
+    }
+}
+
+/// The values of cells.
+#[inline(always)]
+fn gather<C: Cx>(cx: &mut C, cells: &[C::V], to: &mut [C::F]) {
+    for (x, cell) in to.iter_mut().zip(cells) {
+        *x = cx.get(cell);
+    }
+}
+
+/// Can the solver pass over a world in which no constraint acts?
+///
+/// Without constraints a = M⁻¹ τ. If a drive is damped only the outside reads that: the integrator factors
+/// a matrix of its own, and the next solve can start from anywhere. So a block of worlds that stay inside
+/// their limits saves the solver, a quarter of its step. In `f64` the start is MuJoCo's.
+fn may_idle<C: Cx>(m: &ConstantsOf<C>) -> bool {
+    let only_limits = m.equalities.is_empty() && m.frictions.is_empty();
+    !<<C::F as Num>::Real as Real>::DOUBLE && only_limits && m.damped
+}
+
+/// The worlds that the solver may not pass over.
+#[inline(always)]
+fn acts<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, weight: &[C::V]) -> MaskOf<C> {
+    let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+    let mut stiffest = zero;
+    if may_idle::<C>(m) {
+        for weight in weight {
+            stiffest = stiffest.max(cx.get(weight));
+        }
+    } else {
+        stiffest = one;
+    }
+    zero.lt(stiffest)
 }
 
 /// Rounds that take the whole step without a line search, which costs as much as two rounds.
@@ -145,24 +191,25 @@ fn choose_start<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let n = m.dofs.len();
     let w = &mut b.work;
     let [warm, smooth, ahead, pull] = &mut w.vector;
-    let [jar, jar_smooth] = &mut w.row;
+    let [jar, jar_smooth, weight, aref] = &mut w.row;
+    gather(cx, &b.efc_weight, weight);
+    gather(cx, &b.efc_aref, aref);
     w.hessian.copy_from_slice(&w.mass_matrix);
     smooth.copy_from_slice(&w.smooth_force);
-    factor(&m.pattern, &mut w.hessian);
-    back_substitute(&m.pattern, &w.hessian, smooth);
+    solve_linear(&m.pattern, &mut w.hessian, smooth);
     for j in 0..n {
         warm[j] = cx.get(&b.joint_qdd[j]);
         ahead[j] = warm[j] - smooth[j];
     }
-    residual(m, &w.limit_side, &w.efc_aref, warm, jar);
-    residual(m, &w.limit_side, &w.efc_aref, smooth, jar_smooth);
+    residual(m, &w.limit_side, aref, warm, jar);
+    residual(m, &w.limit_side, aref, smooth, jar_smooth);
     multiply(&m.pattern, &w.mass_matrix, ahead, pull);
     let mut gauss = C::F::c(0.0);
     for j in 0..n {
         gauss = ahead[j].fma(pull[j], gauss);
     }
-    let cost_warm = gauss.fma(C::F::c(0.5), cost(m, &w.efc_weight, jar));
-    let cheaper = cost(m, &w.efc_weight, jar_smooth).lt(cost_warm);
+    let cost_warm = gauss.fma(C::F::c(0.5), cost(m, weight, jar));
+    let cheaper = cost(m, weight, jar_smooth).lt(cost_warm);
     for j in 0..n {
         cx.set(
             &mut b.joint_qdd[j],

@@ -10,17 +10,38 @@
 //! an error of 1e-3 to 1e-6; `Newton::refinements` says how many a model needs.
 
 use super::rows::{assemble, forces, residual};
+use super::{acts, gather, may_idle};
 use crate::lane::{Cx, Num, Real};
-use crate::math::factor::{factor, solve};
+use crate::math::factor::solve;
 use crate::step::inverse_dynamics::inverse_dynamics;
 use crate::step::{BlockOf, ConstantsOf};
+use crate::when;
 
 #[inline(always)]
 pub(in crate::step) fn refine<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    if !<<C::F as Num>::Real as Real>::DOUBLE {
-        for _ in 0..m.solver.refinements {
-            correct(cx, m, b);
-        }
+    if !<<C::F as Num>::Real as Real>::DOUBLE && m.solver.refinements > 0 {
+        let acts = acts(cx, m, &b.efc_weight);
+        when!(cx, acts, {
+            for _ in 0..m.solver.refinements {
+                correct(cx, m, b);
+            }
+        });
+    }
+}
+
+/// Accelerations of the worlds that the solver passed over: the first correction is of 0.
+#[inline(always)]
+pub(in crate::step) fn accelerations<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    if may_idle::<C>(m) {
+        let idle = C::F::not(acts(cx, m, &b.efc_weight));
+        when!(cx, idle, {
+            for qdd in &mut b.joint_qdd {
+                cx.set(qdd, C::F::c(0.0));
+            }
+            for _ in 0..=m.solver.refinements {
+                correct(cx, m, b);
+            }
+        });
     }
 }
 
@@ -29,40 +50,31 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     inverse_dynamics(cx, m, b);
     let n = m.dofs.len();
     let w = &mut b.work;
-    let [missing, a, rhs, force] = &mut w.vector;
-    let [jar, _] = &mut w.row;
+    let [missing, a, rhs, joint] = &mut w.vector;
+    let [jar, force, weight, aref] = &mut w.row;
+    gather(cx, &b.efc_weight, weight);
+    gather(cx, &b.efc_aref, aref);
     for j in 0..n {
         a[j] = cx.get(&b.joint_qdd[j]);
         let applied = w.smooth_force[j] + w.bias_force[j];
-        missing[j] = applied + w.constraint_force[j] - missing[j];
+        missing[j] = applied + cx.get(&b.constraint_force[j]) - missing[j];
         rhs[j] = C::F::c(0.0);
     }
     w.hessian.copy_from_slice(&w.mass_matrix);
-    residual(m, &w.limit_side, &w.efc_aref, a, jar);
-    assemble(
-        m,
-        &w.limit_side,
-        &w.efc_weight,
-        &w.efc_aref,
-        jar,
-        &mut w.hessian,
-        rhs,
-    );
-    factor(&m.pattern, &mut w.hessian);
-    solve(&m.pattern, &w.hessian, missing);
+    residual(m, &w.limit_side, aref, a, jar);
+    assemble(m, &w.limit_side, weight, aref, jar, &mut w.hessian, rhs);
+    solve(&m.pattern, &mut w.hessian, missing);
     for j in 0..n {
         a[j] = a[j] + missing[j];
         cx.set(&mut b.joint_qdd[j], a[j]);
-        force[j] = C::F::c(0.0);
+        joint[j] = C::F::c(0.0);
     }
-    residual(m, &w.limit_side, &w.efc_aref, a, jar);
-    forces(
-        m,
-        &w.limit_side,
-        &w.efc_weight,
-        jar,
-        &mut w.efc_force,
-        force,
-    );
-    w.constraint_force.copy_from_slice(force);
+    residual(m, &w.limit_side, aref, a, jar);
+    forces(m, &w.limit_side, weight, jar, force, joint);
+    for r in 0..m.rows() {
+        cx.set(&mut b.efc_force[r], force[r]);
+    }
+    for j in 0..n {
+        cx.set(&mut b.constraint_force[j], joint[j]);
+    }
 }
