@@ -11,14 +11,23 @@
 //! r = R c     v = v(c) - ω × r     a = a(c) - α × r - ω × (ω × r)
 //! v += h a    p += h v             ω' = Rᵀω + h Rᵀα        R' = R exp(h ω')
 //! ```
+//!
+//! One that carries nothing that moves is also implicit in its gyroscopic force, to first order, as MuJoCo is since 3.11:
+//! so it gains no energy by spinning. With J the inertia about c, A that with drives' inertia and damping, L = J ω:
+//!
+//! ```text
+//! (A + h ∂(ω × L)/∂ω) δ = -h (α × L + ω × J α)       α += δ       a -= h (α × (ω × r) + ω × (α × r))
+//! ```
 
 use super::kinematics::read_quat;
 use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, Num};
 use crate::math::factor::solve;
 use crate::math::quat::{self, Quat};
+use crate::math::spatial::symmetric;
 use crate::math::vec3::{
-    Mat3, add, constant, cross, scale_add, sub, transform, transform_back, zero,
+    Mat3, Vec3, add, constant, cross, cross_add, dot, scale, scale_add, sub, transform,
+    transform_back, zero,
 };
 use crate::model::constants::{Body, Motion};
 
@@ -45,6 +54,10 @@ pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
     for (k, body) in m.bodies.iter().enumerate() {
         if body.motion == Motion::Free {
             let rotation = w.rotation[k];
+            if m.bodies.iter().all(|other| other.parent != Some(k)) {
+                let [acceleration, ..] = &mut w.vector;
+                gyroscopic::<C>(cx, m, body, &rotation, acceleration, &b.joint_qd);
+            }
             free::<C>(
                 cx,
                 body,
@@ -69,6 +82,53 @@ pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
             let q = dt.fma(qd[0], cx.get(&b.joint_q[c]));
             cx.set(&mut b.joint_q[c], q);
         }
+    }
+}
+
+/// Makes the accelerations of a free body implicit in its gyroscopic force.
+#[inline(always)]
+fn gyroscopic<C: Cx>(
+    cx: &C,
+    m: &ConstantsOf<C>,
+    body: &Body<<C::F as Num>::Real>,
+    rotation: &Mat3<C::F>,
+    acceleration: &mut [C::F],
+    joint_qd: &[C::V],
+) {
+    let d = body.dof;
+    let dt = C::F::k(m.dt);
+    let spin = [3, 4, 5].map(|i| cx.get(&joint_qd[d + i]));
+    let angular = [3, 4, 5].map(|i| acceleration[d + i]);
+    // relative to the trace, so that determinants of small bodies stay within f32
+    let trace: f64 = body.inertia[..3].iter().map(|x| x.to_f64()).sum();
+    let unit = C::F::c(1.0 / trace);
+    let inertia = |v: Vec3<C::F>| {
+        let own = symmetric(body.inertia, transform_back(rotation, v));
+        scale(transform(rotation, own), unit)
+    };
+    let momentum = inertia(spin);
+    let rate = |v: Vec3<C::F>| cross_add(v, momentum, cross(spin, inertia(v)));
+    let mut columns = [zero(); 3];
+    for (i, column) in columns.iter_mut().enumerate() {
+        let mut axis = zero();
+        axis[i] = C::F::c(1.0);
+        *column = scale_add(rate(axis), dt, inertia(axis));
+        let dof = &m.dofs[d + 3 + i];
+        let driven = dt.fma(C::F::k(dof.damping), C::F::k(dof.armature));
+        column[i] = driven.fma(unit, column[i]);
+    }
+    let change = scale(rate(angular), -dt);
+    let [x, y, z] = columns;
+    let minors = [cross(y, z), cross(z, x), cross(x, y)];
+    let determinant = dot(x, minors[0]);
+    let angular: Vec3<C::F> =
+        [0, 1, 2].map(|i| angular[i] + dot(minors[i], change).div(determinant));
+    let arm = transform(rotation, constant(body.center));
+    let swing = cross_add(angular, cross(spin, arm), cross(spin, cross(angular, arm)));
+    for i in 0..3 {
+        // of the centre of mass: the origin's, which the step takes, lags behind it by so much
+        acceleration[d + i] = dt.fnma(swing[i], acceleration[d + i]);
+        acceleration[d + 3 + i] = angular[i];
     }
 }
 
