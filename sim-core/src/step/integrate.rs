@@ -21,7 +21,7 @@
 
 use super::kinematics::read_quat;
 use super::{BlockOf, ConstantsOf};
-use crate::lane::{Cx, Num};
+use crate::lane::{Cx, Num, Real};
 use crate::math::factor::solve;
 use crate::math::quat::{self, Quat};
 use crate::math::spatial::symmetric;
@@ -97,32 +97,35 @@ fn gyroscopic<C: Cx>(
 ) {
     let d = body.dof;
     let dt = C::F::k(m.dt);
-    let spin = [3, 4, 5].map(|i| cx.get(&joint_qd[d + i]));
-    let angular = [3, 4, 5].map(|i| acceleration[d + i]);
+    let (mut spin, mut angular) = (zero(), zero());
+    for i in 0..3 {
+        spin[i] = cx.get(&joint_qd[d + 3 + i]);
+        angular[i] = acceleration[d + 3 + i];
+    }
     // relative to the trace, so that determinants of small bodies stay within f32
     let trace: f64 = body.inertia[..3].iter().map(|x| x.to_f64()).sum();
     let unit = C::F::c(1.0 / trace);
-    let inertia = |v: Vec3<C::F>| {
-        let own = symmetric(body.inertia, transform_back(rotation, v));
-        scale(transform(rotation, own), unit)
-    };
-    let momentum = inertia(spin);
-    let rate = |v: Vec3<C::F>| cross_add(v, momentum, cross(spin, inertia(v)));
+    let momentum = scale(turned(body, rotation, spin), unit);
     let mut columns = [zero(); 3];
     for (i, column) in columns.iter_mut().enumerate() {
         let mut axis = zero();
         axis[i] = C::F::c(1.0);
-        *column = scale_add(rate(axis), dt, inertia(axis));
+        let inertia = scale(turned(body, rotation, axis), unit);
+        let rate = cross_add(axis, momentum, cross(spin, inertia));
+        *column = scale_add(rate, dt, inertia);
         let dof = &m.dofs[d + 3 + i];
         let driven = dt.fma(C::F::k(dof.damping), C::F::k(dof.armature));
         column[i] = driven.fma(unit, column[i]);
     }
-    let change = scale(rate(angular), -dt);
+    let inertia = scale(turned(body, rotation, angular), unit);
+    let rate = cross_add(angular, momentum, cross(spin, inertia));
+    let change = scale(rate, -dt);
     let [x, y, z] = columns;
     let minors = [cross(y, z), cross(z, x), cross(x, y)];
     let determinant = dot(x, minors[0]);
-    let angular: Vec3<C::F> =
-        [0, 1, 2].map(|i| angular[i] + dot(minors[i], change).div(determinant));
+    for i in 0..3 {
+        angular[i] = angular[i] + dot(minors[i], change).div(determinant);
+    }
     let arm = transform(rotation, constant(body.center));
     let swing = cross_add(angular, cross(spin, arm), cross(spin, cross(angular, arm)));
     for i in 0..3 {
@@ -130,6 +133,13 @@ fn gyroscopic<C: Cx>(
         acceleration[d + i] = dt.fnma(swing[i], acceleration[d + i]);
         acceleration[d + 3 + i] = angular[i];
     }
+}
+
+/// J v in world axes, J the inertia about the centre of mass.
+#[inline(always)]
+fn turned<F: Num>(body: &Body<F::Real>, rotation: &Mat3<F>, v: Vec3<F>) -> Vec3<F> {
+    let own = symmetric(body.inertia, transform_back(rotation, v));
+    transform(rotation, own)
 }
 
 #[inline(always)]

@@ -115,7 +115,8 @@ impl<'a, 'input> Reader<'a, 'input> {
             let inertial = if has_inertial {
                 Some(inertial(&link.inertial))
             } else {
-                self.inertial_of(&link.name, &collisions)?
+                self.inertial_of(&link.name, &collisions)
+                    .map_err(|error| self.scan.place(node, error))?
             };
             links.push(Link {
                 name: link.name.clone(),

@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// The FR3 with drives and armatures of the usual size.
 pub fn fr3() -> Constants<f32> {
-    robot("../examples/assets/fr3/fr3_franka_hand.urdf", 0.1, false)
+    robot("examples/assets/fr3/fr3_franka_hand.urdf", 0.1, false)
 }
 
 /// Every kind of joint on a floating base, with accelerations refined.

@@ -1,7 +1,7 @@
 //! Every stage of a step, for the FR3 and for a robot of every joint: recorded, printed, validated, and run against the CPU.
 
 mod models;
-#[path = "../toy/mod.rs"]
+#[path = "../../sim-core/tests/toy/mod.rs"]
 mod toy;
 
 use models::{every_joint, fr3, limits_only, random_state};
