@@ -176,6 +176,9 @@ def test_a_shape_of_a_body_is_refused_by_name():
         scene.add_sphere(body="cub", radius=0.1)
     with pytest.raises(tl.SceneError, match="sphere `sphere` is static and has no density"):
         scene.add_sphere(radius=0.1, density=400)
+    stranger = tl.Scene().add_body(name="cube", mass=1)
+    with pytest.raises(tl.SceneError, match="body `cube` is of another scene"):
+        scene.add_sphere(body=stranger, radius=0.1)
     assert not scene.shapes
     with pytest.raises(AttributeError):
         setattr(body, "masss", 1)  # noqa: B010 (a checker refuses the plain form too)

@@ -95,7 +95,8 @@ def quaternion(what: str, values: Vector) -> Quaternion:
 def name(what: str, given: str, taken: Sequence[str]) -> str:
     """A name that can stand before a slash and that nothing else in the scene has."""
     if not isinstance(given, str) or not _NAME.fullmatch(given):
-        raise SceneError(f"{what} name {given!r}: use letters, digits, `_`, `-` and `.`")
+        rule = "use letters, digits, `_`, `-` and `.`, of which the last two do not come first"
+        raise SceneError(f"{what} name {given!r}: {rule}; name= gives another")
     if given in taken:
         raise SceneError(f"{what} name `{given}` is taken; give another name=")
     return given

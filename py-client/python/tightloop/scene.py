@@ -228,6 +228,11 @@ class Scene:
         if isinstance(package_dirs, str) or not isinstance(package_dirs, Sequence):
             raise SceneError(f"add_urdf: package_dirs is {package_dirs!r}; give a list of folders")
         packages = [checks.path("add_urdf: a folder of package_dirs", folder) for folder in package_dirs]
+        for folder in packages:
+            if not folder.is_dir():
+                raise SceneError(
+                    f"add_urdf: package_dirs names {folder}, which is no folder; mend or leave out the path"
+                )
         folders = [str(folder) for folder in packages]
         vertices = checks.integer("add_urdf: mesh_max_hull_vertices", mesh_max_hull_vertices)
         decompose = bool(convex_decomposition)
@@ -352,6 +357,8 @@ class Scene:
         name = checks.name(kind, self._free_name(kind) if name is None else name, self._names())
         what = f"{kind} `{name}`"
         bearer = body.name if isinstance(body, Body) else body
+        if isinstance(body, Body) and self.bodies.get(body.name) is not body:
+            raise SceneError(f"{what}: body `{body.name}` is of another scene; give one of this scene's")
         if bearer is not None and bearer not in self.bodies:
             known = ", ".join(f"`{body}`" for body in self.bodies) or "none yet; add_body makes one"
             raise SceneError(f"{what}: body is {bearer!r}, which is no body of this scene; there are: {known}")
