@@ -147,7 +147,7 @@ fn spin_of_a_body_of_revolution_precesses_in_it_at_the_analytic_rate() {
             (spin[2] - along).abs() < tolerance,
             "{precision:?}: {spin:?}"
         );
-        // Euler's explicit step turns by atan(Ω h), which is Ω h to third order, and stretches by its hypotenuse
+        // Euler's implicit step turns by atan(Ω h), which is Ω h to third order, and shrinks by its hypotenuse
         let angle = rate * seconds;
         let lag = (rate * dt).powi(2) / 3.0 * angle;
         let phase = spin[1].atan2(spin[0]);
@@ -157,7 +157,7 @@ fn spin_of_a_body_of_revolution_precesses_in_it_at_the_analytic_rate() {
             (behind - lag).abs() < 1e-3 * lag + tolerance,
             "{precision:?}: {behind:e} rad behind, expected {lag:e}"
         );
-        let length = across * (1.0 + (rate * dt).powi(2)).powf(0.5 * n);
+        let length = across * (1.0 + (rate * dt).powi(2)).powf(-0.5 * n);
         assert!(
             (spin[0].hypot(spin[1]) - length).abs() < 2.0 * tolerance,
             "{precision:?}: {spin:?}"
