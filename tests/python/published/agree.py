@@ -69,7 +69,9 @@ def files(config: pytest.Config) -> list[File]:
     for path in found:
         wheel, *rest = path.relative_to(PUBLISHED).parts
         name = "/".join([wheel, *(part for part in rest if part not in FOLDERS)])
-        out.append(File(path, name, (PUBLISHED / wheel / "packages",), refusal(name)))
+        # one of the wheels has no packages
+        packages = tuple(folder for folder in (PUBLISHED / wheel / "packages",) if folder.is_dir())
+        out.append(File(path, name, packages, refusal(name)))
     return out
 
 
