@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tightloop import checks
-from tightloop.checks import Quaternion, Triple, Vector
+from tightloop.checks import Triple, Vector
 from tightloop.errors import SceneError
+from tightloop.placed import Placed
 
 
-class Body:
+class Body(Placed):
     """A rigid body; made by `Scene.add_body`. ``scene.add_box(body=…)`` and the like give it shapes.
 
     Attributes:
@@ -25,7 +26,9 @@ class Body:
     """
 
     # A misspelt property is an error
-    __slots__ = ("_name", "_pos", "_quat", "com", "fixed", "inertia", "mass")
+    __slots__ = ("com", "fixed", "inertia", "mass")
+
+    kind = "body"
 
     def __init__(
         self,
@@ -39,38 +42,13 @@ class Body:
         fixed: bool,
     ) -> None:
         what = f"body `{name}`"
-        self._name = name
-        self.pos = pos
-        self.quat = quat
+        super().__init__(name, pos, quat)
         self.fixed = bool(fixed)
         self.mass = None if mass is None else checks.number(f"{what}: mass", mass, above=0.0)
         self.com: Triple | None = None if com is None else checks.triple(f"{what}: com", com)
         self.inertia = None if inertia is None else _tensor(f"{what}: inertia", inertia)
         if inertia is not None and mass is None:
             raise SceneError(f"{what} has an inertia but no mass; give mass= too")
-
-    @property
-    def name(self) -> str:
-        """Its name in the scene."""
-        return self._name
-
-    @property
-    def pos(self) -> Triple:
-        """Where its frame stands at the start, in the world [m]."""
-        return self._pos
-
-    @pos.setter
-    def pos(self, pos: Vector) -> None:
-        self._pos = checks.triple(f"body `{self.name}`: pos", pos)
-
-    @property
-    def quat(self) -> Quaternion:
-        """Orientation of its frame at the start, unit quaternion (x, y, z, w)."""
-        return self._quat
-
-    @quat.setter
-    def quat(self, quat: Vector) -> None:
-        self._quat = checks.quaternion(f"body `{self.name}`: quat", quat)
 
     def table(self) -> dict[str, Any]:
         """The body as a scene file has it."""

@@ -9,9 +9,9 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import checks
-from tightloop.checks import Quaternion, Triple, Vector
+from tightloop.checks import Vector
 from tightloop.errors import SceneError
+from tightloop.placed import Placed
 
 MODES = ("position", "velocity", "both")
 
@@ -118,7 +118,7 @@ class _Modes(_PerDof):
         robot._own[self.name] = modes
 
 
-class Robot:
+class Robot(Placed):
     """A robot of a scene, made by `Scene.add_urdf`.
 
     Properties have one entry a dof, in the order of ``dof_names`` (``joint_q``: a coordinate, ``coord_names``). A
@@ -128,10 +128,7 @@ class Robot:
 
     # A misspelt property is an error
     __slots__ = (
-        "_name",
         "_own",
-        "_pos",
-        "_quat",
         "_summary",
         "convex_decomposition",
         "floating",
@@ -141,6 +138,8 @@ class Robot:
         "strict",
         "urdf",
     )
+
+    kind = "robot"
 
     joint_q = _Positions("Start positions [rad or m], shape ``(coords,)``.")
     joint_target_q = _Numbers(
@@ -175,11 +174,9 @@ class Robot:
         convex_decomposition: bool,
         summary: dict[str, Any],
     ) -> None:
-        self._name = name
+        super().__init__(name, pos, quat)
         self.urdf = urdf
         self.package_dirs = package_dirs
-        self.pos = pos
-        self.quat = quat
         self.floating = floating
         self.self_collisions = self_collisions
         self.strict = strict
@@ -187,29 +184,6 @@ class Robot:
         self.convex_decomposition = convex_decomposition
         self._summary = summary
         self._own: dict[str, Any] = {}
-
-    @property
-    def name(self) -> str:
-        """Its name in the scene, which stands before joint and link names."""
-        return self._name
-
-    @property
-    def pos(self) -> Triple:
-        """Where the root link stands in the world [m]."""
-        return self._pos
-
-    @pos.setter
-    def pos(self, pos: Vector) -> None:
-        self._pos = checks.triple(f"robot `{self.name}`: pos", pos)
-
-    @property
-    def quat(self) -> Quaternion:
-        """Orientation of the root link in the world, unit quaternion (x, y, z, w)."""
-        return self._quat
-
-    @quat.setter
-    def quat(self, quat: Vector) -> None:
-        self._quat = checks.quaternion(f"robot `{self.name}`: quat", quat)
 
     @property
     def joint_names(self) -> list[str]:
