@@ -1,20 +1,22 @@
 //! The CPU machine: a mask of active worlds, and scratch rows of one block of worlds.
 
-use super::{Cx, Lane, Table};
+use super::{Cx, Fixed, Lane, Real, Table, Tables};
 
 /// Runs the text natively: loops are Rust loops, blocks are masks.
 pub struct Cpu<'a, F: Lane> {
     mask: F::Mask,
     memory: &'a mut [F],
+    tables: &'a Tables<F::Real>,
 }
 
 impl<'a, F: Lane> Cpu<'a, F> {
-    /// A machine with every world active, over scratch memory for the tables of the text.
+    /// A machine with every world active, over scratch memory for the tables of the text and the tables of a model.
     #[inline(always)]
-    pub fn new(memory: &'a mut [F]) -> Self {
+    pub fn new(memory: &'a mut [F], tables: &'a Tables<F::Real>) -> Self {
         Cpu {
             mask: F::all(),
             memory,
+            tables,
         }
     }
 
@@ -28,17 +30,28 @@ impl<'a, F: Lane> Cpu<'a, F> {
     }
 }
 
-/// Rows of every world, compacted: world w has rows 0..count(w).
+/// Rows of every world, compacted: world w has rows first..first + count(w).
 pub struct Rows<F> {
+    first: usize,
     capacity: usize,
-    /// Rows that any world has.
-    used: usize,
     /// Rows per world, those that did not fit included.
     count: F,
+    /// Where the count is kept.
+    home: Option<usize>,
+}
+
+/// A fresh row of every world.
+#[derive(Clone, Copy)]
+pub struct Fresh<F> {
+    row: F,
+    /// The row, where it is the same in all worlds that have one.
+    shared: Option<usize>,
 }
 
 /// An open loop: over the rows of a list, or a number of rounds.
 pub struct Loop<F: Lane> {
+    /// Index of round 0.
+    first: usize,
     round: usize,
     rounds: usize,
     outer: F::Mask,
@@ -51,7 +64,7 @@ impl<F: Lane> Cx for Cpu<'_, F> {
     type F = F;
     type V = F;
     type I = usize;
-    type Row = F;
+    type Row = Fresh<F>;
     type Loop = Loop<F>;
     type Block = F::Mask;
     type List = Rows<F>;
@@ -68,10 +81,48 @@ impl<F: Lane> Cx for Cpu<'_, F> {
     fn set(&mut self, v: &mut F, x: F) {
         *v = F::select(self.mask, x, *v);
     }
+    #[inline(always)]
+    fn put(&mut self, v: &mut F, x: F) {
+        *v = x;
+    }
+    #[inline(always)]
+    fn only(&mut self, x: F) -> F {
+        F::select(self.mask, x, F::c(0.0))
+    }
 
     #[inline(always)]
     fn at(&self, i: usize) -> usize {
         i
+    }
+    #[inline(always)]
+    fn number(&mut self, i: usize) -> F {
+        F::c(i as f64)
+    }
+    #[inline(always)]
+    fn constant(&mut self, t: Fixed, row: usize, k: usize) -> F {
+        debug_assert!(
+            row < t.rows && k < t.stride,
+            "row {row}, number {k} of {t:?}"
+        );
+        F::k(self.tables.numbers[t.base + row * t.stride + k])
+    }
+    #[inline(always)]
+    fn pick(&mut self, t: Fixed, row: F, k: usize) -> F {
+        debug_assert!(k < t.stride, "number {k} of {t:?}");
+        // a number that is none becomes 0
+        let row = row.max(F::c(0.0)).min(F::c(t.rows as f64 - 1.0));
+        let numbers = &self.tables.numbers[t.base + k..t.base + t.rows * t.stride];
+        F::gather(numbers, row * F::c(t.stride as f64))
+    }
+    #[inline(always)]
+    fn index(&mut self, t: Fixed, row: usize, k: usize, end: usize) -> usize {
+        debug_assert!(
+            row < t.rows && k < t.stride,
+            "row {row}, number {k} of {t:?}"
+        );
+        let index = self.tables.indices[t.base + row * t.stride + k] as usize;
+        debug_assert!(index < end, "index {index} of {t:?} is not below {end}");
+        index
     }
     #[inline(always)]
     fn load(&mut self, t: Table, row: usize, k: usize) -> F {
@@ -88,47 +139,63 @@ impl<F: Lane> Cx for Cpu<'_, F> {
         *self.cell(t, row, k) = x;
     }
     #[inline(always)]
-    fn init(&mut self, t: Table, row: F, k: usize, x: F) {
-        // the row number differs per world: write each row for the worlds that are at it
-        let mut rest = self.mask;
-        for r in 0..t.rows {
-            if !F::any(rest) {
-                break;
-            }
-            let here = F::and(rest, row.lt(F::c(r as f64 + 0.5)));
-            rest = F::and(rest, F::not(here));
-            let cell = self.cell(t, r, k);
-            *cell = F::select(here, x, *cell);
+    fn init(&mut self, t: Table, row: Fresh<F>, k: usize, x: F) {
+        if let Some(shared) = row.shared {
+            return self.store(t, shared, k, x);
+        }
+        let mut worlds = F::bits(self.mask);
+        while worlds != 0 {
+            let world = worlds.trailing_zeros() as usize;
+            worlds &= worlds - 1;
+            let place = row.row.lane(world).to_usize();
+            self.cell(t, place, k).set_lane(world, x.lane(world));
         }
     }
 
     #[inline(always)]
     fn list(&mut self, capacity: usize) -> Rows<F> {
         Rows {
+            first: 0,
             capacity,
-            used: 0,
             count: F::c(0.0),
+            home: None,
         }
     }
     #[inline(always)]
-    fn push(&mut self, list: &mut Rows<F>, mask: F::Mask) -> (F::Mask, Option<F>) {
+    fn kept(&mut self, counts: Table, at: usize, first: usize, capacity: usize) -> Rows<F> {
+        Rows {
+            first,
+            capacity,
+            count: *self.cell(counts, at, 0),
+            home: Some(counts.base + at * counts.stride),
+        }
+    }
+    #[inline(always)]
+    fn push(&mut self, list: &mut Rows<F>, mask: F::Mask) -> (F::Mask, Option<Fresh<F>>) {
         let outer = self.mask;
         let pushing = F::and(outer, mask);
         if !F::any(pushing) {
             return (outer, None);
         }
-        let row = list.count;
-        list.count = F::select(pushing, row + F::c(1.0), row);
-        let fits = F::and(pushing, row.lt(F::c(list.capacity as f64 - 0.5)));
+        let count = list.count;
+        list.count = F::select(pushing, count + F::c(1.0), count);
+        if let Some(home) = list.home {
+            self.memory[home] = list.count;
+        }
+        let fits = F::and(pushing, count.lt(F::c(list.capacity as f64 - 0.5)));
         if !F::any(fits) {
             return (outer, None);
         }
-        // rows are filled in order, so at most one more row comes into use
-        if list.used < list.capacity && F::any(F::and(fits, F::c(list.used as f64 - 0.5).lt(row))) {
-            list.used += 1;
-        }
         self.mask = fits;
-        (outer, Some(row))
+        let lowest = count.lane(F::bits(fits).trailing_zeros() as usize);
+        let same = F::k(lowest);
+        let differs = F::or(count.lt(same), same.lt(count));
+        let shared = match F::any(F::and(fits, differs)) {
+            true => None,
+            false => Some(list.first + lowest.to_usize()),
+        };
+        let row = count + F::c(list.first as f64);
+        (outer, Some(Fresh { row, shared }))
     }
     #[inline(always)]
     fn pushed(&mut self, list: &Rows<F>) -> F {
@@ -148,8 +215,9 @@ impl<F: Lane> Cx for Cpu<'_, F> {
     #[inline(always)]
     fn rows(&mut self, list: &Rows<F>) -> Loop<F> {
         Loop {
+            first: list.first,
             round: 0,
-            rounds: list.used,
+            rounds: list.capacity,
             outer: self.mask,
             live: self.mask,
             count: Some(list.count),
@@ -157,9 +225,14 @@ impl<F: Lane> Cx for Cpu<'_, F> {
     }
     #[inline(always)]
     fn times(&mut self, n: usize) -> Loop<F> {
+        self.span(0, n)
+    }
+    #[inline(always)]
+    fn span(&mut self, first: usize, end: usize) -> Loop<F> {
         Loop {
+            first,
             round: 0,
-            rounds: n,
+            rounds: end.saturating_sub(first),
             outer: self.mask,
             live: self.mask,
             count: None,
@@ -179,7 +252,7 @@ impl<F: Lane> Cx for Cpu<'_, F> {
             };
             if F::any(self.mask) {
                 l.round = round + 1;
-                return Some(round);
+                return Some(l.first + round);
             }
         }
         self.mask = l.outer;

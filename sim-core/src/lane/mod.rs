@@ -1,8 +1,8 @@
 //! The machine that the one text of physics is written for.
 //!
 //! Equations are plain functions over [`Num`], one value per world. What needs control flow or
-//! scratch memory takes a machine [`Cx`] and the macros [`each!`], [`times!`], [`push!`], [`when!`]
-//! and [`break_if!`]. Three machines run the same text: [`scalar`] numbers (`f64`, the reference,
+//! scratch memory takes a machine [`Cx`] and the macros [`each!`], [`times!`], [`span!`], [`push!`],
+//! [`when!`] and [`break_if!`]. Three machines run the same text: [`scalar`] numbers (`f64`, the reference,
 //! and `f32`), [`simd`] registers with one world a lane, and [`record`], which turns it into WGSL.
 //!
 //! A run-time `if` on a world's value does not type-check: select with [`Num::select`], or open a
@@ -25,6 +25,11 @@ pub trait Real: Copy + Default + PartialOrd + Send + Sync + std::fmt::Debug + 's
     fn of(x: f64) -> Self;
     /// Widens to a double.
     fn to_f64(self) -> f64;
+    /// The whole number that it is; 0 for what is below 0 or no number.
+    #[inline(always)]
+    fn to_usize(self) -> usize {
+        self.to_f64() as usize
+    }
 }
 
 impl Real for f32 {
@@ -206,6 +211,14 @@ pub trait Lane: Num + Default + Send + Sync + 'static {
     fn all() -> Self::Mask;
     /// Does the mask hold in any world?
     fn any(mask: Self::Mask) -> bool;
+    /// The worlds of the mask, one bit a lane, lane 0 lowest.
+    fn bits(mask: Self::Mask) -> u32;
+    /// The number of one world.
+    fn lane(self, lane: usize) -> Self::Real;
+    /// Changes the number of one world.
+    fn set_lane(&mut self, lane: usize, x: Self::Real);
+    /// Reads one number for every world: that at `places`, which are whole and lie inside.
+    fn gather(from: &[Self::Real], places: Self) -> Self;
 }
 
 /// A table of rows in scratch memory: `rows` rows of `stride` numbers, one value per world.
@@ -217,6 +230,26 @@ pub struct Table {
     pub stride: usize,
     /// Rows that fit.
     pub rows: usize,
+}
+
+/// A table of the model: the same for every world, read at an index that is found at run time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Fixed {
+    /// First number of row 0.
+    pub base: usize,
+    /// Numbers in a row.
+    pub stride: usize,
+    /// Its rows.
+    pub rows: usize,
+}
+
+/// The tables of a model, one after another: of numbers, and of indices into tables.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tables<R> {
+    /// What [`Cx::constant`] and [`Cx::pick`] read.
+    pub numbers: Vec<R>,
+    /// What [`Cx::index`] reads.
+    pub indices: Vec<u32>,
 }
 
 /// The machine: variables, scratch rows, and control flow in which every world stops by itself.
@@ -244,9 +277,23 @@ pub trait Cx: Sized {
     fn get(&self, v: &Self::V) -> Self::F;
     /// Assigns in the active worlds only.
     fn set(&mut self, v: &mut Self::V, x: Self::F);
+    /// Assigns where the inactive worlds need no guard: `x` is what they have already, or nobody reads
+    /// it there. A masked store costs more; see [`Cx::only`].
+    fn put(&mut self, v: &mut Self::V, x: Self::F);
+    /// `x` in the active worlds, 0 elsewhere.
+    fn only(&mut self, x: Self::F) -> Self::F;
 
     /// A constant index.
     fn at(&self, i: usize) -> Self::I;
+    /// An index as a number.
+    fn number(&mut self, i: Self::I) -> Self::F;
+    /// Number `k` of a row of a table of the model.
+    fn constant(&mut self, t: Fixed, row: Self::I, k: usize) -> Self::F;
+    /// Number `k` of a row of a table of the model, another row in each world; rows past the ends are the
+    /// nearest. Where a world is inactive the result is undefined.
+    fn pick(&mut self, t: Fixed, row: Self::F, k: usize) -> Self::F;
+    /// Index `k` of a row of an index table of the model, below `end`.
+    fn index(&mut self, t: Fixed, row: Self::I, k: usize, end: usize) -> Self::I;
     /// Reads number `k` of a row.
     fn load(&mut self, t: Table, row: Self::I, k: usize) -> Self::F;
     /// Writes number `k` of a row, in the active worlds only.
@@ -258,6 +305,10 @@ pub trait Cx: Sized {
 
     /// An empty list of at most `capacity` rows; what does not fit is counted, not stored.
     fn list(&mut self, capacity: usize) -> Self::List;
+    /// A list that outlasts the text: its rows are `first..first + capacity` of its tables, and its length
+    /// is number 0 of row `at` of `counts`.
+    fn kept(&mut self, counts: Table, at: Self::I, first: Self::I, capacity: Self::I)
+    -> Self::List;
     /// Opens a block for the worlds in `mask`, with a fresh row; see [`push!`].
     fn push(
         &mut self,
@@ -275,6 +326,8 @@ pub trait Cx: Sized {
     fn rows(&mut self, list: &Self::List) -> Self::Loop;
     /// Opens a loop of at most `n` rounds; see [`times!`].
     fn times(&mut self, n: usize) -> Self::Loop;
+    /// Opens a loop with a round for each index of `first..end`; see [`span!`].
+    fn span(&mut self, first: Self::I, end: Self::I) -> Self::Loop;
     /// Enters the next round, or closes the loop.
     fn next(&mut self, l: &mut Self::Loop) -> Option<Self::I>;
     /// Ends the loop for the worlds in `mask`; true if none is left. See [`break_if!`].
@@ -293,12 +346,25 @@ macro_rules! each {
     }};
 }
 
-/// `times!(cx, n, { … })`: at most `n` rounds; see [`break_if!`].
+/// `times!(cx, n, { … })` or `times!(cx, i in n, { … })`: at most `n` rounds; see [`break_if!`].
 #[macro_export]
 macro_rules! times {
+    ($cx:ident, $i:ident in $n:expr, $body:block) => {{
+        let mut rounds = $crate::lane::Cx::times($cx, $n);
+        while let Some($i) = $crate::lane::Cx::next($cx, &mut rounds) $body
+    }};
     ($cx:ident, $n:expr, $body:block) => {{
         let mut rounds = $crate::lane::Cx::times($cx, $n);
         while let Some(_) = $crate::lane::Cx::next($cx, &mut rounds) $body
+    }};
+}
+
+/// `span!(cx, i in first, end, { … })`: a round for each index from `first` to before `end`.
+#[macro_export]
+macro_rules! span {
+    ($cx:ident, $i:ident in $first:expr, $end:expr, $body:block) => {{
+        let mut rounds = $crate::lane::Cx::span($cx, $first, $end);
+        while let Some($i) = $crate::lane::Cx::next($cx, &mut rounds) $body
     }};
 }
 

@@ -88,6 +88,22 @@ macro_rules! scalar {
             fn any(mask: bool) -> bool {
                 mask
             }
+            #[inline(always)]
+            fn bits(mask: bool) -> u32 {
+                u32::from(mask)
+            }
+            #[inline(always)]
+            fn lane(self, _lane: usize) -> $real {
+                self
+            }
+            #[inline(always)]
+            fn set_lane(&mut self, _lane: usize, x: $real) {
+                *self = x;
+            }
+            #[inline(always)]
+            fn gather(from: &[$real], places: Self) -> Self {
+                from[places as usize]
+            }
         }
     };
 }

@@ -17,7 +17,7 @@ macro_rules! register {
      arithmetic [$add:ident $sub:ident $mul:ident $div:ident $fma:ident $fnma:ident $sqrt:ident $min:ident $max:ident],
      memory [$splat:ident $load:ident $store:ident $transpose:ident $block:ident],
      bits [$neg:ident $abs:ident $round:ident $lt:ident $select:ident],
-     masks [$and:ident $or:ident $not:ident $any:ident $all:ident]) => {
+     masks [$and:ident $or:ident $not:ident $any:ident $all:ident $mask_bits:ident], gather $gather:ident) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug)]
         #[repr(transparent)]
@@ -158,6 +158,31 @@ macro_rules! register {
             fn any(mask: $mask) -> bool {
                 unsafe { $any(mask) }
             }
+            #[inline(always)]
+            fn bits(mask: $mask) -> u32 {
+                unsafe { $mask_bits(mask) }
+            }
+            #[inline(always)]
+            fn lane(self, lane: usize) -> f32 {
+                let mut lanes = [0.0; $width];
+                self.store(&mut lanes);
+                lanes[lane]
+            }
+            #[inline(always)]
+            fn set_lane(&mut self, lane: usize, x: f32) {
+                let mut lanes = [0.0; $width];
+                self.store(&mut lanes);
+                lanes[lane] = x;
+                *self = Self::load(&lanes);
+            }
+            #[inline(always)]
+            fn gather(from: &[f32], places: Self) -> Self {
+                // inside, whatever was asked for: a number that is none becomes 0
+                let last = from.len().min(1 << 24) as f32 - 1.0;
+                assert!(last >= 0.0, "nothing to read");
+                let places = places.max(Self::k(0.0)).min(Self::k(last));
+                Self(unsafe { $gather(from, places.0) })
+            }
         }
     };
 }
@@ -169,7 +194,7 @@ register!(
         _mm256_sqrt_ps _mm256_min_ps _mm256_max_ps],
     memory [_mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps transpose8 block8],
     bits [neg8 abs8 round8 lt8 select8],
-    masks [_mm256_and_ps _mm256_or_ps not8 any8 all8]
+    masks [_mm256_and_ps _mm256_or_ps not8 any8 all8 bits8], gather gather8
 );
 
 register!(
@@ -179,7 +204,7 @@ register!(
         _mm512_sqrt_ps _mm512_min_ps _mm512_max_ps],
     memory [_mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps transpose16 block16],
     bits [neg16 _mm512_abs_ps round16 lt16 select16],
-    masks [and16 or16 not16 any16 all16]
+    masks [and16 or16 not16 any16 all16 bits16], gather gather16
 );
 
 #[inline(always)]
@@ -213,6 +238,15 @@ unsafe fn not8(a: __m256) -> __m256 {
 #[inline(always)]
 unsafe fn any8(a: __m256) -> bool {
     unsafe { _mm256_movemask_ps(a) != 0 }
+}
+#[inline(always)]
+unsafe fn bits8(a: __m256) -> u32 {
+    unsafe { _mm256_movemask_ps(a) as u32 }
+}
+/// Numbers of `from` at whole places inside it.
+#[inline(always)]
+unsafe fn gather8(from: &[f32], places: __m256) -> __m256 {
+    unsafe { _mm256_i32gather_ps::<4>(from.as_ptr(), _mm256_cvtps_epi32(places)) }
 }
 
 /// In each block of four worlds: from numbers by world to worlds by number.
@@ -270,6 +304,15 @@ unsafe fn not16(a: __mmask16) -> __mmask16 {
 #[inline(always)]
 unsafe fn any16(a: __mmask16) -> bool {
     a != 0
+}
+#[inline(always)]
+unsafe fn bits16(a: __mmask16) -> u32 {
+    u32::from(a)
+}
+/// As [`gather8`].
+#[inline(always)]
+unsafe fn gather16(from: &[f32], places: __m512) -> __m512 {
+    unsafe { _mm512_i32gather_ps::<4>(_mm512_cvtps_epi32(places), from.as_ptr()) }
 }
 #[inline(always)]
 unsafe fn all16() -> __mmask16 {

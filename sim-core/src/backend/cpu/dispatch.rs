@@ -42,7 +42,8 @@ macro_rules! compiled {
             ) {
                 // made here, so that the compiler sees that every world is active: what is set outside of
                 // blocks and loops is then a plain store, which the next load need not wait for
-                let mut machine = Machine::new(&mut []);
+                let tables = Default::default();
+                let mut machine = Machine::new(&mut [], &tables);
                 Stage::ALL[S].run(&mut machine, constants, block);
             }
 

@@ -8,7 +8,7 @@ use super::handles::{
 use super::state::{Kind, NOWHERE, with};
 use super::tree::{Cell, Op, Operand, Rounds, Row, Statement};
 use super::{Recorded, RecordedMask};
-use crate::lane::{Cx, Table};
+use crate::lane::{Cx, Fixed, Table};
 use std::marker::PhantomData;
 use std::panic::Location;
 
@@ -79,6 +79,37 @@ impl Cx for Recorder {
             list: None,
             home: NOWHERE,
         }
+    }
+
+    fn put(&mut self, _v: &mut RecordedVariable, _x: Recorded) {
+        unimplemented!()
+    }
+    fn only(&mut self, _x: Recorded) -> Recorded {
+        unimplemented!()
+    }
+    fn number(&mut self, _i: RecordedIndex) -> Recorded {
+        unimplemented!()
+    }
+    fn constant(&mut self, _t: Fixed, _row: RecordedIndex, _k: usize) -> Recorded {
+        unimplemented!()
+    }
+    fn pick(&mut self, _t: Fixed, _row: Recorded, _k: usize) -> Recorded {
+        unimplemented!()
+    }
+    fn index(&mut self, _t: Fixed, _row: RecordedIndex, _k: usize, _end: usize) -> RecordedIndex {
+        unimplemented!()
+    }
+    fn kept(
+        &mut self,
+        _counts: Table,
+        _at: RecordedIndex,
+        _first: RecordedIndex,
+        _capacity: RecordedIndex,
+    ) -> RecordedList {
+        unimplemented!()
+    }
+    fn span(&mut self, _first: RecordedIndex, _end: RecordedIndex) -> RecordedLoop {
+        unimplemented!()
     }
 
     #[track_caller]
