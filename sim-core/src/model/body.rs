@@ -1,10 +1,11 @@
 //! Rigid bodies of a scene: robots of one link, free in the world or fixed in it.
 
-use super::description::{Collision, Description, Inertial, Link, Robot};
+use super::description::{Collision, Description, Inertial, Link, Robot, Shape};
 use super::error::ModelError;
 use super::geometry::{DENSITY, mass_properties};
 use super::inertia::merge;
 use super::pose::Pose;
+use super::validate::collision_name;
 
 /// A rigid body as users describe it; what is left out comes from its shapes.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,7 +44,12 @@ impl Body {
     /// Mass, centre and inertia; `None` for nothing at all.
     fn inertial(&self) -> Result<Option<Inertial>, ModelError> {
         let mut shapes: Option<Inertial> = None;
-        for (collision, density) in &self.shapes {
+        for (index, (collision, density)) in self.shapes.iter().enumerate() {
+            if collision.shape == Shape::Plane {
+                let owner = format!("body `{}`", self.name);
+                let what = collision_name(&owner, index, collision);
+                return Err(ModelError::PlaneBorne { what });
+            }
             let part = mass_properties(&collision.shape, *density)?;
             let whole = shapes.unwrap_or(Inertial {
                 mass: 0.0,
@@ -85,6 +91,16 @@ impl Body {
     }
 }
 
+/// The link of a body.
+const LINK: &str = "body";
+
+impl Robot {
+    /// Whether it is a body of the scene.
+    pub(super) fn is_body(&self) -> bool {
+        self.urdf.is_none() && self.links.len() == 1 && self.links[0].name == LINK
+    }
+}
+
 /// Inertia of a solid ball of water, 2/5 m r². `(3, 3)` [kg·m²]
 fn ball(mass: f64) -> [[f64; 3]; 3] {
     let radius = (mass / (DENSITY * 4.0 / 3.0 * std::f64::consts::PI)).cbrt();
@@ -99,7 +115,7 @@ impl Description {
     /// A body that weighs nothing, or a value that is out of range, by name; the scene is then unchanged.
     pub fn add_body(&mut self, body: Body) -> Result<&mut Robot, ModelError> {
         let link = Link {
-            name: "body".to_owned(),
+            name: LINK.to_owned(),
             inertial: body.inertial()?,
             collisions: body.shapes.into_iter().map(|(shape, _)| shape).collect(),
         };

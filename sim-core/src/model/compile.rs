@@ -83,6 +83,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         dof_names: builder.dof_names,
         coord_names: builder.coord_names,
         body_names: builder.body_names,
+        shape_names: scene.shape_names(),
         robots: builder.robots,
         start: builder.start,
         dof_inverse_weight: reference.dof_inverse_weight,

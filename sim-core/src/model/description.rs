@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use super::geometry::Mesh;
 use super::pose::Pose;
+use super::surface::Surface;
 
 /// Everything a simulation starts from.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +24,12 @@ pub struct Description {
     pub robots: Vec<Robot>,
     /// Shapes that never move.
     pub shapes: Vec<StaticShape>,
+    /// Pairs that never touch: names as [`Description::shape_names`] has them, or of a robot, body or link for all its shapes.
+    pub filters: Vec<[String; 2]>,
+    /// Most contacts that a world has room for; `None` is as many as its shapes suggest.
+    pub contacts_max: Option<usize>,
+    /// Most constraint rows of contacts that a world has room for; `None` is as many as its contacts need.
+    pub rows_max: Option<usize>,
 }
 
 /// Options of the constraint solver, with MuJoCo's meaning.
@@ -71,6 +78,20 @@ pub struct StaticShape {
     pub pose: Pose,
     /// Its geometry.
     pub shape: Shape,
+    /// What it is like where it touches.
+    pub surface: Surface,
+}
+
+impl StaticShape {
+    /// A shape with the default surface.
+    pub fn new(name: &str, shape: Shape, pose: Pose) -> StaticShape {
+        StaticShape {
+            name: name.to_owned(),
+            pose,
+            shape,
+            surface: Surface::default(),
+        }
+    }
 }
 
 /// A tree of links.
@@ -127,11 +148,27 @@ pub struct Collision {
     pub pose: Pose,
     /// Its geometry.
     pub shape: Shape,
+    /// What it is like where it touches.
+    pub surface: Surface,
+}
+
+impl Collision {
+    /// A shape with the default surface.
+    pub fn new(name: Option<String>, shape: Shape, pose: Pose) -> Collision {
+        Collision {
+            name,
+            pose,
+            shape,
+            surface: Surface::default(),
+        }
+    }
 }
 
 /// Geometry; axes of revolution are the local z axis.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
+    /// All below z = 0, without end; its normal is +z. Of static shapes only.
+    Plane,
     /// A cuboid.
     Box {
         /// Half of each edge [m].
@@ -325,36 +362,10 @@ impl Description {
             solver: Solver::default(),
             robots: Vec::new(),
             shapes: Vec::new(),
+            filters: Vec::new(),
+            contacts_max: None,
+            rows_max: None,
         }
-    }
-
-    /// Adds a static shape; an empty name becomes the first free one of `shape`, `shape_2`, …
-    pub fn add_shape(&mut self, name: &str, shape: Shape, pose: Pose) -> &mut StaticShape {
-        let name = if name.is_empty() {
-            self.free_shape_name(shape.kind())
-        } else {
-            name.to_owned()
-        };
-        self.shapes.push(StaticShape { name, pose, shape });
-        self.shapes.last_mut().expect("a shape was just added")
-    }
-
-    /// Adds a static box with these half edges [m].
-    pub fn add_box(&mut self, name: &str, half_extents: [f64; 3], pose: Pose) -> &mut StaticShape {
-        self.add_shape(name, Shape::Box { half_extents }, pose)
-    }
-
-    fn free_shape_name(&self, kind: &str) -> String {
-        (1..)
-            .map(|count| {
-                if count == 1 {
-                    kind.to_owned()
-                } else {
-                    format!("{kind}_{count}")
-                }
-            })
-            .find(|name| self.shapes.iter().all(|shape| shape.name != *name))
-            .expect("there are more names than shapes")
     }
 }
 
@@ -362,6 +373,7 @@ impl Shape {
     /// Its kind in one word.
     pub fn kind(&self) -> &'static str {
         match self {
+            Shape::Plane => "plane",
             Shape::Box { .. } => "box",
             Shape::Sphere { .. } => "sphere",
             Shape::Cylinder { .. } => "cylinder",

@@ -133,6 +133,28 @@ pub enum ModelError {
         name: String,
     },
 
+    /// A name that nothing of its kind has.
+    #[error("{owner}: there is no {what} `{name}`; there are: {known}")]
+    UnknownName {
+        /// Where it was looked for, or by what.
+        owner: String,
+        /// What it should be.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// The names that exist, the first few.
+        known: String,
+    },
+
+    /// A plane that is part of a link or body.
+    #[error(
+        "{what}: a plane has no end and thus no mass, so neither link nor body bears one; add it to the scene as a static shape, or make it a box"
+    )]
+    PlaneBorne {
+        /// The shape.
+        what: String,
+    },
+
     /// A robot without any link.
     #[error("robot `{robot}` has no links; a robot needs at least one <link>")]
     NoLinks {
@@ -158,7 +180,7 @@ pub enum ModelError {
     },
 
     /// Links that hang from no joint, where there should be exactly one.
-    #[error("robot `{robot}` has {} roots: {}; connect all but one of them to a parent by a joint", roots.len(), list(roots))]
+    #[error("robot `{robot}` has {} roots: {}; connect all but one of them to a parent by a joint", roots.len(), first_few(roots))]
     SeveralRoots {
         /// The robot.
         robot: String,
@@ -184,7 +206,7 @@ pub enum ModelError {
     /// Links that follow one another in a circle.
     #[error(
         "robot `{robot}`: links {} hang from one another in a loop; delete one of their joints: a robot is a tree",
-        list(links)
+        first_few(links)
     )]
     LinkLoop {
         /// The robot.
@@ -353,7 +375,7 @@ pub enum ModelError {
     /// Joints that mimic one another in a circle.
     #[error(
         "robot `{robot}`: joints {} mimic one another in a circle; let one of them lead",
-        list(joints)
+        first_few(joints)
     )]
     MimicLoop {
         /// The robot.
@@ -393,10 +415,13 @@ pub enum ModelError {
 /// Most names in a message: enough to see the slip, not a page of them.
 const LISTED_MAX: usize = 8;
 
-/// Names in quotes, joined by commas.
-fn list(names: &[String]) -> String {
+/// The first few names in quotes, joined by commas; `none` where there are none.
+pub(super) fn first_few(names: &[impl AsRef<str>]) -> String {
+    if names.is_empty() {
+        return "none".to_owned();
+    }
     let shown = names.iter().take(LISTED_MAX);
-    let quoted: Vec<String> = shown.map(|name| format!("`{name}`")).collect();
+    let quoted: Vec<String> = shown.map(|name| format!("`{}`", name.as_ref())).collect();
     let more = if names.len() > LISTED_MAX {
         ", …"
     } else {
@@ -420,5 +445,5 @@ fn list_paths(paths: &[PathBuf]) -> String {
         .iter()
         .map(|path| path.display().to_string())
         .collect();
-    list(&names)
+    first_few(&names)
 }

@@ -25,6 +25,7 @@ pub struct Model {
     pub(super) dof_names: Vec<String>,
     pub(super) coord_names: Vec<String>,
     pub(super) body_names: Vec<String>,
+    pub(super) shape_names: Vec<String>,
     pub(super) robots: Vec<RobotRange>,
     pub(super) start: Start,
     pub(super) dof_inverse_weight: Vec<f64>,
@@ -66,6 +67,10 @@ impl Model {
     /// Names of the bodies, `robot/link`.
     pub fn body_names(&self) -> &[String] {
         &self.body_names
+    }
+    /// Names of the shapes, as [`super::Description::shape_names`] has them.
+    pub fn shape_names(&self) -> &[String] {
+        &self.shape_names
     }
     /// Each robot's part of the arrays.
     pub fn robots(&self) -> &[RobotRange] {

@@ -16,6 +16,10 @@ const ITERATIONS_MAX: usize = 10_000;
 const ROBOT_DOFS_MAX: usize = 512;
 /// Most dofs of all robots of a scene: its dense inverse at the reference pose takes a second.
 const SCENE_DOFS_MAX: usize = 2048;
+/// Most contacts that a world has room for: 70 boxes that all touch each other.
+const CONTACTS_MAX: usize = 4096;
+/// Most rows of contacts: four for each, which is a pyramid's.
+const ROWS_MAX: usize = 4 * CONTACTS_MAX;
 /// Largest length [m]: f32 keeps a tenth of a metre there.
 const LENGTH_MAX: f64 = 1e6;
 /// Largest mass [kg]: ten of the largest ships.
@@ -76,10 +80,19 @@ impl Description {
             let what = format!("shape `{}`", shape.name);
             pose(&what, &shape.pose)?;
             shape_sizes(&what, &shape.shape)?;
+            shape.surface.validate(&what)?;
+        }
+        if let Some(contacts) = self.contacts_max {
+            let rule = "it must be between 1 and 4096";
+            count("contacts_max", contacts, CONTACTS_MAX, rule)?;
+        }
+        if let Some(rows) = self.rows_max {
+            count("rows_max", rows, ROWS_MAX, "it must be between 1 and 16384")?;
         }
         let dofs = self.robots.iter().map(Robot::dof_count).sum();
         few("the scene".to_owned(), dofs, SCENE_DOFS_MAX)?;
-        self.robots.iter().try_for_each(Robot::validate)
+        self.robots.iter().try_for_each(Robot::validate)?;
+        self.validate_shape_names()
     }
 }
 
@@ -194,6 +207,10 @@ impl Robot {
             let what = collision_name(&what, index, collision);
             pose(&what, &collision.pose)?;
             shape_sizes(&what, &collision.shape)?;
+            collision.surface.validate(&what)?;
+            if collision.shape == Shape::Plane {
+                return Err(ModelError::PlaneBorne { what });
+            }
         }
         Ok(())
     }
@@ -398,6 +415,7 @@ fn size<const N: usize>(what: &str, values: [f64; N]) -> Result<(), ModelError> 
 /// Refuses sizes that are not positive or too large.
 pub(super) fn shape_sizes(what: &str, shape: &Shape) -> Result<(), ModelError> {
     match *shape {
+        Shape::Plane => Ok(()),
         Shape::Box { half_extents } => {
             size(&format!("{what}: half extent of the box"), half_extents)
         }

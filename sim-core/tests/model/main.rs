@@ -8,5 +8,6 @@ mod mimic;
 mod oddities;
 mod pose;
 mod refused;
+mod shapes;
 mod urdf;
 mod validate;

@@ -45,11 +45,8 @@ impl BodyTable {
             .map(|inertia| inertia.map(|row| row.map(|entry| entry.0)));
         for (index, shape) in shapes.iter().enumerate() {
             if shape.body.as_ref() == Some(&self.name) {
-                let collision = Collision {
-                    name: shape.name.clone(),
-                    pose: shape.pose(),
-                    shape: shape.shape(index)?,
-                };
+                let geometry = shape.shape(index)?;
+                let collision = Collision::new(shape.name.clone(), geometry, shape.pose());
                 let density = shape.density.map_or(DENSITY, |density| density.0);
                 body.shapes.push((collision, density));
             }

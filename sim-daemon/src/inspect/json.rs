@@ -57,6 +57,7 @@ fn link(facts: &Facts, index: usize) -> Value {
 
 fn collision(collision: &Collision) -> Value {
     let mut value = match &collision.shape {
+        Shape::Plane => json!({}),
         Shape::Box { half_extents } => json!({ "half_extents": half_extents }),
         Shape::Sphere { radius } => json!({ "radius": radius }),
         Shape::Cylinder {

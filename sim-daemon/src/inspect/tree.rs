@@ -177,6 +177,7 @@ fn shape(facts: &Facts, collision: &Collision) -> String {
         format!("{} m", edges.join(" × ")).replace(' ', NO_BREAK)
     };
     let mut text = match &collision.shape {
+        Shape::Plane => "plane".to_owned(),
         Shape::Box { half_extents } => {
             format!("box {}", edges(half_extents.map(|half| 2.0 * half)))
         }

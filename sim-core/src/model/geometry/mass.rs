@@ -21,7 +21,7 @@ pub const DENSITY: f64 = 1000.0;
 /// A mesh that bounds no solid has those of its convex hull.
 ///
 /// # Errors
-/// A mesh without volume, by its file.
+/// A mesh without volume, by its file; a plane.
 pub fn mass_properties(shape: &Shape, density: f64) -> Result<Inertial, ModelError> {
     let centred = |mass: f64, moments: [f64; 3]| {
         let mut inertia = [[0.0; 3]; 3];
@@ -35,6 +35,10 @@ pub fn mass_properties(shape: &Shape, density: f64) -> Result<Inertial, ModelErr
         }
     };
     Ok(match shape {
+        Shape::Plane => {
+            let what = "a shape with a mass".to_owned();
+            return Err(ModelError::PlaneBorne { what });
+        }
         Shape::Box {
             half_extents: [x, y, z],
         } => {

@@ -10,9 +10,19 @@ const AROUND: usize = 48;
 
 /// The surface of a shape in its own frame, counter-clockwise from outside [m].
 ///
-/// Round shapes are inscribed polyhedra with 48 corners a turn; a mesh is as its file has it.
+/// Round shapes are inscribed polyhedra with 48 corners a turn; a mesh is as its file has it; of a plane it is a square of
+/// 2 m around the origin.
 pub fn triangles(shape: &Shape) -> TriMesh {
     match shape {
+        Shape::Plane => TriMesh {
+            vertices: vec![
+                [-1.0, -1.0, 0.0],
+                [1.0, -1.0, 0.0],
+                [1.0, 1.0, 0.0],
+                [-1.0, 1.0, 0.0],
+            ],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        },
         &Shape::Box { half_extents } => cuboid(half_extents),
         &Shape::Sphere { radius } => revolved(&half_circles(radius, 0.0)),
         &Shape::Cylinder {

@@ -6,7 +6,7 @@ use roxmltree::Node;
 use urdf_rs::JointType;
 
 use super::super::description::{Joint, JointKind, Mimic};
-use super::super::error::ModelError;
+use super::super::error::{ModelError, first_few};
 use super::reader::{Reader, pose};
 use super::scan::{children, has};
 
@@ -253,19 +253,4 @@ impl<'a, 'input> Reader<'a, 'input> {
         }
         Ok(())
     }
-}
-
-/// Enough names to see the slip, not a page of them.
-fn first_few(names: &[&str]) -> String {
-    let shown: Vec<String> = names
-        .iter()
-        .take(8)
-        .map(|name| format!("`{name}`"))
-        .collect();
-    let more = if names.len() > shown.len() {
-        ", …"
-    } else {
-        ""
-    };
-    format!("{}{more}", shown.join(", "))
 }

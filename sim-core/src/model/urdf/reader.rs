@@ -103,13 +103,11 @@ impl<'a, 'input> Reader<'a, 'input> {
             let collision_nodes: Vec<Node> = children(node, "collision").collect();
             let mut collisions = Vec::with_capacity(link.collision.len());
             for (collision, &node) in link.collision.iter().zip(&collision_nodes) {
-                collisions.push(Collision {
-                    name: collision.name.clone(),
-                    pose: pose(&collision.origin),
-                    shape: self
-                        .shape(&link.name, &collision.geometry, node)
-                        .map_err(|error| self.scan.place(node, error))?,
-                });
+                let shape = self
+                    .shape(&link.name, &collision.geometry, node)
+                    .map_err(|error| self.scan.place(node, error))?;
+                let pose = pose(&collision.origin);
+                collisions.push(Collision::new(collision.name.clone(), shape, pose));
             }
             self.note_missing_visuals(&link.name, node);
             let inertial = if has_inertial {
