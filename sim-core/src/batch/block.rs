@@ -16,6 +16,8 @@ pub struct Block<F, V> {
     pub joint_qdd: Vec<V>,
     /// 1 where the solver used up its iterations since this was cleared, else 0. `(1)` [–]
     pub unconverged: Vec<V>,
+    /// Most contacts that did not fit in a step since this was cleared. `(1)` [–]
+    pub left_out: Vec<V>,
     /// Regularised stiffness D = 1/R of each constraint row; 0 where it is not active. `(rows)` [kg·m² or kg]
     pub efc_weight: Vec<V>,
     /// Reference acceleration of each row. `(rows)` [rad/s² or m/s²]
@@ -24,6 +26,14 @@ pub struct Block<F, V> {
     pub efc_force: Vec<V>,
     /// Constraint forces in joint space, Jᵀ f. `(dofs)` [N·m or N]
     pub constraint_force: Vec<V>,
+    /// Scratch of the solver: a matrix to add contacts to. Packed as `mass_matrix`; empty without contacts.
+    pub system: Vec<V>,
+    /// Scratch of the solver: the same, with the couplings of contacts. Packed as `Constants::coupled`.
+    pub coupled_system: Vec<V>,
+    /// Scratch of the solver: a right-hand side to add contacts to. `(dofs)`
+    pub pull: Vec<V>,
+    /// Scratch of the solver: what solves either system. `(dofs)`
+    pub solution: Vec<V>,
     /// Joint torques applied. `(dofs)` [N·m or N]
     pub joint_f: Vec<F>,
     /// Position targets. `(dofs)` [rad or m]
@@ -69,6 +79,10 @@ pub struct Workspace<F> {
     pub force: Vec<Spatial<F>>,
     /// Scratch of a stage: a matrix to factor. Packed as `mass_matrix`.
     pub hessian: Vec<F>,
+    /// Scratch of the solver: `coupled_system` to factor.
+    pub coupled_hessian: Vec<F>,
+    /// Scratch of the solver: its right-hand side. `(dofs)`
+    pub coupled_vector: Vec<F>,
     /// Scratch of a stage. `(4, dofs)`
     pub vector: [Vec<F>; 4],
     /// Scratch of a stage. `(4, rows)`
@@ -86,6 +100,16 @@ pub enum Slot {
     JointQdd,
     /// [`Block::unconverged`]
     Unconverged,
+    /// [`Block::left_out`]
+    LeftOut,
+    /// [`Block::system`]
+    System,
+    /// [`Block::coupled_system`]
+    CoupledSystem,
+    /// [`Block::pull`]
+    Pull,
+    /// [`Block::solution`]
+    Solution,
     /// [`Block::joint_f`]
     JointF,
     /// [`Block::joint_target_q`]
@@ -142,11 +166,19 @@ impl<F: Num, V: Copy> Block<F, V> {
         let (n, bodies, rows) = (m.dofs.len(), m.bodies.len(), m.rows());
         let zero = F::c(0.0);
         let packed = m.pattern.len();
+        let touching = !m.contacts.classes.is_empty();
+        let coupled = m.coupled.pattern.len();
+        let when = |condition: bool, length: usize| if condition { length } else { 0 };
         Block {
             joint_q: vec![cell; m.coords],
             joint_qd: vec![cell; n],
             joint_qdd: vec![cell; n],
             unconverged: vec![cell; 1],
+            left_out: vec![cell; 1],
+            system: vec![cell; when(touching, packed)],
+            coupled_system: vec![cell; coupled],
+            pull: vec![cell; when(touching, n)],
+            solution: vec![cell; when(coupled > 0, n)],
             efc_weight: vec![cell; rows],
             efc_aref: vec![cell; rows],
             efc_force: vec![cell; rows],
@@ -171,6 +203,8 @@ impl<F: Num, V: Copy> Block<F, V> {
                 velocity: vec![[[zero; 3]; 2]; bodies],
                 force: vec![[[zero; 3]; 2]; bodies],
                 hessian: vec![zero; packed],
+                coupled_hessian: vec![zero; coupled],
+                coupled_vector: vec![zero; when(coupled > 0, n)],
                 vector: [vec![zero; n], vec![zero; n], vec![zero; n], vec![zero; n]],
                 row: [
                     vec![zero; rows],
@@ -191,6 +225,11 @@ impl<F: Num, V: Copy> Block<F, V> {
             Slot::JointQd => Cells(&mut self.joint_qd),
             Slot::JointQdd => Cells(&mut self.joint_qdd),
             Slot::Unconverged => Cells(&mut self.unconverged),
+            Slot::LeftOut => Cells(&mut self.left_out),
+            Slot::System => Cells(&mut self.system),
+            Slot::CoupledSystem => Cells(&mut self.coupled_system),
+            Slot::Pull => Cells(&mut self.pull),
+            Slot::Solution => Cells(&mut self.solution),
             Slot::JointF => Values(&mut self.joint_f),
             Slot::JointTargetQ => Values(&mut self.joint_target_q),
             Slot::JointTargetQd => Values(&mut self.joint_target_qd),

@@ -1,5 +1,6 @@
 //! What the text of physics reads of a model: numbers in the precision of the run.
 
+use super::contact::Contacts;
 use crate::lane::Real;
 use crate::math::factor::Pattern;
 
@@ -34,8 +35,23 @@ pub struct Constants<R> {
     pub limits: Vec<Limit<R>>,
     /// Entries of the mass matrix and of the solver's Hessian that may differ from zero.
     pub pattern: Pattern,
+    /// The same where contacts couple what the mass matrix does not; empty where none can.
+    pub coupled: Coupled,
+    /// Shapes, and which may touch.
+    pub contacts: Contacts<R>,
+    /// Impedance of contacts.
+    pub contact_impedance: Impedance<R>,
     /// Solver options.
     pub solver: Newton<R>,
+}
+
+/// The pattern of a larger system that holds a smaller one.
+#[derive(Clone, Debug, Default)]
+pub struct Coupled {
+    /// The larger pattern.
+    pub pattern: Pattern,
+    /// Where each entry of the smaller one is kept in it.
+    pub places: Vec<usize>,
 }
 
 /// How a body moves in the frame that carries it.
@@ -250,16 +266,17 @@ pub struct Newton<R> {
 impl<R: Real> Constants<R> {
     /// The same numbers, rounded to another precision.
     pub fn cast<S: Real>(&self) -> Constants<S> {
+        let impedance = |i: &Impedance<R>| Impedance {
+            d_min: cast(i.d_min),
+            d_max: cast(i.d_max),
+            inverse_width: cast(i.inverse_width),
+            midpoint: cast(i.midpoint),
+        };
         let soft = |s: &Soft<R>| Soft {
             stiffness: cast(s.stiffness),
             damping: cast(s.damping),
             inverse_weight: cast(s.inverse_weight),
-            impedance: Impedance {
-                d_min: cast(s.impedance.d_min),
-                d_max: cast(s.impedance.d_max),
-                inverse_width: cast(s.impedance.inverse_width),
-                midpoint: cast(s.impedance.midpoint),
-            },
+            impedance: impedance(&s.impedance),
         };
         Constants {
             dt: cast(self.dt),
@@ -353,6 +370,9 @@ impl<R: Real> Constants<R> {
                 })
                 .collect(),
             pattern: self.pattern.clone(),
+            coupled: self.coupled.clone(),
+            contacts: self.contacts.cast(),
+            contact_impedance: impedance(&self.contact_impedance),
             solver: Newton {
                 iterations: self.solver.iterations,
                 ls_iterations: self.solver.ls_iterations,

@@ -6,6 +6,7 @@ mod body;
 mod checks;
 mod compile;
 pub mod constants;
+pub mod contact;
 mod description;
 mod error;
 mod frozen;

@@ -72,7 +72,7 @@ fn soft_row<F: Num>(soft: &Soft<F::Real>, position: F, velocity: F) -> (F, F) {
 
 /// d(r): from `d_min` at 0 to `d_max` at `width`, along two parabolas.
 #[inline(always)]
-fn impedance<F: Num>(i: &Impedance<F::Real>, position: F) -> F {
+pub(super) fn impedance<F: Num>(i: &Impedance<F::Real>, position: F) -> F {
     let (one, midpoint) = (F::c(1.0), i.midpoint.to_f64());
     let x = (position.abs() * F::k(i.inverse_width)).min(one);
     let rest = one - x;

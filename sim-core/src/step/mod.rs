@@ -5,7 +5,9 @@
 
 mod actuation;
 mod bias;
+pub mod collide;
 mod constraint;
+mod contact_rows;
 mod integrate;
 mod inverse_dynamics;
 mod kinematics;
@@ -36,6 +38,10 @@ pub enum Stage {
     Actuation,
     /// Constraint rows: stiffness and reference acceleration.
     Constraint,
+    /// Contacts: where shapes touch.
+    Collide,
+    /// Constraint rows of contacts.
+    ContactRows,
     /// Accelerations and constraint forces.
     Solver,
     /// Accelerations and constraint forces, corrected where `f32` needs it.
@@ -51,24 +57,28 @@ pub enum Stage {
 }
 
 /// The order of a step.
-pub const STAGES: [Stage; 8] = [
+pub const STAGES: [Stage; 10] = [
     Stage::Kinematics,
     Stage::Bias,
     Stage::MassMatrix,
     Stage::Actuation,
     Stage::Constraint,
+    Stage::Collide,
+    Stage::ContactRows,
     Stage::Solver,
     Stage::Refine,
     Stage::Integrate,
 ];
 
 /// What evaluates a state without stepping: all derived fields.
-pub const FORWARD: [Stage; 10] = [
+pub const FORWARD: [Stage; 12] = [
     Stage::Kinematics,
     Stage::Bias,
     Stage::MassMatrix,
     Stage::Actuation,
     Stage::Constraint,
+    Stage::Collide,
+    Stage::ContactRows,
     Stage::Solver,
     Stage::Refine,
     Stage::Accelerations,
@@ -78,12 +88,14 @@ pub const FORWARD: [Stage; 10] = [
 
 impl Stage {
     /// Every stage.
-    pub const ALL: [Stage; 11] = [
+    pub const ALL: [Stage; 13] = [
         Stage::Kinematics,
         Stage::Bias,
         Stage::MassMatrix,
         Stage::Actuation,
         Stage::Constraint,
+        Stage::Collide,
+        Stage::ContactRows,
         Stage::Solver,
         Stage::Refine,
         Stage::Integrate,
@@ -100,6 +112,8 @@ impl Stage {
             Stage::MassMatrix => "mass_matrix",
             Stage::Actuation => "actuation",
             Stage::Constraint => "constraint",
+            Stage::Collide => "collide",
+            Stage::ContactRows => "contact_rows",
             Stage::Solver => "solver",
             Stage::Refine => "refine",
             Stage::Integrate => "integrate",
@@ -125,6 +139,8 @@ impl Stage {
                 BiasForce,
             ],
             Stage::Constraint => &[JointQ, JointQd],
+            Stage::Collide => &[LeftOut, Rotation, Origin, Reference],
+            Stage::ContactRows => &[JointQd, Reference, Motion],
             Stage::Solver => &[
                 JointQdd,
                 Unconverged,
@@ -172,6 +188,8 @@ impl Stage {
             Stage::MassMatrix => &[MassMatrix, Inertia],
             Stage::Actuation => &[SmoothForce],
             Stage::Constraint => &[EfcWeight, EfcAref, LimitSide],
+            Stage::Collide => &[LeftOut],
+            Stage::ContactRows => &[],
             Stage::Solver => &[JointQdd, Unconverged, EfcForce, ConstraintForce],
             Stage::Refine | Stage::Accelerations => &[JointQdd, EfcForce, ConstraintForce],
             Stage::Integrate => &[JointQ, JointQd, MassMatrix],
@@ -189,6 +207,8 @@ impl Stage {
             Stage::MassMatrix => mass_matrix::mass_matrix(m, &mut b.work),
             Stage::Actuation => actuation::smooth_force(cx, m, b),
             Stage::Constraint => constraint::rows(cx, m, b),
+            Stage::Collide => collide::collide(cx, m, b),
+            Stage::ContactRows => contact_rows::contact_rows(cx, m, b),
             Stage::Solver => solver::solve(cx, m, b),
             Stage::Refine => solver::refine(cx, m, b),
             Stage::Integrate => integrate::implicit_fast(cx, m, b),

@@ -1,6 +1,7 @@
 //! The cost along a segment, and its exact minimum.
 
 use super::super::ConstantsOf;
+use super::contacts;
 use super::rows::{Law, dry_friction, equality, one_sided};
 use crate::lane::{Cx, Num, Real};
 use crate::model::constants::Constants;
@@ -32,8 +33,11 @@ struct Derivative<F> {
 
 impl<'a, F: Num> Line<'a, F> {
     /// `curvature` is sᵀ M s; `jar` and its change `jv` over the segment are `(rows)`.
+    ///
+    /// Turns what contacts have ahead into its change.
     #[inline(always)]
-    pub fn new(
+    pub fn new<C: Cx<F = F>>(
+        cx: &mut C,
         m: &Constants<F::Real>,
         curvature: F,
         weight: &'a [F],
@@ -46,9 +50,11 @@ impl<'a, F: Num> Line<'a, F> {
             descent = (law.stiffness * jv[r]).fma(jv[r], descent);
             size = size + (law.force * jv[r]).abs();
         }
+        let (mut with_contacts, mut size) = (cx.var(descent), cx.var(size));
+        contacts::begin_line(cx, &m.contacts, &mut with_contacts, &mut size);
         Line {
-            descent,
-            size,
+            descent: cx.get(&with_contacts),
+            size: cx.get(&size),
             weight,
             jar,
             jv,
@@ -56,7 +62,12 @@ impl<'a, F: Num> Line<'a, F> {
     }
 
     #[inline(always)]
-    fn derivative(&self, m: &Constants<F::Real>, alpha: F) -> Derivative<F> {
+    fn derivative<C: Cx<F = F>>(
+        &self,
+        cx: &mut C,
+        m: &Constants<F::Real>,
+        alpha: F,
+    ) -> Derivative<F> {
         let rest = F::c(1.0) - alpha;
         let slope = -(rest * self.descent);
         let mut d = Derivative {
@@ -77,7 +88,16 @@ impl<'a, F: Num> Line<'a, F> {
             d.size = d.size + power.abs();
             d.curvature = ((here.stiffness - start.stiffness) * jv).fma(jv, d.curvature);
         }
-        d
+        let mut slope = cx.var(d.slope);
+        let mut curvature = cx.var(d.curvature);
+        let mut size = cx.var(d.size);
+        let t = &m.contacts;
+        contacts::derivative(cx, t, alpha, &mut slope, &mut curvature, &mut size);
+        Derivative {
+            slope: cx.get(&slope),
+            curvature: cx.get(&curvature),
+            size: cx.get(&size),
+        }
     }
 }
 
@@ -110,7 +130,7 @@ pub(super) fn search<C: Cx>(
     let mut high = cx.var(C::F::c(1.0e10));
     times!(cx, m.solver.ls_iterations, {
         let alpha = cx.get(length);
-        let d = line.derivative(m, alpha);
+        let d = line.derivative(cx, m, alpha);
         let below = C::F::select(d.slope.lt(zero), alpha, cx.get(&low));
         let above = C::F::select(d.slope.lt(zero), cx.get(&high), alpha);
         let found = C::F::not((d.size * resolution).lt(d.slope.abs()));

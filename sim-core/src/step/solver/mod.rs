@@ -17,6 +17,7 @@
 //! result, which mostly makes the first round the only one; in `f64`, the reference, it is chosen as
 //! MuJoCo does (see [`choose_start`]).
 
+mod contacts;
 mod line;
 mod refine;
 mod rows;
@@ -26,6 +27,7 @@ pub(super) use refine::{accelerations, refine};
 use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::factor::{multiply, solve as solve_linear};
+use crate::model::contact::row;
 use crate::{break_if, times, when};
 use line::{Line, search};
 use rows::{assemble, changes, cost, forces, residual};
@@ -38,15 +40,16 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     if <<C::F as Num>::Real as Real>::DOUBLE {
         choose_start(cx, m, b);
     }
-    let w = &mut b.work;
     let acts = acts(cx, m, &b.efc_weight);
+    let t = &m.contacts;
     let mut busy = cx.var(C::F::select(acts, one, zero));
     let mut round = cx.var(zero);
     times!(cx, m.solver.iterations, {
         if may_idle::<C>(m) {
             break_if!(cx, C::F::not(acts));
         }
-        let [a, minimum, step, pull] = &mut w.vector;
+        let w = &mut b.work;
+        let [a, minimum, ..] = &mut w.vector;
         let [jar, jar_minimum, weight, aref] = &mut w.row;
         gather(cx, &b.efc_weight, weight);
         gather(cx, &b.efc_aref, aref);
@@ -57,10 +60,17 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         w.hessian.copy_from_slice(&w.mass_matrix);
         residual(m, &w.limit_side, aref, a, jar);
         assemble(m, &w.limit_side, weight, aref, jar, &mut w.hessian, minimum);
-        solve_linear(&m.pattern, &mut w.hessian, minimum);
+        contacts::residual(cx, t, a, row::JAR);
+        solve_system(cx, m, b, MINIMUM, true);
+        let w = &mut b.work;
+        let [a, minimum, step, pull] = &mut w.vector;
+        let [jar, jar_minimum, weight, aref] = &mut w.row;
         residual(m, &w.limit_side, aref, minimum, jar_minimum);
+        contacts::residual(cx, t, minimum, row::AHEAD);
 
-        let changed = half.lt(changes(m, weight, jar, jar_minimum));
+        let mut moved = cx.var(changes(m, weight, jar, jar_minimum));
+        contacts::changes(cx, t, &mut moved);
+        let changed = half.lt(cx.get(&moved));
         let later = half.lt(cx.get(&round));
         let trusted = cx.get(&round).lt(C::F::c(trusted_rounds::<C::F>()));
         let searches = C::F::and(C::F::or(changed, later), C::F::not(trusted));
@@ -78,7 +88,7 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             for r in 0..m.rows() {
                 jar_minimum[r] = jar_minimum[r] - jar[r];
             }
-            let line = Line::new(m, curvature, weight, jar, jar_minimum);
+            let line = Line::new(cx, m, curvature, weight, jar, jar_minimum);
             search::<C>(cx, m, &line, &mut length);
             // The model promises a gain of ½ |p'(0)|. Below the tolerance the step is not taken, as in
             // MuJoCo, but for the first; below the rounding of p' it is the last that can help.
@@ -138,6 +148,78 @@ fn constraint_forces<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) 
     for j in 0..m.dofs.len() {
         cx.set(&mut b.constraint_force[j], joint[j]);
     }
+    contacts::residual(cx, &m.contacts, a, row::JAR);
+    contacts::forces(cx, &m.contacts, &mut b.constraint_force);
+}
+
+/// Which of the scratch vectors has the right-hand side of a round, and then its minimum.
+const MINIMUM: usize = 1;
+
+/// Solves (M + JᵀWJ) x = rhs in place, in scratch vector `x`; the Hessian has the joint rows already, and the
+/// contacts' pull is added to the right-hand side if `pulls`.
+///
+/// A world whose contacts couple what the mass matrix does not solves a larger system; the others need not.
+#[inline(always)]
+fn solve_system<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    x: usize,
+    pulls: bool,
+) {
+    let t = &m.contacts;
+    let w = &mut b.work;
+    if t.classes.is_empty() {
+        return solve_linear(&m.pattern, &mut w.hessian, &mut w.vector[x]);
+    }
+    for (cell, value) in b.system.iter_mut().zip(&w.hessian) {
+        cx.put(cell, *value);
+    }
+    for (cell, value) in b.pull.iter_mut().zip(&w.vector[x]) {
+        cx.put(cell, *value);
+    }
+    for (k, class) in t.classes.iter().enumerate() {
+        if !class.couples {
+            contacts::assemble(cx, t, k, &m.pattern, &mut b.system, &mut b.pull, pulls);
+        }
+    }
+    gather(cx, &b.system, &mut w.hessian);
+    gather(cx, &b.pull, &mut w.vector[x]);
+    if !t.couples() {
+        return solve_linear(&m.pattern, &mut w.hessian, &mut w.vector[x]);
+    }
+    let coupled = C::F::c(0.5).lt(contacts::coupling(cx, t));
+    when!(cx, coupled, {
+        for cell in &mut b.coupled_system {
+            cx.put(cell, C::F::c(0.0));
+        }
+        for (value, &place) in w.hessian.iter().zip(&m.coupled.places) {
+            cx.put(&mut b.coupled_system[place], *value);
+        }
+        for (k, class) in t.classes.iter().enumerate() {
+            if class.couples {
+                let pattern = &m.coupled.pattern;
+                contacts::assemble(cx, t, k, pattern, &mut b.coupled_system, &mut b.pull, pulls);
+            }
+        }
+        gather(cx, &b.coupled_system, &mut w.coupled_hessian);
+        gather(cx, &b.pull, &mut w.coupled_vector);
+        solve_linear(
+            &m.coupled.pattern,
+            &mut w.coupled_hessian,
+            &mut w.coupled_vector,
+        );
+        for (cell, value) in b.solution.iter_mut().zip(&w.coupled_vector) {
+            cx.set(cell, *value);
+        }
+    });
+    when!(cx, C::F::not(coupled), {
+        solve_linear(&m.pattern, &mut w.hessian, &mut w.vector[x]);
+        for (cell, value) in b.solution.iter_mut().zip(&w.vector[x]) {
+            cx.set(cell, *value);
+        }
+    });
+    gather(cx, &b.solution, &mut w.vector[x]);
 }
 
 /// The values of cells.
@@ -167,6 +249,7 @@ fn acts<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, weight: &[C::V]) -> MaskOf<C> {
         for weight in weight {
             stiffest = stiffest.max(cx.get(weight));
         }
+        stiffest = stiffest.max(contacts::count(cx, &m.contacts));
     } else {
         stiffest = one;
     }
@@ -208,8 +291,13 @@ fn choose_start<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     for j in 0..n {
         gauss = ahead[j].fma(pull[j], gauss);
     }
-    let cost_warm = gauss.fma(C::F::c(0.5), cost(m, weight, jar));
-    let cheaper = cost(m, weight, jar_smooth).lt(cost_warm);
+    let mut cost_warm = cx.var(gauss.fma(C::F::c(0.5), cost(m, weight, jar)));
+    let mut cost_smooth = cx.var(cost(m, weight, jar_smooth));
+    contacts::residual(cx, &m.contacts, warm, row::JAR);
+    contacts::residual(cx, &m.contacts, smooth, row::AHEAD);
+    contacts::cost(cx, &m.contacts, row::JAR, &mut cost_warm);
+    contacts::cost(cx, &m.contacts, row::AHEAD, &mut cost_smooth);
+    let cheaper = cx.get(&cost_smooth).lt(cx.get(&cost_warm));
     for j in 0..n {
         cx.set(
             &mut b.joint_qdd[j],

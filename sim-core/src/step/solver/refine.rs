@@ -10,9 +10,9 @@
 //! an error of 1e-3 to 1e-6; `Newton::refinements` says how many a model needs.
 
 use super::rows::{assemble, forces, residual};
-use super::{acts, gather, may_idle};
+use super::{acts, contacts, gather, may_idle, solve_system};
 use crate::lane::{Cx, Num, Real};
-use crate::math::factor::solve;
+use crate::model::contact::row;
 use crate::step::inverse_dynamics::inverse_dynamics;
 use crate::step::{BlockOf, ConstantsOf};
 use crate::when;
@@ -45,6 +45,9 @@ pub(in crate::step) fn accelerations<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &
     }
 }
 
+/// Which of the scratch vectors has what is missing, and then the correction.
+const MISSING: usize = 0;
+
 #[inline(always)]
 fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     inverse_dynamics(cx, m, b);
@@ -63,7 +66,11 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     w.hessian.copy_from_slice(&w.mass_matrix);
     residual(m, &w.limit_side, aref, a, jar);
     assemble(m, &w.limit_side, weight, aref, jar, &mut w.hessian, rhs);
-    solve(&m.pattern, &mut w.hessian, missing);
+    contacts::residual(cx, &m.contacts, a, row::JAR);
+    solve_system(cx, m, b, MISSING, false);
+    let w = &mut b.work;
+    let [missing, a, _, joint] = &mut w.vector;
+    let [jar, force, weight, aref] = &mut w.row;
     for j in 0..n {
         a[j] = a[j] + missing[j];
         cx.set(&mut b.joint_qdd[j], a[j]);
@@ -77,4 +84,6 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     for j in 0..n {
         cx.set(&mut b.constraint_force[j], joint[j]);
     }
+    contacts::residual(cx, &m.contacts, a, row::JAR);
+    contacts::forces(cx, &m.contacts, &mut b.constraint_force);
 }

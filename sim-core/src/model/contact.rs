@@ -1,0 +1,314 @@
+//! What the text reads of a model's shapes: where they are, which pairs may touch, and how soft they are.
+
+use super::description::Cone;
+use crate::lane::{Fixed, Real, Table, Tables};
+
+/// Kinds of shapes; of a pair, the lower kind is the first. A sphere's size is its radius; a capsule's and a
+/// cylinder's radius and half height; a box's and a hull's half extents (those of the box around it).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// z ≤ 0.
+    Plane,
+    /// Around its centre.
+    Sphere,
+    /// Along z.
+    Capsule,
+    /// Along its axes.
+    Box,
+    /// Along z.
+    Cylinder,
+    /// A row of the hull table.
+    Hull,
+}
+
+/// Shapes, the pairs of them that may touch, and the classes of contacts.
+#[derive(Clone, Debug)]
+pub struct Contacts<R> {
+    /// Shape of the friction cone.
+    pub cone: Cone,
+    /// Friction impedance over normal impedance [–].
+    pub impratio: R,
+    /// Shapes that some pair has.
+    pub solids: Vec<Solid<R>>,
+    /// Pairs by kinds.
+    pub groups: Vec<Group>,
+    /// Contacts by the bodies that they may be of.
+    pub classes: Vec<Class<R>>,
+    /// Pairs, in the order of the tables.
+    pub pairs: Vec<Pair>,
+    /// Contacts that a world has room for.
+    pub contacts_max: usize,
+    /// Rows that they may have.
+    pub rows_max: usize,
+    /// Can more be found than there is room for?
+    pub may_overflow: bool,
+    /// Numbers of pairs, and of hulls.
+    pub tables: Tables<R>,
+    /// Where they are.
+    pub handles: Handles,
+    /// Where the stages keep what they find.
+    pub memory: Memory,
+}
+
+/// Tables of the model.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Handles {
+    /// Numbers of a pair; see [`pair`].
+    pub pair_numbers: Fixed,
+    /// Indices of a pair; see [`pair`].
+    pub pair_indices: Fixed,
+    /// First row and capacity of a class.
+    pub class_rows: Fixed,
+}
+
+/// Scratch tables.
+#[derive(Clone, Copy, Debug)]
+pub struct Memory {
+    /// Axes (9) [–] and centre relative to the reference point of its tree (3) [m] of each solid.
+    pub poses: Table,
+    /// Reference point of each tree, and at last the world's origin [m].
+    pub origins: Table,
+    /// Contacts of each class; then contacts, rows, and contacts left out of the world.
+    pub counts: Table,
+    /// A row a contact; see [`row`].
+    pub rows: Table,
+    /// Numbers of all of them.
+    pub len: usize,
+}
+
+/// A shape of a body, or one that stands still.
+#[derive(Clone, Debug)]
+pub struct Solid<R> {
+    /// What it is.
+    pub kind: Kind,
+    /// The body that bears it, or none.
+    pub body: Option<usize>,
+    /// Its axes in the body's frame, or in the world: columns [–].
+    pub axes: [[R; 3]; 3],
+    /// Its centre in the body's frame, or in the world [m].
+    pub center: [R; 3],
+}
+
+/// Pairs of two kinds of shapes.
+#[derive(Clone, Copy, Debug)]
+pub struct Group {
+    /// The lower kind first.
+    pub kinds: (Kind, Kind),
+    /// Its first pair.
+    pub first: usize,
+    /// The pair after its last.
+    pub end: usize,
+}
+
+/// A pair for people: numbers of shapes in the order of [`super::Model::shape_names`]; the normal points from the first to
+/// the second.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pair {
+    /// The two shapes.
+    pub shapes: [usize; 2],
+    /// Their links, as in `body_names`; none of a static shape.
+    pub links: [Option<usize>; 2],
+    /// The class of its contacts.
+    pub class: usize,
+}
+
+/// Contacts of like bodies: the columns of their Jacobians are the same dofs.
+#[derive(Clone, Debug)]
+pub struct Class<R> {
+    /// Trees of the bodies on its two sides; the first is none where that side stands still.
+    pub trees: (Option<usize>, usize),
+    /// Its dofs, rising.
+    pub columns: Vec<Column>,
+    /// Entries of JᵀWJ that may differ from 0: columns (the first not before the second).
+    pub entries: Vec<(usize, usize)>,
+    /// Does any entry lie outside the pattern of the mass matrix?
+    pub couples: bool,
+    /// Numbers of a pair that all its pairs share.
+    pub shared: Vec<Option<R>>,
+    /// First row of its contacts.
+    pub first: usize,
+    /// Their number at most.
+    pub capacity: usize,
+}
+
+/// A dof that moves bodies of a class.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Column {
+    /// The dof.
+    pub dof: usize,
+    /// Is it of the first side's tree?
+    pub is_first: bool,
+    /// Where the number of a pair is that says how it moves the second body relative to the first: 1, -1 or 0.
+    pub lever: usize,
+}
+
+/// Places of the numbers and indices of a pair.
+pub mod pair {
+    /// Distance below which contacts are found [m].
+    pub const REACH: usize = 0;
+    /// Radii around the centres, and the reach [m].
+    pub const RADIUS: usize = 1;
+    /// Size of the first shape (3) [m].
+    pub const SIZE_A: usize = 2;
+    /// Size of the second shape (3) [m].
+    pub const SIZE_B: usize = 5;
+    /// -1 where the first shape of the class's side is the pair's second, else 1.
+    pub const FLIP: usize = 8;
+    /// Distance below which a contact pushes [m].
+    pub const MARGIN: usize = 9;
+    /// Coefficient of friction [–].
+    pub const MU: usize = 10;
+    /// Inverse weight of both bodies [1/kg].
+    pub const WEIGHT: usize = 11;
+    /// Reference stiffness k [1/s²].
+    pub const STIFFNESS: usize = 12;
+    /// Reference damping b [1/s].
+    pub const DAMPING: usize = 13;
+    /// Reference damping of friction rows [1/s].
+    pub const SLIDING: usize = 14;
+    /// 1 with friction, 0 without.
+    pub const RUBS: usize = 15;
+    /// Constraint rows of a contact.
+    pub const ROWS: usize = 16;
+    /// First of the levers.
+    pub const LEVERS: usize = 17;
+
+    /// Number of the first shape among the solids.
+    pub const SOLID_A: usize = 0;
+    /// Number of the second shape among the solids.
+    pub const SOLID_B: usize = 1;
+    /// Row of the first shape's reference point.
+    pub const ORIGIN_A: usize = 2;
+    /// Row of the second shape's reference point.
+    pub const ORIGIN_B: usize = 3;
+    /// Row of the reference point that contacts of the class are relative to.
+    pub const ORIGIN: usize = 4;
+    /// The class.
+    pub const CLASS: usize = 5;
+    /// Hull of the first shape, if it is one.
+    pub const HULL_A: usize = 6;
+    /// Hull of the second shape, if it is one.
+    pub const HULL_B: usize = 7;
+    /// Indices of a pair.
+    pub const INDICES: usize = 8;
+}
+
+/// Places of the numbers of a contact.
+pub mod row {
+    /// Point between the surfaces, relative to the reference point of the class's last tree (3) [m].
+    pub const POINT: usize = 0;
+    /// Distance of the surfaces [m].
+    pub const DISTANCE: usize = 3;
+    /// From the class's first side to its second (3) [–].
+    pub const NORMAL: usize = 4;
+    /// Number of the pair.
+    pub const PAIR: usize = 7;
+    /// Regularised stiffness D of the normal row, or of an edge of the pyramid [kg].
+    pub const STIFFNESS: usize = 8;
+    /// Coefficient of friction, 0 without [–].
+    pub const MU: usize = 9;
+    /// Reference acceleration: normal, two tangents [m/s²].
+    pub const AREF: usize = 10;
+    /// J a - aref (3) [m/s²].
+    pub const JAR: usize = 13;
+    /// The same somewhere else, or its change (3) [m/s²].
+    pub const AHEAD: usize = 16;
+    /// Force along normal and tangents (3) [N].
+    pub const FORCE: usize = 19;
+    /// Tangents (6) [–].
+    pub const TANGENTS: usize = 22;
+    /// Jacobian: normal row, then tangents.
+    pub const JACOBIAN: usize = 28;
+}
+
+/// What follows the classes in `counts`.
+pub const COUNT_CONTACTS: usize = 0;
+/// Rows in use.
+pub const COUNT_ROWS: usize = 1;
+/// Contacts that did not fit.
+pub const COUNT_LEFT_OUT: usize = 2;
+/// Rows of `counts` after the classes.
+pub const COUNTS: usize = 3;
+
+impl<R: Real> Contacts<R> {
+    /// None at all.
+    pub fn none(cone: Cone, impratio: f64) -> Contacts<R> {
+        let table = Table {
+            base: 0,
+            stride: 1,
+            rows: 0,
+        };
+        Contacts {
+            cone,
+            impratio: R::of(impratio),
+            solids: Vec::new(),
+            groups: Vec::new(),
+            classes: Vec::new(),
+            pairs: Vec::new(),
+            contacts_max: 0,
+            rows_max: 0,
+            may_overflow: false,
+            tables: Tables {
+                numbers: Vec::new(),
+                indices: Vec::new(),
+            },
+            handles: Handles::default(),
+            memory: Memory {
+                poses: table,
+                origins: table,
+                counts: table,
+                rows: table,
+                len: 0,
+            },
+        }
+    }
+
+    /// Does any class reach beyond the pattern of the mass matrix?
+    #[inline(always)]
+    pub fn couples(&self) -> bool {
+        self.classes.iter().any(|class| class.couples)
+    }
+
+    /// The same numbers, rounded to another precision.
+    pub(super) fn cast<S: Real>(&self) -> Contacts<S> {
+        let cast = |x: R| S::of(x.to_f64());
+        Contacts {
+            cone: self.cone,
+            impratio: cast(self.impratio),
+            solids: self
+                .solids
+                .iter()
+                .map(|s| Solid {
+                    kind: s.kind,
+                    body: s.body,
+                    axes: s.axes.map(|column| column.map(cast)),
+                    center: s.center.map(cast),
+                })
+                .collect(),
+            groups: self.groups.clone(),
+            classes: self
+                .classes
+                .iter()
+                .map(|c| Class {
+                    trees: c.trees,
+                    columns: c.columns.clone(),
+                    entries: c.entries.clone(),
+                    couples: c.couples,
+                    shared: c.shared.iter().map(|x| x.map(cast)).collect(),
+                    first: c.first,
+                    capacity: c.capacity,
+                })
+                .collect(),
+            pairs: self.pairs.clone(),
+            contacts_max: self.contacts_max,
+            rows_max: self.rows_max,
+            may_overflow: self.may_overflow,
+            tables: Tables {
+                numbers: self.tables.numbers.iter().copied().map(cast).collect(),
+                indices: self.tables.indices.clone(),
+            },
+            handles: self.handles,
+            memory: self.memory,
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! Collision detection: which pairs of shapes are near each other, and where they touch.
+//!
+//! Every pair of the model's table is looked at: spheres around the shapes first, then, of those that pass, the shapes
+//! themselves. A shape's position is kept relative to the reference point of its tree, that of a pair relative to its
+//! first shape, so that `f32` keeps its digits far from the origin.
+
+pub mod points;
+
+use super::{BlockOf, ConstantsOf};
+use crate::lane::{Cx, Num, Real};
+use crate::math::vec3::{
+    Mat3, Vec3, add, constant, dot, scale_add, sub, transform, transform_add,
+};
+use crate::model::contact::{
+    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, COUNTS, Contacts, Group, Kind, pair,
+};
+use crate::{span, when};
+use points::{Placed, Points, Room};
+
+#[inline(always)]
+pub(super) fn collide<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let t = &m.contacts;
+    if t.groups.is_empty() {
+        return;
+    }
+    let classes = t.classes.len();
+    for count in 0..classes + COUNTS {
+        let (row, zero) = (cx.at(count), C::F::c(0.0));
+        cx.fill(t.memory.counts, row, 0, zero);
+    }
+    place(cx, m, b);
+    for group in &t.groups {
+        let (first, end) = (cx.at(group.first), cx.at(group.end));
+        span!(cx, p in first, end, {
+            pair_of::<C>(cx, t, group, p);
+        });
+    }
+    let mut left_out = C::F::c(0.0);
+    if t.may_overflow {
+        let row = cx.at(classes + COUNT_LEFT_OUT);
+        left_out = cx.load(t.memory.counts, row, 0);
+    }
+    let most = cx.get(&b.left_out[0]).max(left_out);
+    cx.set(&mut b.left_out[0], most);
+}
+
+/// Poses of all shapes, and the reference points that they are relative to.
+#[inline(always)]
+fn place<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
+    let (w, memory) = (&b.work, &m.contacts.memory);
+    for (k, solid) in m.contacts.solids.iter().enumerate() {
+        let [x, y, z] = solid.axes;
+        let mut axes: Mat3<C::F> = [constant(x), constant(y), constant(z)];
+        let mut center = constant(solid.center);
+        if let Some(body) = solid.body {
+            let r = &w.rotation[body];
+            axes = [
+                transform(r, axes[0]),
+                transform(r, axes[1]),
+                transform(r, axes[2]),
+            ];
+            center = transform_add(r, center, w.origin[body]);
+        }
+        let row = cx.at(k);
+        for (i, x) in axes.as_flattened().iter().chain(&center).enumerate() {
+            cx.fill(memory.poses, row, i, *x);
+        }
+    }
+    for (t, reference) in w.reference.iter().enumerate() {
+        let row = cx.at(t);
+        for (i, x) in reference.iter().enumerate() {
+            cx.fill(memory.origins, row, i, *x);
+        }
+    }
+    let (world, zero) = (cx.at(w.reference.len()), C::F::c(0.0));
+    for i in 0..3 {
+        cx.fill(memory.origins, world, i, zero);
+    }
+}
+
+/// The contacts of a pair.
+#[inline(always)]
+fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, group: &Group, p: C::I) {
+    let (numbers, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
+    let (poses, origins) = (t.memory.poses, t.memory.origins);
+    let a = cx.index(indices, p, pair::SOLID_A, poses.rows);
+    let b = cx.index(indices, p, pair::SOLID_B, poses.rows);
+    let origin_a = cx.index(indices, p, pair::ORIGIN_A, origins.rows);
+    let origin_b = cx.index(indices, p, pair::ORIGIN_B, origins.rows);
+    let center_a = three(cx, poses, a, 9);
+    let origin_a = three(cx, origins, origin_a, 0);
+    let between = sub(three(cx, origins, origin_b, 0), origin_a);
+    let center = add(sub(three(cx, poses, b, 9), center_a), between);
+    let radius = cx.constant(numbers, p, pair::RADIUS);
+    let near = match group.kinds.0 {
+        Kind::Plane => dot(three(cx, poses, a, 6), center).lt(radius),
+        _ => dot(center, center).lt(radius * radius),
+    };
+    when!(cx, near, {
+        let axes: Mat3<C::F> = [
+            three(cx, poses, a, 0),
+            three(cx, poses, a, 3),
+            three(cx, poses, a, 6),
+        ];
+        let other = Placed {
+            axes: [
+                three(cx, poses, b, 0),
+                three(cx, poses, b, 3),
+                three(cx, poses, b, 6),
+            ],
+            center,
+        };
+        let origin = cx.index(indices, p, pair::ORIGIN, origins.rows);
+        let origin = three(cx, origins, origin, 0);
+        let class = cx.index(indices, p, pair::CLASS, t.classes.len());
+        let first = cx.index(t.handles.class_rows, class, 0, t.memory.rows.rows);
+        let capacity = cx.index(t.handles.class_rows, class, 1, t.memory.rows.rows + 1);
+        let mut points = Points::<C> {
+            list: cx.kept(t.memory.counts, class, first, capacity),
+            table: t.memory.rows,
+            pair: cx.number(p),
+            base: add(center_a, sub(origin_a, origin)),
+            flip: cx.constant(numbers, p, pair::FLIP),
+            room: Room {
+                counts: t.memory.counts,
+                contacts: t.classes.len() + COUNT_CONTACTS,
+                rows: t.classes.len() + COUNT_ROWS,
+                left_out: t.classes.len() + COUNT_LEFT_OUT,
+                contacts_max: C::F::c(t.contacts_max as f64),
+                rows_max: C::F::c(t.rows_max as f64),
+                of_a_contact: cx.constant(numbers, p, pair::ROWS),
+                is_tight: t.may_overflow,
+            },
+        };
+        let margin = cx.constant(numbers, p, pair::REACH);
+        let size_a = [
+            cx.constant(numbers, p, pair::SIZE_A),
+            cx.constant(numbers, p, pair::SIZE_A + 1),
+            cx.constant(numbers, p, pair::SIZE_A + 2),
+        ];
+        let size_b = [
+            cx.constant(numbers, p, pair::SIZE_B),
+            cx.constant(numbers, p, pair::SIZE_B + 1),
+            cx.constant(numbers, p, pair::SIZE_B + 2),
+        ];
+        touch(
+            cx, t, group, p, &axes, size_a, &other, size_b, margin, &mut points,
+        );
+    });
+}
+
+/// Three neighbouring numbers of a row.
+#[inline(always)]
+fn three<C: Cx>(cx: &mut C, table: crate::lane::Table, row: C::I, k: usize) -> Vec3<C::F> {
+    [
+        cx.load(table, row, k),
+        cx.load(table, row, k + 1),
+        cx.load(table, row, k + 2),
+    ]
+}
+
+/// The narrow phase of two kinds.
+#[allow(clippy::too_many_arguments)]
+#[inline(always)]
+fn touch<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    group: &Group,
+    p: C::I,
+    axes: &Mat3<C::F>,
+    size_a: Vec3<C::F>,
+    other: &Placed<C::F>,
+    size_b: Vec3<C::F>,
+    margin: C::F,
+    out: &mut Points<C>,
+) {
+    match group.kinds {
+        (Kind::Box, Kind::Box) => boxes::box_box(cx, axes, size_a, other, size_b, margin, out),
+        (a, b) => unreachable!("{a:?} and {b:?} are no pair"),
+    }
+}

@@ -1,0 +1,153 @@
+//! Constraint rows of contacts: tangents, Jacobian, stiffness and reference acceleration (Todorov 2014; MuJoCo
+//! documentation, "Computation: constraint model").
+//!
+//! ```text
+//! v = J q̇, of the second body relative to the first, along normal and tangents
+//! elliptic      R₀ = (1 - d)/d w          D₁ = D₂ = impratio D₀
+//! pyramidal     R₀ = (1 - d)/d w (1 + μ²)  D = 1 / (2 μ² R₀ / impratio), of the edges n ± μ t
+//! aref = -b v - k d (r - margin)  along the normal,   -b' v along a tangent
+//! ```
+
+use super::{BlockOf, ConstantsOf};
+use crate::each;
+use crate::lane::{Cx, Num};
+use crate::math::vec3::{Vec3, cross, dot, scale, scale_add, sub};
+use crate::model::contact::{Class, Contacts, pair, row};
+use crate::model::description::Cone;
+use crate::step::constraint::impedance;
+
+#[inline(always)]
+pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let t = &m.contacts;
+    for (k, class) in t.classes.iter().enumerate() {
+        let list = class_list(cx, t, k);
+        each!(cx, r in list, {
+            let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+            let normal = three(cx, t, r, row::NORMAL);
+            let point = three(cx, t, r, row::POINT);
+            let number = cx.load(t.memory.rows, r, row::PAIR);
+            let rubs = shared(cx, t, class, number, pair::RUBS);
+            let tangents = tangents(normal);
+            // without friction a contact has no tangents
+            let frame = [normal, scale(tangents[0], rubs), scale(tangents[1], rubs)];
+            let mut velocity = [zero; 3];
+            let w = &b.work;
+            let second = w.reference[class.trees.1];
+            let point_first = match class.trees.0 {
+                Some(tree) if tree != class.trees.1 => {
+                    add_difference(point, second, w.reference[tree])
+                }
+                _ => point,
+            };
+            for (i, axis) in frame.iter().enumerate() {
+                let torques = [cross(point_first, *axis), cross(point, *axis)];
+                for (c, column) in class.columns.iter().enumerate() {
+                    let [linear, angular] = w.motion[column.dof];
+                    let torque = torques[usize::from(!column.is_first)];
+                    let lever = shared(cx, t, class, number, column.lever);
+                    let j = lever * (dot(linear, *axis) + dot(angular, torque));
+                    velocity[i] = j.fma(cx.get(&b.joint_qd[column.dof]), velocity[i]);
+                    cx.store(t.memory.rows, r, row::JACOBIAN + 3 * c + i, j);
+                }
+                if i > 0 {
+                    for (e, x) in axis.iter().enumerate() {
+                        cx.store(t.memory.rows, r, row::TANGENTS + 3 * (i - 1) + e, *x);
+                    }
+                }
+            }
+            let distance = cx.load(t.memory.rows, r, row::DISTANCE);
+            let position = distance - shared(cx, t, class, number, pair::MARGIN);
+            let d = impedance(&m.contact_impedance, position);
+            let mu = shared(cx, t, class, number, pair::MU) * rubs;
+            let weight = shared(cx, t, class, number, pair::WEIGHT);
+            let stiff = d.div((one - d) * weight);
+            let damping = shared(cx, t, class, number, pair::DAMPING);
+            let spring = shared(cx, t, class, number, pair::STIFFNESS) * d * position;
+            let mut aref = [-velocity[0].fma(damping, spring), zero, zero];
+            let (stiff, sliding) = match t.cone {
+                Cone::Elliptic => (stiff, shared(cx, t, class, number, pair::SLIDING)),
+                Cone::Pyramidal => {
+                    let square = mu * mu;
+                    let edges = C::F::k(t.impratio).div((square + square) * (one + square));
+                    // without friction four edges fall together
+                    let share = C::F::select(zero.lt(mu), edges, C::F::c(0.25));
+                    (stiff * share, damping)
+                }
+            };
+            for i in 1..3 {
+                aref[i] = -(velocity[i] * sliding);
+            }
+            let pushes = position.lt(zero);
+            let stiff = C::F::select(pushes, stiff, zero);
+            cx.store(t.memory.rows, r, row::STIFFNESS, stiff);
+            cx.store(t.memory.rows, r, row::MU, mu);
+            for (i, x) in aref.iter().enumerate() {
+                let x = C::F::select(pushes, *x, zero);
+                cx.store(t.memory.rows, r, row::AREF + i, x);
+            }
+        });
+    }
+}
+
+/// The contacts of a class that the worlds have now.
+#[inline(always)]
+pub(super) fn class_list<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    class: usize,
+) -> C::List {
+    let (at, first) = (cx.at(class), cx.at(t.classes[class].first));
+    let capacity = cx.at(t.classes[class].capacity);
+    cx.kept(t.memory.counts, at, first, capacity)
+}
+
+/// A number of a contact's pair, which may be the same for all pairs of the class.
+#[inline(always)]
+fn shared<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    class: &Class<<C::F as Num>::Real>,
+    number: C::F,
+    k: usize,
+) -> C::F {
+    match class.shared[k] {
+        Some(x) => C::F::k(x),
+        None => cx.pick(t.handles.pair_numbers, number, k),
+    }
+}
+
+/// Three neighbouring numbers of a contact.
+#[inline(always)]
+fn three<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    r: C::I,
+    k: usize,
+) -> Vec3<C::F> {
+    [
+        cx.load(t.memory.rows, r, k),
+        cx.load(t.memory.rows, r, k + 1),
+        cx.load(t.memory.rows, r, k + 2),
+    ]
+}
+
+/// a + (b - c)
+#[inline(always)]
+fn add_difference<F: Num>(a: Vec3<F>, b: Vec3<F>, c: Vec3<F>) -> Vec3<F> {
+    crate::math::vec3::add(a, sub(b, c))
+}
+
+/// Two unit vectors across the normal, as MuJoCo's `mju_makeFrame` chooses them: y unless the normal is near y, then z.
+#[inline(always)]
+fn tangents<F: Num>(normal: Vec3<F>) -> [Vec3<F>; 2] {
+    let (zero, one) = (F::c(0.0), F::c(1.0));
+    let steep = normal[1].abs().lt(F::c(0.5));
+    let axis = [
+        zero,
+        F::select(steep, one, zero),
+        F::select(steep, zero, one),
+    ];
+    let across = scale_add(normal, -dot(axis, normal), axis);
+    let first = scale(across, one.div(dot(across, across).sqrt()));
+    [first, cross(normal, first)]
+}
