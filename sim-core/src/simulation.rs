@@ -118,7 +118,7 @@ impl Simulation {
         };
         let worlds = (options.worlds as u64).saturating_add(width);
         // state and commands of a world, its counters; see backend/cpu/chunk.rs
-        worlds.saturating_mul((5 * model.dofs() + model.coords()) as u64 * real + 12)
+        worlds.saturating_mul((5 * model.dofs() + model.coords()) as u64 * real + 16)
     }
 
     /// Sets columns of a command; it holds until it is set again or the world is reset.

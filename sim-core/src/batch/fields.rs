@@ -63,6 +63,8 @@ pub enum Axis {
     Bodies,
     /// Constraint rows.
     Rows,
+    /// Contacts that a world has room for.
+    Contacts,
     /// A fixed number.
     Size(usize),
 }
@@ -75,6 +77,7 @@ impl Axis {
             Axis::Coords => model.coords(),
             Axis::Bodies => model.bodies(),
             Axis::Rows => model.rows(),
+            Axis::Contacts => model.contacts_max(),
             Axis::Size(n) => n,
         }
     }
@@ -86,6 +89,7 @@ impl Axis {
             Axis::Coords => "coords".into(),
             Axis::Bodies => "bodies".into(),
             Axis::Rows => "rows".into(),
+            Axis::Contacts => "contacts".into(),
             Axis::Size(n) => n.to_string(),
         }
     }
@@ -148,6 +152,7 @@ const REAL: FieldDtype = FieldDtype::Real;
 const F64: FieldDtype = FieldDtype::Fixed(Dtype::F64);
 const U64: FieldDtype = FieldDtype::Fixed(Dtype::U64);
 const U32: FieldDtype = FieldDtype::Fixed(Dtype::U32);
+const I32: FieldDtype = FieldDtype::Fixed(Dtype::I32);
 
 fields! {
     JointQ "joint_q" State [Coords] "rad or m" REAL, "Joint positions.";
@@ -167,9 +172,17 @@ fields! {
     EfcD "efc_D" Derived [Rows] "kg·m² or kg" REAL, "Regularised stiffness of a constraint row, 1/R; zero in a row that is not active.";
     EfcAref "efc_aref" Derived [Rows] "rad/s² or m/s²" REAL, "Reference acceleration of a constraint row.";
     EfcForce "efc_force" Derived [Rows] "N·m or N" REAL, "Force of a constraint row.";
+    ContactCount "contact_count" Derived [] "–" I32, "Contacts of the world: how many rows of the other contact fields are in use.";
+    ContactPos "contact_pos" Derived [Contacts, Size(3)] "m" REAL, "Point half-way between the two surfaces, in the world.";
+    ContactNormal "contact_normal" Derived [Contacts, Size(3)] "–" REAL, "Unit normal from the first shape of the pair to the second.";
+    ContactDistance "contact_distance" Derived [Contacts] "m" REAL, "Distance of the two surfaces, negative in penetration.";
+    ContactForce "contact_force" Derived [Contacts, Size(3)] "N" REAL, "Force on the second shape of the pair, in world axes.";
+    ContactPair "contact_pair" Derived [Contacts, Size(2)] "–" I32, "The two shapes, as places in shape_names; -1 in a row that is not in use.";
+    BodyContactForce "body_contact_force" Derived [Bodies, Size(3)] "N" REAL, "Sum of the contact forces on each link, in world axes.";
     Time "time" Counter [] "s" F64, "Simulated time since the world's reset.";
     Step "step" Counter [] "–" U64, "Control frames since the world's reset.";
-    Status "status" Counter [] "–" U32, "Trouble of the world, as bits: 1 = not finite, 2 = the solver used up its iterations; 0 = none.";
+    Status "status" Counter [] "–" U32, "Trouble of the world, as bits: 1 = not finite, 2 = the solver used up its iterations, 4 = contacts were left out; 0 = none.";
+    ContactsLeftOut "contacts_left_out" Counter [] "–" U32, "Contacts that did not fit into contacts_max or rows_max: the most of any substep of the last frame.";
 }
 
 impl Field {

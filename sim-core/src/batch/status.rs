@@ -4,3 +4,5 @@
 pub const NOT_FINITE: u32 = 1;
 /// The constraint solver used up its iterations in some substep of the last frame.
 pub const NOT_CONVERGED: u32 = 2;
+/// More contacts were found in some substep of the last frame than there is room for.
+pub const CONTACTS_LEFT_OUT: u32 = 4;

@@ -4,11 +4,13 @@
 //! that the axis is z; a planar joint becomes two slides and a turn; constraint parameters that derive
 //! from mass are evaluated at the reference pose q = 0.
 
-use super::constants::{Body, Constants, Dof, Frame, MassEntry, Motion, Newton, Tree};
+use super::constants::{Body, Constants, Coupled, Dof, Frame, MassEntry, Motion, Newton, Tree};
 use super::frozen::{Model, RobotRange, Start};
 use super::inertia::merge;
 use super::inverse_weight;
-use super::rows::{DofJoint, add_rows};
+use super::rows::{DofJoint, IMPEDANCE, add_rows};
+use super::contact::Contacts;
+use super::touching::{Borne, Rules, add_contacts};
 use super::{Description, Inertial, Joint, JointKind, ModelError, Pose, Robot, TargetMode};
 use crate::math::factor::Pattern;
 use std::collections::BTreeSet;
@@ -54,6 +56,9 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         equalities: Vec::new(),
         frictions: Vec::new(),
         limits: Vec::new(),
+        coupled: Coupled::default(),
+        contacts: Contacts::none(scene.solver.cone, scene.solver.impratio),
+        contact_impedance: IMPEDANCE,
         solver: Newton {
             iterations: scene.solver.iterations,
             ls_iterations: scene.solver.ls_iterations,
@@ -75,6 +80,14 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         &builder.joints,
         &reference.dof_inverse_weight,
     );
+    let shape_names = scene.shape_names();
+    let borne = borne(scene, &builder.carriers, &constants);
+    let rules = Rules {
+        connected: connected(scene, &builder.carriers, &constants),
+        self_collisions: scene.robots.iter().map(|r| r.self_collisions).collect(),
+        link_inverse_weight: &reference.link_inverse_weight,
+    };
+    add_contacts(&mut constants, scene, &borne, &rules)?;
 
     let mut model = Model {
         constants,
@@ -83,7 +96,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         dof_names: builder.dof_names,
         coord_names: builder.coord_names,
         body_names: builder.body_names,
-        shape_names: scene.shape_names(),
+        shape_names,
         robots: builder.robots,
         start: builder.start,
         dof_inverse_weight: reference.dof_inverse_weight,
@@ -91,6 +104,76 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     };
     model.hash = hash(&model);
     Ok(model)
+}
+
+/// Links that are fixed to each other are of one group: a body's number, or one for what stands still of a robot.
+fn group(constants: &Constants<f64>, robot: usize, carrier: &Carrier) -> usize {
+    carrier.body.unwrap_or(constants.bodies.len() + robot)
+}
+
+/// All shapes of a scene, in the order of their names.
+fn borne<'a>(
+    scene: &'a Description,
+    carriers: &[Vec<Carrier>],
+    constants: &Constants<f64>,
+) -> Vec<Borne<'a>> {
+    let mut all: Vec<Borne<'a>> = Vec::new();
+    for shape in &scene.shapes {
+        all.push(Borne {
+            number: all.len(),
+            shape: &shape.shape,
+            surface: shape.surface,
+            robot: None,
+            link: None,
+            body: None,
+            group: constants.bodies.len() + scene.robots.len(),
+            pose: shape.pose,
+        });
+    }
+    let mut frame = 0;
+    for (index, robot) in scene.robots.iter().enumerate() {
+        for link in robot.link_order() {
+            let carrier = &carriers[index][link];
+            for collision in &robot.links[link].collisions {
+                let mut pose = carrier.pose.mul(&collision.pose);
+                if carrier.body.is_none() {
+                    for (x, base) in pose.pos.iter_mut().zip(constants.trees[carrier.tree].base) {
+                        *x += base;
+                    }
+                }
+                all.push(Borne {
+                    number: all.len(),
+                    shape: &collision.shape,
+                    surface: collision.surface,
+                    robot: Some(index),
+                    link: Some(frame),
+                    body: carrier.body,
+                    group: group(constants, index, carrier),
+                    pose,
+                });
+            }
+            frame += 1;
+        }
+    }
+    all
+}
+
+/// Groups of links that a joint connects.
+fn connected(
+    scene: &Description,
+    carriers: &[Vec<Carrier>],
+    constants: &Constants<f64>,
+) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    for (index, robot) in scene.robots.iter().enumerate() {
+        let of = |link: usize| group(constants, index, &carriers[index][link]);
+        for joint in robot.joints.iter().filter(|joint| joint.moves()) {
+            if let Some(parent) = joint.parent {
+                pairs.push((of(parent), of(joint.child)));
+            }
+        }
+    }
+    pairs
 }
 
 /// Where a link is carried: by which body and tree, and how it lies in that body's frame.
@@ -114,6 +197,8 @@ struct Builder {
     body_names: Vec<String>,
     start: Start,
     couplings: Vec<(usize, usize)>,
+    /// How each link of each robot is carried.
+    carriers: Vec<Vec<Carrier>>,
 }
 
 impl Builder {
@@ -169,6 +254,7 @@ impl Builder {
         for joint in robot.moving_joints() {
             self.add_followers(robot, joint, &dof_of);
         }
+        self.carriers.push(carriers);
         self.robots.push(RobotRange {
             name: robot.name.clone(),
             dofs: first_dof..self.dofs.len(),

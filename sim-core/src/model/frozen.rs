@@ -92,6 +92,10 @@ impl Model {
     pub fn rows(&self) -> usize {
         self.constants.rows()
     }
+    /// Contacts that a world has room for.
+    pub fn contacts_max(&self) -> usize {
+        self.constants.contacts.contacts_max
+    }
     /// State and commands after a reset.
     pub fn start(&self) -> &Start {
         &self.start

@@ -3,13 +3,16 @@
 use super::ModelError;
 use super::constants::{Constants, Motion};
 use crate::math::spatial::{Spatial, momentum, place, power};
-use crate::math::vec3::{cross, transform, transform_add};
+use crate::math::vec3::{cross, cross_add, dot, transform, transform_add};
 use faer::linalg::solvers::DenseSolveCore;
 
 /// Inverse weights at q = 0.
 pub(super) struct Reference {
     /// Diagonal of M⁻¹, MuJoCo's `dof_invweight0`.
     pub dof_inverse_weight: Vec<f64>,
+    /// Mean over the axes of the translational diagonal of J M⁻¹ Jᵀ at each link's centre of mass, 0 where it stands
+    /// still: MuJoCo's `body_invweight0` [1/kg].
+    pub link_inverse_weight: Vec<f64>,
     /// Mean of the diagonal of M, MuJoCo's `stat.meaninertia`.
     pub mean_inertia: f64,
     /// Largest ratio over the dofs of the inertia while all others are locked to that while they are free: how
@@ -27,11 +30,12 @@ pub(super) fn at_reference(
     if n == 0 {
         return Ok(Reference {
             dof_inverse_weight: Vec::new(),
+            link_inverse_weight: vec![0.0; constants.frames.len()],
             mean_inertia: 1.0,
             locked_over_free: 1.0,
         });
     }
-    let mut mass_matrix = mass_matrix(constants);
+    let (mut mass_matrix, frames, motions) = mass_matrix(constants);
     for (k, dof) in constants.dofs.iter().enumerate() {
         mass_matrix[(k, k)] += dof.armature;
     }
@@ -45,6 +49,18 @@ pub(super) fn at_reference(
         .llt(faer::Side::Lower)
         .map_err(|_| ModelError::SingularMass)?;
     let inverse = factor.inverse();
+    let link_inverse_weight = constants
+        .frames
+        .iter()
+        .map(|link| match link.body {
+            None => 0.0,
+            Some(body) => {
+                let (rotation, origin) = &frames[body];
+                let center = transform_add(rotation, link.center, *origin);
+                link_weight(&path(constants, body), &motions, center, &inverse)
+            }
+        })
+        .collect();
     let mut dof_inverse_weight: Vec<f64> = (0..n).map(|k| inverse[(k, k)]).collect();
     let locked_over_free = (0..n)
         .map(|k| mass_matrix[(k, k)] * inverse[(k, k)])
@@ -62,15 +78,53 @@ pub(super) fn at_reference(
     }
     Ok(Reference {
         dof_inverse_weight,
+        link_inverse_weight,
         mean_inertia,
         locked_over_free,
     })
 }
 
-fn mass_matrix(constants: &Constants<f64>) -> faer::Mat<f64> {
+/// Inverse weight of a link whose centre is at `center`, moved by the dofs of `path`.
+fn link_weight(
+    path: &[usize],
+    motions: &[Spatial<f64>],
+    center: [f64; 3],
+    inverse: &faer::Mat<f64>,
+) -> f64 {
+    let columns: Vec<Spatial<f64>> = path
+        .iter()
+        .map(|&d| {
+            let [linear, angular] = motions[d];
+            [cross_add(angular, center, linear), angular]
+        })
+        .collect();
+    let [linear, angular] = [0, 1].map(|part| {
+        let mut sum = 0.0;
+        for (a, &i) in columns.iter().zip(path) {
+            for (b, &j) in columns.iter().zip(path) {
+                sum += dot(a[part], b[part]) * inverse[(i, j)];
+            }
+        }
+        sum / 3.0
+    });
+    // MuJoCo: what only turns about its centre weighs as it turns
+    if linear < WEIGHT_MIN && angular > WEIGHT_MIN {
+        angular
+    } else {
+        linear.max(WEIGHT_MIN)
+    }
+}
+
+/// MuJoCo's `mjMINVAL`: below it an inverse weight counts as none.
+const WEIGHT_MIN: f64 = 1e-15;
+
+/// Rotation, by columns, and origin of each body's frame.
+type Frames = Vec<([[f64; 3]; 3], [f64; 3])>;
+
+fn mass_matrix(constants: &Constants<f64>) -> (faer::Mat<f64>, Frames, Vec<Spatial<f64>>) {
     let n = constants.dofs.len();
     let mut mass_matrix = faer::Mat::<f64>::zeros(n, n);
-    let mut frames: Vec<([[f64; 3]; 3], [f64; 3])> = Vec::new();
+    let mut frames: Frames = Vec::new();
     let mut motions: Vec<Spatial<f64>> = Vec::with_capacity(n);
     for body in &constants.bodies {
         let (rotation, mut origin) = match body.parent {
@@ -107,7 +161,7 @@ fn mass_matrix(constants: &Constants<f64>) -> faer::Mat<f64> {
             }
         }
     }
-    mass_matrix
+    (mass_matrix, frames, motions)
 }
 
 /// The dofs that move a body.

@@ -3,7 +3,7 @@
 use super::constants::{Constants, Equality, Friction, Impedance, Limit, Soft};
 
 /// MuJoCo's default `solimp` (0.9, 0.95, 0.001, 0.5, 2).
-const IMPEDANCE: Impedance<f64> = Impedance {
+pub(super) const IMPEDANCE: Impedance<f64> = Impedance {
     d_min: 0.9,
     d_max: 0.95,
     inverse_width: 1.0 / 0.001,
@@ -81,4 +81,12 @@ fn soft(solref: [f64; 2], inverse_weight: f64, dt: f64) -> Soft<f64> {
         inverse_weight,
         impedance: IMPEDANCE,
     }
+}
+
+/// Damping of a contact's friction rows from Newton's `kf`, for bodies of this inverse weight: MuJoCo's from
+/// `solreffriction` = (2 / (kf w ((1 - dmax)/impratio + dmax)), 1), as Newton's exporter sets it.
+pub(super) fn contact_damping(kf: f64, inverse_weight: f64, impratio: f64, dt: f64) -> f64 {
+    let d_max = IMPEDANCE.d_max;
+    let rate = kf * inverse_weight * ((1.0 - d_max) / impratio + d_max);
+    2.0 / (d_max * (2.0 / rate).max(2.0 * dt))
 }

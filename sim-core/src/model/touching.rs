@@ -4,20 +4,19 @@ use super::contact::{
     COUNTS, Class, Column, Contacts, Group, Handles, Kind, Memory, Pair, Solid, pair, row,
 };
 use super::constants::{Constants, Coupled};
-use super::description::{Collision, Cone, Description, Shape, Surface};
+use super::description::{Cone, Description, Shape};
+use super::surface::Surface;
 use super::paths::{Cluster, clusters};
 use super::rows::{IMPEDANCE, contact_damping};
-use super::Pose;
-use crate::lane::{Fixed, Real, Table};
+use super::{ModelError, Pose};
+use crate::lane::{Fixed, Table};
 use crate::math::factor::Pattern;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A shape of the scene, and what bears it.
 pub(super) struct Borne<'a> {
     /// Its number among the scene's.
     pub number: usize,
-    /// Its full name.
-    pub name: &'a str,
     /// Its geometry and surface; its pose is that in the link.
     pub shape: &'a Shape,
     /// How it touches.
@@ -69,15 +68,16 @@ pub(super) fn add_contacts(
     scene: &Description,
     borne: &[Borne<'_>],
     rules: &Rules<'_>,
-) {
+) -> Result<(), ModelError> {
     let mut contacts = Contacts::none(scene.solver.cone, scene.solver.impratio);
     let pieces = pieces(borne, &mut contacts);
-    let mut pairs = pairs(scene, borne, &pieces, rules);
+    let filtered = scene.filtered_pairs()?;
+    let mut pairs = pairs(borne, &pieces, rules, &filtered);
     // by kinds, then in the order of the scene
     pairs.sort_by_key(|&(a, b)| (pieces[a].solid.kind, pieces[b].solid.kind, a, b));
     if pairs.is_empty() {
         constants.contacts = contacts;
-        return;
+        return Ok(());
     }
     let builder = Builder {
         constants,
@@ -91,6 +91,7 @@ pub(super) fn add_contacts(
     contacts.solids = pieces.iter().map(|piece| piece.solid.clone()).collect();
     constants.coupled = coupled;
     constants.contacts = contacts;
+    Ok(())
 }
 
 fn pieces(borne: &[Borne<'_>], _contacts: &mut Contacts<f64>) -> Vec<Piece> {
@@ -152,16 +153,17 @@ fn piece(
 
 /// Pairs of pieces that may touch, the lower kind first.
 fn pairs(
-    scene: &Description,
     borne: &[Borne<'_>],
     pieces: &[Piece],
     rules: &Rules<'_>,
+    filtered: &BTreeSet<[usize; 2]>,
 ) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
     for (j, second) in pieces.iter().enumerate() {
         for (i, first) in pieces[..j].iter().enumerate() {
             let (a, b) = (&borne[first.borne], &borne[second.borne]);
-            if !may_touch(scene, a, b, rules) {
+            let numbers = [a.number.min(b.number), a.number.max(b.number)];
+            if filtered.contains(&numbers) || !may_touch(a, b, rules) {
                 continue;
             }
             pairs.push(match first.solid.kind <= second.solid.kind {
@@ -173,7 +175,7 @@ fn pairs(
     pairs
 }
 
-fn may_touch(scene: &Description, a: &Borne<'_>, b: &Borne<'_>, rules: &Rules<'_>) -> bool {
+fn may_touch(a: &Borne<'_>, b: &Borne<'_>, rules: &Rules<'_>) -> bool {
     let moves = a.body.is_some() || b.body.is_some();
     let is_one = a.group == b.group;
     let of_one_robot = a.robot.is_some() && a.robot == b.robot;
@@ -182,15 +184,11 @@ fn may_touch(scene: &Description, a: &Borne<'_>, b: &Borne<'_>, rules: &Rules<'_
     let connected = neighbours
         .iter()
         .any(|groups| rules.connected.contains(groups));
-    let filtered = scene.filters.iter().any(|[x, y]| {
-        (x == a.name && y == b.name) || (x == b.name && y == a.name)
-    });
     moves
         && !is_one
         && (!of_one_robot || may_self)
         && !connected
         && groups_touch(a.surface.group, b.surface.group)
-        && !filtered
 }
 
 /// Newton's rule of collision groups: 0 touches nothing, a positive one itself and negative ones, a negative one all but itself.

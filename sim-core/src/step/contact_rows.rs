@@ -13,7 +13,7 @@ use crate::each;
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{Vec3, cross, dot, scale, scale_add, sub};
 use crate::model::contact::{Class, Contacts, pair, row};
-use crate::model::description::Cone;
+use crate::model::Cone;
 use crate::step::constraint::impedance;
 
 #[inline(always)]

@@ -1,6 +1,7 @@
 //! A run of blocks that one thread works on: their state in lane order, and one workspace.
 
 use super::dispatch::RunStage;
+use super::contacts;
 use super::transfer::{self, Arena};
 use crate::backend::Values;
 use crate::batch::{Block, Field, Layout, status};
@@ -107,7 +108,15 @@ fn stages_for(layout: &Layout) -> Vec<Stage> {
             Field::MassMatrix => (Stage::MassMatrix, None),
             Field::SmoothForce => (Stage::Actuation, None),
             Field::EfcJ | Field::EfcD | Field::EfcAref => (Stage::Constraint, None),
-            Field::ConstraintForce | Field::EfcForce => (Stage::Refine, None),
+            Field::ContactCount
+            | Field::ContactPos
+            | Field::ContactNormal
+            | Field::ContactDistance
+            | Field::ContactPair => (Stage::Collide, None),
+            Field::ConstraintForce
+            | Field::EfcForce
+            | Field::ContactForce
+            | Field::BodyContactForce => (Stage::Refine, None),
             Field::JointQdd => (Stage::Accelerations, None),
             _ => continue,
         };
@@ -126,7 +135,11 @@ pub(super) struct Chunk<F: Lane> {
     /// Control frames since the reset of each world.
     steps: Vec<u64>,
     status: Vec<u32>,
+    /// Most contacts that did not fit in a substep of the last frame.
+    left_out: Vec<u32>,
     pub block: Block<F, F>,
+    /// Scratch memory of the machine.
+    pub memory: Vec<F>,
     /// Room for one field of one block.
     pub staging: Vec<F>,
     /// The same, number by number.
@@ -146,7 +159,9 @@ impl<F: Lane> Chunk<F> {
             state: vec![F::Real::default(); blocks * Shape::of(&job.constants).total() * F::WIDTH],
             steps: vec![0; worlds.len()],
             status: vec![0; worlds.len()],
+            left_out: vec![0; worlds.len()],
             block: Block::new(&job.constants, F::default()),
+            memory: vec![F::default(); job.constants.contacts.memory.len],
             staging: vec![F::default(); elements],
             lanes: vec![F::Real::default(); elements * F::WIDTH],
             worlds,
@@ -177,6 +192,7 @@ impl<F: Lane> Chunk<F> {
                 self.reset_lane(job, world);
                 self.steps[world] = 0;
                 self.status[world] = 0;
+                self.left_out[world] = 0;
             }
         }
     }
@@ -270,7 +286,11 @@ impl<F: Lane> Chunk<F> {
                 for stage in stages {
                     // SAFETY: by contract the processor has the instructions of the job's stages.
                     unsafe {
-                        job.stages[*stage as usize](&job.constants, &mut self.block);
+                        job.stages[*stage as usize](
+                            &job.constants,
+                            &mut self.block,
+                            &mut self.memory,
+                        );
                     }
                 }
             }
@@ -287,6 +307,12 @@ impl<F: Lane> Chunk<F> {
                         Field::Step => arena.put(slot, rows, |w| self.steps[w - self.worlds.start]),
                         Field::Status => {
                             arena.put(slot, rows, |w| self.status[w - self.worlds.start])
+                        }
+                        Field::ContactsLeftOut => {
+                            arena.put(slot, rows, |w| self.left_out[w - self.worlds.start])
+                        }
+                        field if contacts::is_of_contacts(field) => {
+                            contacts::export(self, &job.constants, slot, rows, arena)
                         }
                         _ => transfer::export(self, &job.constants, slot, rows, arena),
                     }
@@ -314,6 +340,7 @@ impl<F: Lane> Chunk<F> {
             }
         }
         b.unconverged[0] = F::c(0.0);
+        b.left_out[0] = F::c(0.0);
     }
 
     /// The state of a block out of its workspace; commands did not change.
@@ -350,9 +377,10 @@ impl<F: Lane> Chunk<F> {
         let flags = [
             (trouble, status::NOT_FINITE),
             (self.block.unconverged[0], status::NOT_CONVERGED),
+            (self.block.left_out[0], status::CONTACTS_LEFT_OUT),
         ];
         for (flag, bit) in flags {
-            if bit == status::NOT_CONVERGED && !stepped {
+            if bit != status::NOT_FINITE && !stepped {
                 continue;
             }
             flag.store(&mut self.lanes);
@@ -365,6 +393,10 @@ impl<F: Lane> Chunk<F> {
             }
         }
         if stepped {
+            self.block.left_out[0].store(&mut self.lanes);
+            for (left_out, lane) in self.left_out[first..last].iter_mut().zip(&self.lanes) {
+                *left_out = lane.to_usize() as u32;
+            }
             for step in &mut self.steps[first..last] {
                 *step += 1;
             }

@@ -15,7 +15,7 @@ use crate::step::Stage;
 ///
 /// # Safety
 /// The processor has the instructions that it was compiled for.
-pub(super) type RunStage<F> = unsafe fn(&Constants<<F as Num>::Real>, &mut Block<F, F>);
+pub(super) type RunStage<F> = unsafe fn(&Constants<<F as Num>::Real>, &mut Block<F, F>, &mut [F]);
 
 /// A chunk, compiled for an instruction set.
 ///
@@ -39,11 +39,11 @@ macro_rules! compiled {
             unsafe fn stage<F: Lane, const S: usize>(
                 constants: &Constants<F::Real>,
                 block: &mut Block<F, F>,
+                memory: &mut [F],
             ) {
                 // made here, so that the compiler sees that every world is active: what is set outside of
                 // blocks and loops is then a plain store, which the next load need not wait for
-                let tables = Default::default();
-                let mut machine = Machine::new(&mut [], &tables);
+                let mut machine = Machine::new(memory, &constants.contacts.tables);
                 Stage::ALL[S].run(&mut machine, constants, block);
             }
 
@@ -72,6 +72,8 @@ macro_rules! compiled {
                         stage::<F, 8>,
                         stage::<F, 9>,
                         stage::<F, 10>,
+                        stage::<F, 11>,
+                        stage::<F, 12>,
                     ],
                     chunk: chunk::<F>,
                 }

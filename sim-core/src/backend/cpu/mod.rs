@@ -3,6 +3,7 @@
 //! A control frame is one pass per block with all substeps in cache; nothing is allocated in it.
 
 mod chunk;
+mod contacts;
 mod dispatch;
 mod transfer;
 

@@ -32,7 +32,7 @@ impl Arena {
     /// # Safety
     /// The memory behind the arena lives, and nobody else uses these rows.
     #[inline(always)]
-    unsafe fn rows<'a, T: Copy>(self, slot: &Slot, worlds: &Range<usize>) -> &'a mut [T] {
+    pub(super) unsafe fn rows<'a, T: Copy>(self, slot: &Slot, worlds: &Range<usize>) -> &'a mut [T] {
         let elements: usize = slot.shape[1..].iter().product();
         assert!(size_of::<T>() == slot.dtype.bytes() && worlds.end <= slot.shape[0]);
         assert!(slot.offset + slot.bytes <= self.bytes);
@@ -133,7 +133,7 @@ fn stage<F: Lane>(chunk: &mut Chunk<F>, m: &Constants<F::Real>, field: Field, n:
             }
         }
         Field::EfcJ => jacobian(m, &b.efc_weight, &w.limit_side, to),
-        Field::Time | Field::Step | Field::Status => unreachable!("counters are not staged"),
+        _ => unreachable!("`{}` is not staged", field.row().name),
     }
 }
 

@@ -4,12 +4,13 @@
 //! themselves. A shape's position is kept relative to the reference point of its tree, that of a pair relative to its
 //! first shape, so that `f32` keeps its digits far from the origin.
 
+pub mod boxes;
 pub mod points;
 
 use super::{BlockOf, ConstantsOf};
-use crate::lane::{Cx, Num, Real};
+use crate::lane::{Cx, Num};
 use crate::math::vec3::{
-    Mat3, Vec3, add, constant, dot, scale_add, sub, transform, transform_add,
+    Mat3, Vec3, add, constant, dot, sub, transform, transform_add,
 };
 use crate::model::contact::{
     COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, COUNTS, Contacts, Group, Kind, pair,
@@ -39,6 +40,11 @@ pub(super) fn collide<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>)
     if t.may_overflow {
         let row = cx.at(classes + COUNT_LEFT_OUT);
         left_out = cx.load(t.memory.counts, row, 0);
+    }
+    for (k, class) in t.classes.iter().enumerate() {
+        let row = cx.at(k);
+        let over = cx.load(t.memory.counts, row, 0) - C::F::c(class.capacity as f64);
+        left_out = left_out + over.max(C::F::c(0.0));
     }
     let most = cx.get(&b.left_out[0]).max(left_out);
     cx.set(&mut b.left_out[0], most);
@@ -176,6 +182,6 @@ fn touch<C: Cx>(
 ) {
     match group.kinds {
         (Kind::Box, Kind::Box) => boxes::box_box(cx, axes, size_a, other, size_b, margin, out),
-        (a, b) => unreachable!("{a:?} and {b:?} are no pair"),
+        _ => {}
     }
 }

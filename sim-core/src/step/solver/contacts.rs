@@ -14,7 +14,7 @@
 use crate::each;
 use crate::lane::{Cx, Num, Real};
 use crate::model::contact::{Class, Contacts, row};
-use crate::model::description::Cone;
+use crate::model::Cone;
 use crate::step::contact_rows::class_list;
 
 /// What a contact does at `jar`.
@@ -94,7 +94,7 @@ fn of_piece<F: Num>(sticks: F::Mask, slides: F::Mask, stick: F, slide: F) -> F {
 
 #[inline(always)]
 fn pyramidal<F: Num>(jar: [F; 3], stiff: F, mu: F) -> ConeLaw<F> {
-    let (zero, one, half) = (F::c(0.0), F::c(1.0), F::c(0.5));
+    let (zero, half) = (F::c(0.0), F::c(0.5));
     let (a, b) = (mu * jar[1], mu * jar[2]);
     let mut push = [zero; 4];
     let mut active = [zero; 4];

@@ -50,7 +50,7 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         }
         let w = &mut b.work;
         let [a, minimum, ..] = &mut w.vector;
-        let [jar, jar_minimum, weight, aref] = &mut w.row;
+        let [jar, _, weight, aref] = &mut w.row;
         gather(cx, &b.efc_weight, weight);
         gather(cx, &b.efc_aref, aref);
         for j in 0..n {

@@ -53,8 +53,8 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     inverse_dynamics(cx, m, b);
     let n = m.dofs.len();
     let w = &mut b.work;
-    let [missing, a, rhs, joint] = &mut w.vector;
-    let [jar, force, weight, aref] = &mut w.row;
+    let [missing, a, rhs, _] = &mut w.vector;
+    let [jar, _, weight, aref] = &mut w.row;
     gather(cx, &b.efc_weight, weight);
     gather(cx, &b.efc_aref, aref);
     for j in 0..n {
