@@ -21,6 +21,30 @@ pub enum Kind {
     Hull,
 }
 
+/// Pairs of kinds that can touch, each with the name of its stage; the order in which they are looked at.
+pub const PAIR_KINDS: [((Kind, Kind), &str); 20] = [
+    ((Kind::Plane, Kind::Sphere), "plane_sphere"),
+    ((Kind::Plane, Kind::Capsule), "plane_capsule"),
+    ((Kind::Plane, Kind::Box), "plane_box"),
+    ((Kind::Plane, Kind::Cylinder), "plane_cylinder"),
+    ((Kind::Plane, Kind::Hull), "plane_hull"),
+    ((Kind::Sphere, Kind::Sphere), "sphere_sphere"),
+    ((Kind::Sphere, Kind::Capsule), "sphere_capsule"),
+    ((Kind::Sphere, Kind::Box), "sphere_box"),
+    ((Kind::Sphere, Kind::Cylinder), "sphere_cylinder"),
+    ((Kind::Sphere, Kind::Hull), "sphere_hull"),
+    ((Kind::Capsule, Kind::Capsule), "capsule_capsule"),
+    ((Kind::Capsule, Kind::Box), "capsule_box"),
+    ((Kind::Capsule, Kind::Cylinder), "capsule_cylinder"),
+    ((Kind::Capsule, Kind::Hull), "capsule_hull"),
+    ((Kind::Box, Kind::Box), "box_box"),
+    ((Kind::Box, Kind::Cylinder), "box_cylinder"),
+    ((Kind::Box, Kind::Hull), "box_hull"),
+    ((Kind::Cylinder, Kind::Cylinder), "cylinder_cylinder"),
+    ((Kind::Cylinder, Kind::Hull), "cylinder_hull"),
+    ((Kind::Hull, Kind::Hull), "hull_hull"),
+];
+
 /// Shapes, the pairs of them that may touch, and the classes of contacts.
 #[derive(Clone, Debug)]
 pub struct Contacts<R> {
@@ -229,6 +253,15 @@ pub const COUNT_ROWS: usize = 1;
 pub const COUNT_LEFT_OUT: usize = 2;
 /// Rows of `counts` after the classes.
 pub const COUNTS: usize = 3;
+
+impl<R> Contacts<R> {
+    /// The pairs of two kinds, by their place in [`PAIR_KINDS`].
+    #[inline(always)]
+    pub fn group(&self, kinds: usize) -> Option<&Group> {
+        let kinds = PAIR_KINDS[kinds].0;
+        self.groups.iter().find(|group| group.kinds == kinds)
+    }
+}
 
 impl<R: Real> Contacts<R> {
     /// None at all.

@@ -12,13 +12,17 @@ use super::{BlockOf, ConstantsOf};
 use crate::each;
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{Vec3, cross, dot, scale, scale_add, sub};
-use crate::model::contact::{Class, Contacts, pair, row};
+use crate::model::contact::{COUNT_LEFT_OUT, Class, Contacts, pair, row};
 use crate::model::Cone;
 use crate::step::constraint::impedance;
 
 #[inline(always)]
 pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let t = &m.contacts;
+    if t.groups.is_empty() {
+        return;
+    }
+    note_overflow(cx, t, &mut b.left_out[0]);
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
@@ -87,6 +91,23 @@ pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
             }
         });
     }
+}
+
+/// Keeps the largest number of contacts that did not fit.
+#[inline(always)]
+fn note_overflow<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, most: &mut C::V) {
+    let mut left_out = C::F::c(0.0);
+    if t.may_overflow {
+        let row = cx.at(t.classes.len() + COUNT_LEFT_OUT);
+        left_out = cx.load(t.memory.counts, row, 0);
+    }
+    for (k, class) in t.classes.iter().enumerate() {
+        let row = cx.at(k);
+        let over = cx.load(t.memory.counts, row, 0) - C::F::c(class.capacity as f64);
+        left_out = left_out + over.max(C::F::c(0.0));
+    }
+    let left_out = cx.get(most).max(left_out);
+    cx.set(most, left_out);
 }
 
 /// The contacts of a class that the worlds have now.

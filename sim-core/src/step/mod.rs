@@ -19,6 +19,7 @@ mod velocities;
 use crate::batch::{Block, WorkSlot as Slot};
 use crate::lane::{Cx, Num};
 use crate::model::constants::Constants;
+use crate::model::contact::PAIR_KINDS;
 
 /// The constants that a machine reads.
 pub type ConstantsOf<C> = Constants<<<C as Cx>::F as Num>::Real>;
@@ -36,10 +37,12 @@ pub enum Stage {
     MassMatrix,
     /// Applied, drive and damping forces.
     Actuation,
-    /// Constraint rows: stiffness and reference acceleration.
+    /// Constraint rows of joints: stiffness and reference acceleration.
     Constraint,
-    /// Contacts: where shapes touch.
-    Collide,
+    /// Where the shapes are.
+    Place,
+    /// Contacts of two kinds of shapes, by their place in [`PAIR_KINDS`].
+    Touch(usize),
     /// Constraint rows of contacts.
     ContactRows,
     /// Accelerations and constraint forces.
@@ -56,53 +59,71 @@ pub enum Stage {
     Accelerations,
 }
 
-/// The order of a step.
-pub const STAGES: [Stage; 10] = [
+/// Stages before contacts are looked for.
+const BEFORE: [Stage; 6] = [
     Stage::Kinematics,
     Stage::Bias,
     Stage::MassMatrix,
     Stage::Actuation,
     Stage::Constraint,
-    Stage::Collide,
-    Stage::ContactRows,
-    Stage::Solver,
-    Stage::Refine,
-    Stage::Integrate,
+    Stage::Place,
 ];
+const KINDS: usize = PAIR_KINDS.len();
+/// Stages up to the accelerations.
+const SOLVED: usize = BEFORE.len() + KINDS + 3;
+
+/// The order of a step.
+pub const STAGES: [Stage; SOLVED + 1] = sequence([Stage::Integrate]);
 
 /// What evaluates a state without stepping: all derived fields.
-pub const FORWARD: [Stage; 12] = [
-    Stage::Kinematics,
-    Stage::Bias,
-    Stage::MassMatrix,
-    Stage::Actuation,
-    Stage::Constraint,
-    Stage::Collide,
-    Stage::ContactRows,
-    Stage::Solver,
-    Stage::Refine,
-    Stage::Accelerations,
-    Stage::Poses,
-    Stage::Velocities,
-];
+pub const FORWARD: [Stage; SOLVED + 3] =
+    sequence([Stage::Accelerations, Stage::Poses, Stage::Velocities]);
+
+/// Stages up to the accelerations, then some more.
+const fn sequence<const N: usize, const MORE: usize>(more: [Stage; MORE]) -> [Stage; N] {
+    let mut stages = [Stage::ContactRows; N];
+    let mut k = 0;
+    while k < BEFORE.len() {
+        stages[k] = BEFORE[k];
+        k += 1;
+    }
+    while k < BEFORE.len() + KINDS {
+        stages[k] = Stage::Touch(k - BEFORE.len());
+        k += 1;
+    }
+    stages[k + 1] = Stage::Solver;
+    stages[k + 2] = Stage::Refine;
+    k = 0;
+    while k < MORE {
+        stages[SOLVED + k] = more[k];
+        k += 1;
+    }
+    stages
+}
 
 impl Stage {
     /// Every stage.
-    pub const ALL: [Stage; 13] = [
-        Stage::Kinematics,
-        Stage::Bias,
-        Stage::MassMatrix,
-        Stage::Actuation,
-        Stage::Constraint,
-        Stage::Collide,
-        Stage::ContactRows,
-        Stage::Solver,
-        Stage::Refine,
+    pub const ALL: [Stage; SOLVED + 4] = sequence([
         Stage::Integrate,
+        Stage::Accelerations,
         Stage::Poses,
         Stage::Velocities,
-        Stage::Accelerations,
-    ];
+    ]);
+
+    /// Its place in [`Stage::ALL`].
+    pub fn number(self) -> usize {
+        let place = Stage::ALL.iter().position(|stage| *stage == self);
+        place.expect("all stages are there")
+    }
+
+    /// Has the model anything for it to do?
+    pub fn is_needed<R>(self, m: &Constants<R>) -> bool {
+        match self {
+            Stage::Place | Stage::ContactRows => !m.contacts.groups.is_empty(),
+            Stage::Touch(kinds) => m.contacts.group(kinds).is_some(),
+            _ => true,
+        }
+    }
 
     /// Its name, for timers and reports.
     pub fn name(self) -> &'static str {
@@ -112,7 +133,8 @@ impl Stage {
             Stage::MassMatrix => "mass_matrix",
             Stage::Actuation => "actuation",
             Stage::Constraint => "constraint",
-            Stage::Collide => "collide",
+            Stage::Place => "place",
+            Stage::Touch(kinds) => PAIR_KINDS[kinds].1,
             Stage::ContactRows => "contact_rows",
             Stage::Solver => "solver",
             Stage::Refine => "refine",
@@ -139,8 +161,9 @@ impl Stage {
                 BiasForce,
             ],
             Stage::Constraint => &[JointQ, JointQd],
-            Stage::Collide => &[LeftOut, Rotation, Origin, Reference],
-            Stage::ContactRows => &[JointQd, Reference, Motion],
+            Stage::Place => &[Rotation, Origin, Reference],
+            Stage::Touch(_) => &[],
+            Stage::ContactRows => &[LeftOut, JointQd, Reference, Motion],
             Stage::Solver => &[
                 JointQdd,
                 Unconverged,
@@ -188,8 +211,8 @@ impl Stage {
             Stage::MassMatrix => &[MassMatrix, Inertia],
             Stage::Actuation => &[SmoothForce],
             Stage::Constraint => &[EfcWeight, EfcAref, LimitSide],
-            Stage::Collide => &[LeftOut],
-            Stage::ContactRows => &[],
+            Stage::Place | Stage::Touch(_) => &[],
+            Stage::ContactRows => &[LeftOut],
             Stage::Solver => &[JointQdd, Unconverged, EfcForce, ConstraintForce],
             Stage::Refine | Stage::Accelerations => &[JointQdd, EfcForce, ConstraintForce],
             Stage::Integrate => &[JointQ, JointQd, MassMatrix],
@@ -207,7 +230,8 @@ impl Stage {
             Stage::MassMatrix => mass_matrix::mass_matrix(m, &mut b.work),
             Stage::Actuation => actuation::smooth_force(cx, m, b),
             Stage::Constraint => constraint::rows(cx, m, b),
-            Stage::Collide => collide::collide(cx, m, b),
+            Stage::Place => collide::place(cx, m, b),
+            Stage::Touch(kinds) => collide::touch(cx, &m.contacts, PAIR_KINDS[kinds].0),
             Stage::ContactRows => contact_rows::contact_rows(cx, m, b),
             Stage::Solver => solver::solve(cx, m, b),
             Stage::Refine => solver::refine(cx, m, b),

@@ -17,8 +17,10 @@ pub(super) struct Job<F: Lane> {
     /// Every stage, by its number in [`Stage::ALL`].
     stages: [RunStage<F>; Stage::ALL.len()],
     pub layout: Layout,
+    /// Stages of a step that the model needs, by their numbers.
+    step: Vec<usize>,
     /// Stages that evaluate the fields of the layout.
-    pub evaluate: Vec<Stage>,
+    evaluate: Vec<usize>,
     /// Duration of a control frame [s].
     pub frame_s: f64,
     /// State and commands of a world after a reset, in the order of [`StateField`].
@@ -85,10 +87,16 @@ impl<F: Lane> Job<F> {
                 *to = F::Real::of(*from);
             }
         }
+        let constants = model.constants().cast();
+        let numbers = |needed: &[Stage]| {
+            let needed = needed.iter().filter(|stage| stage.is_needed(&constants));
+            needed.map(|stage| stage.number()).collect()
+        };
         Job {
-            constants: model.constants().cast(),
+            step: numbers(&STAGES),
+            evaluate: numbers(&stages_for(&layout)),
+            constants,
             stages,
-            evaluate: stages_for(&layout),
             layout,
             frame_s: model.substeps() as f64 * model.dt(),
             start: reset,
@@ -112,7 +120,7 @@ fn stages_for(layout: &Layout) -> Vec<Stage> {
             | Field::ContactPos
             | Field::ContactNormal
             | Field::ContactDistance
-            | Field::ContactPair => (Stage::Collide, None),
+            | Field::ContactPair => (Stage::ContactRows, None),
             Field::ConstraintForce
             | Field::EfcForce
             | Field::ContactForce
@@ -281,12 +289,12 @@ impl<F: Lane> Chunk<F> {
                 let stages = if evaluates {
                     &job.evaluate[..]
                 } else {
-                    &STAGES[..]
+                    &job.step[..]
                 };
                 for stage in stages {
                     // SAFETY: by contract the processor has the instructions of the job's stages.
                     unsafe {
-                        job.stages[*stage as usize](
+                        job.stages[*stage](
                             &job.constants,
                             &mut self.block,
                             &mut self.memory,

@@ -13,47 +13,22 @@ use crate::math::vec3::{
     Mat3, Vec3, add, constant, dot, sub, transform, transform_add,
 };
 use crate::model::contact::{
-    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, COUNTS, Contacts, Group, Kind, pair,
+    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, pair,
 };
 use crate::{span, when};
 use points::{Placed, Points, Room};
 
+/// Poses of all shapes, and the reference points that they are relative to; no contacts yet.
 #[inline(always)]
-pub(super) fn collide<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    let t = &m.contacts;
-    if t.groups.is_empty() {
+pub(super) fn place<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
+    let (w, memory) = (&b.work, &m.contacts.memory);
+    if m.contacts.groups.is_empty() {
         return;
     }
-    let classes = t.classes.len();
-    for count in 0..classes + COUNTS {
+    for count in 0..memory.counts.rows {
         let (row, zero) = (cx.at(count), C::F::c(0.0));
-        cx.fill(t.memory.counts, row, 0, zero);
+        cx.fill(memory.counts, row, 0, zero);
     }
-    place(cx, m, b);
-    for group in &t.groups {
-        let (first, end) = (cx.at(group.first), cx.at(group.end));
-        span!(cx, p in first, end, {
-            pair_of::<C>(cx, t, group, p);
-        });
-    }
-    let mut left_out = C::F::c(0.0);
-    if t.may_overflow {
-        let row = cx.at(classes + COUNT_LEFT_OUT);
-        left_out = cx.load(t.memory.counts, row, 0);
-    }
-    for (k, class) in t.classes.iter().enumerate() {
-        let row = cx.at(k);
-        let over = cx.load(t.memory.counts, row, 0) - C::F::c(class.capacity as f64);
-        left_out = left_out + over.max(C::F::c(0.0));
-    }
-    let most = cx.get(&b.left_out[0]).max(left_out);
-    cx.set(&mut b.left_out[0], most);
-}
-
-/// Poses of all shapes, and the reference points that they are relative to.
-#[inline(always)]
-fn place<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
-    let (w, memory) = (&b.work, &m.contacts.memory);
     for (k, solid) in m.contacts.solids.iter().enumerate() {
         let [x, y, z] = solid.axes;
         let mut axes: Mat3<C::F> = [constant(x), constant(y), constant(z)];
@@ -84,9 +59,24 @@ fn place<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
     }
 }
 
+/// Contacts of all pairs of two kinds.
+#[inline(always)]
+pub(super) fn touch<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    kinds: (Kind, Kind),
+) {
+    for group in t.groups.iter().filter(|group| group.kinds == kinds) {
+        let (first, end) = (cx.at(group.first), cx.at(group.end));
+        span!(cx, p in first, end, {
+            pair_of::<C>(cx, t, kinds, p);
+        });
+    }
+}
+
 /// The contacts of a pair.
 #[inline(always)]
-fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, group: &Group, p: C::I) {
+fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, Kind), p: C::I) {
     let (numbers, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
     let (poses, origins) = (t.memory.poses, t.memory.origins);
     let a = cx.index(indices, p, pair::SOLID_A, poses.rows);
@@ -98,7 +88,7 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, group: &Group, 
     let between = sub(three(cx, origins, origin_b, 0), origin_a);
     let center = add(sub(three(cx, poses, b, 9), center_a), between);
     let radius = cx.constant(numbers, p, pair::RADIUS);
-    let near = match group.kinds.0 {
+    let near = match kinds.0 {
         Kind::Plane => dot(three(cx, poses, a, 6), center).lt(radius),
         _ => dot(center, center).lt(radius * radius),
     };
@@ -149,8 +139,8 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, group: &Group, 
             cx.constant(numbers, p, pair::SIZE_B + 1),
             cx.constant(numbers, p, pair::SIZE_B + 2),
         ];
-        touch(
-            cx, t, group, p, &axes, size_a, &other, size_b, margin, &mut points,
+        narrow(
+            cx, t, kinds, p, &axes, size_a, &other, size_b, margin, &mut points,
         );
     });
 }
@@ -168,10 +158,10 @@ fn three<C: Cx>(cx: &mut C, table: crate::lane::Table, row: C::I, k: usize) -> V
 /// The narrow phase of two kinds.
 #[allow(clippy::too_many_arguments)]
 #[inline(always)]
-fn touch<C: Cx>(
+fn narrow<C: Cx>(
     cx: &mut C,
     t: &Contacts<<C::F as Num>::Real>,
-    group: &Group,
+    kinds: (Kind, Kind),
     p: C::I,
     axes: &Mat3<C::F>,
     size_a: Vec3<C::F>,
@@ -180,7 +170,7 @@ fn touch<C: Cx>(
     margin: C::F,
     out: &mut Points<C>,
 ) {
-    match group.kinds {
+    match kinds {
         (Kind::Box, Kind::Box) => boxes::box_box(cx, axes, size_a, other, size_b, margin, out),
         _ => {}
     }
