@@ -1,7 +1,7 @@
 //! The face of a box cut to a face of another box.
 
 use super::boxes::Axis;
-use super::choose::{select, sign, steepest, turned, turned_numbers};
+use super::choose::{reciprocal, select, sign, steepest, turned, turned_numbers};
 use super::points::{Placed, Points};
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::vec3::{Mat3, Vec3, scale, scale_add};
@@ -10,8 +10,6 @@ use crate::math::vec3::{Mat3, Vec3, scale, scale_add};
 const INCLUSIVE: f64 = 16.0;
 /// A reference corner counts that far inside the incident face: more than the above, so that no corner counts twice.
 const INTERIOR: f64 = 32.0;
-/// Below this a component of an edge counts as zero [m].
-const ALONG: f64 = 1e-30;
 
 /// Two faces seen along the normal of one, the reference. The frame: u, v along its sides, and the normal.
 pub struct View<F> {
@@ -145,11 +143,4 @@ fn point<C: Cx>(
     let up = scale_add(view.outwards, at[2] * C::F::c(0.5), view.origin);
     let position = scale_add(view.axes[0], at[0], scale_add(view.axes[1], at[1], up));
     out.add(cx, mask, position, at[2], view.normal);
-}
-
-/// 1/x, finite.
-#[inline(always)]
-fn reciprocal<F: Num>(x: F) -> F {
-    let tiny = x.abs().lt(F::c(ALONG));
-    F::c(1.0).div(F::select(tiny, F::c(ALONG), x))
 }

@@ -7,7 +7,7 @@
 //! features are a vertex and something, since the closest points of two edges lie along an axis of those above.
 
 use super::box_faces::{cut, view};
-use super::choose::{clamped, one_of, one_of_numbers, sign, transposed, unless};
+use super::choose::{clamped, one_of, one_of_numbers, select, sign, transposed, unless};
 use super::points::{Placed, Points};
 use crate::lane::{Cx, Num, Real};
 use crate::math::vec3::{
@@ -23,8 +23,8 @@ const PREFER_FIRST: f64 = 4.0;
 const PREFER_FACES: f64 = 4e-7;
 /// Squared sine below which edges are parallel.
 const PARALLEL: f64 = 1e-8;
-/// An edge axis that close to the face axis (1 - cosine), faces nearly flat on each other, must be shallower by this part
-/// of the depth: as MuJoCo, which keeps the face whatever the angle. One point in place of a face would let it rock.
+/// Where faces are flat on each other to this (1 - cosine), the edge axis too, it must be shallower by this part of the
+/// depth: as MuJoCo, which keeps the face whatever the angle. One point in place of a face would let it rock.
 const FLAT: f64 = 2e-4;
 const FLAT_GAIN: f64 = 0.05;
 
@@ -167,12 +167,12 @@ fn axis<F: Num>(
     );
     let of_b = c(2.5).lt(code);
     let number = code - F::select(of_b, c(3.0), c(0.0));
-    let along_face = F::select(
-        of_b,
-        dot(product, one_of(number, transposed(&turn))),
-        one_of_numbers(number, product),
-    );
-    let flat = c(1.0 - FLAT).lt(along_face.abs() * inverse);
+    let facing = one_of(number, transposed(&turn));
+    let along_face = F::select(of_b, dot(product, facing), one_of_numbers(number, product));
+    // the other box's axes along the face axis
+    let theirs = select(of_b, facing, one_of(number, turn));
+    let parallel = theirs[0].abs().max(theirs[1].abs()).max(theirs[2].abs());
+    let flat = c(1.0 - FLAT).lt(parallel.min(along_face.abs() * inverse));
     let little = separation.fma(inverse, -face).lt(face * c(-FLAT_GAIN));
     let edge = F::and(c(-0.5).lt(pair[0]), F::not(F::and(flat, little)));
     Axis {

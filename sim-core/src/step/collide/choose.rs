@@ -3,6 +3,9 @@
 use crate::lane::Num;
 use crate::math::vec3::{Mat3, Vec3};
 
+/// What is less counts as zero: small enough for rounding noise to keep its size.
+const TINY: f64 = 1e-30;
+
 /// The nearest point of a box with those half extents.
 #[inline(always)]
 pub fn clamped<F: Num>(x: Vec3<F>, half: Vec3<F>) -> Vec3<F> {
@@ -83,4 +86,24 @@ pub fn turned<F: Num>(number: F, of: Mat3<F>) -> Mat3<F> {
 #[inline(always)]
 pub fn turned_numbers<F: Num>(number: F, of: Vec3<F>) -> Vec3<F> {
     one_of(number, [of, [of[1], of[2], of[0]], [of[2], of[0], of[1]]])
+}
+
+/// The least of three numbers, and which it is.
+#[inline(always)]
+pub fn lowest_of<F: Num>(x: Vec3<F>) -> (F, F) {
+    let second = x[1].lt(x[0]);
+    let least = F::select(second, x[1], x[0]);
+    let third = x[2].lt(least);
+    let which = F::select(second, F::c(1.0), F::c(0.0));
+    (
+        F::select(third, F::c(2.0), which),
+        F::select(third, x[2], least),
+    )
+}
+
+/// 1/x, finite.
+#[inline(always)]
+pub fn reciprocal<F: Num>(x: F) -> F {
+    let tiny = x.abs().lt(F::c(TINY));
+    F::c(1.0).div(F::select(tiny, F::c(TINY), x))
 }
