@@ -1,0 +1,318 @@
+//! Box against box: separating axes (Gottschalk, Lin and Manocha 1996), then one face of each cut against the other.
+//!
+//!     separation along l = |l·c| - Σ hₐ|l·aᵢ| - Σ h_b|l·bⱼ|,   l ∈ {aᵢ, bⱼ, aᵢ × bⱼ}/|·|;   the largest is kept
+//!
+//! A face axis: that face is the reference, the most opposite face of the other box is cut to its rectangle. An edge
+//! axis: one point, between the edges. Where the boxes are apart and no point attains the separation, their closest
+//! features are a vertex and something, since the closest points of two edges lie along an axis of those above.
+
+use super::box_faces::{cut, view};
+use super::choose::{clamped, one_of, one_of_numbers, select, sign, transposed, unless};
+use super::points::{Placed, Points};
+use crate::lane::{Cx, Num, Real};
+use crate::math::vec3::{
+    Mat3, Vec3, add, dot, scale, scale_add, sub, transform, transform_add, transform_back,
+};
+use crate::{times, when};
+
+/// How much the separation along a face of B must exceed that along the faces of A, in roundings of the boxes' size, so
+/// that parallel faces do not change places.
+const PREFER_FIRST: f64 = 4.0;
+/// The same for edges against faces, of the boxes' size, before the length of the axis is divided by: noise grows as edges
+/// become parallel.
+const PREFER_FACES: f64 = 4e-7;
+/// Squared sine below which edges are parallel.
+const PARALLEL: f64 = 1e-8;
+/// Where faces are flat on each other to this (1 - cosine), the edge axis too, it must be shallower by this part of the
+/// depth: as MuJoCo, which keeps the face whatever the angle. One point in place of a face would let it rock.
+const FLAT: f64 = 2e-4;
+const FLAT_GAIN: f64 = 0.05;
+
+/// The axis of largest separation.
+pub struct Axis<F: Num> {
+    /// Axes of B by axes of A: `turn[i][j]` = aᵢ · bⱼ.
+    pub turn: Mat3<F>,
+    /// Centre of B in the axes of A, and in its own.
+    pub center: [Vec3<F>; 2],
+    /// The best face axis: of which box, and its number.
+    pub of_b: F::Mask,
+    pub number: F,
+    /// An edge axis is better: of which axes of A and B it is the product, and the unit vector towards B, in the axes of A.
+    pub edge: F::Mask,
+    pub pair: [F; 2],
+    pub product: Vec3<F>,
+    /// Separation along the best axis is `separation * inverse`, inverse of the length of the product.
+    pub separation: F,
+    pub inverse: F,
+    /// The boxes are further apart than the margin.
+    pub far: F::Mask,
+}
+
+/// Sum of the half extents: the size that tolerances refer to.
+#[inline(always)]
+fn size<F: Num>(a: Vec3<F>, b: Vec3<F>) -> F {
+    (a[0] + a[1] + a[2]) + (b[0] + b[1] + b[2])
+}
+
+/// Contact points of two boxes.
+#[inline(always)]
+pub fn box_box<C: Cx>(
+    cx: &mut C,
+    axes_a: &Mat3<C::F>,
+    half_a: Vec3<C::F>,
+    b: &Placed<C::F>,
+    half_b: Vec3<C::F>,
+    margin: C::F,
+    out: &mut Points<C>,
+) {
+    let c = C::F::c;
+    let best = axis(axes_a, half_a, b, half_b, margin);
+    let near = C::F::not(best.far);
+    let mut least = cx.var(c(1e9));
+    when!(cx, C::F::and(near, C::F::not(best.edge)), {
+        let view = view(&best, axes_a, half_a, b, half_b);
+        let nearest = cut(cx, &view, margin, out);
+        cx.set(&mut least, nearest);
+    });
+    when!(cx, C::F::and(near, best.edge), {
+        let nearest = edges(cx, &best, axes_a, half_a, b, half_b, margin, out);
+        cx.set(&mut least, nearest);
+    });
+    // what rounding may leave between the separation and the point that attains it
+    let noise = c(16.0 * <C::F as Num>::Real::EPSILON) * size(half_a, half_b);
+    let reach = best.separation.fma(best.inverse, noise * best.inverse);
+    let apart = C::F::and(c(0.0).lt(best.separation), reach.lt(cx.get(&least)));
+    when!(cx, C::F::and(near, apart), {
+        let nearest = cx.get(&least).min(margin);
+        vertices(cx, axes_a, half_a, b, half_b, &best, nearest, out);
+    });
+}
+
+#[inline(always)]
+fn axis<F: Num>(
+    axes_a: &Mat3<F>,
+    half_a: Vec3<F>,
+    b: &Placed<F>,
+    half_b: Vec3<F>,
+    margin: F,
+) -> Axis<F> {
+    let c = F::c;
+    let mut turn = [[c(0.0); 3]; 3];
+    let mut width = turn;
+    for i in 0..3 {
+        for j in 0..3 {
+            turn[i][j] = dot(axes_a[i], b.axes[j]);
+            width[i][j] = turn[i][j].abs();
+        }
+    }
+    let in_a = transform_back(axes_a, b.center);
+    let in_b = transform_back(&b.axes, b.center);
+    let size = size(half_a, half_b);
+
+    let (mut face, mut code) = (c(-1e9), c(0.0));
+    for i in 0..3 {
+        let x = in_a[i].abs() - half_a[i] - dot(half_b, width[i]);
+        let better = face.lt(x);
+        face = F::select(better, x, face);
+        code = F::select(better, c(i as f64), code);
+    }
+    let (mut face_b, mut code_b) = (c(-1e9), c(0.0));
+    for j in 0..3 {
+        let x = in_b[j].abs() - half_b[j] - dot(half_a, [width[0][j], width[1][j], width[2][j]]);
+        let better = face_b.lt(x);
+        face_b = F::select(better, x, face_b);
+        code_b = F::select(better, c(3.0 + j as f64), code_b);
+    }
+    let better = size
+        .fma(c(PREFER_FIRST * F::Real::EPSILON), face)
+        .lt(face_b);
+    face = F::select(better, face_b, face);
+    code = F::select(better, code_b, code);
+
+    // separation x over length √l is compared by x|x| l' > x'|x'| l
+    let mut best = face * face.abs();
+    let (mut square, mut separation) = (c(1.0), face);
+    let mut pair = [c(-1.0); 2];
+    let noise = size * c(PREFER_FACES);
+    for i in 0..3 {
+        let (i1, i2) = ((i + 1) % 3, (i + 2) % 3);
+        for j in 0..3 {
+            let (j1, j2) = ((j + 1) % 3, (j + 2) % 3);
+            let l = turn[i1][j].fma(turn[i1][j], turn[i2][j] * turn[i2][j]);
+            let between = in_a[i1].fnma(turn[i2][j], in_a[i2] * turn[i1][j]).abs();
+            let of_a = half_a[i1].fma(width[i2][j], half_a[i2] * width[i1][j]);
+            let of_b = half_b[j1].fma(width[i][j2], half_b[j2] * width[i][j1]);
+            let x = between - of_a - of_b;
+            let less = x - noise;
+            let score = less * less.abs();
+            let better = F::and(c(PARALLEL).lt(l), (best * l).lt(score * square));
+            best = F::select(better, score, best);
+            square = F::select(better, l, square);
+            separation = F::select(better, x, separation);
+            pair[0] = F::select(better, c(i as f64), pair[0]);
+            pair[1] = F::select(better, c(j as f64), pair[1]);
+        }
+    }
+    let far = F::or(margin.lt(face), (margin * margin * square).lt(best));
+    let inverse = c(1.0).div(square.sqrt());
+    // aᵢ × bⱼ in the axes of A
+    let column = one_of(pair[1], transposed(&turn));
+    let product = one_of(
+        pair[0],
+        [
+            [c(0.0), -column[2], column[1]],
+            [column[2], c(0.0), -column[0]],
+            [-column[1], column[0], c(0.0)],
+        ],
+    );
+    let of_b = c(2.5).lt(code);
+    let number = code - F::select(of_b, c(3.0), c(0.0));
+    let facing = one_of(number, transposed(&turn));
+    let along_face = F::select(of_b, dot(product, facing), one_of_numbers(number, product));
+    // the other box's axes along the face axis
+    let theirs = select(of_b, facing, one_of(number, turn));
+    let parallel = theirs[0].abs().max(theirs[1].abs()).max(theirs[2].abs());
+    let flat = c(1.0 - FLAT).lt(parallel.min(along_face.abs() * inverse));
+    let little = separation.fma(inverse, -face).lt(face * c(-FLAT_GAIN));
+    let edge = F::and(c(-0.5).lt(pair[0]), F::not(F::and(flat, little)));
+    Axis {
+        turn,
+        center: [in_a, in_b],
+        of_b,
+        number,
+        edge,
+        pair,
+        product: scale(product, inverse * sign(dot(product, in_a))),
+        inverse: F::select(edge, inverse, c(1.0)),
+        separation: F::select(edge, separation, face),
+        far,
+    }
+}
+
+/// The edges of an edge axis: their closest points. Returns the distance.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)] // two boxes, what is known of them, and where points go
+fn edges<C: Cx>(
+    cx: &mut C,
+    best: &Axis<C::F>,
+    axes_a: &Mat3<C::F>,
+    half_a: Vec3<C::F>,
+    b: &Placed<C::F>,
+    half_b: Vec3<C::F>,
+    margin: C::F,
+    out: &mut Points<C>,
+) -> C::F {
+    let c = C::F::c;
+    let q = &best.turn;
+    let normal = best.product;
+    let columns = transposed(q);
+    let normal_b = transform_back(&columns, normal);
+    // middles of the edges, in the axes of A
+    let mut a = [c(0.0); 3];
+    let mut other = a;
+    for k in 0..3 {
+        a[k] = unless(best.pair[0], k, sign(normal[k]) * half_a[k]);
+        other[k] = unless(best.pair[1], k, -(sign(normal_b[k]) * half_b[k]));
+    }
+    let apart = sub(transform_add(&columns, other, best.center[0]), a);
+    let distance = dot(apart, normal);
+    // a + x aᵢ and apart + y bⱼ: the shortest way between the lines
+    let run = one_of(best.pair[1], columns);
+    let along_a = one_of_numbers(best.pair[0], apart);
+    let along_b = dot(apart, run);
+    let cosine = one_of_numbers(best.pair[0], run);
+    let factor = best.inverse * best.inverse;
+    let x = cosine.fnma(along_b, along_a) * factor;
+    let y = cosine.fma(along_a, -along_b) * factor;
+    let long_a = one_of_numbers(best.pair[0], half_a);
+    let long_b = one_of_numbers(best.pair[1], half_b);
+    let over = C::F::or(long_a.lt(x.abs()), long_b.lt(y.abs()));
+    let (x, y) = (x.min(long_a).max(-long_a), y.min(long_b).max(-long_b));
+    let first = one_of(best.pair[0], *axes_a);
+    let second = one_of(best.pair[1], b.axes);
+    let on_a = scale_add(first, x, transform(axes_a, a));
+    let on_b = scale_add(second, y, transform_add(&b.axes, other, b.center));
+    let at = scale(add(on_a, on_b), c(0.5));
+    // past an end the lines do not meet: then something else is nearest, unless the boxes overlap
+    let found = C::F::and(
+        distance.lt(margin),
+        C::F::not(C::F::and(over, c(0.0).lt(distance))),
+    );
+    out.add(cx, found, at, distance, transform(axes_a, normal));
+    C::F::select(found, distance, c(1e9))
+}
+
+/// The vertex of either box that is nearest to the other box, if it is nearer than `nearest`.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)] // two boxes, what is known of them, and where points go
+fn vertices<C: Cx>(
+    cx: &mut C,
+    axes_a: &Mat3<C::F>,
+    half_a: Vec3<C::F>,
+    b: &Placed<C::F>,
+    half_b: Vec3<C::F>,
+    best: &Axis<C::F>,
+    nearest: C::F,
+    out: &mut Points<C>,
+) {
+    let c = C::F::c;
+    let [in_a, in_b] = best.center;
+    let q = best.turn;
+    let into_b = q;
+    let into_a = transposed(&q);
+    let mut square = cx.var(nearest * nearest);
+    let mut middles = [cx.var(c(0.0)), cx.var(c(0.0)), cx.var(c(0.0))];
+    let mut between = [cx.var(c(0.0)), cx.var(c(0.0)), cx.var(c(0.0))];
+    times!(cx, i in 8, {
+        let i = cx.number(i);
+        let (high, i) = bit(i, 4.0);
+        let (middle, i) = bit(i, 2.0);
+        let (low, _) = bit(i, 1.0);
+        let corner = [low, middle, high];
+        for of_b in [true, false] {
+            let (half, box_half) = if of_b { (half_b, half_a) } else { (half_a, half_b) };
+            let local = [corner[0] * half[0], corner[1] * half[1], corner[2] * half[2]];
+            let vertex = match of_b {
+                true => transform_add(&into_a, local, in_a),
+                false => sub(transform(&into_b, local), in_b),
+            };
+            let clamped = clamped(vertex, box_half);
+            let apart = sub(vertex, clamped);
+            let middle = scale_add(apart, c(0.5), clamped);
+            let (middle, apart) = match of_b {
+                true => (transform(axes_a, middle), transform(axes_a, apart)),
+                false => (
+                    transform_add(&b.axes, middle, b.center),
+                    scale(transform(&b.axes, apart), c(-1.0)),
+                ),
+            };
+            let new = dot(apart, apart);
+            let better = new.lt(cx.get(&square));
+            let kept = C::F::select(better, new, cx.get(&square));
+            cx.put(&mut square, kept);
+            for k in 0..3 {
+                let kept = C::F::select(better, middle[k], cx.get(&middles[k]));
+                cx.put(&mut middles[k], kept);
+                let kept = C::F::select(better, apart[k], cx.get(&between[k]));
+                cx.put(&mut between[k], kept);
+            }
+        }
+    });
+    let mut at = [c(0.0); 3];
+    let mut apart = at;
+    for k in 0..3 {
+        at[k] = cx.get(&middles[k]);
+        apart[k] = cx.get(&between[k]);
+    }
+    let distance = dot(apart, apart).sqrt();
+    let normal = scale(apart, c(1.0).div(distance));
+    out.add(cx, c(0.0).lt(distance), at, distance, normal);
+}
+
+/// The sign of a binary digit of a number, and what is left of the number.
+#[inline(always)]
+fn bit<F: Num>(number: F, value: f64) -> (F, F) {
+    let set = F::c(value - 0.5).lt(number);
+    let sign = F::select(set, F::c(1.0), F::c(-1.0));
+    (sign, F::select(set, number - F::c(value), number))
+}

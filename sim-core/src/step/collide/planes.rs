@@ -1,0 +1,158 @@
+//! A plane against sphere, capsule, box and cylinder. The plane is z = 0 of the first shape, and its z axis the normal.
+
+use super::choose::{select, sign};
+use super::points::{Placed, Points};
+use crate::lane::{Cx, Num};
+use crate::math::vec3::{Mat3, Vec3, add, cross, dot, scale, scale_add, sub};
+
+/// Below this sine between axis and normal a cylinder stands: its lowest rim point is then its x axis'. Above the rounding
+/// of f32; the height of the rim is wrong by that part of the radius at most.
+const UPRIGHT: f64 = 2e-6;
+
+/// Adds the contact of a point of a shape with the plane.
+#[inline(always)]
+fn lowest<C: Cx>(
+    cx: &mut C,
+    normal: Vec3<C::F>,
+    at: Vec3<C::F>,
+    distance: C::F,
+    margin: C::F,
+    out: &mut Points<C>,
+) {
+    let middle = scale_add(normal, distance * C::F::c(-0.5), at);
+    out.add(cx, distance.lt(margin), middle, distance, normal);
+}
+
+/// Contact point of a plane and a sphere.
+#[inline(always)]
+pub fn plane_sphere<C: Cx>(
+    cx: &mut C,
+    axes_a: &Mat3<C::F>,
+    b: &Placed<C::F>,
+    radius: C::F,
+    margin: C::F,
+    out: &mut Points<C>,
+) {
+    let normal = axes_a[2];
+    let distance = dot(normal, b.center) - radius;
+    let at = scale_add(normal, -radius, b.center);
+    lowest(cx, normal, at, distance, margin, out);
+}
+
+/// Contact points of a plane and a capsule: one of each end.
+#[inline(always)]
+pub fn plane_capsule<C: Cx>(
+    cx: &mut C,
+    axes_a: &Mat3<C::F>,
+    b: &Placed<C::F>,
+    radius: C::F,
+    half_height: C::F,
+    margin: C::F,
+    out: &mut Points<C>,
+) {
+    for half in [half_height, -half_height] {
+        let end = Placed {
+            axes: b.axes,
+            center: scale_add(b.axes[2], half, b.center),
+        };
+        plane_sphere(cx, axes_a, &end, radius, margin, out);
+    }
+}
+
+/// Contact points of a plane and a box: of each pair of opposite corners the lower one.
+#[inline(always)]
+pub fn plane_box<C: Cx>(
+    cx: &mut C,
+    axes_a: &Mat3<C::F>,
+    b: &Placed<C::F>,
+    half: Vec3<C::F>,
+    margin: C::F,
+    out: &mut Points<C>,
+) {
+    let normal = axes_a[2];
+    let height = dot(normal, b.center);
+    let x = scale(b.axes[0], half[0]);
+    let y = scale(b.axes[1], half[1]);
+    let z = scale(b.axes[2], half[2]);
+    for (y, z) in [
+        (y, z),
+        (scale(y, C::F::c(-1.0)), z),
+        (y, scale(z, C::F::c(-1.0))),
+        (scale(y, C::F::c(-1.0)), scale(z, C::F::c(-1.0))),
+    ] {
+        let corner = add(x, add(y, z));
+        let above = dot(normal, corner);
+        let at = scale_add(corner, -sign(above), b.center);
+        lowest(cx, normal, at, height - above.abs(), margin, out);
+    }
+}
+
+/// Contact points of a plane and a cylinder: a square on the rim of the lower end, turned so that one corner is the lowest
+/// point, and the rim of the other end above that corner.
+#[inline(always)]
+pub fn plane_cylinder<C: Cx>(
+    cx: &mut C,
+    axes_a: &Mat3<C::F>,
+    b: &Placed<C::F>,
+    radius: C::F,
+    half_height: C::F,
+    margin: C::F,
+    out: &mut Points<C>,
+) {
+    let c = C::F::c;
+    let normal = axes_a[2];
+    let height = dot(normal, b.center);
+    let down = scale(b.axes[2], -sign(dot(normal, b.axes[2])));
+    let cosine = dot(normal, down);
+    // the part of -normal across the axis
+    let across = sub(scale(down, cosine), normal);
+    let sine = dot(across, across).sqrt();
+    let upright = sine.lt(c(UPRIGHT));
+    let unit = c(1.0).div(C::F::select(upright, c(1.0), sine));
+    let rim = scale(select(upright, b.axes[0], scale(across, unit)), radius);
+    let side = cross(down, rim);
+    let end = scale_add(down, half_height, b.center);
+    let other = scale_add(down, -half_height, b.center);
+    let reach = half_height * cosine;
+    let (fall, lean) = (dot(normal, rim), dot(normal, side));
+    lowest(
+        cx,
+        normal,
+        add(end, rim),
+        height + reach + fall,
+        margin,
+        out,
+    );
+    lowest(
+        cx,
+        normal,
+        add(other, rim),
+        height - reach + fall,
+        margin,
+        out,
+    );
+    lowest(
+        cx,
+        normal,
+        add(end, side),
+        height + reach + lean,
+        margin,
+        out,
+    );
+    lowest(
+        cx,
+        normal,
+        sub(end, side),
+        height + reach - lean,
+        margin,
+        out,
+    );
+    lowest(
+        cx,
+        normal,
+        sub(end, rim),
+        height + reach - fall,
+        margin,
+        out,
+    );
+}
