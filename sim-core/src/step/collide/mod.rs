@@ -1,0 +1,10 @@
+//! Contact points of pairs of shapes.
+
+mod gjk;
+mod hull_axes;
+pub mod hulls;
+pub mod manifold;
+pub mod points;
+mod sides;
+mod spread;
+mod support;
