@@ -116,7 +116,10 @@ pub(super) fn closest<C: Cx, R: Restart<C>>(
         set3(cx, &mut axis, n);
         let settled = C::F::or(C::F::not(gained), gap.lt(before));
         if R::SOME {
-            let again = C::F::and(settled, C::F::and(x.lt(-deep), cx.get(&restarts).lt(c(0.5))));
+            let again = C::F::and(
+                settled,
+                C::F::and(x.lt(-deep), cx.get(&restarts).lt(c(0.5))),
+            );
             when!(cx, again, {
                 let other = restart.axis(cx);
                 set3(cx, &mut axis, other);
@@ -192,8 +195,16 @@ fn apart<C: Cx>(
         break_if!(cx, done);
 
         // the nearest point of the tetrahedron of the new corner and the three: on a corner, edge or face at the new one
-        let o = [get3(cx, &corners[0]), get3(cx, &corners[1]), get3(cx, &corners[2])];
-        let p = [get3(cx, &points[0]), get3(cx, &points[1]), get3(cx, &points[2])];
+        let o = [
+            get3(cx, &corners[0]),
+            get3(cx, &corners[1]),
+            get3(cx, &corners[2]),
+        ];
+        let p = [
+            get3(cx, &points[0]),
+            get3(cx, &points[1]),
+            get3(cx, &points[2]),
+        ];
         let e = [sub(o[0], w), sub(o[1], w), sub(o[2], w)];
         let ew = [dot(e[0], w), dot(e[1], w), dot(e[2], w)];
         let ee = [dot(e[0], e[0]), dot(e[1], e[1]), dot(e[2], e[2])];
@@ -242,7 +253,11 @@ fn apart<C: Cx>(
         set3(cx, &mut nearest, x);
     });
     let share = get3(cx, &shares);
-    let (p0, p1, p2) = (get3(cx, &points[0]), get3(cx, &points[1]), get3(cx, &points[2]));
+    let (p0, p1, p2) = (
+        get3(cx, &points[0]),
+        get3(cx, &points[1]),
+        get3(cx, &points[2]),
+    );
     Found {
         normal: get3(cx, &normal),
         distance: cx.get(&low),

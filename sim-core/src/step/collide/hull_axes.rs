@@ -210,7 +210,11 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
                 let farther = old.lt(x);
                 let kept = get3(cx, &normal);
                 cx.set(&mut best, C::F::select(farther, x, old));
-                set3(cx, &mut normal, select3(farther, scale(axes[j], side), kept));
+                set3(
+                    cx,
+                    &mut normal,
+                    select3(farther, scale(axes[j], side), kept),
+                );
                 let was = cx.get(&kind);
                 cx.set(&mut kind, C::F::select(farther, c(1.0), was));
             }

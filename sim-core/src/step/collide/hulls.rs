@@ -14,8 +14,8 @@ use super::points::{Placed, Points};
 use super::sides::{BoxSide, HullSide, SegmentSide};
 use super::spread::Spread;
 use super::support::{
-    Block, Point, Polyhedron, Segment, Support, Turned, across, constant3, get3, negated, pick3, select3, set3,
-    var3,
+    Block, Point, Polyhedron, Segment, Support, Turned, across, constant3, get3, negated, pick3,
+    select3, set3, var3,
 };
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{
@@ -46,8 +46,18 @@ pub fn plane_hull<C: Cx>(
         let u = across(n);
         let view = [u, cross(n, u), n];
         let (first, end) = hull.span(cx, 0);
-        let mut spot = [var3(cx, [c(0.0); 3]), var3(cx, [c(0.0); 3]), var3(cx, [c(0.0); 3]), var3(cx, [c(0.0); 3])];
-        let mut found = [cx.var(c(0.0)), cx.var(c(0.0)), cx.var(c(0.0)), cx.var(c(0.0))];
+        let mut spot = [
+            var3(cx, [c(0.0); 3]),
+            var3(cx, [c(0.0); 3]),
+            var3(cx, [c(0.0); 3]),
+            var3(cx, [c(0.0); 3]),
+        ];
+        let mut found = [
+            cx.var(c(0.0)),
+            cx.var(c(0.0)),
+            cx.var(c(0.0)),
+            cx.var(c(0.0)),
+        ];
         // of vertices as deep up to rounding the first stays, so that a resting hull keeps its points
         let mut lowest = var3(cx, [c(0.0), c(0.0), c(1e18)]);
         span!(cx, row in first, end, {
@@ -60,9 +70,13 @@ pub fn plane_hull<C: Cx>(
         });
         let deepest = get3(cx, &lowest);
         set3(cx, &mut spot[0], deepest);
-        cx.set(&mut found[0], C::F::select((deepest[2] + height).lt(margin), c(1.0), c(0.0)));
+        cx.set(
+            &mut found[0],
+            C::F::select((deepest[2] + height).lt(margin), c(1.0), c(0.0)),
+        );
         for stage in 0..3 {
-            let chosen: [Vec3<C::F>; 3] = [get3(cx, &spot[0]), get3(cx, &spot[1]), get3(cx, &spot[2])];
+            let chosen: [Vec3<C::F>; 3] =
+                [get3(cx, &spot[0]), get3(cx, &spot[1]), get3(cx, &spot[2])];
             let spread = Spread::of(stage, chosen);
             let mut best = cx.var(spread.threshold(c(1e-3) * size));
             let mut place = var3(cx, chosen[0]);
@@ -85,9 +99,19 @@ pub fn plane_hull<C: Cx>(
         for k in 0..4 {
             let x = get3(cx, &spot[k]);
             let distance = x[2] + height;
-            let on_hull = scale_add(view[0], x[0], scale_add(view[1], x[1], scale(n, x[2] - c(0.5) * distance)));
+            let on_hull = scale_add(
+                view[0],
+                x[0],
+                scale_add(view[1], x[1], scale(n, x[2] - c(0.5) * distance)),
+            );
             let is = c(0.5).lt(cx.get(&found[k]));
-            out.add(cx, is, transform_add(&b.axes, on_hull, b.center), distance, axes_a[2]);
+            out.add(
+                cx,
+                is,
+                transform_add(&b.axes, on_hull, b.center),
+                distance,
+                axes_a[2],
+            );
         }
     });
 }
@@ -114,7 +138,17 @@ pub fn sphere_hull<C: Cx>(
     let (zero, one) = (c(0.0), c(1.0));
     let upright = [[one, zero, zero], [zero, one, zero], [zero, zero, one]];
     let center = negated(transform_back(&b.axes, b.center));
-    let near = near_hull(cx, &hull, &upright, center, &PointReach, &Point(center), radius, radius, margin);
+    let near = near_hull(
+        cx,
+        &hull,
+        &upright,
+        center,
+        &PointReach,
+        &Point(center),
+        radius,
+        radius,
+        margin,
+    );
     let point = transform_add(&b.axes, near.point, b.center);
     let normal = transform(&b.axes, near.normal);
     out.add(cx, near.distance.lt(margin), point, near.distance, normal);
@@ -141,13 +175,28 @@ pub fn capsule_hull<C: Cx>(
     let other = SegmentReach(half_height);
     let segment = Segment { center, half };
     let size = radius + half_height;
-    let near = near_hull(cx, &hull, &axes, center, &other, &segment, radius, size, margin);
+    let near = near_hull(
+        cx, &hull, &axes, center, &other, &segment, radius, size, margin,
+    );
     when!(cx, near.distance.lt(margin), {
         let face = HullSide::find(cx, &hull, None, negated(near.normal));
         let side = SegmentSide::new(scale_add(near.normal, radius, center), half, near.normal);
         let flat = aligned(face.outward, near.normal);
         let size = size.min(hull.radius(cx));
-        add_points(cx, &near, flat, &side, &face, C::F::c(1.0), size, margin, &b.axes, b.center, cut, out);
+        add_points(
+            cx,
+            &near,
+            flat,
+            &side,
+            &face,
+            C::F::c(1.0),
+            size,
+            margin,
+            &b.axes,
+            b.center,
+            cut,
+            out,
+        );
     });
 }
 
@@ -167,17 +216,47 @@ pub fn box_hull<C: Cx>(
 ) {
     let hull = Polyhedron { tables, hull };
     let (axes, center) = in_frame_of(b, axes_a);
-    let half = [scale(axes[0], half_a[0]), scale(axes[1], half_a[1]), scale(axes[2], half_a[2])];
+    let half = [
+        scale(axes[0], half_a[0]),
+        scale(axes[1], half_a[1]),
+        scale(axes[2], half_a[2]),
+    ];
     let block = Block { center, half };
     let size = dot(half_a, half_a).sqrt();
     let zero = C::F::c(0.0);
-    let near = near_hull(cx, &hull, &axes, center, &BoxReach(half_a), &block, zero, size, margin);
+    let near = near_hull(
+        cx,
+        &hull,
+        &axes,
+        center,
+        &BoxReach(half_a),
+        &block,
+        zero,
+        size,
+        margin,
+    );
     when!(cx, near.distance.lt(margin), {
         let face = HullSide::find(cx, &hull, None, negated(near.normal));
         let side = BoxSide::find(&axes, half_a, center, near.normal);
-        let flat = C::F::or(aligned(face.outward, near.normal), aligned(side.outward, near.normal));
+        let flat = C::F::or(
+            aligned(face.outward, near.normal),
+            aligned(side.outward, near.normal),
+        );
         let size = size.min(hull.radius(cx));
-        add_points(cx, &near, flat, &side, &face, C::F::c(1.0), size, margin, &b.axes, b.center, cut, out);
+        add_points(
+            cx,
+            &near,
+            flat,
+            &side,
+            &face,
+            C::F::c(1.0),
+            size,
+            margin,
+            &b.axes,
+            b.center,
+            cut,
+            out,
+        );
     });
 }
 
@@ -196,22 +275,55 @@ pub fn hull_hull<C: Cx>(
     out: &mut Points<C>,
 ) {
     let (axes, center) = in_frame_of(b, axes_a);
-    let second = Polyhedron { tables, hull: hull_b };
-    let own = Polyhedron { tables, hull: hull_a };
+    let second = Polyhedron {
+        tables,
+        hull: hull_b,
+    };
+    let own = Polyhedron {
+        tables,
+        hull: hull_a,
+    };
     let (half_a, half_b) = (own.half_extents(cx), second.half_extents(cx));
     let (radius_a, radius_b) = (own.radius(cx), second.radius(cx));
     let first = Turned { own, axes, center };
     let outer = bounding_axis(half_b, &axes, center, &BoxReach(half_a));
     when!(cx, outer.distance.lt(margin), {
         let small = radius_a.min(radius_b);
-        let faces = Faces { first: &first, second: &second };
-        let found = closest(cx, &first, &second, outer.normal, radius_a + radius_b, small * C::F::c(DEEP), &faces);
+        let faces = Faces {
+            first: &first,
+            second: &second,
+        };
+        let found = closest(
+            cx,
+            &first,
+            &second,
+            outer.normal,
+            radius_a + radius_b,
+            small * C::F::c(DEEP),
+            &faces,
+        );
         let near = found.near();
         when!(cx, near.distance.lt(margin), {
             let side = HullSide::find(cx, &first.own, Some((axes, center)), near.normal);
             let face = HullSide::find(cx, &second, None, negated(near.normal));
-            let flat = C::F::or(aligned(face.outward, near.normal), aligned(side.outward, near.normal));
-            add_points(cx, &near, flat, &side, &face, C::F::c(1.0), small, margin, &b.axes, b.center, cut, out);
+            let flat = C::F::or(
+                aligned(face.outward, near.normal),
+                aligned(side.outward, near.normal),
+            );
+            add_points(
+                cx,
+                &near,
+                flat,
+                &side,
+                &face,
+                C::F::c(1.0),
+                small,
+                margin,
+                &b.axes,
+                b.center,
+                cut,
+                out,
+            );
         });
     });
 }
@@ -291,7 +403,11 @@ fn deepest_point<C: Cx>(
     let n = best.axis.normal;
     let half = scale(n, c(0.5) * best.axis.distance);
     let corner = shape.farthest(cx, n);
-    let middle = [corner[0] + half[0], corner[1] + half[1], corner[2] + half[2]];
+    let middle = [
+        corner[0] + half[0],
+        corner[1] + half[1],
+        corner[2] + half[2],
+    ];
     let mut point = var3(cx, middle);
     when!(cx, best.of_other(), {
         let vertex = hull.farthest(cx, negated(n));
@@ -300,7 +416,10 @@ fn deepest_point<C: Cx>(
     when!(cx, best.of_edges(), {
         // the hull's edge x = p + s d and the other's x = r + t q, where n is across both: (p - r + s d - t q) ∥ n
         let edges = hull.tables.edges;
-        let (p, d) = (pick3(cx, edges, best.edge, 0), pick3(cx, edges, best.edge, 3));
+        let (p, d) = (
+            pick3(cx, edges, best.edge, 0),
+            pick3(cx, edges, best.edge, 3),
+        );
         let (first, second) = (best.along.lt(c(0.5)), best.along.lt(c(1.5)));
         let q = select3(first, axes[0], select3(second, axes[1], axes[2]));
         let mixed = dot(d, q);

@@ -7,9 +7,9 @@
 
 use super::points::Points;
 use super::spread::Spread;
-use super::support::{across, rounding, select3, set3, var3, get3};
+use super::support::{across, get3, rounding, select3, set3, var3};
 use crate::lane::{Cx, MaskOf, Num, Table};
-use crate::math::vec3::{Mat3, Vec3, cross, dot, scale_add, sub, transform_add, transform};
+use crate::math::vec3::{Mat3, Vec3, cross, dot, scale_add, sub, transform, transform_add};
 use crate::model::hull_tables::CORNERS_MAX;
 use crate::{break_if, times, when};
 
@@ -99,7 +99,12 @@ pub(super) fn add_points<C: Cx>(
     let v = cross(n, u);
     let basis = [u, v, n];
     // the deepest point; the closest one where no candidate is as deep
-    let mut spot = [var3(cx, [zero, zero, near.distance]), var3(cx, [zero; 3]), var3(cx, [zero; 3]), var3(cx, [zero; 3])];
+    let mut spot = [
+        var3(cx, [zero, zero, near.distance]),
+        var3(cx, [zero; 3]),
+        var3(cx, [zero; 3]),
+        var3(cx, [zero; 3]),
+    ];
     let mut found = [cx.var(zero), cx.var(zero), cx.var(zero)];
     let mut plane = var3(cx, [zero; 3]);
     let mut closest = cx.var(one);
@@ -133,9 +138,25 @@ pub(super) fn add_points<C: Cx>(
         });
 
         let least = c(2e-6) * size + rounding::<C::F>() * size;
-        deepest(cx, cut, most, least, &mut spot[0], &mut closest, near.distance);
+        deepest(
+            cx,
+            cut,
+            most,
+            least,
+            &mut spot[0],
+            &mut closest,
+            near.distance,
+        );
         for stage in 0..3 {
-            farthest(cx, cut, most, stage, c(1e-3) * size, &mut spot, &mut found[stage]);
+            farthest(
+                cx,
+                cut,
+                most,
+                stage,
+                c(1e-3) * size,
+                &mut spot,
+                &mut found[stage],
+            );
         }
     });
     let normal = transform(frame, n);
@@ -326,7 +347,12 @@ fn keep<C: Cx>(
     let is = C::F::and(is, distance.lt(margin));
     cx.store(t, i, 3 * slot, x);
     cx.store(t, i, 3 * slot + 1, y);
-    cx.store(t, i, 3 * slot + 2, C::F::select(is, distance, C::F::c(NONE)));
+    cx.store(
+        t,
+        i,
+        3 * slot + 2,
+        C::F::select(is, distance, C::F::c(NONE)),
+    );
 }
 
 /// The deepest candidate, if it is as deep as the shapes are.

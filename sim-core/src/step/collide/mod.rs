@@ -1,5 +1,6 @@
 //! Contact points of pairs of shapes.
 
+pub mod cylinders;
 mod gjk;
 mod hull_axes;
 pub mod hulls;

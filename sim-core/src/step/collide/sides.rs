@@ -1,9 +1,11 @@
 //! The faces and segments of shapes that lie on others.
 
-use super::manifold::Side;
+use super::manifold::{Side, aligned};
 use super::support::{Polyhedron, constant3, pick3, select3, signed};
 use crate::lane::{Cx, Num};
-use crate::math::vec3::{Mat3, Vec3, cross, dot, scale, scale_add, sub, transform, transform_add, transform_back};
+use crate::math::vec3::{
+    Mat3, Vec3, cross, dot, scale, scale_add, sub, transform, transform_add, transform_back,
+};
 use crate::model::hull_tables::{CORNERS_MAX, HullTables};
 use crate::span;
 
@@ -194,13 +196,20 @@ pub(super) struct CylinderSide<F: Num> {
     u: Vec3<F>,
     v: Vec3<F>,
     count: F,
-    cap: F::Mask,
+    /// Is it a cap?
+    pub cap: F::Mask,
 }
 
 impl<F: Num> CylinderSide<F> {
     /// Of the cylinder with these axes and centre, for the unit direction `d`; a cap where that is steeper than 45°.
     #[inline(always)]
-    pub fn find(axes: &Mat3<F>, radius: F, half_height: F, center: Vec3<F>, d: Vec3<F>) -> CylinderSide<F> {
+    pub fn find(
+        axes: &Mat3<F>,
+        radius: F,
+        half_height: F,
+        center: Vec3<F>,
+        d: Vec3<F>,
+    ) -> CylinderSide<F> {
         let local = transform_back(axes, d);
         // an upright one keeps its rim points: their direction is not left to rounding
         let width = local[0].fma(local[0], local[1] * local[1]).sqrt();
@@ -216,10 +225,34 @@ impl<F: Num> CylinderSide<F> {
         let half = scale(axes[2], half_height);
         CylinderSide {
             outward: select3(cap, end, rim),
-            center: select3(cap, scale_add(end, half_height, center), scale_add(rim, radius, center)),
+            center: select3(
+                cap,
+                scale_add(end, half_height, center),
+                scale_add(rim, radius, center),
+            ),
             u: select3(cap, scale(rim, radius), half),
             v: scale(cross(end, rim), radius),
             count: F::select(cap, F::c(CORNERS_MAX as f64), F::c(2.0)),
+            cap,
+        }
+    }
+
+    /// Is it a cap that is flat on the other shape?
+    #[inline(always)]
+    pub fn flat(&self, normal: Vec3<F>) -> F::Mask {
+        F::and(self.cap, aligned(self.outward, normal))
+    }
+
+    /// `a` where the mask holds, else `b`.
+    #[inline(always)]
+    pub fn select(mask: F::Mask, a: &CylinderSide<F>, b: &CylinderSide<F>) -> CylinderSide<F> {
+        let cap = F::or(F::and(mask, a.cap), F::and(F::not(mask), b.cap));
+        CylinderSide {
+            outward: select3(mask, a.outward, b.outward),
+            center: select3(mask, a.center, b.center),
+            u: select3(mask, a.u, b.u),
+            v: select3(mask, a.v, b.v),
+            count: F::select(mask, a.count, b.count),
             cap,
         }
     }

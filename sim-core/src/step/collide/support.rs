@@ -62,7 +62,11 @@ pub(super) fn constant3<C: Cx>(cx: &mut C, t: Fixed, row: C::I, k: usize) -> Vec
 /// Three numbers of a row of the model, another in each world.
 #[inline(always)]
 pub(super) fn pick3<C: Cx>(cx: &mut C, t: Fixed, row: C::F, k: usize) -> Vec3<C::F> {
-    [cx.pick(t, row, k), cx.pick(t, row, k + 1), cx.pick(t, row, k + 2)]
+    [
+        cx.pick(t, row, k),
+        cx.pick(t, row, k + 1),
+        cx.pick(t, row, k + 2),
+    ]
 }
 
 /// -a
