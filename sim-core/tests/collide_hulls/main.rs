@@ -23,6 +23,8 @@ struct Found {
     /// Deep ones whose depth is more than 1% above the least, and the largest such excess.
     worse: usize,
     worst: f64,
+    /// Shallow ones off by more than 1e-5.
+    off: usize,
     /// The distance that is told against that along the normal that is told.
     untrue: f64,
 }
@@ -148,6 +150,7 @@ fn check(kind: usize) -> Found {
             }
         } else if truth > -0.1 * size {
             found.shallow += 1;
+            found.off += usize::from(errors[0] > 1e-5);
             for k in 0..2 {
                 found.touching[k] = found.touching[k].max(errors[k]);
             }

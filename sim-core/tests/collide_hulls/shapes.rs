@@ -166,7 +166,7 @@ pub struct Contact {
     pub normal: Vector,
 }
 
-const ROWS: usize = 8;
+pub const ROWS: usize = 8;
 const POINTS: Table = Table {
     base: 0,
     stride: 8,

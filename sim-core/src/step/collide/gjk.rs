@@ -16,8 +16,8 @@ use crate::{break_if, times, when};
 pub(super) trait Restart<C: Cx> {
     /// Is there one?
     const SOME: bool;
-    /// The axis.
-    fn axis(&self, cx: &mut C) -> Vec3<C::F>;
+    /// An axis that is better than the one that is known, or that one.
+    fn axis(&self, cx: &mut C, known: Axis<C::F>) -> Axis<C::F>;
 }
 
 /// None.
@@ -26,8 +26,8 @@ pub(super) struct NoRestart;
 impl<C: Cx> Restart<C> for NoRestart {
     const SOME: bool = false;
     #[inline(always)]
-    fn axis(&self, _: &mut C) -> Vec3<C::F> {
-        [C::F::c(0.0); 3]
+    fn axis(&self, _: &mut C, known: Axis<C::F>) -> Axis<C::F> {
+        known
     }
 }
 
@@ -116,16 +116,20 @@ pub(super) fn closest<C: Cx, R: Restart<C>>(
         set3(cx, &mut axis, n);
         let settled = C::F::or(C::F::not(gained), gap.lt(before));
         if R::SOME {
-            let again = C::F::and(
-                settled,
-                C::F::and(x.lt(-deep), cx.get(&restarts).lt(c(0.5))),
-            );
-            when!(cx, again, {
-                let other = restart.axis(cx);
-                set3(cx, &mut axis, other);
+            let first = cx.get(&restarts).lt(c(0.5));
+            let mut again = cx.var(zero);
+            when!(cx, C::F::and(settled, C::F::and(x.lt(-deep), first)), {
+                let known = Axis {
+                    normal: n,
+                    distance: x + settled_at,
+                };
+                let other = restart.axis(cx, known);
+                set3(cx, &mut axis, other.normal);
                 cx.set(&mut restarts, one);
+                let better = known.distance.lt(other.distance);
+                cx.set(&mut again, C::F::select(better, one, zero));
             });
-            let settled = C::F::and(settled, C::F::not(again));
+            let settled = C::F::and(settled, cx.get(&again).lt(c(0.5)));
             break_if!(cx, settled);
         } else {
             break_if!(cx, settled);

@@ -5,7 +5,8 @@
 //! sphere is a point, a capsule a segment, with a radius about it. Two hulls: GJK at a stand-off, and where they
 //! penetrate deeply, once more from the best of both hulls' faces.
 
-use super::gjk::{NoRestart, Restart, closest};
+use super::gjk::{NoRestart, closest};
+use super::hull_depth::LeastDepth;
 use super::hull_axes::{
     Best, BoxReach, PointReach, Reach, SegmentReach, bounding_axis, hull_axis, slack,
 };
@@ -289,7 +290,7 @@ pub fn hull_hull<C: Cx>(
     let outer = bounding_axis(half_b, &axes, center, &BoxReach(half_a));
     when!(cx, outer.distance.lt(margin), {
         let small = radius_a.min(radius_b);
-        let faces = Faces {
+        let depth = LeastDepth {
             first: &first,
             second: &second,
         };
@@ -300,7 +301,7 @@ pub fn hull_hull<C: Cx>(
             outer.normal,
             radius_a + radius_b,
             small * C::F::c(DEEP),
-            &faces,
+            &depth,
         );
         let near = found.near();
         when!(cx, near.distance.lt(margin), {
@@ -329,7 +330,7 @@ pub fn hull_hull<C: Cx>(
 }
 
 /// Depth past which the nearest axis may not be that of least depth, relative to the smaller radius.
-const DEEP: f64 = 0.05;
+const DEEP: f64 = 0.005;
 
 /// The axes and the centre of the first shape, which is at the origin, in the frame of the second.
 #[inline(always)]
@@ -429,43 +430,4 @@ fn deepest_point<C: Cx>(
         set3(cx, &mut point, sub(scale_add(d, s, p), half));
     });
     get3(cx, &point)
-}
-
-/// The best of both hulls' faces.
-struct Faces<'a, 'b, C: Cx> {
-    first: &'a Turned<'b, C>,
-    second: &'a Polyhedron<'b, C>,
-}
-
-impl<C: Cx> Restart<C> for Faces<'_, '_, C> {
-    const SOME: bool = true;
-    #[inline(always)]
-    fn axis(&self, cx: &mut C) -> Vec3<C::F> {
-        let c = C::F::c;
-        let (first, second) = (self.first, self.second);
-        let mut best = cx.var(c(-1e18));
-        let mut axis = var3(cx, [c(0.0); 3]);
-        let (start, end) = first.own.span(cx, 1);
-        let faces = first.own.tables.faces;
-        span!(cx, face in start, end, {
-            let n = transform(&first.axes, constant3(cx, faces, face, 0));
-            let near = cx.constant(faces, face, 3) + dot(n, first.center);
-            let x = -(second.reach(cx, negated(n)) + near);
-            let old = cx.get(&best);
-            let kept = get3(cx, &axis);
-            set3(cx, &mut axis, select3(old.lt(x), n, kept));
-            cx.set(&mut best, old.max(x));
-        });
-        let (start, end) = second.span(cx, 1);
-        span!(cx, face in start, end, {
-            let n = negated(constant3(cx, faces, face, 0));
-            let far = cx.constant(faces, face, 3) + dot(n, first.center);
-            let x = -(first.own.reach(cx, transform_back(&first.axes, n)) + far);
-            let old = cx.get(&best);
-            let kept = get3(cx, &axis);
-            set3(cx, &mut axis, select3(old.lt(x), n, kept));
-            cx.set(&mut best, old.max(x));
-        });
-        get3(cx, &axis)
-    }
 }

@@ -3,6 +3,7 @@
 pub mod cylinders;
 mod gjk;
 mod hull_axes;
+mod hull_depth;
 pub mod hulls;
 pub mod manifold;
 pub mod points;
