@@ -183,8 +183,15 @@ const CUT: Cut = Cut {
         stride: Cut::CANDIDATES[1],
         rows: Cut::CANDIDATES[0],
     },
+    edges: Table {
+        base: EDGES,
+        stride: Cut::EDGES[1],
+        rows: Cut::EDGES[0],
+    },
 };
-pub const MEMORY: usize = CUT.candidates.base + Cut::CANDIDATES[0] * Cut::CANDIDATES[1];
+const EDGES: usize =
+    8 * ROWS + Cut::CORNERS[0] * Cut::CORNERS[1] + Cut::CANDIDATES[0] * Cut::CANDIDATES[1];
+pub const MEMORY: usize = EDGES + Cut::EDGES[0] * Cut::EDGES[1];
 
 /// Contact points of pairs with the same shapes but for their sizes, one a lane.
 #[inline(always)]

@@ -108,7 +108,7 @@ pub fn capsule_cylinder<C: Cx>(
             &cylinder,
             start.normal,
             size,
-            size,
+            limit,
             &NoRestart,
         )
         .near();
@@ -187,7 +187,7 @@ pub fn box_cylinder<C: Cx>(
             &cylinder,
             start.normal,
             size_a + size_b,
-            size_a,
+            margin,
             &NoRestart,
         )
         .near();
@@ -264,7 +264,7 @@ pub fn cylinder_cylinder<C: Cx>(
             &second,
             start.normal,
             size_a + size_b,
-            size_a,
+            margin,
             &NoRestart,
         )
         .near();
@@ -328,7 +328,7 @@ pub fn cylinder_hull<C: Cx>(
                 &hull,
                 best.axis.normal,
                 size,
-                size,
+                margin,
                 &NoRestart,
             )
             .near();

@@ -16,6 +16,8 @@ use crate::{break_if, times, when};
 pub(super) trait Restart<C: Cx> {
     /// Is there one?
     const SOME: bool;
+    /// The depth past which it is asked for [m].
+    fn depth(&self) -> C::F;
     /// An axis that is better than the one that is known, or that one.
     fn axis(&self, cx: &mut C, known: Axis<C::F>) -> Axis<C::F>;
 }
@@ -25,6 +27,10 @@ pub(super) struct NoRestart;
 
 impl<C: Cx> Restart<C> for NoRestart {
     const SOME: bool = false;
+    #[inline(always)]
+    fn depth(&self) -> C::F {
+        C::F::c(1e18)
+    }
     #[inline(always)]
     fn axis(&self, _: &mut C, known: Axis<C::F>) -> Axis<C::F> {
         known
@@ -71,8 +77,7 @@ const fn stand_offs<R: Real>() -> usize {
     if R::DOUBLE { 16 } else { 6 }
 }
 
-/// The closest points of two shapes, from the axis `start`, a unit vector. `size` is the sum of their radii; `deep` the
-/// depth past which the restart is tried.
+/// The closest points of two shapes, from the axis `start`, a unit vector. `size` is the sum of their radii. Shapes that are farther apart than `limit` are only found to be so.
 #[inline(always)]
 pub(super) fn closest<C: Cx, R: Restart<C>>(
     cx: &mut C,
@@ -80,7 +85,7 @@ pub(super) fn closest<C: Cx, R: Restart<C>>(
     b: &impl Support<C>,
     start: Vec3<C::F>,
     size: C::F,
-    deep: C::F,
+    limit: C::F,
     restart: &R,
 ) -> Closest<C::F> {
     let c = C::F::c;
@@ -96,9 +101,12 @@ pub(super) fn closest<C: Cx, R: Restart<C>>(
         let m = get3(cx, &axis);
         let (on_a, w) = difference(cx, a, b, m);
         let before = dot(m, w);
+        let known = cx.get(&best);
+        cx.set(&mut best, known.max(before));
+        break_if!(cx, limit.lt(before));
         let shift = (gap - before).max(zero);
         let away = scale(m, shift);
-        let found = apart(cx, a, b, m, away, on_a, add(w, away), size);
+        let found = apart(cx, a, b, m, away, on_a, add(w, away), size, limit + shift);
         let after = found.distance - shift * dot(found.normal, m);
         let gained = (before + settled_at).lt(after);
         let (x, n) = (
@@ -107,18 +115,18 @@ pub(super) fn closest<C: Cx, R: Restart<C>>(
         );
         // half-way between the closest points, B moved back
         let middle = scale_add(sub(found.way, away), c(0.5), found.on_a);
-        let old = cx.get(&best);
-        let better = old.lt(x);
+        let better = C::F::not(x.lt(cx.get(&best)));
         let (kept_normal, kept_point) = (get3(cx, &normal), get3(cx, &point));
+        let old = cx.get(&best);
         cx.set(&mut best, C::F::select(better, x, old));
         set3(cx, &mut normal, select3(better, n, kept_normal));
         set3(cx, &mut point, select3(better, middle, kept_point));
         set3(cx, &mut axis, n);
-        let settled = C::F::or(C::F::not(gained), gap.lt(before));
+        let settled = C::F::or(C::F::not(gained), C::F::or(gap.lt(before), limit.lt(x)));
         if R::SOME {
             let first = cx.get(&restarts).lt(c(0.5));
             let mut again = cx.var(zero);
-            when!(cx, C::F::and(settled, C::F::and(x.lt(-deep), first)), {
+            when!(cx, C::F::and(settled, C::F::and(x.lt(-restart.depth()), first)), {
                 let known = Axis {
                     normal: n,
                     distance: x + settled_at,
@@ -157,7 +165,7 @@ struct Found<F> {
 }
 
 /// GJK for shapes that are apart once B is moved by `away`; the first axis is `m`, with the farthest point `on_a` and the
-/// difference `w` there.
+/// difference `w` there. Past the distance `limit` it goes no further.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 fn apart<C: Cx>(
@@ -169,6 +177,7 @@ fn apart<C: Cx>(
     on_a: Vec3<C::F>,
     w: Vec3<C::F>,
     size: C::F,
+    limit: C::F,
 ) -> Found<C::F> {
     let c = C::F::c;
     let (zero, one) = (c(0.0), c(1.0));
@@ -196,6 +205,7 @@ fn apart<C: Cx>(
         cx.set(&mut low, C::F::select(better, bound, old));
         set3(cx, &mut normal, select3(better, scale(v, unit), kept));
         let done = (square - along).lt(tolerance.fma(square, noise * length));
+        let done = C::F::or(done, limit.lt(bound));
         break_if!(cx, done);
 
         // the nearest point of the tetrahedron of the new corner and the three: on a corner, edge or face at the new one

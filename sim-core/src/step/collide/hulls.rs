@@ -293,6 +293,8 @@ pub fn hull_hull<C: Cx>(
         let depth = LeastDepth {
             first: &first,
             second: &second,
+            depth: small * C::F::c(DEEP),
+            promising: cut.edges,
         };
         let found = closest(
             cx,
@@ -300,7 +302,7 @@ pub fn hull_hull<C: Cx>(
             &second,
             outer.normal,
             radius_a + radius_b,
-            small * C::F::c(DEEP),
+            margin,
             &depth,
         );
         let near = found.near();
@@ -330,7 +332,7 @@ pub fn hull_hull<C: Cx>(
 }
 
 /// Depth past which the nearest axis may not be that of least depth, relative to the smaller radius.
-const DEEP: f64 = 0.005;
+const DEEP: f64 = 0.01;
 
 /// The axes and the centre of the first shape, which is at the origin, in the frame of the second.
 #[inline(always)]
@@ -371,7 +373,7 @@ fn near_hull<C: Cx, R: Reach<C::F>>(
         let apart = C::F::and(c(0.0).lt(best.axis.distance), best.axis.distance.lt(limit));
         let inside = C::F::not(c(0.0).lt(best.axis.distance));
         when!(cx, apart, {
-            let found = closest(cx, shape, hull, best.axis.normal, size, size, &NoRestart);
+            let found = closest(cx, shape, hull, best.axis.normal, size, limit, &NoRestart);
             set3(cx, &mut normal, found.axis.normal);
             set3(cx, &mut point, found.point);
             cx.set(&mut distance, found.axis.distance);
