@@ -1,0 +1,163 @@
+//! The axis of least depth of two hulls that penetrate: that of the nearest face of their Minkowski difference.
+//!
+//! A face of the difference comes from a face of either hull, or from two edges whose arcs of normals cross on the sphere
+//! (Gregorius, GDC 2013). Pairs of edges are too many to try. Along the arc of an edge with the point a, between n₁ and
+//! n₂, the depth is at least the lesser of (a - b) · n₁ and (a - b) · n₂ if both are positive, for any b of the second
+//! hull; so with b its farthest point against n₁ + n₂ few edges are left to be tried with all of the second hull.
+
+use super::gjk::Restart;
+use super::hull_axes::Axis;
+use super::support::{Polyhedron, Support, Turned, constant3, get3, negated, pick3, select3, set3, signed, var3};
+use crate::lane::{Cx, Num, Table};
+use crate::math::vec3::{Vec3, add, cross, dot, scale, sub, transform, transform_add, transform_back};
+use crate::{each, push, span, when};
+
+/// Two hulls, in the frame of the second.
+pub(super) struct LeastDepth<'a, 'b, C: Cx> {
+    pub first: &'a Turned<'b, C>,
+    pub second: &'a Polyhedron<'b, C>,
+    /// Depth past which it is looked for [m].
+    pub depth: C::F,
+    /// Scratch rows of edges.
+    pub promising: Table,
+}
+
+/// The best axis so far.
+struct Best<C: Cx> {
+    depth: C::V,
+    axis: [C::V; 3],
+}
+
+impl<C: Cx> Best<C> {
+    /// Takes an axis that is better.
+    #[inline(always)]
+    fn offer(&mut self, cx: &mut C, depth: C::F, axis: Vec3<C::F>) {
+        let (old, kept) = (cx.get(&self.depth), get3(cx, &self.axis));
+        let better = depth.lt(old);
+        cx.set(&mut self.depth, C::F::select(better, depth, old));
+        set3(cx, &mut self.axis, select3(better, axis, kept));
+    }
+}
+
+impl<C: Cx> Restart<C> for LeastDepth<'_, '_, C> {
+    const SOME: bool = true;
+    #[inline(always)]
+    fn depth(&self) -> C::F {
+        self.depth
+    }
+
+    #[inline(always)]
+    fn axis(&self, cx: &mut C, known: Axis<C::F>) -> Axis<C::F> {
+        let mut best = Best {
+            depth: cx.var(-known.distance),
+            axis: var3(cx, known.normal),
+        };
+        // the points that are deepest now tell which faces and edges are too far from them to be better
+        let on_a = self.first.farthest(cx, known.normal);
+        let on_b = self.second.farthest(cx, negated(known.normal));
+        self.faces(cx, on_a, on_b, &mut best);
+        let mut promising = cx.list(self.promising.rows);
+        self.choose(cx, on_b, &best, &mut promising);
+        self.cross(cx, &promising, &mut best);
+        Axis {
+            normal: get3(cx, &best.axis),
+            distance: -cx.get(&best.depth),
+        }
+    }
+}
+
+impl<C: Cx> LeastDepth<'_, '_, C> {
+    /// The faces of both hulls.
+    #[inline(always)]
+    fn faces(&self, cx: &mut C, on_a: Vec3<C::F>, on_b: Vec3<C::F>, best: &mut Best<C>) {
+        let (first, second) = (self.first, self.second);
+        let faces = second.tables.faces;
+        let (start, end) = first.own.span(cx, 1);
+        span!(cx, face in start, end, {
+            let n = transform(&first.axes, constant3(cx, faces, face, 0));
+            let height = cx.constant(faces, face, 3) + dot(n, first.center);
+            let bound = height - dot(n, on_b);
+            when!(cx, bound.lt(cx.get(&best.depth)), {
+                let depth = second.reach(cx, negated(n)) + height;
+                best.offer(cx, depth, n);
+            });
+        });
+        let (start, end) = second.span(cx, 1);
+        span!(cx, face in start, end, {
+            let n = negated(constant3(cx, faces, face, 0));
+            let height = cx.constant(faces, face, 3);
+            let bound = height + dot(n, on_a);
+            when!(cx, bound.lt(cx.get(&best.depth)), {
+                let far = height + dot(n, first.center);
+                let depth = first.own.reach(cx, transform_back(&first.axes, n)) + far;
+                best.offer(cx, depth, n);
+            });
+        });
+    }
+
+    /// Lists the edges of the first hull that may be less deep than the best axis.
+    #[inline(always)]
+    fn choose(&self, cx: &mut C, on_b: Vec3<C::F>, best: &Best<C>, promising: &mut C::List) {
+        let (first, second) = (self.first, self.second);
+        let edges = second.tables.edges;
+        let (start, end) = first.own.span(cx, 2);
+        span!(cx, edge in start, end, {
+            let n1 = transform(&first.axes, constant3(cx, edges, edge, 6));
+            let n2 = transform(&first.axes, constant3(cx, edges, edge, 9));
+            let point = constant3(cx, edges, edge, 0);
+            let point = transform_add(&first.axes, point, first.center);
+            let way = sub(point, on_b);
+            let bound = dot(way, n1).min(dot(way, n2));
+            when!(cx, bound.lt(cx.get(&best.depth)), {
+                let vertex = second.farthest(cx, negated(add(n1, n2)));
+                let way = sub(point, vertex);
+                let bound = dot(way, n1).min(dot(way, n2));
+                push!(cx, *promising, bound.lt(cx.get(&best.depth)), row, {
+                    let number = cx.number(edge);
+                    cx.init(self.promising, row, 0, number);
+                });
+            });
+        });
+    }
+
+    /// The edges of the list with those of the second hull.
+    #[inline(always)]
+    fn cross(&self, cx: &mut C, promising: &C::List, best: &mut Best<C>) {
+        let c = C::F::c;
+        let (first, second) = (self.first, self.second);
+        let edges = second.tables.edges;
+        each!(cx, row in *promising, {
+            let edge = cx.load(self.promising, row, 0);
+            let point = pick3(cx, edges, edge, 0);
+            let point = transform_add(&first.axes, point, first.center);
+            let d = transform(&first.axes, pick3(cx, edges, edge, 3));
+            let n1 = transform(&first.axes, pick3(cx, edges, edge, 6));
+            let n2 = transform(&first.axes, pick3(cx, edges, edge, 9));
+            let outward = add(n1, n2);
+            let (start, end) = second.span(cx, 2);
+            span!(cx, other in start, end, {
+                let q = constant3(cx, edges, other, 3);
+                let n3 = constant3(cx, edges, other, 6);
+                let n4 = constant3(cx, edges, other, 9);
+                // d is across n₁ and n₂, q across n₃ and n₄: each arc crosses the other's plane, on the same side
+                let crosses = C::F::and(
+                    (dot(d, n3) * dot(d, n4)).lt(c(0.0)),
+                    (dot(q, n1) * dot(q, n2)).lt(c(0.0)),
+                );
+                when!(cx, crosses, {
+                    let axis = cross(d, q);
+                    let square = dot(axis, axis);
+                    let side = dot(axis, outward);
+                    let same = (side * dot(axis, add(n3, n4))).lt(c(0.0));
+                    let unit = c(1.0).div(square.max(c(1e-8)).sqrt());
+                    let axis = scale(axis, signed(unit, side));
+                    let point_b = constant3(cx, edges, other, 0);
+                    let depth = dot(axis, sub(point, point_b));
+                    // of nearly parallel edges the normal is a face's
+                    let is = C::F::and(same, c(1e-8).lt(square));
+                    best.offer(cx, C::F::select(is, depth, c(1e18)), axis);
+                });
+            });
+        });
+    }
+}

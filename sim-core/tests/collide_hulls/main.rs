@@ -1,0 +1,182 @@
+//! The narrow phase of hulls and cylinders against exact oracles.
+
+mod oracle;
+mod shapes;
+
+use oracle::{Polytope, along, least_depth};
+use parry3d_f64::math::{Pose, Vector as Place};
+use parry3d_f64::query::{ClosestPoints, closest_points};
+use parry3d_f64::shape::{Ball, Capsule, ConvexPolyhedron};
+use shapes::*;
+
+/// What the oracles say of many random pairs.
+#[derive(Debug, Default)]
+struct Found {
+    separated: usize,
+    shallow: usize,
+    deep: usize,
+    missing: usize,
+    /// Largest errors where separated, relative to the size: of distance and normal.
+    apart: [f64; 2],
+    /// Where penetration is shallow.
+    touching: [f64; 2],
+    /// Deep ones whose depth is more than 1% above the least, and the largest such excess.
+    worse: usize,
+    worst: f64,
+    /// Shallow ones off by more than 1e-5.
+    off: usize,
+    /// The distance that is told against that along the normal that is told.
+    untrue: f64,
+}
+
+fn place(x: Vector) -> Place {
+    Place::new(x[0], x[1], x[2])
+}
+
+fn closest(a: &Polytope, b: &Polytope) -> Option<(f64, Vector)> {
+    let shape = |polytope: &Polytope| -> Box<dyn parry3d_f64::shape::Shape> {
+        let points: Vec<Place> = polytope.points.iter().map(|&x| place(x)).collect();
+        match points.len() {
+            1 => Box::new(Ball::new(1e-9)),
+            2 => Box::new(Capsule::new(points[0], points[1], 1e-9)),
+            _ => Box::new(ConvexPolyhedron::from_convex_hull(&points).unwrap()),
+        }
+    };
+    let pose = |polytope: &Polytope| match polytope.points[..] {
+        [x] => Pose::from_translation(place(x)),
+        _ => Pose::IDENTITY,
+    };
+    match closest_points(&pose(a), &*shape(a), &pose(b), &*shape(b), 10.0).unwrap() {
+        ClosestPoints::WithinMargin(p, q) => {
+            let way = sub([q.x, q.y, q.z], [p.x, p.y, p.z]);
+            let slack: f64 = [a, b]
+                .iter()
+                .filter(|x| x.points.len() < 3)
+                .map(|_| 1e-9)
+                .sum();
+            let core = dot(way, way).sqrt() + slack;
+            Some((core - a.radius - b.radius, unit(way)))
+        }
+        _ => None,
+    }
+}
+
+fn cases(kind: usize, count: usize) -> (Hulls, Vec<Pair>) {
+    let mut random = Random(7 + kind as u64);
+    let hulls = Hulls::new((0..40).map(|i| random.hull(8 + (56 * i) / 39)).collect());
+    let pairs = (0..count)
+        .map(|_| {
+            let a = match kind {
+                0 => Shape::Sphere(random.between(0.01, 0.1)),
+                1 => Shape::Capsule(random.between(0.01, 0.05), random.between(0.01, 0.1)),
+                2 => Shape::Box(std::array::from_fn(|_| random.between(0.01, 0.1))),
+                _ => Shape::Hull((random.unit() * 40.0) as usize),
+            };
+            let b = (random.unit() * 40.0) as usize;
+            let (axes_a, axes_b) = (random.rotation(), random.rotation());
+            let mut pair = Pair {
+                a,
+                axes_a,
+                b: Shape::Hull(b),
+                axes_b,
+                center: [0.0; 3],
+            };
+            // apart, shallow and deep alike: first so that they touch, then a share of the smaller one in or out
+            let way = random.direction();
+            let first = Polytope::of(a, &axes_a, [0.0; 3], &hulls);
+            let second = Polytope::of(pair.b, &axes_b, [0.0; 3], &hulls);
+            let touching = -along(&first, &second, way);
+            let most = touching.min(0.1);
+            let out = match random.unit() {
+                x if x < 0.3 => random.between(0.0, 0.3) * most,
+                x if x < 0.7 => random.between(-0.25, 0.0) * most,
+                _ => random.between(-1.0, -0.1) * touching,
+            };
+            pair.center = scale(way, touching + out);
+            pair
+        })
+        .collect();
+    (hulls, pairs)
+}
+
+fn check(kind: usize) -> Found {
+    let (hulls, pairs) = cases(kind, 10_000);
+    let mut memory = vec![0.0_f64; MEMORY];
+    let mut found = Found::default();
+    for pair in &pairs {
+        let a = Polytope::of(pair.a, &pair.axes_a, [0.0; 3], &hulls);
+        let b = Polytope::of(pair.b, &pair.axes_b, pair.center, &hulls);
+        let width = |x: &Polytope| {
+            (0..3)
+                .map(|i| {
+                    let mut d = [0.0; 3];
+                    d[i] = 1.0;
+                    x.reach(d) + x.reach(scale(d, -1.0))
+                })
+                .fold(0.0, f64::max)
+        };
+        let size = width(&a).min(width(&b));
+        let contacts = contacts::<f64>(&[*pair], &hulls.places, &hulls.tables, 1.0, &mut memory);
+        let Some(deepest) = contacts[0]
+            .iter()
+            .min_by(|x, y| x.distance.total_cmp(&y.distance))
+        else {
+            found.missing += 1;
+            continue;
+        };
+        let n = deepest.normal;
+        found.untrue = found
+            .untrue
+            .max((along(&a, &b, n) - deepest.distance).abs() / size);
+        assert!(contacts[0].iter().all(|x| x.normal == n));
+        let (core_a, core_b) = (a.radius, b.radius);
+        let (truth, normal, apart) = match closest(&a, &b) {
+            Some((distance, normal)) => (distance, normal, true),
+            None => {
+                let (distance, normal) = least_depth(&a, &b);
+                (distance, normal, false)
+            }
+        };
+        let _ = (core_a, core_b);
+        let way = sub(n, normal);
+        let errors = [
+            (deepest.distance - truth).abs() / size,
+            dot(way, way).sqrt(),
+        ];
+        if truth > 0.0 || apart {
+            found.separated += 1;
+            for k in 0..2 {
+                found.apart[k] = found.apart[k].max(errors[k]);
+            }
+        } else if truth > -0.1 * size {
+            found.shallow += 1;
+            found.off += usize::from(errors[0] > 1e-5);
+            for k in 0..2 {
+                found.touching[k] = found.touching[k].max(errors[k]);
+            }
+        } else {
+            found.deep += 1;
+            let excess = along(&a, &b, n) / truth - 1.0;
+            found.worst = found.worst.max(excess);
+            found.worse += usize::from(excess > 0.01);
+        }
+    }
+    found
+}
+
+#[test]
+fn spheres_and_hulls_are_as_near_as_the_oracles_say() {
+    println!("{:?}", check(0));
+}
+#[test]
+fn capsules_and_hulls_are_as_near_as_the_oracles_say() {
+    println!("{:?}", check(1));
+}
+#[test]
+fn boxes_and_hulls_are_as_near_as_the_oracles_say() {
+    println!("{:?}", check(2));
+}
+#[test]
+fn hulls_are_as_near_as_the_oracles_say() {
+    println!("{:?}", check(3));
+}
