@@ -1,6 +1,8 @@
 //! What the text reads of a model's shapes: where they are, which pairs may touch, and how soft they are.
 
+use super::cut::Cut;
 use super::description::Cone;
+use super::hull_tables::HullTables;
 use crate::lane::{Fixed, Real, Table, Tables};
 
 /// Kinds of shapes; of a pair, the lower kind is the first. A sphere's size is its radius; a capsule's and a
@@ -70,6 +72,8 @@ pub struct Contacts<R> {
     pub tables: Tables<R>,
     /// Where they are.
     pub handles: Handles,
+    /// Where the hulls are.
+    pub hulls: HullTables,
     /// Where the stages keep what they find.
     pub memory: Memory,
 }
@@ -96,6 +100,8 @@ pub struct Memory {
     pub counts: Table,
     /// A row a contact; see [`row`].
     pub rows: Table,
+    /// Scratch of the narrow phase of faces.
+    pub cut: Cut,
     /// Numbers of all of them.
     pub len: usize,
 }
@@ -286,11 +292,17 @@ impl<R: Real> Contacts<R> {
                 indices: Vec::new(),
             },
             handles: Handles::default(),
+            hulls: HullTables::default(),
             memory: Memory {
                 poses: table,
                 origins: table,
                 counts: table,
                 rows: table,
+                cut: Cut {
+                    corners: table,
+                    candidates: table,
+                    edges: table,
+                },
                 len: 0,
             },
         }
@@ -341,6 +353,7 @@ impl<R: Real> Contacts<R> {
                 indices: self.tables.indices.clone(),
             },
             handles: self.handles,
+            hulls: self.hulls,
             memory: self.memory,
         }
     }

@@ -5,6 +5,9 @@ use super::contact::{
 };
 use super::constants::{Constants, Coupled};
 use super::description::{Cone, Description, Shape};
+use super::cut::Cut;
+use super::geometry::Hull;
+use super::hull_tables::HullTables;
 use super::surface::Surface;
 use super::paths::{Cluster, clusters};
 use super::rows::{IMPEDANCE, contact_damping};
@@ -94,8 +97,9 @@ pub(super) fn add_contacts(
     Ok(())
 }
 
-fn pieces(borne: &[Borne<'_>], _contacts: &mut Contacts<f64>) -> Vec<Piece> {
+fn pieces(borne: &[Borne<'_>], contacts: &mut Contacts<f64>) -> Vec<Piece> {
     let mut pieces = Vec::new();
+    let mut hulls: Vec<Hull> = Vec::new();
     for (index, b) in borne.iter().enumerate() {
         let (kind, size, radius) = match b.shape {
             Shape::Plane => (Kind::Plane, [0.0; 3], 0.0),
@@ -120,9 +124,23 @@ fn pieces(borne: &[Borne<'_>], _contacts: &mut Contacts<f64>) -> Vec<Piece> {
                 [*radius, *half_height, 0.0],
                 radius.hypot(*half_height),
             ),
-            Shape::Mesh(_) => continue,
+            Shape::Mesh(mesh) => {
+                for hull in &mesh.hulls {
+                    pieces.push(piece(index, b, Kind::Hull, b.pose, [0.0; 3], 0.0, hulls.len()));
+                    hulls.push(hull.clone());
+                }
+                continue;
+            }
         };
         pieces.push(piece(index, b, kind, b.pose, size, radius, 0));
+    }
+    let (tables, frames) = HullTables::append(&hulls, &mut contacts.tables);
+    contacts.hulls = tables;
+    for piece in pieces.iter_mut().filter(|piece| piece.solid.kind == Kind::Hull) {
+        let frame = &frames[piece.hull];
+        piece.solid.center = borne[piece.borne].pose.transform(frame.center);
+        piece.size = frame.half_extents;
+        piece.radius = frame.radius;
     }
     pieces
 }
@@ -521,6 +539,8 @@ impl Builder<'_> {
             pair_indices,
             class_rows,
         };
+        let is_cylinder = |piece: &&Piece| piece.solid.kind == Kind::Cylinder;
+        let cylinders = self.pieces.iter().filter(is_cylinder).count();
         let mut len = 0;
         let mut table = |stride: usize, rows: usize| {
             let base = len;
@@ -532,6 +552,14 @@ impl Builder<'_> {
             origins: table(3, self.constants.trees.len() + 1),
             counts: table(1, contacts.classes.len() + COUNTS),
             rows: table(row::JACOBIAN + 3 * widest, rows),
+            cut: match contacts.hulls.spans.rows + cylinders {
+                0 => contacts.memory.cut,
+                _ => Cut {
+                    corners: table(Cut::CORNERS[1], Cut::CORNERS[0]),
+                    candidates: table(Cut::CANDIDATES[1], Cut::CANDIDATES[0]),
+                    edges: table(Cut::EDGES[1], Cut::EDGES[0]),
+                },
+            },
             len: 0,
         };
         contacts.memory.len = len;

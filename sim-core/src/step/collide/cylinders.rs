@@ -8,7 +8,8 @@ use super::hull_axes::{
     Axis, BoxReach, CylinderReach, Reach, SegmentReach, better, bounding_axis, hull_axis, slack,
 };
 use super::hulls::in_frame_of;
-use super::manifold::{Cut, Near, add_points, aligned};
+use crate::model::cut::Cut;
+use super::manifold::{Near, add_points, aligned};
 use super::points::{Placed, Points};
 use super::sides::{BoxSide, CylinderSide, HullSide, SegmentSide};
 use super::support::{Block, Cylinder, Polyhedron, Segment, Upright, negated, signed};

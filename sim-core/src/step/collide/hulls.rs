@@ -10,7 +10,8 @@ use super::hull_depth::LeastDepth;
 use super::hull_axes::{
     Best, BoxReach, PointReach, Reach, SegmentReach, bounding_axis, hull_axis, slack,
 };
-use super::manifold::{Cut, Near, add_points, aligned};
+use crate::model::cut::Cut;
+use super::manifold::{Near, add_points, aligned};
 use super::points::{Placed, Points};
 use super::sides::{BoxSide, HullSide, SegmentSide};
 use super::spread::Spread;

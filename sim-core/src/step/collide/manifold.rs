@@ -10,6 +10,7 @@ use super::spread::Spread;
 use super::support::{across, get3, rounding, select3, set3, var3};
 use crate::lane::{Cx, MaskOf, Num, Table};
 use crate::math::vec3::{Mat3, Vec3, cross, dot, scale_add, sub, transform, transform_add};
+use crate::model::cut::Cut;
 use crate::model::hull_tables::CORNERS_MAX;
 use crate::{break_if, times, when};
 
@@ -17,27 +18,6 @@ use crate::{break_if, times, when};
 const ALIGNED: f64 = 0.9995;
 /// The distance of what is no candidate [m].
 const NONE: f64 = 1e9;
-
-/// Scratch tables of a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Cut {
-    /// Corners of both faces across and along the normal (2 × 3), and the second's edges as half-planes (3).
-    pub corners: Table,
-    /// Candidates: the ends of an edge of the first that is cut, a corner of the second (3 × 3).
-    pub candidates: Table,
-    /// Edges of a hull that may cross one of another where they are least deep.
-    pub edges: Table,
-}
-
-impl Cut {
-    /// Rows and numbers a row of `corners`.
-    pub const CORNERS: [usize; 2] = [CORNERS_MAX + 1, 9];
-    /// Rows and numbers a row of `candidates`.
-    pub const CANDIDATES: [usize; 2] = [CORNERS_MAX, 9];
-    /// Rows and numbers a row of `edges`. A hull of 64 vertices has at most 186 edges; of more than this many the rest
-    /// is left out.
-    pub const EDGES: [usize; 2] = [48, 1];
-}
 
 /// The side of a shape that is nearest along the normal: a flat polygon, or a segment as one with two corners.
 pub(super) trait Side<C: Cx> {

@@ -4,8 +4,23 @@
 //! themselves. A shape's position is kept relative to the reference point of its tree, that of a pair relative to its
 //! first shape, so that `f32` keeps its digits far from the origin.
 
+pub mod box_faces;
 pub mod boxes;
+pub mod capsules;
+pub mod choose;
+pub mod cylinders;
+mod gjk;
+mod hull_axes;
+mod hull_depth;
+pub mod hulls;
+pub mod manifold;
+mod narrow;
+pub mod planes;
 pub mod points;
+mod sides;
+pub mod spheres;
+mod spread;
+mod support;
 
 use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, Num};
@@ -16,6 +31,7 @@ use crate::model::contact::{
     COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, pair,
 };
 use crate::{span, when};
+use narrow::{Shape, Two, narrow};
 use points::{Placed, Points, Room};
 
 /// Poses of all shapes, and the reference points that they are relative to; no contacts yet.
@@ -129,19 +145,18 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, K
             },
         };
         let margin = cx.constant(numbers, p, pair::REACH);
-        let size_a = [
-            cx.constant(numbers, p, pair::SIZE_A),
-            cx.constant(numbers, p, pair::SIZE_A + 1),
-            cx.constant(numbers, p, pair::SIZE_A + 2),
-        ];
-        let size_b = [
-            cx.constant(numbers, p, pair::SIZE_B),
-            cx.constant(numbers, p, pair::SIZE_B + 1),
-            cx.constant(numbers, p, pair::SIZE_B + 2),
-        ];
-        narrow(
-            cx, t, kinds, p, &axes, size_a, &other, size_b, margin, &mut points,
+        let (first, second) = (
+            Shape::read(cx, t, kinds.0, p, pair::SIZE_A, pair::HULL_A),
+            Shape::read(cx, t, kinds.1, p, pair::SIZE_B, pair::HULL_B),
         );
+        let two = Two {
+            axes: &axes,
+            first,
+            other: &other,
+            second,
+            margin,
+        };
+        narrow(cx, t, kinds, &two, &mut points);
     });
 }
 
@@ -153,25 +168,4 @@ fn three<C: Cx>(cx: &mut C, table: crate::lane::Table, row: C::I, k: usize) -> V
         cx.load(table, row, k + 1),
         cx.load(table, row, k + 2),
     ]
-}
-
-/// The narrow phase of two kinds.
-#[allow(clippy::too_many_arguments)]
-#[inline(always)]
-fn narrow<C: Cx>(
-    cx: &mut C,
-    t: &Contacts<<C::F as Num>::Real>,
-    kinds: (Kind, Kind),
-    p: C::I,
-    axes: &Mat3<C::F>,
-    size_a: Vec3<C::F>,
-    other: &Placed<C::F>,
-    size_b: Vec3<C::F>,
-    margin: C::F,
-    out: &mut Points<C>,
-) {
-    match kinds {
-        (Kind::Box, Kind::Box) => boxes::box_box(cx, axes, size_a, other, size_b, margin, out),
-        _ => {}
-    }
 }
