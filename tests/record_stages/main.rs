@@ -9,7 +9,7 @@ use sim_core::backend::gpu::program::{ProgramOptions, wgsl};
 use sim_core::batch::{Block, Numbers, WorkSlot};
 use sim_core::lane::memory::Cpu;
 use sim_core::lane::record::{Recorded, RecordedVariable, Recorder, Recording, record};
-use sim_core::lane::{Cx, Num};
+use sim_core::lane::{Cx, Num, Tables};
 use sim_core::model::constants::Constants;
 use sim_core::step::{STAGES, Stage, step};
 use sim_core::times;
@@ -151,7 +151,8 @@ fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
             .collect();
         for _ in 0..STATES {
             let mut block = random_state(&m, &mut random);
-            let cx = &mut Cpu::new(&mut []);
+            let tables = Tables::default();
+            let cx = &mut Cpu::new(&mut [], &tables);
             // poses belong to the state before it moves on
             for stage in STAGES[..BEFORE_INTEGRATE].iter().chain(&[
                 Stage::Accelerations,
@@ -162,7 +163,7 @@ fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
                 let inputs = gathered(&mut block, stage.reads());
                 stage.run(cx, &m, &mut block);
                 let expected = gathered(&mut block, stage.writes());
-                let got = recording.evaluate(&inputs, &mut []);
+                let got = recording.evaluate(&inputs, &mut [], &tables);
                 assert_same(&got, &expected, stage.name());
             }
         }
@@ -177,7 +178,8 @@ fn the_random_states_of_these_tests_take_every_path() {
         let (mut random, mut same) = (toy::Random(1), toy::Random(1));
         let (mut active, mut hard) = (0, 0);
         for _ in 0..STATES {
-            let cx = &mut Cpu::new(&mut []);
+            let tables = Tables::default();
+            let cx = &mut Cpu::new(&mut [], &tables);
             let mut block = random_state(&m, &mut random);
             let mut hurried = random_state(&m, &mut same);
             for stage in &STAGES[..BEFORE_INTEGRATE] {
@@ -225,12 +227,17 @@ fn a_control_frame_is_recorded_as_a_loop_over_substeps() {
         for _ in 0..10 {
             let mut block = random_state(&m, &mut random);
             let inputs = gathered(&mut block, &reads);
-            let cx = &mut Cpu::new(&mut []);
+            let tables = Tables::default();
+            let cx = &mut Cpu::new(&mut [], &tables);
             for _ in 0..SUBSTEPS {
                 step(cx, &m, &mut block);
             }
             let expected = gathered(&mut block, &writes);
-            assert_same(&recording.evaluate(&inputs, &mut []), &expected, "frame");
+            assert_same(
+                &recording.evaluate(&inputs, &mut [], &tables),
+                &expected,
+                "frame",
+            );
         }
     }
 }
@@ -266,7 +273,8 @@ fn what_a_stage_does_not_name_it_neither_reads_nor_writes() {
     ];
     for m in [fr3(), every_joint()] {
         let mut start = random_state(&m, &mut toy::Random(3));
-        let cx = &mut Cpu::new(&mut []);
+        let tables = Tables::default();
+        let cx = &mut Cpu::new(&mut [], &tables);
         for stage in Stage::ALL {
             let mut named = stage.reads().iter().chain(stage.writes());
             assert!(

@@ -28,15 +28,25 @@ impl<'a, F: Lane> Cpu<'a, F> {
         );
         &mut self.memory[t.base + row * t.stride + k]
     }
+
+    /// Rows of a list per world. That of a kept list is read whenever it is used, so that two handles on
+    /// one list agree.
+    #[inline(always)]
+    fn count(&self, list: &Rows<F>) -> F {
+        match list.home {
+            Some(home) => self.memory[home],
+            None => list.count,
+        }
+    }
 }
 
 /// Rows of every world, compacted: world w has rows first..first + count(w).
 pub struct Rows<F> {
     first: usize,
     capacity: usize,
-    /// Rows per world, those that did not fit included.
+    /// Rows per world, those that did not fit included, where the list is not kept.
     count: F,
-    /// Where the count is kept.
+    /// Where the count of a kept list stands.
     home: Option<usize>,
 }
 
@@ -143,13 +153,13 @@ impl<F: Lane> Cx for Cpu<'_, F> {
         if let Some(shared) = row.shared {
             return self.store(t, shared, k, x);
         }
-        let mut worlds = F::bits(self.mask);
-        while worlds != 0 {
-            let world = worlds.trailing_zeros() as usize;
-            worlds &= worlds - 1;
-            let place = row.row.lane(world).to_usize();
-            self.cell(t, place, k).set_lane(world, x.lane(world));
-        }
+        debug_assert!(k < t.stride, "number {k} of {t:?}");
+        debug_assert!(
+            !F::any(F::and(self.mask, F::c(t.rows as f64 - 0.5).lt(row.row))),
+            "a row beyond {t:?}"
+        );
+        let rows = &mut self.memory[t.base + k..];
+        x.scatter(self.mask, rows, row.row, t.stride);
     }
 
     #[inline(always)]
@@ -163,10 +173,11 @@ impl<F: Lane> Cx for Cpu<'_, F> {
     }
     #[inline(always)]
     fn kept(&mut self, counts: Table, at: usize, first: usize, capacity: usize) -> Rows<F> {
+        debug_assert!(at < counts.rows, "row {at} of {counts:?}");
         Rows {
             first,
             capacity,
-            count: *self.cell(counts, at, 0),
+            count: F::c(0.0),
             home: Some(counts.base + at * counts.stride),
         }
     }
@@ -177,10 +188,11 @@ impl<F: Lane> Cx for Cpu<'_, F> {
         if !F::any(pushing) {
             return (outer, None);
         }
-        let count = list.count;
-        list.count = F::select(pushing, count + F::c(1.0), count);
-        if let Some(home) = list.home {
-            self.memory[home] = list.count;
+        let count = self.count(list);
+        let more = F::select(pushing, count + F::c(1.0), count);
+        match list.home {
+            Some(home) => self.memory[home] = more,
+            None => list.count = more,
         }
         let fits = F::and(pushing, count.lt(F::c(list.capacity as f64 - 0.5)));
         if !F::any(fits) {
@@ -199,7 +211,7 @@ impl<F: Lane> Cx for Cpu<'_, F> {
     }
     #[inline(always)]
     fn pushed(&mut self, list: &Rows<F>) -> F {
-        list.count
+        self.count(list)
     }
     #[inline(always)]
     fn enter(&mut self, mask: F::Mask) -> (F::Mask, bool) {
@@ -220,7 +232,7 @@ impl<F: Lane> Cx for Cpu<'_, F> {
             rounds: list.capacity,
             outer: self.mask,
             live: self.mask,
-            count: Some(list.count),
+            count: Some(self.count(list)),
         }
     }
     #[inline(always)]

@@ -215,8 +215,9 @@ pub trait Lane: Num + Default + Send + Sync + 'static {
     fn bits(mask: Self::Mask) -> u32;
     /// The number of one world.
     fn lane(self, lane: usize) -> Self::Real;
-    /// Changes the number of one world.
-    fn set_lane(&mut self, lane: usize, x: Self::Real);
+    /// Writes the number of each world of the mask to its place in a register of `to`: number `rows * stride`,
+    /// where `rows` are whole. The numbers of the other worlds stay.
+    fn scatter(self, mask: Self::Mask, to: &mut [Self], rows: Self, stride: usize);
     /// Reads one number for every world: that at `places`, which are whole and lie inside.
     fn gather(from: &[Self::Real], places: Self) -> Self;
 }
@@ -289,8 +290,8 @@ pub trait Cx: Sized {
     fn number(&mut self, i: Self::I) -> Self::F;
     /// Number `k` of a row of a table of the model.
     fn constant(&mut self, t: Fixed, row: Self::I, k: usize) -> Self::F;
-    /// Number `k` of a row of a table of the model, another row in each world; rows past the ends are the
-    /// nearest. Where a world is inactive the result is undefined.
+    /// Number `k` of a row of a table of the model, another row in each world: `row` is whole; past the ends
+    /// it is the nearest. Where a world is inactive the result is undefined.
     fn pick(&mut self, t: Fixed, row: Self::F, k: usize) -> Self::F;
     /// Index `k` of a row of an index table of the model, below `end`.
     fn index(&mut self, t: Fixed, row: Self::I, k: usize, end: usize) -> Self::I;
@@ -306,7 +307,7 @@ pub trait Cx: Sized {
     /// An empty list of at most `capacity` rows; what does not fit is counted, not stored.
     fn list(&mut self, capacity: usize) -> Self::List;
     /// A list that outlasts the text: its rows are `first..first + capacity` of its tables, and its length
-    /// is number 0 of row `at` of `counts`.
+    /// is number 0 of row `at` of `counts`, read whenever the list is used.
     fn kept(&mut self, counts: Table, at: Self::I, first: Self::I, capacity: Self::I)
     -> Self::List;
     /// Opens a block for the worlds in `mask`, with a fresh row; see [`push!`].

@@ -97,8 +97,10 @@ macro_rules! scalar {
                 self
             }
             #[inline(always)]
-            fn set_lane(&mut self, _lane: usize, x: $real) {
-                *self = x;
+            fn scatter(self, mask: bool, to: &mut [Self], rows: Self, stride: usize) {
+                if mask {
+                    to[rows as usize * stride] = self;
+                }
             }
             #[inline(always)]
             fn gather(from: &[$real], places: Self) -> Self {

@@ -17,7 +17,7 @@ macro_rules! register {
      arithmetic [$add:ident $sub:ident $mul:ident $div:ident $fma:ident $fnma:ident $sqrt:ident $min:ident $max:ident],
      memory [$splat:ident $load:ident $store:ident $transpose:ident $block:ident],
      bits [$neg:ident $abs:ident $round:ident $lt:ident $select:ident],
-     masks [$and:ident $or:ident $not:ident $any:ident $all:ident $mask_bits:ident], gather $gather:ident) => {
+     masks [$and:ident $or:ident $not:ident $any:ident $all:ident $mask_bits:ident], places [$gather:ident $scatter:ident]) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug)]
         #[repr(transparent)]
@@ -169,11 +169,10 @@ macro_rules! register {
                 lanes[lane]
             }
             #[inline(always)]
-            fn set_lane(&mut self, lane: usize, x: f32) {
-                let mut lanes = [0.0; $width];
-                self.store(&mut lanes);
-                lanes[lane] = x;
-                *self = Self::load(&lanes);
+            fn scatter(self, mask: $mask, to: &mut [Self], rows: Self, stride: usize) {
+                // SAFETY: a register is transparent over $width numbers, those of its worlds in order
+                let to = unsafe { std::slice::from_raw_parts_mut(to.as_mut_ptr().cast::<f32>(), to.len() * $width) };
+                unsafe { $scatter(self.0, mask, to, rows.0, stride * $width) }
             }
             #[inline(always)]
             fn gather(from: &[f32], places: Self) -> Self {
@@ -194,7 +193,7 @@ register!(
         _mm256_sqrt_ps _mm256_min_ps _mm256_max_ps],
     memory [_mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps transpose8 block8],
     bits [neg8 abs8 round8 lt8 select8],
-    masks [_mm256_and_ps _mm256_or_ps not8 any8 all8 bits8], gather gather8
+    masks [_mm256_and_ps _mm256_or_ps not8 any8 all8 bits8], places [gather8 scatter8]
 );
 
 register!(
@@ -204,7 +203,7 @@ register!(
         _mm512_sqrt_ps _mm512_min_ps _mm512_max_ps],
     memory [_mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps transpose16 block16],
     bits [neg16 _mm512_abs_ps round16 lt16 select16],
-    masks [and16 or16 not16 any16 all16 bits16], gather gather16
+    masks [and16 or16 not16 any16 all16 bits16], places [gather16 scatter16]
 );
 
 #[inline(always)]
@@ -247,6 +246,22 @@ unsafe fn bits8(a: __m256) -> u32 {
 #[inline(always)]
 unsafe fn gather8(from: &[f32], places: __m256) -> __m256 {
     unsafe { _mm256_i32gather_ps::<4>(from.as_ptr(), _mm256_cvtps_epi32(places)) }
+}
+
+/// Writes the number of each world w of the mask to `to[rows * stride + w]`, where `rows` are whole.
+#[inline(always)]
+unsafe fn scatter8(x: __m256, mask: __m256, to: &mut [f32], rows: __m256, stride: usize) {
+    let (mut numbers, mut places) = ([0.0; 8], [0u32; 8]);
+    unsafe {
+        _mm256_storeu_ps(numbers.as_mut_ptr(), x);
+        _mm256_storeu_si256(places.as_mut_ptr().cast(), _mm256_cvttps_epi32(rows));
+    }
+    let mut worlds = unsafe { bits8(mask) };
+    while worlds != 0 {
+        let world = worlds.trailing_zeros() as usize & 7;
+        worlds &= worlds - 1;
+        to[places[world] as usize * stride + world] = numbers[world];
+    }
 }
 
 /// In each block of four worlds: from numbers by world to worlds by number.
@@ -313,6 +328,23 @@ unsafe fn bits16(a: __mmask16) -> u32 {
 #[inline(always)]
 unsafe fn gather16(from: &[f32], places: __m512) -> __m512 {
     unsafe { _mm512_i32gather_ps::<4>(_mm512_cvtps_epi32(places), from.as_ptr()) }
+}
+/// As [`scatter8`]. The instruction takes as long whatever the mask; a loop over its worlds takes 0.8 to 1.8 times that (Zen 5).
+#[inline(always)]
+unsafe fn scatter16(x: __m512, mask: __mmask16, to: &mut [f32], rows: __m512, stride: usize) {
+    // places are compared unsigned, so that what lies below the largest integer is none below 0
+    let places = to.len().min(1 << 31);
+    assert!(places > 0, "nowhere to write");
+    unsafe {
+        let worlds = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+        let rows = _mm512_mullo_epi32(_mm512_cvttps_epi32(rows), _mm512_set1_epi32(stride as i32));
+        let at = _mm512_add_epi32(rows, worlds);
+        let last = _mm512_set1_epi32((places - 1) as i32);
+        let outside = _mm512_mask_cmpgt_epu32_mask(mask, at, last);
+        assert!(outside == 0, "a row out of bounds");
+        // all places of the mask lie inside (asserted)
+        _mm512_mask_i32scatter_ps::<4>(to.as_mut_ptr().cast(), mask, at, x);
+    }
 }
 #[inline(always)]
 unsafe fn all16() -> __mmask16 {

@@ -2,7 +2,7 @@
 
 use crate::{TABLE, accepted, c, evaluated};
 use sim_core::lane::record::{Recorded, Recorder};
-use sim_core::lane::{Cx, Num, Table};
+use sim_core::lane::{Cx, Num, Table, Tables};
 use sim_core::{each, push, times};
 
 /// Statements but for the loads of inputs and the stores of outputs.
@@ -152,6 +152,6 @@ fn rows_that_do_not_fit_are_counted_and_not_stored() {
     assert_eq!(evaluated(&good, [3.5, 0.0]), [1.0, 4.0]);
     assert_eq!(evaluated(&good, [9.0, 0.0]), [0.0, 0.0]);
     let mut scratch = [7.0; 8];
-    good.evaluate(&[-1.0, 0.0], &mut scratch);
+    good.evaluate(&[-1.0, 0.0], &mut scratch, &Tables::default());
     assert_eq!(scratch, [0.0, 7.0, 1.0, 7.0, 2.0, 7.0, 7.0, 7.0]);
 }

@@ -1,6 +1,7 @@
 //! The recorder: what it refuses, what it folds, and that its programs are right.
 
 mod algebra;
+mod kept;
 mod programs;
 mod refusals;
 mod refused_blocks;
@@ -9,7 +10,7 @@ mod toy;
 
 use sim_core::backend::gpu::program::{ProgramOptions, wgsl};
 use sim_core::lane::record::{Misuse, Recorded, Recorder, Recording, record};
-use sim_core::lane::{Num, Table};
+use sim_core::lane::{Num, Table, Tables};
 
 const TABLE: Table = Table {
     base: 0,
@@ -41,5 +42,5 @@ fn refused(text: impl FnOnce(&mut Recorder, &[Recorded]) -> Vec<Recorded>) -> Mi
 }
 
 fn evaluated(recording: &Recording, inputs: [f32; 2]) -> Vec<f32> {
-    recording.evaluate(&inputs, &mut [0.0; 16])
+    recording.evaluate(&inputs, &mut [0.0; 16], &Tables::default())
 }

@@ -103,7 +103,7 @@ fn random_programs_evaluate_as_scalar_f32_runs() {
         loops += recording.statements().loops;
         toy::validated(&wgsl(&recording, &ProgramOptions::default()));
         for (world, expected) in worlds.iter().zip(&scalar) {
-            let got = recording.evaluate(world, &mut [0.0; toy::SCRATCH]);
+            let got = recording.evaluate(world, &mut [0.0; toy::SCRATCH], &toy::tables());
             let same = got
                 .iter()
                 .zip(expected)

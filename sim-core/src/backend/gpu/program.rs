@@ -6,7 +6,9 @@
 //!
 //! Binding 0 holds the fields: input i is `fields[inputs[i] * worlds + world]`. Binding 1 holds the
 //! rows: number k of row r of a table is `scratch[(base + r * stride + k) * worlds + world]`, and is
-//! declared only where a table is used.
+//! declared only where a table is used. Bindings 2 and 3, too, are declared only where they are read: the
+//! tables of the model, the same for every world, of numbers (`numbers[base + r * stride + k]`) and of
+//! indices. They are buffers, not constants, so that a program does not grow with its model's tables.
 //!
 //! What WGSL leaves open: an implementation may fuse a product with a sum, treat numbers below
 //! 2^-126 as 0, and assume that nothing is infinite or not a number. An infinite constant is
@@ -14,7 +16,7 @@
 //! by the recorder.
 
 use crate::lane::record::Recording;
-use crate::lane::record::tree::{Binary, Cell, Op, Operand, Rounds, Row, Statement, Unary};
+use crate::lane::record::tree::{Binary, Cell, Entry, Op, Operand, Rounds, Row, Statement, Unary};
 use std::fmt::{self, Write};
 
 /// What a program is called and where it finds its numbers.
@@ -111,6 +113,19 @@ impl Printer<'_> {
                 "@group(0) @binding(1) var<storage, read_write> scratch: array<f32>;"
             )?;
         }
+        let (numbers, indices) = self.recording.reads_tables();
+        if numbers {
+            writeln!(
+                self.text,
+                "@group(0) @binding(2) var<storage, read> numbers: array<f32>;"
+            )?;
+        }
+        if indices {
+            writeln!(
+                self.text,
+                "@group(0) @binding(3) var<storage, read> indices: array<u32>;"
+            )?;
+        }
         writeln!(self.text, "\n@compute @workgroup_size(workgroup)")?;
         writeln!(
             self.text,
@@ -200,14 +215,14 @@ impl Printer<'_> {
                 rounds,
                 body,
             } => {
-                let end = match rounds {
-                    Rounds::Times(n) => format!("{n}u"),
+                let (first, end) = match *rounds {
+                    Rounds::Span { first, end } => (index(first), index(end)),
                     Rounds::Rows { list, capacity } => {
                         line!(self, "let end{i} = min(n{list}, {capacity}u);")?;
-                        format!("end{i}")
+                        ("0u".to_owned(), format!("end{i}"))
                     }
                 };
-                line!(self, "for (var i{i} = 0u; i{i} < {end}; i{i}++) {{")?;
+                line!(self, "for (var i{i} = {first}; i{i} < {end}; i{i}++) {{")?;
                 self.nested(body)
             }
             Statement::Stop(mask) => line!(self, "if ({}) {{ break; }}", self.operand(*mask)),
@@ -245,6 +260,19 @@ impl Printer<'_> {
             Op::Fma(a, b, c) => format!("fma({}, {}, {})", x(a), x(b), x(c)),
             // WGSL names the value of the false case first
             Op::Select(mask, a, b) => format!("select({}, {}, {})", x(b), x(a), x(mask)),
+            Op::Number(row) => format!("f32({})", index(row)),
+            Op::Constant(Entry { table, row, number }) => {
+                format!("numbers[{}]", place(table.base + number, table.stride, row))
+            }
+            Op::Pick { table, row, number } => {
+                let first = table.base + number;
+                format!("numbers[u32({}) * {}u + {first}u]", x(row), table.stride)
+            }
+            Op::Index { entry, .. } => {
+                let Entry { table, row, number } = entry;
+                format!("indices[{}]", place(table.base + number, table.stride, row))
+            }
+            Op::After(row, n) => format!("{} + u32({})", index(row), x(n)),
         }
     }
 
@@ -260,17 +288,28 @@ impl Printer<'_> {
     }
 }
 
+fn index(row: Row) -> String {
+    match row {
+        Row::At(i) => format!("{i}u"),
+        Row::Name(name) => format!("i{name}"),
+        Row::Value(number) => format!("t{number}"),
+    }
+}
+
+/// Where a number of a row stands, which is `first` in row 0.
+fn place(first: usize, stride: usize, row: Row) -> String {
+    match row {
+        Row::At(i) => format!("{}u", first + i * stride),
+        _ => format!("{} * {stride}u + {first}u", index(row)),
+    }
+}
+
 fn scratch(cell: &Cell) -> String {
     let Cell { table, row, number } = cell;
-    let first = table.base + number;
+    let place = place(table.base + number, table.stride, *row);
     match row {
-        Row::At(i) => format!("scratch[{}u * worlds + world]", first + i * table.stride),
-        Row::Name(name) => {
-            format!(
-                "scratch[(i{name} * {}u + {first}u) * worlds + world]",
-                table.stride
-            )
-        }
+        Row::At(_) => format!("scratch[{place} * worlds + world]"),
+        _ => format!("scratch[({place}) * worlds + world]"),
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a text must not do if it is to become a program.
 
-use crate::lane::Table;
+use crate::lane::{Fixed, Table};
 use std::panic::Location;
 
 /// Where in the text something was done.
@@ -120,6 +120,16 @@ pub enum Misuse {
     OutsideTable {
         /// The table.
         table: Table,
+        /// The largest row reached.
+        row: usize,
+        /// Number in the row.
+        number: usize,
+    },
+    /// A number outside its table of the model.
+    #[error("row {row}, number {number} lies outside of {table:?} of the model")]
+    OutsideFixed {
+        /// The table.
+        table: Fixed,
         /// The largest row reached.
         row: usize,
         /// Number in the row.

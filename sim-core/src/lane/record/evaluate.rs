@@ -1,8 +1,8 @@
 //! Runs a recording on the CPU, one world at a time: the check on the program where no GPU is.
 
 use super::Recording;
-use super::tree::{Binary, Cell, Op, Operand, Rounds, Row, Statement, Unary};
-use crate::lane::Num;
+use super::tree::{Binary, Cell, Entry, Op, Operand, Rounds, Row, Statement, Unary};
+use crate::lane::{Num, Real, Tables};
 
 /// Should the statements after this one be run?
 #[derive(PartialEq)]
@@ -15,23 +15,26 @@ struct Machine<'a> {
     recording: &'a Recording,
     inputs: &'a [f32],
     scratch: &'a mut [f32],
+    tables: &'a Tables<f32>,
     /// Results by number; masks are 1 or 0.
     values: Vec<f32>,
+    /// Results that are indices, by number.
+    indices: Vec<usize>,
     variables: Vec<f32>,
     /// Lengths of lists, indices of loops, rows.
     counts: Vec<usize>,
 }
 
 impl Recording {
-    /// The outputs for these inputs, in `f32` with fused `fma`, for one world.
+    /// The outputs for these inputs and the tables of a model, in `f32` with fused `fma`, for one world.
     ///
     /// Equal to what the text gives in scalar `f32`, bit for bit up to the sign of zeros, as long
     /// as the numbers are finite: folding keeps every rounding.
     ///
     /// # Panics
-    /// If there are not as many inputs as were recorded, or fewer numbers of scratch memory than
-    /// [`Recording::scratch`] says.
-    pub fn evaluate(&self, inputs: &[f32], scratch: &mut [f32]) -> Vec<f32> {
+    /// If there are not as many inputs as were recorded, fewer numbers of scratch memory than
+    /// [`Recording::scratch`] says, or an index of the tables is not below the end that the text gave it.
+    pub fn evaluate(&self, inputs: &[f32], scratch: &mut [f32], tables: &Tables<f32>) -> Vec<f32> {
         assert_eq!(
             inputs.len(),
             self.inputs,
@@ -45,6 +48,8 @@ impl Recording {
             recording: self,
             inputs,
             scratch,
+            tables,
+            indices: vec![0; self.values.len()],
             values: vec![0.0; self.values.len()],
             variables: vec![0.0; self.names],
             counts: vec![0; self.names],
@@ -60,8 +65,18 @@ impl Machine<'_> {
         for statement in body {
             match statement {
                 Statement::Let(number) => {
-                    let op = self.recording.values[*number as usize];
-                    self.values[*number as usize] = self.compute(op);
+                    let number = *number as usize;
+                    match self.recording.values[number] {
+                        Op::Index { entry, end } => {
+                            let index = self.tables.indices[self.place(&entry)] as usize;
+                            assert!(index < end, "index {index} of {entry:?} is not below {end}");
+                            self.indices[number] = index;
+                        }
+                        Op::After(row, x) => {
+                            self.indices[number] = self.row(row) + self.operand(x).to_usize();
+                        }
+                        op => self.values[number] = self.compute(op),
+                    }
                 }
                 Statement::Var { name, value } | Statement::Set { name, value } => {
                     self.variables[*name as usize] = self.operand(*value);
@@ -97,11 +112,13 @@ impl Machine<'_> {
                     rounds,
                     body,
                 } => {
-                    let n = match *rounds {
-                        Rounds::Times(n) => n,
-                        Rounds::Rows { list, capacity } => self.counts[list as usize].min(capacity),
+                    let (first, end) = match *rounds {
+                        Rounds::Span { first, end } => (self.row(first), self.row(end)),
+                        Rounds::Rows { list, capacity } => {
+                            (0, self.counts[list as usize].min(capacity))
+                        }
                     };
-                    for i in 0..n {
+                    for i in first..end {
                         self.counts[*index as usize] = i;
                         if self.run(body) == Flow::LoopEnds {
                             break;
@@ -152,6 +169,13 @@ impl Machine<'_> {
                     x(b)
                 }
             }
+            Op::Number(row) => self.row(row) as f32,
+            Op::Constant(entry) => self.tables.numbers[self.place(&entry)],
+            Op::Pick { table, row, number } => {
+                let row = x(row).to_usize();
+                self.tables.numbers[table.base + row * table.stride + number]
+            }
+            Op::Index { .. } | Op::After(..) => unreachable!("the value is an index"),
         }
     }
 
@@ -168,10 +192,18 @@ impl Machine<'_> {
     }
 
     fn address(&self, cell: &Cell) -> usize {
-        let row = match cell.row {
+        cell.table.base + self.row(cell.row) * cell.table.stride + cell.number
+    }
+
+    fn place(&self, entry: &Entry) -> usize {
+        entry.table.base + self.row(entry.row) * entry.table.stride + entry.number
+    }
+
+    fn row(&self, row: Row) -> usize {
+        match row {
             Row::At(i) => i,
             Row::Name(name) => self.counts[name as usize],
-        };
-        cell.table.base + row * cell.table.stride + cell.number
+            Row::Value(number) => self.indices[number as usize],
+        }
     }
 }

@@ -4,10 +4,10 @@
 //! what it loads next, whatever the mask was on the CPU.
 
 use super::error::Misuse;
-use super::handles::RecordedIndex;
+use super::handles::{Owner, RecordedIndex};
 use super::state::{Kind, State};
-use super::tree::{Cell, Op, Operand, Row, Statement};
-use crate::lane::Table;
+use super::tree::{Cell, Entry, Op, Operand, Row, Statement};
+use crate::lane::{Fixed, Real, Table};
 use std::collections::HashMap;
 
 /// Values known in one open block.
@@ -61,7 +61,7 @@ impl State {
     /// The cell that an index names, checked; none after a misuse.
     pub(super) fn cell(&mut self, table: Table, row: RecordedIndex, number: usize) -> Option<Cell> {
         self.check(row.home, "index");
-        if let (Some(list), Some(owner)) = (row.list, self.owner(table))
+        if let (Some(list), Some(owner)) = (row.owner, self.owner(table))
             && list != owner
         {
             self.refuse(Misuse::RowOfAnotherList);
@@ -79,6 +79,44 @@ impl State {
             self.refuse(Misuse::OutsideTable { table, row, number });
         }
         !self.failed()
+    }
+
+    /// The number of a table of the model that an index names, checked; none after a misuse.
+    pub(super) fn entry(
+        &mut self,
+        table: Fixed,
+        row: RecordedIndex,
+        number: usize,
+    ) -> Option<Entry> {
+        self.check(row.home, "index");
+        self.is_inside_fixed(table, row.max, number)
+            .then_some(Entry {
+                table,
+                row: row.row,
+                number,
+            })
+    }
+
+    /// Is there such a row and number in the table of the model?
+    pub(super) fn is_inside_fixed(&mut self, table: Fixed, row: usize, number: usize) -> bool {
+        if row >= table.rows || number >= table.stride {
+            self.refuse(Misuse::OutsideFixed { table, row, number });
+        }
+        !self.failed()
+    }
+
+    /// Number `number` of the row of a table of the model that is nearest to `row`.
+    pub(super) fn pick(&mut self, table: Fixed, row: Operand, number: usize) -> Operand {
+        let row = self.max(row, Operand::number(0.0));
+        let row = self.min(row, Operand::number(table.rows as f32 - 1.0));
+        match row.constant() {
+            Some(row) => self.value(Op::Constant(Entry {
+                table,
+                row: Row::At(row.to_usize()),
+                number,
+            })),
+            None => self.value(Op::Pick { table, row, number }),
+        }
     }
 
     /// A fact that was learnt inside the present round of the innermost loop, or outside of all
@@ -152,14 +190,14 @@ impl State {
     }
 
     /// Notes whose rows a table holds from now on; none: rows chosen by number.
-    pub(super) fn own(&mut self, table: Table, list: Option<u32>) {
+    pub(super) fn own(&mut self, table: Table, list: Option<Owner>) {
         match list {
             Some(list) => self.owners.insert(table, list),
             None => self.owners.remove(&table),
         };
     }
 
-    pub(super) fn owner(&self, table: Table) -> Option<u32> {
+    pub(super) fn owner(&self, table: Table) -> Option<Owner> {
         self.owners.get(&table).copied()
     }
 }

@@ -85,7 +85,8 @@ impl Live<'_> {
                         any = true;
                     }
                 }
-                Statement::Store { value, .. } => {
+                Statement::Store { cell, value } => {
+                    cell.row.each_operand(|x| self.mark(x));
                     self.mark(*value);
                     any = true;
                 }
@@ -106,8 +107,14 @@ impl Live<'_> {
                 }
                 Statement::Loop { rounds, body, .. } => {
                     if self.walk(body) {
-                        if let Rounds::Rows { list, .. } = rounds {
-                            self.names.insert(*list);
+                        match rounds {
+                            Rounds::Rows { list, .. } => {
+                                self.names.insert(*list);
+                            }
+                            Rounds::Span { first, end } => {
+                                first.each_operand(|x| self.mark(x));
+                                end.each_operand(|x| self.mark(x));
+                            }
                         }
                         // what ends a live loop is live too
                         for statement in body {

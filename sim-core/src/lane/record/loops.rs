@@ -6,16 +6,20 @@
 
 use super::MAX_NESTING;
 use super::error::{Misuse, Place};
-use super::handles::RecordedLoop;
+use super::handles::{Owner, RecordedLoop};
 use super::rounds::{Difference, Pair};
 use super::state::{Counters, Kind, State};
-use super::tree::{Rounds, Statement};
+use super::tree::{Rounds, Row, Statement};
 
 #[derive(Debug)]
 pub(super) struct OpenLoop {
     block: &'static str,
     pub index: u32,
-    pub rounds: Rounds,
+    rounds: Rounds,
+    /// Past the largest index.
+    pub end: usize,
+    /// Whose rows the loop runs over.
+    pub owner: Option<Owner>,
     depth: usize,
     opened: Place,
     progress: Progress,
@@ -35,18 +39,34 @@ enum Progress {
 }
 
 impl State {
-    /// Opens a loop; it has not started.
-    pub(super) fn open_loop(&mut self, block: &'static str, rounds: Rounds) -> RecordedLoop {
+    /// Opens a loop whose indices lie below `end`; it has not started.
+    pub(super) fn open_loop(
+        &mut self,
+        block: &'static str,
+        rounds: Rounds,
+        end: usize,
+        owner: Option<Owner>,
+    ) -> RecordedLoop {
         if self.loops_open() >= MAX_NESTING {
             self.refuse(Misuse::TooDeep);
         }
-        if rounds.max() == 0 {
+        let is_empty = match rounds {
+            Rounds::Span { first, end } if first == end => true,
+            Rounds::Span {
+                first: Row::At(first),
+                ..
+            } => first >= end,
+            _ => end == 0,
+        };
+        if is_empty {
             return RecordedLoop(None);
         }
         RecordedLoop(Some(OpenLoop {
             block,
             index: self.name(),
             rounds,
+            end,
+            owner,
             depth: self.depth(),
             opened: self.place(),
             progress: Progress::Start,

@@ -7,7 +7,7 @@
 //! depends on is left out.
 //!
 //! ```
-//! use sim_core::lane::{Cx, Num, record::record};
+//! use sim_core::lane::{Cx, Num, Tables, record::record};
 //! use sim_core::times;
 //!
 //! let doubled_thrice = record(1, |cx, x| {
@@ -19,7 +19,7 @@
 //!     vec![cx.get(&sum)]
 //! })
 //! .unwrap();
-//! assert_eq!(doubled_thrice.evaluate(&[5.0], &mut []), [40.0]);
+//! assert_eq!(doubled_thrice.evaluate(&[5.0], &mut [], &Tables::default()), [40.0]);
 //! ```
 //!
 //! What means one thing on this machine and another on a CPU lane is refused ([`Misuse`]): above
@@ -32,6 +32,7 @@ mod evaluate;
 mod facts;
 mod fold;
 mod handles;
+mod lists;
 mod live;
 mod loops;
 mod number;
@@ -74,7 +75,7 @@ pub struct Statements {
     pub variables: usize,
     /// Assignments.
     pub sets: usize,
-    /// Numbers read: inputs and scratch memory.
+    /// Numbers read: inputs, scratch memory, and tables of the model.
     pub loads: usize,
     /// Numbers written: outputs and scratch memory.
     pub stores: usize,
@@ -158,7 +159,7 @@ impl Recording {
         let mut reach = |cell: &Cell| {
             let rows = match cell.row {
                 Row::At(i) => i + 1,
-                Row::Name(_) => cell.table.rows,
+                Row::Name(_) | Row::Value(_) => cell.table.rows,
             };
             end = end.max(cell.table.base + rows * cell.table.stride);
         };
@@ -174,6 +175,21 @@ impl Recording {
         end
     }
 
+    /// Does the text read numbers, and does it read indices, of the tables of the model?
+    pub(crate) fn reads_tables(&self) -> (bool, bool) {
+        let (mut numbers, mut indices) = (false, false);
+        self.each_statement(&mut |statement| {
+            if let Statement::Let(number) = statement {
+                match self.values[*number as usize] {
+                    Op::Constant(_) | Op::Pick { .. } => numbers = true,
+                    Op::Index { .. } => indices = true,
+                    _ => {}
+                }
+            }
+        });
+        (numbers, indices)
+    }
+
     /// How many statements the program will have.
     pub fn statements(&self) -> Statements {
         let mut n = Statements {
@@ -183,7 +199,7 @@ impl Recording {
         };
         self.each_statement(&mut |statement| match statement {
             Statement::Let(number) => match self.values[*number as usize] {
-                Op::Load(_) => n.loads += 1,
+                Op::Load(_) | Op::Constant(_) | Op::Pick { .. } | Op::Index { .. } => n.loads += 1,
                 op if op.is_inline() => {}
                 _ => n.lets += 1,
             },

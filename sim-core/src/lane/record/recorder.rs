@@ -2,7 +2,7 @@
 
 use super::error::Misuse;
 use super::handles::{
-    OpenBlock, RecordedBlock, RecordedIndex, RecordedList, RecordedLoop, RecordedRow,
+    OpenBlock, Opened, RecordedBlock, RecordedIndex, RecordedList, RecordedLoop, RecordedRow,
     RecordedVariable,
 };
 use super::state::{Kind, NOWHERE, with};
@@ -76,40 +76,86 @@ impl Cx for Recorder {
         RecordedIndex {
             row: Row::At(i),
             max: i,
-            list: None,
+            owner: None,
             home: NOWHERE,
         }
     }
 
-    fn put(&mut self, _v: &mut RecordedVariable, _x: Recorded) {
-        unimplemented!()
+    #[track_caller]
+    fn put(&mut self, v: &mut RecordedVariable, x: Recorded) {
+        self.set(v, x);
     }
-    fn only(&mut self, _x: Recorded) -> Recorded {
-        unimplemented!()
+
+    #[track_caller]
+    fn only(&mut self, x: Recorded) -> Recorded {
+        with(Location::caller(), |s| {
+            // a program runs where the world is active
+            let x = s.see(x);
+            s.handle(x)
+        })
     }
-    fn number(&mut self, _i: RecordedIndex) -> Recorded {
-        unimplemented!()
+
+    #[track_caller]
+    fn number(&mut self, i: RecordedIndex) -> Recorded {
+        with(Location::caller(), |s| {
+            s.check(i.home, "index");
+            let x = match s.failed() {
+                true => Operand::number(0.0),
+                false => s.number(i.row),
+            };
+            s.handle(x)
+        })
     }
-    fn constant(&mut self, _t: Fixed, _row: RecordedIndex, _k: usize) -> Recorded {
-        unimplemented!()
+
+    #[track_caller]
+    fn constant(&mut self, t: Fixed, row: RecordedIndex, k: usize) -> Recorded {
+        with(Location::caller(), |s| {
+            let x = match s.entry(t, row, k) {
+                Some(entry) => s.value(Op::Constant(entry)),
+                None => Operand::number(0.0),
+            };
+            s.handle(x)
+        })
     }
-    fn pick(&mut self, _t: Fixed, _row: Recorded, _k: usize) -> Recorded {
-        unimplemented!()
+
+    #[track_caller]
+    fn pick(&mut self, t: Fixed, row: Recorded, k: usize) -> Recorded {
+        with(Location::caller(), |s| {
+            let row = s.see(row);
+            let x = match s.is_inside_fixed(t, 0, k) {
+                true => s.pick(t, row, k),
+                false => Operand::number(0.0),
+            };
+            s.handle(x)
+        })
     }
-    fn index(&mut self, _t: Fixed, _row: RecordedIndex, _k: usize, _end: usize) -> RecordedIndex {
-        unimplemented!()
+
+    #[track_caller]
+    fn index(&mut self, t: Fixed, row: RecordedIndex, k: usize, end: usize) -> RecordedIndex {
+        with(Location::caller(), |s| {
+            let entry = s.entry(t, row, k);
+            let row = match entry.map(|entry| s.value(Op::Index { entry, end })) {
+                Some(Operand::Value(number)) => Row::Value(number),
+                _ => Row::At(0),
+            };
+            RecordedIndex {
+                row,
+                max: end.saturating_sub(1),
+                owner: None,
+                home: s.here(),
+            }
+        })
     }
+
+    #[track_caller]
     fn kept(
         &mut self,
-        _counts: Table,
-        _at: RecordedIndex,
-        _first: RecordedIndex,
-        _capacity: RecordedIndex,
+        counts: Table,
+        at: RecordedIndex,
+        first: RecordedIndex,
+        capacity: RecordedIndex,
     ) -> RecordedList {
-        unimplemented!()
-    }
-    fn span(&mut self, _first: RecordedIndex, _end: RecordedIndex) -> RecordedLoop {
-        unimplemented!()
+        with(Location::caller(), |s| s.kept(counts, at, first, capacity))
     }
 
     #[track_caller]
@@ -128,7 +174,7 @@ impl Cx for Recorder {
         with(Location::caller(), |s| {
             let value = s.see(x);
             if let Some(cell) = s.cell(t, row, k) {
-                if row.list.is_none() {
+                if row.owner.is_none() {
                     s.own(t, None);
                 }
                 s.store(cell, value);
@@ -152,12 +198,12 @@ impl Cx for Recorder {
             if s.pushing() != Some(row.list) {
                 return s.refuse(Misuse::RowOfAnotherList);
             }
-            if s.is_inside(t, row.capacity.saturating_sub(1), k) {
-                s.own(t, Some(row.list));
+            if s.is_inside(t, row.end.saturating_sub(1), k) {
+                s.own(t, Some(row.owner));
                 s.store(
                     Cell {
                         table: t,
-                        row: Row::Name(row.name),
+                        row: row.row,
                         number: k,
                     },
                     value,
@@ -168,16 +214,7 @@ impl Cx for Recorder {
 
     #[track_caller]
     fn list(&mut self, capacity: usize) -> RecordedList {
-        with(Location::caller(), |s| {
-            let name = s.name();
-            s.emit(Statement::List { name });
-            s.assign(name, Operand::number(0.0));
-            RecordedList {
-                name,
-                capacity,
-                home: s.here(),
-            }
-        })
+        with(Location::caller(), |s| s.list(capacity))
     }
 
     #[track_caller]
@@ -192,21 +229,7 @@ impl Cx for Recorder {
             if mask == Operand::Truth(false) || s.failed() {
                 return (RecordedBlock(None), None);
             }
-            s.forget(list.name);
-            let (name, depth) = (s.name(), s.depth());
-            s.enter(Kind::Push { list: list.name });
-            let row = RecordedRow {
-                name,
-                list: list.name,
-                capacity: list.capacity,
-                home: s.here(),
-            };
-            let block = OpenBlock {
-                mask,
-                row: Some(row),
-                depth,
-            };
-            (RecordedBlock(Some(block)), Some(row))
+            s.push(list, mask)
         })
     }
 
@@ -214,7 +237,10 @@ impl Cx for Recorder {
     fn pushed(&mut self, list: &RecordedList) -> Recorded {
         with(Location::caller(), |s| {
             s.check(list.home, "list");
-            let count = s.get(list.name, Op::Count(list.name));
+            let count = match s.failed() {
+                true => Operand::number(0.0),
+                false => s.pushed(list),
+            };
             s.handle(count)
         })
     }
@@ -231,8 +257,8 @@ impl Cx for Recorder {
             (
                 RecordedBlock(Some(OpenBlock {
                     mask,
-                    row: None,
                     depth,
+                    opened: Opened::When,
                 })),
                 true,
             )
@@ -242,48 +268,41 @@ impl Cx for Recorder {
     #[track_caller]
     fn leave(&mut self, block: RecordedBlock) {
         let Some(block) = block.0 else { return };
-        with(Location::caller(), |s| {
-            let body = s.leave(block.depth);
-            if s.failed() {
-                return;
-            }
-            match block.row {
-                Some(row) => s.emit(Statement::Push {
-                    list: row.list,
-                    capacity: row.capacity,
-                    row: row.name,
-                    mask: block.mask,
-                    body,
-                }),
-                None if block.mask == Operand::Truth(true) => {
-                    body.into_iter().for_each(|statement| s.emit(statement));
-                }
-                None => s.emit(Statement::When {
-                    mask: block.mask,
-                    body,
-                }),
-            }
-        });
+        with(Location::caller(), |s| s.close(block));
     }
 
     #[track_caller]
     fn rows(&mut self, list: &RecordedList) -> RecordedLoop {
         with(Location::caller(), |s| {
             s.check(list.home, "list");
-            s.open_loop(
-                "each!",
-                Rounds::Rows {
-                    list: list.name,
-                    capacity: list.capacity,
-                },
-            )
+            match s.failed() {
+                true => RecordedLoop(None),
+                false => s.rows(list),
+            }
         })
     }
 
     #[track_caller]
     fn times(&mut self, n: usize) -> RecordedLoop {
         with(Location::caller(), |s| {
-            s.open_loop("times!", Rounds::Times(n))
+            let rounds = Rounds::Span {
+                first: Row::At(0),
+                end: Row::At(n),
+            };
+            s.open_loop("times!", rounds, n, None)
+        })
+    }
+
+    #[track_caller]
+    fn span(&mut self, first: RecordedIndex, end: RecordedIndex) -> RecordedLoop {
+        with(Location::caller(), |s| {
+            s.check(first.home, "index");
+            s.check(end.home, "index");
+            let rounds = Rounds::Span {
+                first: first.row,
+                end: end.row,
+            };
+            s.open_loop("span!", rounds, end.max, None)
         })
     }
 
@@ -296,15 +315,10 @@ impl Cx for Recorder {
                 l.0 = None;
                 return None;
             }
-            let list = match open.rounds {
-                Rounds::Times(_) => None,
-                Rounds::Rows { list, .. } => Some(list),
-            };
-            let row = Row::Name(open.index);
             Some(RecordedIndex {
-                row,
-                max: open.rounds.max() - 1,
-                list,
+                row: Row::Name(open.index),
+                max: open.end - 1,
+                owner: open.owner,
                 home: s.here(),
             })
         })

@@ -2,7 +2,7 @@
 
 use super::error::Place;
 use super::state::{Counters, Value};
-use super::tree::{Cell, Op, Operand, Rounds, Row, Statement};
+use super::tree::{Cell, Entry, Op, Operand, Rounds, Row, Statement};
 
 /// The first difference found.
 pub(super) struct Difference {
@@ -130,6 +130,31 @@ impl Pair<'_> {
                 self.operand(*a2, *b2)?;
                 self.operand(*a3, *b3)
             }
+            (Op::Number(a), Op::Number(b)) => self.row(*a, *b),
+            (Op::Constant(a), Op::Constant(b)) => self.entry(a, b),
+            (
+                Op::Pick {
+                    table: t,
+                    row: a,
+                    number: m,
+                },
+                Op::Pick {
+                    table: u,
+                    row: b,
+                    number: n,
+                },
+            ) => {
+                same(t == u && m == n)?;
+                self.operand(*a, *b)
+            }
+            (Op::Index { entry: a, end: m }, Op::Index { entry: b, end: n }) => {
+                same(m == n)?;
+                self.entry(a, b)
+            }
+            (Op::After(a, x), Op::After(b, y)) => {
+                self.row(*a, *b)?;
+                self.operand(*x, *y)
+            }
             _ => Err(STRUCTURE),
         }
     }
@@ -155,16 +180,29 @@ impl Pair<'_> {
 
     fn cell(&self, a: &Cell, b: &Cell) -> Same {
         same(a.table == b.table && a.number == b.number)?;
-        match (a.row, b.row) {
+        self.row(a.row, b.row)
+    }
+
+    fn entry(&self, a: &Entry, b: &Entry) -> Same {
+        same(a.table == b.table && a.number == b.number)?;
+        self.row(a.row, b.row)
+    }
+
+    fn row(&self, a: Row, b: Row) -> Same {
+        match (a, b) {
             (Row::At(a), Row::At(b)) => same(a == b),
             (Row::Name(a), Row::Name(b)) => self.name(a, b),
+            (Row::Value(a), Row::Value(b)) => self.value(a, b),
             _ => Err(STRUCTURE),
         }
     }
 
     fn rounds(&self, a: Rounds, b: Rounds) -> Same {
         match (a, b) {
-            (Rounds::Times(a), Rounds::Times(b)) => same(a == b),
+            (Rounds::Span { first: a, end: m }, Rounds::Span { first: b, end: n }) => {
+                self.row(a, b)?;
+                self.row(m, n)
+            }
             (
                 Rounds::Rows {
                     list: a,

@@ -6,6 +6,7 @@
 use super::Recorded;
 use super::error::{Misuse, Place, RecordError};
 use super::facts::Facts;
+use super::handles::Owner;
 use super::tree::{Op, Operand, Statement};
 use crate::lane::Table;
 use std::cell::RefCell;
@@ -35,6 +36,7 @@ pub(super) enum Kind {
         index: u32,
     },
     When,
+    /// Of the list handle with this name.
     Push {
         list: u32,
     },
@@ -80,8 +82,8 @@ pub(super) struct State {
     /// Of every block ever opened, by number.
     kinds: Vec<Kind>,
     pub tables: Vec<Table>,
-    /// The list whose rows a table holds.
-    pub owners: HashMap<Table, u32>,
+    /// Whose rows a table holds.
+    pub owners: HashMap<Table, Owner>,
     error: Option<RecordError>,
     /// Where in the text the present operation is.
     place: Place,
@@ -279,6 +281,15 @@ impl State {
         });
         self.emit(Statement::Let(number));
         Operand::Value(number)
+    }
+
+    /// What stands in a block: where its mask always holds, without one.
+    pub(super) fn emit_when(&mut self, mask: Operand, body: Vec<Statement>) {
+        if mask == Operand::Truth(true) {
+            self.innermost_mut().statements.extend(body);
+        } else {
+            self.emit(Statement::When { mask, body });
+        }
     }
 
     pub(super) fn depth(&self) -> usize {

@@ -1,6 +1,6 @@
 //! What a recording is made of: values in the order they were computed, statements in blocks.
 
-use crate::lane::Table;
+use crate::lane::{Fixed, Table};
 
 /// What an operation reads: a constant, or a value computed before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -65,14 +65,38 @@ pub(crate) enum Op {
     Fma(Operand, Operand, Operand),
     /// Mask, value where it holds, value where it does not.
     Select(Operand, Operand, Operand),
+    /// An index as a number.
+    Number(Row),
+    /// A number of a table of the model.
+    Constant(Entry),
+    /// A number of a table of the model, in a row that is whole and lies inside.
+    Pick {
+        table: Fixed,
+        row: Operand,
+        number: usize,
+    },
+    /// An index of an index table of the model, below `end`. The value is an index.
+    Index {
+        entry: Entry,
+        end: usize,
+    },
+    /// The index that lies a whole number after another. The value is an index.
+    After(Row, Operand),
 }
 
 impl Op {
     /// Calls `f` with every operand.
     pub(crate) fn each_operand(&self, mut f: impl FnMut(Operand)) {
         match *self {
-            Op::Input(_) | Op::Get(_) | Op::Load(_) | Op::Count(_) => {}
-            Op::Unary(_, a) => f(a),
+            Op::Input(_) | Op::Get(_) | Op::Count(_) => {}
+            Op::Load(cell) => cell.row.each_operand(f),
+            Op::Number(row) => row.each_operand(f),
+            Op::Constant(entry) | Op::Index { entry, .. } => entry.row.each_operand(f),
+            Op::Unary(_, a) | Op::Pick { row: a, .. } => f(a),
+            Op::After(row, a) => {
+                row.each_operand(&mut f);
+                f(a);
+            }
             Op::Binary(_, a, b) => {
                 f(a);
                 f(b);
@@ -91,12 +115,31 @@ impl Op {
     }
 }
 
-/// Which row of a table.
+/// An index: of a row of a table, or of a round.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Row {
     At(usize),
     /// The index of an open loop, or the fresh row of an open push.
     Name(u32),
+    /// An index that was computed: [`Op::Index`] or [`Op::After`].
+    Value(u32),
+}
+
+impl Row {
+    /// Calls `f` with the value that it is, if it is one.
+    pub(crate) fn each_operand(self, mut f: impl FnMut(Operand)) {
+        if let Row::Value(number) = self {
+            f(Operand::Value(number));
+        }
+    }
+}
+
+/// Number `number` of a row of a table of the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Entry {
+    pub table: Fixed,
+    pub row: Row,
+    pub number: usize,
 }
 
 /// Number `number` of a row of a table in scratch memory.
@@ -107,24 +150,13 @@ pub(crate) struct Cell {
     pub number: usize,
 }
 
-/// How often a loop runs at most.
+/// Which rounds a loop runs, at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rounds {
-    Times(usize),
+    /// From the first index to before the end.
+    Span { first: Row, end: Row },
     /// The rows that a list holds when the loop starts.
-    Rows {
-        list: u32,
-        capacity: usize,
-    },
-}
-
-impl Rounds {
-    pub(crate) fn max(self) -> usize {
-        match self {
-            Rounds::Times(n) => n,
-            Rounds::Rows { capacity, .. } => capacity,
-        }
-    }
+    Rows { list: u32, capacity: usize },
 }
 
 #[derive(Clone, Debug, PartialEq)]
