@@ -1,10 +1,12 @@
 //! The CPU machines: the same text gives the same bits whatever the width of a block.
 
+mod kept;
+mod sincos;
+#[path = "../toy/mod.rs"]
 mod toy;
 
 use sim_core::lane::{Cx, Lane, Num, Table, Tables};
 use sim_core::{break_if, each, push, times, when};
-use toy::contacts;
 
 const POINTS: Table = Table {
     base: 0,
@@ -65,17 +67,6 @@ fn scalar(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
     )
 }
 
-/// The texts of [`contacts`], with the scratch memory that they leave.
-#[inline(always)]
-fn contacts_of<F: Lane>(worlds: &[[F::Real; 3]]) -> Vec<Vec<F::Real>> {
-    toy::on_cpu_with(
-        worlds,
-        contacts::SCRATCH,
-        &contacts::tables(),
-        |cx, x: &[F]| contacts::both(cx, x),
-    )
-}
-
 #[cfg(target_arch = "x86_64")]
 mod wide {
     use super::*;
@@ -102,16 +93,6 @@ mod wide {
     }
 
     #[target_feature(enable = "avx2,fma")]
-    pub fn contacts_by_eight(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
-        contacts_of::<F32x8>(worlds)
-    }
-
-    #[target_feature(enable = "avx512f")]
-    pub fn contacts_by_sixteen(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
-        contacts_of::<F32x16>(worlds)
-    }
-
-    #[target_feature(enable = "avx2,fma")]
     pub fn run_by_eight(steps: &[toy::Step], worlds: &[[f32; toy::INPUTS]]) -> Vec<Vec<f32>> {
         toy::on_cpu::<F32x8>(steps, worlds)
     }
@@ -119,16 +100,6 @@ mod wide {
     #[target_feature(enable = "avx512f")]
     pub fn run_by_sixteen(steps: &[toy::Step], worlds: &[[f32; toy::INPUTS]]) -> Vec<Vec<f32>> {
         toy::on_cpu::<F32x16>(steps, worlds)
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    pub fn sincos_by_eight(x: &[f32]) -> Vec<(f32, f32)> {
-        sincos::<F32x8>(x)
-    }
-
-    #[target_feature(enable = "avx512f")]
-    pub fn sincos_by_sixteen(x: &[f32]) -> Vec<(f32, f32)> {
-        sincos::<F32x16>(x)
     }
 
     pub fn has_eight() -> bool {
@@ -188,92 +159,6 @@ fn the_text_of_these_tests_takes_every_path() {
         column(2).any(|pushed| pushed > POINTS.rows as f32),
         "a list that overflows"
     );
-    // rows of three kept lists with room for 3, 1 and 0
-    let results = contacts_of::<f32>(&inputs(200));
-    let column = |k: usize| results.iter().map(move |r| r[k]);
-    for (kind, room) in [3.0, 1.0, 0.0].into_iter().enumerate() {
-        assert!(column(kind).any(|pushed| pushed == 0.0));
-        assert!(column(kind).any(|pushed| pushed > room));
-    }
-    assert!(column(0).any(|pushed| pushed > 0.0 && pushed < 3.0));
-    assert!(column(5).any(|largest| largest > 0.0) && column(5).any(|largest| largest == 0.0));
-}
-
-#[cfg(target_arch = "x86_64")]
-#[test]
-fn kept_lists_are_bitwise_the_same_in_every_width_and_order() {
-    let worlds = inputs(200);
-    let order: Vec<usize> = (0..200).map(|i| (i * 37 + 5) % 200).collect();
-    let permuted: Vec<_> = order.iter().map(|i| worlds[*i]).collect();
-    let one = bits(&contacts_of::<f32>(&worlds));
-    let check = |straight: Vec<Vec<f32>>, other: Vec<Vec<f32>>| {
-        assert_eq!(bits(&straight), one);
-        let other = bits(&other);
-        for (i, result) in order.iter().zip(&other) {
-            assert_eq!(result, &one[*i]);
-        }
-    };
-    if wide::has_eight() {
-        // SAFETY: the machine has the features, as was just asked
-        unsafe {
-            check(
-                wide::contacts_by_eight(&worlds),
-                wide::contacts_by_eight(&permuted),
-            )
-        };
-    }
-    if wide::has_sixteen() {
-        // SAFETY: the machine has the features, as was just asked
-        unsafe {
-            check(
-                wide::contacts_by_sixteen(&worlds),
-                wide::contacts_by_sixteen(&permuted),
-            )
-        };
-    }
-}
-
-#[test]
-fn kept_lists_in_f64_hold_the_rows_of_f32() {
-    let worlds = inputs(500);
-    let double: Vec<[f64; 3]> = worlds.iter().map(|w| w.map(f64::from)).collect();
-    for (single, double) in contacts_of::<f32>(&worlds)
-        .iter()
-        .zip(contacts_of::<f64>(&double))
-    {
-        for (a, b) in single.iter().zip(&double) {
-            // at most four rows of 3.7 stiffness by 4 depth, each of three roundings
-            let tolerance = 4.0 * 16.0 * 3.0 * f64::from(f32::EPSILON);
-            assert!(
-                (f64::from(*a) - b).abs() < tolerance,
-                "{single:?}, {double:?}"
-            );
-        }
-    }
-}
-
-#[test]
-fn two_handles_on_a_kept_list_agree() {
-    let counts = Table {
-        base: 0,
-        stride: 1,
-        rows: 2,
-    };
-    let rows = Table {
-        base: 2,
-        stride: 1,
-        rows: 4,
-    };
-    let mut memory = vec![0.0f64; 6];
-    let tables = Tables::default();
-    let mut machine = sim_core::lane::memory::Cpu::new(&mut memory, &tables);
-    let cx = &mut machine;
-    let (mut a, mut b) = (cx.kept(counts, 1, 1, 2), cx.kept(counts, 1, 1, 2));
-    push!(cx, a, true, row, { cx.init(rows, row, 0, 5.0) });
-    push!(cx, b, true, row, { cx.init(rows, row, 0, 6.0) });
-    push!(cx, a, true, row, { cx.init(rows, row, 0, 7.0) });
-    assert_eq!((cx.pushed(&a), cx.pushed(&b)), (3.0, 3.0));
-    assert_eq!(memory, [0.0, 3.0, 0.0, 5.0, 6.0, 0.0]);
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -493,89 +378,4 @@ fn a_row_outside_its_table_is_found_in_debug_builds() {
         row,
         1,
     );
-}
-
-fn sincos<F: Lane<Real = f32>>(x: &[f32]) -> Vec<(f32, f32)> {
-    let mut results = Vec::new();
-    for block in x.chunks(F::WIDTH) {
-        let mut padded = block.to_vec();
-        padded.resize(F::WIDTH, 0.0);
-        let (sin, cos) = F::load(&padded).sincos();
-        let (mut s, mut c) = (padded.clone(), padded);
-        sin.store(&mut s);
-        cos.store(&mut c);
-        results.extend(s.into_iter().zip(c).take(block.len()));
-    }
-    results
-}
-
-/// Random angles up to a limit, and those near multiples of π/2 and π/4, where reductions fail.
-fn angles(limit: f64) -> Vec<f64> {
-    let mut random = toy::Random(5);
-    let mut angles = vec![0.0, -0.0, 1e-30, -1e-8, limit, -limit];
-    for _ in 0..100_000 {
-        angles.push(random.unit() * limit);
-        angles.push(random.unit() * 4.0);
-    }
-    let quarters = (limit / std::f64::consts::FRAC_PI_4) as usize;
-    for _ in 0..50_000 {
-        let near = random.below(quarters) as f64 * std::f64::consts::FRAC_PI_4;
-        angles.push(near + random.unit() * near * 1e-7);
-        angles.push(near * (1.0 + f64::EPSILON * random.below(4) as f64));
-    }
-    angles
-}
-
-#[test]
-fn sincos_in_f32_is_good_to_an_ulp_of_one_up_to_ten_thousand() {
-    let angles: Vec<f32> = angles(1e4).into_iter().map(|x| x as f32).collect();
-    let mut worst = 0.0f64;
-    for (x, (sin, cos)) in angles.iter().zip(sincos::<f32>(&angles)) {
-        let (s, c) = f64::from(*x).sin_cos();
-        worst = worst
-            .max((f64::from(sin) - s).abs())
-            .max((f64::from(cos) - c).abs());
-    }
-    // half an ulp of the result's rounding, as much for the polynomial's, below 1
-    assert!(worst <= f64::from(f32::EPSILON), "{worst:e}");
-}
-
-#[test]
-fn sincos_in_f64_is_good_to_an_ulp_of_one_up_to_ten_thousand() {
-    let mut worst = 0.0f64;
-    for x in angles(1e4) {
-        let (sin, cos) = Num::sincos(x);
-        let (s, c) = x.sin_cos();
-        worst = worst.max((sin - s).abs()).max((cos - c).abs());
-    }
-    assert!(worst <= f64::EPSILON, "{worst:e}");
-}
-
-#[test]
-fn sine_near_zero_is_good_relatively() {
-    for k in -30..0 {
-        let x = 2f32.powi(k) * 1.3;
-        let (sin, cos) = Num::sincos(x);
-        assert!((f64::from(sin) / f64::from(x).sin() - 1.0).abs() < f64::from(f32::EPSILON));
-        assert!((f64::from(cos) - f64::from(x).cos()).abs() < f64::from(f32::EPSILON));
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[test]
-fn sincos_is_bitwise_the_same_in_every_width() {
-    let angles: Vec<f32> = angles(1e6).into_iter().map(|x| x as f32).collect();
-    let one = sincos::<f32>(&angles);
-    let same = |wide: Vec<(f32, f32)>| {
-        let bits = |(s, c): (f32, f32)| (s.to_bits(), c.to_bits());
-        wide.into_iter().zip(&one).all(|(a, b)| bits(a) == bits(*b))
-    };
-    if wide::has_eight() {
-        // SAFETY: the machine has the features, as was just asked
-        assert!(same(unsafe { wide::sincos_by_eight(&angles) }));
-    }
-    if wide::has_sixteen() {
-        // SAFETY: the machine has the features, as was just asked
-        assert!(same(unsafe { wide::sincos_by_sixteen(&angles) }));
-    }
 }
