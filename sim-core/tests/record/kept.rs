@@ -345,6 +345,29 @@ fn index_that_changes_from_round_to_round_is_refused() {
         vec![cx.get(&sum)]
     });
     assert_eq!(misuse, Misuse::RoundsDiffer { block: "times!" });
+    // also one that is known only at run time
+    let misuse = refused(|cx, x| {
+        let at = cx.at(1);
+        let (first, second) = (cx.index(FIXED, at, 0, 3), cx.index(FIXED, at, 1, 3));
+        let mut row = first;
+        times!(cx, 3, {
+            cx.store(TABLE, row, 0, x[0]);
+            row = second;
+        });
+        vec![]
+    });
+    assert_eq!(misuse, Misuse::RoundsDiffer { block: "times!" });
+    let misuse = refused(|cx, x| {
+        let at = cx.at(1);
+        let (first, second) = (cx.index(FIXED, at, 0, 3), cx.index(FIXED, at, 1, 3));
+        let mut end = first;
+        times!(cx, 3, {
+            span!(cx, i in at, end, { cx.store(TABLE, i, 0, x[0]) });
+            end = second;
+        });
+        vec![]
+    });
+    assert_eq!(misuse, Misuse::RoundsDiffer { block: "times!" });
 }
 
 #[test]
