@@ -34,6 +34,24 @@ pub(crate) fn read_urdf(
         .map_err(|error| raise(py, "UrdfError", error.to_string()))
 }
 
+/// What a mesh file becomes, as JSON.
+#[pyfunction]
+pub(crate) fn read_mesh(
+    py: Python<'_>,
+    path: PathBuf,
+    scale: [f64; 3],
+    max_hull_vertices: usize,
+    convex_decomposition: bool,
+) -> PyResult<String> {
+    let options = MeshOptions {
+        max_hull_vertices,
+        convex_decomposition,
+    };
+    config::mesh_summary(&path, scale, &options)
+        .map(|summary| summary.to_string())
+        .map_err(|error| scene_error(py, &error))
+}
+
 /// A scene given as JSON, as TOML; paths stay as they are.
 #[pyfunction]
 pub(crate) fn scene_to_toml(py: Python<'_>, scene: &str) -> PyResult<String> {

@@ -78,6 +78,7 @@ pub(crate) fn description(
         dof_names: model.dof_names().to_vec(),
         coord_names: model.coord_names().to_vec(),
         body_names: model.body_names().to_vec(),
+        shape_names: model.shape_names().to_vec(),
         robots: model
             .robots()
             .iter()
@@ -122,6 +123,10 @@ fn notes(scene: &Scene) -> Vec<String> {
     let mut notes = Vec::new();
     if !scene.shapes.is_empty() || scene.robots.iter().any(collides) {
         notes.push("contacts are not simulated yet: shapes pass through each other".to_owned());
+    }
+    for shape in &scene.shapes {
+        let named = shape.shape.notes();
+        notes.extend(named.map(|note| format!("{}: {note}", shape.name)));
     }
     for robot in &scene.robots {
         let named = robot

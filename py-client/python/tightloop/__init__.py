@@ -38,9 +38,9 @@ if TYPE_CHECKING:
         UrdfError,
         WaitTimeout,
     )
-    from tightloop.robot import Robot
+    from tightloop.robot import Link, Robot
     from tightloop.scene import Scene
-    from tightloop.shapes import Shape
+    from tightloop.shapes import Shape, Surface
     from tightloop.sim import FrameCopy, Sim, attach, launch
 
 _HOMES = {
@@ -67,9 +67,9 @@ _HOMES = {
         "UrdfError",
         "WaitTimeout",
     ),
-    "tightloop.robot": ("Robot",),
+    "tightloop.robot": ("Link", "Robot"),
     "tightloop.scene": ("Scene",),
-    "tightloop.shapes": ("Shape",),
+    "tightloop.shapes": ("Shape", "Surface"),
     "tightloop.sim": ("FrameCopy", "Sim", "attach", "launch"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
@@ -87,6 +87,7 @@ __all__ = [
     "LaunchError",
     "LeaseHeld",
     "LeaseLost",
+    "Link",
     "ProtocolMismatch",
     "ResourceError",
     "Robot",
@@ -95,6 +96,7 @@ __all__ = [
     "Shape",
     "Sim",
     "SimClosed",
+    "Surface",
     "TightloopError",
     "TransportError",
     "UnknownDaemon",

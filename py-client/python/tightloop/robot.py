@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
 
@@ -136,6 +137,7 @@ class Robot(Placed):
         "package_dirs",
         "self_collisions",
         "strict",
+        "surface",
         "urdf",
     )
 
@@ -172,6 +174,7 @@ class Robot(Placed):
         strict: bool,
         mesh_max_hull_vertices: int,
         convex_decomposition: bool,
+        surface: dict[str, Any],
         summary: dict[str, Any],
     ) -> None:
         super().__init__(name, pos, quat)
@@ -182,6 +185,7 @@ class Robot(Placed):
         self.strict = strict
         self.mesh_max_hull_vertices = mesh_max_hull_vertices
         self.convex_decomposition = convex_decomposition
+        self.surface = surface
         self._summary = summary
         self._own: dict[str, Any] = {}
 
@@ -204,6 +208,22 @@ class Robot(Placed):
     def link_names(self) -> list[str]:
         """Links in the order of their bodies, as the URDF names them."""
         return list(self._summary["link_names"])
+
+    @property
+    def shape_names(self) -> list[str]:
+        """Collision shapes of its file, ``link/shape``, links in the order of their bodies; a shape without a name of
+        its own has its place in the link (``sim.shape_names`` has ``robot/link/shape``)."""
+        return list(self._summary["shape_names"])
+
+    def link(self, name: str) -> Link:
+        """One of its links, to bear a shape: ``scene.add_box(body=arm.link("hand"), …)``.
+
+        Raises:
+            SceneError: There is no such link.
+        """
+        if name not in self._summary["link_names"]:
+            raise SceneError(f"robot `{self.name}` has no link {name!r}; there are: {_some(self.link_names, 20)}")
+        return Link(self, name)
 
     @property
     def notes(self) -> list[str]:
@@ -235,6 +255,7 @@ class Robot(Placed):
             "strict": self.strict,
             "mesh_max_hull_vertices": self.mesh_max_hull_vertices,
             "convex_decomposition": self.convex_decomposition,
+            **self.surface,
         } | own
 
     def _urdf_values(self, name: str) -> Any:
@@ -251,6 +272,22 @@ class Robot(Placed):
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, dofs={self.dofs}, urdf={str(self.urdf)!r})"
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link of a robot, made by `Robot.link`."""
+
+    robot: Robot
+    link: str
+
+    @property
+    def name(self) -> str:
+        """``robot/link``."""
+        return f"{self.robot.name}/{self.link}"
+
+    def __str__(self) -> str:
+        return self.name
 
 
 PER_DOF = tuple(name for name, value in vars(Robot).items() if isinstance(value, _PerDof))

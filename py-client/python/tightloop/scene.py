@@ -8,7 +8,7 @@ import re
 import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal, SupportsFloat, SupportsIndex
+from typing import TYPE_CHECKING, Literal, SupportsFloat, SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,12 @@ from tightloop.body import Body
 from tightloop.checks import Triple, Vector
 from tightloop.errors import SceneError
 from tightloop.robot import PER_DOF, Robot
-from tightloop.shapes import ORIGIN, UPRIGHT, Shape, ShapeType, checked
+from tightloop.shaped import Shaped
+from tightloop.shapes import ORIGIN, UPRIGHT, Shape, Surface, checked_surface
+
+if TYPE_CHECKING:
+    # typing has it from Python 3.11 on, the package runs on 3.10
+    from typing_extensions import Unpack
 
 Cone = Literal["elliptic", "pyramidal"]
 
@@ -34,7 +39,7 @@ class Solver:
     impratio: float = 1000.0
 
 
-class Scene:
+class Scene(Shaped):
     """Robots, bodies and shapes, and how time advances.
 
     In the arrays of a frame robots come first, then bodies, each in the order they were added.
@@ -43,20 +48,32 @@ class Scene:
         dt: Length of a physics step [s], above 0.
         substeps: Physics steps a control frame, at least 1. One `Sim.step` advances ``substeps * dt`` seconds.
         gravity: Acceleration of gravity [m/s²], world axes, z up.
+        contacts_max: Most contacts that a world has room for, 1 to 4096; None is as many as its shapes suggest. What
+            does not fit is left out, counted and flagged in the world's status.
+        rows_max: Most constraint rows of contacts that a world has room for, 1 to 16384; None is as many as its
+            contacts need.
 
     Raises:
         SceneError: A value is out of range; the message names it.
     """
 
-    __slots__ = ("_dt", "_gravity", "_solver", "_substeps", "bodies", "robots", "shapes")
+    __slots__ = ("_contacts_max", "_dt", "_gravity", "_rows_max", "_solver", "_substeps")
 
-    def __init__(self, *, dt: float = 1 / 480, substeps: int = 8, gravity: Vector = (0.0, 0.0, -9.81)) -> None:
+    def __init__(
+        self,
+        *,
+        dt: float = 1 / 480,
+        substeps: int = 8,
+        gravity: Vector = (0.0, 0.0, -9.81),
+        contacts_max: int | None = None,
+        rows_max: int | None = None,
+    ) -> None:
+        super().__init__()
         self.dt = dt
         self.substeps = substeps
         self.gravity = gravity
-        self.robots: dict[str, Robot] = {}
-        self.bodies: dict[str, Body] = {}
-        self.shapes: dict[str, Shape] = {}
+        self.contacts_max = contacts_max
+        self.rows_max = rows_max
         self._solver = Solver()
 
     @property
@@ -86,6 +103,24 @@ class Scene:
     def gravity(self, gravity: Vector) -> None:
         self._gravity = checks.triple("Scene: gravity", gravity)
 
+    @property
+    def contacts_max(self) -> int | None:
+        """Most contacts that a world has room for; None is as many as its shapes suggest."""
+        return self._contacts_max
+
+    @contacts_max.setter
+    def contacts_max(self, contacts_max: SupportsIndex | None) -> None:
+        self._contacts_max = _capacity("contacts_max", contacts_max, 4096)
+
+    @property
+    def rows_max(self) -> int | None:
+        """Most constraint rows of contacts that a world has room for; None is as many as its contacts need."""
+        return self._rows_max
+
+    @rows_max.setter
+    def rows_max(self, rows_max: SupportsIndex | None) -> None:
+        self._rows_max = _capacity("rows_max", rows_max, 16384)
+
     def solver(
         self,
         *,
@@ -113,77 +148,6 @@ class Scene:
             impratio=checks.number("solver: impratio", impratio, above=0.0),
         )
 
-    def add_box(
-        self,
-        *,
-        half_extents: Vector,
-        pos: Vector = ORIGIN,
-        quat: Vector = UPRIGHT,
-        body: Body | str | None = None,
-        density: float | None = None,
-        name: str | None = None,
-    ) -> Shape:
-        """Add a box, which stands still or moves with a body.
-
-        Args:
-            half_extents: Half the length of each side [m], above 0.
-            pos: Its centre in the world, or in the body's frame [m].
-            quat: Its orientation there (x, y, z, w).
-            body: The body that bears it, or its name; none for a static box.
-            density: Density of a body's box [kg/m³], 1000 if left out. Where the body's mass is given, only the ratios
-                of its shapes' densities matter.
-            name: Unique name; ``box``, ``box_2``, … if left out.
-
-        Raises:
-            SceneError: A value is out of range; the message names it.
-        """
-        return self._add_shape("box", name, body, density, pos=pos, quat=quat, half_extents=half_extents)
-
-    def add_sphere(
-        self,
-        *,
-        radius: float,
-        pos: Vector = ORIGIN,
-        quat: Vector = UPRIGHT,
-        body: Body | str | None = None,
-        density: float | None = None,
-        name: str | None = None,
-    ) -> Shape:
-        """Add a sphere of that radius [m]; the rest as in `add_box`."""
-        return self._add_shape("sphere", name, body, density, pos=pos, quat=quat, radius=radius)
-
-    def add_cylinder(
-        self,
-        *,
-        radius: float,
-        half_height: float,
-        pos: Vector = ORIGIN,
-        quat: Vector = UPRIGHT,
-        body: Body | str | None = None,
-        density: float | None = None,
-        name: str | None = None,
-    ) -> Shape:
-        """Add a cylinder along its z axis, sizes [m]; the rest as in `add_box`."""
-        return self._add_shape(
-            "cylinder", name, body, density, pos=pos, quat=quat, radius=radius, half_height=half_height
-        )
-
-    def add_capsule(
-        self,
-        *,
-        radius: float,
-        half_height: float,
-        pos: Vector = ORIGIN,
-        quat: Vector = UPRIGHT,
-        body: Body | str | None = None,
-        density: float | None = None,
-        name: str | None = None,
-    ) -> Shape:
-        """Add a capsule along its z axis, sizes [m]; ``half_height`` is that between the caps' centres."""
-        return self._add_shape(
-            "capsule", name, body, density, pos=pos, quat=quat, radius=radius, half_height=half_height
-        )
-
     def add_urdf(
         self,
         path: str | os.PathLike[str],
@@ -197,6 +161,7 @@ class Scene:
         mesh_max_hull_vertices: int = 64,
         convex_decomposition: bool = False,
         package_dirs: Sequence[str | os.PathLike[str]] = (),
+        **surface: Unpack[Surface],
     ) -> Robot:
         """Add a robot from a URDF file, which is read and checked at once.
 
@@ -214,6 +179,8 @@ class Scene:
                 Its error is noted where it exceeds 1 mm or 1% of the mesh.
             convex_decomposition: Whether a concave collision mesh becomes several convex hulls rather than one.
             package_dirs: Folders that hold the packages of ``package://`` paths; those above the file if left out.
+            **surface: How all shapes of its file touch: ``mu``, ``ke``, ``kd``, ``kf``, ``margin``, ``gap``,
+                ``condim``, ``group``, as `tightloop.Surface` has them.
 
         Returns:
             The robot, to set start state, drives and limits.
@@ -225,6 +192,7 @@ class Scene:
             UrdfError: The file is missing, is not URDF, or describes a robot that cannot be simulated.
         """
         urdf = checks.path("add_urdf: path", path)
+        touch = checked_surface("add_urdf", surface)
         if isinstance(package_dirs, str) or not isinstance(package_dirs, Sequence):
             raise SceneError(f"add_urdf: package_dirs is {package_dirs!r}; give a list of folders")
         packages = [checks.path("add_urdf: a folder of package_dirs", folder) for folder in package_dirs]
@@ -250,6 +218,7 @@ class Scene:
             strict=bool(strict),
             mesh_max_hull_vertices=vertices,
             convex_decomposition=decompose,
+            surface=touch,
             summary=summary,
         )
         self.robots[name] = robot
@@ -293,6 +262,32 @@ class Scene:
         self.bodies[name] = body
         return body
 
+    def add_table(self, *, name: str = "table", **surface: Unpack[Surface]) -> Shape:
+        """Add the lesson's table: a static box of 0.8 × 0.8 × 0.1 m, its top at z = 0.1 m, centred at (0, -0.5) m."""
+        return self.add_box(half_extents=(0.4, 0.4, 0.05), pos=(0.0, -0.5, 0.05), name=name, **surface)
+
+    def add_cube(
+        self,
+        *,
+        pos: Vector = (0.0, -0.35, 0.125),
+        quat: Vector = UPRIGHT,
+        name: str = "cube",
+        **surface: Unpack[Surface],
+    ) -> Body:
+        """Add the lesson's cube, which rests on its table: a free body, a box of 5 cm a side and 400 kg/m³.
+
+        Args:
+            pos: Its centre at the start [m].
+            quat: Its orientation at the start (x, y, z, w).
+            name: Name of the body.
+            **surface: How it touches; see `add_box`. Its margin is 1 mm if left out.
+        """
+        checked_surface(f"body `{name}`", surface)
+        surface.setdefault("margin", 1e-3)
+        cube = self.add_body(pos=pos, quat=quat, name=name)
+        self.add_box(half_extents=(0.025, 0.025, 0.025), body=cube, density=400.0, **surface)
+        return cube
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the scene as a TOML file; paths inside are relative to that file where they share a folder with it.
 
@@ -311,7 +306,8 @@ class Scene:
         """
         file = checks.path("load: path", path)
         data = json.loads(_core.load_scene(str(file)))
-        scene = cls(dt=data["dt"], substeps=data["substeps"], gravity=data["gravity"])
+        options = ("dt", "substeps", "gravity", "contacts_max", "rows_max")
+        scene = cls(**{option: data[option] for option in options if option in data})
         scene.solver(**data["solver"])
         for table in data.get("robot", ()):
             joints = {name: table.pop(name) for name in PER_DOF if name in table}
@@ -322,7 +318,11 @@ class Scene:
         for table in data.get("body", ()):
             scene.add_body(**table)
         for shape in data.get("shape", ()):
+            if "path" in shape:
+                shape["path"] = file.parent / shape["path"]
             getattr(scene, f"add_{shape.pop('type')}")(**shape)
+        for pair in data.get("contact_filters", ()):
+            scene.filter_contacts(*pair)
         return scene
 
     def to_toml(self) -> str:
@@ -339,43 +339,21 @@ class Scene:
                 "dt": self.dt,
                 "substeps": self.substeps,
                 "gravity": self.gravity,
+                "contacts_max": self.contacts_max,
+                "rows_max": self.rows_max,
+                "contact_filters": self.filters,
                 "solver": asdict(self._solver),
-                "shape": [asdict(shape) for shape in self.shapes.values()],
+                "shape": [shape.table() for shape in self.shapes.values()],
                 "robot": [robot.table() for robot in self.robots.values()],
                 "body": [body.table() for body in self.bodies.values()],
             }
         )
 
-    def _add_shape(
-        self,
-        kind: ShapeType,
-        name: str | None,
-        body: Body | str | None,
-        density: float | None,
-        **frame_and_sizes: Any,
-    ) -> Shape:
-        name = checks.name(kind, self._free_name(kind) if name is None else name, self._names())
-        what = f"{kind} `{name}`"
-        bearer = body.name if isinstance(body, Body) else body
-        if isinstance(body, Body) and self.bodies.get(body.name) is not body:
-            raise SceneError(f"{what}: body `{body.name}` is of another scene; give one of this scene's")
-        if bearer is not None and bearer not in self.bodies:
-            known = ", ".join(f"`{body}`" for body in self.bodies) or "none yet; add_body makes one"
-            raise SceneError(f"{what}: body is {bearer!r}, which is no body of this scene; there are: {known}")
-        if density is not None:
-            if bearer is None:
-                raise SceneError(f"{what} is static and has no density; leave it out, or give body=")
-            density = checks.number(f"{what}: density", density, above=0.0)
-        shape = Shape(name, kind, body=bearer, density=density, **checked(what, **frame_and_sizes))
-        self.shapes[name] = shape
-        return shape
 
-    def _names(self) -> list[str]:
-        return [*self.robots, *self.bodies, *self.shapes]
-
-    def _free_name(self, kind: str) -> str:
-        names = self._names()
-        count = 1
-        while (name := kind if count == 1 else f"{kind}_{count}") in names:
-            count += 1
-        return name
+def _capacity(what: str, value: SupportsIndex | None, most: int) -> int | None:
+    if value is None:
+        return None
+    checked = checks.integer(f"Scene: {what}", value)
+    if checked > most:
+        raise SceneError(f"Scene: {what} is {checked}; it must be at most {most}")
+    return checked

@@ -51,6 +51,8 @@ class Sim:
         dof_names: ``robot/joint`` of each dof.
         coord_names: ``robot/joint`` of each coordinate.
         body_names: ``robot/link`` of each body.
+        shape_names: Each collision shape: ``shape`` of static ones, which come first, ``robot/link/shape``,
+            ``body/shape``.
         dofs: Slice of each robot's dofs, by robot name.
         coords: Slice of each robot's coordinates.
         bodies: Slice of each robot's bodies.
@@ -74,6 +76,7 @@ class Sim:
         self.dof_names: list[str] = self.info["dof_names"]
         self.coord_names: list[str] = self.info["coord_names"]
         self.body_names: list[str] = self.info["body_names"]
+        self.shape_names: list[str] = self.info["shape_names"]
         self.dofs, self.coords, self.bodies = (
             {robot["name"]: slice(*robot[range_]) for robot in self.info["robots"]}
             for range_ in ("dofs", "coords", "bodies")

@@ -114,6 +114,9 @@ impl Description {
     /// # Errors
     /// A body that weighs nothing, or a value that is out of range, by name; the scene is then unchanged.
     pub fn add_body(&mut self, body: Body) -> Result<&mut Robot, ModelError> {
+        let notes = (body.shapes.iter())
+            .flat_map(|(shape, _)| shape.shape.notes())
+            .collect();
         let link = Link {
             name: LINK.to_owned(),
             inertial: body.inertial()?,
@@ -126,7 +129,7 @@ impl Description {
             self_collisions: false,
             links: vec![link],
             joints: Vec::new(),
-            notes: Vec::new(),
+            notes,
             warnings: Vec::new(),
             urdf: None,
         };

@@ -18,6 +18,18 @@ impl Shape {
     pub fn mesh(path: &Path, scale: [f64; 3], options: &MeshOptions) -> Result<Shape, ModelError> {
         Mesh::load(path, scale, options).map(|mesh| Shape::Mesh(Arc::new(mesh)))
     }
+
+    /// What was done to it that its author may not expect, a sentence each.
+    pub fn notes(&self) -> impl Iterator<Item = String> {
+        let mesh = match self {
+            Shape::Mesh(mesh) => Some(mesh),
+            _ => None,
+        };
+        mesh.into_iter().flat_map(|mesh| {
+            let notes = mesh.notes.iter();
+            notes.map(|note| format!("mesh {} {note}", mesh.path.display()))
+        })
+    }
 }
 
 impl Description {
@@ -84,7 +96,7 @@ impl Description {
             return Err(unknown("scene", "robot", robot, known.collect()));
         };
         let owner = format!("robot `{robot}`");
-        let links = &mut self.robots[place].links;
+        let Robot { links, notes, .. } = &mut self.robots[place];
         let Some(place) = links.iter().position(|other| other.name == link) else {
             let known = links.iter().map(|link| link.name.as_str());
             return Err(unknown(&owner, "link", link, known.collect()));
@@ -101,6 +113,12 @@ impl Description {
                 name: name.clone(),
             });
         }
+        notes.extend(
+            shape
+                .shape
+                .notes()
+                .map(|note| format!("link `{link}`: {note}")),
+        );
         collisions.push(shape);
         Ok(collisions.last_mut().expect("a shape was just added"))
     }
@@ -113,7 +131,10 @@ impl Description {
     /// has.
     pub fn shape_names(&self) -> Vec<String> {
         let fixed = self.shapes.iter().map(|shape| shape.name.clone());
-        let borne = self.robots.iter().flat_map(Robot::shape_names);
+        let borne = self.robots.iter().flat_map(|robot| {
+            let names = robot.shape_names().into_iter();
+            names.map(|name| format!("{}/{name}", robot.name))
+        });
         fixed.chain(borne).collect()
     }
 
@@ -178,16 +199,15 @@ fn named(name: &str, names: &[String]) -> Result<Vec<usize>, ModelError> {
 }
 
 impl Robot {
-    /// Names of the shapes of its links, links in body order.
-    fn shape_names(&self) -> Vec<String> {
+    /// Names of the shapes of its links, `link/shape`, links in body order; a body's are `shape`.
+    pub fn shape_names(&self) -> Vec<String> {
         let mut names = Vec::new();
         for link in self.link_order().into_iter().map(|link| &self.links[link]) {
-            // bodies are robots of one link, of which users do not know
-            let owner = match self.is_body() {
-                true => self.name.clone(),
-                false => format!("{}/{}", self.name, link.name),
-            };
-            names.extend(own_names(link).map(|name| format!("{owner}/{name}")));
+            names.extend(own_names(link).map(|name| match self.is_body() {
+                // bodies are robots of one link, of which users do not know
+                true => name,
+                false => format!("{}/{name}", link.name),
+            }));
         }
         names
     }

@@ -37,6 +37,8 @@ pub struct Description {
     pub coord_names: Vec<String>,
     /// `robot/link` of each body.
     pub body_names: Vec<String>,
+    /// Collision shapes: `shape`, `body/shape` or `robot/link/shape`.
+    pub shape_names: Vec<String>,
     /// The robots with their ranges in the lists above.
     pub robots: Vec<RobotRange>,
     /// Rows of the field table: what every frame carries, in this order.
@@ -117,6 +119,7 @@ impl Description {
         self.dof_names.iter().for_each(|name| hash.text(name));
         self.coord_names.iter().for_each(|name| hash.text(name));
         self.body_names.iter().for_each(|name| hash.text(name));
+        self.shape_names.iter().for_each(|name| hash.text(name));
         for field in &self.fields {
             hash.text(&field.name);
             hash.number(field.dtype as u64);

@@ -1,8 +1,10 @@
 //! Rigid bodies of a scene file.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
+use sim_core::model::Body;
 use sim_core::model::geometry::DENSITY;
-use sim_core::model::{Body, Collision};
 
 use super::{ConfigError, Number, ShapeTable, no_rotation, pose};
 
@@ -34,8 +36,9 @@ pub struct BodyTable {
 }
 
 impl BodyTable {
-    /// The body that it stands for, with those of the scene's shapes that name it.
-    pub(super) fn body(&self, shapes: &[ShapeTable]) -> Result<Body, ConfigError> {
+    /// The body that it stands for, with those of the scene's shapes that name it; relative paths are looked for in
+    /// `base_dir`.
+    pub(super) fn body(&self, shapes: &[ShapeTable], base_dir: &Path) -> Result<Body, ConfigError> {
         let mut body = Body::new(&self.name, pose(&self.pos, &self.quat));
         body.fixed = self.fixed;
         body.mass = self.mass.map(|mass| mass.0);
@@ -45,8 +48,7 @@ impl BodyTable {
             .map(|inertia| inertia.map(|row| row.map(|entry| entry.0)));
         for (index, shape) in shapes.iter().enumerate() {
             if shape.body.as_ref() == Some(&self.name) {
-                let geometry = shape.shape(index)?;
-                let collision = Collision::new(shape.name.clone(), geometry, shape.pose());
+                let collision = shape.collision(index, base_dir)?;
                 let density = shape.density.map_or(DENSITY, |density| density.0);
                 body.shapes.push((collision, density));
             }

@@ -5,24 +5,27 @@
 mod bodies;
 mod number;
 pub(crate) mod paths;
+mod robots;
 mod shapes;
 mod summary;
+mod surface;
 
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sim_core::model::{Cone, Description, ModelError, Pose, Robot, Solver, TargetMode};
+use sim_core::model::{Cone, Description, ModelError, Pose, Solver};
 
 pub use bodies::BodyTable;
 pub use number::{Number, PerDof};
+pub use robots::{ModeName, RobotTable};
 pub use shapes::{ShapeName, ShapeTable};
 pub use sim_core::backend::BackendError;
 pub use sim_core::batch::Field;
 pub use sim_core::dynamics::Dynamics;
 pub use sim_core::model::UrdfOptions;
 pub use sim_core::model::geometry::MeshOptions;
-pub use summary::urdf_summary;
-pub(crate) use summary::{joint_type, robot_summary};
+pub(crate) use summary::{joint_type, mesh_facts, robot_summary};
+pub use summary::{mesh_summary, urdf_summary};
 
 /// Why a scene cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -76,10 +79,19 @@ pub struct SceneFile {
     /// Gravity in world axes [m/s²].
     #[serde(default = "gravity")]
     pub gravity: [Number; 3],
+    /// Most contacts that a world has room for; left out, as many as its shapes suggest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contacts_max: Option<usize>,
+    /// Most constraint rows of contacts that a world has room for; left out, as many as its contacts need.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rows_max: Option<usize>,
+    /// Pairs that never touch: `shape`, `body/shape` or `robot/link/shape`, or a robot, body or link for all its shapes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub contact_filters: Vec<[String; 2]>,
     /// Options of the constraint solver.
     #[serde(default)]
     pub solver: SolverTable,
-    /// Shapes: static ones, and those of bodies.
+    /// Shapes: static ones, and those of bodies and links.
     #[serde(default, rename = "shape", skip_serializing_if = "Vec::is_empty")]
     pub shapes: Vec<ShapeTable>,
     /// Robots, in the order of their dofs.
@@ -135,81 +147,6 @@ pub enum ConeName {
 
 fn no_rotation() -> [Number; 4] {
     Pose::identity().quat.map(Number)
-}
-
-fn hull_vertices() -> usize {
-    MeshOptions::default().max_hull_vertices
-}
-
-/// A robot from a URDF file. Joint values are one number for all dofs, or a list with one a dof.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RobotTable {
-    /// Its name in the scene; left out, it is the name in its file.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
-    /// Its URDF file.
-    pub urdf: PathBuf,
-    /// Folders that hold the packages of `package://` paths.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub package_dirs: Vec<PathBuf>,
-    /// Position of the root link in the world [m].
-    #[serde(default)]
-    pub pos: [Number; 3],
-    /// Orientation of the root link in the world, unit quaternion (x, y, z, w) [–].
-    #[serde(default = "no_rotation")]
-    pub quat: [Number; 4],
-    /// Whether the root link moves freely.
-    #[serde(default)]
-    pub floating: bool,
-    /// Whether an inertia that no body can have is refused; otherwise it is balanced, with a warning.
-    #[serde(default)]
-    pub strict: bool,
-    /// Most vertices of the convex hull of a collision mesh, 8 to 1024.
-    #[serde(default = "hull_vertices")]
-    pub mesh_max_hull_vertices: usize,
-    /// Whether a concave collision mesh becomes several convex hulls.
-    #[serde(default)]
-    pub convex_decomposition: bool,
-    /// Whether its own links touch each other.
-    #[serde(default)]
-    pub self_collisions: bool,
-    /// Positions at the start [rad or m]; left out, 0.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub joint_q: Option<PerDof<Number>>,
-    /// Position targets at the start [rad or m]; left out, the positions at the start.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub joint_target_q: Option<PerDof<Number>>,
-    /// Velocity targets at the start [rad/s or m/s]; left out, 0.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub joint_target_qd: Option<PerDof<Number>>,
-    /// Errors the drives act on; left out, position.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub joint_target_mode: Option<PerDof<ModeName>>,
-    /// Proportional gains [N·m/rad or N/m]; left out, 0.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub joint_target_ke: Option<PerDof<Number>>,
-    /// Derivative gains [N·m·s/rad or N·s/m]; left out, 0.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub joint_target_kd: Option<PerDof<Number>>,
-    /// Largest drive efforts [N·m or N], `inf` for no limit; left out, those of the URDF file.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub joint_effort_limit: Option<PerDof<Number>>,
-    /// Inertia of the drives [kg·m² or kg]; left out, 0.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub joint_armature: Option<PerDof<Number>>,
-}
-
-/// Errors a drive acts on, by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ModeName {
-    /// ke (q* − q) − kd q̇.
-    Position,
-    /// kd (q̇* − q̇).
-    Velocity,
-    /// ke (q* − q) + kd (q̇* − q̇).
-    Both,
 }
 
 /// Reads a scene file.
@@ -282,6 +219,13 @@ impl SceneFile {
                 *path = paths::relative_to(folder, &base_dir.join(&*path));
             }
         }
+        for path in scene
+            .shapes
+            .iter_mut()
+            .filter_map(|shape| shape.path.as_mut())
+        {
+            *path = paths::relative_to(folder, &base_dir.join(&*path));
+        }
         std::fs::write(path, scene.to_toml()).map_err(|error| ConfigError::Write {
             path: path.to_owned(),
             reason: error.to_string(),
@@ -295,6 +239,9 @@ impl SceneFile {
     pub fn describe(&self, base_dir: &Path) -> Result<Description, ConfigError> {
         let mut description = Description::new(self.dt.0, self.substeps);
         description.gravity = self.gravity.map(|part| part.0);
+        description.filters = self.contact_filters.clone();
+        description.contacts_max = self.contacts_max;
+        description.rows_max = self.rows_max;
         description.solver = Solver {
             iterations: self.solver.iterations,
             ls_iterations: self.solver.ls_iterations,
@@ -309,31 +256,24 @@ impl SceneFile {
             shape.check_body(index, &self.bodies)?;
             if shape.body.is_none() {
                 let name = shape.name.as_deref().unwrap_or_default();
-                description.add_shape(name, shape.shape(index)?, shape.pose());
+                let geometry = shape.shape(index, base_dir)?;
+                description.add_shape(name, geometry, shape.pose()).surface = shape.surface();
             }
         }
         for table in &self.robots {
-            let options = UrdfOptions {
-                name: table.name.clone(),
-                pose: pose(&table.pos, &table.quat),
-                floating: table.floating,
-                strict: table.strict,
-                self_collisions: table.self_collisions,
-                meshes: MeshOptions {
-                    max_hull_vertices: table.mesh_max_hull_vertices,
-                    convex_decomposition: table.convex_decomposition,
-                },
-                package_dirs: table
-                    .package_dirs
-                    .iter()
-                    .map(|dir| base_dir.join(dir))
-                    .collect(),
-            };
-            let robot = description.add_urdf(base_dir.join(&table.urdf), options)?;
+            let robot =
+                description.add_urdf(base_dir.join(&table.urdf), table.options(base_dir))?;
+            table.set_surfaces(robot);
             table.set_joints(robot)?;
         }
+        for (index, shape) in self.shapes.iter().enumerate() {
+            if let Some((robot, link)) = shape.link() {
+                let collision = shape.collision(index, base_dir)?;
+                description.add_link_shape(robot, link, collision)?;
+            }
+        }
         for table in &self.bodies {
-            description.add_body(table.body(&self.shapes)?)?;
+            description.add_body(table.body(&self.shapes, base_dir)?)?;
         }
         description.validate()?;
         Ok(description)
@@ -354,38 +294,4 @@ fn pose(pos: &[Number; 3], quat: &[Number; 4]) -> Pose {
         quat: quat.map(|part| part.0),
     }
     .normalized()
-}
-
-impl RobotTable {
-    fn set_joints(&self, robot: &mut Robot) -> Result<(), ModelError> {
-        type Setter = fn(&mut Robot, &[f64]) -> Result<(), ModelError>;
-        let fields: [(&Option<PerDof<Number>>, Setter); 6] = [
-            (&self.joint_target_q, Robot::set_joint_target_q),
-            (&self.joint_target_qd, Robot::set_joint_target_qd),
-            (&self.joint_target_ke, Robot::set_joint_target_ke),
-            (&self.joint_target_kd, Robot::set_joint_target_kd),
-            (&self.joint_effort_limit, Robot::set_joint_effort_limit),
-            (&self.joint_armature, Robot::set_joint_armature),
-        ];
-        let driven = summary::driven(robot);
-        let coords = vec![true; robot.coord_names().len()];
-        if let Some(values) = &self.joint_q {
-            robot.set_joint_q(&values.spread(&coords, 0.0, |value| value.0))?;
-        }
-        for (values, set) in fields {
-            if let Some(values) = values {
-                set(robot, &values.spread(&driven, 0.0, |value| value.0))?;
-            }
-        }
-        if let Some(modes) = &self.joint_target_mode {
-            robot.set_joint_target_mode(&modes.spread(&driven, TargetMode::Position, |mode| {
-                match mode {
-                    ModeName::Position => TargetMode::Position,
-                    ModeName::Velocity => TargetMode::Velocity,
-                    ModeName::Both => TargetMode::Both,
-                }
-            }))?;
-        }
-        Ok(())
-    }
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use serde_json::{Value, json};
+use sim_core::model::geometry::{Mesh, MeshOptions};
 use sim_core::model::{Joint, JointDof, JointKind, Robot, UrdfOptions};
 
 use super::{ConfigError, Number};
@@ -12,7 +13,7 @@ use super::{ConfigError, Number};
 /// Keys: `name`; one entry a moving joint: `joint_names`, `joint_types`, `joint_range` (pairs), `joint_velocity_limit`,
 /// `joint_mimic` (`null`, or an object with `joint`, `multiplier`, `offset`); one entry a coordinate: `coord_names`, `joint_q`;
 /// one entry a dof: `dof_names`, `dof_driven`, `joint_effort_limit`, `joint_damping`, `joint_friction`, `joint_armature`;
-/// `link_names` (in body order), `notes`, `warnings`.
+/// `link_names` (in body order), `shape_names` (`link/shape`), `notes`, `warnings`.
 ///
 /// # Errors
 /// What is wrong with the file, by name.
@@ -65,8 +66,36 @@ pub(crate) fn robot_summary(robot: &Robot) -> Value {
         "joint_friction": dofs(&|dof| json!(dof.friction)),
         "joint_armature": dofs(&|dof| json!(dof.armature)),
         "link_names": links,
+        "shape_names": robot.shape_names(),
         "notes": robot.notes,
         "warnings": robot.warnings,
+    })
+}
+
+/// What a mesh file becomes: `file`, `scale`, `triangles`, `closed`, `hull_vertices` (a number a hull), `extent`, `notes`.
+///
+/// # Errors
+/// Why the file cannot be used, with the cure.
+pub fn mesh_summary(
+    path: &Path,
+    scale: [f64; 3],
+    options: &MeshOptions,
+) -> Result<Value, ConfigError> {
+    let mesh = Mesh::load(path, scale, options)?;
+    let mut summary = mesh_facts(&mesh);
+    summary["notes"] = json!(mesh.notes);
+    Ok(summary)
+}
+
+/// What a mesh is, as [`mesh_summary`] has it, without its notes.
+pub(crate) fn mesh_facts(mesh: &Mesh) -> Value {
+    json!({
+        "file": mesh.path.to_string_lossy(),
+        "scale": mesh.scale,
+        "triangles": mesh.triangles.triangles.len(),
+        "closed": mesh.closed,
+        "hull_vertices": mesh.hulls.iter().map(|hull| hull.vertices.len()).collect::<Value>(),
+        "extent": mesh.triangles.extent(),
     })
 }
 

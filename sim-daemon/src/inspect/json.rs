@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use sim_core::model::{Collision, Pose, Shape, principal_moments};
 
 use super::facts::Facts;
-use crate::config::{joint_type, robot_summary};
+use crate::config::{joint_type, mesh_facts, robot_summary};
 
 /// All there is to say of a robot: what [`crate::config::urdf_summary`] has, and `file`, `floating`, `mass`, `links`,
 /// `picture`.
@@ -68,14 +68,7 @@ fn collision(collision: &Collision) -> Value {
             radius,
             half_height,
         } => json!({ "radius": radius, "half_height": half_height }),
-        Shape::Mesh(mesh) => json!({
-            "file": path(Some(&mesh.path)),
-            "scale": mesh.scale,
-            "triangles": mesh.triangles.triangles.len(),
-            "closed": mesh.closed,
-            "hull_vertices": mesh.hulls.iter().map(|hull| hull.vertices.len()).collect::<Value>(),
-            "extent": mesh.triangles.extent(),
-        }),
+        Shape::Mesh(mesh) => mesh_facts(mesh),
     };
     value["name"] = json!(collision.name);
     value["type"] = json!(collision.shape.kind());

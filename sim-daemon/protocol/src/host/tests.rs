@@ -46,6 +46,7 @@ fn description() -> Description {
         dof_names: ["a/x", "a/y", "a/z"].map(str::to_owned).to_vec(),
         coord_names: Vec::new(),
         body_names: Vec::new(),
+        shape_names: Vec::new(),
         robots: Vec::new(),
         fields: Vec::new(),
         known_fields: Vec::new(),

@@ -1,5 +1,7 @@
 //! Scene files: what is read, what is written back, what is refused.
 
+mod contacts;
+
 use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
@@ -363,6 +365,8 @@ fn summary_tells_what_a_client_shows() {
     let mimic = serde_json::json!({"joint": "fr3_finger_joint1", "multiplier": 1.0, "offset": 0.0});
     assert_eq!(summary["joint_mimic"][8], mimic);
     assert_eq!(summary["link_names"].as_array().unwrap().len(), 14);
+    let shapes = summary["shape_names"].as_array().unwrap();
+    assert_eq!(shapes[0], "fr3_link0/0");
     assert_eq!(summary["notes"], serde_json::json!([]));
 }
 
