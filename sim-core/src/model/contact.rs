@@ -269,6 +269,16 @@ impl<R> Contacts<R> {
     }
 }
 
+impl<R> Contacts<R> {
+    /// Bounds of the first rows and of the capacities of classes: what a machine may know of `class_rows`.
+    #[inline(always)]
+    pub fn row_ends(&self) -> [usize; 2] {
+        let capacity = self.classes.iter().map(|class| class.capacity).max();
+        let first = self.classes.last().map_or(0, |class| class.first);
+        [first + 1, capacity.unwrap_or(0) + 1]
+    }
+}
+
 impl<R: Real> Contacts<R> {
     /// None at all.
     pub fn none(cone: Cone, impratio: f64) -> Contacts<R> {

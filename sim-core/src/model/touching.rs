@@ -206,16 +206,7 @@ fn may_touch(a: &Borne<'_>, b: &Borne<'_>, rules: &Rules<'_>) -> bool {
         && !is_one
         && (!of_one_robot || may_self)
         && !connected
-        && groups_touch(a.surface.group, b.surface.group)
-}
-
-/// Newton's rule of collision groups: 0 touches nothing, a positive one itself and negative ones, a negative one all but itself.
-fn groups_touch(a: i32, b: i32) -> bool {
-    match (a, b) {
-        (0, _) | (_, 0) => false,
-        (a, b) if a > 0 && b > 0 => a == b,
-        (a, b) => a != b,
-    }
+        && a.surface.meets(&b.surface)
 }
 
 struct Builder<'a> {
@@ -314,7 +305,10 @@ impl Builder<'_> {
             });
             first += capacity;
         }
-        self.lay_out(contacts, numbers, indices, stride, widest, first);
+        // as many rows as a machine must reckon with that knows only how large classes are at most
+        let [first_end, capacity_end] = contacts.row_ends();
+        let rows = first_end + capacity_end - 2;
+        self.lay_out(contacts, numbers, indices, stride, widest, rows);
         self.coupled(contacts)
     }
 

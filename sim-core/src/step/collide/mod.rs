@@ -125,8 +125,9 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, K
         let origin = cx.index(indices, p, pair::ORIGIN, origins.rows);
         let origin = three(cx, origins, origin, 0);
         let class = cx.index(indices, p, pair::CLASS, t.classes.len());
-        let first = cx.index(t.handles.class_rows, class, 0, t.memory.rows.rows);
-        let capacity = cx.index(t.handles.class_rows, class, 1, t.memory.rows.rows + 1);
+        let [first_end, capacity_end] = t.row_ends();
+        let first = cx.index(t.handles.class_rows, class, 0, first_end);
+        let capacity = cx.index(t.handles.class_rows, class, 1, capacity_end);
         let mut points = Points::<C> {
             list: cx.kept(t.memory.counts, class, first, capacity),
             table: t.memory.rows,
