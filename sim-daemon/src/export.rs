@@ -119,11 +119,7 @@ pub(crate) fn description(
 
 /// What was ignored or mended, and what is kept without an effect.
 fn notes(scene: &Scene) -> Vec<String> {
-    let collides = |robot: &Robot| robot.links.iter().any(|link| !link.collisions.is_empty());
     let mut notes = Vec::new();
-    if !scene.shapes.is_empty() || scene.robots.iter().any(collides) {
-        notes.push("contacts are not simulated yet: shapes pass through each other".to_owned());
-    }
     for shape in &scene.shapes {
         let named = shape.shape.notes();
         notes.extend(named.map(|note| format!("{}: {note}", shape.name)));

@@ -81,8 +81,6 @@ pub struct Workspace<F> {
     pub hessian: Vec<F>,
     /// Scratch of the solver: `coupled_system` to factor.
     pub coupled_hessian: Vec<F>,
-    /// Scratch of the solver: its right-hand side. `(dofs)`
-    pub coupled_vector: Vec<F>,
     /// Scratch of a stage. `(4, dofs)`
     pub vector: [Vec<F>; 4],
     /// Scratch of a stage. `(4, rows)`
@@ -178,7 +176,7 @@ impl<F: Num, V: Copy> Block<F, V> {
             system: vec![cell; when(touching, packed)],
             coupled_system: vec![cell; coupled],
             pull: vec![cell; when(touching, n)],
-            solution: vec![cell; when(coupled > 0, n)],
+            solution: vec![cell; n],
             efc_weight: vec![cell; rows],
             efc_aref: vec![cell; rows],
             efc_force: vec![cell; rows],
@@ -204,7 +202,6 @@ impl<F: Num, V: Copy> Block<F, V> {
                 force: vec![[[zero; 3]; 2]; bodies],
                 hessian: vec![zero; packed],
                 coupled_hessian: vec![zero; coupled],
-                coupled_vector: vec![zero; when(coupled > 0, n)],
                 vector: [vec![zero; n], vec![zero; n], vec![zero; n], vec![zero; n]],
                 row: [
                     vec![zero; rows],

@@ -303,6 +303,13 @@ pub trait Cx: Sized {
     fn fill(&mut self, t: Table, row: Self::I, k: usize, x: Self::F);
     /// First write to number `k` of a fresh row.
     fn init(&mut self, t: Table, row: Self::Row, k: usize, x: Self::F);
+    /// First writes to the leading numbers of a fresh row.
+    #[inline(always)]
+    fn init_all(&mut self, t: Table, row: Self::Row, numbers: &[Self::F]) {
+        for (k, x) in numbers.iter().enumerate() {
+            self.init(t, row, k, *x);
+        }
+    }
 
     /// An empty list of at most `capacity` rows; what does not fit is counted, not stored.
     fn list(&mut self, capacity: usize) -> Self::List;

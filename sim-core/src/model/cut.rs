@@ -18,7 +18,7 @@ impl Cut {
     /// Rows and numbers a row of `corners`.
     pub const CORNERS: [usize; 2] = [CORNERS_MAX + 1, 9];
     /// Rows and numbers a row of `candidates`.
-    pub const CANDIDATES: [usize; 2] = [CORNERS_MAX, 9];
+    pub const CANDIDATES: [usize; 2] = [CORNERS_MAX + 1, 9];
     /// Rows and numbers a row of `edges`. A hull of 64 vertices has at most 186 edges; of more than this many the rest
     /// is left out.
     pub const EDGES: [usize; 2] = [48, 1];

@@ -1,13 +1,24 @@
 //! The narrow phase of hulls and cylinders against exact oracles.
 
+mod lanes;
 mod oracle;
+mod resting;
 mod shapes;
 
-use oracle::{Polytope, along, least_depth};
+use oracle::{Polytope, along, climb, farthest_axis, least_depth};
 use parry3d_f64::math::{Pose, Vector as Place};
 use parry3d_f64::query::{ClosestPoints, closest_points};
 use parry3d_f64::shape::{Ball, Capsule, ConvexPolyhedron};
 use shapes::*;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Sphere,
+    Capsule,
+    Box,
+    Cylinder,
+    Hull,
+}
 
 /// What the oracles say of many random pairs.
 #[derive(Debug, Default)]
@@ -25,6 +36,8 @@ struct Found {
     worst: f64,
     /// Shallow ones off by more than 1e-5.
     off: usize,
+    /// Normals off by more than 1e-5 where apart or shallow.
+    tilted: usize,
     /// The distance that is told against that along the normal that is told.
     untrue: f64,
 }
@@ -34,7 +47,7 @@ fn place(x: Vector) -> Place {
 }
 
 fn closest(a: &Polytope, b: &Polytope) -> Option<(f64, Vector)> {
-    let shape = |polytope: &Polytope| -> Box<dyn parry3d_f64::shape::Shape> {
+    let shape = |polytope: &Polytope| -> std::boxed::Box<dyn parry3d_f64::shape::Shape> {
         let points: Vec<Place> = polytope.points.iter().map(|&x| place(x)).collect();
         match points.len() {
             1 => Box::new(Ball::new(1e-9)),
@@ -61,23 +74,25 @@ fn closest(a: &Polytope, b: &Polytope) -> Option<(f64, Vector)> {
     }
 }
 
-fn cases(kind: usize, count: usize) -> (Hulls, Vec<Pair>) {
-    let mut random = Random(7 + kind as u64);
+/// Random pairs, apart, shallow and deep alike.
+fn cases(a: Kind, b: Kind, count: usize) -> (Hulls, Vec<Pair>) {
+    let mut random = Random(7 + a as u64 + 10 * b as u64);
     let hulls = Hulls::new((0..40).map(|i| random.hull(8 + (56 * i) / 39)).collect());
+    let shape = |random: &mut Random, kind: Kind| match kind {
+        Kind::Sphere => Shape::Sphere(random.between(0.01, 0.1)),
+        Kind::Capsule => Shape::Capsule(random.between(0.01, 0.05), random.between(0.01, 0.1)),
+        Kind::Box => Shape::Box(std::array::from_fn(|_| random.between(0.01, 0.1))),
+        Kind::Cylinder => Shape::Cylinder(random.between(0.02, 0.1), random.between(0.02, 0.1)),
+        Kind::Hull => Shape::Hull((random.unit() * 40.0) as usize),
+    };
     let pairs = (0..count)
         .map(|_| {
-            let a = match kind {
-                0 => Shape::Sphere(random.between(0.01, 0.1)),
-                1 => Shape::Capsule(random.between(0.01, 0.05), random.between(0.01, 0.1)),
-                2 => Shape::Box(std::array::from_fn(|_| random.between(0.01, 0.1))),
-                _ => Shape::Hull((random.unit() * 40.0) as usize),
-            };
-            let b = (random.unit() * 40.0) as usize;
+            let (a, b) = (shape(&mut random, a), shape(&mut random, b));
             let (axes_a, axes_b) = (random.rotation(), random.rotation());
             let mut pair = Pair {
                 a,
                 axes_a,
-                b: Shape::Hull(b),
+                b,
                 axes_b,
                 center: [0.0; 3],
             };
@@ -99,8 +114,8 @@ fn cases(kind: usize, count: usize) -> (Hulls, Vec<Pair>) {
     (hulls, pairs)
 }
 
-fn check(kind: usize) -> Found {
-    let (hulls, pairs) = cases(kind, 10_000);
+fn check(a: Kind, b: Kind, count: usize) -> Found {
+    let (hulls, pairs) = cases(a, b, count);
     let mut memory = vec![0.0_f64; MEMORY];
     let mut found = Found::default();
     for pair in &pairs {
@@ -129,16 +144,21 @@ fn check(kind: usize) -> Found {
             .untrue
             .max((along(&a, &b, n) - deepest.distance).abs() / size);
         assert!(contacts[0].iter().all(|x| x.normal == n));
-        let (core_a, core_b) = (a.radius, b.radius);
-        let (truth, normal, apart) = match closest(&a, &b) {
+        let curved = a.discs.is_some() || b.discs.is_some();
+        let (truth, normal, apart) = match if curved { None } else { closest(&a, &b) } {
             Some((distance, normal)) => (distance, normal, true),
             None => {
-                let (distance, normal) = least_depth(&a, &b);
+                let (distance, normal) = if curved {
+                    let (x, y) = (farthest_axis(&a, &b), climb(&a, &b, n, 1e-3));
+                    if x.0 > y.0 + 1e-9 * size { x } else { y }
+                } else {
+                    least_depth(&a, &b)
+                };
                 (distance, normal, false)
             }
         };
-        let _ = (core_a, core_b);
         let way = sub(n, normal);
+        found.tilted += usize::from(dot(way, way).sqrt() > 1e-5 && truth > -0.1 * size);
         let errors = [
             (deepest.distance - truth).abs() / size,
             dot(way, way).sqrt(),
@@ -164,19 +184,86 @@ fn check(kind: usize) -> Found {
     found
 }
 
+impl Found {
+    /// Apart and shallow, the errors are below 1e-5 of the size; deep, the depth is within 1% of the least; but for a share
+    /// of those that penetrate, where a curved surface has more minima than are tried.
+    fn hold(&self, share: f64) {
+        assert_eq!(self.missing, 0);
+        assert!(self.apart.iter().all(|&error| error < 1e-5), "{self:?}");
+        assert!(self.off as f64 <= share * self.shallow as f64, "{self:?}");
+        // two axes as shallow as each other are the one other reason for another normal
+        assert!(self.tilted as f64 <= 1e-3 * self.shallow as f64, "{self:?}");
+        assert!(self.worse as f64 <= share * self.deep as f64, "{self:?}");
+        assert!(self.separated > 1000 && self.deep > 1000, "{self:?}");
+        // what is told is the distance along the normal that is told
+        assert!(self.untrue < 1e-5, "{self:?}");
+    }
+}
+
 #[test]
 fn spheres_and_hulls_are_as_near_as_the_oracles_say() {
-    println!("{:?}", check(0));
+    check(Kind::Sphere, Kind::Hull, 10_000).hold(0.0);
 }
+
 #[test]
 fn capsules_and_hulls_are_as_near_as_the_oracles_say() {
-    println!("{:?}", check(1));
+    check(Kind::Capsule, Kind::Hull, 10_000).hold(0.0);
 }
+
 #[test]
 fn boxes_and_hulls_are_as_near_as_the_oracles_say() {
-    println!("{:?}", check(2));
+    check(Kind::Box, Kind::Hull, 10_000).hold(0.0);
 }
+
 #[test]
 fn hulls_are_as_near_as_the_oracles_say() {
-    println!("{:?}", check(3));
+    check(Kind::Hull, Kind::Hull, 10_000).hold(0.0);
+}
+
+#[test]
+fn cylinders_and_spheres_are_as_near_as_the_oracles_say() {
+    check(Kind::Sphere, Kind::Cylinder, 10_000).hold(0.0);
+}
+
+#[test]
+fn cylinders_and_capsules_are_as_near_as_the_oracles_say() {
+    check(Kind::Capsule, Kind::Cylinder, 10_000).hold(1e-3);
+}
+
+#[test]
+fn cylinders_and_boxes_are_as_near_as_the_oracles_say() {
+    check(Kind::Box, Kind::Cylinder, 10_000).hold(1e-3);
+}
+
+#[test]
+fn cylinders_are_as_near_as_the_oracles_say() {
+    check(Kind::Cylinder, Kind::Cylinder, 10_000).hold(1e-3);
+}
+
+#[test]
+fn cylinders_and_hulls_are_as_near_as_the_oracles_say() {
+    check(Kind::Cylinder, Kind::Hull, 10_000).hold(1e-3);
+}
+
+#[test]
+fn the_lowest_vertex_of_a_hull_above_a_plane_is_found() {
+    let (hulls, pairs) = cases(Kind::Hull, Kind::Hull, 10_000);
+    let mut memory = vec![0.0_f64; MEMORY];
+    for pair in pairs {
+        let pair = Pair {
+            a: Shape::Plane,
+            ..pair
+        };
+        let hull = Polytope::of(pair.b, &pair.axes_b, pair.center, &hulls);
+        let n = pair.axes_a[2];
+        let truth = -hull.reach(scale(n, -1.0));
+        let found = &contacts::<f64>(&[pair], &hulls.places, &hulls.tables, 1.0, &mut memory)[0];
+        assert!(found.len() >= 3, "{found:?}");
+        let least = found.iter().map(|x| x.distance).fold(1.0, f64::min);
+        assert!((least - truth).abs() < 1e-5 * 0.1 && found.iter().all(|x| x.normal == n));
+        for x in found {
+            // half-way between the plane and a vertex
+            assert!((dot(n, x.point) - 0.5 * x.distance).abs() < 1e-12);
+        }
+    }
 }

@@ -11,6 +11,8 @@ pub struct Polytope {
     pub edges: Vec<[Vector; 3]>,
     /// Radius around it.
     pub radius: f64,
+    /// Axis and radius of discs about the points: of a cylinder.
+    pub discs: Option<(Vector, f64)>,
     /// Directions of edges that are not told apart by faces: of a box or segment.
     pub directions: Vec<Vector>,
 }
@@ -23,6 +25,7 @@ impl Polytope {
             faces: vec![],
             edges: vec![],
             radius: 0.0,
+            discs: None,
             directions: vec![],
         };
         match shape {
@@ -66,7 +69,11 @@ impl Polytope {
                     })
                     .collect();
             }
-            Shape::Plane | Shape::Cylinder(..) => panic!("not a polytope"),
+            Shape::Cylinder(radius, half) => {
+                polytope.points = vec![place([0.0, 0.0, half]), place([0.0, 0.0, -half])];
+                polytope.discs = Some((axes[2], radius));
+            }
+            Shape::Plane => panic!("a plane has no end"),
         }
         polytope
     }
@@ -77,7 +84,14 @@ impl Polytope {
             .iter()
             .map(|&x| dot(x, d))
             .fold(f64::MIN, f64::max);
-        reach + self.radius
+        let disc = match self.discs {
+            Some((axis, radius)) => {
+                let across = cross(axis, d);
+                radius * dot(across, across).sqrt()
+            }
+            None => 0.0,
+        };
+        reach + disc + self.radius
     }
 }
 
@@ -125,4 +139,51 @@ pub fn least_depth(a: &Polytope, b: &Polytope) -> (f64, Vector) {
         }
     }
     best
+}
+
+/// The largest distance along any axis near `start`, and that axis: by ever smaller steps.
+pub fn climb(a: &Polytope, b: &Polytope, start: Vector, first_step: f64) -> (f64, Vector) {
+    let (mut n, mut best, mut step) = (start, along(a, b, start), first_step);
+    let mut turn: f64 = 0.3;
+    while step > 1e-9 {
+        let side = if n[0].abs() < 0.6 {
+            [1.0, 0.0, 0.0]
+        } else {
+            [0.0, 1.0, 0.0]
+        };
+        let u = unit(cross(n, side));
+        let v = cross(n, u);
+        let mut better = None;
+        for k in 0..8 {
+            let angle = turn + f64::from(k) * std::f64::consts::FRAC_PI_4;
+            let (sin, cos) = angle.sin_cos();
+            let m = unit(add(n, add(scale(u, step * cos), scale(v, step * sin))));
+            let x = along(a, b, m);
+            if x > best {
+                (best, better) = (x, Some(m));
+            }
+        }
+        turn += 1.0;
+        match better {
+            Some(m) => n = m,
+            None => step *= 0.7,
+        }
+    }
+    (best, n)
+}
+
+/// The distance of two shapes, negative in penetration: the largest along any axis, from many starts.
+pub fn farthest_axis(a: &Polytope, b: &Polytope) -> (f64, Vector) {
+    let mut starts: Vec<(f64, Vector)> = (0..600)
+        .map(|i| {
+            let z = (f64::from(i) + 0.5) / 300.0 - 1.0;
+            let (sin, cos) = (f64::from(i) * 2.399_963_229_728_653).sin_cos();
+            let width = (1.0 - z * z).sqrt();
+            let n = [cos * width, sin * width, z];
+            (along(a, b, n), n)
+        })
+        .collect();
+    starts.sort_by(|x, y| y.0.total_cmp(&x.0));
+    let climbed = starts[..8].iter().map(|start| climb(a, b, start.1, 0.1));
+    climbed.max_by(|x, y| x.0.total_cmp(&y.0)).unwrap()
 }

@@ -1,10 +1,10 @@
 //! Random pairs of shapes, and the narrow phase run on them by any machine.
 
 use sim_core::lane::memory::Cpu;
-use sim_core::lane::{Cx, Lane, Num, Real, Table, Tables};
+use sim_core::lane::{Cx, Lane, Real, Table, Tables};
+use sim_core::model::cut::Cut;
 use sim_core::model::geometry::Hull;
 use sim_core::model::hull_tables::{HullFrame, HullTables};
-use sim_core::step::collide::manifold::Cut;
 use sim_core::step::collide::points::{Placed, Points};
 use sim_core::step::collide::{cylinders, hulls};
 

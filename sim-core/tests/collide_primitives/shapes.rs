@@ -171,12 +171,11 @@ pub fn points<F: Lane>(pairs: &[Pair]) -> Vec<Vec<Point<F::Real>>> {
 
 #[inline(always)]
 fn lanes<F: Lane>(block: &[Pair], number: impl Fn(&Pair) -> f64) -> F {
-    let mut x = F::default();
-    for lane in 0..F::WIDTH {
-        let pair = &block[lane.min(block.len() - 1)];
-        x.set_lane(lane, F::Real::of(number(pair)));
-    }
-    x
+    let last = block.len() - 1;
+    let numbers: Vec<F::Real> = (0..F::WIDTH)
+        .map(|lane| F::Real::of(number(&block[lane.min(last)])))
+        .collect();
+    F::load(&numbers)
 }
 
 #[inline(always)]

@@ -113,7 +113,9 @@ compiled!(
     mod avx2 "avx2,fma,bmi1,bmi2"
 );
 compiled!(
-    /// Whatever the target has. Without a fused instruction `mul_add` is a library call: slow, the same bits.
+    /// Whatever the target has, where that is not x86: there every processor since 2015 has AVX2, and a third text would
+    /// take as long to compile as the others.
+    #[cfg(not(target_arch = "x86_64"))]
     mod portable
 );
 
@@ -133,7 +135,7 @@ pub fn available(lanes: Lanes) -> bool {
     #[cfg(not(target_arch = "x86_64"))]
     let (avx2, avx512) = (false, false);
     match lanes {
-        Lanes::Auto | Lanes::Scalar => true,
+        Lanes::Auto | Lanes::Scalar => avx2 || cfg!(not(target_arch = "x86_64")),
         Lanes::Eight => avx2,
         Lanes::Sixteen => avx2 && avx512,
     }
@@ -151,19 +153,19 @@ pub fn create(
     layout: &Layout,
     threads: usize,
 ) -> Result<Box<dyn Backend>, BackendError> {
-    let fused = available(Lanes::Eight);
     let lanes = match lanes {
         // a register that holds one world takes longer than a scalar, for the same bits
         Lanes::Auto if worlds == 1 => Lanes::Scalar,
         Lanes::Auto if available(Lanes::Sixteen) => Lanes::Sixteen,
-        Lanes::Auto if fused => Lanes::Eight,
+        Lanes::Auto if available(Lanes::Eight) => Lanes::Eight,
         Lanes::Auto => Lanes::Scalar,
         asked => asked,
     };
     if !available(lanes) {
         let (lanes, instructions) = match lanes {
+            Lanes::Sixteen => (16, "AVX-512"),
             Lanes::Eight => (8, "AVX2 with FMA"),
-            _ => (16, "AVX-512"),
+            Lanes::Auto | Lanes::Scalar => (1, "AVX2 with FMA"),
         };
         return Err(BackendError::Lanes {
             lanes,
@@ -171,7 +173,7 @@ pub fn create(
         });
     }
     match (precision, lanes) {
-        (Precision::F64, _) => scalar::<f64>(model, worlds, layout, threads, fused, "f64"),
+        (Precision::F64, _) => scalar::<f64>(model, worlds, layout, threads, "f64"),
         #[cfg(target_arch = "x86_64")]
         (Precision::F32, Lanes::Sixteen) => boxed::<crate::lane::simd::F32x16>(
             model,
@@ -190,7 +192,7 @@ pub fn create(
             "AVX2",
             avx2::program(),
         ),
-        (Precision::F32, _) => scalar::<f32>(model, worlds, layout, threads, fused, "f32"),
+        (Precision::F32, _) => scalar::<f32>(model, worlds, layout, threads, "f32"),
     }
 }
 
@@ -199,29 +201,13 @@ fn scalar<F: Lane>(
     worlds: usize,
     layout: &Layout,
     threads: usize,
-    fused: bool,
     name: &str,
 ) -> Result<Box<dyn Backend>, BackendError> {
     #[cfg(target_arch = "x86_64")]
-    if fused {
-        return boxed::<F>(
-            model,
-            worlds,
-            layout,
-            threads,
-            &format!("{name} scalar, FMA"),
-            avx2::program(),
-        );
-    }
-    let _ = fused;
-    boxed::<F>(
-        model,
-        worlds,
-        layout,
-        threads,
-        &format!("{name} scalar"),
-        portable::program(),
-    )
+    let (instructions, program) = (format!("{name} scalar, FMA"), avx2::program());
+    #[cfg(not(target_arch = "x86_64"))]
+    let (instructions, program) = (format!("{name} scalar"), portable::program());
+    boxed::<F>(model, worlds, layout, threads, &instructions, program)
 }
 
 fn boxed<F: Lane>(

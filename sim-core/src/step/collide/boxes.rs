@@ -23,10 +23,12 @@ const PREFER_FIRST: f64 = 4.0;
 const PREFER_FACES: f64 = 4e-7;
 /// Squared sine below which edges are parallel.
 const PARALLEL: f64 = 1e-8;
-/// Where faces are flat on each other to this (1 - cosine), the edge axis too, it must be shallower by this part of the
-/// depth: as MuJoCo, which keeps the face whatever the angle. One point in place of a face would let it rock.
+/// Where faces are flat on each other to this (1 - cosine), the edge axis too, it must exceed by this part of the
+/// separation: as MuJoCo, which keeps the face whatever the angle. One point in place of a face would let it rock.
 const FLAT: f64 = 2e-4;
 const FLAT_GAIN: f64 = 0.05;
+/// Faces further apart than this, of the boxes' size, do not touch soon: there the nearest points are the exact ones.
+const FLAT_APART: f64 = 0.02;
 
 /// The axis of largest separation.
 pub struct Axis<F: Num> {
@@ -41,11 +43,9 @@ pub struct Axis<F: Num> {
     pub edge: F::Mask,
     pub pair: [F; 2],
     pub product: Vec3<F>,
-    /// Separation along the best axis is `separation * inverse`, inverse of the length of the product.
+    /// Separation along the better of both [m], 0 where flat faces are kept though an edge is better, and one over the length of the product that it is.
     pub separation: F,
     pub inverse: F,
-    /// The boxes are further apart than the margin.
-    pub far: F::Mask,
 }
 
 /// Sum of the half extents: the size that tolerances refer to.
@@ -66,36 +66,48 @@ pub fn box_box<C: Cx>(
     out: &mut Points<C>,
 ) {
     let c = C::F::c;
-    let best = axis(axes_a, half_a, b, half_b, margin);
-    let near = C::F::not(best.far);
-    let mut least = cx.var(c(1e9));
-    when!(cx, C::F::and(near, C::F::not(best.edge)), {
-        let view = view(&best, axes_a, half_a, b, half_b);
-        let nearest = cut(cx, &view, margin, out);
-        cx.set(&mut least, nearest);
-    });
-    when!(cx, C::F::and(near, best.edge), {
-        let nearest = edges(cx, &best, axes_a, half_a, b, half_b, margin, out);
-        cx.set(&mut least, nearest);
-    });
-    // what rounding may leave between the separation and the point that attains it
-    let noise = c(16.0 * <C::F as Num>::Real::EPSILON) * size(half_a, half_b);
-    let reach = best.separation.fma(best.inverse, noise * best.inverse);
-    let apart = C::F::and(c(0.0).lt(best.separation), reach.lt(cx.get(&least)));
-    when!(cx, C::F::and(near, apart), {
-        let nearest = cx.get(&least).min(margin);
-        vertices(cx, axes_a, half_a, b, half_b, &best, nearest, out);
+    let faces = faces(axes_a, half_a, b, half_b);
+    when!(cx, C::F::not(margin.lt(faces.separation)), {
+        let edge = edge(&faces, half_a, half_b);
+        // separation over √square against the margin
+        let far = (margin * margin * edge.square).lt(edge.score);
+        when!(cx, C::F::not(far), {
+            let best = best(&faces, &edge, half_a, half_b);
+            let mut least = cx.var(c(1e9));
+            when!(cx, C::F::not(best.edge), {
+                let view = view(&best, axes_a, half_a, b, half_b);
+                let nearest = cut(cx, &view, margin, out);
+                cx.set(&mut least, nearest);
+            });
+            when!(cx, best.edge, {
+                let nearest = edges(cx, &best, axes_a, half_a, b, half_b, margin, out);
+                cx.set(&mut least, nearest);
+            });
+            // what rounding may leave between the separation and the point that attains it
+            let noise = c(16.0 * <C::F as Num>::Real::EPSILON) * size(half_a, half_b);
+            let reach = noise.fma(best.inverse, best.separation);
+            let apart = C::F::and(c(0.0).lt(best.separation), reach.lt(cx.get(&least)));
+            when!(cx, apart, {
+                let nearest = cx.get(&least).min(margin);
+                vertices(cx, axes_a, half_a, b, half_b, &best, nearest, out);
+            });
+        });
     });
 }
 
+/// The face axis of largest separation.
+struct Faces<F> {
+    turn: Mat3<F>,
+    /// Absolute values of `turn`.
+    width: Mat3<F>,
+    center: [Vec3<F>; 2],
+    separation: F,
+    /// Its number: of A, then of B.
+    code: F,
+}
+
 #[inline(always)]
-fn axis<F: Num>(
-    axes_a: &Mat3<F>,
-    half_a: Vec3<F>,
-    b: &Placed<F>,
-    half_b: Vec3<F>,
-    margin: F,
-) -> Axis<F> {
+fn faces<F: Num>(axes_a: &Mat3<F>, half_a: Vec3<F>, b: &Placed<F>, half_b: Vec3<F>) -> Faces<F> {
     let c = F::c;
     let mut turn = [[c(0.0); 3]; 3];
     let mut width = turn;
@@ -107,85 +119,125 @@ fn axis<F: Num>(
     }
     let in_a = transform_back(axes_a, b.center);
     let in_b = transform_back(&b.axes, b.center);
-    let size = size(half_a, half_b);
-
-    let (mut face, mut code) = (c(-1e9), c(0.0));
+    let (mut first, mut code) = (c(-1e9), c(0.0));
     for i in 0..3 {
         let x = in_a[i].abs() - half_a[i] - dot(half_b, width[i]);
-        let better = face.lt(x);
-        face = F::select(better, x, face);
+        let better = first.lt(x);
+        first = F::select(better, x, first);
         code = F::select(better, c(i as f64), code);
     }
-    let (mut face_b, mut code_b) = (c(-1e9), c(0.0));
+    let (mut second, mut code_b) = (c(-1e9), c(0.0));
     for j in 0..3 {
         let x = in_b[j].abs() - half_b[j] - dot(half_a, [width[0][j], width[1][j], width[2][j]]);
-        let better = face_b.lt(x);
-        face_b = F::select(better, x, face_b);
+        let better = second.lt(x);
+        second = F::select(better, x, second);
         code_b = F::select(better, c(3.0 + j as f64), code_b);
     }
-    let better = size
-        .fma(c(PREFER_FIRST * F::Real::EPSILON), face)
-        .lt(face_b);
-    face = F::select(better, face_b, face);
-    code = F::select(better, code_b, code);
+    let noise = size(half_a, half_b) * c(PREFER_FIRST * F::Real::EPSILON);
+    let better = (first + noise).lt(second);
+    Faces {
+        turn,
+        width,
+        center: [in_a, in_b],
+        separation: F::select(better, second, first),
+        code: F::select(better, code_b, code),
+    }
+}
 
+/// The edge axis of largest separation, if it exceeds that of the faces.
+struct Edge<F> {
+    /// Number 3 i + j of aᵢ × bⱼ, or -1.
+    code: F,
+    /// x|x| where x is the separation times the length of the axis.
+    score: F,
+    /// The axis' squared length.
+    square: F,
+}
+
+#[inline(always)]
+fn edge<F: Num>(faces: &Faces<F>, half_a: Vec3<F>, half_b: Vec3<F>) -> Edge<F> {
+    let c = F::c;
+    let (turn, width, in_a) = (&faces.turn, &faces.width, faces.center[0]);
     // separation x over length √l is compared by x|x| l' > x'|x'| l
-    let mut best = face * face.abs();
-    let (mut square, mut separation) = (c(1.0), face);
-    let mut pair = [c(-1.0); 2];
-    let noise = size * c(PREFER_FACES);
+    let mut score = faces.separation * faces.separation.abs();
+    let (mut square, mut code) = (c(1.0), c(-1.0));
+    let noise = size(half_a, half_b) * c(PREFER_FACES);
     for i in 0..3 {
         let (i1, i2) = ((i + 1) % 3, (i + 2) % 3);
         for j in 0..3 {
             let (j1, j2) = ((j + 1) % 3, (j + 2) % 3);
             let l = turn[i1][j].fma(turn[i1][j], turn[i2][j] * turn[i2][j]);
             let between = in_a[i1].fnma(turn[i2][j], in_a[i2] * turn[i1][j]).abs();
-            let of_a = half_a[i1].fma(width[i2][j], half_a[i2] * width[i1][j]);
-            let of_b = half_b[j1].fma(width[i][j2], half_b[j2] * width[i][j1]);
-            let x = between - of_a - of_b;
-            let less = x - noise;
-            let score = less * less.abs();
-            let better = F::and(c(PARALLEL).lt(l), (best * l).lt(score * square));
-            best = F::select(better, score, best);
+            let of_a = half_a[i1].fma(width[i2][j], half_a[i2].fma(width[i1][j], noise));
+            let of_b = half_b[j1].fma(width[i][j2], half_b[j2].fma(width[i][j1], of_a));
+            let x = between - of_b;
+            let here = x * x.abs();
+            let better = F::and(c(PARALLEL).lt(l), (score * l).lt(here * square));
+            score = F::select(better, here, score);
             square = F::select(better, l, square);
-            separation = F::select(better, x, separation);
-            pair[0] = F::select(better, c(i as f64), pair[0]);
-            pair[1] = F::select(better, c(j as f64), pair[1]);
+            code = F::select(better, c((3 * i + j) as f64), code);
         }
     }
-    let far = F::or(margin.lt(face), (margin * margin * square).lt(best));
-    let inverse = c(1.0).div(square.sqrt());
+    Edge {
+        code,
+        score,
+        square,
+    }
+}
+
+/// The better of the best face and edge axes.
+#[inline(always)]
+fn best<F: Num>(faces: &Faces<F>, edge: &Edge<F>, half_a: Vec3<F>, half_b: Vec3<F>) -> Axis<F> {
+    let c = F::c;
+    let turn = faces.turn;
+    let columns = transposed(&turn);
+    let inverse = c(1.0).div(edge.square.sqrt());
+    // what was taken off for noise is added again
+    let root = edge.score.abs().sqrt();
+    let less = F::select(edge.score.lt(c(0.0)), -root, root);
+    let separation = size(half_a, half_b).fma(c(PREFER_FACES), less) * inverse;
+    let first = F::select(
+        c(5.5).lt(edge.code),
+        c(2.0),
+        F::select(c(2.5).lt(edge.code), c(1.0), c(0.0)),
+    );
+    let pair = [first, c(3.0).fnma(first, edge.code)];
     // aᵢ × bⱼ in the axes of A
-    let column = one_of(pair[1], transposed(&turn));
+    let column = one_of(pair[1], columns);
     let product = one_of(
-        pair[0],
+        first,
         [
             [c(0.0), -column[2], column[1]],
             [column[2], c(0.0), -column[0]],
             [-column[1], column[0], c(0.0)],
         ],
     );
-    let of_b = c(2.5).lt(code);
-    let number = code - F::select(of_b, c(3.0), c(0.0));
-    let facing = one_of(number, transposed(&turn));
+    let product = scale(product, inverse * sign(dot(product, faces.center[0])));
+    let of_b = c(2.5).lt(faces.code);
+    let number = faces.code - F::select(of_b, c(3.0), c(0.0));
+    let facing = one_of(number, columns);
     let along_face = F::select(of_b, dot(product, facing), one_of_numbers(number, product));
     // the other box's axes along the face axis
     let theirs = select(of_b, facing, one_of(number, turn));
     let parallel = theirs[0].abs().max(theirs[1].abs()).max(theirs[2].abs());
-    let flat = c(1.0 - FLAT).lt(parallel.min(along_face.abs() * inverse));
-    let little = separation.fma(inverse, -face).lt(face * c(-FLAT_GAIN));
-    let edge = F::and(c(-0.5).lt(pair[0]), F::not(F::and(flat, little)));
+    let flat = c(1.0 - FLAT).lt(parallel.min(along_face.abs()));
+    let little = (separation - faces.separation).lt(faces.separation.abs() * c(FLAT_GAIN));
+    let close = faces.separation.lt(size(half_a, half_b) * c(FLAT_APART));
+    let found = c(-0.5).lt(edge.code);
+    let is_flat = F::and(F::and(found, close), F::and(flat, little));
+    let is_edge = F::and(found, F::not(is_flat));
+    // faces that are kept so are not taken for apart: their points stand
+    let face = F::select(is_flat, c(0.0), faces.separation);
     Axis {
         turn,
-        center: [in_a, in_b],
+        center: faces.center,
         of_b,
         number,
-        edge,
+        edge: is_edge,
         pair,
-        product: scale(product, inverse * sign(dot(product, in_a))),
-        inverse: F::select(edge, inverse, c(1.0)),
-        separation: F::select(edge, separation, face),
-        far,
+        product,
+        separation: F::select(is_edge, separation, face),
+        inverse: F::select(is_edge, inverse, c(1.0)),
     }
 }
 

@@ -3,14 +3,15 @@
 use super::choose::{clamped, one_of, one_of_numbers, reciprocal, select, sign, unless};
 use super::points::{Placed, Points};
 use super::spheres::{leave_box, sphere_off_box, spheres};
-use crate::lane::{Cx, MaskOf, Num};
+use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::vec3::{Mat3, Vec3, cross, dot, scale, scale_add, sub, transform_back};
 use crate::when;
 
 /// Below this sine axes are parallel, or perpendicular to a normal: then two points are given, or one end rocks.
 const PARALLEL: f64 = 0.01;
-/// How much nearer, of the shapes' size, the nearest point must be than those of the ends, to be a point of its own.
-const NEARER: f64 = 1e-6;
+/// How much nearer, in roundings of the shapes' size, the nearest point must be than those of the ends, to be a point of its
+/// own.
+const NEARER: f64 = 8.0;
 /// An end that close to the nearest point, of the axis, is that point.
 const SAME: f64 = 0.05;
 /// A face is larger by this, relatively, where the axis is cut to it.
@@ -82,7 +83,8 @@ pub fn capsule_capsule<C: Cx>(
     }
     let size = radius_a + radius_b + half_height_a + half_height_b;
     let between = sub(nearest[1], nearest[0]);
-    let middle = (dot(between, between).sqrt() + size * c(NEARER)).lt(least);
+    let middle =
+        (dot(between, between).sqrt() + size * c(NEARER * <C::F as Num>::Real::EPSILON)).lt(least);
     let alone = C::F::or(C::F::not(common), middle);
     when!(cx, alone, {
         let [p, q] = nearest;
@@ -132,7 +134,8 @@ pub fn capsule_box<C: Cx>(
         let low = C::F::select(two, low, nearest);
         let first = leave_box(axis.at(low), half).0;
         let second = leave_box(axis.at(high), half).0;
-        let nearer = (distance + size * c(NEARER)).lt(first.min(second));
+        let nearer =
+            (distance + size * c(NEARER * <C::F as Num>::Real::EPSILON)).lt(first.min(second));
         let between = C::F::and(two, nearer);
         let all = C::F::or(two, C::F::not(two));
         sphere(cx, &axis, low, half, b, all, margin, out);

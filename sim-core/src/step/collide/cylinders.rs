@@ -3,23 +3,27 @@
 //! A sphere: in closed form. The others: the best of a few axes rejects what is far, and GJK at a stand-off goes on from
 //! it with the cylinder's exact farthest points. All is found in the frame of the pair's second shape.
 
-use super::gjk::{NoRestart, closest};
+use super::gjk::closest;
 use super::hull_axes::{
     Axis, BoxReach, CylinderReach, Reach, SegmentReach, better, bounding_axis, hull_axis, slack,
 };
 use super::hulls::in_frame_of;
-use crate::model::cut::Cut;
 use super::manifold::{Near, add_points, aligned};
 use super::points::{Placed, Points};
+use super::samples::{Hull, Own, Samples};
 use super::sides::{BoxSide, CylinderSide, HullSide, SegmentSide};
 use super::support::{Block, Cylinder, Polyhedron, Segment, Upright, negated, signed};
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{Mat3, Vec3, cross, dot, scale, scale_add, transform, transform_back};
+use crate::model::cut::Cut;
 use crate::model::hull_tables::HullTables;
 use crate::when;
 
 /// Segments turned to each other less than this lie along each other [–]: 1.8°.
 const PARALLEL: f64 = 0.9995;
+
+/// Depth past which the nearest axis may not be that of least depth, relative to the cylinder's radius.
+const DEEP: f64 = 0.03;
 
 /// A sphere and a cylinder: one point.
 #[inline(always)]
@@ -110,7 +114,7 @@ pub fn capsule_cylinder<C: Cx>(
             start.normal,
             size,
             limit,
-            &NoRestart,
+            &pair.samples(radius_b * c(DEEP)),
         )
         .near();
         let near = Near {
@@ -189,7 +193,7 @@ pub fn box_cylinder<C: Cx>(
             start.normal,
             size_a + size_b,
             margin,
-            &NoRestart,
+            &pair.samples(radius_b * c(DEEP)),
         )
         .near();
         when!(cx, near.distance.lt(margin), {
@@ -266,7 +270,7 @@ pub fn cylinder_cylinder<C: Cx>(
             start.normal,
             size_a + size_b,
             margin,
-            &NoRestart,
+            &pair.samples(radius_b * c(DEEP)),
         )
         .near();
         when!(cx, near.distance.lt(margin), {
@@ -323,6 +327,13 @@ pub fn cylinder_hull<C: Cx>(
                 radius,
                 half_height,
             };
+            let samples = Samples {
+                axes: &axes,
+                center,
+                a: &reach,
+                b: Hull(&hull),
+                depth: radius * c(DEEP),
+            };
             let near = closest(
                 cx,
                 &cylinder,
@@ -330,7 +341,7 @@ pub fn cylinder_hull<C: Cx>(
                 best.axis.normal,
                 size,
                 margin,
-                &NoRestart,
+                &samples,
             )
             .near();
             when!(cx, near.distance.lt(margin), {
@@ -403,7 +414,19 @@ struct Rough<'a, F, A, B> {
     b: &'a B,
 }
 
-impl<F: Num, A: Reach<F>, B: Reach<F>> Rough<'_, F, A, B> {
+impl<'a, F: Num, A: Reach<F>, B: Reach<F>> Rough<'a, F, A, B> {
+    /// Where to start again past a depth.
+    #[inline(always)]
+    fn samples(&self, depth: F) -> Samples<'a, F, A, Own<'a, B>> {
+        Samples {
+            axes: self.axes,
+            center: self.center,
+            a: self.a,
+            b: Own(self.b),
+            depth,
+        }
+    }
+
     /// Their distance along a direction or against it; a vector without length is no axis.
     #[inline(always)]
     fn along(&self, d: Vec3<F>) -> Axis<F> {

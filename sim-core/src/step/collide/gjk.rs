@@ -9,30 +9,33 @@ use super::hull_axes::Axis;
 use super::manifold::Near;
 use super::support::{Support, difference, get3, select3, set3, var3};
 use crate::lane::{Cx, Num, Real};
-use crate::math::vec3::{Vec3, add, dot, scale, scale_add, sub};
+use crate::math::vec3::{Vec3, add, cross, dot, scale, scale_add, sub};
 use crate::{break_if, times, when};
 
 /// Another axis to start from, where the first leads to a depth that may not be the least.
 pub(super) trait Restart<C: Cx> {
-    /// Is there one?
-    const SOME: bool;
+    /// How many times it is asked for.
+    const TRIES: usize;
+    /// Is it worth trying only where it is better than the one that is known?
+    const BETTER: bool;
     /// The depth past which it is asked for [m].
     fn depth(&self) -> C::F;
-    /// An axis that is better than the one that is known, or that one.
-    fn axis(&self, cx: &mut C, known: Axis<C::F>) -> Axis<C::F>;
+    /// The axis; `known` is the best so far, `tried` the last that was started from.
+    fn axis(&self, cx: &mut C, known: Axis<C::F>, tried: Vec3<C::F>) -> Axis<C::F>;
 }
 
 /// None.
 pub(super) struct NoRestart;
 
 impl<C: Cx> Restart<C> for NoRestart {
-    const SOME: bool = false;
+    const TRIES: usize = 0;
+    const BETTER: bool = true;
     #[inline(always)]
     fn depth(&self) -> C::F {
         C::F::c(1e18)
     }
     #[inline(always)]
-    fn axis(&self, _: &mut C, known: Axis<C::F>) -> Axis<C::F> {
+    fn axis(&self, _: &mut C, known: Axis<C::F>, _: Vec3<C::F>) -> Axis<C::F> {
         known
     }
 }
@@ -74,7 +77,7 @@ const fn rounds<R: Real>() -> usize {
 
 /// Rounds of the stand-off.
 const fn stand_offs<R: Real>() -> usize {
-    if R::DOUBLE { 16 } else { 6 }
+    if R::DOUBLE { 32 } else { 12 }
 }
 
 /// The closest points of two shapes, from the axis `start`, a unit vector. `size` is the sum of their radii. Shapes that are farther apart than `limit` are only found to be so.
@@ -97,6 +100,7 @@ pub(super) fn closest<C: Cx, R: Restart<C>>(
     let mut normal = var3(cx, start);
     let mut point = var3(cx, [zero; 3]);
     let mut restarts = cx.var(zero);
+    let mut tried = var3(cx, start);
     times!(cx, stand_offs::<RealOf<C>>(), {
         let m = get3(cx, &axis);
         let (on_a, w) = difference(cx, a, b, m);
@@ -123,19 +127,25 @@ pub(super) fn closest<C: Cx, R: Restart<C>>(
         set3(cx, &mut point, select3(better, middle, kept_point));
         set3(cx, &mut axis, n);
         let settled = C::F::or(C::F::not(gained), C::F::or(gap.lt(before), limit.lt(x)));
-        if R::SOME {
-            let first = cx.get(&restarts).lt(c(0.5));
+        if R::TRIES > 0 {
+            let tries = cx.get(&restarts);
             let mut again = cx.var(zero);
-            when!(cx, C::F::and(settled, C::F::and(x.lt(-restart.depth()), first)), {
+            let deep = C::F::and(x.lt(-restart.depth()), tries.lt(c(R::TRIES as f64 - 0.5)));
+            when!(cx, C::F::and(settled, deep), {
                 let known = Axis {
-                    normal: n,
-                    distance: x + settled_at,
+                    normal: get3(cx, &normal),
+                    distance: cx.get(&best) + settled_at,
                 };
-                let other = restart.axis(cx, known);
+                let from = get3(cx, &tried);
+                let other = restart.axis(cx, known, from);
                 set3(cx, &mut axis, other.normal);
-                cx.set(&mut restarts, one);
-                let better = known.distance.lt(other.distance);
-                cx.set(&mut again, C::F::select(better, one, zero));
+                set3(cx, &mut tried, other.normal);
+                cx.set(&mut restarts, tries + one);
+                let least = if R::BETTER { known.distance } else { c(-1e17) };
+                cx.set(
+                    &mut again,
+                    C::F::select(least.lt(other.distance), one, zero),
+                );
             });
             let settled = C::F::and(settled, cx.get(&again).lt(c(0.5)));
             break_if!(cx, settled);
@@ -223,6 +233,7 @@ fn apart<C: Cx>(
         let ew = [dot(e[0], w), dot(e[1], w), dot(e[2], w)];
         let ee = [dot(e[0], e[0]), dot(e[1], e[1]), dot(e[2], e[2])];
         let (mut least, mut s_best, mut t_best) = (c(1e18), zero, zero);
+        let mut foot = w;
         let (mut o1, mut o2, mut p1, mut p2) = (o[0], o[1], p[0], p[1]);
         for k in 0..3 {
             let t = (-ew[k]).div(ee[k].max(c(1e-30))).max(zero).min(one);
@@ -231,24 +242,28 @@ fn apart<C: Cx>(
             let is = distance.lt(least);
             let l = (k + 1) % 3;
             least = C::F::select(is, distance, least);
+            foot = select3(is, x, foot);
             s_best = C::F::select(is, t, s_best);
             (o1, o2) = (select3(is, o[k], o1), select3(is, o[l], o2));
             (p1, p2) = (select3(is, p[k], p1), select3(is, p[l], p2));
         }
+        // by cross products: of thin triangles, as many near points of a curved surface make, dots lose too much
+        let moment = [cross(e[0], w), cross(e[1], w), cross(e[2], w)];
         for k in 0..3 {
             let l = (k + 1) % 3;
-            let mixed = dot(e[k], e[l]);
-            let product = ee[k] * ee[l];
-            let determinant = mixed.fnma(mixed, product);
-            let inverse = one.div(determinant.max(c(1e-30)));
-            let s = (mixed * ew[l] - ee[l] * ew[k]) * inverse;
-            let t = (mixed * ew[k] - ee[k] * ew[l]) * inverse;
-            let x = scale_add(e[k], s, scale_add(e[l], t, w));
-            let distance = dot(x, x);
-            let wide = (product * c(4.0 * RealOf::<C>::EPSILON)).lt(determinant);
+            let area = cross(e[k], e[l]);
+            let square = dot(area, area);
+            let inverse = one.div(square.max(c(1e-36)));
+            let s = dot(moment[l], area) * inverse;
+            let t = -(dot(moment[k], area) * inverse);
+            let height = dot(area, w);
+            let distance = height * height * inverse;
+            let wide =
+                (ee[k] * ee[l] * c(1e4 * RealOf::<C>::EPSILON * RealOf::<C>::EPSILON)).lt(square);
             let inside = C::F::and(C::F::and(zero.lt(s), zero.lt(t)), (s + t).lt(one));
             let is = C::F::and(C::F::and(wide, inside), distance.lt(least));
             least = C::F::select(is, distance, least);
+            foot = select3(is, scale(area, height * inverse), foot);
             s_best = C::F::select(is, s, s_best);
             t_best = C::F::select(is, t, t_best);
             (o1, o2) = (select3(is, o[k], o1), select3(is, o[l], o2));
@@ -263,8 +278,7 @@ fn apart<C: Cx>(
             set3(cx, &mut points[place], x);
         }
         set3(cx, &mut shares, [one - s_best - t_best, s_best, t_best]);
-        let x = scale_add(sub(o1, w), s_best, scale_add(sub(o2, w), t_best, w));
-        set3(cx, &mut nearest, x);
+        set3(cx, &mut nearest, foot);
     });
     let share = get3(cx, &shares);
     let (p0, p1, p2) = (

@@ -7,9 +7,13 @@
 
 use super::gjk::Restart;
 use super::hull_axes::Axis;
-use super::support::{Polyhedron, Support, Turned, constant3, get3, negated, pick3, select3, set3, signed, var3};
+use super::support::{
+    Polyhedron, Support, Turned, constant3, get3, negated, pick3, select3, set3, signed, var3,
+};
 use crate::lane::{Cx, Num, Table};
-use crate::math::vec3::{Vec3, add, cross, dot, scale, sub, transform, transform_add, transform_back};
+use crate::math::vec3::{
+    Vec3, add, cross, dot, scale, sub, transform, transform_add, transform_back,
+};
 use crate::{each, push, span, when};
 
 /// Two hulls, in the frame of the second.
@@ -40,14 +44,15 @@ impl<C: Cx> Best<C> {
 }
 
 impl<C: Cx> Restart<C> for LeastDepth<'_, '_, C> {
-    const SOME: bool = true;
+    const TRIES: usize = 1;
+    const BETTER: bool = true;
     #[inline(always)]
     fn depth(&self) -> C::F {
         self.depth
     }
 
     #[inline(always)]
-    fn axis(&self, cx: &mut C, known: Axis<C::F>) -> Axis<C::F> {
+    fn axis(&self, cx: &mut C, known: Axis<C::F>, _: Vec3<C::F>) -> Axis<C::F> {
         let mut best = Best {
             depth: cx.var(-known.distance),
             axis: var3(cx, known.normal),

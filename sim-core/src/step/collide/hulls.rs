@@ -1,16 +1,15 @@
 //! Convex hulls against planes, spheres, capsules, boxes and each other.
 //!
 //! All is found in the hull's frame; of two hulls, in the second's. Planes: the hull's lowest vertices. Spheres, capsules
-//! and boxes: the best of all separating axes; it is exact in penetration and where GJK starts where they are apart. A
-//! sphere is a point, a capsule a segment, with a radius about it. Two hulls: GJK at a stand-off, and where they
-//! penetrate deeply, once more from the best of both hulls' faces.
+//! and boxes: the best of all separating axes, which is exact in penetration, and GJK from there where they are apart. A
+//! sphere is a point, a capsule a segment, with a radius about it. Two hulls: GJK at a stand-off, and where they penetrate
+//! more deeply, the nearest face of their Minkowski difference.
 
 use super::gjk::{NoRestart, closest};
-use super::hull_depth::LeastDepth;
 use super::hull_axes::{
     Best, BoxReach, PointReach, Reach, SegmentReach, bounding_axis, hull_axis, slack,
 };
-use crate::model::cut::Cut;
+use super::hull_depth::LeastDepth;
 use super::manifold::{Near, add_points, aligned};
 use super::points::{Placed, Points};
 use super::sides::{BoxSide, HullSide, SegmentSide};
@@ -23,6 +22,7 @@ use crate::lane::{Cx, Num};
 use crate::math::vec3::{
     Mat3, Vec3, cross, dot, scale, scale_add, sub, transform, transform_add, transform_back,
 };
+use crate::model::cut::Cut;
 use crate::model::hull_tables::HullTables;
 use crate::{span, when};
 

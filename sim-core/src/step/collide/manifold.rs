@@ -16,6 +16,8 @@ use crate::{break_if, times, when};
 
 /// Faces that are turned to the normal less than this touch face on [–]: 1.8°.
 const ALIGNED: f64 = 0.9995;
+/// Sides that are steeper than this are not cut [–]: their heights would be errors of a cut many times over.
+const FACING: f64 = 0.2;
 /// The distance of what is no candidate [m].
 const NONE: f64 = 1e9;
 
@@ -116,13 +118,13 @@ pub(super) fn add_points<C: Cx>(
         let q = plane_of(cx, cut, zeroth, 3, along(&basis, second.normal()));
         set3(cx, &mut plane, [p.slope[0], p.slope[1], p.base]);
         half_planes(cx, cut, counts[1], q.turn);
-        let steep = C::F::or(p.facing.lt(c(0.05)), q.facing.lt(c(0.05)));
+        let steep = C::F::or(p.facing.lt(c(FACING)), q.facing.lt(c(FACING)));
         when!(cx, C::F::not(steep), {
             cut_edges(cx, cut, counts, &q, side, size, margin);
             add_corners(cx, cut, counts, &p, side, size, margin);
         });
 
-        let least = c(2e-6) * size + rounding::<C::F>() * size;
+        let least = rounding::<C::F>() * size;
         deepest(
             cx,
             cut,
@@ -148,6 +150,7 @@ pub(super) fn add_points<C: Cx>(
     let slope = get3(cx, &plane);
     for k in 0..4 {
         let [x, y, distance] = get3(cx, &spot[k]);
+        let distance = distance.max(near.distance);
         let height = slope[0].fma(x, slope[1].fma(y, slope[2])) + distance * side * c(0.5);
         let height = match k {
             0 => C::F::select(c(0.5).lt(cx.get(&closest)), zero, height),

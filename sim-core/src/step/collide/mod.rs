@@ -17,6 +17,7 @@ pub mod manifold;
 mod narrow;
 pub mod planes;
 pub mod points;
+mod samples;
 mod sides;
 pub mod spheres;
 mod spread;

@@ -2,7 +2,6 @@
 
 use crate::lane::{Cx, MaskOf, Num, Table};
 use crate::math::vec3::{Mat3, Vec3, add, scale};
-use crate::model::contact::row;
 use crate::{push, when};
 
 /// A shape where it is, relative to the centre of the pair's first shape.
@@ -18,7 +17,7 @@ pub struct Placed<F> {
 pub struct Points<C: Cx> {
     /// Where they go.
     pub list: C::List,
-    /// The rows; see [`row`].
+    /// The rows; see [`crate::model::contact::row`].
     pub table: Table,
     /// The pair.
     pub pair: C::F,
@@ -71,12 +70,9 @@ impl<C: Cx> Points<C> {
         let (list, table, number) = (&mut self.list, self.table, self.pair);
         let (point, normal) = (add(self.base, point), scale(normal, self.flip));
         push!(cx, *list, mask, fresh, {
-            for i in 0..3 {
-                cx.init(table, fresh, row::POINT + i, point[i]);
-                cx.init(table, fresh, row::NORMAL + i, normal[i]);
-            }
-            cx.init(table, fresh, row::DISTANCE, distance);
-            cx.init(table, fresh, row::PAIR, number);
+            let ([x, y, z], [u, v, w]) = (point, normal);
+            // in the order of `row`
+            cx.init_all(table, fresh, &[x, y, z, distance, u, v, w, number]);
         });
     }
 }

@@ -61,7 +61,7 @@ fn elliptic<F: Num>(impratio: F::Real, jar: [F; 3], stiff: F, mu: F) -> ConeLaw<
     let rub = soft * mu;
     let turn = (push * mu) * inverse;
     let along = rub * mu - turn;
-    let pull = push * mu;
+    let pull = -(push * mu);
     ConeLaw {
         force: [
             of_piece::<F>(sticks, slides, -(stiff * jar[0]), push),

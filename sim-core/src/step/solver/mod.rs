@@ -169,56 +169,58 @@ fn solve_system<C: Cx>(
 ) {
     let t = &m.contacts;
     let w = &mut b.work;
-    if t.classes.is_empty() {
-        return solve_linear(&m.pattern, &mut w.hessian, &mut w.vector[x]);
-    }
-    for (cell, value) in b.system.iter_mut().zip(&w.hessian) {
-        cx.put(cell, *value);
-    }
-    for (cell, value) in b.pull.iter_mut().zip(&w.vector[x]) {
-        cx.put(cell, *value);
-    }
-    for (k, class) in t.classes.iter().enumerate() {
-        if !class.couples {
-            contacts::assemble(cx, t, k, &m.pattern, &mut b.system, &mut b.pull, pulls);
+    let touches = !t.classes.is_empty();
+    if touches {
+        for (cell, value) in b.system.iter_mut().zip(&w.hessian) {
+            cx.put(cell, *value);
+        }
+        for (cell, value) in b.pull.iter_mut().zip(&w.vector[x]) {
+            cx.put(cell, *value);
         }
     }
-    gather(cx, &b.system, &mut w.hessian);
-    gather(cx, &b.pull, &mut w.vector[x]);
-    if !t.couples() {
-        return solve_linear(&m.pattern, &mut w.hessian, &mut w.vector[x]);
-    }
-    let coupled = C::F::c(0.5).lt(contacts::coupling(cx, t));
-    when!(cx, coupled, {
-        for cell in &mut b.coupled_system {
-            cx.put(cell, C::F::c(0.0));
+    let couples = t.couples();
+    let coupling = contacts::coupling(cx, t);
+    let (none, half) = (coupling.lt(C::F::c(0.5)), C::F::c(0.5));
+    // a loop, so that assembly and solver are compiled once: they are long
+    for larger in [false, true] {
+        if larger && !couples {
+            break;
         }
-        for (value, &place) in w.hessian.iter().zip(&m.coupled.places) {
-            cx.put(&mut b.coupled_system[place], *value);
+        let solves = if larger { half.lt(coupling) } else { none };
+        if larger {
+            when!(cx, solves, {
+                for cell in &mut b.coupled_system {
+                    cx.put(cell, C::F::c(0.0));
+                }
+                for (cell, &place) in b.system.iter().zip(&m.coupled.places) {
+                    let value = cx.get(cell);
+                    cx.put(&mut b.coupled_system[place], value);
+                }
+            });
         }
-        for (k, class) in t.classes.iter().enumerate() {
-            if class.couples {
-                let pattern = &m.coupled.pattern;
-                contacts::assemble(cx, t, k, pattern, &mut b.coupled_system, &mut b.pull, pulls);
+        let (pattern, cells, matrix) = if larger {
+            (&m.coupled.pattern, &mut b.coupled_system, &mut w.coupled_hessian)
+        } else {
+            (&m.pattern, &mut b.system, &mut w.hessian)
+        };
+        if touches {
+            for k in 0..t.classes.len() {
+                if t.classes[k].couples == larger {
+                    contacts::assemble(cx, t, k, pattern, cells, &mut b.pull, pulls);
+                }
             }
         }
-        gather(cx, &b.coupled_system, &mut w.coupled_hessian);
-        gather(cx, &b.pull, &mut w.coupled_vector);
-        solve_linear(
-            &m.coupled.pattern,
-            &mut w.coupled_hessian,
-            &mut w.coupled_vector,
-        );
-        for (cell, value) in b.solution.iter_mut().zip(&w.coupled_vector) {
-            cx.set(cell, *value);
-        }
-    });
-    when!(cx, C::F::not(coupled), {
-        solve_linear(&m.pattern, &mut w.hessian, &mut w.vector[x]);
-        for (cell, value) in b.solution.iter_mut().zip(&w.vector[x]) {
-            cx.set(cell, *value);
-        }
-    });
+        when!(cx, solves, {
+            if touches {
+                gather(cx, cells, matrix);
+                gather(cx, &b.pull, &mut w.vector[x]);
+            }
+            solve_linear(pattern, matrix, &mut w.vector[x]);
+            for (cell, value) in b.solution.iter_mut().zip(&w.vector[x]) {
+                cx.set(cell, *value);
+            }
+        });
+    }
     gather(cx, &b.solution, &mut w.vector[x]);
 }
 
