@@ -117,8 +117,13 @@ impl Simulation {
             Precision::F64 => (8, 1),
         };
         let worlds = (options.worlds as u64).saturating_add(width);
+        // scratch of each chunk; see backend/cpu/mod.rs
+        let chunks = options.threads.unwrap_or(1).saturating_mul(4) as u64;
+        let scratch = model.constants().contacts.memory.len as u64 * real * width * chunks;
         // state and commands of a world, its counters; see backend/cpu/chunk.rs
-        worlds.saturating_mul((5 * model.dofs() + model.coords()) as u64 * real + 16)
+        worlds
+            .saturating_mul((5 * model.dofs() + model.coords()) as u64 * real + 16)
+            .saturating_add(scratch)
     }
 
     /// Sets columns of a command; it holds until it is set again or the world is reset.

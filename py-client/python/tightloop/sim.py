@@ -241,8 +241,6 @@ def launch(
     except BaseException:
         daemon.stop()
         raise
-    if scene.shapes:
-        warnings.warn("contacts are not simulated yet: robots pass through the scene's shapes", stacklevel=2)
     return sim
 
 

@@ -306,7 +306,9 @@ pub(super) fn cost<C: Cx>(cx: &mut C, t: &ContactsOf<C>, place: usize, sum: &mut
     }
 }
 
-/// Turns `AHEAD` from the end of a step into its change, and adds to `descent` Σ W jv², to `size` Σ |f jv|.
+/// Turns `AHEAD` from the end of a step into its change; adds to `descent` Σ W jv², to `size` Σ W (|J a| + |aref|) |jv|.
+///
+/// Not |f jv|, of which the size is: a force is stiffness times a small difference of J a and aref, and rounded as they are.
 #[inline(always)]
 pub(super) fn begin_line<C: Cx>(
     cx: &mut C,
@@ -326,7 +328,14 @@ pub(super) fn begin_line<C: Cx>(
             }
             let more = cx.get(descent) + cx.only(bent(&law, jv));
             cx.put(descent, more);
-            let more = cx.get(size) + cx.only(power(&law.force, jv).abs());
+            let aref = three(cx, t, r, row::AREF);
+            let [nn, _, _, xx, _, yy] = law.stiffness;
+            let mut terms = C::F::c(0.0);
+            for (i, stiff) in [nn, xx, yy].into_iter().enumerate() {
+                let rounded = (jar[i] + aref[i]).abs() + aref[i].abs();
+                terms = (stiff * rounded).fma(jv[i].abs(), terms);
+            }
+            let more = cx.get(size) + cx.only(terms);
             cx.put(size, more);
         });
     }
