@@ -2,7 +2,7 @@
 
 use sim_core::backend::{BackendError, Values};
 use sim_core::batch::{Dtype, Field, FieldDtype, FieldRow, Group, Layout};
-use sim_core::model::{Description as Scene, Model, Robot};
+use sim_core::model::{Description as Scene, Model};
 use sim_core::simulation::{Options, Precision, Simulation};
 use sim_protocol::host::{Inbox, Numbers};
 use sim_protocol::{self as wire, InputInfo, Op, RefusalKind, RobotRange, Row, Table};

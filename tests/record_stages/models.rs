@@ -1,19 +1,48 @@
-//! The robots of these tests, and states that take every path through the stages.
+//! The robots and shapes of these tests, and states that take every path through the stages.
 
 use crate::{SUBSTEPS, Scalar, toy};
 use sim_core::batch::Block;
 use sim_core::model::constants::{Constants, Motion};
-use sim_core::model::{Description, UrdfOptions};
-use std::path::Path;
+use sim_core::model::geometry::{Hull, Mesh, TriMesh};
+use sim_core::model::{
+    Body, Collision, Cone, Description, Model, Pose, Shape, Surface, UrdfOptions,
+};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A model, and where its random states are.
+pub struct Case {
+    pub name: &'static str,
+    pub m: Constants<f32>,
+    near: Option<Near>,
+}
+
+/// Random states around one state.
+struct Near {
+    /// Positions. `(coords)` [rad or m]
+    joint_q: Vec<f64>,
+    /// Of joints: how far from there, as a share of half their range [–].
+    share: f64,
+    /// Of free bodies: how far from there along each axis [m].
+    apart: f64,
+    /// Of free bodies: how much they may be turned, as what is added to each part of a quaternion [–].
+    turn: f64,
+}
 
 /// The FR3 with drives and armatures of the usual size.
-pub fn fr3() -> Constants<f32> {
-    robot("examples/assets/fr3/fr3_franka_hand.urdf", 0.1, false)
+pub fn fr3() -> Case {
+    let scene = robot("examples/assets/fr3/fr3_franka_hand.urdf", 0.1, false);
+    Case {
+        name: "fr3",
+        m: constants(&scene.compile().unwrap()),
+        near: None,
+    }
 }
 
 /// Every kind of joint on a floating base, with accelerations refined.
-pub fn every_joint() -> Constants<f32> {
-    let m = robot("tests/record_stages/every_joint.urdf", 0.0, true);
+pub fn every_joint() -> Case {
+    let scene = robot("tests/record_stages/every_joint.urdf", 0.0, true);
+    let m = constants(&scene.compile().unwrap());
     assert!(m.solver.refinements > 0);
     for motion in [
         Motion::Revolute,
@@ -24,19 +53,188 @@ pub fn every_joint() -> Constants<f32> {
         assert!(m.bodies.iter().any(|body| body.motion == motion));
     }
     assert!(!m.equalities.is_empty() && !m.frictions.is_empty() && !m.limits.is_empty());
-    m
+    Case {
+        name: "every joint",
+        m,
+        near: None,
+    }
 }
 
 /// The FR3 with limits as its only constraints: the solver passes over states within them.
-pub fn limits_only() -> Constants<f32> {
-    let mut m = fr3();
-    m.equalities.clear();
-    m.frictions.clear();
-    m.solver.refinements = 1;
-    m
+pub fn limits_only() -> Case {
+    let mut case = fr3();
+    case.m.equalities.clear();
+    case.m.frictions.clear();
+    case.m.solver.refinements = 1;
+    Case {
+        name: "limits only",
+        ..case
+    }
 }
 
-fn robot(file: &str, armature: f64, floating: bool) -> Constants<f32> {
+/// Shapes of every kind that stand still, a body with one of every kind but the plane, and a smaller body.
+pub fn shapes(cone: Cone, contacts_max: Option<usize>) -> Case {
+    let mut scene = Description::new(1.0 / 480.0, SUBSTEPS);
+    scene.solver.cone = cone;
+    scene.contacts_max = contacts_max;
+    scene.add_ground("ground", 0.0);
+    let around = [
+        [0.15, 0.0, 0.1],
+        [-0.15, 0.0, 0.1],
+        [0.0, 0.15, 0.1],
+        [0.0, -0.15, 0.1],
+        [0.0, 0.0, 0.25],
+    ];
+    for (shape, place) in every_kind(0.06).into_iter().zip(around) {
+        scene.add_shape("", shape, Pose::at(place));
+    }
+    // a contact without friction, and others with more of it
+    scene.shapes[1].surface.condim = 1;
+    scene.shapes[2].surface.mu = 1.5;
+    let mut body = Body::new("body", Pose::at([0.0, 0.0, 0.1]));
+    let places = [
+        [0.06, 0.0, 0.0],
+        [-0.06, 0.0, 0.0],
+        [0.0, 0.06, 0.0],
+        [0.0, -0.06, 0.0],
+        [0.0, 0.0, 0.06],
+    ];
+    for (k, (shape, place)) in every_kind(0.03).into_iter().zip(places).enumerate() {
+        let surface = Surface {
+            mu: 0.3 * k as f64,
+            condim: if k == 0 { 1 } else { 3 },
+            margin: 0.002,
+            ..Surface::default()
+        };
+        let turned = Pose::about([0.6, 0.0, 0.8], 0.7 * k as f64).quat;
+        let pose = Pose {
+            pos: place,
+            quat: turned,
+        };
+        let shape = Collision {
+            surface,
+            ..Collision::new(None, shape, pose)
+        };
+        body.shapes.push((shape, 1000.0));
+    }
+    scene.add_body(body).unwrap();
+    let mut small = Body::new("small", Pose::at([0.05, 0.05, 0.1]));
+    let edge = Shape::Box {
+        half_extents: [0.03, 0.02, 0.04],
+    };
+    small
+        .shapes
+        .push((Collision::new(None, edge, Pose::identity()), 400.0));
+    scene.add_body(small).unwrap();
+    let model = scene.compile().unwrap();
+    assert!(model.constants().contacts.couples());
+    Case {
+        name: match cone {
+            Cone::Elliptic => "elliptic",
+            Cone::Pyramidal => "pyramidal",
+        },
+        m: constants(&model),
+        near: Some(Near {
+            joint_q: model.start().joint_q.clone(),
+            share: 0.0,
+            apart: 0.08,
+            turn: 1.0,
+        }),
+    }
+}
+
+/// One shape of every kind but the plane, about as large as a ball of this radius [m].
+fn every_kind(size: f64) -> [Shape; 5] {
+    let [x, y, z] = [0.9 * size, 0.7 * size, 1.1 * size];
+    let corners = [
+        [x, 0.0, 0.0],
+        [-x, 0.1 * x, 0.0],
+        [0.0, y, 0.2 * y],
+        [0.0, -y, 0.0],
+        [0.1 * z, 0.0, z],
+        [0.5 * x, 0.5 * y, -z],
+        [-0.5 * x, -0.5 * y, -z],
+    ];
+    let hull = Mesh {
+        path: PathBuf::from("stone"),
+        scale: [1.0; 3],
+        triangles: solid(&corners),
+        closed: true,
+        hulls: vec![Hull::of(&corners, 64).unwrap()],
+        notes: Vec::new(),
+    };
+    [
+        Shape::Sphere { radius: size },
+        Shape::Capsule {
+            radius: 0.6 * size,
+            half_height: 0.7 * size,
+        },
+        Shape::Box {
+            half_extents: [x, y, z],
+        },
+        Shape::Cylinder {
+            radius: 0.8 * size,
+            half_height: 0.9 * size,
+        },
+        Shape::Mesh(Arc::new(hull)),
+    ]
+}
+
+/// Triangles of the hull of some corners, counter-clockwise from outside.
+fn solid(corners: &[[f64; 3]]) -> TriMesh {
+    let hull = Hull::of(corners, 64).unwrap();
+    let fan = |corners: &[u32]| -> Vec<[u32; 3]> {
+        let pairs = corners[1..].windows(2);
+        pairs.map(|pair| [corners[0], pair[0], pair[1]]).collect()
+    };
+    TriMesh {
+        triangles: hull
+            .faces
+            .iter()
+            .flat_map(|face| fan(&face.corners))
+            .collect(),
+        vertices: hull.vertices,
+    }
+}
+
+/// The FR3 between a table and a cube, its fingers about the cube.
+pub fn arm_and_cube() -> Case {
+    let mut scene = robot("examples/assets/fr3/fr3_franka_hand.urdf", 0.1, false);
+    scene.robots[0].pose = Pose::at([-0.5, -0.5, 0.1]);
+    scene.add_box("table", [0.4, 0.4, 0.05], Pose::at([0.0, -0.5, 0.05]));
+    scene.robots[0].set_joint_q(&GRASP).unwrap();
+    let cube = Shape::Box {
+        half_extents: [0.025; 3],
+    };
+    let mut body = Body::new("cube", Pose::at(HELD));
+    body.shapes
+        .push((Collision::new(None, cube, Pose::identity()), 400.0));
+    scene.add_body(body).unwrap();
+    let model = scene.compile().unwrap();
+    Case {
+        name: "arm and cube",
+        m: constants(&model),
+        near: Some(Near {
+            joint_q: model.start().joint_q.clone(),
+            share: 0.02,
+            apart: 0.02,
+            turn: 0.1,
+        }),
+    }
+}
+
+/// The arm of the lesson with its fingers at the cube's sides [rad, m].
+const GRASP: [f64; 9] = [
+    0.187, 0.519, 0.087, -2.289, -0.125, 2.790, 1.167, 0.026, 0.026,
+];
+/// The cube between them, on the table [m].
+const HELD: [f64; 3] = [0.0, -0.35, 0.126];
+
+fn constants(model: &Model) -> Constants<f32> {
+    model.constants().cast()
+}
+
+fn robot(file: &str, armature: f64, floating: bool) -> Description {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     let mut scene = Description::new(1.0 / 480.0, SUBSTEPS);
     let options = UrdfOptions {
@@ -56,45 +254,57 @@ fn robot(file: &str, armature: f64, floating: bool) -> Constants<f32> {
         }
     }
     scene
-        .compile()
-        .unwrap_or_else(|e| panic!("{file}: {e}"))
-        .constants()
-        .cast()
 }
 
-/// Random states: a tenth beyond the joints' ranges at either end, so that rows become active.
-pub fn random_state(m: &Constants<f32>, random: &mut toy::Random) -> Scalar {
-    let mut block = Block::new(m, 0.0);
-    let mut number = |size: f64| (random.unit() * size) as f32;
-    for (j, dof) in m.dofs.iter().enumerate() {
-        let (lower, upper) = m
-            .limits
-            .iter()
-            .find(|l| l.dof == j)
-            .map_or((-1.0, 1.0), |l| (l.lower, l.upper));
-        let (middle, half) = (0.5 * (lower + upper), 0.5 * (upper - lower));
-        let position = middle + 1.2 * half * number(1.0);
-        if matches!(
-            m.bodies[dof.body].motion,
-            Motion::Revolute | Motion::Prismatic
-        ) {
-            block.joint_q[dof.coord] = position;
+impl Case {
+    /// A random state: without a place to be near, a tenth beyond the joints' ranges at either end, so that rows become
+    /// active.
+    pub fn random_state(&self, random: &mut toy::Random) -> Scalar {
+        let m = &self.m;
+        let mut block = Block::new(m, 0.0);
+        let mut number = |size: f64| (random.unit() * size) as f32;
+        for (j, dof) in m.dofs.iter().enumerate() {
+            let (lower, upper) = m
+                .limits
+                .iter()
+                .find(|l| l.dof == j)
+                .map_or((-1.0, 1.0), |l| (l.lower, l.upper));
+            let half = 0.5 * (upper - lower);
+            let (middle, share) = match &self.near {
+                Some(near) => (near.joint_q[dof.coord] as f32, near.share as f32),
+                None => (0.5 * (lower + upper), 1.2),
+            };
+            let position = middle + share * half * number(1.0);
+            if matches!(
+                m.bodies[dof.body].motion,
+                Motion::Revolute | Motion::Prismatic
+            ) {
+                block.joint_q[dof.coord] = position;
+            }
+            block.joint_target_q[j] = middle + half * number(1.0);
+            block.joint_qd[j] = number(2.0);
+            block.joint_qdd[j] = number(20.0);
+            block.joint_f[j] = number(30.0);
+            block.joint_target_qd[j] = number(1.0);
         }
-        block.joint_target_q[j] = middle + half * number(1.0);
-        block.joint_qd[j] = number(2.0);
-        block.joint_qdd[j] = number(20.0);
-        block.joint_f[j] = number(30.0);
-        block.joint_target_qd[j] = number(1.0);
-    }
-    for body in m.bodies.iter().filter(|body| body.motion == Motion::Free) {
-        block.joint_q[body.coord..body.coord + 3].fill_with(|| number(5.0));
-    }
-    for first in m.quaternions() {
-        let turn = [number(1.0), number(1.0), number(1.0), 1.0 + number(0.5)];
-        let norm = turn.iter().map(|x| x * x).sum::<f32>().sqrt();
-        for (to, x) in block.joint_q[first..first + 4].iter_mut().zip(turn) {
-            *to = x / norm;
+        let apart = self.near.as_ref().map_or(5.0, |near| near.apart);
+        for body in m.bodies.iter().filter(|body| body.motion == Motion::Free) {
+            for i in body.coord..body.coord + 3 {
+                let place = self
+                    .near
+                    .as_ref()
+                    .map_or(0.0, |near| near.joint_q[i] as f32);
+                block.joint_q[i] = place + number(apart);
+            }
         }
+        let size = self.near.as_ref().map_or(1.0, |near| near.turn);
+        for first in m.quaternions() {
+            let turn = [number(size), number(size), number(size), 1.0 + number(0.5)];
+            let norm = turn.iter().map(|x| x * x).sum::<f32>().sqrt();
+            for (to, x) in block.joint_q[first..first + 4].iter_mut().zip(turn) {
+                *to = x / norm;
+            }
+        }
+        block
     }
-    block
 }

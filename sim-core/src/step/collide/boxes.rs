@@ -36,15 +36,19 @@ pub struct Axis<F: Num> {
     pub turn: Mat3<F>,
     /// Centre of B in the axes of A, and in its own.
     pub center: [Vec3<F>; 2],
-    /// The best face axis: of which box, and its number.
+    /// The best face axis is one of B.
     pub of_b: F::Mask,
+    /// Its number among the axes of that box.
     pub number: F,
-    /// An edge axis is better: of which axes of A and B it is the product, and the unit vector towards B, in the axes of A.
+    /// An edge axis is better.
     pub edge: F::Mask,
+    /// Of which axes of A and B it is the product.
     pub pair: [F; 2],
+    /// Its unit vector towards B, in the axes of A.
     pub product: Vec3<F>,
-    /// Separation along the better of both [m], 0 where flat faces are kept though an edge is better, and one over the length of the product that it is.
+    /// Separation along the better of both [m]; 0 where flat faces are kept though an edge is better.
     pub separation: F,
+    /// One over the length of the product of an edge axis, else 1.
     pub inverse: F,
 }
 
