@@ -176,6 +176,7 @@ impl Recording {
     }
 
     /// Does the text read numbers, and does it read indices, of the tables of the model?
+    #[cfg_attr(test, allow(dead_code))] // the tests inside this crate leave the GPU out
     pub(crate) fn reads_tables(&self) -> (bool, bool) {
         let (mut numbers, mut indices) = (false, false);
         self.each_statement(&mut |statement| {
