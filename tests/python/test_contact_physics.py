@@ -416,7 +416,7 @@ def test_links_touch_each_other_if_asked_and_neighbours_never(tmp_path, self_col
 
 @PRECISIONS
 def test_a_ball_far_from_the_origin_rests_as_one_at_the_origin(precision):
-    # a pair is seen from its own shapes: a kilometre away f32 keeps no tenths of a millimetre of the world's coordinates
+    # a pair is seen from its own shapes: a kilometre away f32 keeps no tenths of a millimetre of the world's axes
     scene = tl.Scene(dt=1 / 480, substeps=48)
     for name, x in (("near", 0.0), ("far", 1000.0)):
         scene.add_body(name=name, pos=(x, 0, 0.1))

@@ -40,6 +40,8 @@ class Pile:
     cone: str = "elliptic"
     impratio: float = 1000.0
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    by_pairs: bool = True
+    """Whether MuJoCo is told the parameters of each pair; else it finds pairs and parameters by its geoms."""
     surfaces: dict[str, dict] = field(default_factory=dict)
     """By geom, which is named as in ``sim.shape_names``."""
     owners: dict[str, str | None] = field(default_factory=dict)
@@ -118,6 +120,8 @@ class Pile:
     def compile(self) -> mujoco.MjModel:
         """MuJoCo's model, with a pair for every two shapes that may touch."""
         chosen = []
+        if not self.by_pairs:
+            return self._compile_geoms()
         for a, b in itertools.combinations(self.surfaces, 2):
             x, y = self.owners[a], self.owners[b]
             robots = {owner.split("/")[0] for owner in (x, y) if owner is not None}
@@ -140,6 +144,15 @@ class Pile:
             model.pair_gap[number] = s["gap"] + t["gap"]
             model.pair_dim[number] = max(s["condim"], t["condim"])
         return model
+
+    def _compile_geoms(self) -> mujoco.MjModel:
+        for name, surface in self.surfaces.items():
+            geom = self.spec.geom(name)
+            geom.contype = geom.conaffinity = 1
+            geom.friction[0], geom.condim = surface["mu"], surface["condim"]
+            geom.solref[:] = 2 / surface["kd"], surface["kd"] / (2 * np.sqrt(surface["ke"]))
+            geom.margin, geom.gap = surface["margin"], surface["gap"]
+        return self.spec.compile()
 
 
 class Judge:

@@ -47,15 +47,15 @@ ARM = """<robot name="arm">
 )
 
 
-def random_surface(rng: Generator) -> dict:
-    """Soft and hard, slippery and rough."""
+def random_surface(rng: Generator, *, margins: bool = True) -> dict:
+    """Soft and hard, slippery and rough; half of them push before they touch, or are listed before."""
     return {
         "mu": rng.uniform(0.1, 1.5),
         "ke": rng.uniform(1000, 10_000),
         "kd": rng.uniform(60, 250),
         "kf": rng.uniform(300, 2000),
-        "margin": float(rng.choice([0.0, rng.uniform(0, 5e-3)])),
-        "gap": float(rng.choice([0.0, rng.uniform(0, 5e-3)])),
+        "margin": margins * float(rng.choice([0.0, rng.uniform(0, 5e-3)])),
+        "gap": margins * float(rng.choice([0.0, rng.uniform(0, 5e-3)])),
         "condim": int(rng.choice([1, 3, 3])),
     }
 
@@ -69,12 +69,14 @@ def random_size(rng: Generator, kind: str) -> dict:
     return {"radius": rng.uniform(0.03, 0.08), "half_height": rng.uniform(0.05, 0.12)}
 
 
-def random_pile(rng: Generator, kinds: list[str], cone: str, impratio: float) -> Pile:
+def random_pile(rng: Generator, kinds: list[str], cone: str, impratio: float, *, margins: bool = True) -> Pile:
     """One to twelve bodies that fall onto a ground, or onto a table and each other."""
     pile = Pile(cone=cone, impratio=impratio)
-    pile.shape("plane", "ground", {}, quat=tilted(rng, 0.1), **random_surface(rng))
+    pile.shape("plane", "ground", {}, quat=tilted(rng, 0.1), **random_surface(rng, margins=margins))
     if "box" in kinds:
-        pile.shape("box", "table", {"half_extents": (0.4, 0.3, 0.1)}, pos=(0.3, 0, 0.1), **random_surface(rng))
+        pile.shape(
+            "box", "table", {"half_extents": (0.4, 0.3, 0.1)}, pos=(0.3, 0, 0.1), **random_surface(rng, margins=margins)
+        )
     for number in range(rng.integers(1, 13)):
         name, kind = f"b{number}", str(rng.choice(kinds))
         place = np.array([*rng.uniform(-0.12, 0.12, 2), 0.35 + 0.12 * number])
@@ -82,7 +84,13 @@ def random_pile(rng: Generator, kinds: list[str], cone: str, impratio: float) ->
         # every other body's centre of mass is not its frame's origin
         shift = rng.uniform(-0.05, 0.05, 3) * (number % 2)
         pile.shape(
-            kind, f"s{number}", random_size(rng, kind), pos=shift, quat=turn(rng), body=name, **random_surface(rng)
+            kind,
+            f"s{number}",
+            random_size(rng, kind),
+            pos=shift,
+            quat=turn(rng),
+            body=name,
+            **random_surface(rng, margins=margins),
         )
     return pile
 
@@ -168,8 +176,18 @@ def test_accelerations_of_arms_that_touch_are_mujocos(tmp_path, cone, precision)
     assert max(counts) >= 3
 
 
+@pytest.mark.parametrize("precision", TOLERANCES)
+def test_surfaces_combine_as_those_of_mujocos_geoms(precision):
+    # MuJoCo mixes geoms by itself, but knows no kf of them, which pyramids do not read either
+    for seed in SEEDS:
+        rng = np.random.default_rng([seed, 7])
+        pile = random_pile(rng, ["sphere", "box"], "pyramidal", 1.0, margins=False)
+        pile.by_pairs = False
+        assert max(assert_accelerations(pile, rng, precision)) >= 1
+
+
 def shallow(rng: Generator, kind: str) -> tuple[Array, Array]:
-    """Where a box of half extents 0.1, 0.08, 0.06 stands a little in what is below z = 0: by a face, an edge, or anyhow."""
+    """Where a box of half extents 0.1, 0.08, 0.06 stands a little below z = 0: by a face, an edge, or anyhow."""
     spin = rng.uniform(-np.pi, np.pi)
     quat = np.array([0, 0, np.sin(spin / 2), np.cos(spin / 2)])
     height = 0.06
@@ -216,7 +234,7 @@ def test_contacts_of_a_box_with_a_plane_or_a_box_are_mujocos(other, precision):
                 near = np.linalg.norm(points - point, axis=1).argmin()
                 assert np.abs(points[near] - point).max() <= SAME, f"world {world}: {points}, MuJoCo {point}"
                 assert abs(distances[near] - distance) <= SAME
-    assert seen >= {0, 1, 2, 4}
+    assert seen >= {1, 2, 4}
 
 
 # Shapes whose contacts are found by iteration, and may be other points than MuJoCo's: what lies on what, and how
