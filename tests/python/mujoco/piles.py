@@ -119,7 +119,6 @@ class Pile:
 
     def compile(self) -> mujoco.MjModel:
         """MuJoCo's model, with a pair for every two shapes that may touch."""
-        chosen = []
         if not self.by_pairs:
             return self._compile_geoms()
         for a, b in itertools.combinations(self.surfaces, 2):
@@ -128,12 +127,11 @@ class Pile:
             if len(robots) == 2 or (len(robots) == 1 and None in (x, y)):
                 # MuJoCo collides an immovable link with the world if it is a pair, ours does not
                 self.spec.add_pair(geomname1=a, geomname2=b)
-                chosen.append((a, b))
         model = self.spec.compile()
-        for number, (a, b) in enumerate(chosen):
-            s, t = self.surfaces[a], self.surfaces[b]
-            bodies = model.geom_bodyid[[model.geom(a).id, model.geom(b).id]]
-            weight = model.body_invweight0[bodies, 0].sum()
+        # in an order of MuJoCo's own
+        for number, geoms in enumerate(zip(model.pair_geom1, model.pair_geom2, strict=True)):
+            s, t = (self.surfaces[model.geom(geom).name] for geom in geoms)
+            weight = model.body_invweight0[model.geom_bodyid[list(geoms)], 0].sum()
             assert weight > 0, "one of a pair moves"
             softness = [(2 / u["kd"], u["kd"] / (2 * np.sqrt(u["ke"]))) for u in (s, t)]
             rate = (s["kf"] + t["kf"]) / 2 * weight * ((1 - D_MAX) / self.impratio + D_MAX)
