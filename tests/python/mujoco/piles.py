@@ -107,13 +107,15 @@ class Pile:
         self.scene.add_urdf(urdf, name=name, pos=tuple(pos), **surface)
         text = urdf.read_text()
         head = text.index(">", text.index("<robot")) + 1
-        compiler = '<mujoco><compiler discardvisual="false" fusestatic="false" balanceinertia="false"/></mujoco>'
+        compiler = '<mujoco><compiler discardvisual="true" fusestatic="false" balanceinertia="false"/></mujoco>'
         child = mujoco.MjSpec.from_string(text[:head] + compiler + text[head:])
-        for geom in child.geoms:
-            geom.name = f"{geom.parent.name}/{geom.name or 0}"
-            geom.contype = geom.conaffinity = 0
-            self.surfaces[f"{name}/{geom.name}"] = SURFACE | surface
-            self.owners[f"{name}/{geom.name}"] = f"{name}/{geom.parent.name}"
+        for link in child.bodies:
+            for place, geom in enumerate(link.geoms):
+                # shapes without a name have their place for one
+                geom.name = f"{link.name}/{geom.name or place}"
+                geom.contype = geom.conaffinity = 0
+                self.surfaces[f"{name}/{geom.name}"] = SURFACE | surface
+                self.owners[f"{name}/{geom.name}"] = f"{name}/{link.name}"
         frame = self.spec.worldbody.add_frame(pos=pos)
         self.spec.attach(child, prefix=f"{name}/", frame=frame)
 
@@ -121,18 +123,19 @@ class Pile:
         """MuJoCo's model, with a pair for every two shapes that may touch."""
         if not self.by_pairs:
             return self._compile_geoms()
+        model = self.spec.compile()
+        still = {name for name in self.surfaces if not model.body_weldid[model.geom(name).bodyid[0]]}
         for a, b in itertools.combinations(self.surfaces, 2):
             x, y = self.owners[a], self.owners[b]
             robots = {owner.split("/")[0] for owner in (x, y) if owner is not None}
-            if len(robots) == 2 or (len(robots) == 1 and None in (x, y)):
-                # MuJoCo collides an immovable link with the world if it is a pair, ours does not
+            moves = a not in still or b not in still
+            if moves and (len(robots) == 2 or (len(robots) == 1 and None in (x, y))):
                 self.spec.add_pair(geomname1=a, geomname2=b)
         model = self.spec.compile()
         # in an order of MuJoCo's own
         for number, geoms in enumerate(zip(model.pair_geom1, model.pair_geom2, strict=True)):
             s, t = (self.surfaces[model.geom(geom).name] for geom in geoms)
             weight = model.body_invweight0[model.geom_bodyid[list(geoms)], 0].sum()
-            assert weight > 0, "one of a pair moves"
             softness = [(2 / u["kd"], u["kd"] / (2 * np.sqrt(u["ke"]))) for u in (s, t)]
             rate = (s["kf"] + t["kf"]) / 2 * weight * ((1 - D_MAX) / self.impratio + D_MAX)
             model.pair_solref[number] = np.mean(softness, axis=0)
