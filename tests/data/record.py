@@ -11,6 +11,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+HERE = Path(__file__).parent
 FRAMES = 180
 SUBSTEPS = 8
 DOFS = 9
@@ -35,18 +36,21 @@ def torque(frame: int) -> np.float32:
 
 
 def rollout(models: Path, name: str) -> np.ndarray:
-    """Rows of time [s], joint positions and joint velocities, the start state first. ``(frames + 1, 1 + 2 dofs)``"""
+    """Rows of time [s], qpos and qvel, the start state first. ``(frames + 1, 1 + nq + nv)``"""
     model = mujoco.MjModel.from_binary_path(str(models / f"{name}.mjb"))
     data = mujoco.MjData(model)
     data.qpos[:DOFS] = START
-    rows = [np.r_[0.0, data.qpos[:DOFS], data.qvel[:DOFS]]]
+    rows = [np.r_[0.0, data.qpos, data.qvel]]
+    grasp = np.loadtxt(HERE / "grasp_targets.csv", delimiter=",", dtype=np.float32)
     for frame in range(FRAMES):
-        if model.nu:
+        if name == "grasp":
+            data.ctrl[:] = grasp[frame]
+        elif model.nu:
             data.ctrl[:] = target(frame)
         else:
             data.qfrc_applied[2] = torque(frame)
         mujoco.mj_step(model, data, SUBSTEPS)
-        rows.append(np.r_[(frame + 1) / 60.0, data.qpos[:DOFS], data.qvel[:DOFS]])
+        rows.append(np.r_[(frame + 1) / 60.0, data.qpos, data.qvel])
     return np.array(rows)
 
 
@@ -68,11 +72,13 @@ def forward(models: Path) -> dict[str, np.ndarray]:
 
 
 def main(models: Path, out: Path) -> None:
-    """Write the three files of tests/data into a folder."""
+    """Write the recorded files of tests/data into a folder."""
     out.mkdir(parents=True, exist_ok=True)
-    columns = ["t"] + [f"{kind}{dof}" for kind in ("qpos", "qvel") for dof in range(DOFS)]
-    for name in ("target", "torque_free"):
+    for name in ("target", "torque_free", "torque", "grasp"):
         rows = rollout(models, name)
+        # the grasp's cube has a coordinate more than dofs
+        dofs = (rows.shape[1] - 1) // 2
+        columns = ["t"] + [f"qpos{k}" for k in range(rows.shape[1] - 1 - dofs)] + [f"qvel{k}" for k in range(dofs)]
         np.savetxt(out / f"mujoco_{name}.csv", rows, fmt="%.17g", delimiter=",", header=",".join(columns))
     np.savez(out / "unit_forward_target.npz", **forward(models))
 

@@ -6,7 +6,6 @@ import functools
 import json
 import os
 import secrets
-import warnings
 import weakref
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -198,7 +197,7 @@ def launch(
     """Start a daemon that simulates a scene, and join it. The daemon ends with this process, however that ends.
 
     Args:
-        scene: What to simulate; later changes to it have no effect. Contacts are not simulated yet.
+        scene: What to simulate; later changes to it have no effect.
         worlds: How many copies of it, at least 1.
         device: ``"cpu"``, or ``"auto"`` for the best there is.
         precision: ``"f32"``, or ``"f64"`` for the same physics in double precision.
@@ -237,11 +236,10 @@ def launch(
         arguments["log"] = checks.path("launch: log", log, error=ArgumentError)
     daemon = Daemon.start(scene.to_toml(), arguments)
     try:
-        sim = Sim(_core.Client(arguments["name"], lease=True), daemon)
+        return Sim(_core.Client(arguments["name"], lease=True), daemon)
     except BaseException:
         daemon.stop()
         raise
-    return sim
 
 
 def attach(name: str) -> Sim:

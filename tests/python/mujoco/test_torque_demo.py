@@ -1,0 +1,113 @@
+"""The torque demo after its first touch: it is chaos, but deep and energetic as MuJoCo's.
+
+The arm is swung by one joint's torque into the table, in worlds that start a little apart.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from piles import Pile, ours
+from robots import Coordinates
+from twin import Array, drive, flatten_mimics, limits_in_force_space
+
+import tightloop as tl
+from conftest import START, URDF
+
+WORLDS, FRAMES, SUBSTEPS = 48, 180, 8
+# Frames until the fingers, which start outside their limits, have come back; the table is touched in frame 14
+SETTLED = 12
+
+
+@pytest.fixture
+def pile() -> Pile:
+    """The lesson's arm and table, solved as the lesson is."""
+    pile = Pile(dt=1 / 480, substeps=SUBSTEPS)
+    pile.shape("box", "table", {"half_extents": (0.4, 0.4, 0.05)}, pos=(0.0, -0.5, 0.05))
+    pile.robot("arm", URDF, pos=(-0.5, -0.5, 0.1))
+    arm = pile.scene.robots["arm"]
+    arm.joint_q, arm.joint_target_ke, arm.joint_target_kd = START, 0.0, 0.0
+    arm.joint_armature = [0.195] * 4 + [0.074] * 3 + [0.1] * 2
+    for dof, name in enumerate(arm.joint_names):
+        drive(pile.spec, arm, dof, f"arm/{name}")
+    pile.scene.solver()
+    option = pile.spec.option
+    option.iterations, option.tolerance = 20, 1e-8
+    return pile
+
+
+def torque(frame: int) -> Array:
+    """Of all joints in a frame [N·m or N]."""
+    return 35.0 * np.sin(2 * np.pi * frame / FRAMES) * (np.arange(9) == 2)
+
+
+def test_it_sinks_in_no_deeper_than_mujocos_and_gains_no_energy(pile):
+    model = pile.compile()
+    limits_in_force_space(model)
+    flatten_mimics(model)
+    starts = START + np.random.default_rng(0).uniform(-1e-3, 1e-3, (WORLDS, 9)) * (np.arange(9) < 7)
+    with tl.launch(pile.scene, worlds=WORLDS, fields=("joint_q", "joint_qd", "contact_distance")) as sim:
+        to = Coordinates(model, sim)
+        frame = sim.write(joint_q=starts)
+        q, qd, depth = [frame.joint_q.astype(float)], [frame.joint_qd.astype(float)], np.zeros(WORLDS)
+        for number in range(FRAMES):
+            frame = sim.step(joint_f=torque(number))
+            assert not (frame.status & 1).any() and np.isfinite(frame.joint_q).all()
+            q.append(frame.joint_q.astype(float))
+            qd.append(frame.joint_qd.astype(float))
+            depth = np.maximum(depth, -frame.contact_distance.min(axis=1))
+    their_q, their_qd, their_depth = motion_of(model, to, starts)
+    # neither side's deepest world is the other's
+    for share in (0.5, 0.9):
+        most = max(2e-3, 1.1 * np.quantile(their_depth, share))
+        assert np.quantile(depth, share) <= most, f"{np.sort(depth)}, MuJoCo {np.sort(their_depth)}"
+    gain = gain_of(model, to, np.array(q), np.array(qd))
+    theirs = gain_of(model, to, their_q, their_qd)
+    for share in (0.5, 0.9):
+        # MuJoCo gains up to a tenth of the work where soft limits of the joints give back what they took
+        most = 0.01 + max(0.0, 1.1 * np.quantile(theirs, share))
+        assert np.quantile(gain, share) <= most, f"{np.sort(gain)}, MuJoCo {np.sort(theirs)}"
+
+
+def motion_of(model: mujoco.MjModel, to: Coordinates, starts: Array) -> tuple[Array, Array, Array]:
+    """MuJoCo's states, the start's first, ``(frames + 1, worlds, dofs)``, and each world's greatest depth at them."""
+    data, at_end = mujoco.MjData(model), mujoco.MjData(model)
+    q, qd = np.zeros((2, FRAMES + 1, *starts.shape))
+    depth = np.zeros(len(starts))
+    for world, start in enumerate(starts):
+        mujoco.mj_resetData(model, data)
+        data.qpos[:] = to.positions(start)
+        q[0, world], qd[0, world] = ours(to, data)
+        for number in range(FRAMES):
+            data.qfrc_applied[:] = torque(number)
+            mujoco.mj_step(model, data, SUBSTEPS)
+            q[number + 1, world], qd[number + 1, world] = ours(to, data)
+            at_end.qpos[:] = data.qpos
+            mujoco.mj_fwdPosition(model, at_end)
+            depth[world] = max(depth[world], -at_end.contact.dist.min(initial=0.0))
+    return q, qd, depth
+
+
+def gain_of(model: mujoco.MjModel, to: Coordinates, q: Array, qd: Array) -> Array:
+    """Most energy of each world beyond that of its start and the work of its torque, relative to the most work."""
+    energy = energy_of(model, to, q, qd)
+    # a torque that is held over a frame works by the joint's way in it
+    done = [torque(number)[2] * (q[number + 1] - q[number])[:, 2] for number in range(FRAMES)]
+    work = np.vstack([np.zeros(q.shape[1]), np.cumsum(done, axis=0)])
+    return ((energy - energy[SETTLED]) - (work - work[SETTLED]))[SETTLED:].max(axis=0) / np.abs(work).max()
+
+
+def energy_of(model: mujoco.MjModel, to: Coordinates, q: Array, qd: Array) -> Array:
+    """Kinetic and potential energy [J] of states ``(frames, worlds, dofs)``, armatures included."""
+    data = mujoco.MjData(model)
+    out = np.zeros(q.shape[:2])
+    for place in np.ndindex(*out.shape):
+        data.qpos[:], data.qvel[:] = to.positions(q[place]), to.to_qvel(q[place]) @ qd[place]
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_crb(model, data)
+        mujoco.mj_energyPos(model, data)
+        mujoco.mj_energyVel(model, data)
+        out[place] = data.energy.sum()
+    return out
