@@ -178,6 +178,10 @@ pub mod pair {
     pub const REACH: usize = 0;
     /// Radii around the centres, and the reach [m].
     pub const RADIUS: usize = 1;
+    /// Radius around the first shape's centre, and the reach [m].
+    pub const RADIUS_A: usize = 17;
+    /// Radius around the second shape's centre, and the reach [m].
+    pub const RADIUS_B: usize = 18;
     /// Size of the first shape (3) [m].
     pub const SIZE_A: usize = 2;
     /// Size of the second shape (3) [m].
@@ -201,7 +205,7 @@ pub mod pair {
     /// Constraint rows of a contact.
     pub const ROWS: usize = 16;
     /// First of the levers.
-    pub const LEVERS: usize = 17;
+    pub const LEVERS: usize = 19;
 
     /// Number of the first shape among the solids.
     pub const SOLID_A: usize = 0;

@@ -1,16 +1,16 @@
 //! Which shapes may touch, and how: pairs, their numbers, and the classes of their contacts.
 
+use super::constants::{Constants, Coupled};
 use super::contact::{
     COUNTS, Class, Column, Contacts, Group, Handles, Kind, Memory, Pair, Solid, pair, row,
 };
-use super::constants::{Constants, Coupled};
-use super::description::{Cone, Description, Shape};
 use super::cut::Cut;
+use super::description::{Cone, Description, Shape};
 use super::geometry::Hull;
 use super::hull_tables::HullTables;
-use super::surface::Surface;
 use super::paths::{Cluster, clusters};
 use super::rows::{IMPEDANCE, contact_damping};
+use super::surface::Surface;
 use super::{ModelError, Pose};
 use crate::lane::{Fixed, Table};
 use crate::math::factor::Pattern;
@@ -126,7 +126,15 @@ fn pieces(borne: &[Borne<'_>], contacts: &mut Contacts<f64>) -> Vec<Piece> {
             ),
             Shape::Mesh(mesh) => {
                 for hull in &mesh.hulls {
-                    pieces.push(piece(index, b, Kind::Hull, b.pose, [0.0; 3], 0.0, hulls.len()));
+                    pieces.push(piece(
+                        index,
+                        b,
+                        Kind::Hull,
+                        b.pose,
+                        [0.0; 3],
+                        0.0,
+                        hulls.len(),
+                    ));
                     hulls.push(hull.clone());
                 }
                 continue;
@@ -136,7 +144,10 @@ fn pieces(borne: &[Borne<'_>], contacts: &mut Contacts<f64>) -> Vec<Piece> {
     }
     let (tables, frames) = HullTables::append(&hulls, &mut contacts.tables);
     contacts.hulls = tables;
-    for piece in pieces.iter_mut().filter(|piece| piece.solid.kind == Kind::Hull) {
+    for piece in pieces
+        .iter_mut()
+        .filter(|piece| piece.solid.kind == Kind::Hull)
+    {
         let frame = &frames[piece.hull];
         piece.solid.center = borne[piece.borne].pose.transform(frame.center);
         piece.size = frame.half_extents;
@@ -202,11 +213,7 @@ fn may_touch(a: &Borne<'_>, b: &Borne<'_>, rules: &Rules<'_>) -> bool {
     let connected = neighbours
         .iter()
         .any(|groups| rules.connected.contains(groups));
-    moves
-        && !is_one
-        && (!of_one_robot || may_self)
-        && !connected
-        && a.surface.meets(&b.surface)
+    moves && !is_one && (!of_one_robot || may_self) && !connected && a.surface.meets(&b.surface)
 }
 
 struct Builder<'a> {
@@ -343,6 +350,8 @@ impl Builder<'_> {
         let reach = margin + s.gap + t.gap;
         row[pair::REACH] = reach;
         row[pair::RADIUS] = a.radius + b.radius + reach;
+        row[pair::RADIUS_A] = a.radius + reach;
+        row[pair::RADIUS_B] = b.radius + reach;
         row[pair::SIZE_A..][..3].copy_from_slice(&a.size);
         row[pair::SIZE_B..][..3].copy_from_slice(&b.size);
         row[pair::FLIP] = if sides.flipped { -1.0 } else { 1.0 };
@@ -352,7 +361,9 @@ impl Builder<'_> {
         row[pair::RUBS] = if condim == 1 { 0.0 } else { 1.0 };
         row[pair::ROWS] = rows_of(self.scene.solver.cone, condim) as f64;
         let weight = |borne: &super::touching::Borne<'_>| {
-            borne.link.map_or(0.0, |link| self.rules.link_inverse_weight[link])
+            borne
+                .link
+                .map_or(0.0, |link| self.rules.link_inverse_weight[link])
         };
         let weight = weight(x) + weight(y);
         row[pair::WEIGHT] = weight;
@@ -526,7 +537,9 @@ impl Builder<'_> {
         let class_rows = fixed(tables.indices.len(), 2, contacts.classes.len());
         for class in &contacts.classes {
             let index = |x: usize| u32::try_from(x).expect("capacities are small");
-            tables.indices.extend([index(class.first), index(class.capacity)]);
+            tables
+                .indices
+                .extend([index(class.first), index(class.capacity)]);
         }
         contacts.handles = Handles {
             pair_numbers,

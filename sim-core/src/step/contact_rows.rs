@@ -12,8 +12,8 @@ use super::{BlockOf, ConstantsOf};
 use crate::each;
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{Vec3, cross, dot, scale, scale_add, sub};
-use crate::model::contact::{COUNT_LEFT_OUT, Class, Contacts, pair, row};
 use crate::model::Cone;
+use crate::model::contact::{COUNT_LEFT_OUT, Class, Contacts, pair, row};
 use crate::step::constraint::impedance;
 
 #[inline(always)]
@@ -139,12 +139,7 @@ fn shared<C: Cx>(
 
 /// Three neighbouring numbers of a contact.
 #[inline(always)]
-fn three<C: Cx>(
-    cx: &mut C,
-    t: &Contacts<<C::F as Num>::Real>,
-    r: C::I,
-    k: usize,
-) -> Vec3<C::F> {
+fn three<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, r: C::I, k: usize) -> Vec3<C::F> {
     [
         cx.load(t.memory.rows, r, k),
         cx.load(t.memory.rows, r, k + 1),

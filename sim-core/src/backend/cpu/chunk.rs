@@ -1,7 +1,7 @@
 //! A run of blocks that one thread works on: their state in lane order, and one workspace.
 
-use super::dispatch::RunStage;
 use super::contacts;
+use super::dispatch::RunStage;
 use super::transfer::{self, Arena};
 use crate::backend::Values;
 use crate::batch::{Block, Field, Layout, status};
@@ -294,11 +294,7 @@ impl<F: Lane> Chunk<F> {
                 for stage in stages {
                     // SAFETY: by contract the processor has the instructions of the job's stages.
                     unsafe {
-                        job.stages[*stage](
-                            &job.constants,
-                            &mut self.block,
-                            &mut self.memory,
-                        );
+                        job.stages[*stage](&job.constants, &mut self.block, &mut self.memory);
                     }
                 }
             }

@@ -110,7 +110,11 @@ pub(super) unsafe fn export<F: Lane>(
             add_forces(&world, m, contacts, to);
             continue;
         }
-        let size = if slot.field == Field::ContactDistance { 1 } else { 3 };
+        let size = if slot.field == Field::ContactDistance {
+            1
+        } else {
+            3
+        };
         for (contact, to) in contacts.zip(to.chunks_exact_mut(size)) {
             let row = contact.row;
             match slot.field {

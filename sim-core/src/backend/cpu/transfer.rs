@@ -32,7 +32,11 @@ impl Arena {
     /// # Safety
     /// The memory behind the arena lives, and nobody else uses these rows.
     #[inline(always)]
-    pub(super) unsafe fn rows<'a, T: Copy>(self, slot: &Slot, worlds: &Range<usize>) -> &'a mut [T] {
+    pub(super) unsafe fn rows<'a, T: Copy>(
+        self,
+        slot: &Slot,
+        worlds: &Range<usize>,
+    ) -> &'a mut [T] {
         let elements: usize = slot.shape[1..].iter().product();
         assert!(size_of::<T>() == slot.dtype.bytes() && worlds.end <= slot.shape[0]);
         assert!(slot.offset + slot.bytes <= self.bytes);

@@ -24,13 +24,9 @@ mod spread;
 mod support;
 
 use super::{BlockOf, ConstantsOf};
-use crate::lane::{Cx, Num};
-use crate::math::vec3::{
-    Mat3, Vec3, add, constant, dot, sub, transform, transform_add,
-};
-use crate::model::contact::{
-    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, pair,
-};
+use crate::lane::{Cx, Num, Table};
+use crate::math::vec3::{Mat3, Vec3, add, constant, dot, sub, transform, transform_add};
+use crate::model::contact::{COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, pair};
 use crate::{span, when};
 use narrow::{Shape, Two, narrow};
 use points::{Placed, Points, Room};
@@ -78,11 +74,7 @@ pub(super) fn place<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
 
 /// Contacts of all pairs of two kinds.
 #[inline(always)]
-pub(super) fn touch<C: Cx>(
-    cx: &mut C,
-    t: &Contacts<<C::F as Num>::Real>,
-    kinds: (Kind, Kind),
-) {
+pub(super) fn touch<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, Kind)) {
     for group in t.groups.iter().filter(|group| group.kinds == kinds) {
         let (first, end) = (cx.at(group.first), cx.at(group.end));
         span!(cx, p in first, end, {
@@ -110,61 +102,101 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, K
         _ => dot(center, center).lt(radius * radius),
     };
     when!(cx, near, {
-        let axes: Mat3<C::F> = [
-            three(cx, poses, a, 0),
-            three(cx, poses, a, 3),
-            three(cx, poses, a, 6),
-        ];
+        let axes = axes_of(cx, poses, a);
         let other = Placed {
-            axes: [
-                three(cx, poses, b, 0),
-                three(cx, poses, b, 3),
-                three(cx, poses, b, 6),
-            ],
+            axes: axes_of(cx, poses, b),
             center,
         };
-        let origin = cx.index(indices, p, pair::ORIGIN, origins.rows);
-        let origin = three(cx, origins, origin, 0);
-        let class = cx.index(indices, p, pair::CLASS, t.classes.len());
-        let [first_end, capacity_end] = t.row_ends();
-        let first = cx.index(t.handles.class_rows, class, 0, first_end);
-        let capacity = cx.index(t.handles.class_rows, class, 1, capacity_end);
-        let mut points = Points::<C> {
-            list: cx.kept(t.memory.counts, class, first, capacity),
-            table: t.memory.rows,
-            pair: cx.number(p),
-            base: add(center_a, sub(origin_a, origin)),
-            flip: cx.constant(numbers, p, pair::FLIP),
-            room: Room {
-                counts: t.memory.counts,
-                contacts: t.classes.len() + COUNT_CONTACTS,
-                rows: t.classes.len() + COUNT_ROWS,
-                left_out: t.classes.len() + COUNT_LEFT_OUT,
-                contacts_max: C::F::c(t.contacts_max as f64),
-                rows_max: C::F::c(t.rows_max as f64),
-                of_a_contact: cx.constant(numbers, p, pair::ROWS),
-                is_tight: t.may_overflow,
-            },
-        };
-        let margin = cx.constant(numbers, p, pair::REACH);
-        let (first, second) = (
-            Shape::read(cx, t, kinds.0, p, pair::SIZE_A, pair::HULL_A),
-            Shape::read(cx, t, kinds.1, p, pair::SIZE_B, pair::HULL_B),
-        );
-        let two = Two {
-            axes: &axes,
-            first,
-            other: &other,
-            second,
-            margin,
-        };
-        narrow(cx, t, kinds, &two, &mut points);
+        let first = Shape::read(cx, t, kinds.0, p, pair::SIZE_A, pair::HULL_A);
+        let second = Shape::read(cx, t, kinds.1, p, pair::SIZE_B, pair::HULL_B);
+        // the ball around one against the box around the other: a table's own ball is as wide as the table
+        let mut near = near;
+        if kinds.0 >= Kind::Box {
+            let radius = cx.constant(numbers, p, pair::RADIUS_B);
+            near = within(&axes, first.half(kinds.0), center, radius);
+        }
+        if kinds.1 >= Kind::Box && kinds.0 != Kind::Plane {
+            let radius = cx.constant(numbers, p, pair::RADIUS_A);
+            near = C::F::and(
+                near,
+                within(&other.axes, second.half(kinds.1), center, radius),
+            );
+        }
+        when!(cx, near, {
+            let margin = cx.constant(numbers, p, pair::REACH);
+            let two = Two {
+                axes: &axes,
+                first,
+                other: &other,
+                second,
+                margin,
+            };
+            let base = (center_a, origin_a);
+            let mut points = points_of::<C>(cx, t, p, base);
+            narrow(cx, t, kinds, &two, &mut points);
+        });
     });
+}
+
+/// Axes of a shape.
+#[inline(always)]
+fn axes_of<C: Cx>(cx: &mut C, poses: Table, row: C::I) -> Mat3<C::F> {
+    [
+        three(cx, poses, row, 0),
+        three(cx, poses, row, 3),
+        three(cx, poses, row, 6),
+    ]
+}
+
+/// Is a ball at `center` (from a box, or to it) within a radius of the box?
+#[inline(always)]
+fn within<F: Num>(axes: &Mat3<F>, half: Vec3<F>, center: Vec3<F>, radius: F) -> F::Mask {
+    let mut square = F::c(0.0);
+    for (axis, half) in axes.iter().zip(half) {
+        let beyond = (dot(*axis, center).abs() - half).max(F::c(0.0));
+        square = beyond.fma(beyond, square);
+    }
+    square.lt(radius * radius)
+}
+
+/// Where the contacts of a pair go.
+#[inline(always)]
+fn points_of<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    p: C::I,
+    (center_a, origin_a): (Vec3<C::F>, Vec3<C::F>),
+) -> Points<C> {
+    let (numbers, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
+    let origins = t.memory.origins;
+    let origin = cx.index(indices, p, pair::ORIGIN, origins.rows);
+    let origin = three(cx, origins, origin, 0);
+    let class = cx.index(indices, p, pair::CLASS, t.classes.len());
+    let [first_end, capacity_end] = t.row_ends();
+    let first = cx.index(t.handles.class_rows, class, 0, first_end);
+    let capacity = cx.index(t.handles.class_rows, class, 1, capacity_end);
+    Points {
+        list: cx.kept(t.memory.counts, class, first, capacity),
+        table: t.memory.rows,
+        pair: cx.number(p),
+        base: add(center_a, sub(origin_a, origin)),
+        flip: cx.constant(numbers, p, pair::FLIP),
+        room: Room {
+            counts: t.memory.counts,
+            contacts: t.classes.len() + COUNT_CONTACTS,
+            rows: t.classes.len() + COUNT_ROWS,
+            left_out: t.classes.len() + COUNT_LEFT_OUT,
+            contacts_max: C::F::c(t.contacts_max as f64),
+            rows_max: C::F::c(t.rows_max as f64),
+            of_a_contact: cx.constant(numbers, p, pair::ROWS),
+            is_tight: t.may_overflow,
+        },
+    }
 }
 
 /// Three neighbouring numbers of a row.
 #[inline(always)]
-fn three<C: Cx>(cx: &mut C, table: crate::lane::Table, row: C::I, k: usize) -> Vec3<C::F> {
+fn three<C: Cx>(cx: &mut C, table: Table, row: C::I, k: usize) -> Vec3<C::F> {
     [
         cx.load(table, row, k),
         cx.load(table, row, k + 1),

@@ -42,6 +42,18 @@ impl<C: Cx> Shape<C> {
     }
 }
 
+impl<C: Cx> Shape<C> {
+    /// Half extents of the box around it, of kinds that are no thinner than one.
+    #[inline(always)]
+    pub fn half(&self, kind: Kind) -> Vec3<C::F> {
+        let [x, y, z] = self.size;
+        match kind {
+            Kind::Cylinder => [x, x, y],
+            _ => [x, y, z],
+        }
+    }
+}
+
 /// Two shapes, the second where it is relative to the first.
 pub(super) struct Two<'a, C: Cx> {
     /// Axes of the first.

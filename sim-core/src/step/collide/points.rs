@@ -82,11 +82,8 @@ impl<F: Num> Room<F> {
     #[inline(always)]
     fn take<C: Cx<F = F>>(&self, cx: &mut C, mask: MaskOf<C>) -> MaskOf<C> {
         let one = F::c(1.0);
-        let (contacts, rows, left_out) = (
-            cx.at(self.contacts),
-            cx.at(self.rows),
-            cx.at(self.left_out),
-        );
+        let (contacts, rows, left_out) =
+            (cx.at(self.contacts), cx.at(self.rows), cx.at(self.left_out));
         let used = cx.load(self.counts, contacts, 0);
         let used_rows = cx.load(self.counts, rows, 0) + self.of_a_contact;
         // whole numbers: half a one keeps roundings out

@@ -13,8 +13,8 @@
 
 use crate::each;
 use crate::lane::{Cx, Num, Real};
-use crate::model::contact::{Class, Contacts, row};
 use crate::model::Cone;
+use crate::model::contact::{Class, Contacts, row};
 use crate::step::contact_rows::class_list;
 
 /// What a contact does at `jar`.
@@ -79,7 +79,9 @@ fn elliptic<F: Num>(impratio: F::Real, jar: [F; 3], stiff: F, mu: F) -> ConeLaw<
         state: of_piece::<F>(sticks, slides, one, F::c(2.0)),
         curved: F::select(slides, one, zero),
         cost: half
-            * of_piece::<F>(sticks, slides, 
+            * of_piece::<F>(
+                sticks,
+                slides,
                 (stiff * jar[0]).fma(jar[0], across * square),
                 -(push * excess),
             ),

@@ -44,6 +44,7 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let t = &m.contacts;
     let mut busy = cx.var(C::F::select(acts, one, zero));
     let mut round = cx.var(zero);
+    let mut last_gain = cx.var(C::F::c(f64::from(f32::MAX)));
     times!(cx, m.solver.iterations, {
         if may_idle::<C>(m) {
             break_if!(cx, C::F::not(acts));
@@ -94,7 +95,15 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             // MuJoCo, but for the first; below the rounding of p' it is the last that can help.
             let gain = half * line.descent;
             let small = C::F::and(later, gain.lt(C::F::k(m.solver.tolerance)));
-            let last = gain.lt(line.size * epsilon);
+            let rounded = line.size * epsilon;
+            let mut last = gain.lt(rounded);
+            if !<<C::F as Num>::Real as Real>::DOUBLE {
+                // Newton's gains shrink fast; one that does not, and is a small part of the terms, is rounding of the solve
+                let stalls = (C::F::c(STALLED) * cx.get(&last_gain)).lt(gain);
+                let is_small = gain.lt(line.size * C::F::c(STALL_SHARE));
+                last = C::F::or(last, C::F::and(stalls, is_small));
+                cx.set(&mut last_gain, gain);
+            }
             cx.set(&mut settled, C::F::select(C::F::or(small, last), one, zero));
             let alpha = cx.get(&length);
             cx.set(&mut length, C::F::select(small, zero, alpha));
@@ -152,6 +161,11 @@ fn constraint_forces<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) 
     contacts::forces(cx, &m.contacts, &mut b.constraint_force);
 }
 
+/// A gain above this share of the last round's is no progress of Newton's method [–].
+const STALLED: f64 = 0.25;
+/// The gain over the terms of p' that rounding may make up in `f32`: sums of a thousand roundings [–].
+const STALL_SHARE: f64 = 1e-4;
+
 /// Which of the scratch vectors has the right-hand side of a round, and then its minimum.
 const MINIMUM: usize = 1;
 
@@ -160,13 +174,7 @@ const MINIMUM: usize = 1;
 ///
 /// A world whose contacts couple what the mass matrix does not solves a larger system; the others need not.
 #[inline(always)]
-fn solve_system<C: Cx>(
-    cx: &mut C,
-    m: &ConstantsOf<C>,
-    b: &mut BlockOf<C>,
-    x: usize,
-    pulls: bool,
-) {
+fn solve_system<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, x: usize, pulls: bool) {
     let t = &m.contacts;
     let w = &mut b.work;
     let touches = !t.classes.is_empty();
@@ -199,7 +207,11 @@ fn solve_system<C: Cx>(
             });
         }
         let (pattern, cells, matrix) = if larger {
-            (&m.coupled.pattern, &mut b.coupled_system, &mut w.coupled_hessian)
+            (
+                &m.coupled.pattern,
+                &mut b.coupled_system,
+                &mut w.coupled_hessian,
+            )
         } else {
             (&m.pattern, &mut b.system, &mut w.hessian)
         };
