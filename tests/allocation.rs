@@ -2,9 +2,11 @@
 
 mod common;
 
-use common::{Demo, Run, command, lesson};
+use common::shapes::shapes;
+use common::{Demo, Run, command, lesson_with_table};
 use sim_core::backend::Values;
 use sim_core::batch::Field;
+use sim_core::model::Cone;
 use sim_core::simulation::{Options, Precision};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -41,27 +43,37 @@ fn taken(work: impl FnOnce()) -> usize {
 #[test]
 fn command_step_and_forward_take_no_memory() {
     assert!(taken(|| drop(vec![1u8])) == 1, "the count works");
-    for precision in [Precision::F32, Precision::F64] {
-        let model = lesson(Demo::Target).compile().unwrap();
-        let options = Options {
-            worlds: 100,
-            precision,
-            threads: Some(1),
-            fields: Field::ALL.to_vec(),
-            ..Options::default()
-        };
-        let mut run = Run::new(&model, options);
-        let (_, row) = command(Demo::Target, 20);
-        let values: Vec<f64> = (0..100).flat_map(|_| row).collect();
-        let count = taken(|| {
-            for _ in 0..3 {
-                run.sim
-                    .command(Field::JointTargetQ, 0..9, Values::F64(&values))
-                    .unwrap();
-                run.step();
-                run.forward();
-            }
-        });
-        assert_eq!(count, 0, "{precision:?}");
+    let lesson = lesson_with_table(Demo::Target, true).compile().unwrap();
+    let (_, row) = command(Demo::Target, 20);
+    let shapes = shapes(Cone::Elliptic).compile().unwrap();
+    for (model, field, row) in [
+        (lesson, Field::JointTargetQ, &row[..]),
+        (shapes, Field::JointF, &[0.5; 12]),
+    ] {
+        for precision in [Precision::F32, Precision::F64] {
+            let options = Options {
+                worlds: 100,
+                precision,
+                threads: Some(1),
+                fields: Field::ALL.to_vec(),
+                ..Options::default()
+            };
+            let mut run = Run::new(&model, options);
+            let values: Vec<f64> = (0..100).flat_map(|_| row.iter().copied()).collect();
+            let count = taken(|| {
+                for _ in 0..3 {
+                    run.sim
+                        .command(field, 0..row.len(), Values::F64(&values))
+                        .unwrap();
+                    run.step();
+                    run.forward();
+                }
+            });
+            assert_eq!(count, 0, "{precision:?}");
+            assert!(
+                run.get(Field::ContactCount, 0)[0] > 0.0,
+                "shapes touch here"
+            );
+        }
     }
 }

@@ -2,13 +2,12 @@
 
 mod common;
 
-use common::{Demo, FRAMES, Run, command, csv, distance, lesson, repo};
+use common::{Demo, FRAMES, Run, command, csv, distance, lesson, lesson_with_table, repo};
 use sim_core::batch::Field;
+use sim_core::model::Description;
 use sim_core::simulation::{Lanes, Options, Precision};
 
-/// Distance in joint positions from the recorded run, a frame.
-fn deviations(demo: Demo, file: &str, precision: Precision) -> Vec<f64> {
-    let model = lesson(demo).compile().unwrap();
+fn run(scene: &Description, precision: Precision) -> Run {
     let options = Options {
         precision,
         lanes: if precision == Precision::F64 {
@@ -20,8 +19,14 @@ fn deviations(demo: Demo, file: &str, precision: Precision) -> Vec<f64> {
         fields: vec![Field::JointQ, Field::JointQd],
         ..Options::default()
     };
-    let mut run = Run::new(&model, options);
+    let mut run = Run::new(&scene.compile().unwrap(), options);
     run.forward();
+    run
+}
+
+/// Distance in joint positions from the recorded run, a frame.
+fn deviations_of(scene: &Description, demo: Demo, file: &str, precision: Precision) -> Vec<f64> {
+    let mut run = run(scene, precision);
     let recorded = csv(repo(file));
     let mut found = vec![distance(&run.get(Field::JointQ, 0), &recorded[0][1..10])];
     for frame in 0..FRAMES {
@@ -33,6 +38,30 @@ fn deviations(demo: Demo, file: &str, precision: Precision) -> Vec<f64> {
             &recorded[frame + 1][1..10],
         ));
     }
+    found
+}
+
+fn deviations(demo: Demo, file: &str, precision: Precision) -> Vec<f64> {
+    deviations_of(&lesson(demo), demo, file, precision)
+}
+
+/// Distances in joint positions and in the cube's position from the recorded grasp, a frame.
+fn grasp_deviations(precision: Precision) -> [Vec<f64>; 2] {
+    let mut run = run(&lesson_with_table(Demo::Target, true), precision);
+    let recorded = csv(repo("tests/data/mujoco_grasp.csv"));
+    let mut found = [vec![], vec![]];
+    for (targets, row) in csv(repo("tests/data/grasp_targets.csv"))
+        .iter()
+        .zip(&recorded[1..])
+    {
+        let targets: Vec<f64> = targets.iter().map(|&x| f64::from(x as f32)).collect();
+        run.command(Field::JointTargetQ, &targets);
+        run.step();
+        let q = run.get(Field::JointQ, 0);
+        found[0].push(distance(&q[..9], &row[1..10]));
+        found[1].push(distance(&q[9..12], &row[10..13]));
+    }
+    assert_eq!(found[0].len(), FRAMES);
     found
 }
 
@@ -73,4 +102,58 @@ fn free_torque_demo_in_f32_stays_near_mujoco() {
     assert!(worst(&d, 30) < 5e-6, "{:e}", worst(&d, 30));
     assert!(worst(&d, 60) < 5e-5, "{:e}", worst(&d, 60));
     assert!(worst(&d, 120) < 1e-2, "{:e}", worst(&d, 120));
+}
+
+/// In frame 14 the fingers touch the table, and from there it is chaotic.
+const TOUCHES: usize = 13;
+
+fn torque_over_table(precision: Precision) -> Vec<f64> {
+    let scene = lesson_with_table(Demo::Torque, false);
+    deviations_of(
+        &scene,
+        Demo::Torque,
+        "tests/data/mujoco_torque.csv",
+        precision,
+    )
+}
+
+#[test]
+fn torque_demo_over_the_table_in_f64_is_mujocos_until_it_touches() {
+    let d = torque_over_table(Precision::F64);
+    assert!(worst(&d, TOUCHES) < 1e-7, "{:e}", worst(&d, TOUCHES));
+}
+
+#[test]
+fn torque_demo_over_the_table_in_f32_is_mujocos_until_it_touches() {
+    let d = torque_over_table(Precision::F32);
+    assert!(worst(&d, TOUCHES) < 2e-6, "{:e}", worst(&d, TOUCHES));
+}
+
+#[test]
+fn grasp_demo_in_f64_stays_within_5e_7_of_mujoco_until_the_fingers_close() {
+    let [joints, cube] = grasp_deviations(Precision::F64);
+    for d in [joints, cube] {
+        println!(
+            "{:e} to frame 90, {:e} to the end",
+            worst(&d, 89),
+            worst(&d, FRAMES - 1)
+        );
+        assert!(worst(&d, 89) < 5e-7, "{:e}", worst(&d, 89));
+    }
+}
+
+#[test]
+fn grasp_demo_in_f32_stays_within_1e_4_of_mujoco_to_the_end() {
+    let [joints, cube] = grasp_deviations(Precision::F32);
+    assert!(worst(&joints, 89) < 5e-6, "{:e}", worst(&joints, 89));
+    assert!(
+        worst(&joints, FRAMES - 1) < 1e-4,
+        "{:e}",
+        worst(&joints, FRAMES - 1)
+    );
+    assert!(
+        worst(&cube, FRAMES - 1) < 2e-4,
+        "{:e}",
+        worst(&cube, FRAMES - 1)
+    );
 }

@@ -3,15 +3,34 @@
 
 #[path = "../../examples/lesson/mod.rs"]
 mod lesson_scene;
+pub mod shapes;
 
 #[allow(unused_imports)] // as above
 pub use lesson_scene::{Demo, FRAMES, START, command, lesson};
 use sim_core::backend::Values;
-use sim_core::batch::Field;
-use sim_core::model::Model;
+use sim_core::batch::{Dtype, Field};
+use sim_core::model::{Body, Collision, Description, Model, Pose, Shape, Surface};
 use sim_core::simulation::{Lanes, Options, Precision, Simulation};
 use std::path::PathBuf;
 use std::sync::Arc;
+
+/// The lesson's scene with its table, and the cube on it if asked for.
+pub fn lesson_with_table(demo: Demo, has_cube: bool) -> Description {
+    let mut scene = lesson(demo);
+    scene.add_box("table", [0.4, 0.4, 0.05], Pose::at([0.0, -0.5, 0.05]));
+    if has_cube {
+        let half_extents = [0.025; 3];
+        let mut cube = Collision::new(None, Shape::Box { half_extents }, Pose::identity());
+        cube.surface = Surface {
+            margin: 1e-3,
+            ..Surface::default()
+        };
+        let mut body = Body::new("cube", Pose::at([0.0, -0.35, 0.125]));
+        body.shapes.push((cube, 400.0));
+        scene.add_body(body).unwrap();
+    }
+    scene
+}
 
 /// A path in the repository.
 pub fn repo(path: &str) -> PathBuf {
@@ -76,7 +95,7 @@ impl Run {
         self.sim.forward(&mut self.arena);
     }
 
-    /// A real-valued field of a world.
+    /// A field of numbers of a world.
     pub fn get(&self, field: Field, world: usize) -> Vec<f64> {
         let slot = self
             .sim
@@ -95,9 +114,12 @@ impl Run {
         let first = slot.offset + world * n * size;
         bytes[first..first + n * size]
             .chunks_exact(size)
-            .map(|x| match self.sim.precision() {
-                Precision::F32 => f64::from(f32::from_ne_bytes(x.try_into().unwrap())),
-                Precision::F64 => f64::from_ne_bytes(x.try_into().unwrap()),
+            .map(|x| match slot.dtype {
+                Dtype::F32 => f64::from(f32::from_ne_bytes(x.try_into().unwrap())),
+                Dtype::F64 => f64::from_ne_bytes(x.try_into().unwrap()),
+                Dtype::I32 => f64::from(i32::from_ne_bytes(x.try_into().unwrap())),
+                Dtype::U32 => f64::from(u32::from_ne_bytes(x.try_into().unwrap())),
+                other => unreachable!("{other:?}"),
             })
             .collect()
     }

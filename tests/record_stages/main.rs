@@ -1,6 +1,8 @@
 //! Every stage of a step, of robots and of shapes that touch: recorded, printed, validated, and run against the CPU.
 
 mod models;
+#[path = "../common/shapes.rs"]
+mod scene;
 #[path = "../../sim-core/tests/toy/mod.rs"]
 mod toy;
 

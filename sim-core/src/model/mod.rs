@@ -15,6 +15,7 @@ pub mod geometry;
 pub mod hull_tables;
 mod inertia;
 mod inverse_weight;
+mod pairs;
 mod paths;
 mod pose;
 mod robot;

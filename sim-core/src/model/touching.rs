@@ -1,69 +1,19 @@
-//! Which shapes may touch, and how: pairs, their numbers, and the classes of their contacts.
+//! How shapes touch: the numbers of pairs, and the classes of their contacts.
 
+use super::ModelError;
 use super::constants::{Constants, Coupled};
 use super::contact::{
-    COUNTS, Class, Column, Contacts, Group, Handles, Kind, Memory, Pair, Solid, pair, row,
+    COUNTS, Class, Column, Contacts, Group, Handles, Kind, Memory, Pair, pair, row,
 };
 use super::cut::Cut;
-use super::description::{Cone, Description, Shape};
-use super::geometry::Hull;
-use super::hull_tables::HullTables;
+use super::description::{Cone, Description};
+use super::pairs::{Borne, Piece, Rules, contacts_of, pairs, pieces};
 use super::paths::{Cluster, clusters};
 use super::rows::{IMPEDANCE, contact_damping};
 use super::surface::Surface;
-use super::{ModelError, Pose};
 use crate::lane::{Fixed, Table};
 use crate::math::factor::Pattern;
-use std::collections::{BTreeMap, BTreeSet};
-
-/// A shape of the scene, and what bears it.
-pub(super) struct Borne<'a> {
-    /// Its number among the scene's.
-    pub number: usize,
-    /// Its geometry and surface; its pose is that in the link.
-    pub shape: &'a Shape,
-    /// How it touches.
-    pub surface: Surface,
-    /// Its robot, if it is not static.
-    pub robot: Option<usize>,
-    /// Its link, as a frame.
-    pub link: Option<usize>,
-    /// The body that it moves with.
-    pub body: Option<usize>,
-    /// The links that it is fixed to, as a number that they share.
-    pub group: usize,
-    /// Its frame in the body's, or in the world.
-    pub pose: Pose,
-}
-
-/// What pairs depend on beside shapes.
-pub(super) struct Rules<'a> {
-    /// Groups of links that a joint connects.
-    pub connected: Vec<(usize, usize)>,
-    /// Robots whose links touch each other.
-    pub self_collisions: Vec<bool>,
-    /// Translational inverse weight of each link.
-    pub link_inverse_weight: &'a [f64],
-}
-
-/// A convex piece of a shape.
-struct Piece {
-    borne: usize,
-    solid: Solid<f64>,
-    size: [f64; 3],
-    radius: f64,
-    hull: usize,
-}
-
-/// Contacts that two shapes may have at most.
-fn contacts_of(kinds: (Kind, Kind)) -> usize {
-    match kinds {
-        (Kind::Sphere, _) | (Kind::Plane, Kind::Sphere) => 1,
-        (Kind::Plane, Kind::Capsule) | (Kind::Capsule, _) => 2,
-        (Kind::Box, Kind::Box) => 8,
-        _ => 4,
-    }
-}
+use std::collections::BTreeMap;
 
 /// Finds the pairs and sorts them into classes.
 pub(super) fn add_contacts(
@@ -95,125 +45,6 @@ pub(super) fn add_contacts(
     constants.coupled = coupled;
     constants.contacts = contacts;
     Ok(())
-}
-
-fn pieces(borne: &[Borne<'_>], contacts: &mut Contacts<f64>) -> Vec<Piece> {
-    let mut pieces = Vec::new();
-    let mut hulls: Vec<Hull> = Vec::new();
-    for (index, b) in borne.iter().enumerate() {
-        let (kind, size, radius) = match b.shape {
-            Shape::Plane => (Kind::Plane, [0.0; 3], 0.0),
-            Shape::Sphere { radius } => (Kind::Sphere, [*radius, 0.0, 0.0], *radius),
-            Shape::Capsule {
-                radius,
-                half_height,
-            } => (
-                Kind::Capsule,
-                [*radius, *half_height, 0.0],
-                radius + half_height,
-            ),
-            Shape::Box { half_extents } => {
-                let square: f64 = half_extents.iter().map(|h| h * h).sum();
-                (Kind::Box, *half_extents, square.sqrt())
-            }
-            Shape::Cylinder {
-                radius,
-                half_height,
-            } => (
-                Kind::Cylinder,
-                [*radius, *half_height, 0.0],
-                radius.hypot(*half_height),
-            ),
-            Shape::Mesh(mesh) => {
-                for hull in &mesh.hulls {
-                    pieces.push(piece(
-                        index,
-                        b,
-                        Kind::Hull,
-                        b.pose,
-                        [0.0; 3],
-                        0.0,
-                        hulls.len(),
-                    ));
-                    hulls.push(hull.clone());
-                }
-                continue;
-            }
-        };
-        pieces.push(piece(index, b, kind, b.pose, size, radius, 0));
-    }
-    let (tables, frames) = HullTables::append(&hulls, &mut contacts.tables);
-    contacts.hulls = tables;
-    for piece in pieces
-        .iter_mut()
-        .filter(|piece| piece.solid.kind == Kind::Hull)
-    {
-        let frame = &frames[piece.hull];
-        piece.solid.center = borne[piece.borne].pose.transform(frame.center);
-        piece.size = frame.half_extents;
-        piece.radius = frame.radius;
-    }
-    pieces
-}
-
-fn piece(
-    borne: usize,
-    b: &Borne<'_>,
-    kind: Kind,
-    pose: Pose,
-    size: [f64; 3],
-    radius: f64,
-    hull: usize,
-) -> Piece {
-    let rows = pose.rotation();
-    Piece {
-        borne,
-        solid: Solid {
-            kind,
-            body: b.body,
-            axes: std::array::from_fn(|c| std::array::from_fn(|r| rows[r][c])),
-            center: pose.pos,
-        },
-        size,
-        radius,
-        hull,
-    }
-}
-
-/// Pairs of pieces that may touch, the lower kind first.
-fn pairs(
-    borne: &[Borne<'_>],
-    pieces: &[Piece],
-    rules: &Rules<'_>,
-    filtered: &BTreeSet<[usize; 2]>,
-) -> Vec<(usize, usize)> {
-    let mut pairs = Vec::new();
-    for (j, second) in pieces.iter().enumerate() {
-        for (i, first) in pieces[..j].iter().enumerate() {
-            let (a, b) = (&borne[first.borne], &borne[second.borne]);
-            let numbers = [a.number.min(b.number), a.number.max(b.number)];
-            if filtered.contains(&numbers) || !may_touch(a, b, rules) {
-                continue;
-            }
-            pairs.push(match first.solid.kind <= second.solid.kind {
-                true => (i, j),
-                false => (j, i),
-            });
-        }
-    }
-    pairs
-}
-
-fn may_touch(a: &Borne<'_>, b: &Borne<'_>, rules: &Rules<'_>) -> bool {
-    let moves = a.body.is_some() || b.body.is_some();
-    let is_one = a.group == b.group;
-    let of_one_robot = a.robot.is_some() && a.robot == b.robot;
-    let may_self = a.robot.is_some_and(|robot| rules.self_collisions[robot]);
-    let neighbours = [(a.group, b.group), (b.group, a.group)];
-    let connected = neighbours
-        .iter()
-        .any(|groups| rules.connected.contains(groups));
-    moves && !is_one && (!of_one_robot || may_self) && !connected && a.surface.meets(&b.surface)
 }
 
 struct Builder<'a> {
@@ -361,9 +192,7 @@ impl Builder<'_> {
         row[pair::RUBS] = if condim == 1 { 0.0 } else { 1.0 };
         row[pair::ROWS] = rows_of(self.scene.solver.cone, condim) as f64;
         let weight = |borne: &super::touching::Borne<'_>| {
-            borne
-                .link
-                .map_or(0.0, |link| self.rules.link_inverse_weight[link])
+            borne.link.map_or(0.0, |link| self.rules.link_inverse_weight[link])
         };
         let weight = weight(x) + weight(y);
         row[pair::WEIGHT] = weight;
@@ -537,9 +366,7 @@ impl Builder<'_> {
         let class_rows = fixed(tables.indices.len(), 2, contacts.classes.len());
         for class in &contacts.classes {
             let index = |x: usize| u32::try_from(x).expect("capacities are small");
-            tables
-                .indices
-                .extend([index(class.first), index(class.capacity)]);
+            tables.indices.extend([index(class.first), index(class.capacity)]);
         }
         contacts.handles = Handles {
             pair_numbers,

@@ -25,25 +25,19 @@ fn prism(corners: usize, radius: f64, half: f64) -> Hull {
 }
 
 /// Points of b on a, b upside down or on its side, 0.1 mm deep, in both precisions.
-fn points(hulls: &Hulls, a: Shape, b: Shape, axes_b: [Vector; 3], center: Vector) -> Vec<Contact> {
-    let axes_a = turned(0.3, 0.0);
+fn points(hulls: &[Hull], shapes: [Shape; 2], turn: [Vector; 3], center: Vector) -> Vec<Contact> {
     let pair = Pair {
-        a,
-        axes_a,
-        b,
-        axes_b,
+        shapes,
+        axes: [turned(0.3, 0.0), turn],
         center,
     };
-    let mut memory = vec![0.0_f64; MEMORY];
-    let double = contacts::<f64>(&[pair], &hulls.places, &hulls.tables, 0.0, &mut memory);
-    let mut memory = vec![0.0_f32; MEMORY];
-    let single = contacts::<f32>(&[pair], &hulls.places, &hulls.single, 0.0, &mut memory);
-    assert_eq!(double[0].len(), single[0].len(), "{pair:?}");
-    for contact in double[0].iter().chain(&single[0]) {
+    let [double, single] = [DOUBLE, SINGLE].map(|m| contacts(m, hulls, &[pair], 0.0).remove(0));
+    assert_eq!(double.len(), single.len(), "{pair:?}");
+    for contact in double.iter().chain(&single) {
         assert!((contact.normal[2] - 1.0).abs() < 1e-6, "{contact:?}");
         assert!((contact.distance + 1e-4).abs() < 2e-6, "{contact:?}");
     }
-    double[0].clone()
+    double
 }
 
 /// Does the polygon of the points hold the place, with this much room around it?
@@ -60,39 +54,29 @@ fn hold(points: &[Contact], place: [f64; 2], room: f64) -> bool {
 #[test]
 fn a_hull_on_its_face_has_three_or_four_points_around_its_centre() {
     let half = 0.03;
-    let hulls = Hulls::new(
-        [3, 4, 6, 16]
-            .map(|corners| prism(corners, 0.04, half))
-            .to_vec(),
-    );
+    let hulls = [3, 4, 6, 16].map(|corners| prism(corners, 0.04, half));
     let high = half - 1e-4;
     for hull in 0..4 {
         let expected = if hull == 0 { 3 } else { 4 };
         let shape = Shape::Hull(hull);
-        // the triangle's bounding box is not centred on it
-        let middle = hulls.frames[hull].center;
         for axes in [
             turned(0.0, 0.0),
             turned(1.1, 0.0),
             turned(0.4, std::f64::consts::PI),
         ] {
-            let place = transform(&axes, scale(middle, -1.0));
             for (a, top) in [
                 (Shape::Plane, 0.0),
                 (Shape::Box([0.2, 0.2, 0.1]), 0.1),
                 (Shape::Cylinder(0.2, 0.1), 0.1),
                 (Shape::Hull(3), half),
             ] {
-                let found = points(&hulls, a, shape, axes, [0.0, 0.0, top + high]);
+                let found = points(&hulls, [a, shape], axes, [0.0, 0.0, top + high]);
                 let least = if a == Shape::Hull(3) { 3 } else { expected };
                 assert!(
                     found.len() >= least && found.len() <= 4,
                     "{a:?} {hull}: {found:?}"
                 );
-                assert!(
-                    hold(&found, [place[0], place[1]], 0.01),
-                    "{a:?} {hull}: {found:?}"
-                );
+                assert!(hold(&found, [0.0; 2], 0.01), "{a:?} {hull}: {found:?}");
             }
         }
     }
@@ -100,14 +84,13 @@ fn a_hull_on_its_face_has_three_or_four_points_around_its_centre() {
 
 #[test]
 fn a_cylinder_stands_on_four_points_and_lies_on_two() {
-    let hulls = Hulls::new(vec![prism(4, 0.2, 0.1)]);
+    let hulls = [prism(4, 0.2, 0.1)];
     let (radius, half) = (0.03, 0.05);
     let cylinder = Shape::Cylinder(radius, half);
     for base in [Shape::Box([0.2, 0.2, 0.1]), Shape::Cylinder(0.2, 0.1)] {
         let found = points(
             &hulls,
-            base,
-            cylinder,
+            [base, cylinder],
             turned(0.7, 0.0),
             [0.05, 0.0, 0.1 + half - 1e-4],
         );
@@ -116,8 +99,7 @@ fn a_cylinder_stands_on_four_points_and_lies_on_two() {
         let lying = turned(0.7, std::f64::consts::FRAC_PI_2);
         let found = points(
             &hulls,
-            base,
-            cylinder,
+            [base, cylinder],
             lying,
             [0.05, 0.0, 0.1 + radius - 1e-4],
         );
@@ -131,8 +113,7 @@ fn a_cylinder_stands_on_four_points_and_lies_on_two() {
     // a hull on a standing and on a lying cylinder
     let found = points(
         &hulls,
-        cylinder,
-        Shape::Hull(0),
+        [cylinder, Shape::Hull(0)],
         turned(0.7, 0.0),
         [0.0, 0.0, half + 0.1 - 1e-4],
     );
@@ -141,24 +122,21 @@ fn a_cylinder_stands_on_four_points_and_lies_on_two() {
 
 #[test]
 fn a_capsule_lies_on_two_points() {
-    let hulls = Hulls::new(vec![prism(5, 0.2, 0.1)]);
+    let hulls = [prism(5, 0.2, 0.1)];
     let (radius, half) = (0.03, 0.05);
     let pair = |b: Shape, high: f64| Pair {
-        a: Shape::Capsule(radius, half),
-        axes_a: turned(0.7, std::f64::consts::FRAC_PI_2),
-        b,
-        axes_b: turned(0.1, 0.0),
+        shapes: [Shape::Capsule(radius, half), b],
+        axes: [turned(0.7, std::f64::consts::FRAC_PI_2), turned(0.1, 0.0)],
         center: [0.02, 0.01, high],
     };
     for (b, high) in [(Shape::Hull(0), 0.1), (Shape::Cylinder(0.2, 0.1), 0.1)] {
         let pair = pair(b, high + radius - 1e-4);
-        let mut memory = vec![0.0_f64; MEMORY];
-        let found = contacts::<f64>(&[pair], &hulls.places, &hulls.tables, 0.0, &mut memory);
-        assert_eq!(found[0].len(), 2, "{found:?}");
-        for contact in &found[0] {
+        let found = contacts(DOUBLE, &hulls, &[pair], 0.0).remove(0);
+        assert_eq!(found.len(), 2, "{found:?}");
+        for contact in &found {
             assert!((contact.distance + 1e-4).abs() < 1e-9 && contact.normal[2] > 0.999_999);
         }
-        let way = sub(found[0][0].point, found[0][1].point);
+        let way = sub(found[0].point, found[1].point);
         assert!(
             (dot(way, way).sqrt() - 2.0 * half).abs() < 1e-6,
             "{found:?}"

@@ -18,7 +18,7 @@ pub struct Polytope {
 }
 
 impl Polytope {
-    pub fn of(shape: Shape, axes: &[Vector; 3], center: Vector, hulls: &Hulls) -> Polytope {
+    pub fn of(shape: Shape, axes: &[Vector; 3], center: Vector, hulls: &[Hull]) -> Polytope {
         let place = |x: Vector| add(transform(axes, x), center);
         let mut polytope = Polytope {
             points: vec![center],
@@ -52,8 +52,8 @@ impl Polytope {
                 polytope.directions = axes.to_vec();
             }
             Shape::Hull(index) => {
-                let hull: &Hull = &hulls.hulls[index];
-                polytope.points = hulls.vertices[index].iter().map(|&x| place(x)).collect();
+                let hull = &hulls[index];
+                polytope.points = hull.vertices.iter().map(|&x| place(x)).collect();
                 polytope.faces = hull
                     .faces
                     .iter()

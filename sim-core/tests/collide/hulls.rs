@@ -1,15 +1,14 @@
-//! The narrow phase of hulls and cylinders against exact oracles.
+//! Distances and normals of hulls and cylinders against exact oracles.
 
-mod lanes;
-mod oracle;
-mod resting;
-mod shapes;
-
-use oracle::{Polytope, along, climb, farthest_axis, least_depth};
+use super::oracle::{Polytope, along, climb, farthest_axis, least_depth};
+use super::shapes::*;
 use parry3d_f64::math::{Pose, Vector as Place};
 use parry3d_f64::query::{ClosestPoints, closest_points};
 use parry3d_f64::shape::{Ball, Capsule, ConvexPolyhedron};
-use shapes::*;
+use sim_core::model::geometry::Hull;
+
+/// Random pairs that share a model: the same shapes, the first where it is.
+const OF_A_MODEL: usize = 50;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
@@ -75,9 +74,9 @@ fn closest(a: &Polytope, b: &Polytope) -> Option<(f64, Vector)> {
 }
 
 /// Random pairs, apart, shallow and deep alike.
-fn cases(a: Kind, b: Kind, count: usize) -> (Hulls, Vec<Pair>) {
+fn cases(a: Kind, b: Kind, count: usize) -> (Vec<Hull>, Vec<Pair>) {
     let mut random = Random(7 + a as u64 + 10 * b as u64);
-    let hulls = Hulls::new((0..40).map(|i| random.hull(8 + (56 * i) / 39)).collect());
+    let hulls: Vec<Hull> = (0..40).map(|i| random.hull(8 + (56 * i) / 39)).collect();
     let shape = |random: &mut Random, kind: Kind| match kind {
         Kind::Sphere => Shape::Sphere(random.between(0.01, 0.1)),
         Kind::Capsule => Shape::Capsule(random.between(0.01, 0.05), random.between(0.01, 0.1)),
@@ -85,21 +84,16 @@ fn cases(a: Kind, b: Kind, count: usize) -> (Hulls, Vec<Pair>) {
         Kind::Cylinder => Shape::Cylinder(random.between(0.02, 0.1), random.between(0.02, 0.1)),
         Kind::Hull => Shape::Hull((random.unit() * 40.0) as usize),
     };
-    let pairs = (0..count)
-        .map(|_| {
-            let (a, b) = (shape(&mut random, a), shape(&mut random, b));
-            let (axes_a, axes_b) = (random.rotation(), random.rotation());
-            let mut pair = Pair {
-                a,
-                axes_a,
-                b,
-                axes_b,
-                center: [0.0; 3],
-            };
+    let mut pairs = Vec::new();
+    while pairs.len() < count {
+        let shapes = [a, b].map(|kind| shape(&mut random, kind));
+        let still = random.rotation();
+        for _ in 0..OF_A_MODEL {
+            let axes = [still, random.rotation()];
             // apart, shallow and deep alike: first so that they touch, then a share of the smaller one in or out
             let way = random.direction();
-            let first = Polytope::of(a, &axes_a, [0.0; 3], &hulls);
-            let second = Polytope::of(pair.b, &axes_b, [0.0; 3], &hulls);
+            let [first, second] =
+                [0, 1].map(|i| Polytope::of(shapes[i], &axes[i], [0.0; 3], &hulls));
             let touching = -along(&first, &second, way);
             let most = touching.min(0.1);
             let out = match random.unit() {
@@ -107,20 +101,22 @@ fn cases(a: Kind, b: Kind, count: usize) -> (Hulls, Vec<Pair>) {
                 x if x < 0.7 => random.between(-0.25, 0.0) * most,
                 _ => random.between(-1.0, -0.1) * touching,
             };
-            pair.center = scale(way, touching + out);
-            pair
-        })
-        .collect();
+            pairs.push(Pair {
+                shapes,
+                axes,
+                center: scale(way, touching + out),
+            });
+        }
+    }
     (hulls, pairs)
 }
 
 fn check(a: Kind, b: Kind, count: usize) -> Found {
     let (hulls, pairs) = cases(a, b, count);
-    let mut memory = vec![0.0_f64; MEMORY];
     let mut found = Found::default();
-    for pair in &pairs {
-        let a = Polytope::of(pair.a, &pair.axes_a, [0.0; 3], &hulls);
-        let b = Polytope::of(pair.b, &pair.axes_b, pair.center, &hulls);
+    for (pair, contacts) in pairs.iter().zip(contacts(DOUBLE, &hulls, &pairs, 1.0)) {
+        let a = Polytope::of(pair.shapes[0], &pair.axes[0], [0.0; 3], &hulls);
+        let b = Polytope::of(pair.shapes[1], &pair.axes[1], pair.center, &hulls);
         let width = |x: &Polytope| {
             (0..3)
                 .map(|i| {
@@ -131,8 +127,7 @@ fn check(a: Kind, b: Kind, count: usize) -> Found {
                 .fold(0.0, f64::max)
         };
         let size = width(&a).min(width(&b));
-        let contacts = contacts::<f64>(&[*pair], &hulls.places, &hulls.tables, 1.0, &mut memory);
-        let Some(deepest) = contacts[0]
+        let Some(deepest) = contacts
             .iter()
             .min_by(|x, y| x.distance.total_cmp(&y.distance))
         else {
@@ -143,7 +138,7 @@ fn check(a: Kind, b: Kind, count: usize) -> Found {
         found.untrue = found
             .untrue
             .max((along(&a, &b, n) - deepest.distance).abs() / size);
-        assert!(contacts[0].iter().all(|x| x.normal == n));
+        assert!(contacts.iter().all(|x| x.normal == n));
         let curved = a.discs.is_some() || b.discs.is_some();
         let (truth, normal, apart) = match if curved { None } else { closest(&a, &b) } {
             Some((distance, normal)) => (distance, normal, true),
@@ -247,21 +242,20 @@ fn cylinders_and_hulls_are_as_near_as_the_oracles_say() {
 
 #[test]
 fn the_lowest_vertex_of_a_hull_above_a_plane_is_found() {
-    let (hulls, pairs) = cases(Kind::Hull, Kind::Hull, 10_000);
-    let mut memory = vec![0.0_f64; MEMORY];
-    for pair in pairs {
-        let pair = Pair {
-            a: Shape::Plane,
-            ..pair
-        };
-        let hull = Polytope::of(pair.b, &pair.axes_b, pair.center, &hulls);
-        let n = pair.axes_a[2];
+    let (hulls, mut pairs) = cases(Kind::Hull, Kind::Hull, 10_000);
+    for pair in &mut pairs {
+        pair.shapes[0] = Shape::Plane;
+    }
+    for (pair, found) in pairs.iter().zip(contacts(DOUBLE, &hulls, &pairs, 1.0)) {
+        let hull = Polytope::of(pair.shapes[1], &pair.axes[1], pair.center, &hulls);
+        let n = pair.axes[0][2];
         let truth = -hull.reach(scale(n, -1.0));
-        let found = &contacts::<f64>(&[pair], &hulls.places, &hulls.tables, 1.0, &mut memory)[0];
         assert!(found.len() >= 3, "{found:?}");
         let least = found.iter().map(|x| x.distance).fold(1.0, f64::min);
-        assert!((least - truth).abs() < 1e-5 * 0.1 && found.iter().all(|x| x.normal == n));
-        for x in found {
+        assert!((least - truth).abs() < 1e-5 * 0.1);
+        for x in &found {
+            let off = sub(x.normal, n);
+            assert!(dot(off, off).sqrt() < 1e-12, "{x:?} {n:?}");
             // half-way between the plane and a vertex
             assert!((dot(n, x.point) - 0.5 * x.distance).abs() < 1e-12);
         }
