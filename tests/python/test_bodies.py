@@ -7,9 +7,6 @@ import pytest
 
 import tightloop as tl
 
-# shapes have no contacts yet, which launch says
-pytestmark = pytest.mark.filterwarnings("ignore:contacts are not simulated yet")
-
 TURN = (0.0, 0.6, 0.0, 0.8)
 FIELDS = ("joint_q", "joint_qd", "body_q", "body_qd", "mass_matrix")
 

@@ -97,17 +97,6 @@ def test_a_launch_that_fails_says_so_once(pendulum, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_shapes_that_make_no_contacts_yet_are_not_passed_over_in_silence(pendulum):
-    pendulum.add_box(half_extents=(1, 1, 1))
-    pendulum.add_capsule(radius=1, half_height=1)
-    with (
-        pytest.warns(UserWarning, match="contacts are not simulated yet"),
-        tl.launch(pendulum, worlds=1) as sim,
-    ):
-        assert "contacts are not simulated yet" in sim.info["notes"][0]
-        assert sim.step().step[0] == 1
-
-
 @pytest.mark.parametrize("fields", [("joint_q",), ("joint_q", "mass_matrix", "body_q")])
 def test_more_worlds_than_memory_holds_are_refused_before_it_is_touched(pendulum, fields):
     with pytest.raises(tl.ResourceError, match=r"worlds"):

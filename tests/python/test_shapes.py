@@ -7,9 +7,6 @@ import pytest
 import tightloop as tl
 from conftest import URDF
 
-# shapes have no contacts yet, which launch says
-pytestmark = pytest.mark.filterwarnings("ignore:contacts are not simulated yet")
-
 
 def test_a_daemon_names_every_shape_and_static_ones_first(unique):
     scene = tl.Scene(contacts_max=50, rows_max=150)
