@@ -36,9 +36,10 @@ const DOORS: [(&str, &str); 12] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-const UNSAFE: [&str; 8] = [
+const UNSAFE: [&str; 9] = [
     "py-client/src/frame.rs",               // NumPy views
     "sim-core/src/backend/cpu/chunk.rs",    // calls the stages of an instruction set
+    "sim-core/src/backend/cpu/contacts.rs", // rows of a frame, as transfer.rs
     "sim-core/src/backend/cpu/dispatch.rs", // instruction sets
     "sim-core/src/backend/cpu/mod.rs",      // calls what dispatch chose
     "sim-core/src/backend/cpu/transfer.rs", // rows of a frame, written by several threads

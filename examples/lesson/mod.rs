@@ -32,7 +32,6 @@ pub enum Demo {
 /// The lesson's scene (Newton, "Controlling a Robot"), without contacts.
 pub fn lesson(demo: Demo) -> Description {
     let mut scene = Description::new(1.0 / 480.0, 8);
-    scene.add_box("table", [0.4, 0.4, 0.05], Pose::at([0.0, -0.5, 0.05]));
     let robot =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/assets/fr3/fr3_franka_hand.urdf");
     let options = UrdfOptions {
