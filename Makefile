@@ -1,6 +1,6 @@
 # demo · test · published · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
 #
-#   make demo     the Franka lesson in 4096 worlds, with a plot in out/       (make demo WORLDS=256)
+#   make demo     the Franka lesson and a grasp in 4096 worlds, plots in out/  (make demo WORLDS=256)
 #   make test     every Rust and Python test
 #   make published   robots from PyPI against MuJoCo; 260 MB of wheels  (make published TIGHTLOOP_URDF=/path/robot.urdf)
 #   make bench    speed, side by side with what it is compared with
@@ -26,6 +26,7 @@ CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D
 
 demo: wheel
 	$(PYTHON) examples/franka_lesson.py --worlds $(WORLDS)
+	$(PYTHON) examples/franka_grasp.py --worlds $(WORLDS)
 	@echo && echo "The same in process, without daemon and Python:"
 	@cargo run --release --quiet --example franka_lesson -- $(WORLDS)
 
@@ -46,6 +47,7 @@ published: wheel $(VENV)/.dev
 bench: wheel $(VENV)/.dev
 	cargo bench --package tightloop --bench step
 	$(PYTHON) benches/peers.py
+	$(PYTHON) benches/contacts.py
 	$(PYTHON) benches/legged.py
 	$(PYTHON) benches/round_trip.py
 

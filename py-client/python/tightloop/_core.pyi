@@ -17,7 +17,7 @@ class Frame:
     A frame, and every array taken from it, stays valid and unchanged until dropped, even after the daemon died.
     At most ``frames_held`` frames may be alive; ``copy()`` is for those to keep. Real arrays are float32 or float64,
     as the precision of the run says. Only the fields asked for in ``launch(fields=...)`` are there, besides
-    ``time``, ``step`` and ``status``.
+    ``time``, ``step``, ``status`` and ``contacts_left_out``.
 
     Raises:
         UnknownField: The frame does not carry that field; the message lists those it carries.
@@ -58,6 +58,20 @@ class Frame:
     """Reference acceleration of a constraint row [rad/s² or m/s²], ``(worlds, rows)``."""
     efc_force: NDArray[Any]
     """Force of a constraint row [N·m or N], ``(worlds, rows)``."""
+    contact_count: NDArray[np.int32]
+    """Contacts of the world: how many rows of the other contact fields are in use [–], ``(worlds,)``."""
+    contact_pos: NDArray[Any]
+    """Point half-way between the two surfaces, in the world [m], ``(worlds, contacts, 3)``."""
+    contact_normal: NDArray[Any]
+    """Unit normal from the first shape of the pair to the second [–], ``(worlds, contacts, 3)``."""
+    contact_distance: NDArray[Any]
+    """Distance of the two surfaces, negative in penetration [m], ``(worlds, contacts)``."""
+    contact_force: NDArray[Any]
+    """Force on the second shape of the pair, in world axes [N], ``(worlds, contacts, 3)``."""
+    contact_pair: NDArray[np.int32]
+    """The two shapes, as places in ``sim.shape_names`` [–]; -1 in a row not in use, ``(worlds, contacts, 2)``."""
+    body_contact_force: NDArray[Any]
+    """Sum of the contact forces on each link, in world axes [N], ``(worlds, bodies, 3)``."""
     time: NDArray[np.float64]
     """Simulated time since the world's reset [s], ``(worlds,)``."""
     step: NDArray[np.uint64]
@@ -66,8 +80,11 @@ class Frame:
     """Trouble of the world, as bits [–], ``(worlds,)``; 0 is none.
 
     1: positions or velocities are not finite; reset or write the world. 2: the solver used up its iterations in some
-    physics step of the last frame.
+    physics step of the last frame. 4: contacts did not fit into the scene's ``contacts_max`` or ``rows_max``, and were
+    left out.
     """
+    contacts_left_out: NDArray[np.uint32]
+    """Contacts that did not fit: the most of any physics step of the last frame [–], ``(worlds,)``."""
 
     @property
     def fields(self) -> list[str]:
