@@ -253,9 +253,15 @@ pub(super) fn assemble<C: Cx>(
     });
 }
 
-/// Adds to `sum` where a contact is on another piece of its cost at `AHEAD` than at `JAR`, or on a curved one there.
+/// Adds to `sum` where a contact is on another piece of its cost at `AHEAD` than at `JAR`, or on a curved one there; to
+/// `curved` where it is on a curved one at either.
 #[inline(always)]
-pub(super) fn changes<C: Cx>(cx: &mut C, t: &ContactsOf<C>, sum: &mut C::V) {
+pub(super) fn changes<C: Cx>(
+    cx: &mut C,
+    t: &ContactsOf<C>,
+    sum: &mut C::V,
+    curved: &mut C::V,
+) {
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
@@ -265,6 +271,8 @@ pub(super) fn changes<C: Cx>(cx: &mut C, t: &ContactsOf<C>, sum: &mut C::V) {
             let moved = (before.state - after.state).abs() + after.curved;
             let more = cx.get(sum) + cx.only(moved);
             cx.put(sum, more);
+            let more = cx.get(curved) + cx.only(before.curved + after.curved);
+            cx.put(curved, more);
         });
     }
 }

@@ -70,10 +70,13 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         contacts::residual(cx, t, minimum, row::AHEAD);
 
         let mut moved = cx.var(changes(m, weight, jar, jar_minimum));
-        contacts::changes(cx, t, &mut moved);
+        let mut curved = cx.var(zero);
+        contacts::changes(cx, t, &mut moved, &mut curved);
         let changed = half.lt(cx.get(&moved));
         let later = half.lt(cx.get(&round));
-        let trusted = cx.get(&round).lt(C::F::c(trusted_rounds::<C::F>()));
+        let early = cx.get(&round).lt(C::F::c(trusted_rounds::<C::F>()));
+        // a whole step overshoots where a contact slides
+        let trusted = C::F::and(early, cx.get(&curved).lt(half));
         let searches = C::F::and(C::F::or(changed, later), C::F::not(trusted));
         let mut length = cx.var(one);
         let mut settled = cx.var(zero);
