@@ -116,6 +116,9 @@ fn law<F: Num>(m: &Constants<F::Real>, r: usize, jar: F, weight: F) -> Law<F> {
     }
 }
 
+/// Slope over that at the start below which a search ends in `f32`: MuJoCo's `ls_tolerance`. The next round finds the rest.
+const SLACK: f64 = 0.01;
+
 /// Safeguarded Newton on p'(α) = 0: the exact minimum on the segment, and beyond it.
 #[inline(always)]
 pub(super) fn search<C: Cx>(
@@ -126,6 +129,11 @@ pub(super) fn search<C: Cx>(
 ) {
     let zero = C::F::c(0.0);
     let resolution = C::F::c(4.0 * <<C::F as Num>::Real as Real>::EPSILON);
+    let slack = if <<C::F as Num>::Real as Real>::DOUBLE {
+        0.0
+    } else {
+        SLACK
+    };
     let mut low = cx.var(zero);
     let mut high = cx.var(C::F::c(1.0e10));
     times!(cx, m.solver.ls_iterations, {
@@ -133,7 +141,8 @@ pub(super) fn search<C: Cx>(
         let d = line.derivative(cx, m, alpha);
         let below = C::F::select(d.slope.lt(zero), alpha, cx.get(&low));
         let above = C::F::select(d.slope.lt(zero), cx.get(&high), alpha);
-        let found = C::F::not((d.size * resolution).lt(d.slope.abs()));
+        let close = (d.size * resolution).max(line.descent * C::F::c(slack));
+        let found = C::F::not(close.lt(d.slope.abs()));
         break_if!(cx, C::F::or(found, (above - below).lt(above * resolution)));
         cx.set(&mut low, below);
         cx.set(&mut high, above);
