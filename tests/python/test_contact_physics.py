@@ -70,13 +70,13 @@ def test_a_block_slides_past_the_angle_of_friction_and_not_before(cone, precisio
             for _ in range(int(60 * seconds)):
                 frame = sim.step()
             moved = (frame.joint_q[0, :3] - start) @ down
-        slides = 0.5 * GRAVITY * (np.sin(angle) - mu * np.cos(angle)) * seconds**2
         if share < 1:
-            # a soft contact creeps, MuJoCo's by 3e-6 m with an elliptic and 5e-4 m with a pyramidal cone
+            # a soft contact creeps, MuJoCo's by 3e-6 m with an elliptic and 4e-4 m with a pyramidal cone
             assert 0 <= moved < 1e-3
         else:
-            # a block that slides lifts off and falls back by micrometres, which moves MuJoCo's by 1 %
-            assert moved == pytest.approx(slides, rel=0.02)
+            # what friction leaves of gravity moves it by 6 cm: so the coefficient is a hundred times closer than asked
+            acceleration = 2 * moved / seconds**2
+            assert np.tan(angle) - acceleration / (GRAVITY * np.cos(angle)) == pytest.approx(mu, rel=2e-3)
 
 
 @PRECISIONS
@@ -111,8 +111,8 @@ def test_a_stack_of_five_boxes_stands_for_twenty_seconds(precision):
         assert not frame.status.any()
         assert (frame.contact_count == 4 * boxes).all()
     settled = half * (2 * np.arange(boxes) + 1)
-    # each contact gives way by some tenths of a millimetre, the lowest most
-    assert np.abs(q[:, :, 2] - settled).max() < 2e-3
+    # contacts give way by tenths of a millimetre, the lowest most: MuJoCo's top box sinks by 2.05 mm
+    assert np.abs(q[:, :, 2] - settled).max() < 2.2e-3
     assert np.abs(q[:, :, :2]).max() < 1e-3
     assert np.abs(q[:, :, 3:6]).max() < 1e-3
     assert np.abs(frame.joint_qd).max() < 1e-3
@@ -121,7 +121,8 @@ def test_a_stack_of_five_boxes_stands_for_twenty_seconds(precision):
 @CONES
 def test_two_balls_that_collide_keep_their_momentum(cone):
     scene = tl.Scene(dt=1 / 480, substeps=4, gravity=(0, 0, 0))
-    scene.solver(cone=cone)
+    # the gradient that an early end leaves is a force without a counterforce
+    scene.solver(cone=cone, iterations=100, tolerance=0.0)
     radii = np.array([0.1, 0.15])
     for name, radius in zip("ab", radii, strict=True):
         scene.add_body(name=name, pos=(0.0 if name == "a" else 0.3, 0, 0))
@@ -130,7 +131,7 @@ def test_two_balls_that_collide_keep_their_momentum(cone):
     moments = 0.4 * masses * radii**2
     rng = np.random.default_rng(0)
     worlds = 16
-    qd = rng.normal(size=(worlds, 12)) * ([1, 0.3, 0.3] + [5] * 3) * 2
+    qd = rng.normal(size=(worlds, 12)) * np.tile([1, 0.3, 0.3, 5, 5, 5], 2)
     # towards each other, not quite centrally
     qd[:, 0], qd[:, 6] = 3.0, -2.0
 
@@ -150,7 +151,8 @@ def test_two_balls_that_collide_keep_their_momentum(cone):
         assert touched.all() and not frame.contact_count.any(), "all met and parted"
         assert (np.abs(frame.joint_qd[:, 6] + 2.0) > 0.5).all()
     for before, after in zip(start, end, strict=True):
-        np.testing.assert_allclose(after, before, rtol=0, atol=1e-12 * np.abs(before).max())
+        # a step rounds its forces, of which edges of a pyramid have a thousand times (impratio) those of their sum
+        np.testing.assert_allclose(after, before, rtol=0, atol=1e-11 * np.abs(before).max())
 
 
 def heap(contacts_max: int | None = None, rows_max: int | None = None) -> tl.Scene:
