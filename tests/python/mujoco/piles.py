@@ -164,15 +164,15 @@ class Judge:
         self.to = Coordinates(model, sim)
         self.names = sim.shape_names
 
-    def at(self, q: Array, qd: Array, joint_f: Array | None = None) -> tuple[Array, mujoco.MjData]:
-        """Our accelerations as MuJoCo's; forces at the state too."""
+    def at(self, q: Array, qd: Array, joint_f: Array | None = None) -> tuple[Array, int]:
+        """MuJoCo's accelerations in our coordinates, and how many contacts it has; `data` holds the rest."""
         convert, data = self.to.to_qvel(q), self.data
         mujoco.mj_resetData(self.model, data)
         data.qpos[:], data.qvel[:] = self.to.positions(q), convert @ qd
         if joint_f is not None:
             data.qfrc_applied[:] = np.linalg.solve(convert.T, joint_f)
         mujoco.mj_forward(self.model, data)
-        return np.linalg.solve(convert, data.qacc - self.to.drift(q, qd)), data
+        return np.linalg.solve(convert, data.qacc - self.to.drift(q, qd)), data.ncon
 
     def constraint_force(self, q: Array) -> Array:
         """MuJoCo's last constraint force in our coordinates: of a free body, force and torque at its centre of mass."""
