@@ -20,21 +20,23 @@ def test_arrays_are_contiguous_read_only_views_with_worlds_first(pendulum):
     with tl.launch(pendulum, worlds=5, fields=fields) as sim:
         frame = sim.reset()
         shapes = {"joint_q": (5, 2), "joint_qd": (5, 2), "body_q": (5, 3, 7), "mass_matrix": (5, 2, 2)}
-        for name, shape in (shapes | {"time": (5,), "step": (5,), "status": (5,)}).items():
+        always = ("time", "step", "status", "contacts_left_out")
+        for name, shape in (shapes | dict.fromkeys(always, (5,))).items():
             array = getattr(frame, name)
             assert array.shape == shape, name
             assert array.flags.c_contiguous and array.flags.aligned and not array.flags.writeable, name
             assert not array.flags.owndata and array.ctypes.data % 64 == 0, name
             with pytest.raises(ValueError, match="read-only"):
                 array[...] = 0
-        assert [getattr(frame, name).dtype for name in ("joint_q", "time", "step", "status")] == [
+        assert [getattr(frame, name).dtype for name in ("joint_q", *always)] == [
             np.float32,
             np.float64,
             np.uint64,
             np.uint32,
+            np.uint32,
         ]
         assert frame.joint_q is frame.joint_q
-        assert set(sim.fields) >= {*fields, "time", "step", "status"} == set(dir(frame)) & {*fields, *sim.fields}
+        assert set(sim.fields) >= {*fields, *always} == set(dir(frame)) & {*fields, *sim.fields}
 
 
 def test_f64_runs_have_f64_fields(pendulum):

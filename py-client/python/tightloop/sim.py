@@ -202,7 +202,8 @@ def launch(
         device: ``"cpu"``, or ``"auto"`` for the best there is.
         precision: ``"f32"``, or ``"f64"`` for the same physics in double precision.
         threads: Most threads a step may use; all cores if left out.
-        fields: What frames carry besides ``time``, ``step`` and ``status``: names of `Frame` attributes.
+        fields: What frames carry besides ``time``, ``step``, ``status`` and ``contacts_left_out``: names of `Frame`
+            attributes.
         name: Name of the daemon, for `attach`; a unique one if left out.
         log: File for the daemon's news; warnings and errors go to stderr if left out.
         frames_held: How many frames may be alive at once, at least 1.

@@ -7,16 +7,18 @@ the larger friction and condim count, margins and gaps add, and solref is the me
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.random import Generator
-from robots import Coordinates
-from twin import ITERATIONS, Array
+from robots import Coordinates, set_effort
+from twin import ITERATIONS, Array, drive, flatten_mimics, limits_in_force_space
 
 import tightloop as tl
+from conftest import START, STIFFNESS, URDF
 
 # Newton's shape parameters if left out
 SURFACE = {"mu": 1.0, "ke": 2500.0, "kd": 100.0, "kf": 1000.0, "margin": 0.0, "gap": 0.0, "condim": 3}
@@ -75,13 +77,15 @@ class Pile:
         pos: Array | tuple = (0.0, 0.0, 0.0),
         quat: Array | tuple = (0.0, 0.0, 0.0, 1.0),
         body: str | None = None,
+        density: float = 1000.0,
         **surface: float,
     ) -> None:
-        """A shape of the world, of a body or of a link (``robot/link``)."""
+        """A shape of the world, of a body or of a link (``robot/link``), which keeps its mass."""
+        of_link = body is not None and "/" in body
         # a plane never moves
         bearer = {} if kind == "plane" else {"body": body}
+        bearer |= {} if body is None or of_link else {"density": density}
         add = {"name": name, "pos": tuple(pos), "quat": tuple(quat), **bearer, **surface}
-        of_link = body is not None and "/" in body
         if kind == "mesh":
             points, file = size["points"], size["file"]
             write_hull(points, file)
@@ -93,7 +97,7 @@ class Pile:
         owner = self.spec.worldbody if body is None else self.spec.body(body if of_link else f"{body}/body")
         geom = owner.add_geom(name=shape.full_name, type=GEOMS[kind], pos=pos, quat=np.roll(quat, 1))
         geom.contype = geom.conaffinity = 0
-        geom.density = 0.0 if of_link else 1000.0
+        geom.density = 0.0 if of_link else density
         if kind == "mesh":
             geom.meshname = name
         else:
@@ -185,6 +189,31 @@ class Judge:
             pair = tuple(sorted(self.names.index(self.model.geom(geom).name) for geom in contact.geom))
             out.append((pair, float(contact.dist), contact.pos.copy()))
         return out
+
+
+def lesson(*, driven: bool) -> tuple[Pile, Callable[[], mujoco.MjModel]]:
+    """The lesson's arm over its table, solved as the lesson is; and what compiles MuJoCo's model of it."""
+    pile = Pile(dt=1 / 480, substeps=8)
+    pile.shape("box", "table", {"half_extents": (0.4, 0.4, 0.05)}, pos=(0.0, -0.5, 0.05))
+    pile.robot("arm", URDF, pos=(-0.5, -0.5, 0.1))
+    arm = pile.scene.robots["arm"]
+    arm.joint_q = START
+    arm.joint_target_ke, arm.joint_target_kd = STIFFNESS * driven, STIFFNESS / 10 * driven
+    arm.joint_armature = [0.195] * 4 + [0.074] * 3 + [0.1] * 2
+    arm.joint_effort_limit = [87] * 4 + [12] * 3 + [100] * 2
+    for dof, name in enumerate(arm.joint_names):
+        drive(pile.spec, arm, dof, f"arm/{name}")
+    pile.scene.solver()
+    pile.spec.option.iterations, pile.spec.option.tolerance = 20, 1e-8
+
+    def compiled() -> mujoco.MjModel:
+        model = pile.compile()
+        limits_in_force_space(model)
+        flatten_mimics(model)
+        set_effort(model, pile.scene)
+        return model
+
+    return pile, compiled
 
 
 def states_of(model: mujoco.MjModel, coordinates: Coordinates, steps: list[int], push: Array) -> tuple[Array, Array]:

@@ -7,34 +7,16 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-import pytest
-from piles import Pile, ours
+from piles import lesson, ours
 from robots import Coordinates
-from twin import Array, drive, flatten_mimics, limits_in_force_space
+from twin import Array
 
 import tightloop as tl
-from conftest import START, URDF
+from conftest import START
 
 WORLDS, FRAMES, SUBSTEPS = 48, 180, 8
 # Frames until the fingers, which start outside their limits, have come back; the table is touched in frame 14
 SETTLED = 12
-
-
-@pytest.fixture
-def pile() -> Pile:
-    """The lesson's arm and table, solved as the lesson is."""
-    pile = Pile(dt=1 / 480, substeps=SUBSTEPS)
-    pile.shape("box", "table", {"half_extents": (0.4, 0.4, 0.05)}, pos=(0.0, -0.5, 0.05))
-    pile.robot("arm", URDF, pos=(-0.5, -0.5, 0.1))
-    arm = pile.scene.robots["arm"]
-    arm.joint_q, arm.joint_target_ke, arm.joint_target_kd = START, 0.0, 0.0
-    arm.joint_armature = [0.195] * 4 + [0.074] * 3 + [0.1] * 2
-    for dof, name in enumerate(arm.joint_names):
-        drive(pile.spec, arm, dof, f"arm/{name}")
-    pile.scene.solver()
-    option = pile.spec.option
-    option.iterations, option.tolerance = 20, 1e-8
-    return pile
 
 
 def torque(frame: int) -> Array:
@@ -42,10 +24,9 @@ def torque(frame: int) -> Array:
     return 35.0 * np.sin(2 * np.pi * frame / FRAMES) * (np.arange(9) == 2)
 
 
-def test_it_sinks_in_no_deeper_than_mujocos_and_gains_no_energy(pile):
-    model = pile.compile()
-    limits_in_force_space(model)
-    flatten_mimics(model)
+def test_it_sinks_in_no_deeper_than_mujocos_and_gains_no_more_energy():
+    pile, compiled = lesson(driven=False)
+    model = compiled()
     starts = START + np.random.default_rng(0).uniform(-1e-3, 1e-3, (WORLDS, 9)) * (np.arange(9) < 7)
     with tl.launch(pile.scene, worlds=WORLDS, fields=("joint_q", "joint_qd", "contact_distance")) as sim:
         to = Coordinates(model, sim)
