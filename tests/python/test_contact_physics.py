@@ -42,6 +42,13 @@ ARM = """<robot name="arm">
 )
 
 
+def after(sim: tl.Sim, frames: int) -> tl.Frame:
+    """What there is so many control frames later, at least one."""
+    for _ in range(frames - 1):
+        sim.step()
+    return sim.step()
+
+
 def about_y(angle: float) -> tuple[float, float, float, float]:
     """A turn about y [rad], (x, y, z, w)."""
     return (0.0, float(np.sin(angle / 2)), 0.0, float(np.cos(angle / 2)))
@@ -67,8 +74,7 @@ def test_a_block_slides_past_the_angle_of_friction_and_not_before(cone, precisio
         scene.add_box(body="thing", half_extents=(0.1, 0.1, 0.02), mu=0.0)
         with tl.launch(scene, worlds=1, precision=precision, fields=STATE) as sim:
             start = sim.reset().joint_q[0, :3].astype(float)
-            for _ in range(int(60 * seconds)):
-                frame = sim.step()
+            frame = after(sim, int(60 * seconds))
             moved = (frame.joint_q[0, :3] - start) @ down
         if share < 1:
             # a soft contact creeps, MuJoCo's by 3e-6 m with an elliptic and 4e-4 m with a pyramidal cone
@@ -87,8 +93,7 @@ def test_a_ball_rolls_down_a_slope_without_slip(cone, precision):
     scene.solver(cone=cone)
     scene.add_sphere(body="thing", radius=radius)
     with tl.launch(scene, worlds=1, precision=precision, fields=STATE) as sim:
-        for _ in range(int(60 * seconds)):
-            frame = sim.step()
+        frame = after(sim, int(60 * seconds))
         velocity, spin = frame.joint_qd[0, :3] @ down, frame.joint_qd[0, 4]
     expected = 5 / 7 * GRAVITY * np.sin(angle) * seconds
     # its first steps sink it into the slope
@@ -105,8 +110,7 @@ def test_a_stack_of_five_boxes_stands_for_twenty_seconds(precision):
         scene.add_body(name=f"b{number}", pos=(0, 0, half * (2 * number + 1)))
         scene.add_box(body=f"b{number}", half_extents=(half,) * 3)
     with tl.launch(scene, worlds=2, precision=precision, fields=(*STATE, "contact_count")) as sim:
-        for _ in range(200):
-            frame = sim.step()
+        frame = after(sim, 200)
         q = frame.joint_q.astype(float).reshape(2, boxes, 7)
         assert not frame.status.any()
         assert (frame.contact_count == 4 * boxes).all()
@@ -145,8 +149,8 @@ def test_two_balls_that_collide_keep_their_momentum(cone):
         start = momenta(sim.write(joint_qd=qd))
         touched = np.zeros(worlds, bool)
         for _ in range(60):
-            frame = sim.step()
-            touched |= frame.contact_count > 0
+            touched |= sim.step().contact_count > 0
+        frame = sim.forward()
         end = momenta(frame)
         assert touched.all() and not frame.contact_count.any(), "all met and parted"
         assert (np.abs(frame.joint_qd[:, 6] + 2.0) > 0.5).all()
@@ -183,8 +187,7 @@ def test_what_does_not_fit_is_counted_and_flagged_in_its_worlds_alone(precision,
         with tl.launch(scene, worlds=20, precision=precision, fields=(*fields, "contacts_left_out")) as sim:
             first = sim.write(joint_q=q)
             evaluated = first.copy()
-            for _ in range(3):
-                frame = sim.step()
+            frame = after(sim, 3)
             frames[name] = (evaluated, frame.copy())
     tight, roomy = frames["tight"][1], frames["roomy"][1]
     assert np.array_equal(tight.status & LEFT_OUT, LEFT_OUT * crowded)
@@ -229,8 +232,7 @@ def test_permuted_worlds_give_the_same_bits(precision):
         for start in (q, q[order]):
             sim.reset()
             sim.write(joint_q=start.reshape(worlds, -1), joint_qd=np.zeros((worlds, 24)))
-            for _ in range(40):
-                frame = sim.step()
+            frame = after(sim, 40)
             ends.append(frame.copy())
     plain, permuted = ends
     assert plain.contact_count.max() >= 6
@@ -251,8 +253,7 @@ def test_fields_tell_what_touches_where_and_how_hard(precision):
     scene.add_sphere(body="far", radius=0.1)
     weights = GRAVITY * np.array([400 * 1e-3, 2000 * 4 / 3 * np.pi * 0.03**3])
     with tl.launch(scene, worlds=2, precision=precision, fields=(*STATE, *CONTACTS)) as sim:
-        for _ in range(10):
-            frame = sim.step()
+        frame = after(sim, 10)
         names, bodies = sim.shape_names, sim.body_names
     table, cube, ball = (names.index(name) for name in ("table", "cube/skin", "ball/sphere"))
     for world in range(2):
@@ -425,8 +426,7 @@ def test_a_ball_far_from_the_origin_rests_as_one_at_the_origin(precision):
         scene.add_sphere(body=name, radius=0.1, group=1 if x else 2)
         scene.add_box(half_extents=(0.5, 0.5, 0.1), pos=(x, 0, -0.1), name=f"{name}_table", group=1 if x else 2)
     with tl.launch(scene, worlds=1, precision=precision, fields=(*STATE, *CONTACTS)) as sim:
-        for _ in range(20):
-            frame = sim.step()
+        frame = after(sim, 20)
     forces = frame.body_contact_force[0, :, 2]
     assert frame.contact_count[0] == 2
     np.testing.assert_allclose(forces, GRAVITY * 1000 * 4 / 3 * np.pi * 1e-3, rtol=1e-3)
