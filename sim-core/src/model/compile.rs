@@ -5,12 +5,12 @@
 //! from mass are evaluated at the reference pose q = 0.
 
 use super::constants::{Body, Constants, Coupled, Dof, Frame, MassEntry, Motion, Newton, Tree};
+use super::contact::Contacts;
 use super::frozen::{Model, RobotRange, Start};
 use super::inertia::merge;
 use super::inverse_weight;
-use super::rows::{DofJoint, IMPEDANCE, add_rows};
-use super::contact::Contacts;
 use super::pairs::{Borne, Rules};
+use super::rows::{DofJoint, IMPEDANCE, add_rows};
 use super::touching::add_contacts;
 use super::{Description, Inertial, Joint, JointKind, ModelError, Pose, Robot, TargetMode};
 use crate::math::factor::Pattern;

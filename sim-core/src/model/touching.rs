@@ -192,7 +192,9 @@ impl Builder<'_> {
         row[pair::RUBS] = if condim == 1 { 0.0 } else { 1.0 };
         row[pair::ROWS] = rows_of(self.scene.solver.cone, condim) as f64;
         let weight = |borne: &super::touching::Borne<'_>| {
-            borne.link.map_or(0.0, |link| self.rules.link_inverse_weight[link])
+            borne
+                .link
+                .map_or(0.0, |link| self.rules.link_inverse_weight[link])
         };
         let weight = weight(x) + weight(y);
         row[pair::WEIGHT] = weight;
@@ -366,7 +368,9 @@ impl Builder<'_> {
         let class_rows = fixed(tables.indices.len(), 2, contacts.classes.len());
         for class in &contacts.classes {
             let index = |x: usize| u32::try_from(x).expect("capacities are small");
-            tables.indices.extend([index(class.first), index(class.capacity)]);
+            tables
+                .indices
+                .extend([index(class.first), index(class.capacity)]);
         }
         contacts.handles = Handles {
             pair_numbers,

@@ -256,12 +256,7 @@ pub(super) fn assemble<C: Cx>(
 /// Adds to `sum` where a contact is on another piece of its cost at `AHEAD` than at `JAR`, or on a curved one there; to
 /// `curved` where it is on a curved one at either.
 #[inline(always)]
-pub(super) fn changes<C: Cx>(
-    cx: &mut C,
-    t: &ContactsOf<C>,
-    sum: &mut C::V,
-    curved: &mut C::V,
-) {
+pub(super) fn changes<C: Cx>(cx: &mut C, t: &ContactsOf<C>, sum: &mut C::V, curved: &mut C::V) {
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
