@@ -132,7 +132,8 @@ fn contacts_are_the_same_whichever_of_two_shapes_stands_still() {
                     size(turned),
                     size(apart),
                 ];
-                assert!(off.iter().all(|&x| x < 1e-9), "{one:?} {other:?} {pair:?}");
+                // a search on a curved surface ends where the normal is good to 1e-6
+                assert!(off.iter().all(|&x| x < 1e-5), "{one:?} {other:?} {pair:?}");
             }
         }
     }
