@@ -234,7 +234,10 @@ fn worlds_that_exceed_their_room_say_so_and_the_others_are_bitwise_unchanged() {
                         continue;
                     }
                     free += 1;
-                    for field in [Field::JointQ, Field::JointQd, Field::BodyContactForce] {
+                    // the state after the frame may have more contacts than there is room for
+                    let fits = all.get(Field::ContactCount, world)[0] <= MOST as f64;
+                    let forces = [Field::BodyContactForce].into_iter().filter(|_| fits);
+                    for field in [Field::JointQ, Field::JointQd].into_iter().chain(forces) {
                         let [one, other] = [&run, &all].map(|run| run.get(field, world));
                         assert!(one == other, "{room:?}: world {world}: {field:?}");
                     }
