@@ -41,7 +41,6 @@ fn started(model: &Arc<Model>, seeds: &[usize], options: Options) -> Run {
         model,
         Options {
             worlds: seeds.len(),
-            fields: FIELDS.to_vec(),
             ..options
         },
     );
@@ -88,6 +87,7 @@ fn with(precision: Precision, lanes: Lanes, threads: usize) -> Options {
         precision,
         lanes,
         threads: Some(threads),
+        fields: FIELDS.to_vec(),
         ..Options::default()
     }
 }
@@ -135,6 +135,30 @@ fn scalar_equals_eight_equals_sixteen_worlds_a_block_equals_two_threads_where_sh
                 println!("skipped: this processor has no {lanes:?}");
             }
         }
+    }
+}
+
+#[test]
+fn fields_that_are_asked_for_do_not_change_how_shapes_touch() {
+    let seeds: Vec<usize> = (0..20).collect();
+    for model in models() {
+        let motion = |fields: &[Field]| {
+            let options = Options {
+                fields: fields.to_vec(),
+                ..with(Precision::F32, Lanes::Auto, 1)
+            };
+            let mut run = started(&model, &seeds, options);
+            for frame in 0..FRAMES {
+                run.step();
+                if frame % 3 == 0 {
+                    run.forward();
+                }
+            }
+            let world = |&world: &usize| run.get(Field::JointQ, world);
+            let numbers: Vec<f64> = seeds.iter().flat_map(world).collect();
+            numbers.into_iter().map(f64::to_bits).collect::<Vec<_>>()
+        };
+        assert!(motion(&[Field::JointQ]) == motion(Field::ALL));
     }
 }
 
@@ -204,13 +228,16 @@ fn worlds_that_exceed_their_room_say_so_and_the_others_are_bitwise_unchanged() {
                     *has_left_out |= left_out > 0.0;
                     let status = run.get(Field::Status, world)[0] as u32;
                     let says = status & status::CONTACTS_LEFT_OUT != 0;
-                    assert_eq!(says, *has_left_out, "{room:?}: world {world}");
+                    assert_eq!(says, left_out > 0.0, "{room:?}: world {world}");
                     if *has_left_out {
                         full += 1;
                         continue;
                     }
                     free += 1;
-                    for field in [Field::JointQ, Field::JointQd, Field::BodyContactForce] {
+                    // the state after the frame may have more contacts than there is room for
+                    let fits = all.get(Field::ContactCount, world)[0] <= MOST as f64;
+                    let forces = [Field::BodyContactForce].into_iter().filter(|_| fits);
+                    for field in [Field::JointQ, Field::JointQd].into_iter().chain(forces) {
                         let [one, other] = [&run, &all].map(|run| run.get(field, world));
                         assert!(one == other, "{room:?}: world {world}: {field:?}");
                     }

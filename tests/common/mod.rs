@@ -105,14 +105,15 @@ impl Run {
             .find(|slot| slot.field == field);
         let slot = slot.expect("the field was asked for");
         let n: usize = slot.shape[1..].iter().product();
-        let bytes: Vec<u8> = self
-            .arena
+        let size = slot.dtype.bytes();
+        let first = slot.offset + world * n * size;
+        let words = first / 8..(first + n * size).div_ceil(8);
+        let before = first - 8 * words.start;
+        let bytes: Vec<u8> = self.arena[words]
             .iter()
             .flat_map(|word| word.to_ne_bytes())
             .collect();
-        let size = slot.dtype.bytes();
-        let first = slot.offset + world * n * size;
-        bytes[first..first + n * size]
+        bytes[before..before + n * size]
             .chunks_exact(size)
             .map(|x| match slot.dtype {
                 Dtype::F32 => f64::from(f32::from_ne_bytes(x.try_into().unwrap())),

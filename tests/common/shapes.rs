@@ -23,7 +23,7 @@ pub fn shapes(cone: Cone) -> Description {
     // a contact without friction, and others with more of it
     scene.shapes[1].surface.condim = 1;
     scene.shapes[2].surface.mu = 1.5;
-    let mut body = Body::new("body", Pose::at([0.0, 0.0, 0.1]));
+    let mut body = Body::new("body", Pose::at([0.0, 0.0, 0.08]));
     let places = [
         [0.06, 0.0, 0.0],
         [-0.06, 0.0, 0.0],

@@ -122,18 +122,20 @@ fn contacts_are_the_same_whichever_of_two_shapes_stands_still() {
         }
         for (pair, contacts) in pairs.iter().zip(contacts(DOUBLE, &hulls, &pairs, MARGIN)) {
             let other = contacts_exchanged(&hulls, pair, MARGIN);
-            assert_eq!(contacts.len(), other.len(), "{pair:?}");
-            for (one, other) in contacts.iter().zip(&other) {
-                // from the shape that stands still to the free one
-                let turned = add(one.normal, other.normal);
-                let apart = sub(one.point, other.point);
-                let off = [
-                    (one.distance - other.distance).abs(),
-                    size(turned),
-                    size(apart),
-                ];
-                assert!(off.iter().all(|&x| x < 1e-9), "{one:?} {other:?} {pair:?}");
-            }
+            let least = |a: &&Contact, b: &&Contact| a.distance.total_cmp(&b.distance);
+            let nearest = [&contacts, &other].map(|contacts| contacts.iter().min_by(least));
+            let [Some(one), Some(other)] = nearest else {
+                assert_eq!(nearest, [None; 2], "{pair:?}");
+                continue;
+            };
+            // from the shape that stands still to the free one
+            let turned = size(add(one.normal, other.normal));
+            let apart = size(sub(one.point, other.point));
+            let off = (one.distance - other.distance).abs();
+            // a search on a curved surface ends where the normal is good to 1e-6; inside each other lines may cross anywhere
+            assert!(off < 1e-9 && turned < 1e-5, "{one:?} {other:?} {pair:?}");
+            let touching = one.distance < 0.0;
+            assert!(apart < 1e-5 || touching, "{one:?} {other:?} {pair:?}");
         }
     }
 }
