@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import misses
 import tightloop as tl
 
 REPOSITORY = Path(__file__).parents[2]
@@ -111,3 +112,8 @@ def torques() -> Callable[[int], NDArray[np.float32]]:
         return tau
 
     return at
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What is known to fall short is expected to fail."""
+    misses.mark(items)
