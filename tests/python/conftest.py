@@ -9,11 +9,11 @@ import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import misses
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import misses
 import tightloop as tl
 
 REPOSITORY = Path(__file__).parents[2]
