@@ -98,7 +98,10 @@ fn a_client_that_attaches_knows_everything() {
         .map(|field| field.name.as_str())
         .collect();
     let counters = ["time", "step", "status", "contacts_left_out"];
-    assert_eq!(fields, [&["joint_q", "mass_matrix"][..], &counters].concat());
+    assert_eq!(
+        fields,
+        [&["joint_q", "mass_matrix"][..], &counters].concat()
+    );
     assert_eq!(
         (told.fields[1].dtype, &told.fields[1].shape[..]),
         (Dtype::F32, &[3, 9, 9][..])
