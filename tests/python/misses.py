@@ -5,28 +5,18 @@ from __future__ import annotations
 import pytest
 
 PILES = "test_contacts_live.py::test_accelerations_of_piles_are_mujocos"
-CENTRE = "test_contacts_live.py::test_a_centre_of_mass_may_lie_anywhere"
-ARMS = "test_contacts_live.py::test_accelerations_of_arms_that_touch_are_mujocos"
 HOLD = "test_grasp_hold.py::test_the_cube_slips_no_more_than_mujocos"
 SLOPE = "test_contact_physics.py::test_a_block_slides_past_the_angle_of_friction_and_not_before"
 
 STIFF = "f32: M drowns in the stiffness of contacts at large impratio"
 CAPSULE = "MuJoCo lays the pyramid of a capsule on a plane along the capsule: 22.4, 0 for 19.2, 11.1 m/s²"
-SWING = "rows lack the swing of a centre that lies off its frame: 0.449 for 0.477 m/s²"
 
 #: Ends of test names, and by how much and why they fail.
 MISSES: dict[str, str] = {
-    f"{PILES}[sphere-box-elliptic-f32]": f"{STIFF}: up to 5.4e-3, asked 1e-3",
     f"{PILES}[sphere-box-pyramidal-f32]": f"{STIFF}: up to 0.64 for one box, asked 1e-3",
-    f"{PILES}[sphere-capsule-elliptic-f32]": f"{STIFF}: up to 5.4e-3, asked 1e-3",
     f"{PILES}[sphere-capsule-pyramidal-f64]": CAPSULE,
     f"{PILES}[sphere-capsule-pyramidal-f32]": CAPSULE,
-    f"{CENTRE}[elliptic-f64]": SWING,
-    f"{CENTRE}[elliptic-f32]": SWING,
-    f"{CENTRE}[pyramidal-f64]": SWING,
-    f"{CENTRE}[pyramidal-f32]": SWING,
-    f"{ARMS}[pyramidal-f32]": f"{STIFF}: 1.8e-3, asked 1e-3",
-    f"{HOLD}[f32]": "f32: 2.49 mm in 60 s; MuJoCo and f64 20 um",
+    f"{HOLD}[f32]": "f32: more than 1.2 times the 20 um of MuJoCo and f64 in 60 s",
     f"{SLOPE}[pyramidal-f32]": f"{STIFF}: mu measures 0.3010 for 0.3",
 }
 

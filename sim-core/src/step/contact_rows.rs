@@ -10,7 +10,7 @@
 
 use super::{BlockOf, ConstantsOf};
 use crate::each;
-use crate::lane::{Cx, Num};
+use crate::lane::{Cx, Num, Real};
 use crate::math::vec3::{Vec3, cross, dot, scale, scale_add, sub};
 use crate::model::Cone;
 use crate::model::contact::{COUNT_LEFT_OUT, Class, Contacts, pair, row};
@@ -59,6 +59,7 @@ pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
                     }
                 }
             }
+            let swing = swing_between(cx, m, b, class);
             let distance = cx.load(t.memory.rows, r, row::DISTANCE);
             let position = distance - shared(cx, t, class, number, pair::MARGIN);
             let d = impedance(&m.contact_impedance, position);
@@ -86,11 +87,54 @@ pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
             cx.store(t.memory.rows, r, row::STIFFNESS, stiff);
             cx.store(t.memory.rows, r, row::MU, mu);
             for (i, x) in aref.iter().enumerate() {
-                let x = C::F::select(pushes, *x, zero);
+                let x = match swing {
+                    Some(swing) => *x + dot(frame[i], swing),
+                    None => *x,
+                };
+                let x = C::F::select(pushes, x, zero);
                 cx.store(t.memory.rows, r, row::AREF + i, x);
             }
         });
     }
+}
+
+/// What MuJoCo's J q̈ lacks of ours: a free joint's acceleration is of its frame's origin there, of the centre of mass
+/// here, and they differ by ω × (ω × r). None where no centre lies off its frame.
+#[inline(always)]
+fn swing_between<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    class: &Class<<C::F as Num>::Real>,
+) -> Option<Vec3<C::F>> {
+    let (first, second) = class.trees;
+    if first == Some(second) {
+        // both bodies are carried by it
+        return None;
+    }
+    let first = first.and_then(|tree| swing(cx, m, b, tree));
+    let second = swing(cx, m, b, second);
+    match (first, second) {
+        (Some(first), Some(second)) => Some(sub(second, first)),
+        (Some(first), None) => Some(scale(first, -C::F::c(1.0))),
+        (None, second) => second,
+    }
+}
+
+/// ω × (ω × r) of a tree's free body, whose centre of mass is at r from its frame's origin.
+#[inline(always)]
+fn swing<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, tree: usize) -> Option<Vec3<C::F>> {
+    let free = m.trees[tree].free?;
+    let body = &m.bodies[free];
+    if body.center.iter().all(|x| x.to_f64() == 0.0) {
+        return None;
+    }
+    let mut spin = [C::F::c(0.0); 3];
+    for (i, x) in spin.iter_mut().enumerate() {
+        *x = cx.get(&b.joint_qd[body.dof + 3 + i]);
+    }
+    // the frame's origin is kept relative to the centre
+    Some(cross(spin, cross(b.work.origin[free], spin)))
 }
 
 /// Keeps the largest number of contacts that did not fit.

@@ -22,7 +22,7 @@
 use super::kinematics::read_quat;
 use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, Num, Real};
-use crate::math::factor::solve;
+use crate::math::factor::{multiply, solve};
 use crate::math::quat::{self, Quat};
 use crate::math::spatial::symmetric;
 use crate::math::vec3::{
@@ -35,7 +35,16 @@ use crate::model::constants::{Body, Motion};
 pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let w = &mut b.work;
     let dt = C::F::k(m.dt);
-    let [acceleration, ..] = &mut w.vector;
+    let [acceleration, found, _, inertial] = &mut w.vector;
+    // M q̈ is what acts, and without the rounding of stiff forces that cancel
+    let rounds = !<<C::F as Num>::Real as Real>::DOUBLE && !m.contacts.classes.is_empty();
+    let touches = super::solver::touches(cx, m);
+    if m.damped && rounds {
+        for j in 0..m.dofs.len() {
+            found[j] = cx.get(&b.joint_qdd[j]);
+        }
+        multiply(&m.pattern, &w.mass_matrix, found, inertial);
+    }
     if m.damped {
         // the last stage: nobody needs the mass matrix after it
         for (j, dof) in m.dofs.iter().enumerate() {
@@ -44,6 +53,10 @@ pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
             let diagonal = m.pattern.at(j, j);
             w.mass_matrix[diagonal] = dt.fma(damping, w.mass_matrix[diagonal]);
             acceleration[j] = w.smooth_force[j] + cx.get(&b.constraint_force[j]);
+            if rounds {
+                let touched = C::F::c(0.5).lt(touches);
+                acceleration[j] = C::F::select(touched, inertial[j], acceleration[j]);
+            }
         }
         solve(&m.pattern, &mut w.mass_matrix, acceleration);
     } else {

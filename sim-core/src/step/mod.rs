@@ -163,7 +163,7 @@ impl Stage {
             Stage::Constraint => &[JointQ, JointQd],
             Stage::Place => &[Rotation, Origin, Reference],
             Stage::Touch(_) => &[],
-            Stage::ContactRows => &[LeftOut, JointQd, Reference, Motion],
+            Stage::ContactRows => &[LeftOut, JointQd, Origin, Reference, Motion],
             Stage::Solver => &[
                 JointQdd,
                 Unconverged,

@@ -196,7 +196,7 @@ pub(super) fn residual<C: Cx>(cx: &mut C, t: &ContactsOf<C>, a: &[C::F], place: 
     }
 }
 
-/// Adds Jᵀ W J of a class to a Hessian of this pattern, and Jᵀ (f + W J a) to the right-hand side if `pulls`.
+/// Adds Jᵀ W J of a class to a Hessian of this pattern, and Jᵀ f to the right-hand side if `pulls`.
 #[inline(always)]
 pub(super) fn assemble<C: Cx>(
     cx: &mut C,
@@ -211,16 +211,12 @@ pub(super) fn assemble<C: Cx>(
     let list = class_list(cx, t, k);
     each!(cx, r in list, {
         let jar = three(cx, t, r, row::JAR);
-        let aref = three(cx, t, r, row::AREF);
         let law = law_at(cx, t, r, jar);
         let [nn, nx, ny, xx, xy, yy] = law.stiffness;
         let rows = [[nn, nx, ny], [nx, xx, xy], [ny, xy, yy]];
         let mut pull = law.force;
-        for i in 0..3 {
-            for j in 0..3 {
-                pull[i] = rows[i][j].fma(jar[j] + aref[j], pull[i]);
-            }
-            pull[i] = cx.only(pull[i]);
+        for x in &mut pull {
+            *x = cx.only(*x);
         }
         for (c, column) in class.columns.iter().enumerate() {
             let mut own = three(cx, t, r, row::JACOBIAN + 3 * c);

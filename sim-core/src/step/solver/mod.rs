@@ -9,6 +9,7 @@
 //!
 //! ```text
 //! (M + Jᵀ W J) a⁺ = τ + Jᵀ (f + W J a)        f = -s',  W = s''
+//! (M + Jᵀ W J) (a⁺ - a) = τ + Jᵀ f - M a       the same, where there are contacts
 //! ```
 //!
 //! If no row changes its state between `a` and `a⁺` the model was exact and `a⁺` is the answer.
@@ -42,6 +43,8 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     }
     let acts = acts(cx, m, &b.efc_weight);
     let t = &m.contacts;
+    // contacts are so stiff that M is lost in the rounding of H a⁺; of H (a⁺ - a) less is asked
+    let corrects = !t.classes.is_empty();
     let mut busy = cx.var(C::F::select(acts, one, zero));
     let mut round = cx.var(zero);
     let mut last_gain = cx.var(C::F::c(f64::from(f32::MAX)));
@@ -50,7 +53,7 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             break_if!(cx, C::F::not(acts));
         }
         let w = &mut b.work;
-        let [a, minimum, ..] = &mut w.vector;
+        let [a, minimum, _, pull] = &mut w.vector;
         let [jar, _, weight, aref] = &mut w.row;
         gather(cx, &b.efc_weight, weight);
         gather(cx, &b.efc_aref, aref);
@@ -58,13 +61,34 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             a[j] = cx.get(&b.joint_qdd[j]);
             minimum[j] = w.smooth_force[j];
         }
+        if corrects {
+            multiply(&m.pattern, &w.mass_matrix, a, pull);
+            for j in 0..n {
+                minimum[j] = minimum[j] - pull[j];
+            }
+        }
         w.hessian.copy_from_slice(&w.mass_matrix);
         residual(m, &w.limit_side, aref, a, jar);
-        assemble(m, &w.limit_side, weight, aref, jar, &mut w.hessian, minimum);
+        let whole = !corrects;
+        assemble(
+            m,
+            &w.limit_side,
+            weight,
+            aref,
+            jar,
+            &mut w.hessian,
+            minimum,
+            whole,
+        );
         contacts::residual(cx, t, a, row::JAR);
         solve_system(cx, m, b, MINIMUM, true);
         let w = &mut b.work;
         let [a, minimum, step, pull] = &mut w.vector;
+        if corrects {
+            for j in 0..n {
+                minimum[j] = a[j] + minimum[j];
+            }
+        }
         let [jar, jar_minimum, weight, aref] = &mut w.row;
         residual(m, &w.limit_side, aref, minimum, jar_minimum);
         contacts::residual(cx, t, minimum, row::AHEAD);
@@ -140,6 +164,12 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     }
 }
 
+/// 1 or more where a world has contacts.
+#[inline(always)]
+pub(super) fn touches<C: Cx>(cx: &mut C, m: &ConstantsOf<C>) -> C::F {
+    contacts::count(cx, &m.contacts)
+}
+
 /// Forces of the rows at the accelerations found.
 #[inline(always)]
 fn constraint_forces<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
@@ -173,7 +203,7 @@ const STALL_SHARE: f64 = 1e-4;
 const MINIMUM: usize = 1;
 
 /// Solves (M + JᵀWJ) x = rhs in place, in scratch vector `x`; the Hessian has the joint rows already, and the
-/// contacts' pull is added to the right-hand side if `pulls`.
+/// contacts' force is added to the right-hand side if `pulls`.
 ///
 /// A world whose contacts couple what the mass matrix does not solves a larger system; the others need not.
 #[inline(always)]

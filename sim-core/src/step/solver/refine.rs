@@ -65,7 +65,16 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     }
     w.hessian.copy_from_slice(&w.mass_matrix);
     residual(m, &w.limit_side, aref, a, jar);
-    assemble(m, &w.limit_side, weight, aref, jar, &mut w.hessian, rhs);
+    assemble(
+        m,
+        &w.limit_side,
+        weight,
+        aref,
+        jar,
+        &mut w.hessian,
+        rhs,
+        true,
+    );
     contacts::residual(cx, &m.contacts, a, row::JAR);
     solve_system(cx, m, b, MISSING, false);
     let w = &mut b.work;
