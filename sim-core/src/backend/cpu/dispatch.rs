@@ -113,7 +113,7 @@ compiled!(
     mod avx2 "avx2,fma,bmi1,bmi2"
 );
 compiled!(
-    /// Whatever the target has, where that is not x86: there every processor since 2015 has AVX2, and a third text would
+    /// Whatever the target has, where that is not x86: there AVX2 and FMA are asked for, and another text would
     /// take as long to compile as the others.
     #[cfg(not(target_arch = "x86_64"))]
     mod portable
