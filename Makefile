@@ -34,8 +34,8 @@ test: wheel $(VENV)/.dev
 	cargo fmt --all --check
 	$(CLIPPY)
 	@if cargo nextest --version >/dev/null 2>&1; \
-	then set -x; cargo nextest run --release --workspace --exclude py-client; \
-	else set -x; cargo test --release --workspace --exclude py-client --lib --bins --tests; fi
+	then set -x; cargo nextest run --release --workspace; \
+	else set -x; cargo test --release --workspace --lib --bins --tests; fi
 	$(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . py-client/tests tests/python
 
 # Kept out of `test`: 260 MB of wheels, which go to out/published once, and some ten minutes.

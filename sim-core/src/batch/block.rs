@@ -10,6 +10,8 @@ use crate::model::constants::Constants;
 pub struct Block<F, V> {
     /// Joint positions. `(coords)` [rad or m]
     pub joint_q: Vec<V>,
+    /// What rounding has left out of `joint_q`; not used in `f64`. `(coords)` [rad or m]
+    pub joint_q_rest: Vec<V>,
     /// Joint velocities. `(dofs)` [rad/s or m/s]
     pub joint_qd: Vec<V>,
     /// Joint accelerations: the solver's result, and its next start. `(dofs)` [rad/s² or m/s²]
@@ -92,6 +94,8 @@ pub struct Workspace<F> {
 pub enum Slot {
     /// [`Block::joint_q`]
     JointQ,
+    /// [`Block::joint_q_rest`]
+    JointQRest,
     /// [`Block::joint_qd`]
     JointQd,
     /// [`Block::joint_qdd`]
@@ -169,6 +173,7 @@ impl<F: Num, V: Copy> Block<F, V> {
         let when = |condition: bool, length: usize| if condition { length } else { 0 };
         Block {
             joint_q: vec![cell; m.coords],
+            joint_q_rest: vec![cell; m.coords],
             joint_qd: vec![cell; n],
             joint_qdd: vec![cell; n],
             unconverged: vec![cell; 1],
@@ -219,6 +224,7 @@ impl<F: Num, V: Copy> Block<F, V> {
         let w = &mut self.work;
         match slot {
             Slot::JointQ => Cells(&mut self.joint_q),
+            Slot::JointQRest => Cells(&mut self.joint_q_rest),
             Slot::JointQd => Cells(&mut self.joint_qd),
             Slot::JointQdd => Cells(&mut self.joint_qdd),
             Slot::Unconverged => Cells(&mut self.unconverged),

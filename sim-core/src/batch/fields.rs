@@ -182,7 +182,7 @@ fields! {
     Time "time" Counter [] "s" F64, "Simulated time since the world's reset.";
     Step "step" Counter [] "–" U64, "Control frames since the world's reset.";
     Status "status" Counter [] "–" U32, "Trouble of the world, as bits: 1 = not finite, 2 = the solver used up its iterations, 4 = contacts were left out; 0 = none.";
-    ContactsLeftOut "contacts_left_out" Counter [] "–" U32, "Contacts that did not fit into contacts_max or rows_max: the most of any substep of the last frame.";
+    ContactsLeftOut "contacts_left_out" Counter [] "–" U32, "Contacts that did not fit into contacts_max or rows_max: the most of any substep of the last frame, and of the state shown where contact fields are asked for.";
 }
 
 impl Field {

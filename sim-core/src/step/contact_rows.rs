@@ -14,6 +14,7 @@ use crate::lane::{Cx, Num, Real};
 use crate::math::vec3::{Vec3, cross, dot, scale, scale_add, sub};
 use crate::model::Cone;
 use crate::model::contact::{COUNT_LEFT_OUT, Class, Contacts, pair, row};
+use crate::step::collide::rounding;
 use crate::step::constraint::impedance;
 
 #[inline(always)]
@@ -31,7 +32,11 @@ pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
             let point = three(cx, t, r, row::POINT);
             let number = cx.load(t.memory.rows, r, row::PAIR);
             let rubs = shared(cx, t, class, number, pair::RUBS);
-            let tangents = tangents(normal);
+            let along = match t.cone {
+                Cone::Elliptic => None,
+                Cone::Pyramidal => Some(three(cx, t, r, row::TANGENTS)),
+            };
+            let tangents = tangents(normal, along);
             // without friction a contact has no tangents
             let frame = [normal, scale(tangents[0], rubs), scale(tangents[1], rubs)];
             let mut velocity = [zero; 3];
@@ -82,7 +87,8 @@ pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
             for i in 1..3 {
                 aref[i] = -(velocity[i] * sliding);
             }
-            let pushes = position.lt(zero);
+            let radius = shared(cx, t, class, number, pair::RADIUS);
+            let pushes = position.lt(rounding(radius));
             let stiff = C::F::select(pushes, stiff, zero);
             cx.store(t.memory.rows, r, row::STIFFNESS, stiff);
             cx.store(t.memory.rows, r, row::MU, mu);
@@ -197,9 +203,10 @@ fn add_difference<F: Num>(a: Vec3<F>, b: Vec3<F>, c: Vec3<F>) -> Vec3<F> {
     crate::math::vec3::add(a, sub(b, c))
 }
 
-/// Two unit vectors across the normal, as MuJoCo's `mju_makeFrame` chooses them: y unless the normal is near y, then z.
+/// Two unit vectors across the normal, as MuJoCo's `mju_makeFrame` chooses them: the first lies along a direction if one
+/// is given, else along y unless the normal is near y, then z.
 #[inline(always)]
-fn tangents<F: Num>(normal: Vec3<F>) -> [Vec3<F>; 2] {
+fn tangents<F: Num>(normal: Vec3<F>, along: Option<Vec3<F>>) -> [Vec3<F>; 2] {
     let (zero, one) = (F::c(0.0), F::c(1.0));
     let steep = normal[1].abs().lt(F::c(0.5));
     let axis = [
@@ -207,7 +214,21 @@ fn tangents<F: Num>(normal: Vec3<F>) -> [Vec3<F>; 2] {
         F::select(steep, one, zero),
         F::select(steep, zero, one),
     ];
-    let across = scale_add(normal, -dot(axis, normal), axis);
+    let mut across = across(normal, axis);
+    if let Some(along) = along {
+        let first = self::across(normal, along);
+        // a capsule that stands upright has no direction, to the rounding of f32
+        let lies = F::c(1e-12).lt(dot(first, first));
+        for (x, y) in across.iter_mut().zip(first) {
+            *x = F::select(lies, y, *x);
+        }
+    }
     let first = scale(across, one.div(dot(across, across).sqrt()));
     [first, cross(normal, first)]
+}
+
+/// The part of a direction across the normal.
+#[inline(always)]
+fn across<F: Num>(normal: Vec3<F>, axis: Vec3<F>) -> Vec3<F> {
+    scale_add(normal, -dot(axis, normal), axis)
 }

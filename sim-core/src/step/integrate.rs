@@ -4,6 +4,9 @@
 //! (M + h diag(damping + kd)) q̈' = smooth + constraint        q̇ += h q̈'        q += h q̇
 //! ```
 //!
+//! In `f32` what a sum q + h q̇ rounds away is kept for the next one (Kahan 1965): an arm that creeps by less than half a
+//! rounding of its angle a step would else stand still and say that it moves, and rub along what it holds.
+//!
 //! A quaternion moves by the turn h ω in the body's axes. A free body is stepped as MuJoCo steps it, by
 //! the velocity of its frame's origin and the angular velocity in its own axes:
 //!
@@ -77,7 +80,7 @@ pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
                 dt,
                 &rotation,
                 &w.vector[0],
-                &mut b.joint_q,
+                [&mut b.joint_q, &mut b.joint_q_rest],
                 &mut b.joint_qd,
             );
             continue;
@@ -92,10 +95,24 @@ pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
             let turned = quat::turned(read_quat(cx, &b.joint_q, c), qd, dt);
             write_quat(cx, &mut b.joint_q, c, turned);
         } else {
-            let q = dt.fma(qd[0], cx.get(&b.joint_q[c]));
-            cx.set(&mut b.joint_q[c], q);
+            advance(cx, &mut b.joint_q[c], &mut b.joint_q_rest[c], qd[0], dt);
         }
     }
+}
+
+/// q += h v
+#[inline(always)]
+fn advance<C: Cx>(cx: &mut C, q: &mut C::V, rest: &mut C::V, v: C::F, dt: C::F) {
+    let before = cx.get(q);
+    if <<C::F as Num>::Real as Real>::DOUBLE {
+        cx.set(q, dt.fma(v, before));
+        return;
+    }
+    let change = dt.fma(v, cx.get(rest));
+    let after = before + change;
+    // exact where q is the larger of the two, and else a rounding of the change off
+    cx.set(rest, change - (after - before));
+    cx.set(q, after);
 }
 
 /// Makes the accelerations of a free body implicit in its gyroscopic force.
@@ -162,7 +179,7 @@ fn free<C: Cx>(
     dt: C::F,
     rotation: &Mat3<C::F>,
     acceleration: &[C::F],
-    joint_q: &mut [C::V],
+    [joint_q, rests]: [&mut [C::V]; 2],
     joint_qd: &mut [C::V],
 ) {
     let (c, d) = (body.coord, body.dof);
@@ -184,8 +201,7 @@ fn free<C: Cx>(
         transform_back(rotation, spin),
     );
     for i in 0..3 {
-        let position = dt.fma(origin[i], cx.get(&joint_q[c + i]));
-        cx.set(&mut joint_q[c + i], position);
+        advance(cx, &mut joint_q[c + i], &mut rests[c + i], origin[i], dt);
     }
     let turned = quat::turned(read_quat(cx, joint_q, c + 3), own, dt);
     write_quat(cx, joint_q, c + 3, turned);

@@ -191,6 +191,7 @@ impl Stage {
             Stage::Integrate => &[
                 Rotation,
                 JointQ,
+                JointQRest,
                 JointQd,
                 JointQdd,
                 MassMatrix,
@@ -215,7 +216,7 @@ impl Stage {
             Stage::ContactRows => &[LeftOut],
             Stage::Solver => &[JointQdd, Unconverged, EfcForce, ConstraintForce],
             Stage::Refine | Stage::Accelerations => &[JointQdd, EfcForce, ConstraintForce],
-            Stage::Integrate => &[JointQ, JointQd, MassMatrix],
+            Stage::Integrate => &[JointQ, JointQRest, JointQd, MassMatrix],
             Stage::Poses => &[BodyQ],
             Stage::Velocities => &[LinkCenter, BodyQd],
         }

@@ -121,8 +121,9 @@ fn nearest_points_are_parrys() {
                 classes[2] += 1;
                 let least = distance * 1.01;
                 assert!(shown > least, "{ours:?} {shown} {distance} {pair:?}");
+                // the deepest corner of a box may be beside the other's face, where the manifold is cut
                 assert!(
-                    (ours.distance - shown).abs() < DISTANCE * size,
+                    ours.distance > shown - DISTANCE * size && ours.distance < shown * 0.99,
                     "{ours:?} {shown} {pair:?}"
                 );
             }

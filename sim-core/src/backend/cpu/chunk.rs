@@ -21,13 +21,15 @@ pub(super) struct Job<F: Lane> {
     step: Vec<usize>,
     /// Stages that evaluate the fields of the layout.
     evaluate: Vec<usize>,
+    /// Are contacts among what they evaluate?
+    finds_contacts: bool,
     /// Duration of a control frame [s].
     pub frame_s: f64,
     /// State and commands of a world after a reset, in the order of [`StateField`].
     start: Vec<F::Real>,
 }
 
-/// State and commands of a block: groups of one number a dof, and last the positions, one a coordinate.
+/// State and commands of a block: groups of one number a dof, then positions and their rests, one a coordinate.
 #[derive(Clone, Copy)]
 enum StateField {
     Qd,
@@ -36,6 +38,7 @@ enum StateField {
     TargetQ,
     TargetQd,
     Q,
+    QRest,
 }
 
 /// Numbers of a world's state and commands.
@@ -53,10 +56,12 @@ impl Shape {
         }
     }
     fn start(self, field: StateField) -> usize {
-        field as usize * self.dofs
+        let groups = (field as usize).min(StateField::Q as usize);
+        let rests = usize::from(matches!(field, StateField::QRest));
+        groups * self.dofs + rests * self.coords
     }
     fn total(self) -> usize {
-        self.start(StateField::Q) + self.coords
+        self.start(StateField::QRest) + self.coords
     }
 }
 
@@ -92,9 +97,11 @@ impl<F: Lane> Job<F> {
             let needed = needed.iter().filter(|stage| stage.is_needed(&constants));
             needed.map(|stage| stage.number()).collect()
         };
+        let shown = stages_for(&layout);
         Job {
             step: numbers(&STAGES),
-            evaluate: numbers(&stages_for(&layout)),
+            evaluate: numbers(&shown),
+            finds_contacts: shown.contains(&Stage::ContactRows),
             constants,
             stages,
             layout,
@@ -143,7 +150,7 @@ pub(super) struct Chunk<F: Lane> {
     /// Control frames since the reset of each world.
     steps: Vec<u64>,
     status: Vec<u32>,
-    /// Most contacts that did not fit in a substep of the last frame.
+    /// Most contacts that did not fit in a substep of the last frame, or in the state that is shown.
     left_out: Vec<u32>,
     pub block: Block<F, F>,
     /// Scratch memory of the machine.
@@ -247,6 +254,10 @@ impl<F: Lane> Chunk<F> {
                 }
             }
             if matches!(target, StateField::Q) {
+                for coord in columns.clone() {
+                    let place = self.place(shape, world, StateField::QRest, coord);
+                    self.state[place] = F::Real::default();
+                }
                 self.normalize(job, world);
             }
         }
@@ -298,8 +309,10 @@ impl<F: Lane> Chunk<F> {
                     }
                 }
             }
-            let first = block * F::WIDTH;
-            let worlds = first..(first + F::WIDTH).min(self.worlds.len());
+            if substeps > 0 || job.finds_contacts {
+                self.count_left_out(block);
+            }
+            let worlds = self.worlds_of(block);
             for slot in &job.layout.slots {
                 let rows = self.worlds.start + worlds.start..self.worlds.start + worlds.end;
                 // SAFETY: the arena holds the layout, and these worlds are this chunk's alone.
@@ -336,6 +349,7 @@ impl<F: Lane> Chunk<F> {
             &mut b.joint_target_q,
             &mut b.joint_target_qd,
             &mut b.joint_q,
+            &mut b.joint_q_rest,
         ];
         let mut from = self.state[state].chunks_exact(F::WIDTH);
         for group in groups {
@@ -355,6 +369,7 @@ impl<F: Lane> Chunk<F> {
             (StateField::Qd, &b.joint_qd),
             (StateField::Qdd, &b.joint_qdd),
             (StateField::Q, &b.joint_q),
+            (StateField::QRest, &b.joint_q_rest),
         ];
         for (field, group) in groups {
             let first = state.start + shape.start(field) * F::WIDTH;
@@ -376,34 +391,45 @@ impl<F: Lane> Chunk<F> {
                 trouble = F::select(x.abs().lt(infinity), trouble, one);
             }
         }
-        let first = block * F::WIDTH;
-        let last = (first + F::WIDTH).min(self.worlds.len());
-        let flags = [
-            (trouble, status::NOT_FINITE),
-            (self.block.unconverged[0], status::NOT_CONVERGED),
-            (self.block.left_out[0], status::CONTACTS_LEFT_OUT),
-        ];
-        for (flag, bit) in flags {
-            if bit != status::NOT_FINITE && !stepped {
-                continue;
-            }
-            flag.store(&mut self.lanes);
-            for (status, lane) in self.status[first..last].iter_mut().zip(&self.lanes) {
-                *status = if *lane > F::Real::default() {
-                    *status | bit
-                } else {
-                    *status & !bit
-                };
-            }
-        }
+        self.flag(block, trouble, status::NOT_FINITE);
         if stepped {
-            self.block.left_out[0].store(&mut self.lanes);
-            for (left_out, lane) in self.left_out[first..last].iter_mut().zip(&self.lanes) {
-                *left_out = lane.to_usize() as u32;
-            }
-            for step in &mut self.steps[first..last] {
+            self.flag(block, self.block.unconverged[0], status::NOT_CONVERGED);
+            let worlds = self.worlds_of(block);
+            for step in &mut self.steps[worlds] {
                 *step += 1;
             }
         }
+    }
+
+    /// Notes the contacts that did not fit in a substep, or in the state that is shown.
+    #[inline(always)]
+    fn count_left_out(&mut self, block: usize) {
+        let left_out = self.block.left_out[0];
+        self.flag(block, left_out, status::CONTACTS_LEFT_OUT);
+        left_out.store(&mut self.lanes);
+        let worlds = self.worlds_of(block);
+        for (count, lane) in self.left_out[worlds].iter_mut().zip(&self.lanes) {
+            *count = lane.to_usize() as u32;
+        }
+    }
+
+    /// Sets a bit of the status where a number is above 0, and clears it elsewhere.
+    #[inline(always)]
+    fn flag(&mut self, block: usize, number: F, bit: u32) {
+        number.store(&mut self.lanes);
+        let worlds = self.worlds_of(block);
+        for (status, lane) in self.status[worlds].iter_mut().zip(&self.lanes) {
+            *status = if *lane > F::Real::default() {
+                *status | bit
+            } else {
+                *status & !bit
+            };
+        }
+    }
+
+    /// The worlds of a block, counted from the chunk's first.
+    fn worlds_of(&self, block: usize) -> Range<usize> {
+        let first = block * F::WIDTH;
+        first..(first + F::WIDTH).min(self.worlds.len())
     }
 }

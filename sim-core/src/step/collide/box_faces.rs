@@ -8,8 +8,9 @@ use crate::math::vec3::{Mat3, Vec3, scale, scale_add};
 
 /// The reference rectangle is larger by this, relatively, in roundings, so that equal faces keep their corners.
 const INCLUSIVE: f64 = 16.0;
-/// A reference corner counts that far inside the incident face: more than the above, so that no corner counts twice.
-const INTERIOR: f64 = 32.0;
+/// A reference corner counts that far inside the incident face: a little less than the above. So a corner may count twice
+/// if it lies within these few roundings, but none is lost between the two.
+const INTERIOR: f64 = 14.0;
 
 /// Two faces seen along the normal of one, the reference. The frame: u, v along its sides, and the normal.
 pub struct View<F> {

@@ -24,8 +24,9 @@ mod spread;
 mod support;
 
 use super::{BlockOf, ConstantsOf};
-use crate::lane::{Cx, Num, Table};
+use crate::lane::{Cx, Num, Real, Table};
 use crate::math::vec3::{Mat3, Vec3, add, constant, dot, sub, transform, transform_add};
+use crate::model::Cone;
 use crate::model::contact::{COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, pair};
 use crate::{span, when};
 use narrow::{Shape, Two, narrow};
@@ -123,7 +124,7 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, K
             );
         }
         when!(cx, near, {
-            let margin = cx.constant(numbers, p, pair::REACH);
+            let margin = cx.constant(numbers, p, pair::REACH) + rounding(radius);
             let two = Two {
                 axes: &axes,
                 first,
@@ -136,6 +137,14 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, K
             narrow(cx, t, kinds, &two, &mut points);
         });
     });
+}
+
+/// A distance that may be rounding, of shapes whose radii add up to `radius` [m].
+///
+/// Contacts begin that much early: of faces that just touch, all corners do, and not those that were rounded down.
+#[inline(always)]
+pub(super) fn rounding<F: Num>(radius: F) -> F {
+    radius * F::c(4.0 * <F::Real as Real>::EPSILON)
 }
 
 /// Axes of a shape.
@@ -181,6 +190,8 @@ fn points_of<C: Cx>(
         pair: cx.number(p),
         base: add(center_a, sub(origin_a, origin)),
         flip: cx.constant(numbers, p, pair::FLIP),
+        // a pyramid is not the same along all tangents
+        along: (t.cone == Cone::Pyramidal).then_some([C::F::c(0.0); 3]),
         room: Room {
             counts: t.memory.counts,
             contacts: t.classes.len() + COUNT_CONTACTS,

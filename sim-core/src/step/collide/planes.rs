@@ -39,7 +39,7 @@ pub fn plane_sphere<C: Cx>(
     lowest(cx, normal, at, distance, margin, out);
 }
 
-/// Contact points of a plane and a capsule: one of each end.
+/// Contact points of a plane and a capsule: one of each end. The first tangent lies along the capsule, as MuJoCo's.
 #[inline(always)]
 pub fn plane_capsule<C: Cx>(
     cx: &mut C,
@@ -50,6 +50,9 @@ pub fn plane_capsule<C: Cx>(
     margin: C::F,
     out: &mut Points<C>,
 ) {
+    if out.along.is_some() {
+        out.along = Some(b.axes[2]);
+    }
     for half in [half_height, -half_height] {
         let end = Placed {
             axes: b.axes,

@@ -2,6 +2,7 @@
 
 use crate::lane::{Cx, MaskOf, Num, Table};
 use crate::math::vec3::{Mat3, Vec3, add, scale};
+use crate::model::contact::row;
 use crate::{push, when};
 
 /// A shape where it is, relative to the centre of the pair's first shape.
@@ -25,6 +26,8 @@ pub struct Points<C: Cx> {
     pub base: Vec3<C::F>,
     /// -1 where rows have the normal from the second shape to the first, else 1.
     pub flip: C::F,
+    /// Along this the first tangent lies if it is not 0 [–]; none where the direction of tangents does not matter.
+    pub along: Option<Vec3<C::F>>,
     /// What a world has room for.
     pub room: Room<C::F>,
 }
@@ -68,11 +71,17 @@ impl<C: Cx> Points<C> {
             mask
         };
         let (list, table, number) = (&mut self.list, self.table, self.pair);
+        let along = self.along;
         let (point, normal) = (add(self.base, point), scale(normal, self.flip));
         push!(cx, *list, mask, fresh, {
             let ([x, y, z], [u, v, w]) = (point, normal);
             // in the order of `row`
             cx.init_all(table, fresh, &[x, y, z, distance, u, v, w, number]);
+            if let Some(along) = along {
+                for (i, x) in along.iter().enumerate() {
+                    cx.init(table, fresh, row::TANGENTS + i, *x);
+                }
+            }
         });
     }
 }

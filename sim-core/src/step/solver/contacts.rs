@@ -307,15 +307,14 @@ pub(super) fn cost<C: Cx>(cx: &mut C, t: &ContactsOf<C>, place: usize, sum: &mut
     }
 }
 
-/// Turns `AHEAD` from the end of a step into its change; adds to `descent` Σ W jv², to `size` Σ W (|J a| + |aref|) |jv|.
-///
-/// Not |f jv|, of which the size is: a force is stiffness times a small difference of J a and aref, and rounded as they are.
+/// Turns `AHEAD` from the end of a step into its change; adds to `descent` Σ W jv², to `terms` Σ W (|J a| + |aref|)²: a
+/// force is stiffness times a small difference of J a and aref, and rounded as they are.
 #[inline(always)]
 pub(super) fn begin_line<C: Cx>(
     cx: &mut C,
     t: &ContactsOf<C>,
     descent: &mut C::V,
-    size: &mut C::V,
+    terms: &mut C::V,
 ) {
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
@@ -331,13 +330,13 @@ pub(super) fn begin_line<C: Cx>(
             cx.put(descent, more);
             let aref = three(cx, t, r, row::AREF);
             let [nn, _, _, xx, _, yy] = law.stiffness;
-            let mut terms = C::F::c(0.0);
+            let mut sum = C::F::c(0.0);
             for (i, stiff) in [nn, xx, yy].into_iter().enumerate() {
                 let rounded = (jar[i] + aref[i]).abs() + aref[i].abs();
-                terms = (stiff * rounded).fma(jv[i].abs(), terms);
+                sum = (stiff * rounded).fma(rounded, sum);
             }
-            let more = cx.get(size) + cx.only(terms);
-            cx.put(size, more);
+            let more = cx.get(terms) + cx.only(sum);
+            cx.put(terms, more);
         });
     }
 }

@@ -17,8 +17,11 @@ use crate::{break_if, times};
 pub(super) struct Line<'a, F> {
     /// -p'(0), what the model says of the gain at α = 1, twice.
     pub descent: F,
-    /// Size of the terms that p' sums.
-    pub size: F,
+    /// The gain that rounding alone may promise.
+    ///
+    /// Of a correction: ½ gᵀ H⁻¹ g of a gradient g that is but the rounding of jar in Jᵀ W jar and of τ, hence at most about
+    /// ε² (Σ W (|J a| + |aref|)² + |τ a|). Else, where each round solves for the whole minimum, the rounding of p'.
+    pub noise: F,
     weight: &'a [F],
     jar: &'a [F],
     jv: &'a [F],
@@ -32,7 +35,7 @@ struct Derivative<F> {
 }
 
 impl<'a, F: Num> Line<'a, F> {
-    /// `curvature` is sᵀ M s; `jar` and its change `jv` over the segment are `(rows)`.
+    /// `curvature` is sᵀ M s; `jar` and its change `jv` over the segment are `(rows)`, `power` is |τ a|.
     ///
     /// Turns what contacts have ahead into its change.
     #[inline(always)]
@@ -43,18 +46,29 @@ impl<'a, F: Num> Line<'a, F> {
         weight: &'a [F],
         jar: &'a [F],
         jv: &'a [F],
+        aref: &[F],
+        power: F,
     ) -> Self {
-        let (mut descent, mut size) = (curvature, curvature);
+        let corrects = !m.contacts.classes.is_empty();
+        let epsilon = F::c(<F::Real as Real>::EPSILON);
+        let mut descent = curvature;
+        let mut terms = if corrects { power } else { curvature };
         for r in 0..m.rows() {
             let law = law(m, r, jar[r], weight[r]);
             descent = (law.stiffness * jv[r]).fma(jv[r], descent);
-            size = size + (law.force * jv[r]).abs();
+            terms = if corrects {
+                let rounded = (jar[r] + aref[r]).abs() + aref[r].abs();
+                (law.stiffness * rounded).fma(rounded, terms)
+            } else {
+                terms + (law.force * jv[r]).abs()
+            };
         }
-        let (mut with_contacts, mut size) = (cx.var(descent), cx.var(size));
-        contacts::begin_line(cx, &m.contacts, &mut with_contacts, &mut size);
+        let (mut descent, mut terms) = (cx.var(descent), cx.var(terms));
+        contacts::begin_line(cx, &m.contacts, &mut descent, &mut terms);
+        let rounding = if corrects { epsilon * epsilon } else { epsilon };
         Line {
-            descent: cx.get(&with_contacts),
-            size: cx.get(&size),
+            descent: cx.get(&descent),
+            noise: cx.get(&terms) * rounding,
             weight,
             jar,
             jv,

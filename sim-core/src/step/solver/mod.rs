@@ -28,6 +28,7 @@ pub(super) use refine::{accelerations, refine};
 use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::factor::{multiply, solve as solve_linear};
+use crate::model::Cone;
 use crate::model::contact::row;
 use crate::{break_if, times, when};
 use line::{Line, search};
@@ -37,7 +38,6 @@ use rows::{assemble, changes, cost, forces, residual};
 pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let n = m.dofs.len();
     let (zero, half, one) = (C::F::c(0.0), C::F::c(0.5), C::F::c(1.0));
-    let epsilon = C::F::c(<<C::F as Num>::Real as Real>::EPSILON);
     if <<C::F as Num>::Real as Real>::DOUBLE {
         choose_start(cx, m, b);
     }
@@ -45,6 +45,9 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let t = &m.contacts;
     // contacts are so stiff that M is lost in the rounding of H a⁺; of H (a⁺ - a) less is asked
     let corrects = !t.classes.is_empty();
+    // Sums of edges a thousand times as stiff as M leave a step its first three digits only: one more round finds the rest.
+    let polishes = corrects && t.cone == Cone::Pyramidal;
+    let mut calm = cx.var(if polishes { zero } else { one });
     let mut busy = cx.var(C::F::select(acts, one, zero));
     let mut round = cx.var(zero);
     let mut last_gain = cx.var(C::F::c(f64::from(f32::MAX)));
@@ -109,25 +112,27 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
                 step[j] = minimum[j] - a[j];
             }
             multiply(&m.pattern, &w.mass_matrix, step, pull);
-            let mut curvature = zero;
+            let (mut curvature, mut power) = (zero, zero);
             for j in 0..n {
                 curvature = step[j].fma(pull[j], curvature);
+                if corrects {
+                    power = power + (w.smooth_force[j] * a[j]).abs();
+                }
             }
             for r in 0..m.rows() {
                 jar_minimum[r] = jar_minimum[r] - jar[r];
             }
-            let line = Line::new(cx, m, curvature, weight, jar, jar_minimum);
+            let line = Line::new(cx, m, curvature, weight, jar, jar_minimum, aref, power);
             search::<C>(cx, m, &line, &mut length);
             // The model promises a gain of ½ |p'(0)|. Below the tolerance the step is not taken, as in
-            // MuJoCo, but for the first; below the rounding of p' it is the last that can help.
+            // MuJoCo, but for the first; below what rounding makes it is the last that can help.
             let gain = half * line.descent;
             let small = C::F::and(later, gain.lt(C::F::k(m.solver.tolerance)));
-            let rounded = line.size * epsilon;
-            let mut last = gain.lt(rounded);
-            if !<<C::F as Num>::Real as Real>::DOUBLE {
-                // Newton's gains shrink fast; one that does not, and is a small part of the terms, is rounding of the solve
+            let mut last = gain.lt(line.noise);
+            if corrects {
+                // Newton's gains shrink fast; one that does not, and is hardly more than rounding, is rounding
                 let stalls = (C::F::c(STALLED) * cx.get(&last_gain)).lt(gain);
-                let is_small = gain.lt(line.size * C::F::c(STALL_SHARE));
+                let is_small = gain.lt(line.noise * C::F::c(DOUBTED));
                 last = C::F::or(last, C::F::and(stalls, is_small));
                 cx.set(&mut last_gain, gain);
             }
@@ -143,7 +148,11 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
                 C::F::select(searches, moved, minimum[j]),
             );
         }
-        let done = C::F::or(C::F::not(changed), half.lt(cx.get(&settled)));
+        let ends = C::F::and(C::F::not(changed), half.lt(cx.get(&calm)));
+        let done = C::F::or(ends, half.lt(cx.get(&settled)));
+        if polishes {
+            cx.set(&mut calm, C::F::select(changed, zero, one));
+        }
         cx.set(&mut busy, C::F::select(done, zero, one));
         break_if!(cx, done);
         let rounds = cx.get(&round) + one;
@@ -196,8 +205,9 @@ fn constraint_forces<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) 
 
 /// A gain above this share of the last round's is no progress of Newton's method [–].
 const STALLED: f64 = 0.25;
-/// The gain over the terms of p' that rounding may make up in `f32`: sums of a thousand roundings [–].
-const STALL_SHARE: f64 = 1e-4;
+/// Without progress, a gain up to this many times [`Line::noise`] is taken for noise [–]. Of 327 states of random piles,
+/// both cones, no acceleration is then off by more than 3e-4 in `f32`, where 10,000 times leave 2e-3.
+const DOUBTED: f64 = 100.0;
 
 /// Which of the scratch vectors has the right-hand side of a round, and then its minimum.
 const MINIMUM: usize = 1;
