@@ -72,7 +72,7 @@ pub(crate) struct Serve {
     #[arg(long, default_value = "f32")]
     pub(crate) precision: String,
 
-    /// Fields that frames carry, separated by commas; time, step and status come with every frame.
+    /// Fields that frames carry, separated by commas; time, step, status and contacts_left_out come with every frame.
     #[arg(long, value_delimiter = ',', default_value = "joint_q,joint_qd,body_q")]
     pub(crate) fields: Vec<String>,
 

@@ -139,6 +139,20 @@ impl<F: Lane> Cx for Cpu<'_, F> {
         *self.cell(t, row, k)
     }
     #[inline(always)]
+    fn load3(&mut self, t: Table, row: usize, k: usize) -> [F; 3] {
+        debug_assert!(
+            row < t.rows && k + 2 < t.stride,
+            "row {row}, numbers {k} to {} of {t:?}",
+            k + 2
+        );
+        let first = t.base + row * t.stride + k;
+        // one check of the bounds instead of three
+        let &[x, y, z] = &self.memory[first..first + 3] else {
+            unreachable!("three numbers")
+        };
+        [x, y, z]
+    }
+    #[inline(always)]
     fn store(&mut self, t: Table, row: usize, k: usize, x: F) {
         let mask = self.mask;
         let cell = self.cell(t, row, k);
@@ -218,6 +232,10 @@ impl<F: Lane> Cx for Cpu<'_, F> {
         let outer = self.mask;
         self.mask = F::and(outer, mask);
         (outer, F::any(self.mask))
+    }
+    #[inline(always)]
+    fn anywhere(&mut self, mask: F::Mask) -> bool {
+        F::any(F::and(self.mask, mask))
     }
     #[inline(always)]
     fn leave(&mut self, block: F::Mask) {

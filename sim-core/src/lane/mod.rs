@@ -297,6 +297,15 @@ pub trait Cx: Sized {
     fn index(&mut self, t: Fixed, row: Self::I, k: usize, end: usize) -> Self::I;
     /// Reads number `k` of a row.
     fn load(&mut self, t: Table, row: Self::I, k: usize) -> Self::F;
+    /// Reads three neighbouring numbers of a row, from number `k` on.
+    #[inline(always)]
+    fn load3(&mut self, t: Table, row: Self::I, k: usize) -> [Self::F; 3] {
+        [
+            self.load(t, row, k),
+            self.load(t, row, k + 1),
+            self.load(t, row, k + 2),
+        ]
+    }
     /// Writes number `k` of a row, in the active worlds only.
     fn store(&mut self, t: Table, row: Self::I, k: usize, x: Self::F);
     /// Writes number `k` of a row; what inactive worlds hold there becomes undefined.
@@ -327,6 +336,12 @@ pub trait Cx: Sized {
     fn pushed(&mut self, list: &Self::List) -> Self::F;
     /// Opens a block for the worlds in `mask`; false if there are none. See [`when!`].
     fn enter(&mut self, mask: MaskOf<Self>) -> (Self::Block, bool);
+    /// False if the mask holds in no active world: what only such worlds need may be left out then. A machine that
+    /// cannot know says true, so a text must give every world the same numbers either way.
+    #[inline(always)]
+    fn anywhere(&mut self, _mask: MaskOf<Self>) -> bool {
+        true
+    }
     /// Closes a block.
     fn leave(&mut self, block: Self::Block);
 

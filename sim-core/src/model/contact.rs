@@ -149,8 +149,8 @@ pub struct Class<R> {
     pub trees: (Option<usize>, usize),
     /// Its dofs, rising.
     pub columns: Vec<Column>,
-    /// Entries of JᵀWJ that may differ from 0: columns (the first not before the second).
-    pub entries: Vec<(usize, usize)>,
+    /// Of each column, the entries of JᵀWJ with it and those before it that may differ from 0.
+    pub entries: Vec<Vec<Entry>>,
     /// Does any entry lie outside the pattern of the mass matrix?
     pub couples: bool,
     /// Numbers of a pair that all its pairs share.
@@ -170,6 +170,15 @@ pub struct Column {
     pub is_first: bool,
     /// Where the number of a pair is that says how it moves the second body relative to the first: 1, -1 or 0.
     pub lever: usize,
+}
+
+/// An entry of JᵀWJ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Entry {
+    /// The other column.
+    pub column: usize,
+    /// Where it is kept: in the mass matrix's pattern, or in that of couplings if its class couples.
+    pub place: usize,
 }
 
 /// Places of the numbers and indices of a pair.
@@ -251,8 +260,16 @@ pub mod row {
     pub const FORCE: usize = 19;
     /// Tangents (6) [–].
     pub const TANGENTS: usize = 22;
+    /// Stiffness of an elliptic cone's contact that slides, along its own slope [kg].
+    pub const SOFT: usize = 28;
+    /// Of a round of the solver: which piece of its cost the contact is on.
+    pub const STATE: usize = 29;
+    /// Of a line search: force times the change of `AHEAD` [N·m/s²].
+    pub const POWER: usize = 30;
+    /// Of a line search: stiffness times the square of that change [N·m/s²].
+    pub const BEND: usize = 31;
     /// Jacobian: normal row, then tangents.
-    pub const JACOBIAN: usize = 28;
+    pub const JACOBIAN: usize = 32;
 }
 
 /// What follows the classes in `counts`.

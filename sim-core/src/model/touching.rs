@@ -3,7 +3,7 @@
 use super::ModelError;
 use super::constants::{Constants, Coupled};
 use super::contact::{
-    COUNTS, Class, Column, Contacts, Group, Handles, Kind, Memory, Pair, pair, row,
+    COUNTS, Class, Column, Contacts, Entry, Group, Handles, Kind, Memory, Pair, pair, row,
 };
 use super::cut::Cut;
 use super::description::{Cone, Description};
@@ -147,7 +147,19 @@ impl Builder<'_> {
         let [first_end, capacity_end] = contacts.row_ends();
         let rows = first_end + capacity_end - 2;
         self.lay_out(contacts, numbers, indices, stride, widest, rows);
-        self.coupled(contacts)
+        let coupled = self.coupled(contacts);
+        for class in &mut contacts.classes {
+            let pattern = match class.couples {
+                true => &coupled.pattern,
+                false => &self.constants.pattern,
+            };
+            for (row, entries) in class.columns.iter().zip(&mut class.entries) {
+                for entry in entries {
+                    entry.place = pattern.at(row.dof, class.columns[entry.column].dof);
+                }
+            }
+        }
+        coupled
     }
 
     /// Dofs of a class, rising, and whether they are of the first side's tree.
@@ -287,11 +299,8 @@ impl Builder<'_> {
             .scene
             .contacts_max
             .unwrap_or(most.min(DEFAULT_CONTACTS_MAX));
-        let joint_rows = self.constants.rows();
-        contacts.rows_max = match self.scene.rows_max {
-            Some(rows) => rows.saturating_sub(joint_rows),
-            None => contacts.contacts_max * of_a_contact,
-        };
+        let enough = contacts.contacts_max * of_a_contact;
+        contacts.rows_max = self.scene.rows_max.unwrap_or(enough);
         contacts.may_overflow =
             contacts.contacts_max < most || contacts.rows_max < most * of_a_contact;
     }
@@ -314,7 +323,7 @@ impl Builder<'_> {
                     .then_some(x)
             })
             .collect();
-        let mut entries = Vec::new();
+        let mut entries = vec![Vec::new(); columns.len()];
         let mut couples = false;
         for (c, &(row, _)) in columns.iter().enumerate() {
             for (o, &(column, _)) in columns[..=c].iter().enumerate() {
@@ -322,7 +331,10 @@ impl Builder<'_> {
                     number(p, pair::LEVERS + c) != 0.0 && number(p, pair::LEVERS + o) != 0.0
                 };
                 if members.iter().any(both) {
-                    entries.push((c, o));
+                    entries[c].push(Entry {
+                        column: o,
+                        place: 0,
+                    });
                     couples |= self.constants.pattern.find(row, column).is_none();
                 }
             }
@@ -414,7 +426,10 @@ impl Builder<'_> {
         let own: Vec<_> = own.filter(|&(i, j)| pattern.find(i, j).is_some()).collect();
         let more = contacts.classes.iter().flat_map(|class| {
             let dof = |c: usize| class.columns[c].dof;
-            class.entries.iter().map(move |&(i, j)| (dof(i), dof(j)))
+            let pairs = class.entries.iter().enumerate();
+            pairs.flat_map(move |(c, entries)| {
+                entries.iter().map(move |entry| (dof(c), dof(entry.column)))
+            })
         });
         let coupled = Pattern::new(n, own.iter().copied().chain(more));
         let mut places = vec![0; pattern.len()];

@@ -28,13 +28,13 @@ pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
             let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
-            let normal = three(cx, t, r, row::NORMAL);
-            let point = three(cx, t, r, row::POINT);
+            let normal = cx.load3(t.memory.rows, r, row::NORMAL);
+            let point = cx.load3(t.memory.rows, r, row::POINT);
             let number = cx.load(t.memory.rows, r, row::PAIR);
             let rubs = shared(cx, t, class, number, pair::RUBS);
             let along = match t.cone {
                 Cone::Elliptic => None,
-                Cone::Pyramidal => Some(three(cx, t, r, row::TANGENTS)),
+                Cone::Pyramidal => Some(cx.load3(t.memory.rows, r, row::TANGENTS)),
             };
             let tangents = tangents(normal, along);
             // without friction a contact has no tangents
@@ -91,6 +91,11 @@ pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
             let pushes = position.lt(rounding(radius));
             let stiff = C::F::select(pushes, stiff, zero);
             cx.store(t.memory.rows, r, row::STIFFNESS, stiff);
+            if t.cone == Cone::Elliptic {
+                let ratio = C::F::c(1.0 / t.impratio.to_f64());
+                let soft = stiff.div((mu * mu).fma(ratio, one));
+                cx.store(t.memory.rows, r, row::SOFT, soft);
+            }
             cx.store(t.memory.rows, r, row::MU, mu);
             for (i, x) in aref.iter().enumerate() {
                 let x = match swing {
@@ -185,16 +190,6 @@ fn shared<C: Cx>(
         Some(x) => C::F::k(x),
         None => cx.pick(t.handles.pair_numbers, number, k),
     }
-}
-
-/// Three neighbouring numbers of a contact.
-#[inline(always)]
-fn three<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, r: C::I, k: usize) -> Vec3<C::F> {
-    [
-        cx.load(t.memory.rows, r, k),
-        cx.load(t.memory.rows, r, k + 1),
-        cx.load(t.memory.rows, r, k + 2),
-    ]
 }
 
 /// a + (b - c)

@@ -40,9 +40,11 @@ pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
     let dt = C::F::k(m.dt);
     let [acceleration, found, _, inertial] = &mut w.vector;
     // M q̈ is what acts, and without the rounding of stiff forces that cancel
-    let rounds = !<<C::F as Num>::Real as Real>::DOUBLE && !m.contacts.classes.is_empty();
-    let touches = super::solver::touches(cx, m);
-    if m.damped && rounds {
+    let mut rounded = None;
+    if !<<C::F as Num>::Real as Real>::DOUBLE {
+        rounded = super::solver::touching(cx, m);
+    }
+    if m.damped && rounded.is_some() {
         for j in 0..m.dofs.len() {
             found[j] = cx.get(&b.joint_qdd[j]);
         }
@@ -56,9 +58,8 @@ pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
             let diagonal = m.pattern.at(j, j);
             w.mass_matrix[diagonal] = dt.fma(damping, w.mass_matrix[diagonal]);
             acceleration[j] = w.smooth_force[j] + cx.get(&b.constraint_force[j]);
-            if rounds {
-                let touched = C::F::c(0.5).lt(touches);
-                acceleration[j] = C::F::select(touched, inertial[j], acceleration[j]);
+            if let Some(touching) = rounded {
+                acceleration[j] = C::F::select(touching, inertial[j], acceleration[j]);
             }
         }
         solve(&m.pattern, &mut w.mass_matrix, acceleration);

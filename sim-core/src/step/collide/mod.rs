@@ -93,13 +93,13 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, K
     let b = cx.index(indices, p, pair::SOLID_B, poses.rows);
     let origin_a = cx.index(indices, p, pair::ORIGIN_A, origins.rows);
     let origin_b = cx.index(indices, p, pair::ORIGIN_B, origins.rows);
-    let center_a = three(cx, poses, a, 9);
-    let origin_a = three(cx, origins, origin_a, 0);
-    let between = sub(three(cx, origins, origin_b, 0), origin_a);
-    let center = add(sub(three(cx, poses, b, 9), center_a), between);
+    let center_a = cx.load3(poses, a, 9);
+    let origin_a = cx.load3(origins, origin_a, 0);
+    let between = sub(cx.load3(origins, origin_b, 0), origin_a);
+    let center = add(sub(cx.load3(poses, b, 9), center_a), between);
     let radius = cx.constant(numbers, p, pair::RADIUS);
     let near = match kinds.0 {
-        Kind::Plane => dot(three(cx, poses, a, 6), center).lt(radius),
+        Kind::Plane => dot(cx.load3(poses, a, 6), center).lt(radius),
         _ => dot(center, center).lt(radius * radius),
     };
     when!(cx, near, {
@@ -151,9 +151,9 @@ pub(super) fn rounding<F: Num>(radius: F) -> F {
 #[inline(always)]
 fn axes_of<C: Cx>(cx: &mut C, poses: Table, row: C::I) -> Mat3<C::F> {
     [
-        three(cx, poses, row, 0),
-        three(cx, poses, row, 3),
-        three(cx, poses, row, 6),
+        cx.load3(poses, row, 0),
+        cx.load3(poses, row, 3),
+        cx.load3(poses, row, 6),
     ]
 }
 
@@ -179,7 +179,7 @@ fn points_of<C: Cx>(
     let (numbers, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
     let origins = t.memory.origins;
     let origin = cx.index(indices, p, pair::ORIGIN, origins.rows);
-    let origin = three(cx, origins, origin, 0);
+    let origin = cx.load3(origins, origin, 0);
     let class = cx.index(indices, p, pair::CLASS, t.classes.len());
     let [first_end, capacity_end] = t.row_ends();
     let first = cx.index(t.handles.class_rows, class, 0, first_end);
@@ -203,14 +203,4 @@ fn points_of<C: Cx>(
             is_tight: t.may_overflow,
         },
     }
-}
-
-/// Three neighbouring numbers of a row.
-#[inline(always)]
-fn three<C: Cx>(cx: &mut C, table: Table, row: C::I, k: usize) -> Vec3<C::F> {
-    [
-        cx.load(table, row, k),
-        cx.load(table, row, k + 1),
-        cx.load(table, row, k + 2),
-    ]
 }

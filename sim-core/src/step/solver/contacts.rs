@@ -12,7 +12,7 @@
 //! cells: with zeros of worlds that have no such contact.
 
 use crate::each;
-use crate::lane::{Cx, Num, Real};
+use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::model::Cone;
 use crate::model::contact::{Class, Contacts, row};
 use crate::step::contact_rows::class_list;
@@ -23,24 +23,23 @@ pub(super) struct ConeLaw<F> {
     pub force: [F; 3],
     /// s'': 00, 01, 02, 11, 12, 22.
     pub stiffness: [F; 6],
-    /// Which piece of s it is on.
+    /// Which piece of s it is on; see [`curved`].
     pub state: F,
-    /// 1 where s is no quadratic there, else 0.
-    pub curved: F,
     /// s.
     pub cost: F,
 }
 
+/// 1 where s is no quadratic on a piece, else 0: where a contact of an elliptic cone slides.
 #[inline(always)]
-fn law<F: Num>(cone: Cone, impratio: F::Real, jar: [F; 3], stiff: F, mu: F) -> ConeLaw<F> {
+fn curved<F: Num>(cone: Cone, state: F) -> F {
     match cone {
-        Cone::Elliptic => elliptic(impratio, jar, stiff, mu),
-        Cone::Pyramidal => pyramidal(jar, stiff, mu),
+        Cone::Elliptic => F::select(F::c(1.5).lt(state), F::c(1.0), F::c(0.0)),
+        Cone::Pyramidal => F::c(0.0),
     }
 }
 
 #[inline(always)]
-fn elliptic<F: Num>(impratio: F::Real, jar: [F; 3], stiff: F, mu: F) -> ConeLaw<F> {
+fn elliptic<F: Num>(impratio: F::Real, jar: [F; 3], stiff: F, soft: F, mu: F) -> ConeLaw<F> {
     let (zero, one, half) = (F::c(0.0), F::c(1.0), F::c(0.5));
     let ratio = impratio.to_f64();
     let square = jar[1].fma(jar[1], jar[2] * jar[2]);
@@ -55,7 +54,6 @@ fn elliptic<F: Num>(impratio: F::Real, jar: [F; 3], stiff: F, mu: F) -> ConeLaw<
     let sticks = F::and(acts, sticks);
     let slides = F::and(acts, F::not(sticks));
     let across = stiff * F::c(ratio);
-    let soft = stiff.div((mu * mu).fma(F::c(1.0 / ratio), one));
     let push = -(soft * excess);
     // of a sliding contact: soft (1, -μ d)(1, -μ d)ᵀ, and the turning of the friction force
     let rub = soft * mu;
@@ -77,7 +75,6 @@ fn elliptic<F: Num>(impratio: F::Real, jar: [F; 3], stiff: F, mu: F) -> ConeLaw<
             of_piece::<F>(sticks, slides, across, (along * y).fma(y, turn)),
         ],
         state: of_piece::<F>(sticks, slides, one, F::c(2.0)),
-        curved: F::select(slides, one, zero),
         cost: half
             * of_piece::<F>(
                 sticks,
@@ -128,7 +125,6 @@ fn pyramidal<F: Num>(jar: [F; 3], stiff: F, mu: F) -> ConeLaw<F> {
             square * (active[2] + active[3]),
         ],
         state,
-        curved: zero,
         cost,
     }
 }
@@ -136,22 +132,18 @@ fn pyramidal<F: Num>(jar: [F; 3], stiff: F, mu: F) -> ConeLaw<F> {
 type ContactsOf<C> = Contacts<<<C as Cx>::F as Num>::Real>;
 type ClassOf<C> = Class<<<C as Cx>::F as Num>::Real>;
 
-/// Three neighbouring numbers of a contact.
-#[inline(always)]
-fn three<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, k: usize) -> [C::F; 3] {
-    [
-        cx.load(t.memory.rows, r, k),
-        cx.load(t.memory.rows, r, k + 1),
-        cx.load(t.memory.rows, r, k + 2),
-    ]
-}
-
 /// The law of a contact at a `jar` of its row.
 #[inline(always)]
 fn law_at<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, jar: [C::F; 3]) -> ConeLaw<C::F> {
     let stiff = cx.load(t.memory.rows, r, row::STIFFNESS);
     let mu = cx.load(t.memory.rows, r, row::MU);
-    law(t.cone, t.impratio, jar, stiff, mu)
+    match t.cone {
+        Cone::Elliptic => {
+            let soft = cx.load(t.memory.rows, r, row::SOFT);
+            elliptic(t.impratio, jar, stiff, soft, mu)
+        }
+        Cone::Pyramidal => pyramidal(jar, stiff, mu),
+    }
 }
 
 /// The contacts that the worlds have now.
@@ -163,6 +155,20 @@ pub(super) fn count<C: Cx>(cx: &mut C, t: &ContactsOf<C>) -> C::F {
         sum = sum + cx.load(t.memory.counts, at, 0);
     }
     sum
+}
+
+/// The worlds that have contacts now; none if no world has.
+#[inline(always)]
+pub(super) fn touching<C: Cx>(cx: &mut C, t: &ContactsOf<C>) -> Option<MaskOf<C>> {
+    if t.classes.is_empty() {
+        return None;
+    }
+    let touching = C::F::c(0.5).lt(count(cx, t));
+    if cx.anywhere(touching) {
+        Some(touching)
+    } else {
+        None
+    }
 }
 
 /// The contacts that couple what the mass matrix does not.
@@ -184,25 +190,28 @@ pub(super) fn residual<C: Cx>(cx: &mut C, t: &ContactsOf<C>, a: &[C::F], place: 
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
-            for i in 0..3 {
-                let mut jar = -cx.load(t.memory.rows, r, row::AREF + i);
-                for (c, column) in class.columns.iter().enumerate() {
-                    let j = cx.load(t.memory.rows, r, row::JACOBIAN + 3 * c + i);
-                    jar = j.fma(a[column.dof], jar);
+            let [x, y, z] = cx.load3(t.memory.rows, r, row::AREF);
+            let mut jar = [-x, -y, -z];
+            for (c, column) in class.columns.iter().enumerate() {
+                let j = cx.load3(t.memory.rows, r, row::JACOBIAN + 3 * c);
+                for i in 0..3 {
+                    jar[i] = j[i].fma(a[column.dof], jar[i]);
                 }
-                cx.fill(t.memory.rows, r, place + i, jar);
+            }
+            for (i, x) in jar.iter().enumerate() {
+                cx.fill(t.memory.rows, r, place + i, *x);
             }
         });
     }
 }
 
-/// Adds Jᵀ W J of a class to a Hessian of this pattern, and Jᵀ f to the right-hand side if `pulls`.
+/// Adds Jᵀ W J of a class to the matrix that it is for, and Jᵀ f to the right-hand side if `pulls`; keeps the pieces that
+/// its contacts are on.
 #[inline(always)]
 pub(super) fn assemble<C: Cx>(
     cx: &mut C,
     t: &ContactsOf<C>,
     k: usize,
-    pattern: &crate::math::factor::Pattern,
     hessian: &mut [C::V],
     rhs: &mut [C::V],
     pulls: bool,
@@ -210,16 +219,17 @@ pub(super) fn assemble<C: Cx>(
     let class: &ClassOf<C> = &t.classes[k];
     let list = class_list(cx, t, k);
     each!(cx, r in list, {
-        let jar = three(cx, t, r, row::JAR);
+        let jar = cx.load3(t.memory.rows, r, row::JAR);
         let law = law_at(cx, t, r, jar);
+        cx.fill(t.memory.rows, r, row::STATE, law.state);
         let [nn, nx, ny, xx, xy, yy] = law.stiffness;
         let rows = [[nn, nx, ny], [nx, xx, xy], [ny, xy, yy]];
         let mut pull = law.force;
         for x in &mut pull {
             *x = cx.only(*x);
         }
-        for (c, column) in class.columns.iter().enumerate() {
-            let mut own = three(cx, t, r, row::JACOBIAN + 3 * c);
+        for (c, (column, entries)) in class.columns.iter().zip(&class.entries).enumerate() {
+            let mut own = cx.load3(t.memory.rows, r, row::JACOBIAN + 3 * c);
             for x in &mut own {
                 *x = cx.only(*x);
             }
@@ -235,34 +245,33 @@ pub(super) fn assemble<C: Cx>(
                 let along = rows[i][1].fma(own[1], rows[i][2] * own[2]);
                 stiff[i] = cx.only(rows[i][0].fma(own[0], along));
             }
-            for &(_, other) in class.entries.iter().filter(|entry| entry.0 == c) {
-                let at = pattern.at(column.dof, class.columns[other].dof);
-                let mut entry = cx.get(&hessian[at]);
+            for entry in entries {
+                let other = cx.load3(t.memory.rows, r, row::JACOBIAN + 3 * entry.column);
+                let mut sum = cx.get(&hessian[entry.place]);
                 for i in 0..3 {
-                    let j = cx.load(t.memory.rows, r, row::JACOBIAN + 3 * other + i);
-                    let j = cx.only(j);
-                    entry = j.fma(stiff[i], entry);
+                    sum = cx.only(other[i]).fma(stiff[i], sum);
                 }
-                cx.put(&mut hessian[at], entry);
+                cx.put(&mut hessian[entry.place], sum);
             }
         }
     });
 }
 
-/// Adds to `sum` where a contact is on another piece of its cost at `AHEAD` than at `JAR`, or on a curved one there; to
+/// Adds to `sum` where a contact is on another piece of its cost at `AHEAD` than it was at `JAR`, or on a curved one there; to
 /// `curved` where it is on a curved one at either.
 #[inline(always)]
 pub(super) fn changes<C: Cx>(cx: &mut C, t: &ContactsOf<C>, sum: &mut C::V, curved: &mut C::V) {
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
-            let (here, ahead) = (three(cx, t, r, row::JAR), three(cx, t, r, row::AHEAD));
-            let before = law_at(cx, t, r, here);
-            let after = law_at(cx, t, r, ahead);
-            let moved = (before.state - after.state).abs() + after.curved;
+            let before = cx.load(t.memory.rows, r, row::STATE);
+            let ahead = cx.load3(t.memory.rows, r, row::AHEAD);
+            let after = law_at(cx, t, r, ahead).state;
+            let slides = self::curved(t.cone, after);
+            let moved = (before - after).abs() + slides;
             let more = cx.get(sum) + cx.only(moved);
             cx.put(sum, more);
-            let more = cx.get(curved) + cx.only(before.curved + after.curved);
+            let more = cx.get(curved) + cx.only(self::curved(t.cone, before) + slides);
             cx.put(curved, more);
         });
     }
@@ -274,7 +283,7 @@ pub(super) fn forces<C: Cx>(cx: &mut C, t: &ContactsOf<C>, joint: &mut [C::V]) {
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
-            let jar = three(cx, t, r, row::JAR);
+            let jar = cx.load3(t.memory.rows, r, row::JAR);
             let law = law_at(cx, t, r, jar);
             let mut force = law.force;
             for (i, x) in force.iter_mut().enumerate() {
@@ -283,9 +292,9 @@ pub(super) fn forces<C: Cx>(cx: &mut C, t: &ContactsOf<C>, joint: &mut [C::V]) {
             }
             for (c, column) in class.columns.iter().enumerate() {
                 let mut sum = cx.get(&joint[column.dof]);
-                for (i, x) in force.iter().enumerate() {
-                    let j = cx.load(t.memory.rows, r, row::JACOBIAN + 3 * c + i);
-                    sum = cx.only(j).fma(*x, sum);
+                let j = cx.load3(t.memory.rows, r, row::JACOBIAN + 3 * c);
+                for (j, x) in j.iter().zip(&force) {
+                    sum = cx.only(*j).fma(*x, sum);
                 }
                 cx.put(&mut joint[column.dof], sum);
             }
@@ -299,7 +308,7 @@ pub(super) fn cost<C: Cx>(cx: &mut C, t: &ContactsOf<C>, place: usize, sum: &mut
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
-            let jar = three(cx, t, r, place);
+            let jar = cx.load3(t.memory.rows, r, place);
             let law = law_at(cx, t, r, jar);
             let more = cx.get(sum) + cx.only(law.cost);
             cx.put(sum, more);
@@ -319,16 +328,19 @@ pub(super) fn begin_line<C: Cx>(
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
-            let (jar, ahead) = (three(cx, t, r, row::JAR), three(cx, t, r, row::AHEAD));
+            let (jar, ahead) = (cx.load3(t.memory.rows, r, row::JAR), cx.load3(t.memory.rows, r, row::AHEAD));
             let law = law_at(cx, t, r, jar);
             let mut jv = [C::F::c(0.0); 3];
             for i in 0..3 {
                 jv[i] = cx.only(ahead[i] - jar[i]);
                 cx.fill(t.memory.rows, r, row::AHEAD + i, jv[i]);
             }
-            let more = cx.get(descent) + cx.only(bent(&law, jv));
+            let bend = bent(&law, jv);
+            let more = cx.get(descent) + cx.only(bend);
             cx.put(descent, more);
-            let aref = three(cx, t, r, row::AREF);
+            cx.fill(t.memory.rows, r, row::POWER, power(&law.force, jv));
+            cx.fill(t.memory.rows, r, row::BEND, bend);
+            let aref = cx.load3(t.memory.rows, r, row::AREF);
             let [nn, _, _, xx, _, yy] = law.stiffness;
             let mut sum = C::F::c(0.0);
             for (i, stiff) in [nn, xx, yy].into_iter().enumerate() {
@@ -354,16 +366,15 @@ pub(super) fn derivative<C: Cx>(
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
-            let (jar, jv) = (three(cx, t, r, row::JAR), three(cx, t, r, row::AHEAD));
+            let (jar, jv) = (cx.load3(t.memory.rows, r, row::JAR), cx.load3(t.memory.rows, r, row::AHEAD));
             let mut there = jar;
             for i in 0..3 {
                 there[i] = alpha.fma(jv[i], jar[i]);
             }
-            let start = law_at(cx, t, r, jar);
             let here = law_at(cx, t, r, there);
-            let bend = bent(&start, jv);
-            let model = power(&start.force, jv) - alpha * bend;
-            let moved = (here.state - start.state).abs() + here.curved;
+            let [state, power_before, bend] = cx.load3(t.memory.rows, r, row::STATE);
+            let model = power_before - alpha * bend;
+            let moved = (here.state - state).abs() + curved(t.cone, here.state);
             // exactly nothing where the piece is the same quadratic, whatever rounding says
             let differs = C::F::c(0.5).lt(moved);
             let zero = C::F::c(0.0);

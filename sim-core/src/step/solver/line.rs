@@ -22,6 +22,8 @@ pub(super) struct Line<'a, F> {
     /// Of a correction: ½ gᵀ H⁻¹ g of a gradient g that is but the rounding of jar in Jᵀ W jar and of τ, hence at most about
     /// ε² (Σ W (|J a| + |aref|)² + |τ a|). Else, where each round solves for the whole minimum, the rounding of p'.
     pub noise: F,
+    /// Has any world contacts?
+    touches: bool,
     weight: &'a [F],
     jar: &'a [F],
     jv: &'a [F],
@@ -35,7 +37,8 @@ struct Derivative<F> {
 }
 
 impl<'a, F: Num> Line<'a, F> {
-    /// `curvature` is sᵀ M s; `jar` and its change `jv` over the segment are `(rows)`, `power` is |τ a|.
+    /// `curvature` is sᵀ M s, `power` |τ a|; of rows: stiffness of those that act, `jar`, its change `jv` over the segment,
+    /// and `aref`. In the worlds where the solver `corrects`, they touch.
     ///
     /// Turns what contacts have ahead into its change.
     #[inline(always)]
@@ -43,32 +46,31 @@ impl<'a, F: Num> Line<'a, F> {
         cx: &mut C,
         m: &Constants<F::Real>,
         curvature: F,
-        weight: &'a [F],
-        jar: &'a [F],
-        jv: &'a [F],
-        aref: &[F],
         power: F,
+        [weight, jar, jv, aref]: [&'a [F]; 4],
+        corrects: Option<F::Mask>,
     ) -> Self {
-        let corrects = !m.contacts.classes.is_empty();
         let epsilon = F::c(<F::Real as Real>::EPSILON);
-        let mut descent = curvature;
-        let mut terms = if corrects { power } else { curvature };
+        let (mut descent, mut size) = (curvature, curvature);
+        let mut terms = power;
         for r in 0..m.rows() {
             let law = law(m, r, jar[r], weight[r]);
             descent = (law.stiffness * jv[r]).fma(jv[r], descent);
-            terms = if corrects {
-                let rounded = (jar[r] + aref[r]).abs() + aref[r].abs();
-                (law.stiffness * rounded).fma(rounded, terms)
-            } else {
-                terms + (law.force * jv[r]).abs()
-            };
+            size = size + (law.force * jv[r]).abs();
+            let rounded = (jar[r] + aref[r]).abs() + aref[r].abs();
+            terms = (law.stiffness * rounded).fma(rounded, terms);
         }
-        let (mut descent, mut terms) = (cx.var(descent), cx.var(terms));
-        contacts::begin_line(cx, &m.contacts, &mut descent, &mut terms);
-        let rounding = if corrects { epsilon * epsilon } else { epsilon };
+        let mut noise = size * epsilon;
+        if let Some(corrects) = corrects {
+            let (mut sum, mut all) = (cx.var(descent), cx.var(terms));
+            contacts::begin_line(cx, &m.contacts, &mut sum, &mut all);
+            descent = cx.get(&sum);
+            noise = F::select(corrects, cx.get(&all) * (epsilon * epsilon), noise);
+        }
         Line {
-            descent: cx.get(&descent),
-            noise: cx.get(&terms) * rounding,
+            descent,
+            noise,
+            touches: corrects.is_some(),
             weight,
             jar,
             jv,
@@ -102,16 +104,19 @@ impl<'a, F: Num> Line<'a, F> {
             d.size = d.size + power.abs();
             d.curvature = ((here.stiffness - start.stiffness) * jv).fma(jv, d.curvature);
         }
-        let mut slope = cx.var(d.slope);
-        let mut curvature = cx.var(d.curvature);
-        let mut size = cx.var(d.size);
-        let t = &m.contacts;
-        contacts::derivative(cx, t, alpha, &mut slope, &mut curvature, &mut size);
-        Derivative {
-            slope: cx.get(&slope),
-            curvature: cx.get(&curvature),
-            size: cx.get(&size),
+        if self.touches {
+            let mut slope = cx.var(d.slope);
+            let mut curvature = cx.var(d.curvature);
+            let mut size = cx.var(d.size);
+            let t = &m.contacts;
+            contacts::derivative(cx, t, alpha, &mut slope, &mut curvature, &mut size);
+            d = Derivative {
+                slope: cx.get(&slope),
+                curvature: cx.get(&curvature),
+                size: cx.get(&size),
+            };
         }
+        d
     }
 }
 
@@ -130,10 +135,14 @@ fn law<F: Num>(m: &Constants<F::Real>, r: usize, jar: F, weight: F) -> Law<F> {
     }
 }
 
-/// Slope over that at the start below which a search ends in `f32`: MuJoCo's `ls_tolerance`. The next round finds the rest.
-const SLACK: f64 = 0.01;
+/// Slope over that at the start below which a search ends in `f32`: the next round finds the rest, and a search to MuJoCo's
+/// `ls_tolerance` of 0.01 takes half as many steps again.
+const SLACK: f64 = 0.1;
+/// Beyond any minimum [–].
+const FAR: f64 = 1e10;
 
-/// Safeguarded Newton on p'(α) = 0: the exact minimum on the segment, and beyond it.
+/// The exact minimum on the segment, and beyond it: p'(α) = 0 by Newton's method while its moves halve, and otherwise by the
+/// chord between the ends of the bracket, of which an end that stays counts half (Illinois; Dowell and Jarratt 1971).
 #[inline(always)]
 pub(super) fn search<C: Cx>(
     cx: &mut C,
@@ -141,7 +150,7 @@ pub(super) fn search<C: Cx>(
     line: &Line<'_, C::F>,
     length: &mut C::V,
 ) {
-    let zero = C::F::c(0.0);
+    let (zero, half, one) = (C::F::c(0.0), C::F::c(0.5), C::F::c(1.0));
     let resolution = C::F::c(4.0 * <<C::F as Num>::Real as Real>::EPSILON);
     let slack = if <<C::F as Num>::Real as Real>::DOUBLE {
         0.0
@@ -149,20 +158,45 @@ pub(super) fn search<C: Cx>(
         SLACK
     };
     let mut low = cx.var(zero);
-    let mut high = cx.var(C::F::c(1.0e10));
+    let mut low_slope = cx.var(-line.descent);
+    let mut high = cx.var(C::F::c(FAR));
+    let mut high_slope = cx.var(one);
+    // -1 after a point below the minimum, 1 after one above it
+    let mut side = cx.var(zero);
+    let mut last_move = cx.var(one);
     times!(cx, m.solver.ls_iterations, {
         let alpha = cx.get(length);
         let d = line.derivative(cx, m, alpha);
-        let below = C::F::select(d.slope.lt(zero), alpha, cx.get(&low));
-        let above = C::F::select(d.slope.lt(zero), cx.get(&high), alpha);
+        let falls = d.slope.lt(zero);
+        let below = C::F::select(falls, alpha, cx.get(&low));
+        let above = C::F::select(falls, cx.get(&high), alpha);
         let close = (d.size * resolution).max(line.descent * C::F::c(slack));
         let found = C::F::not(close.lt(d.slope.abs()));
         break_if!(cx, C::F::or(found, (above - below).lt(above * resolution)));
         cx.set(&mut low, below);
         cx.set(&mut high, above);
+        let before = cx.get(&side);
+        let now = C::F::select(falls, -one, one);
+        // the end that stays for the second time counts half
+        let weight = C::F::select(half.lt(before * now), half, one);
+        let below_slope = C::F::select(falls, d.slope, cx.get(&low_slope) * weight);
+        let above_slope = C::F::select(falls, cx.get(&high_slope) * weight, d.slope);
+        cx.set(&mut side, now);
+        cx.set(&mut low_slope, below_slope);
+        cx.set(&mut high_slope, above_slope);
+
         let newton = alpha - d.slope.div(d.curvature);
+        let is_open = C::F::c(0.5 * FAR).lt(above);
+        let halves = (newton - alpha).abs().lt(half * cx.get(&last_move));
         let inside = C::F::and(below.lt(newton), newton.lt(above));
-        let middle = C::F::c(0.5) * (below + above);
-        cx.set(length, C::F::select(inside, newton, middle));
+        let is_newton = C::F::and(inside, C::F::or(is_open, halves));
+        let rise = above_slope - below_slope;
+        let chord = below.fma(above_slope, -(above * below_slope)).div(rise);
+        let is_chord = C::F::and(below.lt(chord), chord.lt(above));
+        let middle = half * (below + above);
+        let other = C::F::select(is_chord, chord, middle);
+        let next = C::F::select(is_newton, newton, other);
+        cx.set(&mut last_move, (next - alpha).abs());
+        cx.set(length, next);
     });
 }

@@ -44,13 +44,16 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let acts = acts(cx, m, &b.efc_weight);
     let t = &m.contacts;
     // contacts are so stiff that M is lost in the rounding of H a⁺; of H (a⁺ - a) less is asked
-    let corrects = !t.classes.is_empty();
+    let corrects = contacts::touching(cx, t);
     // Sums of edges a thousand times as stiff as M leave a step its first three digits only: one more round finds the rest.
-    let polishes = corrects && t.cone == Cone::Pyramidal;
-    let mut calm = cx.var(if polishes { zero } else { one });
+    let polished = match (corrects, t.cone) {
+        (Some(corrects), Cone::Pyramidal) => C::F::select(corrects, zero, one),
+        _ => one,
+    };
+    let mut calm = cx.var(polished);
     let mut busy = cx.var(C::F::select(acts, one, zero));
     let mut round = cx.var(zero);
-    let mut last_gain = cx.var(C::F::c(f64::from(f32::MAX)));
+    let mut last_gain = cx.var(C::F::c(2.0 * UNKNOWN));
     times!(cx, m.solver.iterations, {
         if may_idle::<C>(m) {
             break_if!(cx, C::F::not(acts));
@@ -64,15 +67,14 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             a[j] = cx.get(&b.joint_qdd[j]);
             minimum[j] = w.smooth_force[j];
         }
-        if corrects {
+        if let Some(corrects) = corrects {
             multiply(&m.pattern, &w.mass_matrix, a, pull);
             for j in 0..n {
-                minimum[j] = minimum[j] - pull[j];
+                minimum[j] = C::F::select(corrects, minimum[j] - pull[j], minimum[j]);
             }
         }
         w.hessian.copy_from_slice(&w.mass_matrix);
         residual(m, &w.limit_side, aref, a, jar);
-        let whole = !corrects;
         assemble(
             m,
             &w.limit_side,
@@ -81,24 +83,27 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             jar,
             &mut w.hessian,
             minimum,
-            whole,
+            corrects,
         );
-        contacts::residual(cx, t, a, row::JAR);
-        solve_system(cx, m, b, MINIMUM, true);
+        if corrects.is_some() {
+            contacts::residual(cx, t, a, row::JAR);
+        }
+        solve_system(cx, m, b, MINIMUM, true, corrects);
         let w = &mut b.work;
         let [a, minimum, step, pull] = &mut w.vector;
-        if corrects {
+        if let Some(corrects) = corrects {
             for j in 0..n {
-                minimum[j] = a[j] + minimum[j];
+                minimum[j] = C::F::select(corrects, a[j] + minimum[j], minimum[j]);
             }
         }
         let [jar, jar_minimum, weight, aref] = &mut w.row;
         residual(m, &w.limit_side, aref, minimum, jar_minimum);
-        contacts::residual(cx, t, minimum, row::AHEAD);
-
         let mut moved = cx.var(changes(m, weight, jar, jar_minimum));
         let mut curved = cx.var(zero);
-        contacts::changes(cx, t, &mut moved, &mut curved);
+        if corrects.is_some() {
+            contacts::residual(cx, t, minimum, row::AHEAD);
+            contacts::changes(cx, t, &mut moved, &mut curved);
+        }
         let changed = half.lt(cx.get(&moved));
         let later = half.lt(cx.get(&round));
         let early = cx.get(&round).lt(C::F::c(trusted_rounds::<C::F>()));
@@ -115,25 +120,34 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             let (mut curvature, mut power) = (zero, zero);
             for j in 0..n {
                 curvature = step[j].fma(pull[j], curvature);
-                if corrects {
-                    power = power + (w.smooth_force[j] * a[j]).abs();
-                }
+                power = power + (w.smooth_force[j] * a[j]).abs();
             }
             for r in 0..m.rows() {
                 jar_minimum[r] = jar_minimum[r] - jar[r];
             }
-            let line = Line::new(cx, m, curvature, weight, jar, jar_minimum, aref, power);
+            let rows = [&weight[..], jar, jar_minimum, aref];
+            let line = Line::new(cx, m, curvature, power, rows, corrects);
             search::<C>(cx, m, &line, &mut length);
             // The model promises a gain of ½ |p'(0)|. Below the tolerance the step is not taken, as in
-            // MuJoCo, but for the first; below what rounding makes it is the last that can help.
+            // MuJoCo, but for the first; below what rounding makes it is the last that can help. In `f32` it is the last
+            // too if Newton's next one, of which the gain shrinks with the square, would be below the tolerance.
             let gain = half * line.descent;
             let small = C::F::and(later, gain.lt(C::F::k(m.solver.tolerance)));
             let mut last = gain.lt(line.noise);
-            if corrects {
+            if let Some(corrects) = corrects {
+                let before = cx.get(&last_gain);
                 // Newton's gains shrink fast; one that does not, and is hardly more than rounding, is rounding
-                let stalls = (C::F::c(STALLED) * cx.get(&last_gain)).lt(gain);
+                let stalls = (C::F::c(STALLED) * before).lt(gain);
                 let is_small = gain.lt(line.noise * C::F::c(DOUBTED));
-                last = C::F::or(last, C::F::and(stalls, is_small));
+                let mut ends = C::F::and(stalls, is_small);
+                if !<<C::F as Num>::Real as Real>::DOUBLE {
+                    let next = gain * gain;
+                    let is_enough = next.lt(C::F::k(m.solver.tolerance) * before);
+                    let off = (cx.get(&length) - one).abs();
+                    let is_newtons = C::F::and(off.lt(C::F::c(0.25)), before.lt(C::F::c(UNKNOWN)));
+                    ends = C::F::or(ends, C::F::and(is_enough, is_newtons));
+                }
+                last = C::F::or(last, C::F::and(corrects, ends));
                 cx.set(&mut last_gain, gain);
             }
             cx.set(&mut settled, C::F::select(C::F::or(small, last), one, zero));
@@ -150,8 +164,9 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         }
         let ends = C::F::and(C::F::not(changed), half.lt(cx.get(&calm)));
         let done = C::F::or(ends, half.lt(cx.get(&settled)));
-        if polishes {
-            cx.set(&mut calm, C::F::select(changed, zero, one));
+        if let (Some(corrects), Cone::Pyramidal) = (corrects, t.cone) {
+            let again = C::F::and(corrects, changed);
+            cx.set(&mut calm, C::F::select(again, zero, one));
         }
         cx.set(&mut busy, C::F::select(done, zero, one));
         break_if!(cx, done);
@@ -173,10 +188,10 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     }
 }
 
-/// 1 or more where a world has contacts.
+/// The worlds that have contacts now; none if no world has.
 #[inline(always)]
-pub(super) fn touches<C: Cx>(cx: &mut C, m: &ConstantsOf<C>) -> C::F {
-    contacts::count(cx, &m.contacts)
+pub(super) fn touching<C: Cx>(cx: &mut C, m: &ConstantsOf<C>) -> Option<MaskOf<C>> {
+    contacts::touching(cx, &m.contacts)
 }
 
 /// Forces of the rows at the accelerations found.
@@ -209,18 +224,28 @@ const STALLED: f64 = 0.25;
 /// both cones, no acceleration is then off by more than 3e-4 in `f32`, where 10,000 times leave 2e-3.
 const DOUBTED: f64 = 100.0;
 
+/// No gain is as large [J/s²].
+const UNKNOWN: f64 = 1e30;
+
 /// Which of the scratch vectors has the right-hand side of a round, and then its minimum.
 const MINIMUM: usize = 1;
 
 /// Solves (M + JᵀWJ) x = rhs in place, in scratch vector `x`; the Hessian has the joint rows already, and the
-/// contacts' force is added to the right-hand side if `pulls`.
+/// contacts' force is added to the right-hand side if `pulls`. `touching` is that of [`contacts::touching`].
 ///
 /// A world whose contacts couple what the mass matrix does not solves a larger system; the others need not.
 #[inline(always)]
-fn solve_system<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, x: usize, pulls: bool) {
+fn solve_system<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    x: usize,
+    pulls: bool,
+    touching: Option<MaskOf<C>>,
+) {
     let t = &m.contacts;
     let w = &mut b.work;
-    let touches = !t.classes.is_empty();
+    let touches = touching.is_some();
     if touches {
         for (cell, value) in b.system.iter_mut().zip(&w.hessian) {
             cx.put(cell, *value);
@@ -229,7 +254,7 @@ fn solve_system<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, x: us
             cx.put(cell, *value);
         }
     }
-    let couples = t.couples();
+    let couples = touches && t.couples();
     let coupling = contacts::coupling(cx, t);
     let (none, half) = (coupling.lt(C::F::c(0.5)), C::F::c(0.5));
     // a loop, so that assembly and solver are compiled once: they are long
@@ -261,7 +286,7 @@ fn solve_system<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, x: us
         if touches {
             for k in 0..t.classes.len() {
                 if t.classes[k].couples == larger {
-                    contacts::assemble(cx, t, k, pattern, cells, &mut b.pull, pulls);
+                    contacts::assemble(cx, t, k, cells, &mut b.pull, pulls);
                 }
             }
         }

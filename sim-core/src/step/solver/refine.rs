@@ -73,10 +73,11 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         jar,
         &mut w.hessian,
         rhs,
-        true,
+        None,
     );
     contacts::residual(cx, &m.contacts, a, row::JAR);
-    solve_system(cx, m, b, MISSING, false);
+    let touching = contacts::touching(cx, &m.contacts);
+    solve_system(cx, m, b, MISSING, false, touching);
     let w = &mut b.work;
     let [missing, a, _, joint] = &mut w.vector;
     let [jar, force, weight, aref] = &mut w.row;

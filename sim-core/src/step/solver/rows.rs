@@ -71,17 +71,17 @@ pub(super) fn residual<F: Num>(
     }
 }
 
-/// f + W J a, or f alone.
+/// f + W J a, or f alone where the solver `corrects`.
 #[inline(always)]
-fn pull<F: Num>(law: &Law<F>, jar: F, aref: F, whole: bool) -> F {
-    if whole {
-        law.stiffness.fma(jar + aref, law.force)
-    } else {
-        law.force
+fn pull<F: Num>(law: &Law<F>, jar: F, aref: F, corrects: Option<F::Mask>) -> F {
+    let whole = law.stiffness.fma(jar + aref, law.force);
+    match corrects {
+        Some(corrects) => F::select(corrects, law.force, whole),
+        None => whole,
     }
 }
 
-/// Adds Jᵀ W J to the Hessian, and to the right-hand side Jᵀ (f + W J a), which is for a minimum as a `whole`, or Jᵀ f.
+/// Adds Jᵀ W J to the Hessian, and to the right-hand side Jᵀ (f + W J a), or Jᵀ f in the worlds where the solver `corrects`.
 #[allow(clippy::too_many_arguments)]
 #[inline(always)]
 pub(super) fn assemble<F: Num>(
@@ -92,12 +92,12 @@ pub(super) fn assemble<F: Num>(
     jar: &[F],
     hessian: &mut [F],
     rhs: &mut [F],
-    whole: bool,
+    corrects: Option<F::Mask>,
 ) {
     let mut r = 0;
     for e in &m.equalities {
         let law = equality(jar[r], weight[r]);
-        let pull = pull(&law, jar[r], aref[r], whole);
+        let pull = pull(&law, jar[r], aref[r], corrects);
         let (f, l, ratio) = (e.follower, e.leader, F::k(e.multiplier));
         let shared = law.stiffness * ratio;
         let (own, others) = (m.pattern.at(f, f), m.pattern.at(l, l));
@@ -113,14 +113,14 @@ pub(super) fn assemble<F: Num>(
         let law = dry_friction(jar[r], weight[r], F::k(f.zone), F::k(f.loss));
         let diagonal = m.pattern.at(f.dof, f.dof);
         hessian[diagonal] = hessian[diagonal] + law.stiffness;
-        rhs[f.dof] = rhs[f.dof] + pull(&law, jar[r], aref[r], whole);
+        rhs[f.dof] = rhs[f.dof] + pull(&law, jar[r], aref[r], corrects);
         r += 1;
     }
     for (l, side) in m.limits.iter().zip(side) {
         let law = one_sided(jar[r], weight[r]);
         let diagonal = m.pattern.at(l.dof, l.dof);
         hessian[diagonal] = hessian[diagonal] + law.stiffness;
-        let pull = pull(&law, jar[r], aref[r], whole);
+        let pull = pull(&law, jar[r], aref[r], corrects);
         rhs[l.dof] = side.fma(pull, rhs[l.dof]);
         r += 1;
     }
