@@ -9,7 +9,6 @@ import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import misses
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -112,8 +111,3 @@ def torques() -> Callable[[int], NDArray[np.float32]]:
         return tau
 
     return at
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What is known to fall short is expected to fail."""
-    misses.mark(items)
