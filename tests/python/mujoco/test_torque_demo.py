@@ -14,7 +14,9 @@ from twin import Array
 import tightloop as tl
 from conftest import START
 
-WORLDS, FRAMES, SUBSTEPS = 48, 180, 8
+WORLDS, FRAMES, SUBSTEPS = 4096, 180, 8
+# Worlds of MuJoCo's, which are the first of ours, and those of which energies are compared
+JUDGED = 96
 # Frames until the fingers, which start outside their limits, have come back; the table is touched in frame 14
 SETTLED = 12
 
@@ -31,24 +33,29 @@ def test_it_sinks_in_no_deeper_than_mujocos_and_gains_no_more_energy():
     with tl.launch(pile.scene, worlds=WORLDS, fields=("joint_q", "joint_qd", "contact_distance")) as sim:
         to = Coordinates(model, sim)
         frame = sim.write(joint_q=starts)
-        q, qd, depth = [frame.joint_q.astype(float)], [frame.joint_qd.astype(float)], np.zeros(WORLDS)
+        q, qd, depth = [judged(frame.joint_q)], [judged(frame.joint_qd)], np.zeros(WORLDS)
         for number in range(FRAMES):
             frame = sim.step(joint_f=torque(number))
             assert not (frame.status & 1).any() and np.isfinite(frame.joint_q).all()
-            q.append(frame.joint_q.astype(float))
-            qd.append(frame.joint_qd.astype(float))
+            q.append(judged(frame.joint_q))
+            qd.append(judged(frame.joint_qd))
             depth = np.maximum(depth, -frame.contact_distance.min(axis=1))
-    their_q, their_qd, their_depth = motion_of(model, to, starts)
+    their_q, their_qd, their_depth = motion_of(model, to, judged(starts))
     # neither side's deepest world is the other's
-    for share in (0.5, 0.9):
+    for share in (0.5, 0.9, 0.99):
         most = max(2e-3, 1.1 * np.quantile(their_depth, share))
-        assert np.quantile(depth, share) <= most, f"{np.sort(depth)}, MuJoCo {np.sort(their_depth)}"
+        assert np.quantile(depth, share) <= most, f"{np.sort(depth)[-50:]}, MuJoCo {np.sort(their_depth)}"
     gain = gain_of(model, to, np.array(q), np.array(qd))
     theirs = gain_of(model, to, their_q, their_qd)
     for share in (0.5, 0.9):
         # MuJoCo gains up to a tenth of the work where soft limits of the joints give back what they took
         most = 0.01 + max(0.0, 1.1 * np.quantile(theirs, share))
         assert np.quantile(gain, share) <= most, f"{np.sort(gain)}, MuJoCo {np.sort(theirs)}"
+
+
+def judged(state: Array) -> Array:
+    """Of the worlds that are compared in full."""
+    return state[:JUDGED].astype(float)
 
 
 def motion_of(model: mujoco.MjModel, to: Coordinates, starts: Array) -> tuple[Array, Array, Array]:
