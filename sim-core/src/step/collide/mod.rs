@@ -110,6 +110,7 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, K
         };
         let first = Shape::read(cx, t, kinds.0, p, pair::SIZE_A, pair::HULL_A);
         let second = Shape::read(cx, t, kinds.1, p, pair::SIZE_B, pair::HULL_B);
+        let margin = cx.constant(numbers, p, pair::REACH) + rounding(radius);
         // the ball around one against the box around the other: a table's own ball is as wide as the table
         let mut near = near;
         if kinds.0 >= Kind::Box {
@@ -123,8 +124,12 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, K
                 within(&other.axes, second.half(kinds.1), center, radius),
             );
         }
+        // the boxes around both, where what comes next takes longer: boxes begin with this themselves
+        if kinds.0 >= Kind::Box && kinds.1 > Kind::Box {
+            let halves = [first.half(kinds.0), second.half(kinds.1)];
+            near = C::F::and(near, overlap(&axes, &other, halves, margin));
+        }
         when!(cx, near, {
-            let margin = cx.constant(numbers, p, pair::REACH) + rounding(radius);
             let two = Two {
                 axes: &axes,
                 first,
@@ -166,6 +171,32 @@ fn within<F: Num>(axes: &Mat3<F>, half: Vec3<F>, center: Vec3<F>, radius: F) -> 
         square = beyond.fma(beyond, square);
     }
     square.lt(radius * radius)
+}
+
+/// Does no face of either box have the other beyond it by more than `reach`? The first box's centre is 0.
+#[inline(always)]
+fn overlap<F: Num>(
+    axes: &Mat3<F>,
+    other: &Placed<F>,
+    [half, other_half]: [Vec3<F>; 2],
+    reach: F,
+) -> F::Mask {
+    let mut gap = F::c(-1.0);
+    let mut widths = [F::c(0.0); 3];
+    for (axis, half) in axes.iter().zip(half) {
+        let mut width = half;
+        for j in 0..3 {
+            let turn = dot(*axis, other.axes[j]).abs();
+            width = turn.fma(other_half[j], width);
+            widths[j] = turn.fma(half, widths[j]);
+        }
+        gap = gap.max(dot(*axis, other.center).abs() - (width + reach));
+    }
+    for j in 0..3 {
+        let width = widths[j] + other_half[j] + reach;
+        gap = gap.max(dot(other.axes[j], other.center).abs() - width);
+    }
+    gap.lt(F::c(0.0))
 }
 
 /// Where the contacts of a pair go.
