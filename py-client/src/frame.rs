@@ -11,6 +11,9 @@ use sim_protocol::{Dtype, View};
 
 use crate::errors::protocol;
 
+/// Arrays made so far, each with its field's name: an empty field lies where the next one does.
+type Made = Vec<(String, Py<PyAny>)>;
+
 /// What every array of a frame holds on to. The slot in shared memory is given back when the last of them goes.
 #[pyclass(frozen, module = "tightloop._core")]
 pub(crate) struct Sample(sim_protocol::Frame);
@@ -23,7 +26,7 @@ pub(crate) struct Sample(sim_protocol::Frame);
 pub(crate) struct Frame {
     // not the frame itself, which keeps the arrays made so far: that would be a circle
     sample: Py<Sample>,
-    arrays: Mutex<Vec<(usize, Py<PyAny>)>>,
+    arrays: Mutex<Made>,
 }
 
 #[pymethods]
@@ -35,11 +38,10 @@ impl Frame {
             .0
             .field(name)
             .map_err(|error| protocol(py, &error))?;
-        let key = view.ptr as usize;
-        let find = |arrays: &[(usize, Py<PyAny>)]| {
+        let find = |arrays: &Made| {
             arrays
                 .iter()
-                .find(|(made, _)| *made == key)
+                .find(|(made, _)| made == name)
                 .map(|(_, array)| array.bind(py).clone())
         };
         // not held while NumPy allocates, which may run other Python threads
@@ -47,7 +49,8 @@ impl Frame {
             return Ok(array);
         }
         let array = read_only(sample, &view);
-        self.arrays().push((key, array.clone().unbind()));
+        self.arrays()
+            .push((name.to_owned(), array.clone().unbind()));
         Ok(array)
     }
 
@@ -100,7 +103,7 @@ impl Frame {
         })
     }
 
-    fn arrays(&self) -> std::sync::MutexGuard<'_, Vec<(usize, Py<PyAny>)>> {
+    fn arrays(&self) -> std::sync::MutexGuard<'_, Made> {
         self.arrays.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -63,8 +63,7 @@ impl Simulation {
         }
         check_memory(&model, options)?;
         let layout = Simulation::layout_of(&model, options);
-        let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
-        let threads = options.threads.unwrap_or_else(cores);
+        let threads = threads_of(options);
         let (worlds, precision) = (options.worlds, options.precision);
         let backend = cpu::create(&model, worlds, precision, options.lanes, &layout, threads)?;
         Ok(Simulation {
@@ -117,12 +116,15 @@ impl Simulation {
             Precision::F64 => (8, 1),
         };
         let worlds = (options.worlds as u64).saturating_add(width);
-        // scratch of each chunk; see backend/cpu/mod.rs
-        let chunks = options.threads.unwrap_or(1).saturating_mul(4) as u64;
-        let scratch = model.constants().contacts.memory.len as u64 * real * width * chunks;
+        // scratch of each chunk, its matrices included; see backend/cpu/mod.rs
+        let m = model.constants();
+        let matrices = 3 * m.pattern.len() + 2 * m.coupled.pattern.len();
+        let chunks = threads_of(options).saturating_mul(cpu::CHUNKS_PER_THREAD) as u64;
+        let scratch = ((m.contacts.memory.len + matrices) as u64 * real * width)
+            .saturating_mul(chunks.min(worlds));
         // state and commands of a world, its counters; see backend/cpu/chunk.rs
         worlds
-            .saturating_mul((5 * model.dofs() + model.coords()) as u64 * real + 16)
+            .saturating_mul((5 * model.dofs() + 2 * model.coords()) as u64 * real + 16)
             .saturating_add(scratch)
     }
 
@@ -349,6 +351,12 @@ impl Simulation {
             _ => Ok(()),
         }
     }
+}
+
+/// Threads that are asked for: as many as there are cores if none are.
+fn threads_of(options: &Options) -> usize {
+    let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
+    options.threads.unwrap_or_else(cores)
 }
 
 /// Refuses what would not fit, before anything is taken.

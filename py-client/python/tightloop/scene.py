@@ -48,8 +48,8 @@ class Scene(Shaped):
         dt: Length of a physics step [s], above 0.
         substeps: Physics steps a control frame, at least 1. One `Sim.step` advances ``substeps * dt`` seconds.
         gravity: Acceleration of gravity [m/s²], world axes, z up.
-        contacts_max: Most contacts that a world has room for, 1 to 4096; None is as many as its shapes suggest. What
-            does not fit is left out, counted and flagged in the world's status.
+        contacts_max: Most contacts that a world has room for, 1 to 4096; None is as many as its shapes can have, at
+            most 512. What does not fit is left out, counted and flagged in the world's status.
         rows_max: Most constraint rows of contacts that a world has room for, 1 to 16384; None is as many as its
             contacts need.
 
@@ -105,7 +105,7 @@ class Scene(Shaped):
 
     @property
     def contacts_max(self) -> int | None:
-        """Most contacts that a world has room for; None is as many as its shapes suggest."""
+        """Most contacts that a world has room for; None is as many as its shapes can have, at most 512."""
         return self._contacts_max
 
     @contacts_max.setter
@@ -135,9 +135,11 @@ class Scene(Shaped):
         Args:
             iterations: Newton iterations a physics step, at most.
             ls_iterations: Line-search iterations a Newton iteration, at most.
-            tolerance: The solver stops once its scaled improvement or gradient is smaller [–]; at 0 it never does.
+            tolerance: The solver stops once its scaled improvement is smaller [–]; at 0 only rounding stops it.
             cone: Friction cone of contacts, ``"elliptic"`` or ``"pyramidal"``.
-            impratio: Frictional over normal impedance of elliptic contacts [–], above 0.
+            impratio: Frictional over normal impedance of contacts [–], above 0, at most 1e5. In float32 the edges of a
+                pyramidal cone are at most 5e4 times as stiff as its normal, which MuJoCo's exceed where ``mu`` is
+                below 0.1 at 1000.
         """
         checks.choice("cone", cone, ("elliptic", "pyramidal"))
         self._solver = Solver(

@@ -23,13 +23,14 @@ class Surface(TypedDict, total=False):
     """
 
     mu: float | None
-    """Coefficient of sliding friction [–], 1; at least 0."""
+    """Coefficient of sliding friction [–], 1; 0 to 1e12. Below 1e-5 it counts as that, as in MuJoCo."""
     ke: float | None
-    """Contact stiffness, as Newton's shape ``ke``, 2500: with ``kd`` it is MuJoCo's ``solref = (2/kd, kd/(2 √ke))``."""
+    """Contact stiffness [1/s²], as Newton's shape ``ke``, 2500, at most 1e12: with ``kd`` it is MuJoCo's
+    ``solref = (2/kd, kd/(2 √ke))``."""
     kd: float | None
-    """Contact damping, as Newton's shape ``kd``, 100."""
+    """Contact damping [1/s], as Newton's shape ``kd``, 100, at most 1e12."""
     kf: float | None
-    """Friction damping, as Newton's shape ``kf``, 1000, which gives MuJoCo's ``solreffriction``."""
+    """Friction damping [N·s/m], as Newton's shape ``kf``, 1000, at most 1e12, which gives MuJoCo's ``solreffriction``."""
     margin: float | None
     """Distance at which contact forces begin [m], 0."""
     gap: float | None

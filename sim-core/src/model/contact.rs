@@ -188,33 +188,35 @@ pub mod pair {
     /// Radii around the centres, and the reach [m].
     pub const RADIUS: usize = 1;
     /// Radius around the first shape's centre, and the reach [m].
-    pub const RADIUS_A: usize = 17;
+    pub const RADIUS_A: usize = 2;
     /// Radius around the second shape's centre, and the reach [m].
-    pub const RADIUS_B: usize = 18;
+    pub const RADIUS_B: usize = 3;
+    /// Radius around the centre of the smaller shape, a plane counting as large [m].
+    pub const SMALLER: usize = 4;
     /// Size of the first shape (3) [m].
-    pub const SIZE_A: usize = 2;
+    pub const SIZE_A: usize = 5;
     /// Size of the second shape (3) [m].
-    pub const SIZE_B: usize = 5;
+    pub const SIZE_B: usize = 8;
     /// -1 where the first shape of the class's side is the pair's second, else 1.
-    pub const FLIP: usize = 8;
+    pub const FLIP: usize = 11;
     /// Distance below which a contact pushes [m].
-    pub const MARGIN: usize = 9;
+    pub const MARGIN: usize = 12;
     /// Coefficient of friction [–].
-    pub const MU: usize = 10;
+    pub const MU: usize = 13;
     /// Inverse weight of both bodies [1/kg].
-    pub const WEIGHT: usize = 11;
+    pub const WEIGHT: usize = 14;
     /// Reference stiffness k [1/s²].
-    pub const STIFFNESS: usize = 12;
+    pub const STIFFNESS: usize = 15;
     /// Reference damping b [1/s].
-    pub const DAMPING: usize = 13;
+    pub const DAMPING: usize = 16;
     /// Reference damping of friction rows [1/s].
-    pub const SLIDING: usize = 14;
+    pub const SLIDING: usize = 17;
     /// 1 with friction, 0 without.
-    pub const RUBS: usize = 15;
+    pub const RUBS: usize = 18;
     /// Constraint rows of a contact.
-    pub const ROWS: usize = 16;
+    pub const ROWS: usize = 19;
     /// First of the levers.
-    pub const LEVERS: usize = 19;
+    pub const LEVERS: usize = 20;
 
     /// Number of the first shape among the solids.
     pub const SOLID_A: usize = 0;

@@ -53,14 +53,14 @@ pub(super) struct Piece {
 }
 
 /// Contacts that two shapes may have at most: the ends of what lies on the other, and the nearest point between them; the
-/// corners of what faces have in common, or four of them.
+/// corners of what faces have in common, or four of them, and the nearest vertex of boxes.
 pub(super) fn contacts_of(kinds: (Kind, Kind)) -> usize {
     match kinds {
         (Kind::Sphere, _) | (Kind::Plane, Kind::Sphere) => 1,
-        (Kind::Capsule, Kind::Capsule | Kind::Box) => 3,
-        (Kind::Plane, Kind::Capsule) | (Kind::Capsule, _) => 2,
+        (Kind::Plane, Kind::Capsule) => 2,
+        (Kind::Capsule, _) => 3,
         (Kind::Plane, Kind::Cylinder) => 5,
-        (Kind::Box, Kind::Box) => 8,
+        (Kind::Box, Kind::Box) => 9,
         _ => 4,
     }
 }

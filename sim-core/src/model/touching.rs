@@ -195,15 +195,19 @@ impl Builder<'_> {
         row[pair::RADIUS] = a.radius + b.radius + reach;
         row[pair::RADIUS_A] = a.radius + reach;
         row[pair::RADIUS_B] = b.radius + reach;
+        row[pair::SMALLER] = match a.solid.kind {
+            Kind::Plane => b.radius,
+            _ => a.radius.min(b.radius),
+        };
         row[pair::SIZE_A..][..3].copy_from_slice(&a.size);
         row[pair::SIZE_B..][..3].copy_from_slice(&b.size);
         row[pair::FLIP] = if sides.flipped { -1.0 } else { 1.0 };
         row[pair::MARGIN] = margin;
-        row[pair::MU] = s.mu.max(t.mu);
+        row[pair::MU] = s.mu.max(t.mu).max(MU_MIN);
         let condim = s.condim.max(t.condim);
         row[pair::RUBS] = if condim == 1 { 0.0 } else { 1.0 };
         row[pair::ROWS] = rows_of(self.scene.solver.cone, condim) as f64;
-        let weight = |borne: &super::touching::Borne<'_>| {
+        let weight = |borne: &Borne<'_>| {
             borne
                 .link
                 .map_or(0.0, |link| self.rules.link_inverse_weight[link])
@@ -442,6 +446,9 @@ impl Builder<'_> {
         }
     }
 }
+
+/// Least coefficient of friction of a contact that has any (MuJoCo: `mjMINMU`) [–].
+const MU_MIN: f64 = 1e-5;
 
 /// Contacts that there is room for by default, where more could be found: a hundred shapes in a heap.
 const DEFAULT_CONTACTS_MAX: usize = 512;

@@ -6,6 +6,8 @@ use super::error::ModelError;
 use super::inertia::{negative_moment, triangle_excess};
 use super::pose::{Pose, QUAT_SLACK};
 
+/// Largest ratio of frictional and normal impedance [–].
+const IMPRATIO_MAX: f64 = 1e5;
 /// Longest physics step [s]: longer ones are a slip of units.
 const DT_MAX: f64 = 1.0;
 /// Most physics steps in a control frame.
@@ -16,7 +18,7 @@ const ITERATIONS_MAX: usize = 10_000;
 const ROBOT_DOFS_MAX: usize = 512;
 /// Most dofs of all robots of a scene: its dense inverse at the reference pose takes a second.
 const SCENE_DOFS_MAX: usize = 2048;
-/// Most contacts that a world has room for: 70 boxes that all touch each other.
+/// Most contacts that a world has room for: of a heap of a thousand boxes.
 const CONTACTS_MAX: usize = 4096;
 /// Most rows of contacts: four for each, which is a pyramid's.
 const ROWS_MAX: usize = 4 * CONTACTS_MAX;
@@ -70,6 +72,8 @@ impl Description {
         )?;
         not_negative("solver tolerance", solver.tolerance)?;
         positive("solver impratio", solver.impratio)?;
+        let rule = "give at most 1e5: beyond, single precision has no digits left for the bodies";
+        within("solver impratio", solver.impratio, IMPRATIO_MAX, rule)?;
 
         let robots = self.robots.iter().map(|robot| robot.name.as_str());
         unique("scene", "robot", robots).map_err(|(_, error)| error)?;

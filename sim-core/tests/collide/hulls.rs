@@ -190,6 +190,8 @@ impl Found {
         // good to a few 1e-5
         assert!(self.tilted as f64 <= 2e-3 * self.shallow as f64, "{self:?}");
         assert!(self.worse as f64 <= share * self.deep as f64, "{self:?}");
+        // and those are another minimum, not another place
+        assert!(self.touching[0] < 1e-3 && self.worst < 0.25, "{self:?}");
         assert!(self.separated > 1000 && self.deep > 900, "{self:?}");
         // what is told is the distance along the normal that is told
         assert!(self.untrue < 1e-5, "{self:?}");

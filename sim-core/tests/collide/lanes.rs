@@ -107,6 +107,10 @@ fn single_precision_differs_from_double_by_less_than_1e_4_of_the_size_but_for_1_
         let apart = single.iter().zip(&double).filter(far).count();
         // two local minima of depth may change places, and fewer rounds of a curved one end sooner
         assert!(apart <= 4, "{:?}: {apart}", pairs[0].shapes);
+        let each = single.iter().zip(&double);
+        let worst = each.map(|(one, other)| (least(one) - least(other)).abs() / 0.1);
+        let worst = worst.fold(0.0, f64::max);
+        assert!(worst < 0.1, "{:?}: {worst}", pairs[0].shapes);
     }
 }
 

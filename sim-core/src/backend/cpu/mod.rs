@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Chunks a thread: enough that a slow block does not leave the others idle.
-const CHUNKS_PER_THREAD: usize = 4;
+pub(crate) const CHUNKS_PER_THREAD: usize = 4;
 
 struct Cpu<F: Lane> {
     chunks: Vec<Chunk<F>>,

@@ -110,7 +110,8 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, K
         };
         let first = Shape::read(cx, t, kinds.0, p, pair::SIZE_A, pair::HULL_A);
         let second = Shape::read(cx, t, kinds.1, p, pair::SIZE_B, pair::HULL_B);
-        let margin = cx.constant(numbers, p, pair::REACH) + rounding(radius);
+        let smaller = cx.constant(numbers, p, pair::SMALLER);
+        let margin = cx.constant(numbers, p, pair::REACH) + rounding(smaller);
         // the ball around one against the box around the other: a table's own ball is as wide as the table
         let mut near = near;
         if kinds.0 >= Kind::Box {
@@ -144,12 +145,12 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, K
     });
 }
 
-/// A distance that may be rounding, of shapes whose radii add up to `radius` [m].
+/// What the distances of corners of one face may differ by for rounding, of a shape with this radius [m].
 ///
 /// Contacts begin that much early: of faces that just touch, all corners do, and not those that were rounded down.
 #[inline(always)]
 pub(super) fn rounding<F: Num>(radius: F) -> F {
-    radius * F::c(4.0 * <F::Real as Real>::EPSILON)
+    radius * F::c(2.0 * <F::Real as Real>::EPSILON)
 }
 
 /// Axes of a shape.

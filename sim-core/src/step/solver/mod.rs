@@ -28,7 +28,6 @@ pub(super) use refine::{accelerations, refine};
 use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::factor::{multiply, solve as solve_linear};
-use crate::model::Cone;
 use crate::model::contact::row;
 use crate::{break_if, times, when};
 use line::{Line, search};
@@ -45,10 +44,10 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let t = &m.contacts;
     // contacts are so stiff that M is lost in the rounding of H a⁺; of H (a⁺ - a) less is asked
     let corrects = contacts::touching(cx, t);
-    // Sums of edges a thousand times as stiff as M leave a step its first three digits only: one more round finds the rest.
-    let polished = match (corrects, t.cone) {
-        (Some(corrects), Cone::Pyramidal) => C::F::select(corrects, zero, one),
-        _ => one,
+    // A factor of rows a million times as stiff as M leaves a step its first digits only: one more round finds the rest
+    let polished = match corrects {
+        Some(corrects) => C::F::select(corrects, zero, one),
+        None => one,
     };
     let mut calm = cx.var(polished);
     let mut busy = cx.var(C::F::select(acts, one, zero));
@@ -164,7 +163,7 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         }
         let ends = C::F::and(C::F::not(changed), half.lt(cx.get(&calm)));
         let done = C::F::or(ends, half.lt(cx.get(&settled)));
-        if let (Some(corrects), Cone::Pyramidal) = (corrects, t.cone) {
+        if let Some(corrects) = corrects {
             let again = C::F::and(corrects, changed);
             cx.set(&mut calm, C::F::select(again, zero, one));
         }
