@@ -170,6 +170,30 @@ def test_two_balls_that_collide_keep_their_momentum(cone):
         np.testing.assert_allclose(after, before, rtol=0, atol=1e-11 * np.abs(before).max())
 
 
+@CONES
+@pytest.mark.parametrize("mu", [0.0, 1e-3, 0.05])
+def test_slippery_cubes_fall_on_each_other_without_harm_in_single_precision(cone, mu):
+    # a pyramid's edges are impratio / (2 mu²) times as stiff as its normal
+    scene = tl.Scene(dt=1 / 480, substeps=8)
+    scene.solver(cone=cone)
+    scene.add_ground(mu=mu)
+    for number in range(3):
+        scene.add_body(name=f"c{number}", pos=(0, 0, 0.1 + 0.15 * number))
+        scene.add_box(body=f"c{number}", half_extents=(0.05,) * 3, mu=mu)
+    worlds = 32
+    rng = np.random.default_rng(0)
+    qd = rng.normal(size=(worlds, 18)) * np.tile([0.5, 0.5, 0.5, 3, 3, 3], 3)
+    with tl.launch(scene, worlds=worlds, fields=STATE) as sim:
+        frame = sim.write(joint_qd=qd)
+        fastest = 0.0
+        for _ in range(120):
+            frame = sim.step()
+            assert not (frame.status & 1).any()
+            fastest = max(fastest, float(np.abs(frame.joint_qd.reshape(worlds, 3, 6)[..., :3]).max()))
+    # the highest falls 0.4 m: what contacts push out may add some
+    assert fastest < 6.0
+
+
 def heap(contacts_max: int | None = None, rows_max: int | None = None) -> tl.Scene:
     """Three cubes over a ground; where they are is their worlds' matter."""
     scene = tl.Scene(dt=1 / 480, substeps=4, contacts_max=contacts_max, rows_max=rows_max)
@@ -200,6 +224,10 @@ def test_what_does_not_fit_is_counted_and_flagged_in_its_worlds_alone(precision,
             evaluated = first.copy()
             frame = after(sim, 3)
             frames[name] = (evaluated, frame.copy())
+    # the state that was written, which is shown and not stepped, does not fit either
+    shown = frames["tight"][0]
+    assert np.array_equal(shown.status & LEFT_OUT, LEFT_OUT * crowded)
+    assert np.array_equal(shown.contacts_left_out, 6 * crowded)
     tight, roomy = frames["tight"][1], frames["roomy"][1]
     assert np.array_equal(tight.status & LEFT_OUT, LEFT_OUT * crowded)
     assert np.array_equal(tight.contacts_left_out, 6 * crowded)

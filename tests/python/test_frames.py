@@ -15,6 +15,25 @@ import tightloop as tl
 from leftovers import alive, wait_until
 
 
+def test_empty_fields_are_not_taken_for_those_that_lie_where_they_do():
+    scene = tl.Scene()
+    scene.add_cube()
+    shapes = {
+        "contact_pair": (3, 0, 2),
+        "contact_force": (3, 0, 3),
+        "contact_distance": (3, 0),
+        "body_contact_force": (3, 1, 3),
+        "contact_count": (3,),
+    }
+    with tl.launch(scene, worlds=3, fields=tuple(shapes)) as sim:
+        frame = sim.reset()
+        copy = frame.copy()
+        for name, shape in shapes.items():
+            for array in (getattr(frame, name), getattr(copy, name)):
+                assert array.shape == shape, name
+                assert np.issubdtype(array.dtype, np.integer) == (name in ("contact_pair", "contact_count")), name
+
+
 def test_arrays_are_contiguous_read_only_views_with_worlds_first(pendulum):
     fields = ("joint_q", "joint_qd", "body_q", "mass_matrix")
     with tl.launch(pendulum, worlds=5, fields=fields) as sim:

@@ -14,7 +14,7 @@ use crate::lane::{Cx, Num, Real};
 use crate::math::vec3::{Vec3, cross, dot, scale, scale_add, sub};
 use crate::model::Cone;
 use crate::model::contact::{COUNT_LEFT_OUT, Class, Contacts, pair, row};
-use crate::step::collide::rounding;
+use crate::step::collide::contact_slack;
 use crate::step::constraint::impedance;
 
 #[inline(always)]
@@ -92,7 +92,7 @@ pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
                 aref[i] = -(velocity[i] * sliding);
             }
             let smaller = shared(cx, t, class, number, pair::SMALLER);
-            let pushes = position.lt(rounding(smaller));
+            let pushes = position.lt(contact_slack(smaller));
             let stiff = C::F::select(pushes, stiff, zero);
             cx.store(t.memory.rows, r, row::STIFFNESS, stiff);
             if t.cone == Cone::Elliptic {

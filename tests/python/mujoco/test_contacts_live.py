@@ -169,6 +169,16 @@ def test_accelerations_of_piles_are_mujocos(kinds, cone, precision):
     assert min(counts) == 0, "some have none"
 
 
+@pytest.mark.parametrize("cone", CONES)
+def test_friction_of_0_is_mujocos_least(cone):
+    pile = Pile(cone=cone)
+    pile.shape("plane", "ground", {}, mu=0.0)
+    for number in range(3):
+        pile.body(f"b{number}", np.array([0.3 * number, 0, 0.1]), turn(np.random.default_rng(number)))
+        pile.shape("box", f"s{number}", {"half_extents": (0.05, 0.06, 0.07)}, body=f"b{number}", mu=0.0)
+    assert max(assert_accelerations(pile, np.random.default_rng(0), "f64")) >= 3
+
+
 @pytest.mark.parametrize("precision", TOLERANCES)
 @pytest.mark.parametrize("cone", CONES)
 def test_a_centre_of_mass_may_lie_anywhere(cone, precision):

@@ -5,9 +5,10 @@
 //! along the best axis known until it stands off by a small gap. The axis found there is never worse than the one before;
 //! the axes of least depth are those that come back unchanged.
 
+use super::choose::select;
 use super::hull_axes::Axis;
 use super::manifold::Near;
-use super::support::{Support, difference, get3, select3, set3, var3};
+use super::support::{Support, difference, get3, set3, var3};
 use crate::lane::{Cx, Num, Real};
 use crate::math::vec3::{Vec3, add, cross, dot, scale, scale_add, sub};
 use crate::{break_if, times, when};
@@ -115,7 +116,7 @@ pub(super) fn closest<C: Cx, R: Restart<C>>(
         let gained = (before + settled_at).lt(after);
         let (x, n) = (
             C::F::select(gained, after, before),
-            select3(gained, found.normal, m),
+            select(gained, found.normal, m),
         );
         // half-way between the closest points, B moved back
         let middle = scale_add(sub(found.way, away), c(0.5), found.on_a);
@@ -123,8 +124,8 @@ pub(super) fn closest<C: Cx, R: Restart<C>>(
         let (kept_normal, kept_point) = (get3(cx, &normal), get3(cx, &point));
         let old = cx.get(&best);
         cx.set(&mut best, C::F::select(better, x, old));
-        set3(cx, &mut normal, select3(better, n, kept_normal));
-        set3(cx, &mut point, select3(better, middle, kept_point));
+        set3(cx, &mut normal, select(better, n, kept_normal));
+        set3(cx, &mut point, select(better, middle, kept_point));
         set3(cx, &mut axis, n);
         let settled = C::F::or(C::F::not(gained), C::F::or(gap.lt(before), limit.lt(x)));
         if R::TRIES > 0 {
@@ -213,7 +214,7 @@ fn apart<C: Cx>(
         let better = old.lt(bound);
         let kept = get3(cx, &normal);
         cx.set(&mut low, C::F::select(better, bound, old));
-        set3(cx, &mut normal, select3(better, scale(v, unit), kept));
+        set3(cx, &mut normal, select(better, scale(v, unit), kept));
         let done = (square - along).lt(tolerance.fma(square, noise * length));
         let done = C::F::or(done, limit.lt(bound));
         break_if!(cx, done);
@@ -242,10 +243,10 @@ fn apart<C: Cx>(
             let is = distance.lt(least);
             let l = (k + 1) % 3;
             least = C::F::select(is, distance, least);
-            foot = select3(is, x, foot);
+            foot = select(is, x, foot);
             s_best = C::F::select(is, t, s_best);
-            (o1, o2) = (select3(is, o[k], o1), select3(is, o[l], o2));
-            (p1, p2) = (select3(is, p[k], p1), select3(is, p[l], p2));
+            (o1, o2) = (select(is, o[k], o1), select(is, o[l], o2));
+            (p1, p2) = (select(is, p[k], p1), select(is, p[l], p2));
         }
         // by cross products: of thin triangles, as many near points of a curved surface make, dots lose too much
         let moment = [cross(e[0], w), cross(e[1], w), cross(e[2], w)];
@@ -263,11 +264,11 @@ fn apart<C: Cx>(
             let inside = C::F::and(C::F::and(zero.lt(s), zero.lt(t)), (s + t).lt(one));
             let is = C::F::and(C::F::and(wide, inside), distance.lt(least));
             least = C::F::select(is, distance, least);
-            foot = select3(is, scale(area, height * inverse), foot);
+            foot = select(is, scale(area, height * inverse), foot);
             s_best = C::F::select(is, s, s_best);
             t_best = C::F::select(is, t, t_best);
-            (o1, o2) = (select3(is, o[k], o1), select3(is, o[l], o2));
-            (p1, p2) = (select3(is, p[k], p1), select3(is, p[l], p2));
+            (o1, o2) = (select(is, o[k], o1), select(is, o[l], o2));
+            (p1, p2) = (select(is, p[k], p1), select(is, p[l], p2));
         }
         let stuck = C::F::not(least.lt(square));
         break_if!(cx, stuck);

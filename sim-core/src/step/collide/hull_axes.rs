@@ -5,9 +5,8 @@
 //! face of the Minkowski difference. An edge of the hull and one of a box along q do so where q lies between the
 //! normals n₁, n₂ beside the hull's edge: (n₁ · q)(n₂ · q) < 0 (Gregorius, GDC 2013).
 
-use super::support::{
-    Polyhedron, constant3, get3, negated, put3, rounding, select3, set3, signed, var3,
-};
+use super::choose::select;
+use super::support::{Polyhedron, constant3, get3, negated, put3, rounding, set3, signed, var3};
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{Mat3, Vec3, add, cross, dot, scale, sub, transform_back};
 use crate::{span, when};
@@ -106,7 +105,7 @@ impl<F: Num> Best<F> {
 pub(super) fn better<F: Num>(a: Axis<F>, b: Axis<F>, slack: F) -> Axis<F> {
     let second = (a.distance + slack).lt(b.distance);
     Axis {
-        normal: select3(second, b.normal, a.normal),
+        normal: select(second, b.normal, a.normal),
         distance: F::select(second, b.distance, a.distance),
     }
 }
@@ -126,7 +125,7 @@ pub(super) fn bounding_axis<F: Num, R: Reach<F>>(
     let apart = F::c(1e-12).lt(length);
     let ray = scale(center, F::c(-1.0).div(length.max(F::c(1e-12))));
     let up = [F::c(0.0), F::c(0.0), F::c(1.0)];
-    let normal = select3(apart, ray, up);
+    let normal = select(apart, ray, up);
     let distance = length - own.reach(normal) - other.reach(transform_back(axes, normal));
     let mut best = Axis { normal, distance };
     for i in 0..3 {
@@ -176,7 +175,7 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
         let farther = old.lt(x);
         let kept = get3(cx, &normal);
         cx.put(&mut best, C::F::select(farther, x, old));
-        put3(cx, &mut normal, select3(farther, m, kept));
+        put3(cx, &mut normal, select(farther, m, kept));
     });
     if !R::FACES.is_empty() {
         let near = cx.get(&best).lt(limit);
@@ -210,11 +209,7 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
                 let farther = old.lt(x);
                 let kept = get3(cx, &normal);
                 cx.set(&mut best, C::F::select(farther, x, old));
-                set3(
-                    cx,
-                    &mut normal,
-                    select3(farther, scale(axes[j], side), kept),
-                );
+                set3(cx, &mut normal, select(farther, scale(axes[j], side), kept));
                 let was = cx.get(&kind);
                 cx.set(&mut kind, C::F::select(farther, c(1.0), was));
             }
@@ -245,7 +240,7 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
                         let farther = C::F::and(old.lt(x), c(1e-6).lt(square));
                         cx.set(&mut edge_best, C::F::select(farther, x, old));
                         let kept = get3(cx, &edge_normal);
-                        set3(cx, &mut edge_normal, select3(farther, unit, kept));
+                        set3(cx, &mut edge_normal, select(farther, unit, kept));
                         let (number, at, along) = (cx.number(edge), cx.get(&place[0]), cx.get(&place[1]));
                         cx.set(&mut place[0], C::F::select(farther, number, at));
                         cx.set(&mut place[1], C::F::select(farther, c(j as f64), along));
@@ -256,7 +251,7 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
             let farther = (old + slack).lt(x);
             let (unit, kept) = (get3(cx, &edge_normal), get3(cx, &normal));
             cx.set(&mut best, C::F::select(farther, x, old));
-            set3(cx, &mut normal, select3(farther, unit, kept));
+            set3(cx, &mut normal, select(farther, unit, kept));
             let was = cx.get(&kind);
             cx.set(&mut kind, C::F::select(farther, c(2.0), was));
         });

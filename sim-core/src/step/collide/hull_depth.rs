@@ -5,10 +5,11 @@
 //! n₂, the depth is at least the lesser of (a - b) · n₁ and (a - b) · n₂ if both are positive, for any b of the second
 //! hull; so with b its farthest point against n₁ + n₂ few edges are left to be tried with all of the second hull.
 
+use super::choose::select;
 use super::gjk::Restart;
 use super::hull_axes::Axis;
 use super::support::{
-    Polyhedron, Support, Turned, constant3, get3, negated, pick3, select3, set3, signed, var3,
+    Polyhedron, Support, Turned, constant3, get3, negated, pick3, set3, signed, var3,
 };
 use crate::lane::{Cx, Num, Table};
 use crate::math::vec3::{
@@ -39,7 +40,7 @@ impl<C: Cx> Best<C> {
         let (old, kept) = (cx.get(&self.depth), get3(cx, &self.axis));
         let better = depth.lt(old);
         cx.set(&mut self.depth, C::F::select(better, depth, old));
-        set3(cx, &mut self.axis, select3(better, axis, kept));
+        set3(cx, &mut self.axis, select(better, axis, kept));
     }
 }
 

@@ -5,6 +5,7 @@
 //! sphere is a point, a capsule a segment, with a radius about it. Two hulls: GJK at a stand-off, and where they penetrate
 //! more deeply, the nearest face of their Minkowski difference.
 
+use super::choose::select;
 use super::gjk::{NoRestart, closest};
 use super::hull_axes::{
     Best, BoxReach, PointReach, Reach, SegmentReach, bounding_axis, hull_axis, slack,
@@ -16,7 +17,7 @@ use super::sides::{BoxSide, HullSide, SegmentSide};
 use super::spread::Spread;
 use super::support::{
     Block, Point, Polyhedron, Segment, Support, Turned, across, constant3, get3, negated, pick3,
-    select3, set3, var3,
+    set3, var3,
 };
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{
@@ -64,10 +65,10 @@ pub fn plane_hull<C: Cx>(
         let mut lowest = var3(cx, [c(0.0), c(0.0), c(1e18)]);
         span!(cx, row in first, end, {
             for k in 0..4 {
-                let x = seen(&view, constant3(cx, tables.vertices, row, 3 * k));
+                let x = transform_back(&view, constant3(cx, tables.vertices, row, 3 * k));
                 let old = get3(cx, &lowest);
                 let deeper = (x[2] + c(2e-6) * size).lt(old[2]);
-                set3(cx, &mut lowest, select3(deeper, x, old));
+                set3(cx, &mut lowest, select(deeper, x, old));
             }
         });
         let deepest = get3(cx, &lowest);
@@ -85,12 +86,12 @@ pub fn plane_hull<C: Cx>(
             let mut is = cx.var(c(0.0));
             span!(cx, row in first, end, {
                 for k in 0..4 {
-                    let x = seen(&view, constant3(cx, tables.vertices, row, 3 * k));
+                    let x = transform_back(&view, constant3(cx, tables.vertices, row, 3 * k));
                     let score = spread.score(x[0], x[1]);
                     let (old, kept, had) = (cx.get(&best), get3(cx, &place), cx.get(&is));
                     let farther = C::F::and(old.lt(score), (x[2] + height).lt(margin));
                     cx.set(&mut best, C::F::select(farther, score, old));
-                    set3(cx, &mut place, select3(farther, x, kept));
+                    set3(cx, &mut place, select(farther, x, kept));
                     cx.set(&mut is, C::F::select(farther, c(1.0), had));
                 }
             });
@@ -116,12 +117,6 @@ pub fn plane_hull<C: Cx>(
             );
         }
     });
-}
-
-/// A vector in a basis.
-#[inline(always)]
-fn seen<F: Num>(view: &Mat3<F>, x: Vec3<F>) -> Vec3<F> {
-    [dot(view[0], x), dot(view[1], x), dot(view[2], x)]
 }
 
 /// A sphere and a hull: one point.
@@ -425,7 +420,7 @@ fn deepest_point<C: Cx>(
             pick3(cx, edges, best.edge, 3),
         );
         let (first, second) = (best.along.lt(c(0.5)), best.along.lt(c(1.5)));
-        let q = select3(first, axes[0], select3(second, axes[1], axes[2]));
+        let q = select(first, axes[0], select(second, axes[1], axes[2]));
         let mixed = dot(d, q);
         let square = mixed.fnma(mixed, c(1.0)).max(c(1e-7));
         let way = sub(corner, p);

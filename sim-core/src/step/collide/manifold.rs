@@ -5,11 +5,14 @@
 //! of the shapes along n, so whatever is found is sound, and where the least is not among them, the pair's closest point is
 //! added. Of more than four, the deepest and the three that span most are kept.
 
+use super::choose::select;
 use super::points::Points;
 use super::spread::Spread;
-use super::support::{across, get3, rounding, select3, set3, var3};
+use super::support::{across, get3, rounding, set3, var3};
 use crate::lane::{Cx, MaskOf, Num, Table};
-use crate::math::vec3::{Mat3, Vec3, cross, dot, scale_add, sub, transform, transform_add};
+use crate::math::vec3::{
+    Mat3, Vec3, cross, dot, scale_add, sub, transform, transform_add, transform_back,
+};
 use crate::model::cut::Cut;
 use crate::model::hull_tables::CORNERS_MAX;
 use crate::{break_if, times, when};
@@ -101,8 +104,8 @@ pub(super) fn add_points<C: Cx>(
         times!(cx, i in CORNERS_MAX + 1, {
             let p = first.corner(cx, i);
             let q = second.corner(cx, i);
-            let p = along(&basis, sub(p, near.point));
-            let q = along(&basis, sub(q, near.point));
+            let p = transform_back(&basis, sub(p, near.point));
+            let q = transform_back(&basis, sub(q, near.point));
             for k in 0..3 {
                 cx.fill(cut.corners, i, k, p[k]);
                 cx.fill(cut.corners, i, 3 + k, q[k]);
@@ -114,8 +117,8 @@ pub(super) fn add_points<C: Cx>(
             }
         });
         let zeroth = cx.at(0);
-        let p = plane_of(cx, cut, zeroth, 0, along(&basis, first.normal()));
-        let q = plane_of(cx, cut, zeroth, 3, along(&basis, second.normal()));
+        let p = plane_of(cx, cut, zeroth, 0, transform_back(&basis, first.normal()));
+        let q = plane_of(cx, cut, zeroth, 3, transform_back(&basis, second.normal()));
         set3(cx, &mut plane, [p.slope[0], p.slope[1], p.base]);
         half_planes(cx, cut, counts[1], q.turn);
         let steep = C::F::or(p.facing.lt(c(FACING)), q.facing.lt(c(FACING)));
@@ -164,12 +167,6 @@ pub(super) fn add_points<C: Cx>(
         };
         out.add(cx, is, point, distance, normal);
     }
-}
-
-/// A vector in a basis.
-#[inline(always)]
-fn along<F: Num>(basis: &Mat3<F>, x: Vec3<F>) -> Vec3<F> {
-    [dot(basis[0], x), dot(basis[1], x), dot(basis[2], x)]
 }
 
 /// The plane through corner 0 of a side across its outward normal `m`, both in the basis.
@@ -362,14 +359,14 @@ fn deepest<C: Cx>(
             let old: Vec3<C::F> = get3(cx, &best);
             // of points as deep up to rounding the first stays, so that resting contacts keep theirs
             let deeper = (x[2] + least).lt(old[2]);
-            set3(cx, &mut best, select3(deeper, x, old));
+            set3(cx, &mut best, select(deeper, x, old));
         }
         let done = (most - c(1.5)).lt(cx.number(i));
         break_if!(cx, done);
     });
     let (x, old) = (get3(cx, &best), get3(cx, spot));
     let deep = x[2].lt(distance + least + least);
-    set3(cx, spot, select3(deep, x, old));
+    set3(cx, spot, select(deep, x, old));
     cx.set(closest, C::F::select(deep, c(0.0), c(1.0)));
 }
 
@@ -400,7 +397,7 @@ fn farthest<C: Cx>(
             let farther = C::F::and(old.lt(score), x[2].lt(c(0.5 * NONE)));
             cx.set(&mut best, C::F::select(farther, score, old));
             let kept = get3(cx, &place);
-            set3(cx, &mut place, select3(farther, x, kept));
+            set3(cx, &mut place, select(farther, x, kept));
             let had = cx.get(&is);
             cx.set(&mut is, C::F::select(farther, c(1.0), had));
         }

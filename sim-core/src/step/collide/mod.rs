@@ -111,7 +111,7 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, K
         let first = Shape::read(cx, t, kinds.0, p, pair::SIZE_A, pair::HULL_A);
         let second = Shape::read(cx, t, kinds.1, p, pair::SIZE_B, pair::HULL_B);
         let smaller = cx.constant(numbers, p, pair::SMALLER);
-        let margin = cx.constant(numbers, p, pair::REACH) + rounding(smaller);
+        let margin = cx.constant(numbers, p, pair::REACH) + contact_slack(smaller);
         // the ball around one against the box around the other: a table's own ball is as wide as the table
         let mut near = near;
         if kinds.0 >= Kind::Box {
@@ -149,7 +149,7 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, K
 ///
 /// Contacts begin that much early: of faces that just touch, all corners do, and not those that were rounded down.
 #[inline(always)]
-pub(super) fn rounding<F: Num>(radius: F) -> F {
+pub(super) fn contact_slack<F: Num>(radius: F) -> F {
     radius * F::c(2.0 * <F::Real as Real>::EPSILON)
 }
 

@@ -1,8 +1,9 @@
 //! Another axis to start from, where a curved shape penetrates: the best of many directions away from the one known.
 
+use super::choose::select;
 use super::gjk::Restart;
 use super::hull_axes::{Axis, Reach};
-use super::support::{Polyhedron, get3, negated, select3, set3, var3};
+use super::support::{Polyhedron, get3, negated, set3, var3};
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{Mat3, Vec3, dot, transform_back};
 use crate::times;
@@ -75,7 +76,7 @@ impl<C: Cx, A: Reach<C::F>, B: Extent<C>> Restart<C> for Samples<'_, C::F, A, B>
             let is = C::F::and(old.lt(distance), other);
             let kept = get3(cx, &axis);
             cx.set(&mut best, C::F::select(is, distance, old));
-            set3(cx, &mut axis, select3(is, n, kept));
+            set3(cx, &mut axis, select(is, n, kept));
         });
         Axis {
             normal: get3(cx, &axis),

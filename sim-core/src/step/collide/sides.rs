@@ -1,7 +1,8 @@
 //! The faces and segments of shapes that lie on others.
 
+use super::choose::select;
 use super::manifold::{Side, aligned};
-use super::support::{Polyhedron, constant3, pick3, select3, signed};
+use super::support::{Polyhedron, constant3, pick3, signed};
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{
     Mat3, Vec3, cross, dot, scale, scale_add, sub, transform, transform_add, transform_back,
@@ -103,10 +104,10 @@ impl<F: Num> BoxSide<F> {
             let is = most.lt(facing[j].abs());
             most = most.max(facing[j].abs());
             best = BoxSide {
-                outward: select3(is, other.outward, best.outward),
-                center: select3(is, other.center, best.center),
-                u: select3(is, other.u, best.u),
-                v: select3(is, other.v, best.v),
+                outward: select(is, other.outward, best.outward),
+                center: select(is, other.center, best.center),
+                u: select(is, other.u, best.u),
+                v: select(is, other.v, best.v),
             };
         }
         best
@@ -224,13 +225,13 @@ impl<F: Num> CylinderSide<F> {
         let end = scale(axes[2], signed(F::c(1.0), local[2]));
         let half = scale(axes[2], half_height);
         CylinderSide {
-            outward: select3(cap, end, rim),
-            center: select3(
+            outward: select(cap, end, rim),
+            center: select(
                 cap,
                 scale_add(end, half_height, center),
                 scale_add(rim, radius, center),
             ),
-            u: select3(cap, scale(rim, radius), half),
+            u: select(cap, scale(rim, radius), half),
             v: scale(cross(end, rim), radius),
             count: F::select(cap, F::c(CORNERS_MAX as f64), F::c(2.0)),
             cap,
@@ -248,10 +249,10 @@ impl<F: Num> CylinderSide<F> {
     pub fn select(mask: F::Mask, a: &CylinderSide<F>, b: &CylinderSide<F>) -> CylinderSide<F> {
         let cap = F::or(F::and(mask, a.cap), F::and(F::not(mask), b.cap));
         CylinderSide {
-            outward: select3(mask, a.outward, b.outward),
-            center: select3(mask, a.center, b.center),
-            u: select3(mask, a.u, b.u),
-            v: select3(mask, a.v, b.v),
+            outward: select(mask, a.outward, b.outward),
+            center: select(mask, a.center, b.center),
+            u: select(mask, a.u, b.u),
+            v: select(mask, a.v, b.v),
             count: F::select(mask, a.count, b.count),
             cap,
         }

@@ -1,5 +1,6 @@
 //! Farthest points of shapes, and vectors of machine variables.
 
+use super::choose::select;
 use crate::lane::{Cx, Fixed, Num, Real};
 use crate::math::vec3::{Mat3, Vec3, dot, scale, scale_add, sub, transform_add, transform_back};
 use crate::model::hull_tables::HullTables;
@@ -9,16 +10,6 @@ use crate::span;
 #[inline(always)]
 pub(super) fn rounding<F: Num>() -> F {
     F::c(16.0 * F::Real::EPSILON)
-}
-
-/// `a` where the mask holds, else `b`.
-#[inline(always)]
-pub(super) fn select3<F: Num>(mask: F::Mask, a: Vec3<F>, b: Vec3<F>) -> Vec3<F> {
-    [
-        F::select(mask, a[0], b[0]),
-        F::select(mask, a[1], b[1]),
-        F::select(mask, a[2], b[2]),
-    ]
 }
 
 /// New variables.
@@ -87,7 +78,7 @@ pub(super) fn across<F: Num>(a: Vec3<F>) -> Vec3<F> {
     // without its largest or middle component at least a third of its square is left
     let flat = F::c(0.6).lt(a[0].abs());
     let zero = F::c(0.0);
-    let b = select3(flat, [-a[1], a[0], zero], [zero, -a[2], a[1]]);
+    let b = select(flat, [-a[1], a[0], zero], [zero, -a[2], a[1]]);
     scale(b, F::c(1.0).div(dot(b, b).sqrt()))
 }
 
