@@ -138,8 +138,8 @@ class Scene(Shaped):
             tolerance: The solver stops once its scaled improvement is smaller [–]; at 0 only rounding stops it.
             cone: Friction cone of contacts, ``"elliptic"`` or ``"pyramidal"``.
             impratio: Frictional over normal impedance of contacts [–], above 0, at most 1e5. In float32 the edges of a
-                pyramidal cone are at most 5e4 times as stiff as its normal, which MuJoCo's exceed where ``mu`` is
-                below 0.1 at 1000.
+                pyramidal cone are at most 1e4 times as stiff as its normal, which MuJoCo's exceed where ``mu`` is
+                below 0.22 at 1000.
         """
         checks.choice("cone", cone, ("elliptic", "pyramidal"))
         self._solver = Solver(

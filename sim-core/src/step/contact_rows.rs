@@ -115,9 +115,9 @@ pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
 
 /// Most stiffness in `f32` of a pyramid's edge over that of the elliptic cone's normal row [–].
 ///
-/// An edge is as rigid then as `f32` can tell; with four times as much, rounding threw bodies off. MuJoCo's is more
-/// below mu = 0.1 at the default impratio of 1000.
-const EDGES_MAX: f64 = 5e4;
+/// An edge is as rigid then as `f32` can tell; with 20 times as much, rounding threw bodies off. MuJoCo's is more
+/// below mu = 0.22 at the default impratio of 1000.
+const EDGES_MAX: f64 = 1e4;
 
 /// What MuJoCo's J q̈ lacks of ours: a free joint's acceleration is of its frame's origin there, of the centre of mass
 /// here, and they differ by ω × (ω × r). None where no centre lies off its frame.

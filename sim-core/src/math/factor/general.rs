@@ -14,11 +14,10 @@ fn subtract<F: Num>(y: &mut [F], s: F, x: &[F]) {
 
 #[inline(always)]
 fn factor<F: Num>(pattern: &Pattern, block: &Block, a: &mut [F]) {
-    let one = F::c(1.0);
     for k in (0..block.size).rev() {
         let (above, rest) = a.split_at_mut(tri(k, 0));
         let row = &mut rest[..k + 1];
-        let inverse = one.div(row[k]);
+        let inverse = super::inverse(row[k]);
         row[k] = inverse;
         let runs = pattern.runs(block, k);
         for (n, run) in runs.iter().enumerate().rev() {

@@ -34,6 +34,14 @@ pub fn solve<F: Num>(pattern: &Pattern, a: &mut [F], x: &mut [F]) {
     }
 }
 
+/// 1/D of a pivot, or 0 for one that is not above 0: rounding has left nothing of it, and its unknown becomes 0 but for
+/// what the others make of it.
+#[inline(always)]
+fn inverse<F: Num>(pivot: F) -> F {
+    let (zero, one) = (F::c(0.0), F::c(1.0));
+    F::select(zero.lt(pivot), one.div(pivot), zero)
+}
+
 /// y = A x for a packed symmetric A.
 #[inline(always)]
 pub fn multiply<F: Num>(pattern: &Pattern, a: &[F], x: &[F], y: &mut [F]) {

@@ -119,7 +119,7 @@ impl<'a, F: Num, const S: usize> Removed<'a, F, S> {
             l[k][..k + 1].copy_from_slice(&rows[k][length..]);
         }
         for k in (0..S).rev() {
-            let inverse = F::c(1.0).div(l[k][k]);
+            let inverse = super::inverse(l[k][k]);
             l[k][k] = inverse;
             for i in (0..k).rev() {
                 let share = l[k][i] * inverse;

@@ -28,6 +28,7 @@ pub(super) use refine::{accelerations, refine};
 use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::factor::{multiply, solve as solve_linear};
+use crate::model::Cone;
 use crate::model::contact::row;
 use crate::{break_if, times, when};
 use line::{Line, search};
@@ -106,8 +107,11 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let changed = half.lt(cx.get(&moved));
         let later = half.lt(cx.get(&round));
         let early = cx.get(&round).lt(C::F::c(trusted_rounds::<C::F>()));
-        // a whole step overshoots where a contact slides
-        let trusted = C::F::and(early, cx.get(&curved).lt(half));
+        // a whole step overshoots where a contact slides, and where a pyramid's edges are too stiff for their factor
+        let mut trusted = C::F::and(early, cx.get(&curved).lt(half));
+        if let (Some(corrects), Cone::Pyramidal) = (corrects, t.cone) {
+            trusted = C::F::and(trusted, C::F::not(corrects));
+        }
         let searches = C::F::and(C::F::or(changed, later), C::F::not(trusted));
         let mut length = cx.var(one);
         let mut settled = cx.var(zero);
