@@ -32,10 +32,11 @@ type Scalar = Block<f32, f32>;
 type OnTape = Block<Recorded, RecordedVariable>;
 
 /// What stages leave for each other, and the state.
-const SLOTS: [WorkSlot; 25] = {
+const SLOTS: [WorkSlot; 26] = {
     use WorkSlot::*;
     [
         JointQ,
+        JointQRest,
         JointQd,
         JointQdd,
         Unconverged,
@@ -358,6 +359,7 @@ fn a_control_frame_is_recorded_as_a_loop_over_substeps() {
         let m = &case.m;
         let reads = [
             JointQ,
+            JointQRest,
             JointQd,
             JointQdd,
             Unconverged,
@@ -366,7 +368,7 @@ fn a_control_frame_is_recorded_as_a_loop_over_substeps() {
             JointTargetQ,
             JointTargetQd,
         ];
-        let writes = [JointQ, JointQd, JointQdd, Unconverged, LeftOut];
+        let writes = [JointQ, JointQRest, JointQd, JointQdd, Unconverged, LeftOut];
         let start = Instant::now();
         let recording = recorded(m, &reads, &writes, |cx, b| {
             times!(cx, SUBSTEPS, {

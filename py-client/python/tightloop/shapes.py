@@ -30,7 +30,7 @@ class Surface(TypedDict, total=False):
     kd: float | None
     """Contact damping [1/s], as Newton's shape ``kd``, 100, at most 1e12."""
     kf: float | None
-    """Friction damping [N·s/m], as Newton's shape ``kf``, 1000, at most 1e12, which gives MuJoCo's ``solreffriction``."""
+    """Friction damping [N·s/m], as Newton's shape ``kf``, 1000, at most 1e12: MuJoCo's ``solreffriction``."""
     margin: float | None
     """Distance at which contact forces begin [m], 0."""
     gap: float | None

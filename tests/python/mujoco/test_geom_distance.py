@@ -1,4 +1,4 @@
-"""Distances and normals of cylinders against MuJoCo's `mj_geomDistance`, which is another algorithm than its contacts'."""
+"""Distances and normals of cylinders against MuJoCo's `mj_geomDistance`, which is not how it finds contacts."""
 
 from __future__ import annotations
 
