@@ -128,7 +128,8 @@ class Shaped:
         Args:
             path: The file: STL, OBJ, COLLADA, or glTF.
             scale: Factor on the file's coordinates [–], one for all axes or one for each; a negative one mirrors.
-            max_hull_vertices: Most vertices of the hull, 8 to 1024.
+            max_hull_vertices: Most vertices of the hull, 8 to 1024. Contacts keep twelve corners of a face, and try 48
+                of the edges that a deep penetration may go by: enough for 64.
             convex_decomposition: Whether a concave mesh becomes several convex hulls rather than one.
             pos: Where the file's origin stands in the world, or in the body's frame [m].
             quat: Orientation of the file's axes there (x, y, z, w).
