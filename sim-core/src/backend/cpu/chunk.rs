@@ -4,7 +4,7 @@ use super::contacts;
 use super::dispatch::RunStage;
 use super::transfer::{self, Arena};
 use crate::backend::Values;
-use crate::batch::{Block, Field, Layout, status};
+use crate::batch::{Block, Field, Layout};
 use crate::lane::{Lane, Real};
 use crate::model::Model;
 use crate::model::constants::Constants;
@@ -31,7 +31,7 @@ pub(super) struct Job<F: Lane> {
 
 /// State and commands of a block: groups of one number a dof, then positions and their rests, one a coordinate.
 #[derive(Clone, Copy)]
-enum StateField {
+pub(super) enum StateField {
     Qd,
     Qdd,
     F,
@@ -43,7 +43,7 @@ enum StateField {
 
 /// Numbers of a world's state and commands.
 #[derive(Clone, Copy)]
-struct Shape {
+pub(super) struct Shape {
     dofs: usize,
     coords: usize,
 }
@@ -55,7 +55,7 @@ impl Shape {
             coords: m.coords,
         }
     }
-    fn start(self, field: StateField) -> usize {
+    pub(super) fn start(self, field: StateField) -> usize {
         let groups = (field as usize).min(StateField::Q as usize);
         let rests = usize::from(matches!(field, StateField::QRest));
         groups * self.dofs + rests * self.coords
@@ -144,14 +144,14 @@ fn stages_for(layout: &Layout) -> Vec<Stage> {
 }
 
 pub(super) struct Chunk<F: Lane> {
-    worlds: Range<usize>,
+    pub(super) worlds: Range<usize>,
     /// `(blocks, numbers of a world, WIDTH)`
-    state: Vec<F::Real>,
-    /// Control frames since the reset of each world.
-    steps: Vec<u64>,
-    status: Vec<u32>,
+    pub(super) state: Vec<F::Real>,
+    /// Control frames since the reset of each world; those of a frozen one are as many as it was well.
+    pub(super) steps: Vec<u64>,
+    pub(super) status: Vec<u32>,
     /// Most contacts that did not fit in a substep of the last frame, or in the state that is shown.
-    left_out: Vec<u32>,
+    pub(super) left_out: Vec<u32>,
     pub block: Block<F, F>,
     /// Scratch memory of the machine.
     pub memory: Vec<F>,
@@ -293,9 +293,11 @@ impl<F: Lane> Chunk<F> {
             for pass in 0..=substeps {
                 let evaluates = pass == substeps;
                 if evaluates {
+                    if substeps > 0 {
+                        self.note(shape, block, state.clone());
+                    }
                     // before the evaluation, which moves the warm start: what is read must not change the run
                     self.store(shape, state.clone());
-                    self.count(block, substeps > 0);
                 }
                 let stages = if evaluates {
                     &job.evaluate[..]
@@ -378,58 +380,5 @@ impl<F: Lane> Chunk<F> {
                 x.store(to);
             }
         }
-    }
-
-    /// Counts the frame where there was one, and notes trouble.
-    #[inline(always)]
-    fn count(&mut self, block: usize, stepped: bool) {
-        let (zero, one, infinity) = (F::c(0.0), F::c(1.0), F::c(f64::INFINITY));
-        let mut trouble = zero;
-        for group in [&self.block.joint_q, &self.block.joint_qd] {
-            for x in group {
-                // false for NaN too
-                trouble = F::select(x.abs().lt(infinity), trouble, one);
-            }
-        }
-        self.flag(block, trouble, status::NOT_FINITE);
-        if stepped {
-            self.flag(block, self.block.unconverged[0], status::NOT_CONVERGED);
-            let worlds = self.worlds_of(block);
-            for step in &mut self.steps[worlds] {
-                *step += 1;
-            }
-        }
-    }
-
-    /// Notes the contacts that did not fit in a substep, or in the state that is shown.
-    #[inline(always)]
-    fn count_left_out(&mut self, block: usize) {
-        let left_out = self.block.left_out[0];
-        self.flag(block, left_out, status::CONTACTS_LEFT_OUT);
-        left_out.store(&mut self.lanes);
-        let worlds = self.worlds_of(block);
-        for (count, lane) in self.left_out[worlds].iter_mut().zip(&self.lanes) {
-            *count = lane.to_usize() as u32;
-        }
-    }
-
-    /// Sets a bit of the status where a number is above 0, and clears it elsewhere.
-    #[inline(always)]
-    fn flag(&mut self, block: usize, number: F, bit: u32) {
-        number.store(&mut self.lanes);
-        let worlds = self.worlds_of(block);
-        for (status, lane) in self.status[worlds].iter_mut().zip(&self.lanes) {
-            *status = if *lane > F::Real::default() {
-                *status | bit
-            } else {
-                *status & !bit
-            };
-        }
-    }
-
-    /// The worlds of a block, counted from the chunk's first.
-    fn worlds_of(&self, block: usize) -> Range<usize> {
-        let first = block * F::WIDTH;
-        first..(first + F::WIDTH).min(self.worlds.len())
     }
 }

@@ -6,6 +6,7 @@ mod chunk;
 mod contacts;
 mod dispatch;
 mod transfer;
+mod trouble;
 
 pub use dispatch::{available, create};
 

@@ -1,0 +1,97 @@
+//! Trouble of worlds: told in their status, and kept from what comes after.
+
+use super::chunk::{Chunk, Shape, StateField};
+use crate::batch::status;
+use crate::lane::{Lane, Real};
+use std::ops::Range;
+
+impl<F: Lane> Chunk<F> {
+    /// Counts a frame, and notes its trouble. `state` is the block's before the frame.
+    ///
+    /// A world that is no longer finite is frozen: it goes back to that state, its steps stand still, and so it stays until
+    /// it is reset.
+    #[inline(always)]
+    pub(super) fn note(&mut self, shape: Shape, block: usize, state: Range<usize>) {
+        let (zero, one, infinity) = (F::c(0.0), F::c(1.0), F::c(f64::INFINITY));
+        let mut trouble = zero;
+        for group in [&self.block.joint_q, &self.block.joint_qd] {
+            for x in group {
+                // false for NaN too
+                trouble = F::select(x.abs().lt(infinity), trouble, one);
+            }
+        }
+        self.flag(block, self.block.unconverged[0], status::NOT_CONVERGED);
+        let worlds = self.worlds_of(block);
+        trouble.store(&mut self.lanes);
+        let mut frozen = false;
+        for (lane, world) in worlds.enumerate() {
+            if self.lanes[lane] > F::Real::default() || self.is_frozen(world) {
+                self.status[world] = status::NOT_FINITE;
+                self.lanes[lane] = F::Real::of(1.0);
+                frozen = true;
+            } else {
+                self.steps[world] += 1;
+            }
+        }
+        if frozen {
+            self.put_back(shape, state);
+        }
+    }
+
+    /// State of the worlds whose `lanes` are above 0, as it was.
+    #[inline(always)]
+    fn put_back(&mut self, shape: Shape, state: Range<usize>) {
+        let frozen = F::c(0.5).lt(F::load(&self.lanes));
+        let b = &mut self.block;
+        let groups = [
+            (StateField::Qd, &mut b.joint_qd),
+            (StateField::Qdd, &mut b.joint_qdd),
+            (StateField::Q, &mut b.joint_q),
+            (StateField::QRest, &mut b.joint_q_rest),
+        ];
+        for (field, group) in groups {
+            let first = state.start + shape.start(field) * F::WIDTH;
+            let from = self.state[first..].chunks_exact(F::WIDTH);
+            for (x, from) in group.iter_mut().zip(from) {
+                *x = F::select(frozen, F::load(from), *x);
+            }
+        }
+    }
+
+    /// Notes the contacts that did not fit in a substep, or in the state that is shown.
+    #[inline(always)]
+    pub(super) fn count_left_out(&mut self, block: usize) {
+        let left_out = self.block.left_out[0];
+        self.flag(block, left_out, status::CONTACTS_LEFT_OUT);
+        left_out.store(&mut self.lanes);
+        for (lane, world) in self.worlds_of(block).enumerate() {
+            let count = self.lanes[lane].to_usize() as u32;
+            self.left_out[world] = if self.is_frozen(world) { 0 } else { count };
+        }
+    }
+
+    /// Sets a bit of the status where a number is above 0, and clears it elsewhere; a frozen world has no other trouble.
+    #[inline(always)]
+    fn flag(&mut self, block: usize, number: F, bit: u32) {
+        number.store(&mut self.lanes);
+        for (lane, world) in self.worlds_of(block).enumerate() {
+            let is_set = self.lanes[lane] > F::Real::default() && !self.is_frozen(world);
+            let status = &mut self.status[world];
+            *status = if is_set {
+                *status | bit
+            } else {
+                *status & !bit
+            };
+        }
+    }
+
+    fn is_frozen(&self, world: usize) -> bool {
+        self.status[world] & status::NOT_FINITE != 0
+    }
+
+    /// The worlds of a block, counted from the chunk's first.
+    pub(super) fn worlds_of(&self, block: usize) -> Range<usize> {
+        let first = block * F::WIDTH;
+        first..(first + F::WIDTH).min(self.worlds.len())
+    }
+}

@@ -1,0 +1,172 @@
+//! A world that is no longer finite stands still until it is reset, and its neighbours do not notice.
+
+mod common;
+
+use common::{Demo, Run, command, lesson_with_table};
+use sim_core::backend::{Values, cpu};
+use sim_core::batch::{Field, status};
+use sim_core::simulation::{Lanes, Options, Precision};
+
+const WORLDS: usize = 37;
+const FIELDS: [Field; 8] = [
+    Field::JointQ,
+    Field::JointQd,
+    Field::JointQdd,
+    Field::BodyQ,
+    Field::ContactCount,
+    Field::ContactForce,
+    Field::Status,
+    Field::Step,
+];
+/// The frame in which the sick worlds are struck, and the frames in all: contacts begin in frame 14.
+const STRUCK: usize = 15;
+const FRAMES: usize = 22;
+
+/// Beyond any number that stays finite for a frame [N·m].
+fn blow(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 1e38,
+        Precision::F64 => 1e307,
+    }
+}
+
+/// Bits of the fields of every world, frame by frame; the sick worlds are struck once, and reset in the last frame but two
+/// if `heals`.
+fn run(
+    lanes: Lanes,
+    precision: Precision,
+    threads: usize,
+    sick: &[usize],
+    heals: bool,
+) -> Vec<Vec<Vec<u64>>> {
+    let model = lesson_with_table(Demo::Torque, true).compile().unwrap();
+    let options = Options {
+        worlds: WORLDS,
+        precision,
+        lanes,
+        threads: Some(threads),
+        fields: FIELDS[..6].to_vec(),
+    };
+    let mut run = Run::new(&model, options);
+    let dofs = model.dofs();
+    (0..FRAMES)
+        .map(|frame| {
+            let (_, row) = command(Demo::Torque, frame);
+            let mut rows = vec![0.0; WORLDS * dofs];
+            for world in 0..WORLDS {
+                for (j, tau) in row.iter().enumerate() {
+                    rows[world * dofs + j] = tau * (1.0 + 0.01 * world as f64);
+                }
+                if frame == STRUCK && sick.contains(&world) {
+                    rows[world * dofs..(world + 1) * dofs].fill(blow(precision));
+                }
+            }
+            run.sim
+                .command(Field::JointF, 0..dofs, Values::F64(&rows))
+                .unwrap();
+            if heals && frame == FRAMES - 2 {
+                let mask: Vec<bool> = (0..WORLDS).map(|world| sick.contains(&world)).collect();
+                run.sim.reset(Some(&mask)).unwrap();
+                run.sim
+                    .command(Field::JointF, 0..dofs, Values::F64(&rows))
+                    .unwrap();
+            }
+            run.step();
+            let bits = |world: usize| {
+                FIELDS[..7]
+                    .iter()
+                    .flat_map(|&field| run.get(field, world))
+                    .map(f64::to_bits)
+                    .collect()
+            };
+            (0..WORLDS).map(bits).collect()
+        })
+        .collect()
+}
+
+fn machines() -> impl Iterator<Item = (Lanes, Precision)> {
+    [
+        (Lanes::Sixteen, Precision::F32),
+        (Lanes::Eight, Precision::F32),
+        (Lanes::Scalar, Precision::F32),
+        (Lanes::Scalar, Precision::F64),
+    ]
+    .into_iter()
+    .filter(|&(lanes, _)| cpu::available(lanes))
+}
+
+#[test]
+fn a_world_that_is_not_finite_is_frozen_and_the_others_keep_their_bits() {
+    for (lanes, precision) in machines() {
+        let sick = [0, 5, 17, 36];
+        let well = run(lanes, precision, 2, &[], false);
+        let found = run(lanes, precision, 1, &sick, false);
+        for (frame, (worlds, expected)) in found.iter().zip(&well).enumerate() {
+            for world in 0..WORLDS {
+                if frame < STRUCK || !sick.contains(&world) {
+                    assert_eq!(
+                        worlds[world], expected[world],
+                        "{lanes:?} {precision:?}: world {world}, frame {frame}"
+                    );
+                    continue;
+                }
+                let (status, state) = worlds[world].split_last().unwrap();
+                assert_eq!(f64::from_bits(*status), f64::from(status::NOT_FINITE));
+                assert!(
+                    state.iter().all(|&bits| f64::from_bits(bits).is_finite()) || frame == STRUCK,
+                    "{lanes:?} {precision:?}: world {world}, frame {frame}"
+                );
+                // positions and velocities are those before the blow
+                let moving = 2 * 16 - 1;
+                assert_eq!(
+                    state[..moving],
+                    well[STRUCK - 1][world][..moving],
+                    "{lanes:?} {precision:?}: world {world}, frame {frame}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_frozen_world_that_is_reset_is_as_good_as_new() {
+    for (lanes, precision) in machines() {
+        let sick = [3, 20];
+        let found = run(lanes, precision, 1, &sick, true);
+        for world in sick {
+            let (status, state) = found[FRAMES - 2][world].split_last().unwrap();
+            assert_eq!(*status, 0f64.to_bits());
+            assert_ne!(state, &found[FRAMES - 3][world][..state.len()]);
+            assert_ne!(state, &found[FRAMES - 1][world][..state.len()]);
+        }
+    }
+}
+
+#[test]
+fn steps_of_a_frozen_world_stand_still() {
+    let model = lesson_with_table(Demo::Torque, false).compile().unwrap();
+    let options = Options {
+        worlds: 20,
+        fields: vec![Field::JointQ],
+        threads: Some(1),
+        ..Options::default()
+    };
+    let mut run = Run::new(&model, options);
+    let steps = |run: &Run| -> Vec<u64> {
+        let slots = &run.sim.layout().slots;
+        let slot = slots.iter().find(|slot| slot.field == Field::Step).unwrap();
+        run.arena[slot.offset / 8..slot.offset / 8 + 20].to_vec()
+    };
+    run.step();
+    let mut blow = vec![0.0; 20 * 9];
+    blow[7 * 9 + 3] = 1e38;
+    run.sim
+        .command(Field::JointF, 0..9, Values::F64(&blow))
+        .unwrap();
+    run.step();
+    run.command(Field::JointF, &[0.0; 9]);
+    run.step();
+    let mut expected = vec![3; 20];
+    expected[7] = 1;
+    assert_eq!(steps(&run), expected);
+}
