@@ -117,6 +117,21 @@ impl<F: Lane> Cx for Cpu<'_, F> {
         F::k(self.tables.numbers[t.base + row * t.stride + k])
     }
     #[inline(always)]
+    fn constants<const N: usize>(&mut self, t: Fixed, row: usize, k: usize) -> [F; N] {
+        debug_assert!(
+            row < t.rows && k + N <= t.stride,
+            "row {row}, numbers {k}.. of {t:?}"
+        );
+        let first = t.base + row * t.stride + k;
+        // one check of the bounds instead of N
+        let cells = &self.tables.numbers[first..first + N];
+        let mut numbers = [F::c(0.0); N];
+        for i in 0..N {
+            numbers[i] = F::k(cells[i]);
+        }
+        numbers
+    }
+    #[inline(always)]
     fn pick(&mut self, t: Fixed, row: F, k: usize) -> F {
         debug_assert!(k < t.stride, "number {k} of {t:?}");
         // a number that is none becomes 0

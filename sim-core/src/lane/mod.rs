@@ -290,6 +290,15 @@ pub trait Cx: Sized {
     fn number(&mut self, i: Self::I) -> Self::F;
     /// Number `k` of a row of a table of the model.
     fn constant(&mut self, t: Fixed, row: Self::I, k: usize) -> Self::F;
+    /// Neighbouring numbers of a row of a table of the model, from number `k` on.
+    #[inline(always)]
+    fn constants<const N: usize>(&mut self, t: Fixed, row: Self::I, k: usize) -> [Self::F; N] {
+        let mut numbers = [Self::F::c(0.0); N];
+        for (i, x) in numbers.iter_mut().enumerate() {
+            *x = self.constant(t, row, k + i);
+        }
+        numbers
+    }
     /// Number `k` of a row of a table of the model, another row in each world: `row` is whole; past the ends
     /// it is the nearest. Where a world is inactive the result is undefined.
     fn pick(&mut self, t: Fixed, row: Self::F, k: usize) -> Self::F;

@@ -6,7 +6,7 @@
 //! normals n₁, n₂ beside the hull's edge: (n₁ · q)(n₂ · q) < 0 (Gregorius, GDC 2013).
 
 use super::choose::select;
-use super::support::{Polyhedron, constant3, get3, negated, put3, rounding, set3, signed, var3};
+use super::support::{Polyhedron, four, get3, negated, put3, rounding, set3, signed, var3};
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{Mat3, Vec3, add, cross, dot, scale, sub, transform_back};
 use crate::{span, when};
@@ -168,8 +168,8 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
     let mut kind = cx.var(c(0.0));
     let mut place = [cx.var(c(0.0)), cx.var(c(0.0))];
     span!(cx, face in first, end, {
-        let m = constant3(cx, tables.faces, face, 0);
-        let offset = cx.constant(tables.faces, face, 3);
+        let [mx, my, mz, offset] = cx.constants(tables.faces, face, 0);
+        let m = [mx, my, mz];
         let x = dot(m, center) - offset - other.reach(transform_back(axes, m));
         let old = cx.get(&best);
         let farther = old.lt(x);
@@ -185,8 +185,7 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
             let (first, end) = hull.span(cx, 0);
             span!(cx, row in first, end, {
                 let (mut high, mut low) = (get3(cx, &highest), get3(cx, &lowest));
-                for k in 0..4 {
-                    let vertex = constant3(cx, tables.vertices, row, 3 * k);
+                for vertex in four(cx, tables, row) {
                     for &j in R::FACES {
                         let x = dot(vertex, axes[j]);
                         high[j] = high[j].max(x);
@@ -223,8 +222,10 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
             let mut edge_normal = var3(cx, [c(0.0); 3]);
             let (first, end) = hull.span(cx, 2);
             span!(cx, edge in first, end, {
-                let (point, along) = (constant3(cx, tables.edges, edge, 0), constant3(cx, tables.edges, edge, 3));
-                let (n1, n2) = (constant3(cx, tables.edges, edge, 6), constant3(cx, tables.edges, edge, 9));
+                let numbers: [C::F; 12] = cx.constants(tables.edges, edge, 0);
+                let [px, py, pz, ax, ay, az, n1x, n1y, n1z, n2x, n2y, n2z] = numbers;
+                let (point, along) = ([px, py, pz], [ax, ay, az]);
+                let (n1, n2) = ([n1x, n1y, n1z], [n2x, n2y, n2z]);
                 let (way, outward) = (sub(center, point), add(n1, n2));
                 for &j in R::EDGES {
                     let q = axes[j];

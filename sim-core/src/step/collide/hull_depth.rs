@@ -8,9 +8,7 @@
 use super::choose::select;
 use super::gjk::Restart;
 use super::hull_axes::Axis;
-use super::support::{
-    Polyhedron, Support, Turned, constant3, get3, negated, pick3, set3, signed, var3,
-};
+use super::support::{Polyhedron, Support, Turned, get3, negated, pick3, set3, signed, var3};
 use crate::lane::{Cx, Num, Table};
 use crate::math::vec3::{
     Vec3, add, cross, dot, scale, sub, transform, transform_add, transform_back,
@@ -80,7 +78,7 @@ impl<C: Cx> LeastDepth<'_, '_, C> {
         let faces = second.tables.faces;
         let (start, end) = first.own.span(cx, 1);
         span!(cx, face in start, end, {
-            let n = transform(&first.axes, constant3(cx, faces, face, 0));
+            let n = transform(&first.axes, cx.constants(faces, face, 0));
             let height = cx.constant(faces, face, 3) + dot(n, first.center);
             let bound = height - dot(n, on_b);
             when!(cx, bound.lt(cx.get(&best.depth)), {
@@ -90,7 +88,7 @@ impl<C: Cx> LeastDepth<'_, '_, C> {
         });
         let (start, end) = second.span(cx, 1);
         span!(cx, face in start, end, {
-            let n = negated(constant3(cx, faces, face, 0));
+            let n = negated(cx.constants(faces, face, 0));
             let height = cx.constant(faces, face, 3);
             let bound = height + dot(n, on_a);
             when!(cx, bound.lt(cx.get(&best.depth)), {
@@ -108,9 +106,9 @@ impl<C: Cx> LeastDepth<'_, '_, C> {
         let edges = second.tables.edges;
         let (start, end) = first.own.span(cx, 2);
         span!(cx, edge in start, end, {
-            let n1 = transform(&first.axes, constant3(cx, edges, edge, 6));
-            let n2 = transform(&first.axes, constant3(cx, edges, edge, 9));
-            let point = constant3(cx, edges, edge, 0);
+            let n1 = transform(&first.axes, cx.constants(edges, edge, 6));
+            let n2 = transform(&first.axes, cx.constants(edges, edge, 9));
+            let point = cx.constants(edges, edge, 0);
             let point = transform_add(&first.axes, point, first.center);
             let way = sub(point, on_b);
             let bound = dot(way, n1).min(dot(way, n2));
@@ -142,9 +140,9 @@ impl<C: Cx> LeastDepth<'_, '_, C> {
             let outward = add(n1, n2);
             let (start, end) = second.span(cx, 2);
             span!(cx, other in start, end, {
-                let q = constant3(cx, edges, other, 3);
-                let n3 = constant3(cx, edges, other, 6);
-                let n4 = constant3(cx, edges, other, 9);
+                let q = cx.constants(edges, other, 3);
+                let n3 = cx.constants(edges, other, 6);
+                let n4 = cx.constants(edges, other, 9);
                 // d is across n₁ and n₂, q across n₃ and n₄: each arc crosses the other's plane, on the same side
                 let crosses = C::F::and(
                     (dot(d, n3) * dot(d, n4)).lt(c(0.0)),
@@ -157,7 +155,7 @@ impl<C: Cx> LeastDepth<'_, '_, C> {
                     let same = (side * dot(axis, add(n3, n4))).lt(c(0.0));
                     let unit = c(1.0).div(square.max(c(1e-8)).sqrt());
                     let axis = scale(axis, signed(unit, side));
-                    let point_b = constant3(cx, edges, other, 0);
+                    let point_b = cx.constants(edges, other, 0);
                     let depth = dot(axis, sub(point, point_b));
                     // of nearly parallel edges the normal is a face's
                     let is = C::F::and(same, c(1e-8).lt(square));

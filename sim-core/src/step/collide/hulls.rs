@@ -16,8 +16,8 @@ use super::points::{Placed, Points};
 use super::sides::{BoxSide, HullSide, SegmentSide};
 use super::spread::Spread;
 use super::support::{
-    Block, Point, Polyhedron, Segment, Support, Turned, across, constant3, get3, negated, pick3,
-    set3, var3,
+    Block, Point, Polyhedron, Segment, Support, Turned, across, four, get3, negated, pick3, set3,
+    var3,
 };
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{
@@ -64,8 +64,8 @@ pub fn plane_hull<C: Cx>(
         // of vertices as deep up to rounding the first stays, so that a resting hull keeps its points
         let mut lowest = var3(cx, [c(0.0), c(0.0), c(1e18)]);
         span!(cx, row in first, end, {
-            for k in 0..4 {
-                let x = transform_back(&view, constant3(cx, tables.vertices, row, 3 * k));
+            for point in four(cx, tables, row) {
+                let x = transform_back(&view, point);
                 let old = get3(cx, &lowest);
                 let deeper = (x[2] + c(2e-6) * size).lt(old[2]);
                 set3(cx, &mut lowest, select(deeper, x, old));
@@ -85,8 +85,8 @@ pub fn plane_hull<C: Cx>(
             let mut place = var3(cx, chosen[0]);
             let mut is = cx.var(c(0.0));
             span!(cx, row in first, end, {
-                for k in 0..4 {
-                    let x = transform_back(&view, constant3(cx, tables.vertices, row, 3 * k));
+                for point in four(cx, tables, row) {
+                    let x = transform_back(&view, point);
                     let score = spread.score(x[0], x[1]);
                     let (old, kept, had) = (cx.get(&best), get3(cx, &place), cx.get(&is));
                     let farther = C::F::and(old.lt(score), (x[2] + height).lt(margin));

@@ -2,7 +2,7 @@
 
 use super::choose::select;
 use super::manifold::{Side, aligned};
-use super::support::{Polyhedron, constant3, pick3, signed};
+use super::support::{Polyhedron, pick3, signed};
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{
     Mat3, Vec3, cross, dot, scale, scale_add, sub, transform, transform_add, transform_back,
@@ -39,7 +39,7 @@ impl<'a, F: Num> HullSide<'a, F> {
         let mut best = cx.var(F::c(-2.0));
         let mut at = cx.var(F::c(0.0));
         span!(cx, face in start, end, {
-            let m = constant3(cx, faces, face, 0);
+            let m = cx.constants(faces, face, 0);
             let facing = dot(m, d);
             let old = cx.get(&best);
             let (number, kept) = (cx.number(face), cx.get(&at));

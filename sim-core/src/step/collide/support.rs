@@ -40,16 +40,6 @@ pub(super) fn put3<C: Cx>(cx: &mut C, v: &mut [C::V; 3], x: Vec3<C::F>) {
     }
 }
 
-/// Three numbers of a row of the model.
-#[inline(always)]
-pub(super) fn constant3<C: Cx>(cx: &mut C, t: Fixed, row: C::I, k: usize) -> Vec3<C::F> {
-    [
-        cx.constant(t, row, k),
-        cx.constant(t, row, k + 1),
-        cx.constant(t, row, k + 2),
-    ]
-}
-
 /// Three numbers of a row of the model, another in each world.
 #[inline(always)]
 pub(super) fn pick3<C: Cx>(cx: &mut C, t: Fixed, row: C::F, k: usize) -> Vec3<C::F> {
@@ -190,7 +180,7 @@ impl<C: Cx> Polyhedron<'_, C> {
     /// Half extents of its bounding box.
     #[inline(always)]
     pub fn half_extents(&self, cx: &mut C) -> Vec3<C::F> {
-        constant3(cx, self.tables.sizes, self.hull, 0)
+        cx.constants(self.tables.sizes, self.hull, 0)
     }
 
     /// Radius about its centre.
@@ -206,8 +196,8 @@ impl<C: Cx> Polyhedron<'_, C> {
         let mut best = cx.var(C::F::c(-1e18));
         span!(cx, row in first, end, {
             let mut reach = cx.get(&best);
-            for k in 0..4 {
-                reach = reach.max(dot(constant3(cx, self.tables.vertices, row, 3 * k), d));
+            for point in four(cx, self.tables, row) {
+                reach = reach.max(dot(point, d));
             }
             cx.put(&mut best, reach);
         });
@@ -224,8 +214,8 @@ impl<C: Cx> Support<C> for Polyhedron<'_, C> {
         span!(cx, row in first, end, {
             let number = cx.number(row);
             let (mut reach, mut place) = (cx.get(&best), cx.get(&at));
-            for k in 0..4 {
-                let x = dot(constant3(cx, self.tables.vertices, row, 3 * k), d);
+            for (k, point) in four(cx, self.tables, row).into_iter().enumerate() {
+                let x = dot(point, d);
                 let farther = reach.lt(x);
                 reach = reach.max(x);
                 place = C::F::select(farther, number + C::F::c(0.25 * k as f64), place);
@@ -241,6 +231,13 @@ impl<C: Cx> Support<C> for Polyhedron<'_, C> {
         let place = cx.get(&at) * C::F::c(4.0);
         pick3(cx, single, place, 0)
     }
+}
+
+/// The vertices of a row of a hull's table.
+#[inline(always)]
+pub(super) fn four<C: Cx>(cx: &mut C, tables: &HullTables, row: C::I) -> [Vec3<C::F>; 4] {
+    let [a, b, c, d, e, f, g, h, i, j, k, l] = cx.constants(tables.vertices, row, 0);
+    [[a, b, c], [d, e, f], [g, h, i], [j, k, l]]
 }
 
 impl<C: Cx> Support<C> for Turned<'_, C> {
