@@ -112,6 +112,8 @@ class Sim:
     def reset(self, *, mask: ArrayLike | None = None) -> Frame:
         """Put worlds back to the scene's start: state, ``time``, ``joint_f`` = 0, and targets.
 
+        It frees a world that was frozen when it was no longer finite (bit 1 of ``status``).
+
         Args:
             mask: Which worlds, bool, shape ``(worlds,)``; all if left out.
 
@@ -127,7 +129,7 @@ class Sim:
         joint_qd: Command | None = None,
         mask: ArrayLike | None = None,
     ) -> Frame:
-        """Set the state. What is left out, and worlds outside the mask, keep theirs.
+        """Set the state. What is left out, and worlds outside the mask, keep theirs; a frozen world stays frozen.
 
         Args:
             joint_q: Joint positions [rad or m], shape ``(worlds, coords)`` or ``(coords,)``, or a dict by robot.
