@@ -115,6 +115,8 @@ pub struct Solid<R> {
     pub body: Option<usize>,
     /// Its axes in the body's frame, or in the world: columns [–].
     pub axes: [[R; 3]; 3],
+    /// Are they those of the frame?
+    pub is_upright: bool,
     /// Its centre in the body's frame, or in the world [m].
     pub center: [R; 3],
 }
@@ -360,6 +362,7 @@ impl<R: Real> Contacts<R> {
                     kind: s.kind,
                     body: s.body,
                     axes: s.axes.map(|column| column.map(cast)),
+                    is_upright: s.is_upright,
                     center: s.center.map(cast),
                 })
                 .collect(),

@@ -22,7 +22,7 @@ pub struct HullTables {
     pub faces: Fixed,
     /// Corners of the faces, counter-clockwise from outside. `(corners, 3)` [m]
     pub corners: Fixed,
-    /// One end, unit direction, and outward normals of the faces beside it. `(edges, 12)` [m, –]
+    /// One end, unit direction, outward normals of the faces beside it, and length. `(edges, 13)` [m, –]
     pub edges: Fixed,
 }
 
@@ -63,7 +63,7 @@ impl HullTables {
             vertices: numbers(12, rows.vertices),
             faces: numbers(6, rows.faces),
             corners: numbers(3, rows.corners),
-            edges: numbers(12, rows.edges),
+            edges: numbers(13, rows.edges),
         };
         (placed, frames)
     }
@@ -121,6 +121,7 @@ impl Rows {
             for face in edge.faces {
                 self.edges.extend(hull.faces[face as usize].normal);
             }
+            self.edges.push(length);
         }
         let end = self.ends();
         self.spans
@@ -133,7 +134,7 @@ impl Rows {
         let rows = [
             self.vertices.len() / 12,
             self.faces.len() / 6,
-            self.edges.len() / 12,
+            self.edges.len() / 13,
         ];
         rows.map(|rows| rows as u32)
     }

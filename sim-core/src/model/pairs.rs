@@ -135,12 +135,14 @@ fn piece(
     hull: usize,
 ) -> Piece {
     let rows = pose.rotation();
+    let axes = std::array::from_fn(|c| std::array::from_fn(|r| rows[r][c]));
     Piece {
         borne,
         solid: Solid {
             kind,
             body: b.body,
-            axes: std::array::from_fn(|c| std::array::from_fn(|r| rows[r][c])),
+            axes,
+            is_upright: axes == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             center: pose.pos,
         },
         size,

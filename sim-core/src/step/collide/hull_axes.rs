@@ -221,10 +221,20 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
             let mut edge_best = cx.var(start);
             let mut edge_normal = var3(cx, [c(0.0); 3]);
             let (first, end) = hull.span(cx, 2);
+            // Two edges that are the way out pass each other at the depth that they tell. The other shape reaches along the
+            // best axis so far to that axis' depth below the hull's end, and an edge to no more than twice that.
+            let (m, x) = (get3(cx, &normal), cx.get(&best));
+            let top = dot(m, center) - other.reach(transform_back(axes, m)) - x;
+            let is_apart = C::F::not(x.lt(c(0.0)));
+            let floor = C::F::select(is_apart, c(-1e18), top + (x + x) - slack);
             span!(cx, edge in first, end, {
-                let numbers: [C::F; 12] = cx.constants(tables.edges, edge, 0);
-                let [px, py, pz, ax, ay, az, n1x, n1y, n1z, n2x, n2y, n2z] = numbers;
+                let [px, py, pz, ax, ay, az] = cx.constants(tables.edges, edge, 0);
                 let (point, along) = ([px, py, pz], [ax, ay, az]);
+                let length = cx.constant(tables.edges, edge, 12);
+                let height = dot(m, point) + (dot(m, along) * length).max(c(0.0));
+                let reaches = C::F::not(height.lt(floor));
+                when!(cx, reaches, {
+                let [n1x, n1y, n1z, n2x, n2y, n2z] = cx.constants(tables.edges, edge, 6);
                 let (n1, n2) = ([n1x, n1y, n1z], [n2x, n2y, n2z]);
                 let (way, outward) = (sub(center, point), add(n1, n2));
                 for &j in R::EDGES {
@@ -247,6 +257,7 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
                         cx.set(&mut place[1], C::F::select(farther, c(j as f64), along));
                     });
                 }
+                });
             });
             let (x, old) = (cx.get(&edge_best), cx.get(&best));
             let farther = (old + slack).lt(x);

@@ -49,11 +49,15 @@ pub(super) fn place<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
         let mut center = constant(solid.center);
         if let Some(body) = solid.body {
             let r = &w.rotation[body];
-            axes = [
-                transform(r, axes[0]),
-                transform(r, axes[1]),
-                transform(r, axes[2]),
-            ];
+            if solid.is_upright {
+                axes = *r;
+            } else {
+                axes = [
+                    transform(r, axes[0]),
+                    transform(r, axes[1]),
+                    transform(r, axes[2]),
+                ];
+            }
             center = transform_add(r, center, w.origin[body]);
         }
         let row = cx.at(k);
