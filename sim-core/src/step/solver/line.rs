@@ -137,7 +137,7 @@ fn law<F: Num>(m: &Constants<F::Real>, r: usize, jar: F, weight: F) -> Law<F> {
 
 /// Slope over that at the start below which a search ends in `f32`: the next round finds the rest, and a search to MuJoCo's
 /// `ls_tolerance` of 0.01 takes half as many steps again.
-const SLACK: f64 = 0.2;
+const SLACK: f64 = 0.1;
 /// Beyond any minimum [–].
 const FAR: f64 = 1e10;
 
