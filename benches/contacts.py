@@ -26,7 +26,7 @@ import mujoco
 import mujoco.rollout
 import numpy as np
 from numpy.typing import NDArray
-from record import REPOSITORY, write_results
+from record import REPOSITORY, print_slow, print_table, write_results
 from tqdm import tqdm
 
 import tightloop as tl
@@ -240,16 +240,10 @@ def main() -> int:
         for sim in sims.values():
             sim.close()
     rows = [bench.row() for bench in benches]
-    widths = {name: max(len(str(row[name])) for row in [*rows, {name: name}]) for name in rows[0]}
-    print("  ".join(f"{name:>{width}}" for name, width in widths.items()))
-    for row in rows:
-        print("  ".join(f"{value:>{widths[name]}}" for name, value in row.items()))
+    print_table(rows)
     facts = {"command": f"python benches/contacts.py --rounds {rounds}", "mujoco": mujoco.__version__, "threads": 1}
     write_results("contacts", rows, facts | {"robot": robot})
-    slow = [row for row in rows if row["asked_ratio"] != "–" and float(row["median_ratio"]) < float(row["asked_ratio"])]
-    for row in slow:
-        print(f"{row['demo']}: {row['median_ratio']} times MuJoCo, asked {row['asked_ratio']}")
-    return int(bool(slow))
+    return int(print_slow(rows, "demo"))
 
 
 if __name__ == "__main__":

@@ -28,6 +28,22 @@ def write_results(name: str, rows: Sequence[Mapping[str, str | int]], facts: Map
     return path
 
 
+def print_table(rows: Sequence[Mapping[str, str | int]]) -> None:
+    """The rows for people, a column as wide as its widest entry."""
+    widths = {name: max(len(str(row[name])) for row in [*rows, {name: name}]) for name in rows[0]}
+    print("  ".join(f"{name:>{width}}" for name, width in widths.items()))
+    for row in rows:
+        print("  ".join(f"{value:>{widths[name]}}" for name, value in row.items()))
+
+
+def print_slow(rows: Sequence[Mapping[str, str | int]], what: str) -> bool:
+    """Tell which rows, by their column `what`, are slower than asked; whether any is."""
+    slow = [row for row in rows if row["asked_ratio"] != "–" and float(row["median_ratio"]) < float(row["asked_ratio"])]
+    for row in slow:
+        print(f"{row[what]}: {row['median_ratio']} times MuJoCo, asked {row['asked_ratio']}")
+    return bool(slow)
+
+
 def processor() -> str:
     """Name of the processor, as Linux has it."""
     return re.findall(r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)[0]
