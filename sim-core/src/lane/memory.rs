@@ -178,6 +178,19 @@ impl<F: Lane> Cx for Cpu<'_, F> {
         *self.cell(t, row, k) = x;
     }
     #[inline(always)]
+    fn fill_all<const N: usize>(&mut self, t: Table, row: usize, k: usize, numbers: [F; N]) {
+        debug_assert!(
+            row < t.rows && k + N <= t.stride,
+            "row {row}, numbers {k}.. of {t:?}"
+        );
+        let first = t.base + row * t.stride + k;
+        // one check of the bounds instead of N
+        let cells = &mut self.memory[first..first + N];
+        for i in 0..N {
+            cells[i] = numbers[i];
+        }
+    }
+    #[inline(always)]
     fn init(&mut self, t: Table, row: Fresh<F>, k: usize, x: F) {
         if let Some(shared) = row.shared {
             return self.store(t, shared, k, x);

@@ -118,7 +118,8 @@ pub trait Num:
         let square = near * near;
         let terms = if Self::Real::DOUBLE { 21 } else { 10 };
         let mut sum = Self::c(0.0);
-        for i in (1..=terms).rev() {
+        // `..`, not `..=`: a loop that ends with its bound is not unrolled
+        for i in (1..terms + 1).rev() {
             sum = sum.fma(square, Self::c(sign(i) / (2 * i + 1) as f64));
         }
         let angle = (near * square).fma(sum, near);
@@ -141,7 +142,7 @@ pub trait Num:
         let r2 = r * r;
         let (mut s, mut c) = (Self::c(0.0), Self::c(0.0));
         let terms = if Self::Real::DOUBLE { 8 } else { 5 };
-        for i in (1..=terms).rev() {
+        for i in (1..terms + 1).rev() {
             s = s.fma(r2, Self::c(INVERSE_FACTORIAL[2 * i + 1] * sign(i)));
             c = c.fma(r2, Self::c(INVERSE_FACTORIAL[2 * i] * sign(i)));
         }
@@ -319,6 +320,19 @@ pub trait Cx: Sized {
     fn store(&mut self, t: Table, row: Self::I, k: usize, x: Self::F);
     /// Writes number `k` of a row; what inactive worlds hold there becomes undefined.
     fn fill(&mut self, t: Table, row: Self::I, k: usize, x: Self::F);
+    /// Writes neighbouring numbers of a row, from number `k` on, as [`Cx::fill`] does.
+    #[inline(always)]
+    fn fill_all<const N: usize>(
+        &mut self,
+        t: Table,
+        row: Self::I,
+        k: usize,
+        numbers: [Self::F; N],
+    ) {
+        for (i, x) in numbers.into_iter().enumerate() {
+            self.fill(t, row, k + i, x);
+        }
+    }
     /// First write to number `k` of a fresh row.
     fn init(&mut self, t: Table, row: Self::Row, k: usize, x: Self::F);
     /// First writes to the leading numbers of a fresh row.

@@ -272,8 +272,10 @@ pub mod row {
     pub const POWER: usize = 30;
     /// Of a line search: stiffness times the square of that change [N·m/s²].
     pub const BEND: usize = 31;
+    /// Of a line search, along the tangents: jar · jar, jar · `AHEAD`, `AHEAD` · `AHEAD` [m²/s⁴].
+    pub const SQUARES: usize = 32;
     /// Jacobian: normal row, then tangents.
-    pub const JACOBIAN: usize = 32;
+    pub const JACOBIAN: usize = 35;
 }
 
 /// What follows the classes in `counts`.

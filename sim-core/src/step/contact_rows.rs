@@ -48,22 +48,26 @@ pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
                 }
                 _ => point,
             };
+            let mut torques = [[[zero; 3]; 3]; 2];
             for (i, axis) in frame.iter().enumerate() {
-                let torques = [cross(point_first, *axis), cross(point, *axis)];
-                for (c, column) in class.columns.iter().enumerate() {
-                    let [linear, angular] = w.motion[column.dof];
-                    let torque = torques[usize::from(!column.is_first)];
-                    let lever = shared(cx, t, class, number, column.lever);
-                    let j = lever * (dot(linear, *axis) + dot(angular, torque));
-                    velocity[i] = j.fma(cx.get(&b.joint_qd[column.dof]), velocity[i]);
-                    cx.store(t.memory.rows, r, row::JACOBIAN + 3 * c + i, j);
-                }
-                if i > 0 {
-                    for (e, x) in axis.iter().enumerate() {
-                        cx.store(t.memory.rows, r, row::TANGENTS + 3 * (i - 1) + e, *x);
-                    }
-                }
+                torques[0][i] = cross(point_first, *axis);
+                torques[1][i] = cross(point, *axis);
             }
+            for (c, column) in class.columns.iter().enumerate() {
+                let [linear, angular] = w.motion[column.dof];
+                let lever = shared(cx, t, class, number, column.lever);
+                let speed = cx.get(&b.joint_qd[column.dof]);
+                let torques = &torques[usize::from(!column.is_first)];
+                let mut jacobian = [zero; 3];
+                for i in 0..3 {
+                    let turned = dot(linear, frame[i]) + dot(angular, torques[i]);
+                    jacobian[i] = lever * turned;
+                    velocity[i] = jacobian[i].fma(speed, velocity[i]);
+                }
+                cx.fill_all(t.memory.rows, r, row::JACOBIAN + 3 * c, jacobian);
+            }
+            cx.fill_all(t.memory.rows, r, row::TANGENTS, frame[1]);
+            cx.fill_all(t.memory.rows, r, row::TANGENTS + 3, frame[2]);
             let swing = swing_between(cx, m, b, class);
             let distance = cx.load(t.memory.rows, r, row::DISTANCE);
             let position = distance - shared(cx, t, class, number, pair::MARGIN);
@@ -94,21 +98,20 @@ pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
             let smaller = shared(cx, t, class, number, pair::SMALLER);
             let pushes = position.lt(contact_slack(smaller));
             let stiff = C::F::select(pushes, stiff, zero);
-            cx.store(t.memory.rows, r, row::STIFFNESS, stiff);
+            cx.fill(t.memory.rows, r, row::STIFFNESS, stiff);
             if t.cone == Cone::Elliptic {
                 let ratio = C::F::c(1.0 / t.impratio.to_f64());
                 let soft = stiff.div((mu * mu).fma(ratio, one));
-                cx.store(t.memory.rows, r, row::SOFT, soft);
+                cx.fill(t.memory.rows, r, row::SOFT, soft);
             }
-            cx.store(t.memory.rows, r, row::MU, mu);
-            for (i, x) in aref.iter().enumerate() {
-                let x = match swing {
-                    Some(swing) => *x + dot(frame[i], swing),
-                    None => *x,
-                };
-                let x = C::F::select(pushes, x, zero);
-                cx.store(t.memory.rows, r, row::AREF + i, x);
+            cx.fill(t.memory.rows, r, row::MU, mu);
+            for (x, axis) in aref.iter_mut().zip(frame) {
+                if let Some(swing) = swing {
+                    *x = *x + dot(axis, swing);
+                }
+                *x = C::F::select(pushes, *x, zero);
             }
+            cx.fill_all(t.memory.rows, r, row::AREF, aref);
         });
     }
 }

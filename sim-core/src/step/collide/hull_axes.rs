@@ -9,7 +9,7 @@ use super::choose::select;
 use super::support::{Polyhedron, four, get3, negated, put3, rounding, set3, signed, var3};
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{Mat3, Vec3, add, cross, dot, scale, sub, transform_back};
-use crate::{span, when};
+use crate::{break_if, span, when};
 
 /// What a shape about its centre reaches along a direction in its own axes.
 pub(super) trait Reach<F> {
@@ -176,6 +176,8 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
         let kept = get3(cx, &normal);
         cx.put(&mut best, C::F::select(farther, x, old));
         put3(cx, &mut normal, select(farther, m, kept));
+        // farther apart than asked, by whichever face
+        break_if!(cx, limit.lt(x));
     });
     if !R::FACES.is_empty() {
         let near = cx.get(&best).lt(limit);

@@ -61,20 +61,18 @@ pub(super) fn place<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
             center = transform_add(r, center, w.origin[body]);
         }
         let row = cx.at(k);
-        for (i, x) in axes.as_flattened().iter().chain(&center).enumerate() {
-            cx.fill(memory.poses, row, i, *x);
-        }
+        let [x, y, z] = axes;
+        cx.fill_all(memory.poses, row, 0, x);
+        cx.fill_all(memory.poses, row, 3, y);
+        cx.fill_all(memory.poses, row, 6, z);
+        cx.fill_all(memory.poses, row, 9, center);
     }
     for (t, reference) in w.reference.iter().enumerate() {
         let row = cx.at(t);
-        for (i, x) in reference.iter().enumerate() {
-            cx.fill(memory.origins, row, i, *x);
-        }
+        cx.fill_all(memory.origins, row, 0, *reference);
     }
-    let (world, zero) = (cx.at(w.reference.len()), C::F::c(0.0));
-    for i in 0..3 {
-        cx.fill(memory.origins, world, i, zero);
-    }
+    let world = cx.at(w.reference.len());
+    cx.fill_all(memory.origins, world, 0, [C::F::c(0.0); 3]);
 }
 
 /// Contacts of all pairs of two kinds.

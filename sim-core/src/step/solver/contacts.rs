@@ -85,6 +85,57 @@ fn elliptic<F: Num>(impratio: F::Real, jar: [F; 3], stiff: F, soft: F, mu: F) ->
     }
 }
 
+/// What a contact of an elliptic cone does along a line.
+struct Along<F> {
+    /// Force times the line's change of jar.
+    power: F,
+    /// Stiffness times the square of that change.
+    bend: F,
+    state: F,
+}
+
+/// [`elliptic`] at jar + α jv, of which it needs the normal parts and, along the tangents, jar · jar, jar · jv and jv · jv.
+#[inline(always)]
+fn along_line<F: Num>(
+    impratio: F::Real,
+    [normal, change]: [F; 2],
+    [start, mixed, end]: [F; 3],
+    alpha: F,
+    [stiff, soft, mu]: [F; 3],
+) -> Along<F> {
+    let (zero, one) = (F::c(0.0), F::c(1.0));
+    let ratio = impratio.to_f64();
+    let normal = alpha.fma(change, normal);
+    // half the rate of the square
+    let turn = alpha.fma(end, mixed);
+    let square = alpha.fma(mixed + turn, start).max(zero);
+    let slip = square.sqrt();
+    let inverse = one.div(F::select(zero.lt(slip), slip, one));
+    let excess = mu.fnma(slip, normal);
+    let leaves = F::not(excess.lt(zero));
+    let sticks = F::not(zero.lt(mu.fma(normal, slip * F::c(ratio))));
+    let acts = F::and(F::not(leaves), zero.lt(stiff));
+    let sticks = F::and(acts, sticks);
+    let slides = F::and(acts, F::not(sticks));
+    let across = stiff * F::c(ratio);
+    let push = -(soft * excess);
+    // of a sliding contact: rates of the slip and of the excess, and how fast the slip's rate grows
+    let rate = turn * inverse;
+    let speed = mu.fnma(rate, change);
+    let growth = rate.fnma(rate, end).max(zero) * inverse;
+    let pulled = (stiff * normal).fma(change, across * turn);
+    Along {
+        power: of_piece::<F>(sticks, slides, -pulled, push * speed),
+        bend: of_piece::<F>(
+            sticks,
+            slides,
+            (stiff * change).fma(change, across * end),
+            (soft * speed).fma(speed, push * mu * growth),
+        ),
+        state: of_piece::<F>(sticks, slides, one, F::c(2.0)),
+    }
+}
+
 /// What holds while the contact sticks or slides; 0 where it does neither.
 #[inline(always)]
 fn of_piece<F: Num>(sticks: F::Mask, slides: F::Mask, stick: F, slide: F) -> F {
@@ -146,6 +197,33 @@ fn law_at<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, jar: [C::F; 3]) -> Cone
     }
 }
 
+/// The law of a contact at α of the line search.
+#[inline(always)]
+fn law_along<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, alpha: C::F) -> Along<C::F> {
+    let rows = t.memory.rows;
+    if t.cone == Cone::Elliptic {
+        let normal = [cx.load(rows, r, row::JAR), cx.load(rows, r, row::AHEAD)];
+        let squares = cx.load3(rows, r, row::SQUARES);
+        let numbers = [
+            cx.load(rows, r, row::STIFFNESS),
+            cx.load(rows, r, row::SOFT),
+            cx.load(rows, r, row::MU),
+        ];
+        return along_line(t.impratio, normal, squares, alpha, numbers);
+    }
+    let (jar, jv) = (cx.load3(rows, r, row::JAR), cx.load3(rows, r, row::AHEAD));
+    let mut there = jar;
+    for i in 0..3 {
+        there[i] = alpha.fma(jv[i], jar[i]);
+    }
+    let law = law_at(cx, t, r, there);
+    Along {
+        power: power(&law.force, jv),
+        bend: bent(&law, jv),
+        state: law.state,
+    }
+}
+
 /// The contacts that the worlds have now.
 #[inline(always)]
 pub(super) fn count<C: Cx>(cx: &mut C, t: &ContactsOf<C>) -> C::F {
@@ -198,9 +276,7 @@ pub(super) fn residual<C: Cx>(cx: &mut C, t: &ContactsOf<C>, a: &[C::F], place: 
                     jar[i] = j[i].fma(a[column.dof], jar[i]);
                 }
             }
-            for (i, x) in jar.iter().enumerate() {
-                cx.fill(t.memory.rows, r, place + i, *x);
-            }
+            cx.fill_all(t.memory.rows, r, place, jar);
         });
     }
 }
@@ -286,10 +362,10 @@ pub(super) fn forces<C: Cx>(cx: &mut C, t: &ContactsOf<C>, joint: &mut [C::V]) {
             let jar = cx.load3(t.memory.rows, r, row::JAR);
             let law = law_at(cx, t, r, jar);
             let mut force = law.force;
-            for (i, x) in force.iter_mut().enumerate() {
+            for x in &mut force {
                 *x = cx.only(*x);
-                cx.fill(t.memory.rows, r, row::FORCE + i, *x);
             }
+            cx.fill_all(t.memory.rows, r, row::FORCE, force);
             for (c, column) in class.columns.iter().enumerate() {
                 let mut sum = cx.get(&joint[column.dof]);
                 let j = cx.load3(t.memory.rows, r, row::JACOBIAN + 3 * c);
@@ -333,13 +409,17 @@ pub(super) fn begin_line<C: Cx>(
             let mut jv = [C::F::c(0.0); 3];
             for i in 0..3 {
                 jv[i] = cx.only(ahead[i] - jar[i]);
-                cx.fill(t.memory.rows, r, row::AHEAD + i, jv[i]);
             }
+            cx.fill_all(t.memory.rows, r, row::AHEAD, jv);
             let bend = bent(&law, jv);
             let more = cx.get(descent) + cx.only(bend);
             cx.put(descent, more);
-            cx.fill(t.memory.rows, r, row::POWER, power(&law.force, jv));
-            cx.fill(t.memory.rows, r, row::BEND, bend);
+            cx.fill_all(t.memory.rows, r, row::POWER, [power(&law.force, jv), bend]);
+            if t.cone == Cone::Elliptic {
+                let [[_, x, y], [_, u, v]] = [jar, jv];
+                let squares = [x.fma(x, y * y), x.fma(u, y * v), u.fma(u, v * v)];
+                cx.fill_all(t.memory.rows, r, row::SQUARES, squares);
+            }
             let aref = cx.load3(t.memory.rows, r, row::AREF);
             let [nn, _, _, xx, _, yy] = law.stiffness;
             let mut sum = C::F::c(0.0);
@@ -366,25 +446,20 @@ pub(super) fn derivative<C: Cx>(
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
-            let (jar, jv) = (cx.load3(t.memory.rows, r, row::JAR), cx.load3(t.memory.rows, r, row::AHEAD));
-            let mut there = jar;
-            for i in 0..3 {
-                there[i] = alpha.fma(jv[i], jar[i]);
-            }
-            let here = law_at(cx, t, r, there);
-            let [state, power_before, bend] = cx.load3(t.memory.rows, r, row::STATE);
-            let model = power_before - alpha * bend;
+            let here = law_along(cx, t, r, alpha);
+            let [state, power, bend] = cx.load3(t.memory.rows, r, row::STATE);
+            let model = power - alpha * bend;
             let moved = (here.state - state).abs() + curved(t.cone, here.state);
             // exactly nothing where the piece is the same quadratic, whatever rounding says
             let differs = C::F::c(0.5).lt(moved);
             let zero = C::F::c(0.0);
-            let more = C::F::select(differs, model - power(&here.force, jv), zero);
+            let more = C::F::select(differs, model - here.power, zero);
             let more = cx.only(more);
             let sum = cx.get(slope) + more;
             cx.put(slope, sum);
             let sum = cx.get(size) + more.abs();
             cx.put(size, sum);
-            let bend = C::F::select(differs, bent(&here, jv) - bend, zero);
+            let bend = C::F::select(differs, here.bend - bend, zero);
             let sum = cx.get(curvature) + cx.only(bend);
             cx.put(curvature, sum);
         });
