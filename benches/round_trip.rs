@@ -11,8 +11,8 @@ mod daemon;
 use std::time::Instant;
 
 use common::{Demo, FRAMES, Run, command, lesson};
-use sim_core::backend::Values;
-use sim_core::simulation::Options;
+use sim_engine::backend::Values;
+use sim_engine::simulation::Options;
 use sim_protocol::{Client, Command, Frame, keep_waiting};
 
 const ROUNDS: usize = 10;

@@ -4,10 +4,10 @@ mod common;
 
 use common::shapes::shapes;
 use common::{Demo, Run, command, lesson_with_table};
-use sim_core::backend::Values;
 use sim_core::batch::Field;
 use sim_core::model::Cone;
-use sim_core::simulation::{Options, Precision};
+use sim_engine::backend::Values;
+use sim_engine::simulation::{Options, Precision};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 

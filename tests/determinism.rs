@@ -3,10 +3,10 @@
 mod common;
 
 use common::{Demo, Run, command, lesson};
-use sim_core::backend::{Values, cpu};
 use sim_core::batch::Field;
 use sim_core::model::{Description, Model, UrdfOptions};
-use sim_core::simulation::{Lanes, Options, Precision};
+use sim_engine::backend::{Values, cpu};
+use sim_engine::simulation::{Lanes, Options, Precision};
 use std::sync::Arc;
 
 const FIELDS: [Field; 6] = [

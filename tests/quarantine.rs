@@ -3,9 +3,9 @@
 mod common;
 
 use common::{Demo, Run, command, lesson_with_table};
-use sim_core::backend::{Values, cpu};
 use sim_core::batch::{Field, status};
-use sim_core::simulation::{Lanes, Options, Precision};
+use sim_engine::backend::{Values, cpu};
+use sim_engine::simulation::{Lanes, Options, Precision};
 
 const WORLDS: usize = 37;
 const FIELDS: [Field; 8] = [

@@ -5,7 +5,7 @@ mod common;
 use common::{Demo, FRAMES, Run, command, csv, distance, lesson, lesson_with_table, repo};
 use sim_core::batch::Field;
 use sim_core::model::Description;
-use sim_core::simulation::{Lanes, Options, Precision};
+use sim_engine::simulation::{Lanes, Options, Precision};
 
 fn run(scene: &Description, precision: Precision) -> Run {
     let options = Options {

@@ -4,10 +4,10 @@ mod common;
 
 use common::Run;
 use common::shapes::shapes;
-use sim_core::backend::{Values, cpu};
 use sim_core::batch::{Field, status};
 use sim_core::model::{Cone, Description, Model};
-use sim_core::simulation::{Lanes, Options, Precision};
+use sim_engine::backend::{Values, cpu};
+use sim_engine::simulation::{Lanes, Options, Precision};
 use std::sync::Arc;
 
 const FIELDS: [Field; 11] = [

@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use sim_core::batch::Field;
-use sim_core::dynamics::Dynamics;
 use sim_core::model::{Description, Inertial, Joint, JointKind, Link, Pose, Robot};
+use sim_engine::dynamics::Dynamics;
 
 const GRAVITY: f64 = 9.81;
 /// Step of the difference quotient [s]: its third order and its rounding are both near 1e-10.

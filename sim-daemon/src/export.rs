@@ -1,9 +1,9 @@
 //! Between physics and wire: the only file that knows both sim-core and sim-protocol.
 
-use sim_core::backend::{BackendError, Values};
 use sim_core::batch::{Dtype, Field, FieldDtype, FieldRow, Group, Layout};
 use sim_core::model::{Description as Scene, Model};
-use sim_core::simulation::{Options, Precision, Simulation};
+use sim_engine::backend::{BackendError, Values};
+use sim_engine::simulation::{Options, Precision, Simulation};
 use sim_protocol::host::{Inbox, Numbers};
 use sim_protocol::{self as wire, InputInfo, Op, RefusalKind, RobotRange, Row, Table};
 

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use sim_core::simulation::Simulation;
+use sim_engine::simulation::Simulation;
 use sim_protocol::host::{Host, Next};
 
 use crate::error::DaemonError;

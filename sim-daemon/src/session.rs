@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde_json::json;
 use sim_core::batch::Field;
-use sim_core::simulation::{Lanes, Options, Precision, Simulation};
+use sim_engine::simulation::{Lanes, Options, Precision, Simulation};
 use sim_protocol::host::{Host, check_memory};
 use sim_protocol::place::Place;
 use sim_protocol::tenancy::Tenancy;

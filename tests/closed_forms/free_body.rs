@@ -5,7 +5,7 @@ use crate::{
     quat, rounding, turned, vec3,
 };
 use sim_core::model::JointKind;
-use sim_core::simulation::Precision;
+use sim_engine::simulation::Precision;
 
 /// A body without symmetry that spins near its middle axis, where a rotation is unstable.
 const BRICK: Top = Top {

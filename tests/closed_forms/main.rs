@@ -10,7 +10,7 @@ mod planar;
 use common::Run;
 use sim_core::batch::Field;
 use sim_core::model::{Description, Inertial, Joint, JointKind, Link, Pose, Robot};
-use sim_core::simulation::{Lanes, Options, Precision};
+use sim_engine::simulation::{Lanes, Options, Precision};
 
 const GRAVITY: f64 = 9.81;
 /// Steps of a control frame in [`one_body`].

@@ -5,7 +5,7 @@ use crate::{
     rounding, turned, vec3,
 };
 use sim_core::model::JointKind;
-use sim_core::simulation::Precision;
+use sim_engine::simulation::Precision;
 use std::f64::consts::TAU;
 
 /// A bob on a rod of 0.4 m below the joint.

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use daemon::{Daemon, leftovers, scene};
 use sim_core::batch::Field;
-use sim_core::simulation::{Options, Simulation};
+use sim_engine::simulation::{Options, Simulation};
 use sim_protocol::{Client, Command, Dtype, Frame, ProtocolError, Values, keep_waiting};
 
 /// Not a test by itself: the process that other tests start as a daemon.
@@ -150,7 +150,7 @@ fn frames_over_the_wire_equal_frames_in_process_bit_for_bit() {
         .write(
             Field::JointQ,
             0..9,
-            sim_core::backend::Values::F32(&start),
+            sim_engine::backend::Values::F32(&start),
             Some(&mask),
         )
         .unwrap();
@@ -169,7 +169,7 @@ fn frames_over_the_wire_equal_frames_in_process_bit_for_bit() {
             .command(
                 Field::JointTargetQ,
                 2..5,
-                sim_core::backend::Values::F32(&target),
+                sim_engine::backend::Values::F32(&target),
             )
             .unwrap();
         simulation.step(&mut arena);

@@ -7,9 +7,9 @@ mod scene;
 mod toy;
 
 use models::{Case, arm_and_cube, every_joint, fr3, limits_only, shapes};
-use sim_core::backend::gpu::program::{ProgramOptions, wgsl};
 use sim_core::batch::{Block, Numbers, WorkSlot};
 use sim_core::lane::memory::Cpu;
+use sim_core::lane::record::wgsl::{ProgramOptions, wgsl};
 use sim_core::lane::record::{Recorded, RecordedVariable, Recorder, Recording, record};
 use sim_core::lane::{Cx, Num};
 use sim_core::model::Cone;

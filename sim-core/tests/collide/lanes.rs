@@ -1,8 +1,8 @@
 //! Every lane finds what a world alone finds, and nothing that is no number.
 
 use super::shapes::*;
-use sim_core::backend::{Lanes, Precision, cpu};
 use sim_core::model::geometry::Hull;
+use sim_engine::backend::{Lanes, Precision, cpu};
 
 /// Within which contacts are found [m].
 const MARGIN: f64 = 0.01;

@@ -1,10 +1,10 @@
 //! Random pairs of shapes, and the contacts that a simulation finds of them: one shape stands still, the other is free.
 
-use sim_core::backend::{Lanes, Precision, Values};
 use sim_core::batch::{Dtype, Field};
 use sim_core::model::geometry::{Hull, Mesh, TriMesh};
 use sim_core::model::{self, Body, Collision, Description, Pose};
-use sim_core::simulation::{Options, Simulation};
+use sim_engine::backend::{Lanes, Precision, Values};
+use sim_engine::simulation::{Options, Simulation};
 use std::path::PathBuf;
 use std::sync::Arc;
 

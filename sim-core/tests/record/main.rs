@@ -8,7 +8,7 @@ mod refused_blocks;
 #[path = "../toy/mod.rs"]
 mod toy;
 
-use sim_core::backend::gpu::program::{ProgramOptions, wgsl};
+use sim_core::lane::record::wgsl::{ProgramOptions, wgsl};
 use sim_core::lane::record::{Misuse, Recorded, Recorder, Recording, record};
 use sim_core::lane::{Num, Table, Tables};
 

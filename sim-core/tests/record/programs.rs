@@ -1,7 +1,7 @@
 //! Whole programs: their text, and their results against the scalar machine.
 
 use crate::{TABLE, accepted, c, toy};
-use sim_core::backend::gpu::program::{ProgramOptions, wgsl};
+use sim_core::lane::record::wgsl::{ProgramOptions, wgsl};
 use sim_core::lane::record::{Recorded, record};
 use sim_core::lane::{Cx, Num};
 

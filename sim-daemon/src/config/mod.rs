@@ -19,11 +19,11 @@ pub use bodies::BodyTable;
 pub use number::{Number, PerDof};
 pub use robots::{ModeName, RobotTable};
 pub use shapes::{ShapeName, ShapeTable};
-pub use sim_core::backend::BackendError;
 pub use sim_core::batch::Field;
-pub use sim_core::dynamics::Dynamics;
 pub use sim_core::model::UrdfOptions;
 pub use sim_core::model::geometry::MeshOptions;
+pub use sim_engine::backend::BackendError;
+pub use sim_engine::dynamics::Dynamics;
 pub(crate) use summary::{joint_type, mesh_facts, robot_summary};
 pub use summary::{mesh_summary, urdf_summary};
 

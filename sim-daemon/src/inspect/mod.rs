@@ -10,9 +10,9 @@ mod tree;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use sim_core::dynamics::Dynamics;
 use sim_core::model::geometry::{Hull, MeshOptions, TriMesh, triangles};
 use sim_core::model::{Description, ModelError, Pose, Robot, Shape, UrdfOptions};
+use sim_engine::dynamics::Dynamics;
 
 use crate::cli::Inspect;
 use crate::error::DaemonError;

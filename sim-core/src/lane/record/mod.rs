@@ -40,6 +40,7 @@ mod recorder;
 mod rounds;
 mod state;
 pub(crate) mod tree;
+pub mod wgsl;
 
 pub use error::{Misuse, RecordError};
 pub use handles::{

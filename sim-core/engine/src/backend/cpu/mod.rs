@@ -11,12 +11,12 @@ mod trouble;
 pub use dispatch::{available, create};
 
 use super::{Backend, BackendError, Lanes, Precision, Values};
-use crate::batch::{Field, Layout};
-use crate::lane::Lane;
-use crate::model::Model;
 use chunk::{Chunk, Job};
 use dispatch::{Program, RunChunk};
 use rayon::prelude::*;
+use sim_core::batch::{Field, Layout};
+use sim_core::lane::Lane;
+use sim_core::model::Model;
 use std::ops::Range;
 
 /// Chunks a thread: enough that a slow block does not leave the others idle.

@@ -3,9 +3,9 @@
 pub use crate::backend::{Lanes, Precision};
 
 use crate::backend::{Backend, BackendError, Values, cpu};
-use crate::batch::{Dtype, Field, Group, Layout};
-use crate::model::Model;
-use crate::model::constants::Motion;
+use sim_core::batch::{Dtype, Field, Group, Layout};
+use sim_core::model::Model;
+use sim_core::model::constants::Motion;
 use std::ops::Range;
 use std::sync::Arc;
 

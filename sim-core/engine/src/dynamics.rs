@@ -1,11 +1,11 @@
 //! Kinematics and dynamics of a model at states that a caller gives, apart from any simulation.
 //!
-//! Everything is the text of [`crate::step`] in double precision; a state is evaluated, nothing moves.
+//! Everything is the text of [`sim_core::step`] in double precision; a state is evaluated, nothing moves.
 
 use crate::backend::{BackendError, Lanes, Precision, Values};
-use crate::batch::Field;
-use crate::model::Model;
 use crate::simulation::{Options, Simulation};
+use sim_core::batch::Field;
+use sim_core::model::Model;
 use std::sync::Arc;
 
 /// What [`Dynamics`] can evaluate; each depends on positions and velocities only.

@@ -1,21 +1,21 @@
 //! A run of blocks that one thread works on: their state in lane order, and one workspace.
 
 use super::contacts;
-use super::dispatch::RunStage;
 use super::transfer::{self, Arena};
 use crate::backend::Values;
-use crate::batch::{Block, Field, Layout};
-use crate::lane::{Lane, Real};
-use crate::model::Model;
-use crate::model::constants::Constants;
-use crate::step::{FORWARD, STAGES, Stage};
+use sim_core::batch::{Block, Field, Layout};
+use sim_core::compiled::Stages;
+use sim_core::lane::{Lane, Real};
+use sim_core::model::Model;
+use sim_core::model::constants::Constants;
+use sim_core::step::{FORWARD, STAGES, Stage};
 use std::ops::Range;
 
 /// What all chunks share.
 pub(super) struct Job<F: Lane> {
     pub constants: Constants<F::Real>,
     /// Every stage, by its number in [`Stage::ALL`].
-    stages: [RunStage<F>; Stage::ALL.len()],
+    stages: Stages<F>,
     pub layout: Layout,
     /// Stages of a step that the model needs, by their numbers.
     step: Vec<usize>,
@@ -79,7 +79,7 @@ impl StateField {
 }
 
 impl<F: Lane> Job<F> {
-    pub fn new(model: &Model, layout: Layout, stages: [RunStage<F>; Stage::ALL.len()]) -> Job<F> {
+    pub fn new(model: &Model, layout: Layout, stages: Stages<F>) -> Job<F> {
         let shape = Shape::of(model.constants());
         let start = model.start();
         let mut reset = vec![F::Real::default(); shape.total()];

@@ -1,10 +1,10 @@
 //! Out of a block, into the arena: the one place where lane order becomes world-major.
 
 use super::chunk::Chunk;
-use crate::batch::{Field, Slot, Workspace};
-use crate::lane::{Lane, Num};
-use crate::math::vec3::cross_add;
-use crate::model::constants::Constants;
+use sim_core::batch::{Field, Slot, Workspace};
+use sim_core::lane::{Lane, Num};
+use sim_core::math::vec3::cross_add;
+use sim_core::model::constants::Constants;
 use std::ops::Range;
 
 /// The arena of a frame, shared by the threads that write it.

@@ -1,8 +1,8 @@
 //! Trouble of worlds: told in their status, and kept from what comes after.
 
 use super::chunk::{Chunk, Shape, StateField};
-use crate::batch::status;
-use crate::lane::{Lane, Real};
+use sim_core::batch::status;
+use sim_core::lane::{Lane, Real};
 use std::ops::Range;
 
 impl<F: Lane> Chunk<F> {

@@ -1,9 +1,9 @@
 //! What `write` looks at of a masked array, and what it leaves.
 
-use sim_core::backend::{BackendError, Values};
 use sim_core::batch::Field;
 use sim_core::model::{Description, UrdfOptions};
-use sim_core::simulation::{Options, Precision, Simulation};
+use sim_engine::backend::{BackendError, Values};
+use sim_engine::simulation::{Options, Precision, Simulation};
 use std::path::Path;
 
 const WORLDS: usize = 3;

@@ -15,8 +15,8 @@
 //! therefore printed as the largest finite number of its sign; one that is not a number was refused
 //! by the recorder.
 
-use crate::lane::record::Recording;
-use crate::lane::record::tree::{Binary, Cell, Entry, Op, Operand, Rounds, Row, Statement, Unary};
+use super::Recording;
+use super::tree::{Binary, Cell, Entry, Op, Operand, Rounds, Row, Statement, Unary};
 use std::fmt::{self, Write};
 
 /// What a program is called and where it finds its numbers.

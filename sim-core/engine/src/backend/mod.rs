@@ -2,11 +2,10 @@
 
 pub mod cpu;
 mod error;
-pub mod gpu;
 
 pub use error::BackendError;
 
-use crate::batch::Field;
+use sim_core::batch::Field;
 use std::ops::Range;
 
 /// World-major numbers from outside, in either precision.

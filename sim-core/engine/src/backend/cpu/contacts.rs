@@ -2,10 +2,10 @@
 
 use super::chunk::Chunk;
 use super::transfer::Arena;
-use crate::batch::{Dtype, Field, Slot};
-use crate::lane::{Lane, Real};
-use crate::model::constants::Constants;
-use crate::model::contact::{Class, Memory, row};
+use sim_core::batch::{Dtype, Field, Slot};
+use sim_core::lane::{Lane, Real};
+use sim_core::model::constants::Constants;
+use sim_core::model::contact::{Class, Memory, row};
 use std::ops::Range;
 
 /// A contact of one world: its row, and the class that it is of.

@@ -1,0 +1,147 @@
+//! One compiled text per instruction set, chosen once at start.
+
+use super::chunk::{Chunk, Job};
+use super::transfer::Arena;
+use super::{Backend, BackendError, Cpu, Lanes, Layout, Precision};
+use sim_core::compiled::Stages;
+use sim_core::lane::Lane;
+use sim_core::model::Model;
+
+/// A chunk, compiled for an instruction set.
+///
+/// # Safety
+/// As [`Chunk::run`].
+pub(super) type RunChunk<F> = unsafe fn(&mut Chunk<F>, &Job<F>, usize, Arena);
+
+/// The text, compiled for an instruction set.
+pub(super) struct Program<F: Lane> {
+    pub stages: Stages<F>,
+    pub chunk: RunChunk<F>,
+}
+
+macro_rules! compiled {
+    ($(#[$attribute:meta])* $name:ident $($features:literal)?) => {
+        $(#[$attribute])*
+        $(#[target_feature(enable = $features)])?
+        unsafe fn $name<F: Lane>(chunk: &mut Chunk<F>, job: &Job<F>, substeps: usize, arena: Arena) {
+            // SAFETY: by contract.
+            unsafe { chunk.run(job, substeps, arena) }
+        }
+    };
+}
+
+compiled!(
+    #[cfg(target_arch = "x86_64")]
+    avx512 "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma,bmi1,bmi2"
+);
+compiled!(
+    #[cfg(target_arch = "x86_64")]
+    avx2 "avx2,fma,bmi1,bmi2"
+);
+compiled!(
+    #[cfg(not(target_arch = "x86_64"))]
+    portable
+);
+
+/// Does this processor run blocks of this width?
+pub fn available(lanes: Lanes) -> bool {
+    #[cfg(target_arch = "x86_64")]
+    let (avx2, avx512) = (
+        is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2"),
+        is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512dq")
+            && is_x86_feature_detected!("avx512vl")
+            && is_x86_feature_detected!("avx512bw"),
+    );
+    #[cfg(not(target_arch = "x86_64"))]
+    let (avx2, avx512) = (false, false);
+    match lanes {
+        Lanes::Auto | Lanes::Scalar => avx2 || cfg!(not(target_arch = "x86_64")),
+        Lanes::Eight => avx2,
+        Lanes::Sixteen => avx2 && avx512,
+    }
+}
+
+/// The fastest backend that the processor has, or the one asked for.
+///
+/// # Errors
+/// [`BackendError::Lanes`] for a width that it has not, [`BackendError::Threads`].
+pub fn create(
+    model: &Model,
+    worlds: usize,
+    precision: Precision,
+    lanes: Lanes,
+    layout: &Layout,
+    threads: usize,
+) -> Result<Box<dyn Backend>, BackendError> {
+    let lanes = match lanes {
+        // a register that holds one world takes longer than a scalar, for the same bits
+        Lanes::Auto if worlds == 1 => Lanes::Scalar,
+        Lanes::Auto if available(Lanes::Sixteen) => Lanes::Sixteen,
+        Lanes::Auto if available(Lanes::Eight) => Lanes::Eight,
+        Lanes::Auto => Lanes::Scalar,
+        asked => asked,
+    };
+    if !available(lanes) {
+        let (lanes, instructions) = match lanes {
+            Lanes::Sixteen => (16, "AVX-512"),
+            Lanes::Eight => (8, "AVX2 with FMA"),
+            Lanes::Auto | Lanes::Scalar => (1, "AVX2 with FMA"),
+        };
+        return Err(BackendError::Lanes {
+            lanes,
+            instructions,
+        });
+    }
+    match (precision, lanes) {
+        (Precision::F64, _) => {
+            let program = least(stages_f64::STAGES);
+            boxed(model, worlds, layout, threads, "f64 scalar, FMA", program)
+        }
+        #[cfg(target_arch = "x86_64")]
+        (Precision::F32, Lanes::Sixteen) => {
+            let (stages, chunk) = (stages_f32x16::STAGES, avx512);
+            let program = Program { stages, chunk };
+            boxed(model, worlds, layout, threads, "AVX-512", program)
+        }
+        #[cfg(target_arch = "x86_64")]
+        (Precision::F32, Lanes::Eight) => {
+            let program = least(stages_f32x8::STAGES);
+            boxed(model, worlds, layout, threads, "AVX2", program)
+        }
+        (Precision::F32, _) => {
+            let program = least(stages_f32::STAGES);
+            boxed(model, worlds, layout, threads, "f32 scalar, FMA", program)
+        }
+    }
+}
+
+/// What runs wherever the text does.
+fn least<F: Lane>(stages: Stages<F>) -> Program<F> {
+    #[cfg(target_arch = "x86_64")]
+    let chunk = avx2;
+    #[cfg(not(target_arch = "x86_64"))]
+    let chunk = portable;
+    Program { stages, chunk }
+}
+
+fn boxed<F: Lane>(
+    model: &Model,
+    worlds: usize,
+    layout: &Layout,
+    threads: usize,
+    instructions: &str,
+    program: Program<F>,
+) -> Result<Box<dyn Backend>, BackendError> {
+    Ok(Box::new(Cpu::<F>::new(
+        model,
+        worlds,
+        layout,
+        threads,
+        instructions,
+        program,
+    )?))
+}
