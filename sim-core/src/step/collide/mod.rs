@@ -106,43 +106,43 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, K
     };
     when!(cx, near, {
         let axes = axes_of(cx, poses, a);
-        let other = Placed {
-            axes: axes_of(cx, poses, b),
-            center,
-        };
         let first = Shape::read(cx, t, kinds.0, p, pair::SIZE_A, pair::HULL_A);
-        let second = Shape::read(cx, t, kinds.1, p, pair::SIZE_B, pair::HULL_B);
-        let smaller = cx.constant(numbers, p, pair::SMALLER);
-        let margin = cx.constant(numbers, p, pair::REACH) + contact_slack(smaller);
         // the ball around one against the box around the other: a table's own ball is as wide as the table
         let mut near = near;
         if kinds.0 >= Kind::Box {
             let radius = cx.constant(numbers, p, pair::RADIUS_B);
             near = within(&axes, first.half(kinds.0), center, radius);
         }
-        if kinds.1 >= Kind::Box && kinds.0 != Kind::Plane {
-            let radius = cx.constant(numbers, p, pair::RADIUS_A);
-            near = C::F::and(
-                near,
-                within(&other.axes, second.half(kinds.1), center, radius),
-            );
-        }
-        // the boxes around both, where what comes next takes longer: boxes begin with this themselves
-        if kinds.0 >= Kind::Box && kinds.1 > Kind::Box {
-            let halves = [first.half(kinds.0), second.half(kinds.1)];
-            near = C::F::and(near, overlap(&axes, &other, halves, margin));
-        }
         when!(cx, near, {
-            let two = Two {
-                axes: &axes,
-                first,
-                other: &other,
-                second,
-                margin,
+            let other = Placed {
+                axes: axes_of(cx, poses, b),
+                center,
             };
-            let base = (center_a, origin_a);
-            let mut points = points_of::<C>(cx, t, p, base);
-            narrow(cx, t, kinds, &two, &mut points);
+            let second = Shape::read(cx, t, kinds.1, p, pair::SIZE_B, pair::HULL_B);
+            let smaller = cx.constant(numbers, p, pair::SMALLER);
+            let margin = cx.constant(numbers, p, pair::REACH) + contact_slack(smaller);
+            let mut near = near;
+            if kinds.1 >= Kind::Box && kinds.0 != Kind::Plane {
+                let radius = cx.constant(numbers, p, pair::RADIUS_A);
+                near = within(&other.axes, second.half(kinds.1), center, radius);
+            }
+            // the boxes around both, where what comes next takes longer: boxes begin with this themselves
+            if kinds.0 >= Kind::Box && kinds.1 > Kind::Box {
+                let halves = [first.half(kinds.0), second.half(kinds.1)];
+                near = C::F::and(near, overlap(&axes, &other, halves, margin));
+            }
+            when!(cx, near, {
+                let two = Two {
+                    axes: &axes,
+                    first,
+                    other: &other,
+                    second,
+                    margin,
+                };
+                let base = (center_a, origin_a);
+                let mut points = points_of::<C>(cx, t, p, base);
+                narrow(cx, t, kinds, &two, &mut points);
+            });
         });
     });
 }
