@@ -168,6 +168,29 @@ impl<F: Lane> Cx for Cpu<'_, F> {
         [x, y, z]
     }
     #[inline(always)]
+    fn add_triples(&mut self, t: Table, row: usize, k: usize, by: [F; 3], cells: &mut [F]) {
+        let (first, mask, zero) = (t.base + row * t.stride + k, self.mask, F::c(0.0));
+        // one check of the bounds instead of one a number
+        let (triples, _) = self.memory[first..first + 3 * cells.len()].as_chunks::<3>();
+        for (cell, triple) in cells.iter_mut().zip(triples) {
+            for i in 0..3 {
+                *cell = F::select(mask, triple[i], zero).fma(by[i], *cell);
+            }
+        }
+    }
+    #[inline(always)]
+    fn sum_triples(&mut self, t: Table, row: usize, k: usize, x: &[F], sum: [F; 3]) -> [F; 3] {
+        let first = t.base + row * t.stride + k;
+        let (triples, _) = self.memory[first..first + 3 * x.len()].as_chunks::<3>();
+        let mut sum = sum;
+        for (x, triple) in x.iter().zip(triples) {
+            for i in 0..3 {
+                sum[i] = triple[i].fma(*x, sum[i]);
+            }
+        }
+        sum
+    }
+    #[inline(always)]
     fn store(&mut self, t: Table, row: usize, k: usize, x: F) {
         let mask = self.mask;
         let cell = self.cell(t, row, k);

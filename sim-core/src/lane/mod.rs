@@ -316,6 +316,46 @@ pub trait Cx: Sized {
             self.load(t, row, k + 2),
         ]
     }
+    /// Adds to each cell three neighbouring numbers of a row times three others, in the active worlds: those of the first
+    /// cell are from number `k` on, those of the next follow. Inactive worlds need no guard; see [`Cx::put`].
+    #[inline(always)]
+    fn add_triples(
+        &mut self,
+        t: Table,
+        row: Self::I,
+        k: usize,
+        by: [Self::F; 3],
+        cells: &mut [Self::V],
+    ) {
+        for (c, cell) in cells.iter_mut().enumerate() {
+            let mut sum = self.get(cell);
+            let triple = self.load3(t, row, k + 3 * c);
+            for (x, by) in triple.into_iter().zip(by) {
+                sum = self.only(x).fma(by, sum);
+            }
+            self.put(cell, sum);
+        }
+    }
+    /// `sum` and three neighbouring numbers of a row times each x: those of the first x are from number `k` on, those of
+    /// the next follow. Where a world is inactive the result is undefined.
+    #[inline(always)]
+    fn sum_triples(
+        &mut self,
+        t: Table,
+        row: Self::I,
+        k: usize,
+        x: &[Self::F],
+        sum: [Self::F; 3],
+    ) -> [Self::F; 3] {
+        let mut sum = sum;
+        for (c, x) in x.iter().enumerate() {
+            let triple = self.load3(t, row, k + 3 * c);
+            for i in 0..3 {
+                sum[i] = triple[i].fma(*x, sum[i]);
+            }
+        }
+        sum
+    }
     /// Writes number `k` of a row, in the active worlds only.
     fn store(&mut self, t: Table, row: Self::I, k: usize, x: Self::F);
     /// Writes number `k` of a row; what inactive worlds hold there becomes undefined.

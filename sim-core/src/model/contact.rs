@@ -151,8 +151,11 @@ pub struct Class<R> {
     pub trees: (Option<usize>, usize),
     /// Its dofs, rising.
     pub columns: Vec<Column>,
-    /// Of each column, the entries of JᵀWJ with it and those before it that may differ from 0.
-    pub entries: Vec<Vec<Entry>>,
+    /// The same dofs, by runs.
+    pub runs: Vec<Run>,
+    /// Of each column, the entries of JᵀWJ with it and those before it that may differ from 0, by runs of columns whose
+    /// places follow each other: in the mass matrix's pattern, or in that of couplings if the class couples.
+    pub entries: Vec<Vec<Run>>,
     /// Does any entry lie outside the pattern of the mass matrix?
     pub couples: bool,
     /// Numbers of a pair that all its pairs share.
@@ -174,13 +177,46 @@ pub struct Column {
     pub lever: usize,
 }
 
-/// An entry of JᵀWJ.
+/// Columns of a class, and what belongs to them, one after the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Entry {
-    /// The other column.
+pub struct Run {
+    /// The first column.
     pub column: usize,
-    /// Where it is kept: in the mass matrix's pattern, or in that of couplings if its class couples.
+    /// Where what belongs to it is kept.
     pub place: usize,
+    /// How many they are.
+    pub len: usize,
+}
+
+impl Run {
+    /// The runs of rising columns with their places.
+    pub fn of(columns: impl IntoIterator<Item = (usize, usize)>) -> Vec<Run> {
+        let mut runs: Vec<Run> = Vec::new();
+        for (column, place) in columns {
+            match runs.last_mut() {
+                Some(run) if (run.column + run.len, run.place + run.len) == (column, place) => {
+                    run.len += 1;
+                }
+                _ => runs.push(Run {
+                    column,
+                    place,
+                    len: 1,
+                }),
+            }
+        }
+        runs
+    }
+
+    /// Its columns.
+    pub fn columns(&self) -> std::ops::Range<usize> {
+        self.column..self.column + self.len
+    }
+
+    /// Where what belongs to them is kept.
+    #[inline(always)]
+    pub fn places(&self) -> std::ops::Range<usize> {
+        self.place..self.place + self.len
+    }
 }
 
 /// Places of the numbers and indices of a pair.
@@ -375,6 +411,7 @@ impl<R: Real> Contacts<R> {
                 .map(|c| Class {
                     trees: c.trees,
                     columns: c.columns.clone(),
+                    runs: c.runs.clone(),
                     entries: c.entries.clone(),
                     couples: c.couples,
                     shared: c.shared.iter().map(|x| x.map(cast)).collect(),

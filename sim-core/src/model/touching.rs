@@ -3,7 +3,7 @@
 use super::ModelError;
 use super::constants::{Constants, Coupled};
 use super::contact::{
-    COUNTS, Class, Column, Contacts, Entry, Group, Handles, Kind, Memory, Pair, pair, row,
+    COUNTS, Class, Column, Contacts, Group, Handles, Kind, Memory, Pair, Run, pair, row,
 };
 use super::cut::Cut;
 use super::description::{Cone, Description};
@@ -153,10 +153,10 @@ impl Builder<'_> {
                 true => &coupled.pattern,
                 false => &self.constants.pattern,
             };
-            for (row, entries) in class.columns.iter().zip(&mut class.entries) {
-                for entry in entries {
-                    entry.place = pattern.at(row.dof, class.columns[entry.column].dof);
-                }
+            let columns = &class.columns;
+            for (row, entries) in columns.iter().zip(&mut class.entries) {
+                let place = |column: usize| (column, pattern.at(row.dof, columns[column].dof));
+                *entries = Run::of(entries.iter().flat_map(Run::columns).map(place));
             }
         }
         coupled
@@ -335,9 +335,11 @@ impl Builder<'_> {
                     number(p, pair::LEVERS + c) != 0.0 && number(p, pair::LEVERS + o) != 0.0
                 };
                 if members.iter().any(both) {
-                    entries[c].push(Entry {
+                    // the place is known when all classes are
+                    entries[c].push(Run {
                         column: o,
                         place: 0,
+                        len: 1,
                     });
                     couples |= self.constants.pattern.find(row, column).is_none();
                 }
@@ -357,6 +359,7 @@ impl Builder<'_> {
                     lever: pair::LEVERS + c,
                 })
                 .collect(),
+            runs: Run::of(columns.iter().enumerate().map(|(c, &(dof, _))| (c, dof))),
             entries,
             couples,
             shared,
@@ -432,7 +435,8 @@ impl Builder<'_> {
             let dof = |c: usize| class.columns[c].dof;
             let pairs = class.entries.iter().enumerate();
             pairs.flat_map(move |(c, entries)| {
-                entries.iter().map(move |entry| (dof(c), dof(entry.column)))
+                let others = entries.iter().flat_map(Run::columns);
+                others.map(move |other| (dof(c), dof(other)))
             })
         });
         let coupled = Pattern::new(n, own.iter().copied().chain(more));

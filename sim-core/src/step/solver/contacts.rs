@@ -270,11 +270,9 @@ pub(super) fn residual<C: Cx>(cx: &mut C, t: &ContactsOf<C>, a: &[C::F], place: 
         each!(cx, r in list, {
             let [x, y, z] = cx.load3(t.memory.rows, r, row::AREF);
             let mut jar = [-x, -y, -z];
-            for (c, column) in class.columns.iter().enumerate() {
-                let j = cx.load3(t.memory.rows, r, row::JACOBIAN + 3 * c);
-                for i in 0..3 {
-                    jar[i] = j[i].fma(a[column.dof], jar[i]);
-                }
+            for run in &class.runs {
+                let first = row::JACOBIAN + 3 * run.column;
+                jar = cx.sum_triples(t.memory.rows, r, first, &a[run.places()], jar);
             }
             cx.fill_all(t.memory.rows, r, place, jar);
         });
@@ -304,30 +302,25 @@ pub(super) fn assemble<C: Cx>(
         for x in &mut pull {
             *x = cx.only(*x);
         }
-        for (c, (column, entries)) in class.columns.iter().zip(&class.entries).enumerate() {
+        if pulls {
+            for run in &class.runs {
+                let first = row::JACOBIAN + 3 * run.column;
+                cx.add_triples(t.memory.rows, r, first, pull, &mut rhs[run.places()]);
+            }
+        }
+        for (c, entries) in class.entries.iter().enumerate() {
             let mut own = cx.load3(t.memory.rows, r, row::JACOBIAN + 3 * c);
             for x in &mut own {
                 *x = cx.only(*x);
-            }
-            if pulls {
-                let mut moved = cx.get(&rhs[column.dof]);
-                for i in 0..3 {
-                    moved = own[i].fma(pull[i], moved);
-                }
-                cx.put(&mut rhs[column.dof], moved);
             }
             let mut stiff = [C::F::c(0.0); 3];
             for i in 0..3 {
                 let along = rows[i][1].fma(own[1], rows[i][2] * own[2]);
                 stiff[i] = cx.only(rows[i][0].fma(own[0], along));
             }
-            for entry in entries {
-                let other = cx.load3(t.memory.rows, r, row::JACOBIAN + 3 * entry.column);
-                let mut sum = cx.get(&hessian[entry.place]);
-                for i in 0..3 {
-                    sum = cx.only(other[i]).fma(stiff[i], sum);
-                }
-                cx.put(&mut hessian[entry.place], sum);
+            for run in entries {
+                let (first, places) = (row::JACOBIAN + 3 * run.column, run.places());
+                cx.add_triples(t.memory.rows, r, first, stiff, &mut hessian[places]);
             }
         }
     });
@@ -366,13 +359,9 @@ pub(super) fn forces<C: Cx>(cx: &mut C, t: &ContactsOf<C>, joint: &mut [C::V]) {
                 *x = cx.only(*x);
             }
             cx.fill_all(t.memory.rows, r, row::FORCE, force);
-            for (c, column) in class.columns.iter().enumerate() {
-                let mut sum = cx.get(&joint[column.dof]);
-                let j = cx.load3(t.memory.rows, r, row::JACOBIAN + 3 * c);
-                for (j, x) in j.iter().zip(&force) {
-                    sum = cx.only(*j).fma(*x, sum);
-                }
-                cx.put(&mut joint[column.dof], sum);
+            for run in &class.runs {
+                let first = row::JACOBIAN + 3 * run.column;
+                cx.add_triples(t.memory.rows, r, first, force, &mut joint[run.places()]);
             }
         });
     }

@@ -42,6 +42,9 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         choose_start(cx, m, b);
     }
     let acts = acts(cx, m, &b.efc_weight);
+    let [_, _, weight, aref] = &mut b.work.row;
+    gather(cx, &b.efc_weight, weight);
+    gather(cx, &b.efc_aref, aref);
     let t = &m.contacts;
     // contacts are so stiff that M is lost in the rounding of H a⁺; of H (a⁺ - a) less is asked
     let corrects = contacts::touching(cx, t);
@@ -61,8 +64,6 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let w = &mut b.work;
         let [a, minimum, _, pull] = &mut w.vector;
         let [jar, _, weight, aref] = &mut w.row;
-        gather(cx, &b.efc_weight, weight);
-        gather(cx, &b.efc_aref, aref);
         for j in 0..n {
             a[j] = cx.get(&b.joint_qdd[j]);
             minimum[j] = w.smooth_force[j];
@@ -203,8 +204,6 @@ fn constraint_forces<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) 
     let w = &mut b.work;
     let [a, joint, ..] = &mut w.vector;
     let [jar, force, weight, aref] = &mut w.row;
-    gather(cx, &b.efc_weight, weight);
-    gather(cx, &b.efc_aref, aref);
     for j in 0..m.dofs.len() {
         a[j] = cx.get(&b.joint_qdd[j]);
         joint[j] = C::F::c(0.0);
