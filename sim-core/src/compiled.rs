@@ -46,6 +46,7 @@ macro_rules! compiled {
         }
 
         /// Every stage, by its number.
-        pub const STAGES: Stages<$number> = [$(stage::<$stage>),*];
+        // a constant would be compiled by whoever uses it
+        pub static STAGES: Stages<$number> = [$(stage::<$stage>),*];
     };
 }
