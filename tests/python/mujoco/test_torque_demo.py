@@ -19,6 +19,8 @@ WORLDS, FRAMES, SUBSTEPS = 4096, 180, 8
 JUDGED = 1024
 # Worlds of which energies are compared
 WEIGHED = 96
+# Frames before its greatest depth from which a world is given to MuJoCo
+LED = 3
 # Frames until the fingers, which start outside their limits, have come back; the table is touched in frame 14
 SETTLED = 12
 
@@ -35,18 +37,27 @@ def test_it_sinks_in_no_deeper_than_mujocos_and_gains_no_more_energy():
     with tl.launch(pile.scene, worlds=WORLDS, fields=("joint_q", "joint_qd", "contact_distance")) as sim:
         to = Coordinates(model, sim)
         frame = sim.write(joint_q=starts)
-        q, qd, depth = [judged(frame.joint_q)], [judged(frame.joint_qd)], np.zeros(WORLDS)
+        states, depths = [(frame.joint_q.copy(), frame.joint_qd.copy())], [np.zeros(WORLDS)]
         for number in range(FRAMES):
             frame = sim.step(joint_f=torque(number))
             assert not (frame.status & 1).any() and np.isfinite(frame.joint_q).all()
-            q.append(judged(frame.joint_q))
-            qd.append(judged(frame.joint_qd))
-            depth = np.maximum(depth, -frame.contact_distance.min(axis=1))
+            states.append((frame.joint_q.copy(), frame.joint_qd.copy()))
+            depths.append(-frame.contact_distance.min(axis=1))
+    depth = np.max(depths, axis=0)
     their_q, their_qd, their_depth = motion_of(model, to, judged(starts))
     # neither side's deepest world is the other's
-    for share in (0.5, 0.9, 0.99, 1.0):
+    for share in (0.5, 0.9, 0.99):
         most = max(2e-3, 1.1 * np.quantile(their_depth, share))
         assert np.quantile(depth, share) <= most, f"{np.sort(depth)[-50:]}, MuJoCo {np.sort(their_depth)}"
+    # of four times as many worlds a few are hit harder than any of MuJoCo's, which sinks in as deep when it is hit so
+    beyond = np.flatnonzero(depth > max(2e-3, 1.1 * their_depth.max()))
+    assert len(beyond) <= WORLDS // JUDGED, f"{depth[beyond]}, MuJoCo {np.sort(their_depth)}"
+    for world in beyond:
+        deepest = int(np.argmax([row[world] for row in depths]))
+        first = max(0, deepest - LED)
+        q, qd = (array[world].astype(float) for array in states[first])
+        assert depth[world] <= 1.1 * depth_after(model, to, q, qd, range(first, deepest)), f"world {world}"
+    q, qd = ([judged(state[k]) for state in states] for k in (0, 1))
     gain = gain_of(model, to, np.array(q)[:, :WEIGHED], np.array(qd)[:, :WEIGHED])
     theirs = gain_of(model, to, their_q[:, :WEIGHED], their_qd[:, :WEIGHED])
     for share in (0.5, 0.9, 1.0):
@@ -58,6 +69,17 @@ def test_it_sinks_in_no_deeper_than_mujocos_and_gains_no_more_energy():
 def judged(state: Array) -> Array:
     """Of the worlds that are compared in full."""
     return state[:JUDGED].astype(float)
+
+
+def depth_after(model: mujoco.MjModel, to: Coordinates, q: Array, qd: Array, frames: range) -> float:
+    """MuJoCo's depth [m] when it has been led from a state ``(dofs,)`` of ours through these frames."""
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = to.positions(q), to.to_qvel(q) @ qd
+    for number in frames:
+        data.qfrc_applied[:] = torque(number)
+        mujoco.mj_step(model, data, SUBSTEPS)
+    mujoco.mj_fwdPosition(model, data)
+    return -data.contact.dist.min(initial=0.0)
 
 
 def motion_of(model: mujoco.MjModel, to: Coordinates, starts: Array) -> tuple[Array, Array, Array]:
