@@ -6,7 +6,7 @@ mod scene;
 #[path = "../../sim-core/tests/toy/mod.rs"]
 mod toy;
 
-use models::{Case, arm_and_cube, every_joint, fr3, limits_only, shapes};
+use models::{Case, arm_and_cube, every_joint, every_param, fr3, limits_only, shapes};
 use sim_core::batch::{Block, Numbers, WorkSlot};
 use sim_core::lane::memory::Cpu;
 use sim_core::lane::record::wgsl::{ProgramOptions, wgsl};
@@ -32,7 +32,7 @@ type Scalar = Block<f32, f32>;
 type OnTape = Block<Recorded, RecordedVariable>;
 
 /// What stages leave for each other, and the state.
-const SLOTS: [WorkSlot; 26] = {
+const SLOTS: [WorkSlot; 27] = {
     use WorkSlot::*;
     [
         JointQ,
@@ -44,6 +44,7 @@ const SLOTS: [WorkSlot; 26] = {
         JointF,
         JointTargetQ,
         JointTargetQd,
+        Params,
         Rotation,
         Origin,
         Reference,
@@ -72,7 +73,7 @@ const SCRATCH: [WorkSlot; 4] = [
     WorkSlot::Solution,
 ];
 
-fn cases() -> [Case; 6] {
+fn cases() -> [Case; 7] {
     [
         fr3(),
         every_joint(),
@@ -80,6 +81,7 @@ fn cases() -> [Case; 6] {
         shapes(Cone::Elliptic, None),
         shapes(Cone::Pyramidal, Some(5)),
         arm_and_cube(),
+        every_param(),
     ]
 }
 
@@ -355,7 +357,7 @@ fn the_random_shapes_of_these_tests_touch_in_every_pair_of_kinds() {
 fn a_control_frame_is_recorded_as_a_loop_over_substeps() {
     use WorkSlot::*;
     // the searches of hulls are loops as deep as a text may have them: with those of a frame around them, too deep
-    for case in [fr3(), every_joint(), arm_and_cube()] {
+    for case in [fr3(), every_joint(), arm_and_cube(), every_param()] {
         let m = &case.m;
         let reads = [
             JointQ,
@@ -367,6 +369,7 @@ fn a_control_frame_is_recorded_as_a_loop_over_substeps() {
             JointF,
             JointTargetQ,
             JointTargetQd,
+            Params,
         ];
         let writes = [JointQ, JointQRest, JointQd, JointQdd, Unconverged, LeftOut];
         let start = Instant::now();

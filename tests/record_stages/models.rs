@@ -3,6 +3,7 @@
 use crate::{SUBSTEPS, Scalar, scene, toy};
 use sim_core::batch::Block;
 use sim_core::model::constants::{Constants, Motion};
+use sim_core::model::params::Param;
 use sim_core::model::{Body, Collision, Cone, Description, Model, Pose, Shape, UrdfOptions};
 use std::path::Path;
 
@@ -91,6 +92,15 @@ pub fn shapes(cone: Cone, contacts_max: Option<usize>) -> Case {
 
 /// The FR3 between a table and a cube, its fingers about the cube.
 pub fn arm_and_cube() -> Case {
+    arm_at_cube("arm and cube", [])
+}
+
+/// The same where every parameter varies.
+pub fn every_param() -> Case {
+    arm_at_cube("every parameter", Param::ALL)
+}
+
+fn arm_at_cube(name: &'static str, params: impl IntoIterator<Item = Param>) -> Case {
     let mut scene = robot("examples/assets/fr3/fr3_franka_hand.urdf", 0.1, false);
     scene.robots[0].pose = Pose::at([-0.5, -0.5, 0.1]);
     scene.add_box("table", [0.4, 0.4, 0.05], Pose::at([0.0, -0.5, 0.05]));
@@ -102,9 +112,10 @@ pub fn arm_and_cube() -> Case {
     body.shapes
         .push((Collision::new(None, cube, Pose::identity()), 400.0));
     scene.add_body(body).unwrap();
+    scene.params.extend(params);
     let model = scene.compile().unwrap();
     Case {
-        name: "arm and cube",
+        name,
         m: constants(&model),
         near: Some(Near {
             joint_q: model.start().joint_q.clone(),
@@ -178,6 +189,12 @@ impl Case {
             block.joint_qdd[j] = number(20.0);
             block.joint_f[j] = number(30.0);
             block.joint_target_qd[j] = number(1.0);
+        }
+        for (x, (param, start)) in block.params.iter_mut().zip(m.varying.starts()) {
+            *x = match param.is_load() {
+                true => number(5.0),
+                false => *start as f32 * (1.0 + number(0.3)),
+            };
         }
         let apart = self.near.as_ref().map_or(5.0, |near| near.apart);
         for body in m.bodies.iter().filter(|body| body.motion == Motion::Free) {

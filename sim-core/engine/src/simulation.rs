@@ -75,6 +75,12 @@ impl Simulation {
         })
     }
 
+    pub(crate) fn backend(&self) -> &dyn Backend {
+        &*self.backend
+    }
+    pub(crate) fn backend_mut(&mut self) -> &mut dyn Backend {
+        &mut *self.backend
+    }
     /// The model.
     pub fn model(&self) -> &Arc<Model> {
         &self.model
@@ -124,7 +130,9 @@ impl Simulation {
             .saturating_mul(chunks.min(worlds));
         // state and commands of a world, its counters; see backend/cpu/chunk.rs
         worlds
-            .saturating_mul((5 * model.dofs() + 2 * model.coords()) as u64 * real + 16)
+            .saturating_mul(
+                (5 * model.dofs() + 2 * model.coords() + m.varying.len()) as u64 * real + 16,
+            )
             .saturating_add(scratch)
     }
 
@@ -222,24 +230,7 @@ impl Simulation {
             });
         }
         let all = field.elements(&self.model);
-        if columns.start > columns.end || columns.end > all {
-            return Err(BackendError::Columns {
-                field: row.name,
-                columns: all,
-                start: columns.start,
-                end: columns.end,
-            });
-        }
-        let expected = self.worlds * columns.len();
-        if values.len() != expected {
-            return Err(BackendError::Length {
-                field: row.name,
-                got: values.len(),
-                expected,
-                worlds: self.worlds,
-                columns: columns.len(),
-            });
-        }
+        self.check_shape(row.name, all, columns, values.len())?;
         let names = match field {
             Field::JointQ => self.model.coord_names(),
             _ => self.model.dof_names(),
@@ -256,10 +247,7 @@ impl Simulation {
                 field: row.name,
                 world: place / columns.len(),
                 name: names[columns.start + place % columns.len()].clone(),
-                value: match values {
-                    Values::F32(v) => f64::from(v[place]),
-                    Values::F64(v) => v[place],
-                },
+                value: values.at(place),
             });
         }
         match field {
@@ -268,6 +256,35 @@ impl Simulation {
                 self.check_targets(field, columns, values)?;
             }
             _ => {}
+        }
+        Ok(())
+    }
+
+    /// Refuses columns or a number of values that do not fit; `all` columns there are.
+    pub(crate) fn check_shape(
+        &self,
+        field: &'static str,
+        all: usize,
+        columns: &Range<usize>,
+        got: usize,
+    ) -> Result<(), BackendError> {
+        if columns.start > columns.end || columns.end > all {
+            return Err(BackendError::Columns {
+                field,
+                columns: all,
+                start: columns.start,
+                end: columns.end,
+            });
+        }
+        let expected = self.worlds * columns.len();
+        if got != expected {
+            return Err(BackendError::Length {
+                field,
+                got,
+                expected,
+                worlds: self.worlds,
+                columns: columns.len(),
+            });
         }
         Ok(())
     }

@@ -42,6 +42,8 @@ pub struct Block<F, V> {
     pub joint_target_q: Vec<F>,
     /// Velocity targets. `(dofs)` [rad/s or m/s]
     pub joint_target_qd: Vec<F>,
+    /// Numbers of the model that vary; see [`crate::model::params::Varying`].
+    pub params: Vec<F>,
     /// What the stages leave for each other.
     pub work: Workspace<F>,
 }
@@ -118,6 +120,8 @@ pub enum Slot {
     JointTargetQ,
     /// [`Block::joint_target_qd`]
     JointTargetQd,
+    /// [`Block::params`]
+    Params,
     /// [`Workspace::rotation`]
     Rotation,
     /// [`Workspace::origin`]
@@ -189,6 +193,7 @@ impl<F: Num, V: Copy> Block<F, V> {
             joint_f: vec![zero; n],
             joint_target_q: vec![zero; n],
             joint_target_qd: vec![zero; n],
+            params: m.varying.starts().iter().map(|&(_, x)| F::c(x)).collect(),
             work: Workspace {
                 rotation: vec![[[zero; 3]; 3]; bodies],
                 origin: vec![[zero; 3]; bodies],
@@ -236,6 +241,7 @@ impl<F: Num, V: Copy> Block<F, V> {
             Slot::JointF => Values(&mut self.joint_f),
             Slot::JointTargetQ => Values(&mut self.joint_target_q),
             Slot::JointTargetQd => Values(&mut self.joint_target_qd),
+            Slot::Params => Values(&mut self.params),
             Slot::Rotation => Values(w.rotation.as_flattened_mut().as_flattened_mut()),
             Slot::Origin => Values(w.origin.as_flattened_mut()),
             Slot::Reference => Values(w.reference.as_flattened_mut()),

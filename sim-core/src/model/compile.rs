@@ -4,12 +4,15 @@
 //! that the axis is z; a planar joint becomes two slides and a turn; constraint parameters that derive
 //! from mass are evaluated at the reference pose q = 0.
 
-use super::constants::{Body, Constants, Coupled, Dof, Frame, MassEntry, Motion, Newton, Tree};
+use super::constants::{
+    Body, Constants, Coupled, Dof, Frame, MassEntry, Motion, Newton, Part, Tree,
+};
 use super::contact::Contacts;
 use super::frozen::{Model, RobotRange, Start};
 use super::inertia::merge;
 use super::inverse_weight;
-use super::pairs::{Borne, Rules};
+use super::pairs::{Rules, borne, connected};
+use super::params::{Param, Varying};
 use super::rows::{DofJoint, IMPEDANCE, add_rows};
 use super::touching::add_contacts;
 use super::{Description, Inertial, Joint, JointKind, ModelError, Pose, Robot, TargetMode};
@@ -47,7 +50,10 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         gravity: scene.gravity,
         pattern,
         bodies: builder.bodies,
-        damped: builder.dofs.iter().any(|d| d.damping + d.kd > 0.0),
+        damped: builder.dofs.iter().any(|d| d.damping + d.kd > 0.0)
+            || [Param::JointDamping, Param::JointTargetKd]
+                .iter()
+                .any(|p| scene.params.contains(p)),
         dofs: builder.dofs,
         trees: builder.trees,
         frames: builder.frames,
@@ -66,6 +72,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
             tolerance: 0.0,
             refinements: 0,
         },
+        varying: Varying::default(),
     };
     let reference = inverse_weight::at_reference(&constants, &builder.dof_names)?;
     // MuJoCo scales costs by 1 / (mean inertia × dofs)
@@ -89,6 +96,20 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         link_inverse_weight: &reference.link_inverse_weight,
     };
     add_contacts(&mut constants, scene, &borne, &rules)?;
+    let surfaces: Vec<f64> = borne.iter().map(|shape| shape.surface.mu).collect();
+    for &param in &scene.params {
+        let numbers = param.starts(&constants, &surfaces);
+        constants.varying.add(param, numbers);
+    }
+    if scene.params.contains(&Param::BodyMassScale) {
+        for (robot, (ours, carriers)) in scene
+            .robots
+            .iter()
+            .zip(builder.robots.iter().zip(&builder.carriers))
+        {
+            add_parts(&mut constants, robot, ours.bodies.start, carriers);
+        }
+    }
 
     let mut model = Model {
         constants,
@@ -107,82 +128,29 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     Ok(model)
 }
 
-/// Links that are fixed to each other are of one group: a body's number, or one for what stands still of a robot.
-fn group(constants: &Constants<f64>, robot: usize, carrier: &Carrier) -> usize {
-    carrier.body.unwrap_or(constants.bodies.len() + robot)
-}
-
-/// All shapes of a scene, in the order of their names.
-fn borne<'a>(
-    scene: &'a Description,
-    carriers: &[Vec<Carrier>],
-    constants: &Constants<f64>,
-) -> Vec<Borne<'a>> {
-    let mut all: Vec<Borne<'a>> = Vec::new();
-    for shape in &scene.shapes {
-        all.push(Borne {
-            number: all.len(),
-            shape: &shape.shape,
-            surface: shape.surface,
-            robot: None,
-            link: None,
-            body: None,
-            group: constants.bodies.len() + scene.robots.len(),
-            pose: shape.pose,
+/// The links of each body of a robot, whose links are numbered from `first` on, in the order that they are carried.
+fn add_parts(m: &mut Constants<f64>, robot: &Robot, first: usize, carriers: &[Carrier]) {
+    for (place, link) in robot.link_order().into_iter().enumerate() {
+        let carrier = &carriers[link];
+        let (Some(body), Some(inertial)) = (carrier.body, &robot.links[link].inertial) else {
+            continue;
+        };
+        let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = carrier.pose.rotate_tensor(inertial.inertia);
+        m.bodies[body].parts.push(Part {
+            link: first + place,
+            mass: inertial.mass,
+            center: carrier.pose.transform(inertial.pos),
+            inertia: [xx, yy, zz, xy, xz, yz],
         });
     }
-    let mut frame = 0;
-    for (index, robot) in scene.robots.iter().enumerate() {
-        for link in robot.link_order() {
-            let carrier = &carriers[index][link];
-            for collision in &robot.links[link].collisions {
-                let mut pose = carrier.pose.mul(&collision.pose);
-                if carrier.body.is_none() {
-                    for (x, base) in pose.pos.iter_mut().zip(constants.trees[carrier.tree].base) {
-                        *x += base;
-                    }
-                }
-                all.push(Borne {
-                    number: all.len(),
-                    shape: &collision.shape,
-                    surface: collision.surface,
-                    robot: Some(index),
-                    link: Some(frame),
-                    body: carrier.body,
-                    group: group(constants, index, carrier),
-                    pose,
-                });
-            }
-            frame += 1;
-        }
-    }
-    all
-}
-
-/// Groups of links that a joint connects.
-fn connected(
-    scene: &Description,
-    carriers: &[Vec<Carrier>],
-    constants: &Constants<f64>,
-) -> Vec<(usize, usize)> {
-    let mut pairs = Vec::new();
-    for (index, robot) in scene.robots.iter().enumerate() {
-        let of = |link: usize| group(constants, index, &carriers[index][link]);
-        for joint in robot.joints.iter().filter(|joint| joint.moves()) {
-            if let Some(parent) = joint.parent {
-                pairs.push((of(parent), of(joint.child)));
-            }
-        }
-    }
-    pairs
 }
 
 /// Where a link is carried: by which body and tree, and how it lies in that body's frame.
 #[derive(Clone, Copy)]
-struct Carrier {
-    body: Option<usize>,
-    tree: usize,
-    pose: Pose,
+pub(super) struct Carrier {
+    pub body: Option<usize>,
+    pub tree: usize,
+    pub pose: Pose,
 }
 
 #[derive(Default)]
@@ -326,6 +294,7 @@ impl Builder {
             mass: 0.0,
             center: [0.0; 3],
             inertia: [0.0; 6],
+            parts: Vec::new(),
         });
         let coords = &joint.q[first..first + motion.coords()];
         self.start.joint_q.extend(coords);
@@ -339,6 +308,7 @@ impl Builder {
                 damping: dof.damping,
                 ke: if drives_position { dof.target_ke } else { 0.0 },
                 kd: dof.target_kd,
+                follows_position: drives_position,
                 follows_velocity: dof.target_mode != TargetMode::Position,
                 effort_limit: dof.effort_limit.filter(|limit| limit.is_finite()),
             });

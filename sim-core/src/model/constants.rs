@@ -1,6 +1,7 @@
 //! What the text of physics reads of a model: numbers in the precision of the run.
 
 use super::contact::Contacts;
+use super::params::Varying;
 use crate::lane::Real;
 use crate::math::factor::Pattern;
 
@@ -43,6 +44,8 @@ pub struct Constants<R> {
     pub contact_impedance: Impedance<R>,
     /// Solver options.
     pub solver: Newton<R>,
+    /// Which of all these numbers vary from world to world.
+    pub varying: Varying,
 }
 
 /// The pattern of a larger system that holds a smaller one.
@@ -115,6 +118,21 @@ pub struct Body<R> {
     pub center: [R; 3],
     /// xx yy zz xy xz yz about the centre of mass, in the body's axes [kg·m²].
     pub inertia: [R; 6],
+    /// The links that make it up, where their masses vary.
+    pub parts: Vec<Part<R>>,
+}
+
+/// A link that is fixed to others, or the only one of a body.
+#[derive(Clone, Debug)]
+pub struct Part<R> {
+    /// Its number among the links.
+    pub link: usize,
+    /// [kg]
+    pub mass: R,
+    /// Its centre of mass in the body's frame [m].
+    pub center: [R; 3],
+    /// xx yy zz xy xz yz about its centre of mass, in the body's axes [kg·m²].
+    pub inertia: [R; 6],
 }
 
 impl<R> Body<R> {
@@ -142,6 +160,8 @@ pub struct Dof<R> {
     pub ke: R,
     /// Derivative gain [N·m·s/rad or N·s/m].
     pub kd: R,
+    /// Does the drive follow the position target?
+    pub follows_position: bool,
     /// Does the drive follow the velocity target?
     pub follows_velocity: bool,
     /// Bound of the drive's force; none = no limit [N·m or N].
@@ -297,6 +317,16 @@ impl<R: Real> Constants<R> {
                     mass: cast(b.mass),
                     center: b.center.map(cast),
                     inertia: b.inertia.map(cast),
+                    parts: b
+                        .parts
+                        .iter()
+                        .map(|part| Part {
+                            link: part.link,
+                            mass: cast(part.mass),
+                            center: part.center.map(cast),
+                            inertia: part.inertia.map(cast),
+                        })
+                        .collect(),
                 })
                 .collect(),
             dofs: self
@@ -310,6 +340,7 @@ impl<R: Real> Constants<R> {
                     damping: cast(d.damping),
                     ke: cast(d.ke),
                     kd: cast(d.kd),
+                    follows_position: d.follows_position,
                     follows_velocity: d.follows_velocity,
                     effort_limit: d.effort_limit.map(cast),
                 })
@@ -379,6 +410,7 @@ impl<R: Real> Constants<R> {
                 tolerance: cast(self.solver.tolerance),
                 refinements: self.solver.refinements,
             },
+            varying: self.varying.clone(),
         }
     }
 

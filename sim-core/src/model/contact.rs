@@ -102,6 +102,8 @@ pub struct Memory {
     pub rows: Table,
     /// Scratch of the narrow phase of faces.
     pub cut: Cut,
+    /// Coefficient of friction of each solid, where it varies [–].
+    pub mu: Table,
     /// Numbers of all of them.
     pub len: usize,
 }
@@ -111,6 +113,8 @@ pub struct Memory {
 pub struct Solid<R> {
     /// What it is.
     pub kind: Kind,
+    /// Its shape, as in `shape_names`.
+    pub shape: usize,
     /// The body that bears it, or none.
     pub body: Option<usize>,
     /// Its axes in the body's frame, or in the world: columns [–].
@@ -314,6 +318,9 @@ pub mod row {
     pub const JACOBIAN: usize = 35;
 }
 
+/// Least coefficient of friction of a contact that has any (MuJoCo: `mjMINMU`) [–].
+pub const MU_MIN: f64 = 1e-5;
+
 /// What follows the classes in `counts`.
 pub const COUNT_CONTACTS: usize = 0;
 /// Rows in use.
@@ -371,6 +378,7 @@ impl<R: Real> Contacts<R> {
                 origins: table,
                 counts: table,
                 rows: table,
+                mu: table,
                 cut: Cut {
                     corners: table,
                     candidates: table,
@@ -398,6 +406,7 @@ impl<R: Real> Contacts<R> {
                 .iter()
                 .map(|s| Solid {
                     kind: s.kind,
+                    shape: s.shape,
                     body: s.body,
                     axes: s.axes.map(|column| column.map(cast)),
                     is_upright: s.is_upright,

@@ -2,10 +2,12 @@
 //!
 //! SI units, radians, z up, quaternions (x, y, z, w).
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::geometry::Mesh;
+use super::params::Param;
 use super::pose::Pose;
 use super::surface::Surface;
 
@@ -30,6 +32,8 @@ pub struct Description {
     pub contacts_max: Option<usize>,
     /// Most constraint rows of contacts that a world has room for; `None` is as many as its contacts need.
     pub rows_max: Option<usize>,
+    /// Parameters that vary from world to world, and may be written while it runs.
+    pub params: BTreeSet<Param>,
 }
 
 /// Options of the constraint solver, with MuJoCo's meaning.
@@ -365,6 +369,7 @@ impl Description {
             filters: Vec::new(),
             contacts_max: None,
             rows_max: None,
+            params: BTreeSet::new(),
         }
     }
 }

@@ -16,6 +16,7 @@ pub mod hull_tables;
 mod inertia;
 mod inverse_weight;
 mod pairs;
+pub mod params;
 mod paths;
 mod pose;
 mod robot;

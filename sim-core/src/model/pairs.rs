@@ -1,10 +1,12 @@
 //! Convex pieces of the shapes of a scene, and which pairs of them may touch.
 
-use super::Pose;
+use super::compile::Carrier;
+use super::constants::Constants;
 use super::contact::{Contacts, Kind, Solid};
-use super::description::Shape;
+use super::description::{Description, Shape};
 use super::geometry::Hull;
 use super::hull_tables::HullTables;
+use super::pose::Pose;
 use super::surface::Surface;
 use std::collections::BTreeSet;
 
@@ -63,6 +65,76 @@ pub(super) fn contacts_of(kinds: (Kind, Kind)) -> usize {
         (Kind::Box, Kind::Box) => 9,
         _ => 4,
     }
+}
+
+/// Links that are fixed to each other are of one group: a body's number, or one for what stands still of a robot.
+fn group(constants: &Constants<f64>, robot: usize, carrier: &Carrier) -> usize {
+    carrier.body.unwrap_or(constants.bodies.len() + robot)
+}
+
+/// All shapes of a scene, in the order of their names.
+pub(super) fn borne<'a>(
+    scene: &'a Description,
+    carriers: &[Vec<Carrier>],
+    constants: &Constants<f64>,
+) -> Vec<Borne<'a>> {
+    let mut all: Vec<Borne<'a>> = Vec::new();
+    for shape in &scene.shapes {
+        all.push(Borne {
+            number: all.len(),
+            shape: &shape.shape,
+            surface: shape.surface,
+            robot: None,
+            link: None,
+            body: None,
+            group: constants.bodies.len() + scene.robots.len(),
+            pose: shape.pose,
+        });
+    }
+    let mut frame = 0;
+    for (index, robot) in scene.robots.iter().enumerate() {
+        for link in robot.link_order() {
+            let carrier = &carriers[index][link];
+            for collision in &robot.links[link].collisions {
+                let mut pose = carrier.pose.mul(&collision.pose);
+                if carrier.body.is_none() {
+                    for (x, base) in pose.pos.iter_mut().zip(constants.trees[carrier.tree].base) {
+                        *x += base;
+                    }
+                }
+                all.push(Borne {
+                    number: all.len(),
+                    shape: &collision.shape,
+                    surface: collision.surface,
+                    robot: Some(index),
+                    link: Some(frame),
+                    body: carrier.body,
+                    group: group(constants, index, carrier),
+                    pose,
+                });
+            }
+            frame += 1;
+        }
+    }
+    all
+}
+
+/// Groups of links that a joint connects.
+pub(super) fn connected(
+    scene: &Description,
+    carriers: &[Vec<Carrier>],
+    constants: &Constants<f64>,
+) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    for (index, robot) in scene.robots.iter().enumerate() {
+        let of = |link: usize| group(constants, index, &carriers[index][link]);
+        for joint in robot.joints.iter().filter(|joint| joint.moves()) {
+            if let Some(parent) = joint.parent {
+                pairs.push((of(parent), of(joint.child)));
+            }
+        }
+    }
+    pairs
 }
 
 /// The pieces of all shapes; their hulls go to the tables.
@@ -140,6 +212,7 @@ fn piece(
         borne,
         solid: Solid {
             kind,
+            shape: b.number,
             body: b.body,
             axes,
             is_upright: axes == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],

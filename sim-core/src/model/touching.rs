@@ -3,11 +3,12 @@
 use super::ModelError;
 use super::constants::{Constants, Coupled};
 use super::contact::{
-    COUNTS, Class, Column, Contacts, Group, Handles, Kind, Memory, Pair, Run, pair, row,
+    COUNTS, Class, Column, Contacts, Group, Handles, Kind, MU_MIN, Memory, Pair, Run, pair, row,
 };
 use super::cut::Cut;
 use super::description::{Cone, Description};
 use super::pairs::{Borne, Piece, Rules, contacts_of, pairs, pieces};
+use super::params::Param;
 use super::paths::{Cluster, clusters};
 use super::rows::{IMPEDANCE, contact_damping};
 use super::surface::Surface;
@@ -409,6 +410,10 @@ impl Builder<'_> {
             origins: table(3, self.constants.trees.len() + 1),
             counts: table(1, contacts.classes.len() + COUNTS),
             rows: table(row::JACOBIAN + 3 * widest, rows),
+            mu: match self.scene.params.contains(&Param::ShapeMu) {
+                true => table(1, self.pieces.len()),
+                false => contacts.memory.mu,
+            },
             cut: match contacts.hulls.spans.rows + cylinders {
                 0 => contacts.memory.cut,
                 _ => Cut {
@@ -450,9 +455,6 @@ impl Builder<'_> {
         }
     }
 }
-
-/// Least coefficient of friction of a contact that has any (MuJoCo: `mjMINMU`) [–].
-const MU_MIN: f64 = 1e-5;
 
 /// Contacts that there is room for by default, where more could be found: a hundred shapes in a heap.
 const DEFAULT_CONTACTS_MAX: usize = 512;

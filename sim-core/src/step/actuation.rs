@@ -2,17 +2,20 @@
 //!
 //! ```text
 //! drive = clamp(ke (q* - q) + kd (q̇* - q̇), ± effort limit)      q̇* only where the drive follows it
-//! smooth = joint_f + drive - damping q̇ - bias
+//! smooth = joint_f + drive - damping q̇ - bias + Σ Jᵀ body_f
 //! ```
 //!
 //! The target of a ball is a rotation vector; its error is the rotation vector from here to there.
 
 use super::kinematics::read_quat;
-use super::{BlockOf, ConstantsOf};
+use super::{BlockOf, ConstantsOf, param};
+use crate::batch::Workspace;
 use crate::lane::{Cx, Num};
 use crate::math::quat::{self, conjugate, mul};
-use crate::math::vec3::Vec3;
-use crate::model::constants::{Dof, Motion};
+use crate::math::spatial::{power, sum};
+use crate::math::vec3::{Vec3, constant, cross_add, transform_add, zero};
+use crate::model::constants::{Constants, Motion};
+use crate::model::params::Param;
 
 #[inline(always)]
 pub(super) fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
@@ -21,47 +24,84 @@ pub(super) fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
             Motion::Revolute | Motion::Prismatic => {
                 let j = body.dof;
                 let error = b.joint_target_q[j] - cx.get(&b.joint_q[body.coord]);
-                drive(cx, &m.dofs[j], b, j, error);
+                drive(cx, m, b, j, error);
             }
             Motion::Ball => {
                 let errors = ball_error(cx, b, body.coord, body.dof);
                 for (j, error) in body.dofs().zip(errors) {
-                    drive(cx, &m.dofs[j], b, j, error);
+                    drive(cx, m, b, j, error);
                 }
             }
             Motion::Free => {
                 for j in body.dofs() {
-                    let damping = C::F::k(m.dofs[j].damping);
+                    let fixed = m.dofs[j].damping;
+                    let damping = param(m, &b.params, Param::JointDamping, j, fixed);
                     let applied = cx.get(&b.joint_qd[j]).fnma(damping, b.joint_f[j]);
                     b.work.smooth_force[j] = applied - b.work.bias_force[j];
                 }
             }
         }
     }
+    if let Some(first) = m.varying.first(Param::BodyF) {
+        push(m, &b.params, first, &mut b.work);
+    }
 }
 
 /// The force of dof `j` at this position error.
 #[inline(always)]
-fn drive<C: Cx>(
-    cx: &mut C,
-    dof: &Dof<<C::F as Num>::Real>,
-    b: &mut BlockOf<C>,
-    j: usize,
-    error: C::F,
-) {
+fn drive<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, j: usize, error: C::F) {
+    let dof = &m.dofs[j];
     let qd = cx.get(&b.joint_qd[j]);
     let rate = if dof.follows_velocity {
         b.joint_target_qd[j] - qd
     } else {
         -qd
     };
-    let mut drive = error.fma(C::F::k(dof.ke), rate * C::F::k(dof.kd));
-    if let Some(limit) = dof.effort_limit {
-        let limit = C::F::k(limit);
+    let mut drive = rate * param(m, &b.params, Param::JointTargetKd, j, dof.kd);
+    if dof.follows_position {
+        drive = error.fma(param(m, &b.params, Param::JointTargetKe, j, dof.ke), drive);
+    }
+    let limit = match m.varying.first(Param::JointEffortLimit) {
+        Some(first) => Some(b.params[first + j]),
+        None => dof.effort_limit.map(C::F::k),
+    };
+    if let Some(limit) = limit {
         drive = drive.min(limit).max(-limit);
     }
-    let applied = qd.fnma(C::F::k(dof.damping), b.joint_f[j] + drive);
+    let damping = param(m, &b.params, Param::JointDamping, j, dof.damping);
+    let applied = qd.fnma(damping, b.joint_f[j] + drive);
     b.work.smooth_force[j] = applied - b.work.bias_force[j];
+}
+
+/// Adds the forces on links to those of the joints that carry them.
+#[inline(always)]
+fn push<F: Num>(m: &Constants<F::Real>, params: &[F], first: usize, w: &mut Workspace<F>) {
+    for force in &mut w.force {
+        *force = [zero(), zero()];
+    }
+    for (link, frame) in m.frames.iter().enumerate() {
+        if let Some(body) = frame.body {
+            let given = &params[first + 6 * link..first + 6 * link + 6];
+            let force = [given[0], given[1], given[2]];
+            let torque = [given[3], given[4], given[5]];
+            let point = transform_add(&w.rotation[body], constant(frame.center), w.origin[body]);
+            let wrench = [force, cross_add(point, force, torque)];
+            w.force[body] = sum(w.force[body], wrench);
+        }
+    }
+    for (k, body) in m.bodies.iter().enumerate().rev() {
+        let force = w.force[k];
+        for (axis, d) in body.dofs().enumerate() {
+            let pushed = match body.motion {
+                Motion::Free => force.as_flattened()[axis],
+                _ => power(&w.motion[d], &force),
+            };
+            w.smooth_force[d] = w.smooth_force[d] + pushed;
+        }
+        if let Some(parent) = body.parent {
+            w.force[parent] = sum(w.force[parent], force);
+        }
+    }
 }
 
 /// log(q⁻¹ exp(target)), in the body's axes.

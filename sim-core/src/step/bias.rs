@@ -7,18 +7,18 @@
 //!
 //! A free body has S = 1. Its axes stand still, but those of its rotation follow its centre of mass: a = v × ω.
 
-use super::{BlockOf, ConstantsOf};
+use super::{BlockOf, ConstantsOf, gravity};
 use crate::lane::Cx;
 use crate::math::spatial::{
     ANGULAR, LINEAR, Spatial, cross_force_add, cross_motion, momentum, power, scale_sum, sum,
 };
-use crate::math::vec3::{constant, cross_add, scale, zero};
+use crate::math::vec3::{cross_add, scale, zero};
 use crate::model::constants::Motion;
 
 #[inline(always)]
 pub(super) fn bias_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let gravity = gravity(m, &b.params);
     let w = &mut b.work;
-    let gravity = constant::<C::F>(m.gravity);
     let base: Spatial<C::F> = [[-gravity[0], -gravity[1], -gravity[2]], zero()];
     // `force` holds the acceleration of a body until the backward pass
     for (k, body) in m.bodies.iter().enumerate() {

@@ -72,7 +72,11 @@ pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
             let distance = cx.load(t.memory.rows, r, row::DISTANCE);
             let position = distance - shared(cx, t, class, number, pair::MARGIN);
             let d = impedance(&m.contact_impedance, position);
-            let mu = shared(cx, t, class, number, pair::MU) * rubs;
+            let mu = match t.memory.mu.rows {
+                0 => shared(cx, t, class, number, pair::MU),
+                _ => cx.load(t.memory.rows, r, row::MU),
+            };
+            let mu = mu * rubs;
             let weight = shared(cx, t, class, number, pair::WEIGHT);
             let stiff = d.div((one - d) * weight);
             let damping = shared(cx, t, class, number, pair::DAMPING);

@@ -23,7 +23,7 @@
 //! ```
 
 use super::kinematics::read_quat;
-use super::{BlockOf, ConstantsOf};
+use super::{BlockOf, ConstantsOf, param};
 use crate::lane::{Cx, Num, Real};
 use crate::math::factor::{multiply, solve};
 use crate::math::quat::{self, Quat};
@@ -32,7 +32,8 @@ use crate::math::vec3::{
     Mat3, Vec3, add, constant, cross, cross_add, dot, scale, scale_add, sub, transform,
     transform_back, zero,
 };
-use crate::model::constants::{Body, Motion};
+use crate::model::constants::{Body, Constants, Motion};
+use crate::model::params::Param;
 
 #[inline(always)]
 pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
@@ -54,7 +55,8 @@ pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
         // the last stage: nobody needs the mass matrix after it
         for (j, dof) in m.dofs.iter().enumerate() {
             // a clamped drive keeps its damping here, as under MuJoCo's `actfrcrange`
-            let damping = C::F::k(dof.damping) + C::F::k(dof.kd);
+            let passive = param(m, &b.params, Param::JointDamping, j, dof.damping);
+            let damping = passive + param(m, &b.params, Param::JointTargetKd, j, dof.kd);
             let diagonal = m.pattern.at(j, j);
             w.mass_matrix[diagonal] = dt.fma(damping, w.mass_matrix[diagonal]);
             acceleration[j] = w.smooth_force[j] + cx.get(&b.constraint_force[j]);
@@ -73,7 +75,7 @@ pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
             let rotation = w.rotation[k];
             if m.bodies.iter().all(|other| other.parent != Some(k)) {
                 let [acceleration, ..] = &mut w.vector;
-                gyroscopic::<C>(cx, m, body, &rotation, acceleration, &b.joint_qd);
+                gyroscopic::<C>(cx, m, &b.params, body, &rotation, acceleration, &b.joint_qd);
             }
             free::<C>(
                 cx,
@@ -121,6 +123,7 @@ fn advance<C: Cx>(cx: &mut C, q: &mut C::V, rest: &mut C::V, v: C::F, dt: C::F) 
 fn gyroscopic<C: Cx>(
     cx: &C,
     m: &ConstantsOf<C>,
+    params: &[C::F],
     body: &Body<<C::F as Num>::Real>,
     rotation: &Mat3<C::F>,
     acceleration: &mut [C::F],
@@ -136,19 +139,21 @@ fn gyroscopic<C: Cx>(
     // relative to the trace, so that determinants of small bodies stay within f32
     let trace: f64 = body.inertia[..3].iter().map(|x| x.to_f64()).sum();
     let unit = C::F::c(1.0 / trace);
-    let momentum = scale(turned(body, rotation, spin), unit);
+    let momentum = scale(turned(m, params, body, rotation, spin), unit);
     let mut columns = [zero(); 3];
     for (i, column) in columns.iter_mut().enumerate() {
         let mut axis = zero();
         axis[i] = C::F::c(1.0);
-        let inertia = scale(turned(body, rotation, axis), unit);
+        let inertia = scale(turned(m, params, body, rotation, axis), unit);
         let rate = cross_add(axis, momentum, cross(spin, inertia));
         *column = scale_add(rate, dt, inertia);
-        let dof = &m.dofs[d + 3 + i];
-        let driven = dt.fma(C::F::k(dof.damping), C::F::k(dof.armature));
+        let (j, dof) = (d + 3 + i, &m.dofs[d + 3 + i]);
+        let damping = param(m, params, Param::JointDamping, j, dof.damping);
+        let armature = param(m, params, Param::JointArmature, j, dof.armature);
+        let driven = dt.fma(damping, armature);
         column[i] = driven.fma(unit, column[i]);
     }
-    let inertia = scale(turned(body, rotation, angular), unit);
+    let inertia = scale(turned(m, params, body, rotation, angular), unit);
     let rate = cross_add(angular, momentum, cross(spin, inertia));
     let change = scale(rate, -dt);
     let [x, y, z] = columns;
@@ -166,10 +171,31 @@ fn gyroscopic<C: Cx>(
     }
 }
 
-/// J v in world axes, J the inertia about the centre of mass.
+/// J v in world axes, J the inertia about the centre of mass; of links whose masses vary, each about its own.
 #[inline(always)]
-fn turned<F: Num>(body: &Body<F::Real>, rotation: &Mat3<F>, v: Vec3<F>) -> Vec3<F> {
-    let own = symmetric(body.inertia, transform_back(rotation, v));
+fn turned<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    body: &Body<F::Real>,
+    rotation: &Mat3<F>,
+    v: Vec3<F>,
+) -> Vec3<F> {
+    let v = transform_back(rotation, v);
+    let own = match m.varying.first(Param::BodyMassScale) {
+        None => symmetric(body.inertia, v),
+        Some(first) => {
+            let mut sum = zero();
+            for part in &body.parts {
+                let scale = params[first + part.link];
+                // about the centre that the scene has
+                let arm = sub(constant(part.center), constant(body.center));
+                let swing = cross(arm, cross(v, arm));
+                let own = scale_add(swing, F::k(part.mass), symmetric(part.inertia, v));
+                sum = scale_add(own, scale, sum);
+            }
+            sum
+        }
+    };
     transform(rotation, own)
 }
 

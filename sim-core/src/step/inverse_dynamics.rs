@@ -10,19 +10,20 @@
 //! τ = z · n  or  z · f
 //! ```
 
-use super::{BlockOf, ConstantsOf};
+use super::{BlockOf, ConstantsOf, gravity, param};
 use crate::lane::{Cx, Num};
-use crate::math::spatial::{ANGULAR, LINEAR, Spatial, sum, symmetric};
+use crate::math::spatial::{ANGULAR, LINEAR, Spatial, scale_sum, sum, symmetric};
 use crate::math::vec3::{
-    Vec3, add, constant, cross, cross_add, dot, scale, scale_add, sub, transform, transform_add,
-    transform_back, zero,
+    Mat3, Vec3, add, constant, cross, cross_add, dot, scale, scale_add, sub, transform,
+    transform_add, transform_back, zero,
 };
 use crate::model::constants::{Body, Motion};
+use crate::model::params::Param;
 
 /// The forces of `joint_qdd` at this state, into `vector[0]`.
 #[inline(always)]
 pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    let gravity = constant::<C::F>(m.gravity);
+    let gravity = gravity(m, &b.params);
     let base: Spatial<C::F> = [[-gravity[0], -gravity[1], -gravity[2]], zero()];
     // `force` holds the acceleration of a body's origin until its force is known
     for (k, body) in m.bodies.iter().enumerate() {
@@ -67,18 +68,31 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
     for (k, body) in m.bodies.iter().enumerate() {
         let w = &mut b.work;
         let (axes, omega) = (&w.rotation[k], w.velocity[k][ANGULAR]);
-        let center = transform(axes, constant(body.center));
-        let force = scale(carried_along(w.force[k], omega, center), C::F::k(body.mass));
-        let (spin, turn) = (
-            transform_back(axes, omega),
-            transform_back(axes, w.force[k][ANGULAR]),
-        );
-        let own = cross_add(
-            spin,
-            symmetric(body.inertia, spin),
-            symmetric(body.inertia, turn),
-        );
-        w.force[k] = [force, transform_add(axes, own, cross(center, force))];
+        w.force[k] = match m.varying.first(Param::BodyMassScale) {
+            None => held::<C::F>(
+                body.mass,
+                body.center,
+                body.inertia,
+                axes,
+                omega,
+                w.force[k],
+            ),
+            Some(first) => {
+                let mut whole = [zero(), zero()];
+                for part in &body.parts {
+                    let own = held::<C::F>(
+                        part.mass,
+                        part.center,
+                        part.inertia,
+                        axes,
+                        omega,
+                        w.force[k],
+                    );
+                    whole = scale_sum(own, b.params[first + part.link], whole);
+                }
+                whole
+            }
+        };
     }
     for (k, body) in m.bodies.iter().enumerate().rev() {
         let arm = arm(cx, b, k, body);
@@ -101,9 +115,29 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
         }
     }
     for (j, dof) in m.dofs.iter().enumerate() {
-        let driven = C::F::k(dof.armature);
+        let driven = param(m, &b.params, Param::JointArmature, j, dof.armature);
         b.work.vector[0][j] = driven.fma(cx.get(&b.joint_qdd[j]), b.work.vector[0][j]);
     }
+}
+
+/// The force that gives a mass its acceleration, and its moment about the origin of the frame that carries it.
+#[inline(always)]
+fn held<F: Num>(
+    mass: F::Real,
+    center: Vec3<F::Real>,
+    inertia: [F::Real; 6],
+    axes: &Mat3<F>,
+    omega: Vec3<F>,
+    acceleration: Spatial<F>,
+) -> Spatial<F> {
+    let center = transform(axes, constant(center));
+    let force = scale(carried_along(acceleration, omega, center), F::k(mass));
+    let (spin, turn) = (
+        transform_back(axes, omega),
+        transform_back(axes, acceleration[ANGULAR]),
+    );
+    let own = cross_add(spin, symmetric(inertia, spin), symmetric(inertia, turn));
+    [force, transform_add(axes, own, cross(center, force))]
 }
 
 /// Acceleration of a point `arm` away on a body that moves so: a + α × r + ω × (ω × r).

@@ -18,6 +18,7 @@ use crate::math::vec3::{
     Mat3, Vec3, add, constant, cross, scale, scale_add, sub, transform, transform_add, zero,
 };
 use crate::model::constants::{Body, Motion};
+use crate::model::params::Param;
 
 #[inline(always)]
 pub(super) fn kinematics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
@@ -86,7 +87,20 @@ pub(super) fn kinematics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
                 }
             }
         }
-        w.inertia[k] = place::<C::F>(body.mass, body.center, body.inertia, &rotation, origin);
+        w.inertia[k] = match m.varying.first(Param::BodyMassScale) {
+            None => place::<C::F>(body.mass, body.center, body.inertia, &rotation, origin),
+            Some(first) => {
+                let mut sum = [C::F::c(0.0); 10];
+                for part in &body.parts {
+                    let own =
+                        place::<C::F>(part.mass, part.center, part.inertia, &rotation, origin);
+                    for (sum, own) in sum.iter_mut().zip(own) {
+                        *sum = own.fma(b.params[first + part.link], *sum);
+                    }
+                }
+                sum
+            }
+        };
         w.rotation[k] = rotation;
         w.origin[k] = origin;
     }

@@ -6,13 +6,15 @@
 //!
 //! For a free body S = 1: its columns are the momentum Iᶜ S(i) itself, its own block is Iᶜ.
 
+use super::param;
 use crate::batch::Workspace;
 use crate::lane::Num;
 use crate::math::spatial::{momentum, power};
 use crate::model::constants::{Constants, Motion};
+use crate::model::params::Param;
 
 #[inline(always)]
-pub(super) fn mass_matrix<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
+pub(super) fn mass_matrix<F: Num>(m: &Constants<F::Real>, params: &[F], w: &mut Workspace<F>) {
     for &place in &m.mass_zeros {
         w.mass_matrix[place] = F::c(0.0);
     }
@@ -42,7 +44,8 @@ pub(super) fn mass_matrix<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) 
                 }
                 diagonal = power(&w.motion[i], &force);
             }
-            w.mass_matrix[own.place] = diagonal + F::k(dof.armature);
+            w.mass_matrix[own.place] =
+                diagonal + param(m, params, Param::JointArmature, i, dof.armature);
         }
         if let Some(parent) = body.parent {
             for e in 0..10 {

@@ -18,8 +18,10 @@ mod velocities;
 
 use crate::batch::{Block, WorkSlot as Slot};
 use crate::lane::{Cx, Num};
+use crate::math::vec3::Vec3;
 use crate::model::constants::Constants;
 use crate::model::contact::PAIR_KINDS;
+use crate::model::params::Param;
 
 /// The constants that a machine reads.
 pub type ConstantsOf<C> = Constants<<<C as Cx>::F as Num>::Real>;
@@ -149,19 +151,23 @@ impl Stage {
     pub fn reads(self) -> &'static [Slot] {
         use Slot::*;
         match self {
-            Stage::Kinematics => &[JointQ],
-            Stage::Bias => &[JointQd, Motion, Inertia],
-            Stage::MassMatrix => &[Motion, Inertia],
+            Stage::Kinematics => &[JointQ, Params],
+            Stage::Bias => &[JointQd, Motion, Inertia, Params],
+            Stage::MassMatrix => &[Motion, Inertia, Params],
             Stage::Actuation => &[
                 JointQ,
                 JointQd,
                 JointF,
                 JointTargetQ,
                 JointTargetQd,
+                Params,
+                Rotation,
+                Origin,
+                Motion,
                 BiasForce,
             ],
             Stage::Constraint => &[JointQ, JointQd],
-            Stage::Place => &[Rotation, Origin, Reference],
+            Stage::Place => &[Params, Rotation, Origin, Reference],
             Stage::Touch(_) => &[],
             Stage::ContactRows => &[LeftOut, JointQd, Origin, Reference, Motion],
             Stage::Solver => &[
@@ -177,6 +183,7 @@ impl Stage {
                 JointQ,
                 JointQd,
                 JointQdd,
+                Params,
                 Rotation,
                 Velocity,
                 BiasForce,
@@ -189,6 +196,7 @@ impl Stage {
                 ConstraintForce,
             ],
             Stage::Integrate => &[
+                Params,
                 Rotation,
                 JointQ,
                 JointQRest,
@@ -228,7 +236,7 @@ impl Stage {
         match self {
             Stage::Kinematics => kinematics::kinematics(cx, m, b),
             Stage::Bias => bias::bias_force(cx, m, b),
-            Stage::MassMatrix => mass_matrix::mass_matrix(m, &mut b.work),
+            Stage::MassMatrix => mass_matrix::mass_matrix(m, &b.params, &mut b.work),
             Stage::Actuation => actuation::smooth_force(cx, m, b),
             Stage::Constraint => constraint::rows(cx, m, b),
             Stage::Place => collide::place(cx, m, b),
@@ -242,6 +250,31 @@ impl Stage {
             Stage::Accelerations => solver::accelerations(cx, m, b),
         }
     }
+}
+
+/// Number `k` of a parameter: the worlds' own where it varies, else the model's.
+#[inline(always)]
+fn param<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    param: Param,
+    k: usize,
+    fixed: F::Real,
+) -> F {
+    match m.varying.first(param) {
+        Some(first) => params[first + k],
+        None => F::k(fixed),
+    }
+}
+
+/// Gravity in world axes.
+#[inline(always)]
+fn gravity<F: Num>(m: &Constants<F::Real>, params: &[F]) -> Vec3<F> {
+    let mut gravity = [F::c(0.0); 3];
+    for i in 0..3 {
+        gravity[i] = param(m, params, Param::Gravity, i, m.gravity[i]);
+    }
+    gravity
 }
 
 /// One substep: the state moves on by `dt`.

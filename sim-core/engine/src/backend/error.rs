@@ -131,4 +131,40 @@ pub enum BackendError {
         /// The value.
         value: f64,
     },
+    /// A parameter that is a constant of the program.
+    #[error(
+        "`{param}` is the same constant in all worlds of this run; to write it, name it at launch: params=(\"{param}\",) (of this run vary: {varying})"
+    )]
+    Constant {
+        /// The parameter.
+        param: &'static str,
+        /// Those that vary.
+        varying: String,
+    },
+    /// A parameter that is too small.
+    #[error(
+        "`{param}` is {value} in world {world} for `{name}`; nothing was written, give at least {least}"
+    )]
+    BelowLeast {
+        /// The parameter.
+        param: &'static str,
+        /// The world.
+        world: usize,
+        /// What it is of.
+        name: String,
+        /// The value.
+        value: f64,
+        /// The least that it may be.
+        least: f64,
+    },
+    /// A position gain of a drive that follows velocities.
+    #[error(
+        "joint_target_ke of `{name}` is {value}, but its drive follows velocity targets only; give 0, or another target mode in the scene"
+    )]
+    VelocityMode {
+        /// The joint.
+        name: String,
+        /// The gain.
+        value: f64,
+    },
 }

@@ -31,6 +31,14 @@ impl Values<'_> {
         self.len() == 0
     }
 
+    /// The value at a place.
+    pub fn at(&self, place: usize) -> f64 {
+        match self {
+            Values::F32(v) => f64::from(v[place]),
+            Values::F64(v) => v[place],
+        }
+    }
+
     /// The first of a part that is not finite, counted from the first of all.
     pub fn first_not_finite(&self, part: Range<usize>) -> Option<usize> {
         let first = part.start;
@@ -81,6 +89,10 @@ pub trait Backend: Send {
         values: Values<'_>,
         mask: Option<&[bool]>,
     );
+    /// Sets columns of the parameters that vary in the worlds of the mask (none = all).
+    fn write_params(&mut self, columns: Range<usize>, values: Values<'_>, mask: Option<&[bool]>);
+    /// Reads columns of the parameters that vary, `(worlds, columns)`, world-major.
+    fn params(&self, columns: Range<usize>, to: &mut [f64]);
     /// Back to the start, in the worlds of the mask (none = all).
     fn reset(&mut self, mask: Option<&[bool]>);
     /// Runs `substeps` substeps (none = evaluates only), then writes every field of the layout

@@ -27,7 +27,10 @@ use super::{BlockOf, ConstantsOf};
 use crate::lane::{Cx, Num, Real, Table};
 use crate::math::vec3::{Mat3, Vec3, add, constant, dot, sub, transform, transform_add};
 use crate::model::Cone;
-use crate::model::contact::{COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, pair};
+use crate::model::contact::{
+    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, MU_MIN, pair,
+};
+use crate::model::params::Param;
 use crate::{span, when};
 use narrow::{Shape, Two, narrow};
 use points::{Placed, Points, Room};
@@ -66,6 +69,9 @@ pub(super) fn place<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
         cx.fill_all(memory.poses, row, 3, y);
         cx.fill_all(memory.poses, row, 6, z);
         cx.fill_all(memory.poses, row, 9, center);
+        if let Some(first) = m.varying.first(Param::ShapeMu) {
+            cx.fill(memory.mu, row, 0, b.params[first + solid.shape]);
+        }
     }
     for (t, reference) in w.reference.iter().enumerate() {
         let row = cx.at(t);
@@ -202,6 +208,16 @@ fn overlap<F: Num>(
     gap.lt(F::c(0.0))
 }
 
+/// Coefficient of friction of a pair whose shapes' vary: the larger.
+#[inline(always)]
+fn friction<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) -> C::F {
+    let (indices, table) = (t.handles.pair_indices, t.memory.mu);
+    let a = cx.index(indices, p, pair::SOLID_A, table.rows);
+    let b = cx.index(indices, p, pair::SOLID_B, table.rows);
+    let (a, b) = (cx.load(table, a, 0), cx.load(table, b, 0));
+    a.max(b).max(C::F::c(MU_MIN))
+}
+
 /// Where the contacts of a pair go.
 #[inline(always)]
 fn points_of<C: Cx>(
@@ -224,6 +240,10 @@ fn points_of<C: Cx>(
         pair: cx.number(p),
         base: add(center_a, sub(origin_a, origin)),
         flip: cx.constant(numbers, p, pair::FLIP),
+        mu: match t.memory.mu.rows {
+            0 => None,
+            _ => Some(friction(cx, t, p)),
+        },
         // a pyramid is not the same along all tangents
         along: (t.cone == Cone::Pyramidal).then_some([C::F::c(0.0); 3]),
         room: Room {

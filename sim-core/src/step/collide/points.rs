@@ -26,6 +26,8 @@ pub struct Points<C: Cx> {
     pub base: Vec3<C::F>,
     /// -1 where rows have the normal from the second shape to the first, else 1.
     pub flip: C::F,
+    /// Coefficient of friction, where it varies [–].
+    pub mu: Option<C::F>,
     /// Along this the first tangent lies if it is not 0 [–]; none where the direction of tangents does not matter.
     pub along: Option<Vec3<C::F>>,
     /// What a world has room for.
@@ -71,12 +73,15 @@ impl<C: Cx> Points<C> {
             mask
         };
         let (list, table, number) = (&mut self.list, self.table, self.pair);
-        let along = self.along;
+        let (along, mu) = (self.along, self.mu);
         let (point, normal) = (add(self.base, point), scale(normal, self.flip));
         push!(cx, *list, mask, fresh, {
             let ([x, y, z], [u, v, w]) = (point, normal);
             // in the order of `row`
             cx.init_all(table, fresh, &[x, y, z, distance, u, v, w, number]);
+            if let Some(mu) = mu {
+                cx.init(table, fresh, row::MU, mu);
+            }
             if let Some(along) = along {
                 for (i, x) in along.iter().enumerate() {
                     cx.init(table, fresh, row::TANGENTS + i, *x);

@@ -29,7 +29,8 @@ pub(super) struct Job<F: Lane> {
     start: Vec<F::Real>,
 }
 
-/// State and commands of a block: groups of one number a dof, then positions and their rests, one a coordinate.
+/// State and commands of a block: groups of one number a dof, then positions and their rests, one a coordinate, then the
+/// parameters that vary.
 #[derive(Clone, Copy)]
 pub(super) enum StateField {
     Qd,
@@ -39,6 +40,7 @@ pub(super) enum StateField {
     TargetQd,
     Q,
     QRest,
+    Params,
 }
 
 /// Numbers of a world's state and commands.
@@ -46,6 +48,7 @@ pub(super) enum StateField {
 pub(super) struct Shape {
     dofs: usize,
     coords: usize,
+    params: usize,
 }
 
 impl Shape {
@@ -53,20 +56,21 @@ impl Shape {
         Shape {
             dofs: m.dofs.len(),
             coords: m.coords,
+            params: m.varying.len(),
         }
     }
     pub(super) fn start(self, field: StateField) -> usize {
         let groups = (field as usize).min(StateField::Q as usize);
-        let rests = usize::from(matches!(field, StateField::QRest));
-        groups * self.dofs + rests * self.coords
+        let coords = (field as usize).saturating_sub(StateField::Q as usize);
+        groups * self.dofs + coords * self.coords
     }
     fn total(self) -> usize {
-        self.start(StateField::QRest) + self.coords
+        self.start(StateField::Params) + self.params
     }
 }
 
 impl StateField {
-    fn of(field: Field) -> StateField {
+    pub(super) fn of(field: Field) -> StateField {
         match field {
             Field::JointQ => StateField::Q,
             Field::JointQd => StateField::Qd,
@@ -91,6 +95,9 @@ impl<F: Lane> Job<F> {
             for (to, from) in reset[shape.start(field)..].iter_mut().zip(values) {
                 *to = F::Real::of(*from);
             }
+        }
+        for (k, &(_, x)) in model.constants().varying.starts().iter().enumerate() {
+            reset[shape.start(StateField::Params) + k] = F::Real::of(x);
         }
         let constants = model.constants().cast();
         let numbers = |needed: &[Stage]| {
@@ -183,7 +190,7 @@ impl<F: Lane> Chunk<F> {
         };
         // lanes past the last world run along from the same start
         for lane in 0..blocks * F::WIDTH {
-            chunk.reset_lane(job, lane);
+            chunk.start_lane(job, lane, |_| true);
         }
         chunk
     }
@@ -194,11 +201,19 @@ impl<F: Lane> Chunk<F> {
         (block * shape.total() + shape.start(field) + k) * F::WIDTH + lane
     }
 
-    fn reset_lane(&mut self, job: &Job<F>, world: usize) {
+    /// Puts the numbers of a world that are chosen to what they start from.
+    fn start_lane(&mut self, job: &Job<F>, world: usize, chosen: impl Fn(usize) -> bool) {
         let first = self.place(Shape::of(&job.constants), world, StateField::Qd, 0);
-        for (k, &x) in job.start.iter().enumerate() {
+        for (k, &x) in job.start.iter().enumerate().filter(|(k, _)| chosen(*k)) {
             self.state[first + k * F::WIDTH] = x;
         }
+    }
+
+    /// Parameters stay as they are, but for loads.
+    fn reset_lane(&mut self, job: &Job<F>, world: usize) {
+        let params = Shape::of(&job.constants).start(StateField::Params);
+        let starts = job.constants.varying.starts();
+        self.start_lane(job, world, |k| k < params || starts[k - params].0.is_load());
     }
 
     pub fn reset(&mut self, job: &Job<F>, mask: Option<&[bool]>) {
@@ -215,7 +230,7 @@ impl<F: Lane> Chunk<F> {
     pub fn write(
         &mut self,
         job: &Job<F>,
-        field: Field,
+        target: StateField,
         columns: &Range<usize>,
         values: Values<'_>,
         mask: Option<&[bool]>,
@@ -225,7 +240,6 @@ impl<F: Lane> Chunk<F> {
             return;
         }
         let shape = Shape::of(&job.constants);
-        let target = StateField::of(field);
         let writes_state = matches!(target, StateField::Q | StateField::Qd);
         for world in 0..self.worlds.len() {
             let outside = self.worlds.start + world;
@@ -259,6 +273,18 @@ impl<F: Lane> Chunk<F> {
                     self.state[place] = F::Real::default();
                 }
                 self.normalize(job, world);
+            }
+        }
+    }
+
+    /// Columns of the parameters of every world, as the backend's.
+    pub fn params(&self, job: &Job<F>, columns: &Range<usize>, to: &mut [f64]) {
+        let shape = Shape::of(&job.constants);
+        for world in 0..self.worlds.len() {
+            let row = (self.worlds.start + world) * columns.len();
+            for (k, column) in columns.clone().enumerate() {
+                let place = self.place(shape, world, StateField::Params, column);
+                to[row + k] = self.state[place].to_f64();
             }
         }
     }
@@ -352,6 +378,7 @@ impl<F: Lane> Chunk<F> {
             &mut b.joint_target_qd,
             &mut b.joint_q,
             &mut b.joint_q_rest,
+            &mut b.params,
         ];
         let mut from = self.state[state].chunks_exact(F::WIDTH);
         for group in groups {

@@ -11,7 +11,7 @@ mod trouble;
 pub use dispatch::{available, create};
 
 use super::{Backend, BackendError, Lanes, Precision, Values};
-use chunk::{Chunk, Job};
+use chunk::{Chunk, Job, StateField};
 use dispatch::{Program, RunChunk};
 use rayon::prelude::*;
 use sim_core::batch::{Field, Layout};
@@ -102,7 +102,19 @@ impl<F: Lane> Backend for Cpu<F> {
         mask: Option<&[bool]>,
     ) {
         for chunk in &mut self.chunks {
-            chunk.write(&self.job, field, &columns, values, mask);
+            chunk.write(&self.job, StateField::of(field), &columns, values, mask);
+        }
+    }
+
+    fn write_params(&mut self, columns: Range<usize>, values: Values<'_>, mask: Option<&[bool]>) {
+        for chunk in &mut self.chunks {
+            chunk.write(&self.job, StateField::Params, &columns, values, mask);
+        }
+    }
+
+    fn params(&self, columns: Range<usize>, to: &mut [f64]) {
+        for chunk in &self.chunks {
+            chunk.params(&self.job, &columns, to);
         }
     }
 

@@ -1,0 +1,137 @@
+//! Parameters of a simulation: written and read world by world, effective in the next step.
+
+use crate::backend::{BackendError, Values};
+use crate::simulation::Simulation;
+use sim_core::model::params::{Param, Per};
+use std::ops::Range;
+
+/// Numbers of a parameter are written as far below their least as rounding to `f32` takes them [–].
+const ROUNDING: f64 = 1e-7;
+
+impl Simulation {
+    /// Numbers of a world that a parameter has.
+    pub fn param_columns(&self, param: Param) -> usize {
+        let model = self.model();
+        match param.row().per {
+            Per::Entry(n) => n,
+            Per::Dof => model.dofs(),
+            Per::Body(n) => n * model.bodies(),
+            Per::Shape => model.shape_names().len(),
+        }
+    }
+
+    /// Sets columns of a parameter in the worlds of the mask (none = all), for the steps to come.
+    ///
+    /// `values` is `(worlds, columns)`, world-major; rows of other worlds are not looked at.
+    ///
+    /// # Errors
+    /// A parameter that does not vary, columns, length or mask that do not fit, a value that is not finite or below the
+    /// parameter's least; nothing is written then.
+    pub fn write_param(
+        &mut self,
+        param: Param,
+        columns: Range<usize>,
+        values: Values<'_>,
+        mask: Option<&[bool]>,
+    ) -> Result<(), BackendError> {
+        let first = self.check_param(param, &columns, values, mask)?;
+        let columns = first + columns.start..first + columns.end;
+        self.backend_mut().write_params(columns, values, mask);
+        Ok(())
+    }
+
+    /// A parameter of every world, `(worlds, columns)`, world-major.
+    ///
+    /// # Errors
+    /// [`BackendError::Constant`].
+    pub fn param(&self, param: Param) -> Result<Vec<f64>, BackendError> {
+        let first = self.first_of(param)?;
+        let columns = self.param_columns(param);
+        let mut numbers = vec![0.0; self.worlds() * columns];
+        self.backend().params(first..first + columns, &mut numbers);
+        Ok(numbers)
+    }
+
+    /// Checks what [`Simulation::write_param`] would, without setting anything; the place of the parameter's first number.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn check_param(
+        &self,
+        param: Param,
+        columns: &Range<usize>,
+        values: Values<'_>,
+        mask: Option<&[bool]>,
+    ) -> Result<usize, BackendError> {
+        let first = self.first_of(param)?;
+        self.check_mask(mask)?;
+        self.check_shape(
+            param.row().name,
+            self.param_columns(param),
+            columns,
+            values.len(),
+        )?;
+        let least = param
+            .row()
+            .least
+            .map_or(f64::NEG_INFINITY, |least| least * (1.0 - ROUNDING));
+        for world in (0..self.worlds()).filter(|&world| mask.is_none_or(|mask| mask[world])) {
+            for column in columns.clone() {
+                let value = values.at(world * columns.len() + column - columns.start);
+                let name = || self.param_name(param, column);
+                if !value.is_finite() {
+                    return Err(BackendError::NotFinite {
+                        field: param.row().name,
+                        world,
+                        name: name(),
+                        value,
+                    });
+                }
+                if value < least {
+                    return Err(BackendError::BelowLeast {
+                        param: param.row().name,
+                        world,
+                        name: name(),
+                        value,
+                        least: param.row().least.unwrap_or_default(),
+                    });
+                }
+                if param == Param::JointTargetKe
+                    && value > 0.0
+                    && !self.model().constants().dofs[column].follows_position
+                {
+                    return Err(BackendError::VelocityMode {
+                        name: name(),
+                        value,
+                    });
+                }
+            }
+        }
+        Ok(first)
+    }
+
+    fn first_of(&self, param: Param) -> Result<usize, BackendError> {
+        let varying = &self.model().constants().varying;
+        varying.first(param).ok_or_else(|| {
+            let names: Vec<_> = varying.params().map(|param| param.row().name).collect();
+            BackendError::Constant {
+                param: param.row().name,
+                varying: match names.len() {
+                    0 => "none does".to_owned(),
+                    _ => names.join(", "),
+                },
+            }
+        })
+    }
+
+    /// What a column of a parameter is of.
+    fn param_name(&self, param: Param, column: usize) -> String {
+        let model = self.model();
+        match param.row().per {
+            Per::Entry(_) => ["x", "y", "z"][column.min(2)].to_owned(),
+            Per::Dof => model.dof_names()[column].clone(),
+            Per::Body(n) => model.body_names()[column / n].clone(),
+            Per::Shape => model.shape_names()[column].clone(),
+        }
+    }
+}
