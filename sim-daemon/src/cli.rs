@@ -76,6 +76,10 @@ pub(crate) struct Serve {
     #[arg(long, value_delimiter = ',', default_value = "joint_q,joint_qd,body_q")]
     pub(crate) fields: Vec<String>,
 
+    /// Parameters that vary from world to world and may be written, besides those of the scene, separated by commas.
+    #[arg(long, value_delimiter = ',')]
+    pub(crate) params: Vec<String>,
+
     /// Frames that a client may hold at once.
     #[arg(long, default_value_t = 4)]
     pub(crate) frames_held: usize,

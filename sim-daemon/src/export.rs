@@ -1,11 +1,12 @@
 //! Between physics and wire: the only file that knows both sim-core and sim-protocol.
 
 use sim_core::batch::{Dtype, Field, FieldDtype, FieldRow, Group, Layout};
+use sim_core::model::params::Param;
 use sim_core::model::{Description as Scene, Model};
 use sim_engine::backend::{BackendError, Values};
 use sim_engine::simulation::{Options, Precision, Simulation};
 use sim_protocol::host::{Inbox, Numbers};
-use sim_protocol::{self as wire, InputInfo, Op, RefusalKind, RobotRange, Row, Table};
+use sim_protocol::{self as wire, InputInfo, Op, ParamInfo, RefusalKind, RobotRange, Row, Table};
 
 /// Why a command is not carried out; nothing was changed.
 #[derive(Debug)]
@@ -105,8 +106,25 @@ pub(crate) fn description(
                 field_info(row, dtype, Vec::new())
             })
             .collect(),
-        commands: input(Group::Command),
-        writes: input(Group::State),
+        commands: {
+            let mut commands: Vec<InputInfo> = input(Group::Command);
+            let loads = model.constants().varying.params();
+            let loads = loads.filter(|param| param.is_load());
+            commands.extend(loads.map(|param| param_info(model, param)));
+            commands
+        },
+        writes: {
+            let mut writes: Vec<InputInfo> = input(Group::State);
+            let varying = model.constants().varying.params();
+            writes.extend(varying.map(|param| param_info(model, param)));
+            writes
+        },
+        params: Param::ALL
+            .map(|param| ParamInfo {
+                place: model.constants().varying.first(param),
+                info: param_info(model, param),
+            })
+            .to_vec(),
         scene: facts.scene_text,
         scene_folder: facts.scene_folder,
         model_hash: model.hash(),
@@ -114,6 +132,16 @@ pub(crate) fn description(
         frames_held: facts.frames_held,
         watch_worlds: facts.watch_worlds.min(options.worlds),
         schema: 0,
+    }
+}
+
+fn param_info(model: &Model, param: Param) -> InputInfo {
+    let row = param.row();
+    InputInfo {
+        name: row.name.to_owned(),
+        columns: param.columns(model),
+        unit: row.unit.to_owned(),
+        doc: row.doc.to_owned(),
     }
 }
 
@@ -208,19 +236,31 @@ pub(crate) fn apply(
             // one array is checked as it is set; of several, none may be set before all are checked
             let alone = inbox.arrays().nth(1).is_none();
             for row in inbox.arrays().filter(|_| !alone) {
-                let (field, columns, values) = input(simulation, inbox, row)?;
-                let group = if inbox.op() == Op::Step {
-                    Group::Command
-                } else {
-                    Group::State
-                };
-                simulation.check(field, group, &columns, values, masked)?;
+                let (target, columns, values) = input(simulation, inbox, row)?;
+                match (target, inbox.op()) {
+                    (Target::Param(param), _) => {
+                        simulation.check_param(param, &columns, values, masked)?;
+                    }
+                    (Target::Field(field), Op::Step) => {
+                        simulation.check(field, Group::Command, &columns, values, masked)?;
+                    }
+                    (Target::Field(field), _) => {
+                        simulation.check(field, Group::State, &columns, values, masked)?;
+                    }
+                }
             }
             for row in inbox.arrays() {
-                let (field, columns, values) = input(simulation, inbox, row)?;
-                match inbox.op() {
-                    Op::Step => simulation.command(field, columns, values)?,
-                    _ => simulation.write(field, columns, values, masked)?,
+                let (target, columns, values) = input(simulation, inbox, row)?;
+                match (target, inbox.op()) {
+                    (Target::Param(param), _) => {
+                        simulation.write_param(param, columns, values, masked)?;
+                    }
+                    (Target::Field(field), Op::Step) => {
+                        simulation.command(field, columns, values)?;
+                    }
+                    (Target::Field(field), _) => {
+                        simulation.write(field, columns, values, masked)?
+                    }
                 }
             }
         }
@@ -234,13 +274,30 @@ pub(crate) fn apply(
     })
 }
 
+/// What an array of a command sets.
+#[derive(Debug, Clone, Copy)]
+enum Target {
+    Field(Field),
+    Param(Param),
+}
+
+impl Target {
+    /// What a name stands for; parameters are written, or loads given with a step.
+    fn named(name: &str, op: Op) -> Option<Target> {
+        let param = Param::named(name).filter(|param| op == Op::Write || param.is_load());
+        param
+            .map(Target::Param)
+            .or_else(|| Field::named(name).map(Target::Field))
+    }
+}
+
 /// An array of a command as the simulation takes it.
 fn input<'a>(
     simulation: &Simulation,
     inbox: &'a Inbox,
     row: &Row,
-) -> Result<(Field, std::ops::Range<usize>, Values<'a>), Refusal> {
-    let field = Field::named(&row.name).ok_or_else(|| {
+) -> Result<(Target, std::ops::Range<usize>, Values<'a>), Refusal> {
+    let target = Target::named(&row.name, inbox.op()).ok_or_else(|| {
         refusal(
             RefusalKind::Field,
             format!("there is no field `{}`", row.name),
@@ -273,7 +330,7 @@ fn input<'a>(
             )));
         }
     };
-    Ok((field, row.start..end, values))
+    Ok((target, row.start..end, values))
 }
 
 fn refusal(kind: RefusalKind, reason: String) -> Refusal {
@@ -287,7 +344,7 @@ impl From<BackendError> for Refusal {
             BackendError::Columns { .. }
             | BackendError::Length { .. }
             | BackendError::Mask { .. } => RefusalKind::Shape,
-            BackendError::Group { .. } => RefusalKind::Field,
+            BackendError::Group { .. } | BackendError::Constant { .. } => RefusalKind::Field,
             _ => RefusalKind::Backend,
         };
         refusal(kind, error.to_string())

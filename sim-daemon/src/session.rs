@@ -86,7 +86,9 @@ fn open(serve: &Serve, stop: &Arc<AtomicBool>) -> Result<(Simulation, Host), Dae
     sim_protocol::sweep(None)?;
     let tenancy = Tenancy::take(&place)?;
 
-    let (scene, folder) = read_scene(&serve.scene)?;
+    let (mut scene, folder) = read_scene(&serve.scene)?;
+    let named = serve.params.iter().map(|name| name.trim().to_owned());
+    scene.params.extend(named.filter(|name| !name.is_empty()));
     let description = scene.describe(&folder)?;
     let model = description.compile()?;
     let layout = Simulation::layout_of(&model, &options);

@@ -9,17 +9,6 @@ use std::ops::Range;
 const ROUNDING: f64 = 1e-7;
 
 impl Simulation {
-    /// Numbers of a world that a parameter has.
-    pub fn param_columns(&self, param: Param) -> usize {
-        let model = self.model();
-        match param.row().per {
-            Per::Entry(n) => n,
-            Per::Dof => model.dofs(),
-            Per::Body(n) => n * model.bodies(),
-            Per::Shape => model.shape_names().len(),
-        }
-    }
-
     /// Sets columns of a parameter in the worlds of the mask (none = all), for the steps to come.
     ///
     /// `values` is `(worlds, columns)`, world-major; rows of other worlds are not looked at.
@@ -46,7 +35,7 @@ impl Simulation {
     /// [`BackendError::Constant`].
     pub fn param(&self, param: Param) -> Result<Vec<f64>, BackendError> {
         let first = self.first_of(param)?;
-        let columns = self.param_columns(param);
+        let columns = param.columns(self.model());
         let mut numbers = vec![0.0; self.worlds() * columns];
         self.backend().params(first..first + columns, &mut numbers);
         Ok(numbers)
@@ -67,7 +56,7 @@ impl Simulation {
         self.check_mask(mask)?;
         self.check_shape(
             param.row().name,
-            self.param_columns(param),
+            param.columns(self.model()),
             columns,
             values.len(),
         )?;

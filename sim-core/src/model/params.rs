@@ -2,6 +2,7 @@
 //!
 //! Those that a scene names ([`super::Description::params`]) vary; the others are constants of the program.
 
+use super::Model;
 use super::constants::{Constants, Dof};
 
 /// What a parameter has a number for.
@@ -86,6 +87,16 @@ impl Param {
         Param::ALL
             .into_iter()
             .find(|param| param.row().name == name)
+    }
+
+    /// Numbers of a world that it has.
+    pub fn columns(self, model: &Model) -> usize {
+        match self.row().per {
+            Per::Entry(n) => n,
+            Per::Dof => model.dofs(),
+            Per::Body(n) => n * model.bodies(),
+            Per::Shape => model.shape_names().len(),
+        }
     }
 
     /// What worlds start from; `mu` is of each shape.

@@ -47,8 +47,10 @@ pub struct Description {
     pub known_fields: Vec<FieldInfo>,
     /// What a step may set (`joint_f`, targets).
     pub commands: Vec<InputInfo>,
-    /// What a write may set (`joint_q`, `joint_qd`).
+    /// What a write may set (`joint_q`, `joint_qd`, and the parameters that vary).
     pub writes: Vec<InputInfo>,
+    /// Parameters, those that do not vary included.
+    pub params: Vec<ParamInfo>,
     /// The scene as TOML text.
     pub scene: String,
     /// Folder to which paths in the scene are relative.
@@ -63,6 +65,15 @@ pub struct Description {
     pub watch_worlds: usize,
     /// Hash over the fields, inputs, worlds and dofs; see [`Description::schema_hash`].
     pub schema: u64,
+}
+
+/// A number of the model that may vary from world to world.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ParamInfo {
+    /// The place of its first number among those of a world, if it varies.
+    pub place: Option<usize>,
+    /// What it is.
+    pub info: InputInfo,
 }
 
 /// Ranges of one robot, each `[start, stop)`.

@@ -42,7 +42,7 @@ pub mod tenancy;
 mod transport;
 
 pub use client::{AttachOptions, Client, Command, Hook, Values, keep_waiting};
-pub use description::{Description, FieldInfo, InputInfo, RobotRange};
+pub use description::{Description, FieldInfo, InputInfo, ParamInfo, RobotRange};
 pub use error::ProtocolError;
 pub use frame::{Entry, Frame, View};
 pub use header::{

@@ -13,6 +13,7 @@ mod surface;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use sim_core::model::params::Param;
 use sim_core::model::{Cone, Description, ModelError, Pose, Solver};
 
 pub use bodies::BodyTable;
@@ -79,6 +80,9 @@ pub struct SceneFile {
     /// Gravity in world axes [m/s²].
     #[serde(default = "gravity")]
     pub gravity: [Number; 3],
+    /// Parameters that vary from world to world, by their names.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub params: Vec<String>,
     /// Most contacts that a world has room for; left out, as many as its shapes suggest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contacts_max: Option<usize>,
@@ -239,6 +243,9 @@ impl SceneFile {
     pub fn describe(&self, base_dir: &Path) -> Result<Description, ConfigError> {
         let mut description = Description::new(self.dt.0, self.substeps);
         description.gravity = self.gravity.map(|part| part.0);
+        for name in &self.params {
+            description.params.insert(param(name)?);
+        }
         description.filters = self.contact_filters.clone();
         description.contacts_max = self.contacts_max;
         description.rows_max = self.rows_max;
@@ -286,6 +293,16 @@ impl SceneFile {
     pub fn dynamics(&self, base_dir: &Path) -> Result<Dynamics, ConfigError> {
         Ok(Dynamics::new(self.describe(base_dir)?.compile()?))
     }
+}
+
+/// The parameter of a name.
+fn param(name: &str) -> Result<Param, ModelError> {
+    Param::named(name).ok_or_else(|| ModelError::UnknownName {
+        owner: "scene".to_owned(),
+        what: "parameter",
+        name: name.to_owned(),
+        known: Param::ALL.map(|param| param.row().name).join(", "),
+    })
 }
 
 fn pose(pos: &[Number; 3], quat: &[Number; 4]) -> Pose {

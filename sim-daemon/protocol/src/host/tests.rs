@@ -52,6 +52,7 @@ fn description() -> Description {
         known_fields: Vec::new(),
         commands: vec![input("joint_f")],
         writes: vec![input("joint_q")],
+        params: Vec::new(),
         scene: String::new(),
         scene_folder: String::new(),
         model_hash: 0,
