@@ -7,6 +7,8 @@ use sim_engine::simulation::{Options, Precision, Simulation};
 use sim_protocol::host::{Inbox, Numbers};
 use sim_protocol::{self as wire, InputInfo, Op, RefusalKind, RobotRange, Row, Table};
 
+use crate::snapshot;
+
 /// Why a command is not carried out; nothing was changed.
 #[derive(Debug)]
 pub(crate) struct Refusal {
@@ -190,7 +192,7 @@ pub(crate) fn apply(
 ) -> Result<Advance, Refusal> {
     let masked = match (inbox.op(), inbox.mask()) {
         (_, None) => None,
-        (Op::Reset | Op::Write, Some(bytes)) => {
+        (Op::Reset | Op::Write | Op::Restore, Some(bytes)) => {
             mask.clear();
             mask.extend(bytes.iter().map(|&byte| byte != 0));
             Some(mask.as_slice())
@@ -226,6 +228,8 @@ pub(crate) fn apply(
         }
         Op::Reset => simulation.reset(masked)?,
         Op::Forward => {}
+        Op::Snapshot => snapshot::save(simulation, inbox)?,
+        Op::Restore => snapshot::restore(simulation, inbox, masked)?,
     }
     Ok(if inbox.op() == Op::Step {
         Advance::Step
@@ -276,7 +280,7 @@ fn input<'a>(
     Ok((field, row.start..end, values))
 }
 
-fn refusal(kind: RefusalKind, reason: String) -> Refusal {
+pub(crate) fn refusal(kind: RefusalKind, reason: String) -> Refusal {
     Refusal { kind, reason }
 }
 
