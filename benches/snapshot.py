@@ -30,16 +30,16 @@ FRAMES = 120
 ASKED_MS = 10.0
 
 
-def row(what: str, times: list[float], bytes_: int, *, asked: bool) -> dict[str, str | int]:
-    """For people and files."""
+def row(what: str, times: list[float], *, size: int | None) -> dict[str, str | int]:
+    """For people and files; `size` [bytes] is that of the snapshot, where there is one."""
     ms = 1e3 * np.array(times)
     return {
         "what": what,
         "worlds": WORLDS,
-        "megabytes": f"{bytes_ / 1e6:.2f}",
+        "megabytes": f"{size / 1e6:.2f}" if size else "–",
         "median_ms": f"{np.median(ms):.2f}",
         "p99_ms": f"{np.percentile(ms, 99):.2f}",
-        "asked_ms": f"{ASKED_MS:.0f}" if asked else "–",
+        "asked_ms": f"{ASKED_MS:.0f}" if size else "–",
     }
 
 
@@ -70,7 +70,7 @@ def main() -> int:
                     times[what].append(time.perf_counter() - begin)
         device = sim.device
     size = len(snapshot.to_bytes())
-    rows = [row(what, seen, size if what != "forward" else 0, asked=what != "forward") for what, seen in times.items()]
+    rows = [row(what, seen, size=size if what != "forward" else None) for what, seen in times.items()]
     print_table(rows)
     write_results("snapshot", rows, {"command": f"python benches/snapshot.py --rounds {rounds}", "device": device})
     slow = [row for row in rows if row["asked_ms"] != "–" and float(row["median_ms"]) > ASKED_MS]

@@ -11,7 +11,7 @@ use crate::backend::{COUNTERS, Precision};
 
 /// How a snapshot begins; the line end shows a transfer that took it for text.
 const MAGIC: [u8; 8] = *b"tlsnap\r\n";
-/// Version of the format.
+/// Version of the format; another where the numbers of a world mean something else while they are as many.
 const VERSION: u32 = 1;
 /// Where what the checksum covers begins.
 const COVERED: usize = 16;
