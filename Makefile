@@ -50,6 +50,7 @@ bench: wheel $(VENV)/.dev
 	$(PYTHON) benches/contacts.py
 	$(PYTHON) benches/legged.py
 	$(PYTHON) benches/round_trip.py
+	$(PYTHON) benches/snapshot.py
 
 check: wheel $(VENV)/.dev
 	cargo fmt --all --check

@@ -15,18 +15,19 @@ const ORDER: [(&str, &[&str]); 2] = [
     ),
     (
         "sim-core/engine/src",
-        &["backend", "simulation", "dynamics"],
+        &["backend", "snapshot", "simulation", "dynamics"],
     ),
 ];
 
 /// The only door of each heavy package.
-const DOORS: [(&str, &str); 12] = [
+const DOORS: [(&str, &str); 13] = [
     ("urdf_rs", "sim-core/src/model/urdf"),
     ("faer", "sim-core/src/model"),
     ("parry3d_f64", "sim-core/src/model/geometry"),
     ("gltf", "sim-core/src/model/geometry/load"),
     ("base64", "sim-core/src/model/geometry/load"),
     ("rayon", "sim-core/engine/src/backend/cpu"),
+    ("crc32fast", "sim-core/engine/src/snapshot.rs"),
     ("iceoryx2", "sim-daemon/protocol/src"),
     ("clap", "sim-daemon/src/cli.rs"),
     ("noto_sans_mono_bitmap", "sim-daemon/src/inspect/picture"),

@@ -88,6 +88,24 @@ impl Client {
         frame(py, |hook| connection.forward(hook))
     }
 
+    fn snapshot(&self, py: Python<'_>, path: &str) -> PyResult<Frame> {
+        let connection = self.connection(py)?;
+        frame(py, |hook| connection.snapshot(path, hook))
+    }
+
+    fn restore(
+        &self,
+        py: Python<'_>,
+        path: &str,
+        mask: Option<&Bound<'_, PyAny>>,
+        from_world: Option<u64>,
+    ) -> PyResult<Frame> {
+        let connection = self.connection(py)?;
+        let mask = Mask::new(mask, self.description.worlds)?;
+        let mask = mask.as_slice()?;
+        frame(py, |hook| connection.restore(path, mask, from_world, hook))
+    }
+
     /// Give the lease back and end the connection; calls after it raise ``SimClosed``.
     fn close(&self, py: Python<'_>) {
         let connection = self

@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyType;
-use sim_protocol::ProtocolError;
+use sim_protocol::{ProtocolError, RefusalKind};
 
 /// The exception class `tightloop.errors.<class>` with a message.
 pub(crate) fn raise(py: Python<'_>, class: &str, message: impl Into<String>) -> PyErr {
@@ -29,6 +29,10 @@ pub(crate) fn protocol(py: Python<'_>, error: &ProtocolError) -> PyErr {
         LeaseLost { .. } => "LeaseLost",
         FramesHeld { .. } => "FramesHeld",
         NoField { .. } => "UnknownField",
+        CommandRefused {
+            kind: RefusalKind::Snapshot,
+            ..
+        } => "SnapshotError",
         NotAnInput { .. } | Shape { .. } | CommandRefused { .. } => "CommandRefused",
         SharedMemory { .. } | Memory { .. } => "ResourceError",
         Timeout { .. } => "WaitTimeout",

@@ -8,6 +8,8 @@ use sim_engine::simulation::{Options, Precision, Simulation};
 use sim_protocol::host::{Inbox, Numbers};
 use sim_protocol::{self as wire, InputInfo, Op, ParamInfo, RefusalKind, RobotRange, Row, Table};
 
+use crate::snapshot;
+
 /// Why a command is not carried out; nothing was changed.
 #[derive(Debug)]
 pub(crate) struct Refusal {
@@ -218,7 +220,7 @@ pub(crate) fn apply(
 ) -> Result<Advance, Refusal> {
     let masked = match (inbox.op(), inbox.mask()) {
         (_, None) => None,
-        (Op::Reset | Op::Write, Some(bytes)) => {
+        (Op::Reset | Op::Write | Op::Restore, Some(bytes)) => {
             mask.clear();
             mask.extend(bytes.iter().map(|&byte| byte != 0));
             Some(mask.as_slice())
@@ -266,6 +268,8 @@ pub(crate) fn apply(
         }
         Op::Reset => simulation.reset(masked)?,
         Op::Forward => {}
+        Op::Snapshot => snapshot::save(simulation, inbox)?,
+        Op::Restore => snapshot::restore(simulation, inbox, masked)?,
     }
     Ok(if inbox.op() == Op::Step {
         Advance::Step
@@ -333,7 +337,7 @@ fn input<'a>(
     Ok((target, row.start..end, values))
 }
 
-fn refusal(kind: RefusalKind, reason: String) -> Refusal {
+pub(crate) fn refusal(kind: RefusalKind, reason: String) -> Refusal {
     Refusal { kind, reason }
 }
 

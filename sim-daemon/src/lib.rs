@@ -11,6 +11,7 @@ mod inspect;
 mod news;
 mod server;
 mod session;
+mod snapshot;
 mod watchdog;
 
 use std::ffi::OsString;

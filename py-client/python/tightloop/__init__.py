@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         ResourceError,
         SceneError,
         SimClosed,
+        SnapshotError,
         TightloopError,
         TransportError,
         UnknownDaemon,
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from tightloop.scene import Scene
     from tightloop.shapes import Shape, Surface
     from tightloop.sim import FrameCopy, Sim, attach, launch
+    from tightloop.snapshot import Snapshot
 
 _HOMES = {
     "tightloop._core": ("Frame", "__version__"),
@@ -60,6 +62,7 @@ _HOMES = {
         "ResourceError",
         "SceneError",
         "SimClosed",
+        "SnapshotError",
         "TightloopError",
         "TransportError",
         "UnknownDaemon",
@@ -71,6 +74,7 @@ _HOMES = {
     "tightloop.scene": ("Scene",),
     "tightloop.shapes": ("Shape", "Surface"),
     "tightloop.sim": ("FrameCopy", "Sim", "attach", "launch"),
+    "tightloop.snapshot": ("Snapshot",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -96,6 +100,8 @@ __all__ = [
     "Shape",
     "Sim",
     "SimClosed",
+    "Snapshot",
+    "SnapshotError",
     "Surface",
     "TightloopError",
     "TransportError",

@@ -67,6 +67,10 @@ class CommandRefused(TightloopError, ValueError):
     """A command has a wrong shape, dtype or value; the message names field, world and dof. The daemon goes on."""
 
 
+class SnapshotError(TightloopError, ValueError):
+    """A snapshot is damaged, of something else, or cannot be written; the message says which. No world was changed."""
+
+
 class UnknownField(TightloopError, AttributeError):
     """Frames of this run do not carry that field; ask for it in ``fields`` at launch."""
 

@@ -17,8 +17,9 @@ from tightloop import _core, checks
 from tightloop._core import Frame
 from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
-from tightloop.errors import ArgumentError, UnknownField
+from tightloop.errors import ArgumentError, CommandRefused, UnknownField
 from tightloop.scene import Scene
+from tightloop.snapshot import Snapshot, passing
 
 #: An array (worlds, dofs) for the whole scene, one (dofs,) for every world, or such arrays by robot name.
 Command = ArrayLike | Mapping[str, ArrayLike]
@@ -144,6 +145,52 @@ class Sim:
     def forward(self) -> Frame:
         """Evaluate every field at the present state and commands, without stepping. Raises as `step` does."""
         return self._client.forward()
+
+    def snapshot(self) -> Snapshot:
+        """Keep all worlds as they are now: a run that is restored from it goes on with the same bits.
+
+        It holds state, commands, ``step`` and ``status`` of every world, on their way through a file in shared memory.
+
+        Raises:
+            SnapshotError: There is no room for it. Other errors are those of `step`.
+        """
+        with passing() as path:
+            self._client.snapshot(str(path))
+            return Snapshot.load(path)
+
+    def restore(
+        self,
+        snapshot: Snapshot,
+        *,
+        worlds: ArrayLike | None = None,
+        from_world: int | None = None,
+    ) -> Frame:
+        """Put worlds back to what they were in a snapshot: state, commands, ``step`` and ``status``.
+
+        Under the same commands the run then has the bits that it had after the snapshot, on any number of threads.
+        A world that was frozen then is frozen again, any other is freed.
+
+        Args:
+            snapshot: Of the same scene and precision; without ``from_world`` of as many worlds, too.
+            worlds: Which worlds of this simulation, bool, shape ``(worlds,)``; all if left out.
+            from_world: A world of the snapshot, which goes into all these worlds; each to its own if left out.
+
+        Returns:
+            A frame evaluated at that state.
+
+        Raises:
+            SnapshotError: The snapshot does not fit, or has no such world; no world was touched. Also where there is no
+                room for it.
+            CommandRefused: ``worlds`` has another shape or dtype, or ``from_world`` is no whole number.
+                Other errors are those of `step`.
+        """
+        if not isinstance(snapshot, Snapshot):
+            raise CommandRefused(f"restore: snapshot is {type(snapshot).__name__}; give a tightloop.Snapshot")
+        if from_world is not None:
+            from_world = checks.integer("restore: from_world", from_world, least=0, error=CommandRefused)
+        with passing() as path:
+            snapshot.save(path)
+            return self._client.restore(str(path), worlds, from_world)
 
     @functools.cached_property
     def dynamics(self) -> Dynamics:

@@ -3,6 +3,7 @@
 pub use crate::backend::{Lanes, Precision};
 
 use crate::backend::{Backend, BackendError, Values, cpu};
+use crate::snapshot::{self, Head, SnapshotError};
 use sim_core::batch::{Dtype, Field, Group, Layout};
 use sim_core::model::Model;
 use sim_core::model::constants::Motion;
@@ -181,6 +182,42 @@ impl Simulation {
         self.check_mask(mask)?;
         self.backend.reset(mask);
         Ok(())
+    }
+
+    /// All worlds as bytes, from which a run resumes bit for bit; [`crate::snapshot`] says how they lie.
+    pub fn snapshot(&self) -> Vec<u8> {
+        snapshot::write(&self.head(), |records| self.backend.save(records))
+    }
+
+    /// Bytes that [`Simulation::snapshot`] gives.
+    pub fn snapshot_bytes(&self) -> usize {
+        self.head().bytes()
+    }
+
+    /// Sets the worlds of the mask (none = all) to what a snapshot has of them, counters and commands included;
+    /// with `from_world`, all of them to that world of the snapshot, which may then have another number of worlds.
+    ///
+    /// # Errors
+    /// Bytes that are no snapshot, or damaged, or not of this model, precision and number of worlds; a world that the
+    /// snapshot does not have; a mask of the wrong length; nothing is changed then.
+    pub fn restore(
+        &mut self,
+        bytes: &[u8],
+        mask: Option<&[bool]>,
+        from_world: Option<usize>,
+    ) -> Result<(), SnapshotError> {
+        let records = snapshot::check(bytes, &self.head(), mask, from_world)?;
+        self.backend.restore(records, mask, from_world);
+        Ok(())
+    }
+
+    fn head(&self) -> Head {
+        Head {
+            model: self.model.hash(),
+            worlds: self.worlds,
+            numbers: self.backend.numbers(),
+            precision: self.precision,
+        }
     }
 
     /// Advances every world by one control frame, then writes every field into the arena.

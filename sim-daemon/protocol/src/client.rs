@@ -214,8 +214,8 @@ impl Client {
         lock(&self.controller).is_some()
     }
 
-    /// Takes the lease; done by itself at the first [`Client::step`], [`Client::reset`], [`Client::write`] or
-    /// [`Client::forward`]. From then on a thread of this client sends heartbeats.
+    /// Takes the lease; done by itself at the first [`Client::step`], [`Client::reset`], [`Client::write`],
+    /// [`Client::forward`], [`Client::snapshot`] or [`Client::restore`]. From then on a thread of this client sends heartbeats.
     ///
     /// # Errors
     /// [`ProtocolError::LeaseHeld`] with the holder's process, [`ProtocolError::SharedMemory`],
@@ -256,7 +256,14 @@ impl Client {
     /// been made. [`ProtocolError::LeaseHeld`], [`ProtocolError::LeaseLost`], [`ProtocolError::DaemonLost`],
     /// [`ProtocolError::DaemonRestarted`].
     pub fn step(&self, commands: &[Command<'_>], hook: Hook<'_>) -> Result<Frame, ProtocolError> {
-        self.run(Op::Step, commands, None, hook)
+        let arrays = commands;
+        self.run(
+            Call {
+                arrays,
+                ..call(Op::Step)
+            },
+            hook,
+        )
     }
 
     /// Puts the worlds under the mask (all without one) back to the start and returns the frame there.
@@ -264,7 +271,13 @@ impl Client {
     /// # Errors
     /// As [`Client::step`].
     pub fn reset(&self, mask: Option<&[bool]>, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
-        self.run(Op::Reset, &[], mask, hook)
+        self.run(
+            Call {
+                mask,
+                ..call(Op::Reset)
+            },
+            hook,
+        )
     }
 
     /// Sets the state of the worlds under the mask (all without one) and returns the frame evaluated there.
@@ -277,7 +290,12 @@ impl Client {
         mask: Option<&[bool]>,
         hook: Hook<'_>,
     ) -> Result<Frame, ProtocolError> {
-        self.run(Op::Write, arrays, mask, hook)
+        let write = Call {
+            arrays,
+            mask,
+            ..call(Op::Write)
+        };
+        self.run(write, hook)
     }
 
     /// Evaluates the fields at the present state without stepping.
@@ -285,23 +303,55 @@ impl Client {
     /// # Errors
     /// As [`Client::step`].
     pub fn forward(&self, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
-        self.run(Op::Forward, &[], None, hook)
+        self.run(call(Op::Forward), hook)
     }
 
-    fn run(
+    /// Lets the daemon write all worlds into a file, and evaluates the fields. What was there before is replaced as a whole
+    /// or, after an error, not at all.
+    ///
+    /// # Errors
+    /// As [`Client::step`]; [`ProtocolError::CommandRefused`] where the daemon cannot write `path`, which must be absolute.
+    pub fn snapshot(&self, path: &str, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
+        let path = Some(path);
+        self.run(
+            Call {
+                path,
+                ..call(Op::Snapshot)
+            },
+            hook,
+        )
+    }
+
+    /// Sets the worlds under the mask (all without one) to those of a snapshot, counters and commands included, or all of
+    /// them to its world `from_world`; returns the frame evaluated there.
+    ///
+    /// # Errors
+    /// As [`Client::step`]; [`ProtocolError::CommandRefused`] where the daemon cannot read `path`, which must be absolute, or
+    /// what it reads is not a whole snapshot of the same model, precision and, without `from_world`, number of worlds.
+    pub fn restore(
         &self,
-        op: Op,
-        arrays: &[Command<'_>],
+        path: &str,
         mask: Option<&[bool]>,
+        from_world: Option<u64>,
         hook: Hook<'_>,
     ) -> Result<Frame, ProtocolError> {
+        let restore = Call {
+            mask,
+            path: Some(path),
+            from_world,
+            ..call(Op::Restore)
+        };
+        self.run(restore, hook)
+    }
+
+    fn run(&self, call: Call<'_>, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
         self.check_process()?;
         let mut held = lock(&self.controller);
         let controller = match &mut *held {
             Some(controller) => controller,
             empty => empty.insert(self.take_lease(hook)?),
         };
-        let result = controller.run(&Call { op, arrays, mask }, hook);
+        let result = controller.run(&call, hook);
         // a lost lease can be asked for again; a lost daemon cannot come back
         if matches!(result, Err(ProtocolError::LeaseLost { .. })) {
             held.take();
@@ -386,6 +436,17 @@ impl Client {
             std::thread::sleep(Duration::from_millis(1));
         }
         Ok(())
+    }
+}
+
+/// A call with nothing in it.
+fn call<'a>(op: Op) -> Call<'a> {
+    Call {
+        op,
+        arrays: &[],
+        mask: None,
+        path: None,
+        from_world: None,
     }
 }
 

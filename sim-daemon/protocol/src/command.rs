@@ -4,14 +4,22 @@ use crate::client::{Command, Values};
 use crate::header::encode_row;
 use crate::{ALIGNMENT, Description, Dtype, InputInfo, Op, ProtocolError, ROWS_MAX, Table};
 
-/// Name of the mask in a command.
+/// Name of the mask in a command: a byte a world.
 pub(crate) const MASK: &str = "mask";
+/// Name of a snapshot's path in a command: bytes of UTF-8.
+pub(crate) const PATH: &str = "path";
+/// Name of the world of a snapshot that goes into all, in a command: one `u64`.
+pub(crate) const FROM_WORLD: &str = "from_world";
+/// Longest path [bytes], as Linux has it.
+pub(crate) const PATH_MAX: usize = 4096;
 
 /// One call of a client, as it came.
 pub(crate) struct Call<'a> {
     pub(crate) op: Op,
     pub(crate) arrays: &'a [Command<'a>],
     pub(crate) mask: Option<&'a [bool]>,
+    pub(crate) path: Option<&'a str>,
+    pub(crate) from_world: Option<u64>,
 }
 
 impl Call<'_> {
@@ -81,11 +89,20 @@ impl Call<'_> {
                 ));
             }
         }
-        match self.mask {
-            Some(mask) if mask.len() != worlds => Err(ProtocolError::Shape {
+        if let Some(mask) = self.mask
+            && mask.len() != worlds
+        {
+            return Err(ProtocolError::Shape {
                 field: MASK.to_owned(),
                 expected: format!("({worlds},)"),
                 got: format!("({},)", mask.len()),
+            });
+        }
+        match self.path {
+            Some(path) if path.len() > PATH_MAX => Err(ProtocolError::Shape {
+                field: PATH.to_owned(),
+                expected: format!("at most {PATH_MAX} bytes"),
+                got: path.len().to_string(),
             }),
             _ => Ok(()),
         }
@@ -93,7 +110,12 @@ impl Call<'_> {
 
     /// Rows of the field table.
     pub(crate) fn rows(&self) -> usize {
-        self.arrays.len() + usize::from(self.mask.is_some())
+        let others = [
+            self.mask.is_some(),
+            self.path.is_some(),
+            self.from_world.is_some(),
+        ];
+        self.arrays.len() + others.into_iter().filter(|&is_there| is_there).count()
     }
 
     /// Size of the sample.
@@ -103,7 +125,11 @@ impl Call<'_> {
             .iter()
             .map(|array| padded(array, description.real()));
         let mask = self.mask.map_or(0, |_| mask_bytes(description.worlds));
-        Table::head_bytes(self.rows()) + arrays.sum::<usize>() + mask
+        let path = self
+            .path
+            .map_or(0, |path| path.len().next_multiple_of(ALIGNMENT));
+        let from_world = self.from_world.map_or(0, |_| ALIGNMENT);
+        Table::head_bytes(self.rows()) + arrays.sum::<usize>() + mask + path + from_world
     }
 
     /// Writes field table and arrays; of `words`, every word that means something.
@@ -130,20 +156,28 @@ impl Call<'_> {
             );
             offset += bytes;
         }
+        let mut rows = table[self.arrays.len()..].iter_mut();
+        let mut bytes_of = |name, dtype: Dtype, entries: usize| {
+            let row = rows.next().expect("a row for all that is sent");
+            encode_row(row, name, dtype, &[entries], 0, head + offset);
+            let (first, bytes) = (offset / 8, (entries * dtype.size()).next_multiple_of(8));
+            offset += bytes.next_multiple_of(ALIGNMENT);
+            first..first + bytes / 8
+        };
         if let Some(mask) = self.mask {
-            encode_row(
-                &mut table[self.arrays.len()],
-                MASK,
-                Dtype::U8,
-                &[worlds],
-                0,
-                head + offset,
-            );
-            let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data[offset / 8..]);
+            let words = &mut data[bytes_of(MASK, Dtype::U8, worlds)];
+            let bytes: &mut [u8] = bytemuck::cast_slice_mut(words);
             bytes
                 .iter_mut()
                 .zip(mask)
                 .for_each(|(byte, &set)| *byte = u8::from(set));
+        }
+        if let Some(path) = self.path {
+            let words = &mut data[bytes_of(PATH, Dtype::U8, path.len())];
+            bytemuck::cast_slice_mut(words)[..path.len()].copy_from_slice(path.as_bytes());
+        }
+        if let Some(world) = self.from_world {
+            data[bytes_of(FROM_WORLD, Dtype::U64, 1)][0] = world;
         }
     }
 }
@@ -153,14 +187,15 @@ fn padded(array: &Command<'_>, real: Dtype) -> usize {
     (array.values.len() * real.size()).next_multiple_of(ALIGNMENT)
 }
 
-/// Bytes that the largest command of a run takes: every input of a step or of a write, and a mask.
+/// Bytes that the largest command of a run takes: every input of a step or of a write, a mask, and what else a restore has.
 pub(crate) fn command_bytes(description: &Description) -> usize {
     let columns = |inputs: &[InputInfo]| inputs.iter().map(|input| input.columns).sum::<usize>();
     let columns = columns(&description.commands).max(columns(&description.writes));
     let entries = description.worlds * columns * description.real().size();
     // an input may come in several pieces, each rounded up
     let head = Table::head_bytes(ROWS_MAX) + ROWS_MAX * ALIGNMENT;
-    head + entries.next_multiple_of(ALIGNMENT) + mask_bytes(description.worlds)
+    let restore = PATH_MAX + ALIGNMENT;
+    head + entries.next_multiple_of(ALIGNMENT) + mask_bytes(description.worlds) + restore
 }
 
 fn mask_bytes(worlds: usize) -> usize {

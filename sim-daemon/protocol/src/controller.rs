@@ -32,7 +32,7 @@ pub(crate) struct Controller {
     seq: u64,
     /// A command whose answer was not waited for, since the caller interrupted.
     unanswered: bool,
-    paces: [Pace; 4],
+    paces: [Pace; Op::ALL.len()],
     apart: Apart,
     table: Option<Arc<Table>>,
     frames: Arc<Alive>,

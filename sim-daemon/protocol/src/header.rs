@@ -87,14 +87,26 @@ pub enum Op {
     Write = 3,
     /// Evaluate the fields without stepping.
     Forward = 4,
+    /// Write all worlds into a file, evaluate the fields.
+    Snapshot = 5,
+    /// Set the worlds under the mask to those of such a file, or to one of them; evaluate the fields there.
+    Restore = 6,
 }
 
 impl Op {
+    /// All, in the order of their numbers, which begin with 1.
+    pub const ALL: [Op; 6] = [
+        Op::Step,
+        Op::Reset,
+        Op::Write,
+        Op::Forward,
+        Op::Snapshot,
+        Op::Restore,
+    ];
+
     /// The inverse of `op as u32`.
     pub fn from_wire(op: u32) -> Option<Op> {
-        [Op::Step, Op::Reset, Op::Write, Op::Forward]
-            .into_iter()
-            .find(|&known| known as u32 == op)
+        Op::ALL.into_iter().find(|&known| known as u32 == op)
     }
 }
 
@@ -114,13 +126,15 @@ pub enum RefusalKind {
     Stale = 5,
     /// The simulation refused.
     Backend = 6,
+    /// A snapshot cannot be written, read or restored.
+    Snapshot = 7,
 }
 
 impl RefusalKind {
     /// The inverse of `kind as u32`; what a newer daemon may add reads as [`RefusalKind::Backend`].
     pub fn from_wire(kind: u32) -> RefusalKind {
         use RefusalKind::*;
-        [NotFinite, Shape, Field, Malformed, Stale]
+        [NotFinite, Shape, Field, Malformed, Stale, Snapshot]
             .into_iter()
             .find(|&known| known as u32 == kind)
             .unwrap_or(Backend)

@@ -11,7 +11,7 @@
 //! - A sample is lines of eight words: a field table, then arrays, world-major and 64-byte aligned ([`header`], [`table`]).
 //! - Steps are lock-step: the client sends `seq = n`, the daemon answers `ack_seq = n` with a frame or a refusal.
 //! - A lease is one `epoch`, with services of its own; it ends by release, by death, or when another client asks for it
-//!   after the heartbeats stopped. Reset, write and forward travel as commands too, so that they keep their order.
+//!   after the heartbeats stopped. Reset, write, forward, snapshot and restore travel as commands too, so that they keep their order.
 //! - A daemon's presence is a lock on `ROOT/NAME.lock` ([`place`], [`tenancy`]); its run is a random `session`.
 //! - Clients know no physics: the [`Description`] names what can be sent and what frames carry.
 //! - Every process here belongs to one user. A hostile process of that user is outside what shared memory can stop; against

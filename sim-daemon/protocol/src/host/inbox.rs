@@ -1,6 +1,6 @@
 //! A command at the daemon: copied once, then checked; nothing is read from shared memory twice.
 
-use crate::command::MASK;
+use crate::command::{FROM_WORLD, MASK, PATH};
 use crate::{CommandHeader, Dtype, Op, Row, Table};
 
 /// The last command received.
@@ -50,6 +50,20 @@ impl Inbox {
         if !self.table.describes(words, header.rows) {
             self.table = Table::parse(words, header.rows)?;
         }
+        for (name, dtype) in [
+            (MASK, Dtype::U8),
+            (PATH, Dtype::U8),
+            (FROM_WORLD, Dtype::U64),
+        ] {
+            let row = self.table.row(name);
+            if let Some(row) = row.filter(|row| row.dtype != dtype || row.shape.len() != 1) {
+                let (got, axes, expected) =
+                    (row.dtype.numpy_name(), row.shape.len(), dtype.numpy_name());
+                return Err(format!(
+                    "{name}: {got} of {axes} axes; {expected} of one is needed"
+                ));
+            }
+        }
         self.used = payload.len();
         Ok(())
     }
@@ -81,8 +95,19 @@ impl Inbox {
 
     /// The mask, one byte a world, if there is one. Its length is not checked.
     pub fn mask(&self) -> Option<&[u8]> {
-        let row = self.table.row(MASK)?;
-        (row.dtype == Dtype::U8).then(|| self.bytes(row))
+        Some(self.bytes(self.table.row(MASK)?))
+    }
+
+    /// The path of a snapshot, if there is one, as it came: it may not be UTF-8.
+    pub fn path(&self) -> Option<&[u8]> {
+        Some(self.bytes(self.table.row(PATH)?))
+    }
+
+    /// The world of a snapshot that goes into all, if there is one: its entries, of which there should be one.
+    pub fn from_world(&self) -> Option<&[u64]> {
+        Some(bytemuck::cast_slice(
+            self.bytes(self.table.row(FROM_WORLD)?),
+        ))
     }
 
     /// Bytes of an array of this command's table; the table was checked against the payload.

@@ -55,7 +55,7 @@ pub(crate) struct Free {
     /// Of the file system that holds shared memory.
     shared: u64,
     /// Of the machine and of our control group, whichever has less; shared memory counts there, too.
-    memory: u64,
+    pub(super) memory: u64,
 }
 
 /// Refuses when `shared` bytes, and 5 % for what is not counted, do not fit, or not together with `own` bytes of the

@@ -221,6 +221,11 @@ pub fn check_memory(
     )
 }
 
+/// Memory that can still be taken, of the machine or of our control group, whichever has less [bytes].
+pub fn free_memory() -> u64 {
+    memory::free().memory
+}
+
 /// Random number of a run: two runs must not be taken for each other, nothing more.
 fn random() -> u64 {
     use std::hash::{BuildHasher, Hasher, RandomState};

@@ -154,7 +154,7 @@ fn hostile_commands_are_refused_with_a_reason_and_the_host_goes_on() {
         rows: 1,
         core: 0,
     };
-    let cases: [(&str, CommandHeader, Vec<u64>, &str); 9] = [
+    let cases: [(&str, CommandHeader, Vec<u64>, &str); 12] = [
         (
             "a truncated table",
             header,
@@ -185,6 +185,34 @@ fn hostile_commands_are_refused_with_a_reason_and_the_host_goes_on() {
             "unknown dtype 77",
         ),
         ("no name", header, with(0, 0), "a name is empty"),
+        (
+            "a mask of floats",
+            header,
+            with(0, u64::from_le_bytes(*b"mask\0\0\0\0")),
+            "mask: float32 of 2 axes; uint8 of one is needed",
+        ),
+        (
+            "a path of floats",
+            header,
+            with(0, u64::from_le_bytes(*b"path\0\0\0\0")),
+            "path: float32",
+        ),
+        (
+            "a world of floats",
+            header,
+            with(0, u64::from_le_bytes(*b"from_wor"))
+                .iter()
+                .enumerate()
+                .map(|(i, &word)| {
+                    if i == 1 {
+                        u64::from(b'l') | u64::from(b'd') << 8
+                    } else {
+                        word
+                    }
+                })
+                .collect(),
+            "from_world: float32 of 2 axes; uint64 of one is needed",
+        ),
         (
             "an unknown operation",
             CommandHeader { op: 9, ..header },

@@ -52,7 +52,7 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    fn of<R: Real>(m: &Constants<R>) -> Shape {
+    pub(super) fn of<R: Real>(m: &Constants<R>) -> Shape {
         Shape {
             dofs: m.dofs.len(),
             coords: m.coords,
@@ -64,7 +64,7 @@ impl Shape {
         let coords = (field as usize).saturating_sub(StateField::Q as usize);
         groups * self.dofs + coords * self.coords
     }
-    fn total(self) -> usize {
+    pub(super) fn total(self) -> usize {
         self.start(StateField::Params) + self.params
     }
 }
@@ -196,7 +196,7 @@ impl<F: Lane> Chunk<F> {
     }
 
     /// Place of a number of a world (counted from the chunk's first) in `state`.
-    fn place(&self, shape: Shape, world: usize, field: StateField, k: usize) -> usize {
+    pub(super) fn place(&self, shape: Shape, world: usize, field: StateField, k: usize) -> usize {
         let (block, lane) = (world / F::WIDTH, world % F::WIDTH);
         (block * shape.total() + shape.start(field) + k) * F::WIDTH + lane
     }

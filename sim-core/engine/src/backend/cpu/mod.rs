@@ -5,6 +5,7 @@
 mod chunk;
 mod contacts;
 mod dispatch;
+mod records;
 mod transfer;
 mod trouble;
 
@@ -121,6 +122,22 @@ impl<F: Lane> Backend for Cpu<F> {
     fn reset(&mut self, mask: Option<&[bool]>) {
         for chunk in &mut self.chunks {
             chunk.reset(&self.job, mask);
+        }
+    }
+
+    fn numbers(&self) -> usize {
+        self.job.numbers()
+    }
+
+    fn save(&self, records: &mut [u8]) {
+        for chunk in &self.chunks {
+            chunk.save(&self.job, records);
+        }
+    }
+
+    fn restore(&mut self, records: &[u8], mask: Option<&[bool]>, from_world: Option<usize>) {
+        for chunk in &mut self.chunks {
+            chunk.restore(&self.job, records, mask, from_world);
         }
     }
 

@@ -1,0 +1,132 @@
+"""All worlds of a simulation as bytes: `Sim.snapshot` takes them, `Sim.restore` goes back to them.
+
+A snapshot is a head of 40 bytes, then a record a world; `sim-core/engine/src/snapshot.rs` says how they lie.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import struct
+import tempfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tightloop import checks
+from tightloop.errors import SnapshotError
+
+# Magic, version, checksum, model, worlds, numbers of a world, bytes of a number; little endian
+_HEAD = struct.Struct("<8sIIQQII")
+_MAGIC, _VERSION = b"tlsnap\r\n", 1
+# Where what the checksum covers begins; bytes of a world's counters, which come before its numbers
+_COVERED, _COUNTERS = 16, 16
+_SHARED_MEMORY = Path("/dev/shm")
+
+
+class Snapshot:
+    """All worlds of a simulation at one instant; immutable, and of no use but to `Sim.restore`.
+
+    Made by `Sim.snapshot`, `Snapshot.load` and `Snapshot.from_bytes`.
+
+    Attributes:
+        worlds: Number of worlds.
+        precision: ``"f32"`` or ``"f64"``.
+        model_hash: Hash of the scene's model; ``sim.info["model_hash"]`` of a simulation that can restore it.
+    """
+
+    def __init__(self, data: bytes, origin: str) -> None:
+        self._data = data
+        self.model_hash, self.worlds, real = _check(data, origin)
+        self.precision = f"f{8 * real}"
+
+    @classmethod
+    def from_bytes(cls, data: bytes | bytearray | memoryview) -> Snapshot:
+        """The snapshot that `to_bytes` gave.
+
+        Raises:
+            SnapshotError: These bytes are no snapshot, of another release, cut short or damaged.
+        """
+        if not isinstance(data, bytes | bytearray | memoryview):
+            raise SnapshotError(f"snapshot: data is {type(data).__name__}; give the bytes of one")
+        return cls(bytes(data), "snapshot")
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Snapshot:
+        """The snapshot that `save` wrote.
+
+        Raises:
+            SnapshotError: The file cannot be read, is no snapshot, of another release, cut short or damaged.
+        """
+        file = checks.path("snapshot: path", path, error=SnapshotError)
+        try:
+            data = file.read_bytes()
+        except OSError as problem:
+            raise SnapshotError(f"{file}: cannot be read: {problem.strerror}") from None
+        return cls(data, str(file))
+
+    def to_bytes(self) -> bytes:
+        """Everything that `from_bytes` needs."""
+        return self._data
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write it into a file. What was there before is replaced as a whole or, after an error, not at all.
+
+        Raises:
+            SnapshotError: The file cannot be written; the message says why.
+        """
+        file = checks.path("snapshot: path", path, error=SnapshotError)
+        part = file.with_name(f".tightloop-{secrets.token_hex(8)}")
+        try:
+            try:
+                with part.open("xb") as to:
+                    to.write(self._data)
+                    to.flush()
+                    # Or a power cut might leave the name with nothing behind it
+                    os.fsync(to.fileno())
+                part.replace(file)
+            except BaseException:
+                part.unlink(missing_ok=True)
+                raise
+        except OSError as problem:
+            raise SnapshotError(f"{file}: cannot be written: {problem.strerror}") from None
+
+    def __repr__(self) -> str:
+        return f"Snapshot(worlds={self.worlds}, precision={self.precision!r}, model_hash={self.model_hash:#018x})"
+
+
+@contextmanager
+def passing() -> Iterator[Path]:
+    """Path of a file between client and daemon, which is gone afterwards; in shared memory where there is one.
+
+    Raises:
+        SnapshotError: There is no folder for it.
+    """
+    try:
+        folder = tempfile.TemporaryDirectory(
+            prefix="tightloop-", dir=_SHARED_MEMORY if _SHARED_MEMORY.is_dir() else None
+        )
+    except OSError as problem:
+        raise SnapshotError(f"snapshot: no room on its way to the daemon: {problem}") from None
+    with folder as path:
+        yield Path(path) / "snapshot"
+
+
+def _check(data: bytes, origin: str) -> tuple[int, int, int]:
+    """Model hash, worlds and bytes of a number, of a snapshot that is whole."""
+    if not data.startswith(_MAGIC):
+        raise SnapshotError(f"{origin}: this is no snapshot; give what was saved as one")
+    if len(data) < _HEAD.size:
+        raise SnapshotError(f"{origin}: cut short: {len(data)} bytes of {_HEAD.size}; copy it again, whole")
+    _, version, checksum, model, worlds, numbers, real = _HEAD.unpack_from(data)
+    if version != _VERSION:
+        reads = f"this release reads format {_VERSION}; take it again with this release"
+        raise SnapshotError(f"{origin}: of format {version}, {reads}")
+    expected = _HEAD.size + worlds * (_COUNTERS + numbers * real)
+    if len(data) < expected:
+        raise SnapshotError(f"{origin}: cut short: {len(data)} bytes of {expected}; copy it again, whole")
+    if len(data) > expected or zlib.crc32(memoryview(data)[_COVERED:]) != checksum:
+        damaged = "damaged: its checksum does not match"
+        raise SnapshotError(f"{origin}: {damaged}; copy it again, or take another")
+    return model, worlds, real

@@ -1,0 +1,74 @@
+//! Worlds out of lanes and back: records of a snapshot, which are the same whatever the lanes and threads.
+
+use super::chunk::{Chunk, Job, Shape, StateField};
+use crate::backend::COUNTERS;
+use sim_core::lane::{Lane, Real};
+use std::array;
+
+impl<F: Lane> Job<F> {
+    /// Numbers of a world's state and commands.
+    pub fn numbers(&self) -> usize {
+        Shape::of(&self.constants).total()
+    }
+
+    fn record(&self) -> usize {
+        COUNTERS + self.numbers() * size_of::<F::Real>()
+    }
+}
+
+impl<F: Lane> Chunk<F> {
+    /// Writes the chunk's worlds into the records of all.
+    pub fn save(&self, job: &Job<F>, records: &mut [u8]) {
+        let shape = Shape::of(&job.constants);
+        let records = records.chunks_exact_mut(job.record());
+        let own = records.skip(self.worlds.start).take(self.worlds.len());
+        for (world, record) in own.enumerate() {
+            let (counters, numbers) = record.split_at_mut(COUNTERS);
+            counters[..8].copy_from_slice(&self.steps[world].to_le_bytes());
+            counters[8..12].copy_from_slice(&self.status[world].to_le_bytes());
+            counters[12..].copy_from_slice(&self.left_out[world].to_le_bytes());
+            let first = self.place(shape, world, StateField::Qd, 0);
+            let state = self.state[first..].iter().step_by(F::WIDTH);
+            let to = numbers.chunks_exact_mut(size_of::<F::Real>());
+            for (to, x) in to.zip(state) {
+                if F::Real::DOUBLE {
+                    to.copy_from_slice(&x.to_f64().to_le_bytes());
+                } else {
+                    to.copy_from_slice(&(x.to_f64() as f32).to_le_bytes());
+                }
+            }
+        }
+    }
+
+    /// Sets the chunk's worlds of the mask (none = all) to their records, or to that of one world.
+    pub fn restore(
+        &mut self,
+        job: &Job<F>,
+        records: &[u8],
+        mask: Option<&[bool]>,
+        from_world: Option<usize>,
+    ) {
+        let shape = Shape::of(&job.constants);
+        for world in 0..self.worlds.len() {
+            let outside = self.worlds.start + world;
+            if mask.is_some_and(|mask| !mask[outside]) {
+                continue;
+            }
+            let first = from_world.unwrap_or(outside) * job.record();
+            let (counters, numbers) = records[first..first + job.record()].split_at(COUNTERS);
+            self.steps[world] = u64::from_le_bytes(array::from_fn(|i| counters[i]));
+            self.status[world] = u32::from_le_bytes(array::from_fn(|i| counters[8 + i]));
+            self.left_out[world] = u32::from_le_bytes(array::from_fn(|i| counters[12 + i]));
+            let first = self.place(shape, world, StateField::Qd, 0);
+            let state = self.state[first..].iter_mut().step_by(F::WIDTH);
+            for (x, from) in state.zip(numbers.chunks_exact(size_of::<F::Real>())) {
+                *x = if F::Real::DOUBLE {
+                    F::Real::of(f64::from_le_bytes(array::from_fn(|i| from[i])))
+                } else {
+                    let from = f32::from_le_bytes(array::from_fn(|i| from[i]));
+                    F::Real::of(f64::from(from))
+                };
+            }
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Snapshots as files: written as a whole or not at all, and read only when there is room.
+
+use std::fs::{self, File};
+use std::io::{ErrorKind, Read, Write};
+use std::path::Path;
+
+use sim_engine::simulation::Simulation;
+use sim_protocol::RefusalKind;
+use sim_protocol::host::{Inbox, free_memory};
+
+use crate::export::{Refusal, refusal};
+
+const MB: u64 = 1 << 20;
+
+/// Writes all worlds into the file that the command names.
+pub(crate) fn save(simulation: &Simulation, inbox: &Inbox) -> Result<(), Refusal> {
+    let path = path(inbox)?;
+    let refuse = |problem: String| refused(path, &problem);
+    let Some(folder) = path.parent() else {
+        return Err(refuse("is no file; give the path of one".to_owned()));
+    };
+    // the bytes, and the file where it lies in memory too
+    check_room(2 * simulation.snapshot_bytes() as u64).map_err(refuse)?;
+    let header = inbox.header();
+    // no other command has this name
+    let part = folder.join(format!(
+        ".tightloop-{:016x}-{}-{}",
+        header.session, header.epoch, header.seq
+    ));
+    let write = || {
+        let mut file = File::create_new(&part)?;
+        file.write_all(&simulation.snapshot())?;
+        // or a power cut might leave the name with nothing behind it
+        file.sync_all()?;
+        fs::rename(&part, path)
+    };
+    write().map_err(|problem| {
+        let _ = fs::remove_file(&part);
+        refuse(match problem.kind() {
+            ErrorKind::NotFound => {
+                format!("there is no folder {}; make it first", folder.display())
+            }
+            _ => format!("cannot be written: {problem}"),
+        })
+    })
+}
+
+/// Sets the worlds of the mask to those of the file that the command names, or to one of them.
+pub(crate) fn restore(
+    simulation: &mut Simulation,
+    inbox: &Inbox,
+    mask: Option<&[bool]>,
+) -> Result<(), Refusal> {
+    let from_world = match inbox.from_world() {
+        None => None,
+        Some(&[world]) => Some(usize::try_from(world).unwrap_or(usize::MAX)),
+        Some(worlds) => {
+            let problem = format!("from_world has {} entries; give one", worlds.len());
+            return Err(refusal(RefusalKind::Malformed, problem));
+        }
+    };
+    let path = path(inbox)?;
+    let bytes = read(path).map_err(|problem| refused(path, &problem))?;
+    let restored = simulation.restore(&bytes, mask, from_world);
+    restored.map_err(|error| refused(path, &error.to_string()))
+}
+
+/// The bytes of a file.
+fn read(path: &Path) -> Result<Vec<u8>, String> {
+    let failed = |problem: std::io::Error| format!("cannot be read: {problem}");
+    // a pipe would be waited for, and a device has no end
+    if !fs::metadata(path).map_err(failed)?.is_file() {
+        return Err("is no file; give the file of a snapshot".to_owned());
+    }
+    let file = File::open(path).map_err(failed)?;
+    let length = file.metadata().map_err(failed)?.len();
+    check_room(length)?;
+    let mut bytes = Vec::with_capacity(length as usize);
+    file.take(length).read_to_end(&mut bytes).map_err(failed)?;
+    Ok(bytes)
+}
+
+/// Refuses what would not fit: memory that is missing kills instead of failing.
+fn check_room(needed: u64) -> Result<(), String> {
+    let free = free_memory();
+    if needed > free {
+        return Err(format!(
+            "needs {} MB of memory and {} MB are available; end other programs",
+            needed.div_ceil(MB),
+            free / MB
+        ));
+    }
+    Ok(())
+}
+
+/// The path that a command names.
+fn path(inbox: &Inbox) -> Result<&Path, Refusal> {
+    let malformed = |problem: &str| refusal(RefusalKind::Malformed, problem.to_owned());
+    let path = inbox.path().ok_or_else(|| malformed("path is missing"))?;
+    let path = std::str::from_utf8(path).map_err(|_| malformed("path is not UTF-8"))?;
+    if !Path::new(path).is_absolute() {
+        let problem = "is relative, and the daemon runs elsewhere; give an absolute path";
+        return Err(refused(Path::new(path), problem));
+    }
+    Ok(Path::new(path))
+}
+
+fn refused(path: &Path, problem: &str) -> Refusal {
+    refusal(
+        RefusalKind::Snapshot,
+        format!("{}: {problem}", path.display()),
+    )
+}
