@@ -1,0 +1,148 @@
+"""Parameters of each world against MuJoCo's numbers: what derives from masses at the reference pose stays on both sides."""
+
+from __future__ import annotations
+
+import copy
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.random import Generator
+from piles import Judge, Pile, lesson, states_of
+from robots import Coordinates
+from twin import Array
+
+import tightloop as tl
+from conftest import START
+
+WORLDS = 12
+# Relative to the largest acceleration
+TOLERANCES = {"f64": 1e-6, "f32": 1e-3}
+OF_DOFS = ("joint_armature", "joint_damping", "joint_target_ke", "joint_target_kd", "joint_effort_limit")
+
+
+def around(rng: Generator, numbers: Array) -> Array:
+    """Other numbers for every world, ``(worlds, ...)``."""
+    return numbers * rng.uniform(0.6, 1.5, (WORLDS, *np.shape(numbers)))
+
+
+def give(model: mujoco.MjModel, sim: tl.Sim, world: int, params: dict[str, Array]) -> mujoco.MjModel:
+    """MuJoCo's model with the numbers of a world."""
+    own = copy.copy(model)
+    own.opt.gravity[:] = params["gravity"][world]
+    for link, scale in zip(sim.body_names, params["body_mass_scale"][world], strict=True):
+        body = mujoco.mj_name2id(own, mujoco.mjtObj.mjOBJ_BODY, link)
+        if body >= 0:
+            own.body_mass[body] *= scale
+            own.body_inertia[body] *= scale
+    for dof, name in enumerate(sim.dof_names):
+        joint = mujoco.mj_name2id(own, mujoco.mjtObj.mjOBJ_JOINT, name)
+        if joint < 0:
+            continue  # of a free body: it has none of these
+        place = own.jnt_dofadr[joint]
+        own.dof_armature[place] = params["joint_armature"][world, dof]
+        own.dof_damping[place] = params["joint_damping"][world, dof]
+        limit = params["joint_effort_limit"][world, dof]
+        own.jnt_actfrclimited[joint], own.jnt_actfrcrange[joint] = 1, (-limit, limit)
+        for drive in np.flatnonzero(own.actuator_trnid[:, 0] == joint):
+            stiffness, damping = params["joint_target_ke"][world, dof], params["joint_target_kd"][world, dof]
+            own.actuator_gainprm[drive, 0], own.actuator_biasprm[drive, :3] = stiffness, (0, -stiffness, -damping)
+    names = sim.shape_names
+    for pair, geoms in enumerate(zip(own.pair_geom1, own.pair_geom2, strict=True)):
+        mu = [params["shape_mu"][world, names.index(own.geom(geom).name)] for geom in geoms]
+        own.pair_friction[pair, :2] = max(mu)
+    return own
+
+
+def assert_same(sim: tl.Sim, model: mujoco.MjModel, q: Array, qd: Array, params: dict[str, Array], wrench: Array) -> None:
+    """Accelerations of every world; `wrench` is `body_f`."""
+    frame = sim.write(joint_q=q, joint_qd=qd)
+    sim.params.write(body_f=wrench, **params)
+    frame = sim.forward()
+    touching = 0
+    for world in range(WORLDS):
+        own = give(model, sim, world, params)
+        judge = Judge(own, sim)
+        here, speed = frame.joint_q[world].astype(float), frame.joint_qd[world].astype(float)
+        data, to = judge.data, judge.to
+        convert = to.to_qvel(here)
+        data.qpos[:], data.qvel[:] = to.positions(here), convert @ speed
+        for link, push in zip(sim.body_names, wrench[world], strict=True):
+            body = mujoco.mj_name2id(own, mujoco.mjtObj.mjOBJ_BODY, link)
+            if body >= 0:
+                data.xfrc_applied[body] = push
+        data.ctrl[:] = START[: own.nu]
+        mujoco.mj_forward(own, data)
+        expected = np.linalg.solve(convert, data.qacc - to.drift(here, speed))
+        off = np.abs(frame.joint_qdd[world] - expected).max() / max(1.0, np.abs(expected).max())
+        assert off < TOLERANCES[sim.precision], f"world {world}: {off}"
+        touching += data.ncon > 0
+    assert len({tuple(row) for row in frame.joint_qdd}) == WORLDS
+    assert touching or model.npair == 0 or len(sim.dof_names) == len(START)
+
+
+@pytest.mark.parametrize("precision", TOLERANCES)
+def test_an_arm_with_numbers_of_its_own_in_each_world(precision: str):
+    rng = np.random.default_rng(5)
+    pile, compiled = lesson(driven=True)
+    model = compiled()
+    names = ("gravity", "body_mass_scale", *OF_DOFS, "shape_mu", "body_f")
+    with tl.launch(
+        pile.scene, worlds=WORLDS, precision=precision, params=names, fields=("joint_q", "joint_qd", "joint_qdd")
+    ) as sim:
+        assert sim.params.names == names
+        params = {name: around(rng, getattr(sim.params, name)[0]) for name in names[:-1]}
+        q = START + rng.uniform(-0.2, 0.2, (WORLDS, 9)) * (np.arange(9) < 7)
+        qd = rng.uniform(-0.5, 0.5, (WORLDS, 9)) * (np.arange(9) < 7)
+        wrench = rng.uniform(-5, 5, (WORLDS, len(sim.body_names), 6))
+        assert_same(sim, model, q, qd, params, wrench)
+
+
+@pytest.mark.parametrize("precision", TOLERANCES)
+def test_bodies_that_lie_and_slide_with_numbers_of_their_own(precision: str):
+    rng = np.random.default_rng(6)
+    pile = Pile()
+    pile.shape("plane", "ground", {}, mu=0.4)
+    for number in range(4):
+        pile.body(f"b{number}", np.array([0.2 * number, 0, 0.06 + 0.02 * number]), np.array([0, 0, 0, 1.0]))
+        pile.shape("box", f"s{number}", {"half_extents": (0.05, 0.04, 0.05)}, body=f"b{number}", mu=0.2 * number)
+    model = pile.compile()
+    names = ("gravity", "body_mass_scale", "shape_mu", "body_f")
+    with tl.launch(
+        pile.scene, worlds=WORLDS, precision=precision, params=names, fields=("joint_q", "joint_qd", "joint_qdd")
+    ) as sim:
+        steps = list(np.linspace(20, 300, WORLDS, dtype=int))
+        q, qd = states_of(model, Coordinates(model, sim), steps, rng.uniform(-0.5, 0.5, model.nv))
+        params = {name: around(rng, getattr(sim.params, name)[0]) for name in names[:-1]}
+        for name in OF_DOFS:
+            params[name] = np.zeros((WORLDS, len(sim.dof_names)))
+        wrench = rng.uniform(-2, 2, (WORLDS, len(sim.body_names), 6)) * [1, 1, 1, 0.1, 0.1, 0.1]
+        given = {name: params[name] for name in names[:-1]}
+        assert_same_bodies(sim, model, q, qd, given, params, wrench)
+
+
+def assert_same_bodies(
+    sim: tl.Sim,
+    model: mujoco.MjModel,
+    q: Array,
+    qd: Array,
+    given: dict[str, Array],
+    params: dict[str, Array],
+    wrench: Array,
+) -> None:
+    """As `assert_same`, of a scene that has no joints but free ones."""
+    sim.write(joint_q=q, joint_qd=qd)
+    sim.params.write(body_f=wrench, **given)
+    frame = sim.forward()
+    touching = 0
+    for world in range(WORLDS):
+        own = give(model, sim, world, params)
+        judge = Judge(own, sim)
+        here, speed = frame.joint_q[world].astype(float), frame.joint_qd[world].astype(float)
+        for link, push in zip(sim.body_names, wrench[world], strict=True):
+            judge.data.xfrc_applied[own.body(link).id] = push
+        expected, count = judge.at(here, speed)
+        off = np.abs(frame.joint_qdd[world] - expected).max() / max(1.0, np.abs(expected).max())
+        assert off < TOLERANCES[sim.precision], f"world {world}: {off}"
+        touching += count > 0
+    assert touching > WORLDS // 2
