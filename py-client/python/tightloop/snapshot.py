@@ -105,7 +105,7 @@ def passing() -> Iterator[Path]:
     """
     try:
         folder = tempfile.TemporaryDirectory(
-            prefix="tightloop-", dir=_SHARED_MEMORY if _SHARED_MEMORY.is_dir() else None
+            prefix=f"tightloop-{os.getpid()}-", dir=_SHARED_MEMORY if _SHARED_MEMORY.is_dir() else None
         )
     except OSError as problem:
         raise SnapshotError(f"snapshot: no room on its way to the daemon: {problem}") from None
