@@ -352,6 +352,8 @@ impl Builder {
                 .joint_target_q
                 .push(dof.target_q.unwrap_or(start));
             self.start.joint_target_qd.push(dof.target_qd);
+            self.start.joint_q_offset.push(dof.offset_q);
+            self.start.joint_qd_offset.push(dof.offset_qd);
             self.joints.push(DofJoint {
                 range: joint.range,
                 friction: dof.friction,

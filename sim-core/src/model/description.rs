@@ -5,6 +5,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::distribution::Distribution;
 use super::geometry::Mesh;
 use super::pose::Pose;
 use super::surface::Surface;
@@ -245,6 +246,11 @@ pub struct JointDof {
     pub target_ke: f64,
     /// Derivative gain of the drive [N·m·s/rad or N·s/m].
     pub target_kd: f64,
+    /// What a reset adds to the start position [rad or m]: of a ball a rotation vector in the child's axes, of a free joint
+    /// x, y, z, then roll, pitch, yaw about the world's axes. Limits clamp the sum; a follower moves with its leader instead.
+    pub offset_q: Option<Distribution>,
+    /// What a reset adds to the start velocity, which is 0 [rad/s or m/s].
+    pub offset_qd: Option<Distribution>,
 }
 
 /// The motion a joint allows.

@@ -372,6 +372,30 @@ pub enum ModelError {
         reason: &'static str,
     },
 
+    /// A follower with an offset of its own.
+    #[error(
+        "robot `{robot}`: joint `{joint}` mimics `{leader}` and starts where that does; give `{leader}` the offset"
+    )]
+    FollowerOffset {
+        /// The robot.
+        robot: String,
+        /// The follower.
+        joint: String,
+        /// The joint it follows.
+        leader: String,
+    },
+
+    /// A uniform distribution without numbers.
+    #[error("{what}: low is {low} and high is {high}; low must not be above high")]
+    EmptyUniform {
+        /// Whose distribution it is.
+        what: String,
+        /// The lower end.
+        low: f64,
+        /// The upper end.
+        high: f64,
+    },
+
     /// Joints that mimic one another in a circle.
     #[error(
         "robot `{robot}`: joints {} mimic one another in a circle; let one of them lead",

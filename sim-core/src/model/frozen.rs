@@ -1,6 +1,7 @@
 //! The frozen model.
 
 use super::constants::Constants;
+use super::distribution::Distribution;
 use std::ops::Range;
 
 /// Where a robot's rows lie in the arrays of the scene.
@@ -32,7 +33,7 @@ pub struct Model {
     pub(super) hash: u64,
 }
 
-/// State and commands after a reset: positions one entry a coordinate, targets one a dof.
+/// State and commands after a reset: positions one entry a coordinate, the rest one a dof.
 #[derive(Clone, Debug, Default)]
 pub struct Start {
     /// [rad or m]
@@ -41,6 +42,10 @@ pub struct Start {
     pub joint_target_q: Vec<f64>,
     /// [rad/s or m/s]
     pub joint_target_qd: Vec<f64>,
+    /// What is drawn and added to the positions, as [`super::JointDof::offset_q`] has it.
+    pub joint_q_offset: Vec<Option<Distribution>>,
+    /// What is drawn and added to the velocities, which are 0.
+    pub joint_qd_offset: Vec<Option<Distribution>>,
 }
 
 impl Model {

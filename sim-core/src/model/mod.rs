@@ -9,6 +9,7 @@ pub mod constants;
 pub mod contact;
 pub mod cut;
 mod description;
+mod distribution;
 mod error;
 mod frozen;
 pub mod geometry;
@@ -32,6 +33,7 @@ pub use description::{
     Collision, Cone, Description, Inertial, Joint, JointDof, JointKind, Link, Mimic, Robot, Shape,
     Solver, StaticShape, TargetMode,
 };
+pub use distribution::Distribution;
 pub use error::ModelError;
 pub use frozen::{Model, RobotRange, Start};
 pub use inertia::principal_moments;

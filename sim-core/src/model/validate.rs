@@ -334,6 +334,14 @@ impl Robot {
         if leader.mimic.is_some() {
             return refuse(leader.name.clone(), "follows another joint itself");
         }
+        let offsets = |dof: &JointDof| dof.offset_q.or(dof.offset_qd).is_some();
+        if joint.dofs.iter().any(offsets) {
+            return Err(ModelError::FollowerOffset {
+                robot: self.name.clone(),
+                joint: joint.name.clone(),
+                leader: leader.name.clone(),
+            });
+        }
         let rule = "give at most 1e12, followed leaders multiplied in";
         let multiplier = format!("{what}: mimic multiplier");
         within(&multiplier, mimic.multiplier, FACTOR_MAX, rule)?;
@@ -366,7 +374,12 @@ fn validate_dof(what: &str, dof: &JointDof) -> Result<(), ModelError> {
     }
     let target_q = dof.target_q.unwrap_or(0.0);
     finite(&format!("{what}: joint_target_q"), target_q)?;
-    finite(&format!("{what}: joint_target_qd"), dof.target_qd)
+    finite(&format!("{what}: joint_target_qd"), dof.target_qd)?;
+    let offsets = [("joint_q", dof.offset_q), ("joint_qd", dof.offset_qd)];
+    offsets.iter().try_for_each(|(field, offset)| match offset {
+        Some(offset) => offset.validate(&format!("{what}: offset of {field}")),
+        None => Ok(()),
+    })
 }
 
 /// Refuses a frame with a number that is not finite, or a quaternion that is no rotation.
