@@ -15,7 +15,7 @@ const ORDER: [(&str, &[&str]); 2] = [
     ),
     (
         "sim-core/engine/src",
-        &["backend", "simulation", "dynamics"],
+        &["random", "start", "backend", "simulation", "dynamics"],
     ),
 ];
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tightloop._core import Frame, __version__
     from tightloop.body import Body
+    from tightloop.distributions import Normal, Uniform
     from tightloop.dynamics import Dynamics
     from tightloop.errors import (
         ArgumentError,
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "tightloop._core": ("Frame", "__version__"),
     "tightloop.body": ("Body",),
+    "tightloop.distributions": ("Normal", "Uniform"),
     "tightloop.dynamics": ("Dynamics",),
     "tightloop.errors": (
         "ArgumentError",
@@ -88,6 +90,7 @@ __all__ = [
     "LeaseHeld",
     "LeaseLost",
     "Link",
+    "Normal",
     "ProtocolMismatch",
     "ResourceError",
     "Robot",
@@ -99,6 +102,7 @@ __all__ = [
     "Surface",
     "TightloopError",
     "TransportError",
+    "Uniform",
     "UnknownDaemon",
     "UnknownField",
     "UrdfError",

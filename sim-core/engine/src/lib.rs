@@ -1,9 +1,11 @@
 //! Worlds of a model: a [`simulation::Simulation`] keeps many and steps them on a [`backend`]; [`dynamics::Dynamics`] are
 //! functions of given states.
 //!
-//! Imports run one way: `backend ← simulation ← dynamics`. The physics is the text of `sim-core`, which `sim-core/stages`
-//! compile for the machine.
+//! Imports run one way: `random ← start ← backend ← simulation ← dynamics`. The physics is the text of `sim-core`, which
+//! `sim-core/stages` compile for the machine.
 
 pub mod backend;
 pub mod dynamics;
+pub mod random;
 pub mod simulation;
+pub mod start;

@@ -256,15 +256,27 @@ impl Client {
     /// been made. [`ProtocolError::LeaseHeld`], [`ProtocolError::LeaseLost`], [`ProtocolError::DaemonLost`],
     /// [`ProtocolError::DaemonRestarted`].
     pub fn step(&self, commands: &[Command<'_>], hook: Hook<'_>) -> Result<Frame, ProtocolError> {
-        self.run(Op::Step, commands, None, hook)
+        self.run(&Call::new(Op::Step, commands, None), hook)
     }
 
     /// Puts the worlds under the mask (all without one) back to the start and returns the frame there.
     ///
+    /// What of the state the scene has distributions of is drawn from (seed, world, episode). A reset starts the next episode
+    /// of a world; with a seed, one for all or one a world, the first one of that seed. Seed and episode are 0 at first.
+    ///
     /// # Errors
     /// As [`Client::step`].
-    pub fn reset(&self, mask: Option<&[bool]>, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
-        self.run(Op::Reset, &[], mask, hook)
+    pub fn reset(
+        &self,
+        mask: Option<&[bool]>,
+        seed: Option<&[u64]>,
+        hook: Hook<'_>,
+    ) -> Result<Frame, ProtocolError> {
+        let call = Call {
+            seed,
+            ..Call::new(Op::Reset, &[], mask)
+        };
+        self.run(&call, hook)
     }
 
     /// Sets the state of the worlds under the mask (all without one) and returns the frame evaluated there.
@@ -277,7 +289,7 @@ impl Client {
         mask: Option<&[bool]>,
         hook: Hook<'_>,
     ) -> Result<Frame, ProtocolError> {
-        self.run(Op::Write, arrays, mask, hook)
+        self.run(&Call::new(Op::Write, arrays, mask), hook)
     }
 
     /// Evaluates the fields at the present state without stepping.
@@ -285,23 +297,17 @@ impl Client {
     /// # Errors
     /// As [`Client::step`].
     pub fn forward(&self, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
-        self.run(Op::Forward, &[], None, hook)
+        self.run(&Call::new(Op::Forward, &[], None), hook)
     }
 
-    fn run(
-        &self,
-        op: Op,
-        arrays: &[Command<'_>],
-        mask: Option<&[bool]>,
-        hook: Hook<'_>,
-    ) -> Result<Frame, ProtocolError> {
+    fn run(&self, call: &Call<'_>, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
         self.check_process()?;
         let mut held = lock(&self.controller);
         let controller = match &mut *held {
             Some(controller) => controller,
             empty => empty.insert(self.take_lease(hook)?),
         };
-        let result = controller.run(&Call { op, arrays, mask }, hook);
+        let result = controller.run(call, hook);
         // a lost lease can be asked for again; a lost daemon cannot come back
         if matches!(result, Err(ProtocolError::LeaseLost { .. })) {
             held.take();

@@ -6,15 +6,29 @@ use crate::{ALIGNMENT, Description, Dtype, InputInfo, Op, ProtocolError, ROWS_MA
 
 /// Name of the mask in a command.
 pub(crate) const MASK: &str = "mask";
+/// Name of the seeds in a reset.
+const SEED: &str = "seed";
 
 /// One call of a client, as it came.
 pub(crate) struct Call<'a> {
     pub(crate) op: Op,
     pub(crate) arrays: &'a [Command<'a>],
     pub(crate) mask: Option<&'a [bool]>,
+    /// One for all worlds, or one a world.
+    pub(crate) seed: Option<&'a [u64]>,
 }
 
-impl Call<'_> {
+impl<'a> Call<'a> {
+    /// A call without seeds.
+    pub(crate) fn new(op: Op, arrays: &'a [Command<'a>], mask: Option<&'a [bool]>) -> Call<'a> {
+        Call {
+            op,
+            arrays,
+            mask,
+            seed: None,
+        }
+    }
+
     /// Finds what the daemon would refuse anyway, with the names at hand.
     pub(crate) fn check(&self, description: &Description) -> Result<(), ProtocolError> {
         let (worlds, arrays) = (description.worlds, self.arrays);
@@ -81,6 +95,16 @@ impl Call<'_> {
                 ));
             }
         }
+        if let Some(seed) = self.seed
+            && seed.len() != 1
+            && seed.len() != worlds
+        {
+            return Err(ProtocolError::Shape {
+                field: SEED.to_owned(),
+                expected: format!("(1,) or ({worlds},)"),
+                got: format!("({},)", seed.len()),
+            });
+        }
         match self.mask {
             Some(mask) if mask.len() != worlds => Err(ProtocolError::Shape {
                 field: MASK.to_owned(),
@@ -93,7 +117,7 @@ impl Call<'_> {
 
     /// Rows of the field table.
     pub(crate) fn rows(&self) -> usize {
-        self.arrays.len() + usize::from(self.mask.is_some())
+        self.arrays.len() + usize::from(self.seed.is_some()) + usize::from(self.mask.is_some())
     }
 
     /// Size of the sample.
@@ -102,8 +126,9 @@ impl Call<'_> {
             .arrays
             .iter()
             .map(|array| padded(array, description.real()));
+        let seed = self.seed.map_or(0, seed_bytes);
         let mask = self.mask.map_or(0, |_| mask_bytes(description.worlds));
-        Table::head_bytes(self.rows()) + arrays.sum::<usize>() + mask
+        Table::head_bytes(self.rows()) + arrays.sum::<usize>() + seed + mask
     }
 
     /// Writes field table and arrays; of `words`, every word that means something.
@@ -113,7 +138,8 @@ impl Call<'_> {
         let (table, data) = words.split_at_mut(head / 8);
         let (table, _) = table.as_chunks_mut();
         let mut offset = 0;
-        for (row, array) in table.iter_mut().zip(self.arrays) {
+        let mut rows = table.iter_mut();
+        for (row, array) in rows.by_ref().zip(self.arrays) {
             let (columns, bytes) = (&array.columns, padded(array, real));
             encode_row(
                 row,
@@ -130,15 +156,13 @@ impl Call<'_> {
             );
             offset += bytes;
         }
-        if let Some(mask) = self.mask {
-            encode_row(
-                &mut table[self.arrays.len()],
-                MASK,
-                Dtype::U8,
-                &[worlds],
-                0,
-                head + offset,
-            );
+        if let (Some(seed), Some(row)) = (self.seed, rows.next()) {
+            encode_row(row, SEED, Dtype::U64, &[seed.len()], 0, head + offset);
+            data[offset / 8..][..seed.len()].copy_from_slice(seed);
+            offset += seed_bytes(seed);
+        }
+        if let (Some(mask), Some(row)) = (self.mask, rows.next()) {
+            encode_row(row, MASK, Dtype::U8, &[worlds], 0, head + offset);
             let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data[offset / 8..]);
             bytes
                 .iter_mut()
@@ -153,14 +177,18 @@ fn padded(array: &Command<'_>, real: Dtype) -> usize {
     (array.values.len() * real.size()).next_multiple_of(ALIGNMENT)
 }
 
-/// Bytes that the largest command of a run takes: every input of a step or of a write, and a mask.
+/// Bytes that the largest command of a run takes: every input of a step or of a write, or seeds, and a mask.
 pub(crate) fn command_bytes(description: &Description) -> usize {
     let columns = |inputs: &[InputInfo]| inputs.iter().map(|input| input.columns).sum::<usize>();
     let columns = columns(&description.commands).max(columns(&description.writes));
-    let entries = description.worlds * columns * description.real().size();
+    let entries = description.worlds * (columns * description.real().size()).max(size_of::<u64>());
     // an input may come in several pieces, each rounded up
     let head = Table::head_bytes(ROWS_MAX) + ROWS_MAX * ALIGNMENT;
     head + entries.next_multiple_of(ALIGNMENT) + mask_bytes(description.worlds)
+}
+
+fn seed_bytes(seed: &[u64]) -> usize {
+    size_of_val(seed).next_multiple_of(ALIGNMENT)
 }
 
 fn mask_bytes(worlds: usize) -> usize {

@@ -81,8 +81,9 @@ pub trait Backend: Send {
         values: Values<'_>,
         mask: Option<&[bool]>,
     );
-    /// Back to the start, in the worlds of the mask (none = all).
-    fn reset(&mut self, mask: Option<&[bool]>);
+    /// Back to the start, in the worlds of the mask (none = all): of their next episode, or of the first one of new seeds, one
+    /// for all or one a world. What is drawn is [`crate::start::StartDraw`]'s.
+    fn reset(&mut self, mask: Option<&[bool]>, seeds: Option<&[u64]>);
     /// Runs `substeps` substeps (none = evaluates only), then writes every field of the layout
     /// into the arena, 8-byte words. No allocation, no error.
     fn run(&mut self, substeps: usize, arena: &mut [u64]);

@@ -5,6 +5,7 @@
 mod chunk;
 mod contacts;
 mod dispatch;
+mod reset;
 mod transfer;
 mod trouble;
 
@@ -106,9 +107,9 @@ impl<F: Lane> Backend for Cpu<F> {
         }
     }
 
-    fn reset(&mut self, mask: Option<&[bool]>) {
+    fn reset(&mut self, mask: Option<&[bool]>, seeds: Option<&[u64]>) {
         for chunk in &mut self.chunks {
-            chunk.reset(&self.job, mask);
+            chunk.reset(&self.job, mask, seeds);
         }
     }
 
