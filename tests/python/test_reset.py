@@ -128,6 +128,9 @@ def test_limits_clamp_and_mimic_joints_follow(lesson):
 
 
 def test_a_floating_robot_is_moved_by_body_q(pendulum_urdf):
+    mass = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+    text = pendulum_urdf.read_text()
+    pendulum_urdf.write_text(text.replace('<link name="base"/>', f'<link name="base">{mass}</link>'))
     scene = tl.Scene()
     scene.add_urdf(pendulum_urdf, name="dog", floating=True, pos=(0, 0, 5))
     scene.randomize(body_q={"dog": {"z": tl.Uniform(1, 1), "roll": tl.Uniform(0.2, 0.2)}})

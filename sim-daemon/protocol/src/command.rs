@@ -138,8 +138,7 @@ impl<'a> Call<'a> {
         let (table, data) = words.split_at_mut(head / 8);
         let (table, _) = table.as_chunks_mut();
         let mut offset = 0;
-        let mut rows = table.iter_mut();
-        for (row, array) in rows.by_ref().zip(self.arrays) {
+        for (row, array) in table.iter_mut().zip(self.arrays) {
             let (columns, bytes) = (&array.columns, padded(array, real));
             encode_row(
                 row,
@@ -156,13 +155,16 @@ impl<'a> Call<'a> {
             );
             offset += bytes;
         }
-        if let (Some(seed), Some(row)) = (self.seed, rows.next()) {
-            encode_row(row, SEED, Dtype::U64, &[seed.len()], 0, head + offset);
+        let mut row = self.arrays.len();
+        if let Some(seed) = self.seed {
+            let shape = &[seed.len()];
+            encode_row(&mut table[row], SEED, Dtype::U64, shape, 0, head + offset);
             data[offset / 8..][..seed.len()].copy_from_slice(seed);
-            offset += seed_bytes(seed);
+            (row, offset) = (row + 1, offset + seed_bytes(seed));
         }
-        if let (Some(mask), Some(row)) = (self.mask, rows.next()) {
-            encode_row(row, MASK, Dtype::U8, &[worlds], 0, head + offset);
+        if let Some(mask) = self.mask {
+            let shape = &[worlds];
+            encode_row(&mut table[row], MASK, Dtype::U8, shape, 0, head + offset);
             let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data[offset / 8..]);
             bytes
                 .iter_mut()
