@@ -17,7 +17,7 @@ pub enum Stream {
     StartVelocity = 1,
 }
 
-/// The numbers of one stream in one episode of one world. Everyone has an index.
+/// The numbers of one stream in one episode of one world, each with its index.
 #[derive(Clone, Copy, Debug)]
 pub struct Draw {
     key: [u32; 2],
