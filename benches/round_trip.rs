@@ -39,7 +39,7 @@ fn main() {
 
     let (mut here, mut there, mut busy) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..ROUNDS {
-        run.sim.reset(None).expect("no mask, no error");
+        run.sim.reset(None, None).expect("no mask, no error");
         measure(&mut here, &rows, |row| {
             run.sim
                 .command(field, 0..9, Values::F32(row))
@@ -47,7 +47,7 @@ fn main() {
             run.step();
         });
         client
-            .reset(None, &mut keep_waiting())
+            .reset(None, None, &mut keep_waiting())
             .expect("the daemon answers");
         measure(&mut there, &rows, |row| {
             let frame = step(&client, row);

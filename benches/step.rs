@@ -140,7 +140,9 @@ fn steps_per_s(
         let mut frames = 0;
         // whole demos from their start, again and again
         while frames == 0 || start.elapsed() < round {
-            run.sim.reset(None).expect("a reset without a mask fits");
+            run.sim
+                .reset(None, None)
+                .expect("a reset without a mask fits");
             for (field, row) in &commands {
                 run.command(*field, row);
                 run.step();

@@ -5,7 +5,7 @@ mod common;
 use common::shapes::shapes;
 use common::{Demo, Run, command, lesson_with_table};
 use sim_core::batch::Field;
-use sim_core::model::Cone;
+use sim_core::model::{Cone, Distribution};
 use sim_engine::backend::Values;
 use sim_engine::simulation::{Options, Precision};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -76,4 +76,26 @@ fn command_step_and_forward_take_no_memory() {
             );
         }
     }
+}
+
+#[test]
+fn a_reset_takes_no_memory_even_where_it_draws() {
+    let mut scene = lesson_with_table(Demo::Target, true);
+    let offset = Distribution::Normal {
+        mean: 0.0,
+        std: 0.1,
+    };
+    for robot in &mut scene.robots {
+        for joint in robot.joints.iter_mut().filter(|j| j.mimic.is_none()) {
+            for dof in &mut joint.dofs {
+                (dof.offset_q, dof.offset_qd) = (Some(offset), Some(offset));
+            }
+        }
+    }
+    let mut run = Run::new(&scene.compile().unwrap(), Options::default());
+    let count = taken(|| {
+        run.sim.reset(None, None).unwrap();
+        run.sim.reset(Some(&[true]), Some(&[1])).unwrap();
+    });
+    assert_eq!(count, 0);
 }

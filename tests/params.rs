@@ -308,7 +308,7 @@ fn a_reset_keeps_parameters_and_takes_loads_away() {
             .unwrap();
     }
     let mask = [true, false, true];
-    run.sim.reset(Some(&mask)).unwrap();
+    run.sim.reset(Some(&mask), None).unwrap();
     for param in Param::ALL {
         let columns = param.columns(&model);
         let mut expected = own(&model, param, &[4, 5, 6]);

@@ -66,7 +66,7 @@ fn run(
                 .unwrap();
             if heals && frame == FRAMES - 2 {
                 let mask: Vec<bool> = (0..WORLDS).map(|world| sick.contains(&world)).collect();
-                run.sim.reset(Some(&mask)).unwrap();
+                run.sim.reset(Some(&mask), None).unwrap();
                 run.sim
                     .command(Field::JointF, 0..dofs, Values::F64(&rows))
                     .unwrap();

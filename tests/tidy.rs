@@ -15,7 +15,15 @@ const ORDER: [(&str, &[&str]); 2] = [
     ),
     (
         "sim-core/engine/src",
-        &["backend", "snapshot", "simulation", "dynamics"],
+        &[
+            "random",
+            "start",
+            "backend",
+            "snapshot",
+            "simulation",
+            "params",
+            "dynamics",
+        ],
     ),
 ];
 

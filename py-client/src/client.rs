@@ -8,7 +8,7 @@ use sim_protocol::{AttachOptions, Client as Connection, Description, Hook, Proto
 
 use crate::errors::{protocol, raise};
 use crate::frame::Frame;
-use crate::input::{Axis, Inputs, Mask};
+use crate::input::{Axis, Inputs, Mask, Seed};
 
 /// A connection to a daemon. `tightloop.Sim` wraps it, and documents its methods.
 #[pyclass(frozen, module = "tightloop._core")]
@@ -76,11 +76,17 @@ impl Client {
         frame(py, |hook| connection.write(&commands, mask, hook))
     }
 
-    fn reset(&self, py: Python<'_>, mask: Option<&Bound<'_, PyAny>>) -> PyResult<Frame> {
+    fn reset(
+        &self,
+        py: Python<'_>,
+        mask: Option<&Bound<'_, PyAny>>,
+        seed: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Frame> {
         let connection = self.connection(py)?;
         let mask = Mask::new(mask, self.description.worlds)?;
-        let mask = mask.as_slice()?;
-        frame(py, |hook| connection.reset(mask, hook))
+        let seed = Seed::new(seed, self.description.worlds)?;
+        let (mask, seed) = (mask.as_slice()?, seed.as_slice()?);
+        frame(py, |hook| connection.reset(mask, seed, hook))
     }
 
     fn forward(&self, py: Python<'_>) -> PyResult<Frame> {

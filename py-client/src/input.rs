@@ -192,3 +192,26 @@ impl<'py> Mask<'py> {
         Ok(self.0.as_ref().map(|mask| mask.as_slice()).transpose()?)
     }
 }
+
+/// Seeds of a reset: one for all worlds, or one a world.
+pub(crate) struct Seed<'py>(Option<PyReadonlyArrayDyn<'py, u64>>);
+
+impl<'py> Seed<'py> {
+    pub(crate) fn new(seed: Option<&Bound<'py, PyAny>>, worlds: usize) -> PyResult<Seed<'py>> {
+        let Some(seed) = seed else {
+            return Ok(Seed(None));
+        };
+        let checked = seed
+            .py()
+            .import("tightloop.inputs")?
+            .getattr("as_seed")?
+            .call1((seed, worlds))?;
+        Ok(Seed(Some(
+            checked.cast_into::<PyArrayDyn<u64>>()?.try_readonly()?,
+        )))
+    }
+
+    pub(crate) fn as_slice(&self) -> PyResult<Option<&[u64]>> {
+        Ok(self.0.as_ref().map(|seed| seed.as_slice()).transpose()?)
+    }
+}

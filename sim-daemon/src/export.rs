@@ -266,7 +266,7 @@ pub(crate) fn apply(
                 }
             }
         }
-        Op::Reset => simulation.reset(masked)?,
+        Op::Reset => simulation.reset(masked, seeds(inbox)?)?,
         Op::Forward => {}
         Op::Snapshot => snapshot::save(simulation, inbox)?,
         Op::Restore => snapshot::restore(simulation, inbox, masked)?,
@@ -293,6 +293,23 @@ impl Target {
             .map(Target::Param)
             .or_else(|| Field::named(name).map(Target::Field))
     }
+}
+
+/// The seeds of a reset, which takes no other array.
+fn seeds(inbox: &Inbox) -> Result<Option<&[u64]>, Refusal> {
+    let mut seeds = None;
+    for row in inbox.arrays() {
+        if row.name != "seed" {
+            let reason = format!("a reset takes no `{}`; it takes `seed`", row.name);
+            return Err(refusal(RefusalKind::Field, reason));
+        }
+        let Some(Numbers::U64(values)) = inbox.numbers(row) else {
+            let reason = "`seed`: entries must be uint64".to_owned();
+            return Err(refusal(RefusalKind::Shape, reason));
+        };
+        seeds = Some(values);
+    }
+    Ok(seeds)
 }
 
 /// An array of a command as the simulation takes it.
@@ -347,7 +364,8 @@ impl From<BackendError> for Refusal {
             BackendError::NotFinite { .. } => RefusalKind::NotFinite,
             BackendError::Columns { .. }
             | BackendError::Length { .. }
-            | BackendError::Mask { .. } => RefusalKind::Shape,
+            | BackendError::Mask { .. }
+            | BackendError::Seeds { .. } => RefusalKind::Shape,
             BackendError::Group { .. } | BackendError::Constant { .. } => RefusalKind::Field,
             _ => RefusalKind::Backend,
         };

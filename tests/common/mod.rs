@@ -1,6 +1,7 @@
 //! What several tests share: the lesson's scene, and frames of a simulation as numbers.
 #![allow(dead_code)] // each test binary uses its part
 
+pub mod drawn;
 #[path = "../../examples/lesson/mod.rs"]
 mod lesson_scene;
 pub mod shapes;

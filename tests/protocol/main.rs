@@ -31,7 +31,7 @@ fn step(client: &Client, commands: &[Command<'_>]) -> Result<Frame, ProtocolErro
 }
 
 fn reset(client: &Client) -> Frame {
-    client.reset(None, &mut keep_waiting()).unwrap()
+    client.reset(None, None, &mut keep_waiting()).unwrap()
 }
 
 fn floats(frame: &Frame, field: &str) -> Vec<f32> {
@@ -185,10 +185,12 @@ fn frames_over_the_wire_equal_frames_in_process_bit_for_bit() {
             "after step",
         );
     }
-    simulation.reset(Some(&mask)).unwrap();
+    simulation.reset(Some(&mask), None).unwrap();
     simulation.forward(&mut arena);
     same(
-        &client.reset(Some(&mask), &mut keep_waiting()).unwrap(),
+        &client
+            .reset(Some(&mask), None, &mut keep_waiting())
+            .unwrap(),
         &simulation,
         &arena,
         "after reset",

@@ -52,7 +52,7 @@ fn wrong_shapes_fields_and_masks_are_refused_with_what_is_right() {
     let daemon = Daemon::start("shapes", &["--worlds", "2"]);
     let client = daemon.attach();
     let wait = &mut keep_waiting();
-    let cases: [(Result<Frame, ProtocolError>, &str); 7] = [
+    let cases: [(Result<Frame, ProtocolError>, &str); 8] = [
         (
             step(&client, &[command("joint_f", &[0.0; 9])]),
             "2 worlds x 9 columns = 18",
@@ -90,7 +90,14 @@ fn wrong_shapes_fields_and_masks_are_refused_with_what_is_right() {
             ),
             "at most once",
         ),
-        (client.reset(Some(&[true]), wait), "expected (2,), got (1,)"),
+        (
+            client.reset(Some(&[true]), None, wait),
+            "expected (2,), got (1,)",
+        ),
+        (
+            client.reset(None, Some(&[1, 2, 3]), wait),
+            "expected (1,) or (2,), got (3,)",
+        ),
     ];
     for (result, words) in cases {
         let error = result.unwrap_err().to_string();

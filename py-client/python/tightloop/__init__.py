@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tightloop._core import Frame, __version__
     from tightloop.body import Body
+    from tightloop.distributions import Normal, Uniform
     from tightloop.dynamics import Dynamics
     from tightloop.errors import (
         ArgumentError,
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "tightloop._core": ("Frame", "__version__"),
     "tightloop.body": ("Body",),
+    "tightloop.distributions": ("Normal", "Uniform"),
     "tightloop.dynamics": ("Dynamics",),
     "tightloop.errors": (
         "ArgumentError",
@@ -92,6 +94,7 @@ __all__ = [
     "LeaseHeld",
     "LeaseLost",
     "Link",
+    "Normal",
     "ProtocolMismatch",
     "ResourceError",
     "Robot",
@@ -105,6 +108,7 @@ __all__ = [
     "Surface",
     "TightloopError",
     "TransportError",
+    "Uniform",
     "UnknownDaemon",
     "UnknownField",
     "UrdfError",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,30 @@ def as_mask(value: Any, worlds: int) -> NDArray[np.bool_]:
     if given.shape != (worlds,):
         raise CommandRefused(f"mask: expected shape {(worlds,)}; got {given.shape}")
     return np.ascontiguousarray(given)
+
+
+def as_seed(value: Any, worlds: int) -> NDArray[np.uint64]:
+    """One seed for all worlds, or one a world, contiguous, shape ``(1,)`` or ``(worlds,)``.
+
+    Raises:
+        CommandRefused: Another length, or something else than whole numbers from 0 to 2**64 - 1.
+    """
+    alone = isinstance(value, str | bytes) or np.ndim(value) == 0
+    entries: list[Any] = [value] if alone else list(value)
+    if not alone and len(entries) != worlds:
+        raise CommandRefused(f"seed: {len(entries)} seeds for {worlds} worlds; give one, or one a world")
+    seeds = []
+    for world, entry in enumerate(entries):
+        of = "" if alone else f" of world {world}"
+        try:
+            # a bool is an index too, and never meant as a seed
+            seed = None if isinstance(entry, bool | np.bool_) else operator.index(entry)
+        except TypeError:
+            seed = None
+        if seed is None or not 0 <= seed < 2**64:
+            raise CommandRefused(f"seed{of} is {entry!r}; give a whole number from 0 to 2**64 - 1")
+        seeds.append(seed)
+    return np.array(seeds, dtype=np.uint64)
 
 
 def _numpy(what: str, value: Any) -> NDArray[Any]:

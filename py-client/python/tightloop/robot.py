@@ -195,6 +195,17 @@ class Robot(Placed):
         return list(self._summary["joint_names"])
 
     @property
+    def joint_types(self) -> dict[str, str]:
+        """What each moving joint is, in URDF's words: ``revolute``, ``continuous``, ``prismatic``, …"""
+        return dict(zip(self._summary["joint_names"], self._summary["joint_types"], strict=True))
+
+    @property
+    def joint_leaders(self) -> dict[str, str]:
+        """The joint that each mimic joint follows."""
+        joints = zip(self._summary["joint_names"], self._summary["joint_mimic"], strict=True)
+        return {joint: mimic["joint"] for joint, mimic in joints if mimic is not None}
+
+    @property
     def dof_names(self) -> list[str]:
         """Dofs: the joint, and for one with several ``joint.part``."""
         return list(self._summary["dof_names"])

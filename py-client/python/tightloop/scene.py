@@ -17,8 +17,8 @@ from tightloop import _core, checks
 from tightloop.body import Body
 from tightloop.checks import Triple, Vector
 from tightloop.errors import SceneError
+from tightloop.randomized import Randomized
 from tightloop.robot import PER_DOF, Robot
-from tightloop.shaped import Shaped
 from tightloop.shapes import ORIGIN, UPRIGHT, Shape, Surface, checked_surface
 
 if TYPE_CHECKING:
@@ -39,8 +39,8 @@ class Solver:
     impratio: float = 1000.0
 
 
-class Scene(Shaped):
-    """Robots, bodies and shapes, and how time advances.
+class Scene(Randomized):
+    """Robots, bodies and shapes, how time advances, and what differs from world to world.
 
     In the arrays of a frame robots come first, then bodies, each in the order they were added.
 
@@ -325,6 +325,7 @@ class Scene(Shaped):
             getattr(scene, f"add_{shape.pop('type')}")(**shape)
         for pair in data.get("contact_filters", ()):
             scene.filter_contacts(*pair)
+        scene._load_offsets(data.get("randomize", {}))
         return scene
 
     def to_toml(self) -> str:
@@ -345,6 +346,7 @@ class Scene(Shaped):
                 "rows_max": self.rows_max,
                 "contact_filters": self.filters,
                 "solver": asdict(self._solver),
+                "randomize": self._offsets,
                 "shape": [shape.table() for shape in self.shapes.values()],
                 "robot": [robot.table() for robot in self.robots.values()],
                 "body": [body.table() for body in self.bodies.values()],

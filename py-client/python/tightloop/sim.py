@@ -110,18 +110,29 @@ class Sim:
         """
         return self._client.step(joint_f, joint_target_q, joint_target_qd)
 
-    def reset(self, *, mask: ArrayLike | None = None) -> Frame:
-        """Put worlds back to the scene's start: state, ``time``, ``joint_f`` = 0, and targets.
+    def reset(
+        self,
+        *,
+        mask: ArrayLike | None = None,
+        seed: int | Sequence[int] | NDArray[np.integer[Any]] | None = None,
+    ) -> Frame:
+        """Put worlds back to the scene's start: state, ``time``, ``joint_f`` = 0, and targets, which stay the scene's.
 
         It frees a world that was frozen when it was no longer finite (bit 1 of ``status``).
 
+        What `Scene.randomize` has distributions of is drawn anew. A draw depends on the world's number, its seed and
+        its episode, which counts its resets since it got the seed, and on nothing else: neither on the number of worlds
+        nor on precision or threads. A launch draws episode 0 of seed 0.
+
         Args:
             mask: Which worlds, bool, shape ``(worlds,)``; all if left out.
+            seed: Seed of these worlds from now on, beginning with its episode 0: an int from 0 to 2**64 - 1, which
+                gives each world other numbers, or a sequence with one a world. Their next episode if left out.
 
         Returns:
             A frame evaluated at that state. Raises as `step` does.
         """
-        return self._client.reset(mask)
+        return self._client.reset(mask, seed)
 
     def write(
         self,

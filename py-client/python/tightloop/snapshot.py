@@ -21,7 +21,7 @@ from tightloop.errors import SnapshotError
 _HEAD = struct.Struct("<8sIIQQII")
 _MAGIC, _VERSION = b"tlsnap\r\n", 1
 # Where what the checksum covers begins; bytes of a world's counters, which come before its numbers
-_COVERED, _COUNTERS = 16, 16
+_COVERED, _COUNTERS = 16, 28
 _SHARED_MEMORY = Path("/dev/shm")
 
 

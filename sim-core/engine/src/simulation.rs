@@ -132,7 +132,7 @@ impl Simulation {
         // state and commands of a world, its counters; see backend/cpu/chunk.rs
         worlds
             .saturating_mul(
-                (5 * model.dofs() + 2 * model.coords() + m.varying.len()) as u64 * real + 16,
+                (5 * model.dofs() + 2 * model.coords() + m.varying.len()) as u64 * real + 28,
             )
             .saturating_add(scratch)
     }
@@ -174,13 +174,29 @@ impl Simulation {
         Ok(())
     }
 
-    /// Back to the start state, `joint_f` 0 and targets as in the scene, in the worlds of the mask.
+    /// Back to the start state, `joint_f` 0 and targets as in the scene, in the worlds of the mask (none = all).
+    ///
+    /// What of the state the scene has distributions of is drawn from (seed, world, episode). A reset starts the next episode
+    /// of a world; with a seed, one for all or one a world, the first one of that seed. Seed and episode are 0 at first.
     ///
     /// # Errors
-    /// A mask of the wrong length.
-    pub fn reset(&mut self, mask: Option<&[bool]>) -> Result<(), BackendError> {
+    /// A mask or seeds of the wrong length; no world is touched then.
+    pub fn reset(
+        &mut self,
+        mask: Option<&[bool]>,
+        seed: Option<&[u64]>,
+    ) -> Result<(), BackendError> {
         self.check_mask(mask)?;
-        self.backend.reset(mask);
+        if let Some(seed) = seed
+            && seed.len() != 1
+            && seed.len() != self.worlds
+        {
+            return Err(BackendError::Seeds {
+                got: seed.len(),
+                worlds: self.worlds,
+            });
+        }
+        self.backend.reset(mask, seed);
         Ok(())
     }
 

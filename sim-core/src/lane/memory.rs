@@ -208,10 +208,7 @@ impl<F: Lane> Cx for Cpu<'_, F> {
         );
         let first = t.base + row * t.stride + k;
         // one check of the bounds instead of N
-        let cells = &mut self.memory[first..first + N];
-        for i in 0..N {
-            cells[i] = numbers[i];
-        }
+        self.memory[first..first + N].copy_from_slice(&numbers);
     }
     #[inline(always)]
     fn init(&mut self, t: Table, row: Fresh<F>, k: usize, x: F) {

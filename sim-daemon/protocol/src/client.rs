@@ -256,28 +256,27 @@ impl Client {
     /// been made. [`ProtocolError::LeaseHeld`], [`ProtocolError::LeaseLost`], [`ProtocolError::DaemonLost`],
     /// [`ProtocolError::DaemonRestarted`].
     pub fn step(&self, commands: &[Command<'_>], hook: Hook<'_>) -> Result<Frame, ProtocolError> {
-        let arrays = commands;
-        self.run(
-            Call {
-                arrays,
-                ..call(Op::Step)
-            },
-            hook,
-        )
+        self.run(&Call::new(Op::Step, commands, None), hook)
     }
 
     /// Puts the worlds under the mask (all without one) back to the start and returns the frame there.
     ///
+    /// What of the state the scene has distributions of is drawn from (seed, world, episode). A reset starts the next episode
+    /// of a world; with a seed, one for all or one a world, the first one of that seed. Seed and episode are 0 at first.
+    ///
     /// # Errors
     /// As [`Client::step`].
-    pub fn reset(&self, mask: Option<&[bool]>, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
-        self.run(
-            Call {
-                mask,
-                ..call(Op::Reset)
-            },
-            hook,
-        )
+    pub fn reset(
+        &self,
+        mask: Option<&[bool]>,
+        seed: Option<&[u64]>,
+        hook: Hook<'_>,
+    ) -> Result<Frame, ProtocolError> {
+        let call = Call {
+            seed,
+            ..Call::new(Op::Reset, &[], mask)
+        };
+        self.run(&call, hook)
     }
 
     /// Sets the state of the worlds under the mask (all without one) and returns the frame evaluated there.
@@ -290,12 +289,7 @@ impl Client {
         mask: Option<&[bool]>,
         hook: Hook<'_>,
     ) -> Result<Frame, ProtocolError> {
-        let write = Call {
-            arrays,
-            mask,
-            ..call(Op::Write)
-        };
-        self.run(write, hook)
+        self.run(&Call::new(Op::Write, arrays, mask), hook)
     }
 
     /// Evaluates the fields at the present state without stepping.
@@ -303,7 +297,7 @@ impl Client {
     /// # Errors
     /// As [`Client::step`].
     pub fn forward(&self, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
-        self.run(call(Op::Forward), hook)
+        self.run(&Call::new(Op::Forward, &[], None), hook)
     }
 
     /// Lets the daemon write all worlds into a file, and evaluates the fields. What was there before is replaced as a whole
@@ -312,14 +306,11 @@ impl Client {
     /// # Errors
     /// As [`Client::step`]; [`ProtocolError::CommandRefused`] where the daemon cannot write `path`, which must be absolute.
     pub fn snapshot(&self, path: &str, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
-        let path = Some(path);
-        self.run(
-            Call {
-                path,
-                ..call(Op::Snapshot)
-            },
-            hook,
-        )
+        let call = Call {
+            path: Some(path),
+            ..Call::new(Op::Snapshot, &[], None)
+        };
+        self.run(&call, hook)
     }
 
     /// Sets the worlds under the mask (all without one) to those of a snapshot, counters and commands included, or all of
@@ -335,23 +326,22 @@ impl Client {
         from_world: Option<u64>,
         hook: Hook<'_>,
     ) -> Result<Frame, ProtocolError> {
-        let restore = Call {
-            mask,
+        let call = Call {
             path: Some(path),
             from_world,
-            ..call(Op::Restore)
+            ..Call::new(Op::Restore, &[], mask)
         };
-        self.run(restore, hook)
+        self.run(&call, hook)
     }
 
-    fn run(&self, call: Call<'_>, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
+    fn run(&self, call: &Call<'_>, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
         self.check_process()?;
         let mut held = lock(&self.controller);
         let controller = match &mut *held {
             Some(controller) => controller,
             empty => empty.insert(self.take_lease(hook)?),
         };
-        let result = controller.run(&call, hook);
+        let result = controller.run(call, hook);
         // a lost lease can be asked for again; a lost daemon cannot come back
         if matches!(result, Err(ProtocolError::LeaseLost { .. })) {
             held.take();
@@ -436,17 +426,6 @@ impl Client {
             std::thread::sleep(Duration::from_millis(1));
         }
         Ok(())
-    }
-}
-
-/// A call with nothing in it.
-fn call<'a>(op: Op) -> Call<'a> {
-    Call {
-        op,
-        arrays: &[],
-        mask: None,
-        path: None,
-        from_world: None,
     }
 }
 

@@ -12,6 +12,8 @@ pub(crate) const PATH: &str = "path";
 pub(crate) const FROM_WORLD: &str = "from_world";
 /// Longest path [bytes], as Linux has it.
 pub(crate) const PATH_MAX: usize = 4096;
+/// Name of the seeds in a reset.
+const SEED: &str = "seed";
 
 /// One call of a client, as it came.
 pub(crate) struct Call<'a> {
@@ -20,9 +22,23 @@ pub(crate) struct Call<'a> {
     pub(crate) mask: Option<&'a [bool]>,
     pub(crate) path: Option<&'a str>,
     pub(crate) from_world: Option<u64>,
+    /// One for all worlds, or one a world.
+    pub(crate) seed: Option<&'a [u64]>,
 }
 
-impl Call<'_> {
+impl<'a> Call<'a> {
+    /// A call of arrays and a mask alone.
+    pub(crate) fn new(op: Op, arrays: &'a [Command<'a>], mask: Option<&'a [bool]>) -> Call<'a> {
+        Call {
+            op,
+            arrays,
+            mask,
+            path: None,
+            from_world: None,
+            seed: None,
+        }
+    }
+
     /// Finds what the daemon would refuse anyway, with the names at hand.
     pub(crate) fn check(&self, description: &Description) -> Result<(), ProtocolError> {
         let (worlds, arrays) = (description.worlds, self.arrays);
@@ -89,6 +105,16 @@ impl Call<'_> {
                 ));
             }
         }
+        if let Some(seed) = self.seed
+            && seed.len() != 1
+            && seed.len() != worlds
+        {
+            return Err(ProtocolError::Shape {
+                field: SEED.to_owned(),
+                expected: format!("(1,) or ({worlds},)"),
+                got: format!("({},)", seed.len()),
+            });
+        }
         if let Some(mask) = self.mask
             && mask.len() != worlds
         {
@@ -111,6 +137,7 @@ impl Call<'_> {
     /// Rows of the field table.
     pub(crate) fn rows(&self) -> usize {
         let others = [
+            self.seed.is_some(),
             self.mask.is_some(),
             self.path.is_some(),
             self.from_world.is_some(),
@@ -124,12 +151,13 @@ impl Call<'_> {
             .arrays
             .iter()
             .map(|array| padded(array, description.real()));
+        let seed = self.seed.map_or(0, seed_bytes);
         let mask = self.mask.map_or(0, |_| mask_bytes(description.worlds));
         let path = self
             .path
             .map_or(0, |path| path.len().next_multiple_of(ALIGNMENT));
         let from_world = self.from_world.map_or(0, |_| ALIGNMENT);
-        Table::head_bytes(self.rows()) + arrays.sum::<usize>() + mask + path + from_world
+        Table::head_bytes(self.rows()) + arrays.sum::<usize>() + seed + mask + path + from_world
     }
 
     /// Writes field table and arrays; of `words`, every word that means something.
@@ -164,6 +192,9 @@ impl Call<'_> {
             offset += bytes.next_multiple_of(ALIGNMENT);
             first..first + bytes / 8
         };
+        if let Some(seed) = self.seed {
+            data[bytes_of(SEED, Dtype::U64, seed.len())].copy_from_slice(seed);
+        }
         if let Some(mask) = self.mask {
             let words = &mut data[bytes_of(MASK, Dtype::U8, worlds)];
             let bytes: &mut [u8] = bytemuck::cast_slice_mut(words);
@@ -187,15 +218,20 @@ fn padded(array: &Command<'_>, real: Dtype) -> usize {
     (array.values.len() * real.size()).next_multiple_of(ALIGNMENT)
 }
 
-/// Bytes that the largest command of a run takes: every input of a step or of a write, a mask, and what else a restore has.
+/// Bytes that the largest command of a run takes: every input of a step or of a write, or seeds, a mask, and what else a
+/// restore has.
 pub(crate) fn command_bytes(description: &Description) -> usize {
     let columns = |inputs: &[InputInfo]| inputs.iter().map(|input| input.columns).sum::<usize>();
     let columns = columns(&description.commands).max(columns(&description.writes));
-    let entries = description.worlds * columns * description.real().size();
+    let entries = description.worlds * (columns * description.real().size()).max(size_of::<u64>());
     // an input may come in several pieces, each rounded up
     let head = Table::head_bytes(ROWS_MAX) + ROWS_MAX * ALIGNMENT;
     let restore = PATH_MAX + ALIGNMENT;
     head + entries.next_multiple_of(ALIGNMENT) + mask_bytes(description.worlds) + restore
+}
+
+fn seed_bytes(seed: &[u64]) -> usize {
+    size_of_val(seed).next_multiple_of(ALIGNMENT)
 }
 
 fn mask_bytes(worlds: usize) -> usize {

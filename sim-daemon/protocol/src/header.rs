@@ -81,7 +81,7 @@ const _: () = assert!(size_of::<CommandHeader>() == 40 && align_of::<CommandHead
 pub enum Op {
     /// Set the given inputs, advance every world by one control frame.
     Step = 1,
-    /// Put the worlds under the mask back to the start.
+    /// Put the worlds under the mask back to the start, of their next episode or, with a `seed`, of that seed's first.
     Reset = 2,
     /// Set the state of the worlds under the mask, evaluate the fields there.
     Write = 3,

@@ -5,6 +5,7 @@
 mod bodies;
 mod number;
 pub(crate) mod paths;
+mod randomize;
 mod robots;
 mod shapes;
 mod summary;
@@ -18,6 +19,7 @@ use sim_core::model::{Cone, Description, ModelError, Pose, Solver};
 
 pub use bodies::BodyTable;
 pub use number::{Number, PerDof};
+pub use randomize::{DistributionTable, RandomizeTable};
 pub use robots::{ModeName, RobotTable};
 pub use shapes::{ShapeName, ShapeTable};
 pub use sim_core::batch::Field;
@@ -64,6 +66,14 @@ pub enum ConfigError {
         /// What is wrong, and the cure.
         reason: String,
     },
+    /// A distribution of the start state that nothing can have.
+    #[error("{culprit}: {problem}")]
+    Randomize {
+        /// The entry.
+        culprit: String,
+        /// What is wrong, and the cure.
+        problem: String,
+    },
     /// A robot or value that physics cannot use.
     #[error(transparent)]
     Model(#[from] ModelError),
@@ -95,6 +105,9 @@ pub struct SceneFile {
     /// Options of the constraint solver.
     #[serde(default)]
     pub solver: SolverTable,
+    /// What a reset draws of the start state.
+    #[serde(default, skip_serializing_if = "RandomizeTable::is_empty")]
+    pub randomize: RandomizeTable,
     /// Shapes: static ones, and those of bodies and links.
     #[serde(default, rename = "shape", skip_serializing_if = "Vec::is_empty")]
     pub shapes: Vec<ShapeTable>,
@@ -282,6 +295,7 @@ impl SceneFile {
         for table in &self.bodies {
             description.add_body(table.body(&self.shapes, base_dir)?)?;
         }
+        self.randomize.write(&mut description)?;
         description.validate()?;
         Ok(description)
     }

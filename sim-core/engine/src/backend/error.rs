@@ -85,6 +85,14 @@ pub enum BackendError {
         /// Worlds of the simulation.
         worlds: usize,
     },
+    /// Seeds of the wrong number.
+    #[error("seed has {got} entries; give one, or one a world, of which there are {worlds}")]
+    Seeds {
+        /// Entries given.
+        got: usize,
+        /// Worlds of the simulation.
+        worlds: usize,
+    },
     /// A target of a free body.
     #[error(
         "`{field}` is {value} in world {world} for `{name}`, which is free and has no drive; nothing was written, send 0 and push it with joint_f"

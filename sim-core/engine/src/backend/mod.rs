@@ -8,8 +8,9 @@ pub use error::BackendError;
 use sim_core::batch::Field;
 use std::ops::Range;
 
-/// Bytes of a world's counters in a record: steps `u64`, status `u32`, contacts left out `u32`, little endian.
-pub const COUNTERS: usize = 16;
+/// Bytes of a world's counters in a record: steps `u64`, status `u32`, contacts left out `u32`, seed `u64`, episode `u32`,
+/// little endian.
+pub const COUNTERS: usize = 28;
 
 /// World-major numbers from outside, in either precision.
 #[derive(Clone, Copy, Debug)]
@@ -96,14 +97,15 @@ pub trait Backend: Send {
     fn write_params(&mut self, columns: Range<usize>, values: Values<'_>, mask: Option<&[bool]>);
     /// Reads columns of the parameters that vary, `(worlds, columns)`, world-major.
     fn params(&self, columns: Range<usize>, to: &mut [f64]);
-    /// Back to the start, in the worlds of the mask (none = all).
-    fn reset(&mut self, mask: Option<&[bool]>);
     /// Numbers of a world's state and commands: all that a step begins from.
     fn numbers(&self) -> usize;
     /// Writes a record a world, in order: [`COUNTERS`] bytes, then [`Backend::numbers`] numbers of the run's precision.
     fn save(&self, records: &mut [u8]);
     /// Sets the worlds of the mask (none = all) to their records, or all of them to that of `from_world`.
     fn restore(&mut self, records: &[u8], mask: Option<&[bool]>, from_world: Option<usize>);
+    /// Back to the start, in the worlds of the mask (none = all): of their next episode, or of the first one of new seeds, one
+    /// for all or one a world. What is drawn is [`crate::start::StartDraw`]'s.
+    fn reset(&mut self, mask: Option<&[bool]>, seeds: Option<&[u64]>);
     /// Runs `substeps` substeps (none = evaluates only), then writes every field of the layout
     /// into the arena, 8-byte words. No allocation, no error.
     fn run(&mut self, substeps: usize, arena: &mut [u64]);

@@ -20,6 +20,8 @@ pub enum Numbers<'a> {
     F32(&'a [f32]),
     /// Double precision.
     F64(&'a [f64]),
+    /// Whole numbers.
+    U64(&'a [u64]),
 }
 
 impl Inbox {
@@ -83,12 +85,13 @@ impl Inbox {
         self.table.rows().iter().filter(|row| row.name != MASK)
     }
 
-    /// The numbers of an array; `None` when it is not of floats.
+    /// The numbers of an array; `None` when it is not of one of those types.
     pub fn numbers(&self, row: &Row) -> Option<Numbers<'_>> {
         let bytes = self.bytes(row);
         match row.dtype {
             Dtype::F32 => Some(Numbers::F32(bytemuck::cast_slice(bytes))),
             Dtype::F64 => Some(Numbers::F64(bytemuck::cast_slice(bytes))),
+            Dtype::U64 => Some(Numbers::U64(bytemuck::cast_slice(bytes))),
             _ => None,
         }
     }

@@ -3,6 +3,7 @@
 use super::contacts;
 use super::transfer::{self, Arena};
 use crate::backend::Values;
+use crate::start::StartDraw;
 use sim_core::batch::{Block, Field, Layout};
 use sim_core::compiled::Stages;
 use sim_core::lane::{Lane, Real};
@@ -26,7 +27,9 @@ pub(super) struct Job<F: Lane> {
     /// Duration of a control frame [s].
     pub frame_s: f64,
     /// State and commands of a world after a reset, in the order of [`StateField`].
-    start: Vec<F::Real>,
+    pub start: Vec<F::Real>,
+    /// What is drawn over it.
+    pub draw: StartDraw,
 }
 
 /// State and commands of a block: groups of one number a dof, then positions and their rests, one a coordinate, then the
@@ -114,6 +117,7 @@ impl<F: Lane> Job<F> {
             layout,
             frame_s: model.substeps() as f64 * model.dt(),
             start: reset,
+            draw: StartDraw::new(model),
         }
     }
 }
@@ -159,6 +163,10 @@ pub(super) struct Chunk<F: Lane> {
     pub(super) status: Vec<u32>,
     /// Most contacts that did not fit in a substep of the last frame, or in the state that is shown.
     pub(super) left_out: Vec<u32>,
+    /// Seeds of what is drawn for each world.
+    pub(super) seeds: Vec<u64>,
+    /// Resets of each world since it got its seed.
+    pub(super) episodes: Vec<u32>,
     pub block: Block<F, F>,
     /// Scratch memory of the machine.
     pub memory: Vec<F>,
@@ -182,16 +190,15 @@ impl<F: Lane> Chunk<F> {
             steps: vec![0; worlds.len()],
             status: vec![0; worlds.len()],
             left_out: vec![0; worlds.len()],
+            seeds: vec![0; worlds.len()],
+            episodes: vec![0; worlds.len()],
             block: Block::new(&job.constants, F::default()),
             memory: vec![F::default(); job.constants.contacts.memory.len],
             staging: vec![F::default(); elements],
             lanes: vec![F::Real::default(); elements * F::WIDTH],
             worlds,
         };
-        // lanes past the last world run along from the same start
-        for lane in 0..blocks * F::WIDTH {
-            chunk.start_lane(job, lane, |_| true);
-        }
+        chunk.start(job);
         chunk
     }
 
@@ -199,32 +206,6 @@ impl<F: Lane> Chunk<F> {
     pub(super) fn place(&self, shape: Shape, world: usize, field: StateField, k: usize) -> usize {
         let (block, lane) = (world / F::WIDTH, world % F::WIDTH);
         (block * shape.total() + shape.start(field) + k) * F::WIDTH + lane
-    }
-
-    /// Puts the numbers of a world that are chosen to what they start from.
-    fn start_lane(&mut self, job: &Job<F>, world: usize, chosen: impl Fn(usize) -> bool) {
-        let first = self.place(Shape::of(&job.constants), world, StateField::Qd, 0);
-        for (k, &x) in job.start.iter().enumerate().filter(|(k, _)| chosen(*k)) {
-            self.state[first + k * F::WIDTH] = x;
-        }
-    }
-
-    /// Parameters stay as they are, but for loads.
-    fn reset_lane(&mut self, job: &Job<F>, world: usize) {
-        let params = Shape::of(&job.constants).start(StateField::Params);
-        let starts = job.constants.varying.starts();
-        self.start_lane(job, world, |k| k < params || starts[k - params].0.is_load());
-    }
-
-    pub fn reset(&mut self, job: &Job<F>, mask: Option<&[bool]>) {
-        for world in 0..self.worlds.len() {
-            if mask.is_none_or(|mask| mask[self.worlds.start + world]) {
-                self.reset_lane(job, world);
-                self.steps[world] = 0;
-                self.status[world] = 0;
-                self.left_out[world] = 0;
-            }
-        }
     }
 
     pub fn write(

@@ -6,6 +6,7 @@ mod chunk;
 mod contacts;
 mod dispatch;
 mod records;
+mod reset;
 mod transfer;
 mod trouble;
 
@@ -119,9 +120,9 @@ impl<F: Lane> Backend for Cpu<F> {
         }
     }
 
-    fn reset(&mut self, mask: Option<&[bool]>) {
+    fn reset(&mut self, mask: Option<&[bool]>, seeds: Option<&[u64]>) {
         for chunk in &mut self.chunks {
-            chunk.reset(&self.job, mask);
+            chunk.reset(&self.job, mask, seeds);
         }
     }
 

@@ -26,7 +26,9 @@ impl<F: Lane> Chunk<F> {
             let (counters, numbers) = record.split_at_mut(COUNTERS);
             counters[..8].copy_from_slice(&self.steps[world].to_le_bytes());
             counters[8..12].copy_from_slice(&self.status[world].to_le_bytes());
-            counters[12..].copy_from_slice(&self.left_out[world].to_le_bytes());
+            counters[12..16].copy_from_slice(&self.left_out[world].to_le_bytes());
+            counters[16..24].copy_from_slice(&self.seeds[world].to_le_bytes());
+            counters[24..].copy_from_slice(&self.episodes[world].to_le_bytes());
             let first = self.place(shape, world, StateField::Qd, 0);
             let state = self.state[first..].iter().step_by(F::WIDTH);
             let to = numbers.chunks_exact_mut(size_of::<F::Real>());
@@ -59,6 +61,8 @@ impl<F: Lane> Chunk<F> {
             self.steps[world] = u64::from_le_bytes(array::from_fn(|i| counters[i]));
             self.status[world] = u32::from_le_bytes(array::from_fn(|i| counters[8 + i]));
             self.left_out[world] = u32::from_le_bytes(array::from_fn(|i| counters[12 + i]));
+            self.seeds[world] = u64::from_le_bytes(array::from_fn(|i| counters[16 + i]));
+            self.episodes[world] = u32::from_le_bytes(array::from_fn(|i| counters[24 + i]));
             let first = self.place(shape, world, StateField::Qd, 0);
             let state = self.state[first..].iter_mut().step_by(F::WIDTH);
             for (x, from) in state.zip(numbers.chunks_exact(size_of::<F::Real>())) {

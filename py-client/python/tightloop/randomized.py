@@ -1,0 +1,169 @@
+"""What a scene has of randomness: the distributions that a reset draws from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from tightloop.distributions import Distribution, Normal, Uniform, from_table
+from tightloop.errors import SceneError
+from tightloop.robot import Robot
+from tightloop.shaped import Shaped
+
+_POSE = ("x", "y", "z", "roll", "pitch", "yaw")
+_VELOCITY = ("vx", "vy", "vz", "wx", "wy", "wz")
+
+Offsets = Mapping[str, Distribution]
+BodyOffsets = Mapping[str, Mapping[str, Distribution]]
+
+
+class Randomized(Shaped):
+    """The part of a scene that is about randomness."""
+
+    __slots__ = ("_offsets",)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._offsets: dict[str, dict[str, Any]] = {}
+
+    def randomize(
+        self,
+        *,
+        joint_q: Offsets | None = None,
+        joint_qd: Offsets | None = None,
+        body_q: BodyOffsets | None = None,
+        body_qd: BodyOffsets | None = None,
+    ) -> None:
+        """Draw the state that worlds start from, at the launch and at each `Sim.reset`, instead of giving all the same.
+
+        What is drawn is an offset from the scene's start. `Sim.reset` says what a draw depends on.
+
+        >>> scene.randomize(
+        ...     joint_q={"arm": tl.Uniform(-0.1, 0.1), "arm/fr3_joint4": tl.Normal(0.0, 0.02)},
+        ...     body_q={"cube": {"x": tl.Uniform(-0.05, 0.05), "yaw": tl.Uniform(-3.14, 3.14)}},
+        ... )
+
+        Args:
+            joint_q: `Uniform` or `Normal` offsets of joint positions [rad or m], by ``"robot/joint"``,
+                ``"robot/joint.part"`` where a joint has several dofs, or ``"robot"`` for all its joints; the more
+                special name holds, whichever came first. A joint with limits is clamped to them. A mimic joint follows
+                its leader, whose limits alone count. A ball joint turns by a rotation vector in the child's axes.
+            joint_qd: Joint velocities [rad/s or m/s], by the same names.
+            body_q: Poses of free bodies (``"cube"``), floating robots (``"dog"``) and floating joints
+                (``"robot/joint"``): ``x``, ``y``, ``z`` [m] along the world's axes; ``roll``, ``pitch``, ``yaw`` [rad]
+                about the world's fixed x, y, z axes in that order, through the frame's origin, after the start
+                orientation.
+            body_qd: Their velocities in world axes: ``vx``, ``vy``, ``vz`` [m/s] of the centre of mass (of all links
+                fixed to the body, as in the frame's ``joint_qd``), ``wx``, ``wy``, ``wz`` [rad/s].
+                A later call adds to an earlier one, and replaces what it names again.
+
+        Raises:
+            SceneError: A name that nothing in the scene has, or no distribution; the message names it. Nothing is
+                changed then.
+        """
+        given = {
+            "joint_q": self._joints("joint_q", joint_q),
+            "joint_qd": self._joints("joint_qd", joint_qd),
+            "body_q": self._bodies("body_q", body_q, _POSE),
+            "body_qd": self._bodies("body_qd", body_qd, _VELOCITY),
+        }
+        for field, tables in given.items():
+            if tables:
+                old = self._offsets.setdefault(field, {})
+                for name, table in tables.items():
+                    old[name] = old.get(name, {}) | table if field in ("body_q", "body_qd") else table
+
+    def _joints(self, field: str, offsets: Offsets | None) -> dict[str, Any]:
+        tables = {}
+        for name, distribution in _items(f"randomize: {field}", offsets):
+            what = f"randomize: {field} of {name!r}"
+            self._check_joint(what, name)
+            tables[name] = _table(what, distribution)
+        return tables
+
+    def _check_joint(self, what: str, name: str) -> None:
+        robot, _, joint = name.partition("/")
+        if robot in self.bodies:
+            raise SceneError(f"{what}: it is a body; give body_q or body_qd")
+        found = self._robot(what, robot)
+        kinds, leaders = found.joint_types, found.joint_leaders
+        own = [joint for joint, kind in kinds.items() if kind != "floating" and joint not in leaders]
+        if not joint:
+            if "/" in name or not own:
+                raise SceneError(f"{what}: it has no joints but floating and following ones")
+            return
+        parts = [dof for dof in found.dof_names if dof.rpartition(".")[0] in kinds]
+        owner = joint if joint in kinds else joint.rpartition(".")[0] if joint in parts else None
+        if owner is None:
+            raise SceneError(f"{what}: there is no joint {joint!r}; there are: {_some([*kinds])}")
+        if owner in leaders:
+            leader = leaders[owner]
+            raise SceneError(f"{what}: it follows `{leader}`; give `{robot}/{leader}` the distribution")
+        if owner not in own:
+            raise SceneError(f"{what}: it is a floating joint; give body_q or body_qd")
+
+    def _bodies(self, field: str, offsets: BodyOffsets | None, parts: tuple[str, ...]) -> dict[str, Any]:
+        tables = {}
+        for name, given in _items(f"randomize: {field}", offsets):
+            what = f"randomize: {field} of {name!r}"
+            self._check_body(what, name)
+            tables[name] = {}
+            for part, distribution in _items(what, given):
+                if part not in parts:
+                    raise SceneError(f"{what}: there is no part {part!r}; use {', '.join(parts)}")
+                tables[name][part] = _table(f"{what}, {part}", distribution)
+        return tables
+
+    def _check_body(self, what: str, name: str) -> None:
+        if name in self.bodies:
+            if self.bodies[name].fixed:
+                raise SceneError(f"{what}: it is fixed; make it with fixed=False, or leave it out")
+            return
+        robot, _, joint = name.partition("/")
+        kinds = self._robot(what, robot).joint_types
+        floating = [joint for joint, kind in kinds.items() if kind == "floating"]
+        if not floating:
+            raise SceneError(f"{what}: it does not move freely; add_urdf(floating=True) lets a robot float")
+        if joint not in floating and ("/" in name or len(floating) > 1):
+            names = [f"{robot}/{joint}" for joint in floating]
+            raise SceneError(f"{what}: name one of the floating joints: {_some(names)}")
+
+    def _robot(self, what: str, name: str) -> Robot:
+        if name not in self.robots:
+            known = _some([*self.robots, *self.bodies])
+            raise SceneError(f"{what}: there is no robot or body {name!r}; there are: {known}")
+        return self.robots[name]
+
+    def _load_offsets(self, tables: Mapping[str, Mapping[str, Any]]) -> None:
+        """Takes what a scene file has."""
+        fields: dict[str, Any] = {}
+        for field, named in tables.items():
+            if field in ("body_q", "body_qd"):
+                read = {
+                    name: {part: from_table(table) for part, table in parts.items()} for name, parts in named.items()
+                }
+            else:
+                read = {name: from_table(table) for name, table in named.items()}
+            fields[field] = read
+        self.randomize(**fields)
+
+
+def _items(what: str, given: Any) -> list[tuple[str, Any]]:
+    if given is None:
+        return []
+    if not isinstance(given, Mapping):
+        raise SceneError(f"{what} is {given!r}; give a dict of distributions by name")
+    for name in given:
+        if not isinstance(name, str):
+            raise SceneError(f"{what} has the key {name!r}; give names")
+    return list(given.items())
+
+
+def _table(what: str, distribution: Any) -> dict[str, list[float]]:
+    if not isinstance(distribution, Uniform | Normal):
+        raise SceneError(f"{what} is {distribution!r}; give a tightloop.Uniform or a tightloop.Normal")
+    return distribution.table()
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:20]) + (", …" if len(names) > 20 else "") if names else "none"

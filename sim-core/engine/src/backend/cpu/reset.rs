@@ -1,0 +1,71 @@
+//! Worlds go back to their start.
+
+use super::chunk::{Chunk, Job, Shape, StateField};
+use sim_core::lane::{Lane, Real};
+
+impl<F: Lane> Chunk<F> {
+    /// Puts every lane at its start; those past the last world run along from the scene's.
+    pub(super) fn start(&mut self, job: &Job<F>) {
+        let lanes = self.worlds.len().next_multiple_of(F::WIDTH);
+        for lane in 0..lanes {
+            self.start_lane(job, lane, |_| true);
+        }
+        for world in 0..self.worlds.len() {
+            self.draw_start(job, world);
+        }
+    }
+
+    /// Starts the next episode of the worlds of the mask, or the first one of their new seeds.
+    pub(super) fn reset(&mut self, job: &Job<F>, mask: Option<&[bool]>, seeds: Option<&[u64]>) {
+        for world in 0..self.worlds.len() {
+            let outside = self.worlds.start + world;
+            if mask.is_some_and(|mask| !mask[outside]) {
+                continue;
+            }
+            match seeds {
+                Some(seeds) => {
+                    self.seeds[world] = if let [seed] = seeds {
+                        *seed
+                    } else {
+                        seeds[outside]
+                    };
+                    self.episodes[world] = 0;
+                }
+                // after 2³² episodes the first comes again
+                None => self.episodes[world] = self.episodes[world].wrapping_add(1),
+            }
+            self.reset_lane(job, world);
+            self.draw_start(job, world);
+            self.steps[world] = 0;
+            self.status[world] = 0;
+            self.left_out[world] = 0;
+        }
+    }
+
+    /// State and commands of a lane as the scene starts them; parameters stay as they are, but for loads.
+    fn reset_lane(&mut self, job: &Job<F>, lane: usize) {
+        let params = Shape::of(&job.constants).start(StateField::Params);
+        let starts = job.constants.varying.starts();
+        self.start_lane(job, lane, |k| k < params || starts[k - params].0.is_load());
+    }
+
+    /// The numbers of a lane that are chosen, as the scene starts them.
+    fn start_lane(&mut self, job: &Job<F>, lane: usize, chosen: impl Fn(usize) -> bool) {
+        let first = self.place(Shape::of(&job.constants), lane, StateField::Qd, 0);
+        for (k, &x) in job.start.iter().enumerate().filter(|(k, _)| chosen(*k)) {
+            self.state[first + k * F::WIDTH] = x;
+        }
+    }
+
+    /// What is drawn of the state.
+    fn draw_start(&mut self, job: &Job<F>, world: usize) {
+        let shape = Shape::of(&job.constants);
+        let (seed, episode) = (self.seeds[world], self.episodes[world]);
+        let outside = (self.worlds.start + world) as u32;
+        job.draw
+            .draw(seed, outside, episode, |field, column, value| {
+                let place = self.place(shape, world, StateField::of(field), column);
+                self.state[place] = F::Real::of(value);
+            });
+    }
+}

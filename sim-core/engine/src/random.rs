@@ -1,0 +1,93 @@
+//! Random numbers by counting: each is a function of what it is for, so it is the same on every backend, in every order of
+//! asking, and whatever other worlds there are.
+//!
+//! Philox4x32-10 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC 2011): ten rounds of
+//! multiplications turn a counter into 128 random bits under a key. The key is a seed, the counter (world, episode, stream,
+//! index).
+
+use sim_core::model::Distribution;
+
+/// What numbers are for; those of different streams have nothing to do with each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Stream {
+    /// Positions after a reset; the index is a dof.
+    StartPosition = 0,
+    /// Velocities after a reset; the index is a dof.
+    StartVelocity = 1,
+}
+
+/// The numbers of one stream in one episode of one world, each with its index.
+#[derive(Clone, Copy, Debug)]
+pub struct Draw {
+    key: [u32; 2],
+    world: u32,
+    episode: u32,
+    stream: u32,
+}
+
+impl Draw {
+    /// Numbers of a world's episode under a seed.
+    pub fn new(seed: u64, world: u32, episode: u32, stream: Stream) -> Draw {
+        Draw {
+            key: [seed as u32, (seed >> 32) as u32],
+            world,
+            episode,
+            stream: stream as u32,
+        }
+    }
+
+    /// A number in [low, high], every one as likely as any other.
+    pub fn uniform(&self, index: u32, low: f64, high: f64) -> f64 {
+        let [unit, _] = self.units(index);
+        // rounding of the sum may reach the end, not pass it
+        (low + (high - low) * unit).min(high)
+    }
+
+    /// A number of a normal distribution (Box and Muller 1958); no further than 8.6 `std` from the mean.
+    pub fn normal(&self, index: u32, mean: f64, std: f64) -> f64 {
+        let [a, b] = self.units(index);
+        // 1 - a is above 0, and its logarithm finite
+        let radius = (-2.0 * (1.0 - a).ln()).sqrt();
+        mean + std * radius * (std::f64::consts::TAU * b).cos()
+    }
+
+    /// A number of a distribution.
+    pub fn sample(&self, index: u32, distribution: Distribution) -> f64 {
+        match distribution {
+            Distribution::Uniform { low, high } => self.uniform(index, low, high),
+            Distribution::Normal { mean, std } => self.normal(index, mean, std),
+        }
+    }
+
+    /// Two independent numbers in [0, 1), multiples of 2⁻⁵³.
+    fn units(&self, index: u32) -> [f64; 2] {
+        let [a, b, c, d] = philox([self.world, self.episode, self.stream, index], self.key);
+        let unit = |high: u32, low: u32| {
+            let bits = u64::from(high) << 32 | u64::from(low);
+            (bits >> 11) as f64 / (1u64 << 53) as f64
+        };
+        [unit(a, b), unit(c, d)]
+    }
+}
+
+/// Philox4x32-10: 128 random bits of a counter under a key.
+pub fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
+    const MULTIPLIERS: [u32; 2] = [0xd251_1f53, 0xcd9e_8d57];
+    // the golden ratio and √3 - 1: Weyl's sequence turns one key into ten
+    const STEPS: [u32; 2] = [0x9e37_79b9, 0xbb67_ae85];
+    for _ in 0..10 {
+        let [a, b] = [counter[0], counter[2]];
+        let product = |i: usize, x: u32| u64::from(MULTIPLIERS[i]) * u64::from(x);
+        let (p, q) = (product(0, a), product(1, b));
+        let high = |product: u64| (product >> 32) as u32;
+        counter = [
+            high(q) ^ counter[1] ^ key[0],
+            q as u32,
+            high(p) ^ counter[3] ^ key[1],
+            p as u32,
+        ];
+        key = [key[0].wrapping_add(STEPS[0]), key[1].wrapping_add(STEPS[1])];
+    }
+    counter
+}

@@ -1,0 +1,162 @@
+//! The state that a world starts from, where it is a draw around the scene's.
+
+use crate::random::{Draw, Stream};
+use sim_core::batch::Field;
+use sim_core::model::constants::Motion;
+use sim_core::model::{Distribution, Model, Pose};
+
+/// What of the start state is drawn.
+#[derive(Clone, Debug)]
+pub struct StartDraw {
+    joints: Vec<DrawnJoint>,
+}
+
+/// A joint of which something is drawn.
+#[derive(Clone, Debug)]
+struct DrawnJoint {
+    motion: Motion,
+    dof: usize,
+    coord: usize,
+    /// Where the scene starts it, one a coordinate [rad or m].
+    q: Vec<f64>,
+    /// One a dof.
+    q_offset: Vec<Option<Distribution>>,
+    /// One a dof.
+    qd_offset: Vec<Option<Distribution>>,
+    /// [rad or m]
+    range: [f64; 2],
+    followers: Vec<Follower>,
+}
+
+/// A joint that mimics a drawn one.
+#[derive(Clone, Debug)]
+struct Follower {
+    dof: usize,
+    coord: usize,
+    multiplier: f64,
+    /// Where the scene starts it [rad or m].
+    q: f64,
+}
+
+impl StartDraw {
+    /// What a model says of it.
+    pub fn new(model: &Model) -> StartDraw {
+        let (m, start) = (model.constants(), model.start());
+        let drawn = m.bodies.iter().filter(|body| {
+            let mut offsets = body
+                .dofs()
+                .map(|dof| start.joint_q_offset[dof].or(start.joint_qd_offset[dof]));
+            offsets.any(|offset| offset.is_some())
+        });
+        let joints = drawn.map(|body| {
+            let limit = m.limits.iter().find(|limit| limit.dof == body.dof);
+            let followers = m.equalities.iter().filter(|e| e.leader == body.dof);
+            DrawnJoint {
+                motion: body.motion,
+                dof: body.dof,
+                coord: body.coord,
+                q: start.joint_q[body.coord..][..body.motion.coords()].to_vec(),
+                q_offset: start.joint_q_offset[body.dofs()].to_vec(),
+                qd_offset: start.joint_qd_offset[body.dofs()].to_vec(),
+                range: limit.map_or([f64::NEG_INFINITY, f64::INFINITY], |limit| {
+                    [limit.lower, limit.upper]
+                }),
+                followers: followers
+                    .map(|e| {
+                        let coord = m.dofs[e.follower].coord;
+                        Follower {
+                            dof: e.follower,
+                            coord,
+                            multiplier: e.multiplier,
+                            q: start.joint_q[coord],
+                        }
+                    })
+                    .collect(),
+            }
+        });
+        StartDraw {
+            joints: joints.collect(),
+        }
+    }
+
+    /// Draws the start of a world's episode: gives `put` the numbers of `joint_q` and `joint_qd` that are not the scene's, each
+    /// with its column.
+    pub fn draw(
+        &self,
+        seed: u64,
+        world: u32,
+        episode: u32,
+        mut put: impl FnMut(Field, usize, f64),
+    ) {
+        let positions = Draw::new(seed, world, episode, Stream::StartPosition);
+        let velocities = Draw::new(seed, world, episode, Stream::StartVelocity);
+        for joint in &self.joints {
+            joint.draw_position(&positions, &mut put);
+            joint.draw_velocity(&velocities, &mut put);
+        }
+    }
+}
+
+impl DrawnJoint {
+    fn draw_position(&self, draw: &Draw, put: &mut impl FnMut(Field, usize, f64)) {
+        let offset = |k: usize| {
+            let drawn = |of| draw.sample((self.dof + k) as u32, of);
+            self.q_offset[k].map_or(0.0, drawn)
+        };
+        let varies = |first: usize| self.q_offset[first..].iter().any(Option::is_some);
+        if !varies(0) {
+            return;
+        }
+        let mut set = |k: usize, value: f64| put(Field::JointQ, self.coord + k, value);
+        match self.motion {
+            Motion::Revolute | Motion::Prismatic => {
+                let q = (self.q[0] + offset(0)).clamp(self.range[0], self.range[1]);
+                set(0, q);
+                for follower in &self.followers {
+                    let q = follower.q + follower.multiplier * (q - self.q[0]);
+                    put(Field::JointQ, follower.coord, q);
+                }
+            }
+            Motion::Ball => {
+                let turned = rotation(&self.q).mul(&turn(std::array::from_fn(offset)));
+                (0..4).for_each(|k| set(k, turned.quat[k]));
+            }
+            Motion::Free => {
+                (0..3).for_each(|k| set(k, self.q[k] + offset(k)));
+                if varies(3) {
+                    let turn = Pose::from_rpy([0.0; 3], std::array::from_fn(|k| offset(3 + k)));
+                    let turned = turn.mul(&rotation(&self.q[3..]));
+                    (0..4).for_each(|k| set(3 + k, turned.quat[k]));
+                }
+            }
+        }
+    }
+
+    fn draw_velocity(&self, draw: &Draw, put: &mut impl FnMut(Field, usize, f64)) {
+        for (k, offset) in self.qd_offset.iter().enumerate() {
+            let Some(offset) = *offset else { continue };
+            let qd = draw.sample((self.dof + k) as u32, offset);
+            put(Field::JointQd, self.dof + k, qd);
+            for follower in &self.followers {
+                put(Field::JointQd, follower.dof, follower.multiplier * qd);
+            }
+        }
+    }
+}
+
+/// A quaternion (x, y, z, w) as a rotation.
+fn rotation(quat: &[f64]) -> Pose {
+    Pose {
+        pos: [0.0; 3],
+        quat: [quat[0], quat[1], quat[2], quat[3]],
+    }
+}
+
+/// The rotation of a rotation vector [rad].
+fn turn(vector: [f64; 3]) -> Pose {
+    let angle = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if angle == 0.0 {
+        return Pose::identity();
+    }
+    Pose::about(vector.map(|x| x / angle), angle)
+}
