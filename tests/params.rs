@@ -208,7 +208,7 @@ fn own(model: &Model, param: Param, seeds: &[usize]) -> Vec<f64> {
     let mut numbers = Vec::new();
     for &seed in seeds {
         for (k, start) in starts.iter().enumerate() {
-            let share = ((seed * 31 + k * 7 + param as usize * 5) % 17) as f64 / 17.0;
+            let share = ((seed * 31 + k * 7 + param as usize * 5) % 37) as f64 / 37.0;
             numbers.push(match param {
                 Param::BodyF => 4.0 * (share - 0.5),
                 Param::JointEffortLimit if *start == NO_LIMIT => 60.0 + 20.0 * share,

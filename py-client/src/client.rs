@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use sim_protocol::{AttachOptions, Client as Connection, Description, Hook, ProtocolError};
 
 use crate::errors::{protocol, raise};
@@ -50,9 +51,13 @@ impl Client {
         joint_f: Option<&Bound<'_, PyAny>>,
         joint_target_q: Option<&Bound<'_, PyAny>>,
         joint_target_qd: Option<&Bound<'_, PyAny>>,
+        body_f: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Frame> {
         let connection = self.connection(py)?;
         let mut inputs = Inputs::new(&self.description);
+        if let Some(body_f) = body_f {
+            inputs.add_ready("body_f", body_f)?;
+        }
         inputs.add("joint_f", Axis::Dofs, joint_f)?;
         inputs.add("joint_target_q", Axis::Dofs, joint_target_q)?;
         inputs.add("joint_target_qd", Axis::Dofs, joint_target_qd)?;
@@ -71,6 +76,23 @@ impl Client {
         let mut inputs = Inputs::new(&self.description);
         inputs.add("joint_q", Axis::Coords, joint_q)?;
         inputs.add("joint_qd", Axis::Dofs, joint_qd)?;
+        let mask = Mask::new(mask, self.description.worlds)?;
+        let (commands, mask) = (inputs.commands()?, mask.as_slice()?);
+        frame(py, |hook| connection.write(&commands, mask, hook))
+    }
+
+    /// Parameters by name, each `(worlds, columns)` in float64, contiguous.
+    fn write_params(
+        &self,
+        py: Python<'_>,
+        params: &Bound<'_, PyDict>,
+        mask: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Frame> {
+        let connection = self.connection(py)?;
+        let mut inputs = Inputs::new(&self.description);
+        for (name, value) in params {
+            inputs.add_ready(name.extract()?, &value)?;
+        }
         let mask = Mask::new(mask, self.description.worlds)?;
         let (commands, mask) = (inputs.commands()?, mask.as_slice()?);
         frame(py, |hook| connection.write(&commands, mask, hook))

@@ -19,11 +19,11 @@ pub(crate) enum Axis {
 /// The arrays of one command.
 pub(crate) struct Inputs<'a, 'py> {
     description: &'a Description,
-    arrays: Vec<Input<'py>>,
+    arrays: Vec<Input<'a, 'py>>,
 }
 
-struct Input<'py> {
-    field: &'static str,
+struct Input<'a, 'py> {
+    field: &'a str,
     columns: Range<usize>,
     array: Array<'py>,
 }
@@ -33,7 +33,7 @@ enum Array<'py> {
     F64(PyReadonlyArrayDyn<'py, f64>),
 }
 
-impl Input<'_> {
+impl Input<'_, '_> {
     fn command(&self) -> PyResult<Command<'_>> {
         let values = match &self.array {
             Array::F32(array) => Values::F32(array.as_slice()?),
@@ -53,6 +53,24 @@ impl<'a, 'py> Inputs<'a, 'py> {
             description,
             arrays: Vec::with_capacity(3),
         }
+    }
+
+    /// Takes a parameter of every world that needs no conversion.
+    pub(crate) fn add_ready(&mut self, name: &str, value: &Bound<'py, PyAny>) -> PyResult<()> {
+        let params = self.description.params.iter();
+        let known = params
+            .map(|param| &param.info)
+            .find(|info| info.name == name);
+        let info = known.ok_or_else(|| {
+            let reason = format!("there is no parameter `{name}`");
+            raise(value.py(), "CommandRefused", reason)
+        })?;
+        self.arrays.push(Input {
+            field: &info.name,
+            columns: 0..info.columns,
+            array: Array::F64(value.cast::<PyArrayDyn<f64>>()?.try_readonly()?),
+        });
+        Ok(())
     }
 
     /// Takes an argument: nothing, an array for the whole scene, or a mapping of arrays by robot.

@@ -6,7 +6,7 @@ import json
 import os
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Literal, SupportsFloat, SupportsIndex
 
@@ -52,12 +52,13 @@ class Scene(Randomized):
             most 512. What does not fit is left out, counted and flagged in the world's status.
         rows_max: Most constraint rows of contacts that a world has room for, 1 to 16384; None is as many as its
             contacts need.
+        params: Numbers of the model that vary from world to world, besides those named at launch; see `launch`.
 
     Raises:
         SceneError: A value is out of range; the message names it.
     """
 
-    __slots__ = ("_contacts_max", "_dt", "_gravity", "_rows_max", "_solver", "_substeps")
+    __slots__ = ("_contacts_max", "_dt", "_gravity", "_params", "_rows_max", "_solver", "_substeps")
 
     def __init__(
         self,
@@ -67,6 +68,7 @@ class Scene(Randomized):
         gravity: Vector = (0.0, 0.0, -9.81),
         contacts_max: int | None = None,
         rows_max: int | None = None,
+        params: Iterable[str] = (),
     ) -> None:
         super().__init__()
         self.dt = dt
@@ -74,6 +76,7 @@ class Scene(Randomized):
         self.gravity = gravity
         self.contacts_max = contacts_max
         self.rows_max = rows_max
+        self.params = params
         self._solver = Solver()
 
     @property
@@ -102,6 +105,17 @@ class Scene(Randomized):
     @gravity.setter
     def gravity(self, gravity: Vector) -> None:
         self._gravity = checks.triple("Scene: gravity", gravity)
+
+    @property
+    def params(self) -> tuple[str, ...]:
+        """Numbers of the model that vary from world to world, besides those named at launch; see `launch`."""
+        return self._params
+
+    @params.setter
+    def params(self, params: Iterable[str]) -> None:
+        if isinstance(params, str) or not isinstance(params, Iterable):
+            raise SceneError(f"Scene: params is {params!r}; give a list of names")
+        self._params = tuple(checks.text("Scene: an entry of params", param) for param in params)
 
     @property
     def contacts_max(self) -> int | None:
@@ -308,7 +322,7 @@ class Scene(Randomized):
         """
         file = checks.path("load: path", path)
         data = json.loads(_core.load_scene(str(file)))
-        options = ("dt", "substeps", "gravity", "contacts_max", "rows_max")
+        options = ("dt", "substeps", "gravity", "contacts_max", "rows_max", "params")
         scene = cls(**{option: data[option] for option in options if option in data})
         scene.solver(**data["solver"])
         for table in data.get("robot", ()):
@@ -342,6 +356,7 @@ class Scene(Randomized):
                 "dt": self.dt,
                 "substeps": self.substeps,
                 "gravity": self.gravity,
+                "params": self.params,
                 "contacts_max": self.contacts_max,
                 "rows_max": self.rows_max,
                 "contact_filters": self.filters,

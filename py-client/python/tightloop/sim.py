@@ -18,6 +18,7 @@ from tightloop._core import Frame
 from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
 from tightloop.errors import ArgumentError, CommandRefused, UnknownField
+from tightloop.params import Params
 from tightloop.scene import Scene
 from tightloop.snapshot import Snapshot, passing
 
@@ -56,6 +57,7 @@ class Sim:
         dofs: Slice of each robot's dofs, by robot name.
         coords: Slice of each robot's coordinates.
         bodies: Slice of each robot's bodies.
+        params: Numbers of the model that differ from world to world; see `tightloop.params.Params`.
         info: Everything the daemon tells about itself, notes on the scene included.
     """
 
@@ -81,6 +83,7 @@ class Sim:
             {robot["name"]: slice(*robot[range_]) for robot in self.info["robots"]}
             for range_ in ("dofs", "coords", "bodies")
         )
+        self.params = Params(client, self.info, lambda: self.snapshot().numbers)
 
     def step(
         self,
@@ -88,6 +91,7 @@ class Sim:
         joint_f: Command | None = None,
         joint_target_q: Command | None = None,
         joint_target_qd: Command | None = None,
+        body_f: ArrayLike | None = None,
     ) -> Frame:
         """Advance every world by one control frame. What is left out keeps its last value.
 
@@ -97,6 +101,8 @@ class Sim:
             joint_target_q: Drive targets [rad or m], same shapes.
             joint_target_qd: Drive velocity targets [rad/s or m/s], same shapes.
                 Each may be a dict of arrays by robot name, with that robot's dofs only.
+            body_f: Force on each link at its centre of mass [N], then torque [N·m], in world axes, shape
+                ``(worlds, bodies, 6)`` or ``(bodies, 6)``; asked for by ``launch(params=("body_f",))``.
 
         Returns:
             A frame of read-only views. It stays valid, unchanged, until it is dropped.
@@ -108,7 +114,8 @@ class Sim:
             LeaseLost: This client did, and no longer does.
             DaemonLost: The daemon went away; its state is lost.
         """
-        return self._client.step(joint_f, joint_target_q, joint_target_qd)
+        wrench = None if body_f is None else self.params.ready("body_f", body_f)
+        return self._client.step(joint_f, joint_target_q, joint_target_qd, wrench)
 
     def reset(
         self,
@@ -250,6 +257,7 @@ def launch(
     precision: str = "f32",
     threads: int | None = None,
     fields: Sequence[str] = ("joint_q", "joint_qd", "body_q"),
+    params: Sequence[str] = (),
     name: str | None = None,
     log: str | os.PathLike[str] | None = None,
     frames_held: int = 4,
@@ -264,6 +272,9 @@ def launch(
         threads: Most threads a step may use; all cores if left out.
         fields: What frames carry besides ``time``, ``step``, ``status`` and ``contacts_left_out``: names of `Frame`
             attributes.
+        params: Numbers of the model that vary from world to world and may be written while it runs, besides those that
+            the scene names: of ``gravity``, ``body_mass_scale``, ``joint_armature``, ``joint_damping``,
+            ``joint_target_ke``, ``joint_target_kd``, ``joint_effort_limit``, ``shape_mu``, ``body_f``; see `Sim.params`.
         name: Name of the daemon, for `attach`; a unique one if left out.
         log: File for the daemon's news; warnings and errors go to stderr if left out.
         frames_held: How many frames may be alive at once, at least 1.
@@ -276,16 +287,18 @@ def launch(
     """
     if not isinstance(scene, Scene):
         raise ArgumentError(f"launch: scene is {type(scene).__name__}; give a tightloop.Scene")
-    if isinstance(fields, str):
-        raise ArgumentError(f"launch: fields is {fields!r}; give a list of names, such as ({fields!r},)")
-    if not isinstance(fields, Iterable):
-        raise ArgumentError(f"launch: fields is {fields!r}; give a list of names, or () for none")
+    for argument, names in (("fields", fields), ("params", params)):
+        if isinstance(names, str):
+            raise ArgumentError(f"launch: {argument} is {names!r}; give a list of names, such as ({names!r},)")
+        if not isinstance(names, Iterable):
+            raise ArgumentError(f"launch: {argument} is {names!r}; give a list of names, or () for none")
     # Types are checked here, values by the daemon, before it takes anything
     arguments: dict[str, Any] = {
         "worlds": checks.integer("launch: worlds", worlds, error=ArgumentError),
         "device": checks.text("launch: device", device, error=ArgumentError),
         "precision": checks.text("launch: precision", precision, error=ArgumentError),
         "fields": ",".join(checks.text("launch: an entry of fields", field, error=ArgumentError) for field in fields),
+        "params": ",".join(checks.text("launch: an entry of params", param, error=ArgumentError) for param in params),
         "name": f"sim-{os.getpid()}-{secrets.token_hex(4)}"
         if name is None
         else checks.text("launch: name", name, error=ArgumentError),

@@ -13,6 +13,10 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tightloop import checks
 from tightloop.errors import SnapshotError
@@ -65,6 +69,13 @@ class Snapshot:
         except OSError as problem:
             raise SnapshotError(f"{file}: cannot be read: {problem.strerror}") from None
         return cls(data, str(file))
+
+    @property
+    def numbers(self) -> NDArray[Any]:
+        """State, commands and parameters of each world, ``(worlds, numbers)``, read-only, in the order of the daemon."""
+        real = int(self.precision[1:]) // 8
+        rows = np.frombuffer(self._data, np.uint8, offset=_HEAD.size).reshape(self.worlds, -1)[:, _COUNTERS:]
+        return np.ascontiguousarray(rows).view(f"<f{real}")
 
     def to_bytes(self) -> bytes:
         """Everything that `from_bytes` needs."""

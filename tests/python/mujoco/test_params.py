@@ -54,7 +54,9 @@ def give(model: mujoco.MjModel, sim: tl.Sim, world: int, params: dict[str, Array
     return own
 
 
-def assert_same(sim: tl.Sim, model: mujoco.MjModel, q: Array, qd: Array, params: dict[str, Array], wrench: Array) -> None:
+def assert_same(
+    sim: tl.Sim, model: mujoco.MjModel, q: Array, qd: Array, params: dict[str, Array], wrench: Array
+) -> None:
     """Accelerations of every world; `wrench` is `body_f`."""
     frame = sim.write(joint_q=q, joint_qd=qd)
     sim.params.write(body_f=wrench, **params)
