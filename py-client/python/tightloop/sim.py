@@ -274,7 +274,8 @@ def launch(
             attributes.
         params: Numbers of the model that vary from world to world and may be written while it runs, besides those that
             the scene names: of ``gravity``, ``body_mass_scale``, ``joint_armature``, ``joint_damping``,
-            ``joint_target_ke``, ``joint_target_kd``, ``joint_effort_limit``, ``shape_mu``, ``body_f``; see `Sim.params`.
+            ``joint_target_ke``, ``joint_target_kd``, ``joint_effort_limit``, ``shape_mu``, ``body_f``; see
+            `Sim.params`.
         name: Name of the daemon, for `attach`; a unique one if left out.
         log: File for the daemon's news; warnings and errors go to stderr if left out.
         frames_held: How many frames may be alive at once, at least 1.
@@ -298,7 +299,7 @@ def launch(
         "device": checks.text("launch: device", device, error=ArgumentError),
         "precision": checks.text("launch: precision", precision, error=ArgumentError),
         "fields": ",".join(checks.text("launch: an entry of fields", field, error=ArgumentError) for field in fields),
-        "params": ",".join(checks.text("launch: an entry of params", param, error=ArgumentError) for param in params),
+        "params": ",".join(checks.text("launch: an entry of params", name, error=ArgumentError) for name in params),
         "name": f"sim-{os.getpid()}-{secrets.token_hex(4)}"
         if name is None
         else checks.text("launch: name", name, error=ArgumentError),

@@ -74,8 +74,8 @@ class Snapshot:
     def numbers(self) -> NDArray[Any]:
         """State, commands and parameters of each world, ``(worlds, numbers)``, read-only, in the order of the daemon."""
         real = int(self.precision[1:]) // 8
-        rows = np.frombuffer(self._data, np.uint8, offset=_HEAD.size).reshape(self.worlds, -1)[:, _COUNTERS:]
-        return np.ascontiguousarray(rows).view(f"<f{real}")
+        records = np.frombuffer(self._data, np.uint8, offset=_HEAD.size).reshape(self.worlds, -1)
+        return np.ascontiguousarray(records[:, _COUNTERS:]).view(f"<f{real}")
 
     def to_bytes(self) -> bytes:
         """Everything that `from_bytes` needs."""
