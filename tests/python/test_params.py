@@ -126,17 +126,17 @@ def test_constants_and_wrong_values_are_refused_by_name(pendulum):
             _ = sim.params.gravity
         with pytest.raises(tl.CommandRefused, match=r'params=\("body_f",\)'):
             sim.step(body_f=np.zeros((3, 3, 6)))
-        with pytest.raises(tl.UnknownField, match="there is no parameter 'mass'; there are: gravity, "):
+        with pytest.raises(tl.UnknownField, match=r"there is no parameter 'mass'; there are: gravity, "):
             sim.params.mass = 1.0
         with pytest.raises(tl.CommandRefused, match=r"expected shape \(3, 2\), \(2,\) .* got \(2, 2\)"):
             sim.params.joint_target_ke = np.zeros((2, 2))
-        with pytest.raises(tl.CommandRefused, match="is no array|not a real number"):
+        with pytest.raises(tl.CommandRefused, match=r"is no array|not a real number"):
             sim.params.joint_target_ke = "stiff"
         for bad, reason in ((-1.0, "give at least 0"), (np.nan, "NaN"), (np.inf, "inf")):
             with pytest.raises(tl.CommandRefused, match=reason):
                 sim.params.write(joint_target_ke=[1.0, bad], body_mass_scale=2.0)
         for scale in (0.0, -2.0):
-            with pytest.raises(tl.CommandRefused, match="body_mass_scale.*give at least 0.001"):
+            with pytest.raises(tl.CommandRefused, match=r"body_mass_scale.*give at least 0.001"):
                 sim.params.body_mass_scale = scale
         with pytest.raises(tl.CommandRefused, match=r"mask: expected shape \(3,\)"):
             sim.params.write(joint_target_ke=1.0, mask=[True])
@@ -145,11 +145,11 @@ def test_constants_and_wrong_values_are_refused_by_name(pendulum):
 
 
 def test_unknown_names_are_refused_at_launch(pendulum):
-    with pytest.raises(tl.SceneError, match="parameter `mass`.*gravity, body_mass_scale"):
+    with pytest.raises(tl.SceneError, match=r"parameter `mass`.*gravity, body_mass_scale"):
         tl.launch(pendulum, worlds=1, params=["mass"])
-    with pytest.raises(tl.ArgumentError, match="params is 'gravity'; give a list of names"):
+    with pytest.raises(tl.ArgumentError, match=r"params is 'gravity'; give a list of names"):
         tl.launch(pendulum, worlds=1, params="gravity")
-    with pytest.raises(tl.SceneError, match="params is 'gravity'; give a list of names"):
+    with pytest.raises(tl.SceneError, match=r"params is 'gravity'; give a list of names"):
         tl.Scene(params="gravity")
 
 

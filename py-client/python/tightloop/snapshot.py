@@ -72,7 +72,7 @@ class Snapshot:
 
     @property
     def numbers(self) -> NDArray[Any]:
-        """State, commands and parameters of each world, ``(worlds, numbers)``, read-only, in the order of the daemon."""
+        """State, commands and parameters of each world, ``(worlds, numbers)``, read-only, as the daemon has them."""
         real = int(self.precision[1:]) // 8
         records = np.frombuffer(self._data, np.uint8, offset=_HEAD.size).reshape(self.worlds, -1)
         return np.ascontiguousarray(records[:, _COUNTERS:]).view(f"<f{real}")

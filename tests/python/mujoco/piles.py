@@ -168,13 +168,28 @@ class Judge:
         self.to = Coordinates(model, sim)
         self.names = sim.shape_names
 
-    def at(self, q: Array, qd: Array, joint_f: Array | None = None) -> tuple[Array, int]:
-        """MuJoCo's accelerations in our coordinates, and how many contacts it has; `data` holds the rest."""
+    def at(
+        self,
+        q: Array,
+        qd: Array,
+        joint_f: Array | None = None,
+        *,
+        push: Array | None = None,
+        control: Array | None = None,
+    ) -> tuple[Array, int]:
+        """MuJoCo's accelerations in our coordinates, and how many contacts it has; `data` holds the rest.
+
+        `push` is force and torque on each of its bodies, `control` of each of its actuators.
+        """
         convert, data = self.to.to_qvel(q), self.data
         mujoco.mj_resetData(self.model, data)
         data.qpos[:], data.qvel[:] = self.to.positions(q), convert @ qd
         if joint_f is not None:
             data.qfrc_applied[:] = np.linalg.solve(convert.T, joint_f)
+        if push is not None:
+            data.xfrc_applied[:] = push
+        if control is not None:
+            data.ctrl[:] = control
         mujoco.mj_forward(self.model, data)
         return np.linalg.solve(convert, data.qacc - self.to.drift(q, qd)), data.ncon
 
