@@ -27,6 +27,7 @@ CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D
 demo: wheel
 	$(PYTHON) examples/franka_lesson.py --worlds $(WORLDS)
 	$(PYTHON) examples/franka_grasp.py --worlds $(WORLDS)
+	$(PYTHON) examples/randomized_push.py --worlds $(WORLDS)
 	@echo && echo "The same in process, without daemon and Python:"
 	@cargo run --release --quiet --example franka_lesson -- $(WORLDS)
 
