@@ -6,7 +6,7 @@ use common::shapes::shapes;
 use common::{Demo, Run, lesson_with_table};
 use sim_core::batch::{Field, status};
 use sim_core::model::{Body, Collision, Cone, Description, Model, Pose, Shape, UrdfOptions};
-use sim_engine::backend::{Values, cpu};
+use sim_engine::backend::{COUNTERS, Values, cpu};
 use sim_engine::simulation::{Lanes, Options, Precision};
 use sim_engine::snapshot::SnapshotError;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ const FIELDS: [Field; 13] = [
     Field::BodyContactForce,
 ];
 /// Frames before the snapshot: contacts of the lesson begin in frame 14.
-const BEFORE: usize = 28;
+const BEFORE: usize = 16;
 const AFTER: usize = 12;
 
 /// A number in [-1, 1) from a world's seed: no shared generator, so worlds can be moved about.
@@ -359,7 +359,7 @@ fn refusals_name_what_is_wrong() {
     use SnapshotError as Wrong;
     let mut run = ball(400.0, Precision::F32, 3);
     let good = run.sim.snapshot();
-    let numbers = (good.len() - 40) / 3 / 4 - 4;
+    let numbers = ((good.len() - 40) / 3 - COUNTERS) / 4;
     run.step();
     let of = |density, precision, worlds| ball(density, precision, worlds).sim.snapshot();
     assert_eq!(
@@ -432,7 +432,7 @@ fn numbers_that_are_not_finite_are_refused_in_the_worlds_asked_for() {
         f32::INFINITY.to_bits(),
         f32::NEG_INFINITY.to_bits(),
     ] {
-        for at in (40 + record + BEFORE..40 + 2 * record).step_by(4) {
+        for at in (40 + record + COUNTERS..40 + 2 * record).step_by(4) {
             let bytes = forged(&good, at, bits);
             let expected = SnapshotError::NotFinite { world: 1 };
             assert_eq!(refused(&mut run, &bytes, None, None), expected);

@@ -210,7 +210,7 @@ def test_what_does_not_fit_is_refused_and_the_daemon_goes_on(small, pendulum):
         (heavy, {}, "another model"),
         (snapshot, {"from_world": 2}, "from_world is 2; the snapshot has worlds 0 to 1"),
         (snapshot, {"from_world": 2**62}, "from_world is"),
-        (forged(snapshot, 60, struct.pack("<f", np.nan)), {}, "world 0 .*not finite"),
+        (forged(snapshot, 68, struct.pack("<f", np.nan)), {}, "world 0 .*not finite"),
     ]
     for wrong, arguments, named in refusals:
         with pytest.raises(tl.SnapshotError, match=named):
