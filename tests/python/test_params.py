@@ -77,12 +77,12 @@ def test_what_is_written_holds_over_resets_but_loads_do_not(sim):
 
 def test_a_step_may_push_links(sim):
     push = np.zeros((WORLDS, len(sim.body_names), 6))
-    push[4, -1, 1] = 5.0
+    push[4, -1] = (5.0, 4.0, 3.0, 0.2, 0.3, 0.4)
     still = sim.step().joint_q.copy()
     sim.reset()
     moved = sim.step(body_f=push).joint_q
     np.testing.assert_array_equal((moved != still).any(axis=1), np.arange(WORLDS) == 4)
-    np.testing.assert_array_equal(sim.params.body_f, push)
+    np.testing.assert_array_equal(sim.params.body_f, push.astype(sim.params.body_f.dtype))
 
 
 def test_a_gain_that_explodes_freezes_its_world_alone(pendulum):

@@ -35,6 +35,10 @@ def give(model: mujoco.MjModel, sim: tl.Sim, world: int, params: dict[str, Array
         if body >= 0:
             own.body_mass[body] *= scale
             own.body_inertia[body] *= scale
+    # MuJoCo has the masses of simple bodies twice; what derives from them for the softness of rows stays
+    mujoco.mj_setConst(own, mujoco.MjData(own))
+    for name in ("body_invweight0", "dof_invweight0"):
+        getattr(own, name)[:] = getattr(model, name)
     for dof, name in enumerate(sim.dof_names):
         joint = mujoco.mj_name2id(own, mujoco.mjtObj.mjOBJ_JOINT, name)
         if joint < 0:
@@ -45,8 +49,12 @@ def give(model: mujoco.MjModel, sim: tl.Sim, world: int, params: dict[str, Array
         limit = params["joint_effort_limit"][world, dof]
         own.jnt_actfrclimited[joint], own.jnt_actfrcrange[joint] = 1, (-limit, limit)
         for drive in np.flatnonzero(own.actuator_trnid[:, 0] == joint):
-            stiffness, damping = params["joint_target_ke"][world, dof], params["joint_target_kd"][world, dof]
-            own.actuator_gainprm[drive, 0], own.actuator_biasprm[drive, :3] = stiffness, (0, -stiffness, -damping)
+            # one follows the position target, another the velocity target, if any
+            if own.actuator_biasprm[drive, 1]:
+                stiffness = params["joint_target_ke"][world, dof]
+                own.actuator_gainprm[drive, 0], own.actuator_biasprm[drive, 1] = stiffness, -stiffness
+            if own.actuator_biasprm[drive, 2]:
+                own.actuator_biasprm[drive, 2] = -params["joint_target_kd"][world, dof]
     names = sim.shape_names
     for pair, geoms in enumerate(zip(own.pair_geom1, own.pair_geom2, strict=True)):
         mu = [params["shape_mu"][world, names.index(own.geom(geom).name)] for geom in geoms]
@@ -95,7 +103,9 @@ def test_an_arm_with_numbers_of_its_own_in_each_world(precision: str):
         params = {name: around(rng, getattr(sim.params, name)[0]) for name in names[:-1]}
         q = START + rng.uniform(-0.2, 0.2, (WORLDS, 9)) * (np.arange(9) < 7)
         qd = rng.uniform(-0.5, 0.5, (WORLDS, 9)) * (np.arange(9) < 7)
-        params["body_f"] = rng.uniform(-5, 5, (WORLDS, len(sim.body_names), 6))
+        # MuJoCo has the centre of a link that weighs nothing somewhere else: ours is its frame's origin
+        weighs = [model.body(name).mass[0] > 0 for name in sim.body_names]
+        params["body_f"] = rng.uniform(-5, 5, (WORLDS, len(sim.body_names), 6)) * np.array(weighs)[:, None]
         assert_same(sim, model, (q, qd), params)
 
 
