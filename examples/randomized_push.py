@@ -24,9 +24,9 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 HERE = Path(__file__).resolve().parent
-HALF, DENSITY, GRAVITY = 0.05, 400.0, 9.81  # half an edge [m], [kg/m³], [m/s²]
-MASS = DENSITY * (2 * HALF) ** 3  # of the scene's box [kg]
-FORCE, PUSHED, FRAMES = 3.0, 0.5, 180  # [N], [s]; 60 frames a second
+HALF, DENSITY, GRAVITY = (0.1, 0.1, 0.02), 250.0, 9.81  # half edges [m], [kg/m³], [m/s²]
+MASS = DENSITY * float(np.prod(2 * np.array(HALF)))  # of the scene's box, which is flat and does not tumble [kg]
+FORCE, PUSHED, FRAMES = 2.0, 0.5, 180  # [N], [s]; 60 frames a second
 FRICTIONS, SCALES = (0.05, 0.8), (0.5, 2.0)
 STARTS = 0.5  # the box starts off by at most so much in x and y [m]
 CLOSE = 0.02  # of the law, beside 1 cm [–]
@@ -37,17 +37,19 @@ def scene() -> tl.Scene:
     scene = tl.Scene(dt=1 / 480, substeps=8, params=("body_mass_scale", "shape_mu"))
     # of two that touch the larger friction counts: the ground's
     scene.add_ground(mu=FRICTIONS[0])
-    scene.add_body(name="box", pos=(0.0, 0.0, HALF))
-    scene.add_box(body="box", half_extents=(HALF, HALF, HALF), density=DENSITY, mu=0.0)
+    scene.add_body(name="box", pos=(0.0, 0.0, HALF[2]))
+    scene.add_box(body="box", half_extents=HALF, density=DENSITY, mu=0.0)
     around = tl.Uniform(-STARTS, STARTS)
     scene.randomize(body_q={"box": {"x": around, "y": around, "yaw": tl.Uniform(-np.pi, np.pi)}})
     return scene
 
 
 def law(mu: NDArray[np.float64], mass: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far a box slides [m]: ½ a T² while it is pushed, v² / (2 μ g) after it."""
-    pushed = np.maximum(FORCE / mass - mu * GRAVITY, 0.0)
-    return 0.5 * pushed * PUSHED**2 + (pushed * PUSHED) ** 2 / (2 * mu * GRAVITY)
+    """How far a box slides [m]: ½ a T² while it is pushed, then v t - ½ μ g t² until it stands or the time is over."""
+    pushed, slowed = np.maximum(FORCE / mass - mu * GRAVITY, 0.0), mu * GRAVITY
+    speed = pushed * PUSHED
+    after = np.minimum(speed / slowed, FRAMES / 60 - PUSHED)
+    return 0.5 * pushed * PUSHED**2 + speed * after - 0.5 * slowed * after**2
 
 
 @dataclass

@@ -72,7 +72,7 @@ class Params:
         """
         return self._client.write_params({name: self.ready(name, value) for name, value in params.items()}, mask)
 
-    def ready(self, name: str, value: ArrayLike) -> NDArray[np.float64]:
+    def ready(self, name: str, value: Any) -> NDArray[np.float64]:
         """A value of a parameter for every world, float64, contiguous, shape ``(worlds, columns)``.
 
         Raises:

@@ -91,7 +91,7 @@ class Sim:
         joint_f: Command | None = None,
         joint_target_q: Command | None = None,
         joint_target_qd: Command | None = None,
-        body_f: ArrayLike | None = None,
+        body_f: Command | None = None,
     ) -> Frame:
         """Advance every world by one control frame. What is left out keeps its last value.
 
