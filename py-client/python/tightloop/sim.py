@@ -57,7 +57,6 @@ class Sim:
         dofs: Slice of each robot's dofs, by robot name.
         coords: Slice of each robot's coordinates.
         bodies: Slice of each robot's bodies.
-        params: Numbers of the model that differ from world to world; see `tightloop.params.Params`.
         info: Everything the daemon tells about itself, notes on the scene included.
     """
 
@@ -83,7 +82,6 @@ class Sim:
             {robot["name"]: slice(*robot[range_]) for robot in self.info["robots"]}
             for range_ in ("dofs", "coords", "bodies")
         )
-        self.params = Params(client, self.info, lambda: self.snapshot().numbers)
 
     def step(
         self,
@@ -209,6 +207,12 @@ class Sim:
         with passing() as path:
             snapshot.save(path)
             return self._client.restore(str(path), worlds, from_world)
+
+    @property
+    def params(self) -> Params:
+        """Numbers of the model that differ from world to world; see `tightloop.params.Params`."""
+        # made anew each time: kept, it and the simulation would keep each other alive
+        return Params(self._client, self.info, lambda: self.snapshot().numbers)
 
     @functools.cached_property
     def dynamics(self) -> Dynamics:
