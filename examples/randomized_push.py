@@ -75,7 +75,7 @@ def run(*, worlds: int, seed: int, precision: str, threads: int | None) -> Run:
     with tl.launch(
         scene(), worlds=worlds, precision=precision, threads=threads, params=("body_f",), fields=("joint_q",)
     ) as sim:
-        frictions = sim.params.shape_mu
+        frictions = sim.params.shape_mu.copy()
         frictions[:, sim.shape_names.index("ground")] = mu
         sim.params.write(shape_mu=frictions, body_mass_scale=scale[:, None])
         start = sim.reset(seed=seed).joint_q.copy()

@@ -38,6 +38,8 @@ def test_each_is_read_as_it_was_written(sim):
     for number, name in enumerate(ALL):
         before = getattr(sim.params, name)
         assert before.shape[0] == WORLDS and before.dtype == dtype
+        with pytest.raises(ValueError, match="read-only"):
+            before[0] = 1.0
         given = np.random.default_rng(number).uniform(0.5, 2.0, before.shape)
         setattr(sim.params, name, given)
         np.testing.assert_array_equal(getattr(sim.params, name), given.astype(dtype))

@@ -19,8 +19,8 @@ LINK_PARTS = {"body_f": 6}
 class Params:
     """What `Sim.params` is: each parameter named in ``launch(params=...)`` or by the scene is an attribute.
 
-    Reading one gives an array of its own, shape ``(worlds, ...)``; assigning to one writes it in all worlds, `write` in
-    some. What is written holds from the next step on, over resets too (but for ``body_f``, which a reset clears).
+    Reading one gives an array, shape ``(worlds, ...)``, read-only (``.copy()`` is yours); assigning to one writes it in
+    all worlds, `write` in some. What is written holds from the next step on, over resets too (but for ``body_f``, which a reset clears).
 
     ``gravity`` (worlds, 3) [m/s²], ``body_mass_scale`` (worlds, bodies) [–], ``joint_armature`` [kg·m² or kg],
     ``joint_damping``, ``joint_target_kd`` [N·m·s/rad or N·s/m], ``joint_target_ke`` [N·m/rad or N/m],
@@ -55,7 +55,10 @@ class Params:
         # the parameters are the last numbers of a world
         first = self._numbers - param["place"]
         rows = self._state()[:, -first:][:, : param["info"]["columns"]]
-        return np.ascontiguousarray(rows).reshape(self._shape(name))
+        array = np.array(rows).reshape(self._shape(name))
+        # what was set in it would go nowhere
+        array.flags.writeable = False
+        return array
 
     def __setattr__(self, name: str, value: ArrayLike) -> None:
         self.write(**{name: value})
