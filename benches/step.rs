@@ -127,6 +127,7 @@ fn steps_per_s(
         lanes,
         threads: Some(1),
         fields,
+        ..Options::default()
     };
     let mut run = Run::new(&model, options);
     let (rounds, round) = if once {

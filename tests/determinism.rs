@@ -66,6 +66,7 @@ fn run(
         threads: Some(threads),
         lanes,
         fields: FIELDS.to_vec(),
+        ..Options::default()
     };
     let mut run = Run::new(model, options);
     let rows = |scale: f64, base: &dyn Fn(usize) -> f64, salt: usize| -> Vec<f64> {
@@ -190,6 +191,7 @@ fn run_every_joint(seeds: &[usize], lanes: Lanes) -> Vec<Vec<u64>> {
         threads: Some(1),
         lanes,
         fields: fields.clone(),
+        ..Options::default()
     };
     let mut run = Run::new(&model, options);
     for (field, columns) in [

@@ -32,6 +32,7 @@ fn options(worlds: usize, precision: Precision, lanes: Lanes, threads: usize) ->
         lanes,
         threads: Some(threads),
         fields: FIELDS.to_vec(),
+        ..Options::default()
     }
 }
 

@@ -5,7 +5,7 @@ mod common;
 use common::{Demo, Run, command, lesson_with_table};
 use sim_core::batch::{Field, status};
 use sim_engine::backend::{Values, cpu};
-use sim_engine::simulation::{Lanes, Options, Precision};
+use sim_engine::simulation::{Faults, Lanes, Options, Precision, Simulation};
 
 const WORLDS: usize = 37;
 const FIELDS: [Field; 8] = [
@@ -46,6 +46,7 @@ fn run(
         lanes,
         threads: Some(threads),
         fields: FIELDS[..6].to_vec(),
+        ..Options::default()
     };
     let mut run = Run::new(&model, options);
     let dofs = model.dofs();
@@ -169,4 +170,111 @@ fn steps_of_a_frozen_world_stand_still() {
     let mut expected = vec![3; 20];
     expected[7] = 1;
     assert_eq!(steps(&run), expected);
+}
+
+/// Status, steps and velocities of every world of a pendulum's fall, frame by frame.
+fn swing(faults: Faults, worlds: usize) -> Vec<(Vec<f64>, Vec<u64>, Vec<f64>)> {
+    let mut scene = lesson_with_table(Demo::Torque, false);
+    scene.shapes.clear();
+    let model = scene.compile().unwrap();
+    let options = Options {
+        worlds,
+        threads: Some(1),
+        fields: vec![Field::JointQd],
+        faults,
+        ..Options::default()
+    };
+    let mut run = Run::new(&model, options);
+    let mut rows = vec![0.0; worlds * 9];
+    for world in 0..worlds {
+        rows[world * 9 + 2] = 3.0 * world as f64;
+    }
+    let steps = |run: &Run| -> Vec<u64> {
+        let slots = &run.sim.layout().slots;
+        let slot = slots.iter().find(|slot| slot.field == Field::Step).unwrap();
+        run.arena[slot.offset / 8..slot.offset / 8 + worlds].to_vec()
+    };
+    (0..40)
+        .map(|_| {
+            run.sim
+                .command(Field::JointF, 0..9, Values::F64(&rows))
+                .unwrap();
+            run.step();
+            let status = (0..worlds).flat_map(|w| run.get(Field::Status, w));
+            let qd = (0..worlds).flat_map(|w| run.get(Field::JointQd, w));
+            (status.collect(), steps(&run), qd.collect())
+        })
+        .collect()
+}
+
+/// Largest speed of a world's joints.
+fn speed(qd: &[f64], world: usize) -> f64 {
+    let row = &qd[world * 9..(world + 1) * 9];
+    row.iter().fold(0.0, |most, x| most.max(x.abs()))
+}
+
+#[test]
+fn a_world_beyond_the_bounds_is_frozen_within_them() {
+    const BOUND: f64 = 2.0;
+    let bounds = Faults {
+        joint_qd_max: BOUND,
+        ..Faults::default()
+    };
+    let (free, bound) = (swing(Faults::default(), 19), swing(bounds, 19));
+    let mut frozen = [false; 19];
+    for ((_, _, plain), (status, _, qd)) in free.iter().zip(&bound) {
+        for (world, frozen) in frozen.iter_mut().enumerate() {
+            *frozen |= speed(plain, world) > BOUND;
+            let expected = if *frozen { status::OUT_OF_BOUNDS } else { 0 };
+            assert_eq!(status[world], f64::from(expected), "world {world}");
+            assert!(speed(qd, world) <= BOUND);
+            let row = world * 9..(world + 1) * 9;
+            assert!(*frozen || plain[row.clone()] == qd[row]);
+        }
+    }
+    assert!(frozen.contains(&true) && frozen.contains(&false));
+}
+
+#[test]
+fn a_world_that_is_reset_by_itself_begins_anew() {
+    let faults = Faults {
+        joint_qd_max: 2.0,
+        resets: true,
+        ..Faults::default()
+    };
+    let found = swing(faults, 19);
+    let mut again = 0;
+    for (before, after) in found.iter().zip(&found[1..]) {
+        for world in 0..19 {
+            if before.0[world] == f64::from(status::OUT_OF_BOUNDS) {
+                assert_eq!(
+                    (after.0[world], after.1[world]),
+                    (0.0, 1),
+                    "it has made a step since"
+                );
+                // as in its first frame
+                let row = world * 9..(world + 1) * 9;
+                assert_eq!(after.2[row.clone()], found[0].2[row]);
+                again += 1;
+            }
+        }
+    }
+    assert!(again > 3);
+}
+
+#[test]
+fn bounds_that_no_world_keeps_are_refused() {
+    let model = lesson_with_table(Demo::Torque, false).compile().unwrap();
+    for value in [0.0, -1.0, f64::NAN] {
+        let faults = Faults {
+            joint_q_max: value,
+            ..Faults::default()
+        };
+        let options = Options {
+            faults,
+            ..Options::default()
+        };
+        let error = Simulation::new(model.clone(), &options).err().unwrap();
+        assert!(error.to_string().starts_with("the bound of joint_q is"));
+    }
 }

@@ -65,6 +65,7 @@ fn options(precision: Precision, lanes: Lanes, threads: usize, worlds: usize) ->
         lanes,
         threads: Some(threads),
         fields: FIELDS.to_vec(),
+        ..Options::default()
     }
 }
 

@@ -80,6 +80,18 @@ pub(crate) struct Serve {
     #[arg(long, value_delimiter = ',')]
     pub(crate) params: Vec<String>,
 
+    /// Largest |joint_q| of a world [rad or m]; one beyond it is frozen at its state before that frame.
+    #[arg(long, value_name = "Q", default_value_t = f64::INFINITY)]
+    pub(crate) joint_q_max: f64,
+
+    /// Largest |joint_qd| of a world [rad/s or m/s], likewise.
+    #[arg(long, value_name = "QD", default_value_t = f64::INFINITY)]
+    pub(crate) joint_qd_max: f64,
+
+    /// What becomes of a frozen world: freeze keeps it until it is reset, reset resets it before its next step.
+    #[arg(long, default_value = "freeze")]
+    pub(crate) on_fault: String,
+
     /// Frames that a client may hold at once.
     #[arg(long, default_value_t = 4)]
     pub(crate) frames_held: usize,

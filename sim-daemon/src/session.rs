@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde_json::json;
 use sim_core::batch::Field;
-use sim_engine::simulation::{Lanes, Options, Precision, Simulation};
+use sim_engine::simulation::{Faults, Lanes, Options, Precision, Simulation};
 use sim_protocol::host::{Host, check_memory};
 use sim_protocol::place::Place;
 use sim_protocol::tenancy::Tenancy;
@@ -184,6 +184,20 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
         };
         fields.push(field);
     }
+    if !matches!(serve.on_fault.as_str(), "freeze" | "reset") {
+        let problem = "unknown; use freeze or reset".to_owned();
+        return wrong("on-fault", &serve.on_fault, problem);
+    }
+    for (argument, value) in [
+        ("joint-q-max", serve.joint_q_max),
+        ("joint-qd-max", serve.joint_qd_max),
+    ] {
+        // false for NaN too
+        if !(value > 0.0) {
+            let problem = "give a number above 0, or leave it out for none".to_owned();
+            return wrong(argument, &value, problem);
+        }
+    }
     let (worlds, threads) = (serve.worlds as usize, serve.threads);
     Ok(Options {
         worlds,
@@ -191,6 +205,11 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
         threads,
         lanes: Lanes::Auto,
         fields,
+        faults: Faults {
+            joint_q_max: serve.joint_q_max,
+            joint_qd_max: serve.joint_qd_max,
+            resets: serve.on_fault == "reset",
+        },
     })
 }
 

@@ -93,6 +93,7 @@ fn motion(
         threads: Some(1),
         lanes,
         fields,
+        ..Options::default()
     };
     let mut run = Run::new(&scene.compile().unwrap(), options);
     run.write(Field::JointQ, q);

@@ -55,6 +55,7 @@ pub fn options(worlds: usize, precision: Precision, lanes: Lanes, threads: usize
         threads: Some(threads),
         lanes,
         fields: STATE.to_vec(),
+        ..Options::default()
     }
 }
 

@@ -40,3 +40,28 @@ def test_one_world_that_blows_up_is_frozen_and_comes_back_by_reset(pendulum, pre
         frame = sim.step(joint_f=torque)
         assert not frame.status.any() and frame.step.tolist() == np.where(well, 5, 1).tolist()
         assert np.array_equal(frame.joint_q[sick], before.joint_q[sick]), "as in its first frame"
+
+
+def test_bounds_freeze_a_world_and_on_fault_resets_it(pendulum):
+    push = np.zeros((9, 2))
+    push[4] = 30.0
+    runs = {}
+    for on_fault in ("freeze", "reset"):
+        with tl.launch(pendulum, worlds=9, bounds={"joint_qd": 3.0}, on_fault=on_fault) as sim:
+            runs[on_fault] = [(frame := sim.step(joint_f=push)).status.copy() for _ in range(30)]
+            assert np.abs(frame.joint_qd).max() <= 3.0
+    stays, returns = (np.array(runs[on_fault])[:, 4] for on_fault in ("freeze", "reset"))
+    first = int(np.argmax(stays))
+    assert stays[first] == 8 and (stays[first:] == 8).all()
+    assert returns[first] == 8 and returns[first + 1] == 0
+    for run in runs.values():
+        assert not np.delete(np.array(run), 4, axis=1).any()
+
+
+def test_wrong_bounds_are_refused_by_name(pendulum):
+    with pytest.raises(tl.ArgumentError, match=r"bounds has 'speed'; give joint_q and joint_qd"):
+        tl.launch(pendulum, worlds=1, bounds={"speed": 1.0})
+    with pytest.raises(tl.ArgumentError, match=r"bounds of joint_q is -1; it must be above 0"):
+        tl.launch(pendulum, worlds=1, bounds={"joint_q": -1.0})
+    with pytest.raises(tl.ArgumentError, match=r"on-fault.*`?panic`?.*use freeze or reset"):
+        tl.launch(pendulum, worlds=1, on_fault="panic")

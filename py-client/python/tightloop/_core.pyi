@@ -79,9 +79,9 @@ class Frame:
     status: NDArray[np.uint32]
     """Trouble of the world, as bits [–], ``(worlds,)``; 0 is none.
 
-    1: positions or velocities are not finite; reset or write the world. 2: the solver used up its iterations in some
-    physics step of the last frame. 4: contacts did not fit into the scene's ``contacts_max`` or ``rows_max``, and were
-    left out.
+    1: it was no longer finite, 8: it was beyond the bounds of the run: it is frozen until it is reset or restored.
+    2: the solver used up its iterations in some physics step of the last frame. 4: contacts did not fit into the
+    scene's ``contacts_max`` or ``rows_max``, and were left out.
     """
     contacts_left_out: NDArray[np.uint32]
     """Contacts that did not fit: the most of any physics step of the last frame [–], ``(worlds,)``."""

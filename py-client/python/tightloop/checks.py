@@ -25,20 +25,27 @@ _INT_MAX = 2**63 - 1
 _QUAT_NORM_SLACK = 1e-3
 
 
-def number(what: str, value: SupportsFloat, *, above: float | None = None, least: float | None = None) -> float:
+def number(
+    what: str,
+    value: SupportsFloat,
+    *,
+    above: float | None = None,
+    least: float | None = None,
+    error: type[Exception] = SceneError,
+) -> float:
     """A finite float, above or at least a bound."""
     try:
         checked = float(value)
     except (TypeError, ValueError):
-        raise SceneError(f"{what} is {value!r}; give a number") from None
+        raise error(f"{what} is {value!r}; give a number") from None
     except OverflowError:  # a whole number of more than 308 digits
-        raise SceneError(f"{what} is larger than any float; give a finite number") from None
+        raise error(f"{what} is larger than any float; give a finite number") from None
     if not math.isfinite(checked):
-        raise SceneError(f"{what} is {checked}; give a finite number")
+        raise error(f"{what} is {checked}; give a finite number")
     if above is not None and checked <= above:
-        raise SceneError(f"{what} is {checked:g}; it must be above {above:g}")
+        raise error(f"{what} is {checked:g}; it must be above {above:g}")
     if least is not None and checked < least:
-        raise SceneError(f"{what} is {checked:g}; it must be at least {least:g}")
+        raise error(f"{what} is {checked:g}; it must be at least {least:g}")
     return checked
 
 

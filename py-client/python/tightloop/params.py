@@ -20,7 +20,8 @@ class Params:
     """What `Sim.params` is: each parameter named in ``launch(params=...)`` or by the scene is an attribute.
 
     Reading one gives an array, shape ``(worlds, ...)``, read-only (``.copy()`` is yours); assigning to one writes it in
-    all worlds, `write` in some. What is written holds from the next step on, over resets too (but for ``body_f``, which a reset clears).
+    all worlds, `write` in some. What is written holds from the next step on, over resets too (but for ``body_f``, which
+    a reset clears).
 
     ``gravity`` (worlds, 3) [m/s²], ``body_mass_scale`` (worlds, bodies) [–], ``joint_armature`` [kg·m² or kg],
     ``joint_damping``, ``joint_target_kd`` [N·m·s/rad or N·s/m], ``joint_target_ke`` [N·m/rad or N/m],

@@ -262,6 +262,8 @@ def launch(
     threads: int | None = None,
     fields: Sequence[str] = ("joint_q", "joint_qd", "body_q"),
     params: Sequence[str] = (),
+    bounds: Mapping[str, float] | None = None,
+    on_fault: str = "freeze",
     name: str | None = None,
     log: str | os.PathLike[str] | None = None,
     frames_held: int = 4,
@@ -280,6 +282,10 @@ def launch(
             the scene names: of ``gravity``, ``body_mass_scale``, ``joint_armature``, ``joint_damping``,
             ``joint_target_ke``, ``joint_target_kd``, ``joint_effort_limit``, ``shape_mu``, ``body_f``; see
             `Sim.params`.
+        bounds: Largest ``"joint_q"`` [rad or m] and ``"joint_qd"`` [rad/s or m/s], in size; a world beyond one is
+            frozen at its state before that frame, with bit 8 of ``status``. None if left out.
+        on_fault: What becomes of a frozen world: ``"freeze"`` keeps it until it is reset, ``"reset"`` resets it
+            before its next step, so that its ``status`` is seen once.
         name: Name of the daemon, for `attach`; a unique one if left out.
         log: File for the daemon's news; warnings and errors go to stderr if left out.
         frames_held: How many frames may be alive at once, at least 1.
@@ -309,6 +315,12 @@ def launch(
         else checks.text("launch: name", name, error=ArgumentError),
         "frames-held": checks.integer("launch: frames_held", frames_held, error=ArgumentError),
     }
+    arguments["on-fault"] = checks.text("launch: on_fault", on_fault, error=ArgumentError)
+    for bound, value in ({} if bounds is None else bounds).items():
+        if bound not in ("joint_q", "joint_qd"):
+            raise ArgumentError(f"launch: bounds has {bound!r}; give joint_q and joint_qd, or one of them")
+        name_of = f"launch: bounds of {bound}"
+        arguments[f"{bound.replace('_', '-')}-max"] = checks.number(name_of, value, above=0.0, error=ArgumentError)
     if threads is not None:
         arguments["threads"] = checks.integer("launch: threads", threads, error=ArgumentError)
     if log is not None:

@@ -191,6 +191,7 @@ impl Dynamics {
                     threads: Some(1),
                     lanes: Lanes::Auto,
                     fields: fields.to_vec(),
+                    ..Options::default()
                 };
                 let simulation = Simulation::new(Arc::clone(&self.model), &options)?;
                 let arena = vec![0; simulation.layout().bytes.div_ceil(8)];

@@ -1,6 +1,6 @@
 //! Many worlds of one model: reset, write, step, read.
 
-pub use crate::backend::{Lanes, Precision};
+pub use crate::backend::{Faults, Lanes, Precision};
 
 use crate::backend::{Backend, BackendError, Values, cpu};
 use crate::snapshot::{self, Head, SnapshotError};
@@ -23,6 +23,8 @@ pub struct Options {
     pub lanes: Lanes,
     /// Fields of a frame; counters come with every frame.
     pub fields: Vec<Field>,
+    /// When a world is frozen, and what becomes of it.
+    pub faults: Faults,
 }
 
 impl Default for Options {
@@ -33,6 +35,7 @@ impl Default for Options {
             threads: None,
             lanes: Lanes::Auto,
             fields: vec![Field::JointQ, Field::JointQd, Field::BodyQ],
+            faults: Faults::default(),
         }
     }
 }
@@ -62,11 +65,23 @@ impl Simulation {
         if options.threads == Some(0) {
             return Err(BackendError::NoThreads);
         }
+        let Faults {
+            joint_q_max,
+            joint_qd_max,
+            ..
+        } = options.faults;
+        for (bound, value) in [("joint_q", joint_q_max), ("joint_qd", joint_qd_max)] {
+            // false for NaN too
+            if !(value > 0.0) {
+                return Err(BackendError::Bound { bound, value });
+            }
+        }
         check_memory(&model, options)?;
         let layout = Simulation::layout_of(&model, options);
         let threads = threads_of(options);
         let (worlds, precision) = (options.worlds, options.precision);
-        let backend = cpu::create(&model, worlds, precision, options.lanes, &layout, threads)?;
+        let mut backend = cpu::create(&model, worlds, precision, options.lanes, &layout, threads)?;
+        backend.set_faults(options.faults);
         Ok(Simulation {
             model,
             worlds,

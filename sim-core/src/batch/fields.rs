@@ -181,7 +181,7 @@ fields! {
     BodyContactForce "body_contact_force" Derived [Bodies, Size(3)] "N" REAL, "Sum of the contact forces on each link, in world axes.";
     Time "time" Counter [] "s" F64, "Simulated time since the world's reset.";
     Step "step" Counter [] "–" U64, "Control frames since the world's reset.";
-    Status "status" Counter [] "–" U32, "Trouble of the world, as bits: 1 = it was no longer finite and is frozen at its last finite state, and `step`, until it is reset; 2 = the solver used up its iterations, 4 = contacts were left out; 0 = none.";
+    Status "status" Counter [] "–" U32, "Trouble of the world, as bits: 1 = it was no longer finite, 8 = it was beyond the bounds of the run: it is frozen at its state before that frame, and `step`, until it is reset; 2 = the solver used up its iterations, 4 = contacts were left out; 0 = none.";
     ContactsLeftOut "contacts_left_out" Counter [] "–" U32, "Contacts that did not fit into contacts_max or rows_max: the most of any substep of the last frame, and of the state shown where contact fields are asked for.";
 }
 

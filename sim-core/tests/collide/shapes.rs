@@ -236,6 +236,7 @@ fn touching(
             Field::ContactDistance,
             Field::ContactNormal,
         ],
+        ..Options::default()
     };
     let mut sim = Simulation::new(scene.compile().unwrap(), &options).unwrap();
     let mut arena = vec![0; sim.layout().bytes / 8];

@@ -175,4 +175,12 @@ pub enum BackendError {
         /// The gain.
         value: f64,
     },
+    /// A bound that every world is beyond.
+    #[error("the bound of {bound} is {value}; give a number above 0, or infinity for none")]
+    Bound {
+        /// What it bounds.
+        bound: &'static str,
+        /// The bound.
+        value: f64,
+    },
 }

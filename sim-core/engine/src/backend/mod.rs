@@ -78,12 +78,35 @@ pub enum Lanes {
     Sixteen,
 }
 
+/// When a world is frozen, besides where it is no longer finite, and what becomes of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Faults {
+    /// Largest |joint_q| [rad or m].
+    pub joint_q_max: f64,
+    /// Largest |joint_qd| [rad/s or m/s].
+    pub joint_qd_max: f64,
+    /// Is it reset before its next step, or frozen until somebody resets it?
+    pub resets: bool,
+}
+
+impl Default for Faults {
+    fn default() -> Faults {
+        Faults {
+            joint_q_max: f64::INFINITY,
+            joint_qd_max: f64::INFINITY,
+            resets: false,
+        }
+    }
+}
+
 /// What keeps the worlds. Arguments were checked by [`crate::simulation::Simulation`].
 pub trait Backend: Send {
     /// What it runs on, for people.
     fn device(&self) -> &str;
     /// Threads that a step may use.
     fn threads(&self) -> usize;
+    /// When worlds are frozen from now on, and what becomes of them.
+    fn set_faults(&mut self, faults: Faults);
     /// Sets columns of a state or command field in the worlds of the mask (none = all);
     /// a written state clears the warm start of its worlds.
     fn write(

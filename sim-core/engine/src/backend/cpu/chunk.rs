@@ -2,7 +2,7 @@
 
 use super::contacts;
 use super::transfer::{self, Arena};
-use crate::backend::Values;
+use crate::backend::{Faults, Values};
 use crate::start::StartDraw;
 use sim_core::batch::{Block, Field, Layout};
 use sim_core::compiled::Stages;
@@ -26,6 +26,8 @@ pub(super) struct Job<F: Lane> {
     finds_contacts: bool,
     /// Duration of a control frame [s].
     pub frame_s: f64,
+    /// When a world is frozen.
+    pub faults: Faults,
     /// State and commands of a world after a reset, in the order of [`StateField`].
     pub start: Vec<F::Real>,
     /// What is drawn over it.
@@ -116,6 +118,7 @@ impl<F: Lane> Job<F> {
             stages,
             layout,
             frame_s: model.substeps() as f64 * model.dt(),
+            faults: Faults::default(),
             start: reset,
             draw: StartDraw::new(model),
         }
@@ -296,12 +299,15 @@ impl<F: Lane> Chunk<F> {
         let stride = shape.total() * F::WIDTH;
         for block in 0..self.worlds.len().div_ceil(F::WIDTH) {
             let state = block * stride..(block + 1) * stride;
+            if job.faults.resets && substeps > 0 {
+                self.reset_frozen(job, block);
+            }
             self.load(state.clone());
             for pass in 0..=substeps {
                 let evaluates = pass == substeps;
                 if evaluates {
                     if substeps > 0 {
-                        self.note(shape, block, state.clone());
+                        self.note(job, block, state.clone());
                     }
                     // before the evaluation, which moves the warm start: what is read must not change the run
                     self.store(shape, state.clone());

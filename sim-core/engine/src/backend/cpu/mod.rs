@@ -12,7 +12,7 @@ mod trouble;
 
 pub use dispatch::{available, create};
 
-use super::{Backend, BackendError, Lanes, Precision, Values};
+use super::{Backend, BackendError, Faults, Lanes, Precision, Values};
 use chunk::{Chunk, Job, StateField};
 use dispatch::{Program, RunChunk};
 use rayon::prelude::*;
@@ -94,6 +94,10 @@ impl<F: Lane> Backend for Cpu<F> {
 
     fn threads(&self) -> usize {
         self.threads
+    }
+
+    fn set_faults(&mut self, faults: Faults) {
+        self.job.faults = faults;
     }
 
     fn write(

@@ -30,16 +30,26 @@ impl<F: Lane> Chunk<F> {
                         seeds[outside]
                     };
                     self.episodes[world] = 0;
+                    self.begin(job, world);
                 }
-                // after 2³² episodes the first comes again
-                None => self.episodes[world] = self.episodes[world].wrapping_add(1),
+                None => self.begin_next(job, world),
             }
-            self.reset_lane(job, world);
-            self.draw_start(job, world);
-            self.steps[world] = 0;
-            self.status[world] = 0;
-            self.left_out[world] = 0;
         }
+    }
+
+    /// Begins the next episode of a world; after 2³² the first comes again.
+    pub(super) fn begin_next(&mut self, job: &Job<F>, world: usize) {
+        self.episodes[world] = self.episodes[world].wrapping_add(1);
+        self.begin(job, world);
+    }
+
+    /// Begins the episode of a world.
+    fn begin(&mut self, job: &Job<F>, world: usize) {
+        self.reset_lane(job, world);
+        self.draw_start(job, world);
+        self.steps[world] = 0;
+        self.status[world] = 0;
+        self.left_out[world] = 0;
     }
 
     /// State and commands of a lane as the scene starts them; parameters stay as they are, but for loads.

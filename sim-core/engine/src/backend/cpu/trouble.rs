@@ -1,6 +1,6 @@
 //! Trouble of worlds: told in their status, and kept from what comes after.
 
-use super::chunk::{Chunk, Shape, StateField};
+use super::chunk::{Chunk, Job, Shape, StateField};
 use sim_core::batch::status;
 use sim_core::lane::{Lane, Real};
 use std::ops::Range;
@@ -8,25 +8,40 @@ use std::ops::Range;
 impl<F: Lane> Chunk<F> {
     /// Counts a frame, and notes its trouble. `state` is the block's before the frame.
     ///
-    /// A world that is no longer finite is frozen: it goes back to that state, its steps stand still, and so it stays until
-    /// it is reset.
+    /// A world that is no longer finite, or beyond the bounds of the run, is frozen: it goes back to that state, its steps
+    /// stand still, and so it stays until it is reset.
     #[inline(always)]
-    pub(super) fn note(&mut self, shape: Shape, block: usize, state: Range<usize>) {
-        let (zero, one, infinity) = (F::c(0.0), F::c(1.0), F::c(f64::INFINITY));
-        let mut trouble = zero;
-        for group in [&self.block.joint_q, &self.block.joint_qd] {
+    pub(super) fn note(&mut self, job: &Job<F>, block: usize, state: Range<usize>) {
+        let (zero, infinity) = (F::c(0.0), F::c(f64::INFINITY));
+        let (lost, beyond) = (
+            F::c(f64::from(status::NOT_FINITE)),
+            F::c(f64::from(status::OUT_OF_BOUNDS)),
+        );
+        let (mut trouble, mut outside) = (zero, zero);
+        for (group, bound) in [
+            (&self.block.joint_q, job.faults.joint_q_max),
+            (&self.block.joint_qd, job.faults.joint_qd_max),
+        ] {
+            let bound = F::c(bound);
             for x in group {
                 // false for NaN too
-                trouble = F::select(x.abs().lt(infinity), trouble, one);
+                trouble = F::select(x.abs().lt(infinity), trouble, lost);
+                outside = F::select(bound.lt(x.abs()), beyond, outside);
             }
         }
         self.flag(block, self.block.unconverged[0], status::NOT_CONVERGED);
         let worlds = self.worlds_of(block);
-        trouble.store(&mut self.lanes);
+        F::select(zero.lt(trouble), trouble, outside).store(&mut self.lanes);
         let mut frozen = false;
         for (lane, world) in worlds.enumerate() {
-            if self.lanes[lane] > F::Real::default() || self.is_frozen(world) {
-                self.status[world] = status::NOT_FINITE;
+            let found = self.lanes[lane].to_usize() as u32;
+            let trouble = if self.is_frozen(world) {
+                self.status[world]
+            } else {
+                found
+            };
+            if trouble & status::FROZEN != 0 {
+                self.status[world] = trouble;
                 self.lanes[lane] = F::Real::of(1.0);
                 frozen = true;
             } else {
@@ -34,7 +49,16 @@ impl<F: Lane> Chunk<F> {
             }
         }
         if frozen {
-            self.put_back(shape, state);
+            self.put_back(Shape::of(&job.constants), state);
+        }
+    }
+
+    /// Resets the worlds of a block that are frozen: their next episode begins.
+    pub(super) fn reset_frozen(&mut self, job: &Job<F>, block: usize) {
+        for world in self.worlds_of(block) {
+            if self.is_frozen(world) {
+                self.begin_next(job, world);
+            }
         }
     }
 
@@ -86,7 +110,7 @@ impl<F: Lane> Chunk<F> {
     }
 
     fn is_frozen(&self, world: usize) -> bool {
-        self.status[world] & status::NOT_FINITE != 0
+        self.status[world] & status::FROZEN != 0
     }
 
     /// The worlds of a block, counted from the chunk's first.
