@@ -5,7 +5,7 @@ mod common;
 use common::{Demo, Run, START, command, lesson_with_table};
 use sim_core::batch::Field;
 use sim_core::model::params::{NO_LIMIT, Param};
-use sim_core::model::{Body, Collision, Description, Model, Pose, Shape};
+use sim_core::model::{Body, Collision, Description, Model, Pose, Shape, TargetMode};
 use sim_engine::backend::{BackendError, Values, cpu};
 use sim_engine::simulation::{Lanes, Options, Precision};
 use std::sync::Arc;
@@ -425,4 +425,57 @@ fn wrong_parameters_are_refused_by_name_and_change_nothing() {
     .concat();
     let kept: Vec<f64> = kept.iter().map(|&x| f64::from(x as f32)).collect();
     assert_eq!(run.sim.param(Param::JointTargetKe).unwrap(), kept);
+}
+
+#[test]
+fn gains_do_not_reach_what_has_no_drive() {
+    let gains = [
+        Param::JointTargetKe,
+        Param::JointTargetKd,
+        Param::JointEffortLimit,
+    ];
+    let model = arm(gains).compile().unwrap();
+    let free = model.dofs() - 6..model.dofs();
+    let [plain, driven] = [0.0, 700.0].map(|number| {
+        let mut run = Run::reference(&model, &[Field::JointQ]);
+        for param in gains {
+            let mut row = starts(&model, param);
+            row[free.clone()].fill(number);
+            set(&mut run, param, &row);
+        }
+        let mut start = model.start().joint_q.clone();
+        start[11] += 2.0;
+        run.write(Field::JointQ, &start);
+        play(&mut run, 0..20);
+        run.get(Field::JointQ, 0)
+    });
+    assert_eq!(plain, driven);
+    // it falls, and meets nothing
+    assert!((plain[11] - 2.125 + 0.5 * 9.81 / 9.0).abs() < 0.01);
+}
+
+#[test]
+fn a_drive_that_follows_velocities_has_no_position_gain() {
+    let mut scene = arm([Param::JointTargetKe]);
+    for joint in &mut scene.robots[0].joints {
+        for dof in &mut joint.dofs {
+            dof.target_mode = TargetMode::Velocity;
+        }
+    }
+    let model = scene.compile().unwrap();
+    let mut run = Run::new(&model, options(1, Precision::F32, Lanes::Auto, 1));
+    let gains = vec![5.0; model.dofs()];
+    let error = run
+        .sim
+        .write_param(
+            Param::JointTargetKe,
+            0..gains.len(),
+            Values::F64(&gains),
+            None,
+        )
+        .unwrap_err();
+    assert!(
+        matches!(error, BackendError::VelocityMode { .. }),
+        "{error}"
+    );
 }

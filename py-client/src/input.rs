@@ -61,14 +61,16 @@ impl<'a, 'py> Inputs<'a, 'py> {
         let known = params
             .map(|param| &param.info)
             .find(|info| info.name == name);
-        let info = known.ok_or_else(|| {
-            let reason = format!("there is no parameter `{name}`");
-            raise(value.py(), "CommandRefused", reason)
-        })?;
+        let refused = |reason: String| raise(value.py(), "CommandRefused", reason);
+        let info = known.ok_or_else(|| refused(format!("there is no parameter `{name}`")))?;
+        let array = value.cast::<PyArrayDyn<f64>>()?;
+        if !array.is_c_contiguous() {
+            return Err(refused(format!("{name}: its rows are not contiguous")));
+        }
         self.arrays.push(Input {
             field: &info.name,
             columns: 0..info.columns,
-            array: Array::F64(value.cast::<PyArrayDyn<f64>>()?.try_readonly()?),
+            array: Array::F64(array.try_readonly()?),
         });
         Ok(())
     }

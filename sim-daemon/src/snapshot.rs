@@ -19,6 +19,12 @@ pub(crate) fn save(simulation: &Simulation, inbox: &Inbox) -> Result<(), Refusal
     let Some(folder) = path.parent() else {
         return Err(refuse("is no file; give the path of one".to_owned()));
     };
+    // a device or a pipe would be replaced by a file
+    if fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+        return Err(refuse(
+            "is there and no file; give the path of one".to_owned(),
+        ));
+    }
     // the bytes, and the file where it lies in memory too
     check_room(2 * simulation.snapshot_bytes() as u64).map_err(refuse)?;
     let header = inbox.header();

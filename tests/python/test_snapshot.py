@@ -274,3 +274,15 @@ def test_the_daemon_refuses_places_and_files_by_name_and_goes_on(small, tmp_path
     assert bits(small.forward()) == bits(here)
     client.snapshot(str(tmp_path / "text"))
     assert bits(client.restore(str(tmp_path / "text"), None, None)) == bits(here)
+
+
+def test_a_pipe_is_not_replaced_by_a_file(small, tmp_path: Path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(tl.SnapshotError, match="is there and no file"):
+        small.snapshot().save(pipe)
+    assert pipe.is_fifo()
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "file")
+    small.snapshot().save(link)
+    assert link.is_symlink() and tl.Snapshot.load(tmp_path / "file").worlds == small.worlds

@@ -48,7 +48,10 @@ def as_seed(value: Any, worlds: int) -> NDArray[np.uint64]:
     Raises:
         CommandRefused: Another length, or something else than whole numbers from 0 to 2**64 - 1.
     """
-    alone = isinstance(value, str | bytes) or np.ndim(value) == 0
+    try:
+        alone = isinstance(value, str | bytes) or np.ndim(value) == 0
+    except ValueError:  # rows of different lengths
+        alone = False
     entries: list[Any] = [value] if alone else list(value)
     if not alone and len(entries) != worlds:
         raise CommandRefused(f"seed: {len(entries)} seeds for {worlds} worlds; give one, or one a world")

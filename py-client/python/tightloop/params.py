@@ -23,6 +23,9 @@ class Params:
     all worlds, `write` in some. What is written holds from the next step on, over resets too (but for ``body_f``, which
     a reset clears).
 
+    Free joints have no drive: their gains and effort limits have no effect. `Sim.inverse_dynamics` and the other functions
+    of a state use the scene's numbers, not these. Reading takes a snapshot, for which this client must be in control.
+
     ``gravity`` (worlds, 3) [m/s²], ``body_mass_scale`` (worlds, bodies) [–], ``joint_armature`` [kg·m² or kg],
     ``joint_damping``, ``joint_target_kd`` [N·m·s/rad or N·s/m], ``joint_target_ke`` [N·m/rad or N/m],
     ``joint_effort_limit`` [N·m or N; 1e30 is none], each (worlds, dofs), ``shape_mu`` (worlds, shapes) [–],
@@ -52,6 +55,8 @@ class Params:
         return tuple(name for name, param in self._known.items() if param["place"] is not None)
 
     def __getattr__(self, name: str) -> NDArray[Any]:
+        if name.startswith("_"):
+            raise AttributeError(name)
         param = self._varying(name)
         # the parameters are the last numbers of a world
         first = self._numbers - param["place"]

@@ -165,7 +165,8 @@ class Sim:
     def snapshot(self) -> Snapshot:
         """Keep all worlds as they are now: a run that is restored from it goes on with the same bits.
 
-        It holds state, commands, ``step`` and ``status`` of every world, on their way through a file in shared memory.
+        It holds state, commands, parameters, seed and episode, ``step`` and ``status`` of every world, on their way
+        through a file in shared memory.
 
         Raises:
             SnapshotError: There is no room for it. Other errors are those of `step`.
@@ -181,7 +182,7 @@ class Sim:
         worlds: ArrayLike | None = None,
         from_world: int | None = None,
     ) -> Frame:
-        """Put worlds back to what they were in a snapshot: state, commands, ``step`` and ``status``.
+        """Put worlds back to what they were in a snapshot: state, commands, parameters, seeds, ``step``, ``status``.
 
         Under the same commands the run then has the bits that it had after the snapshot, on any number of threads.
         A world that was frozen then is frozen again, any other is freed.
@@ -216,7 +217,7 @@ class Sim:
 
     @functools.cached_property
     def dynamics(self) -> Dynamics:
-        """The scene's kinematics and dynamics as functions of a state; they touch no world.
+        """The scene's kinematics and dynamics as functions of a state; they touch no world, nor do they know `params`.
 
         Raises:
             SceneError: A robot's file cannot be read here, or is no longer what the daemon read.

@@ -88,6 +88,11 @@ class Snapshot:
             SnapshotError: The file cannot be written; the message says why.
         """
         file = checks.path("snapshot: path", path, error=SnapshotError)
+        # A device or a pipe would be replaced by a file
+        if file.exists() and not (file.is_file() or file.is_dir()):
+            raise SnapshotError(f"{file}: is there and no file; give the path of one")
+        # A link stays, what it leads to is replaced
+        file = file.resolve()
         part = file.with_name(f".tightloop-{secrets.token_hex(8)}")
         try:
             try:

@@ -5,7 +5,8 @@
 //! record   steps u64 · status u32 · contacts left out u32 · seed u64 · episode u32 · numbers         one a world, in order
 //! ```
 //! Numbers are little endian, those of a record f32 or f64. The checksum is the CRC-32 (IEEE 802.3) of all that follows it. A record's numbers are the whole
-//! state vector of a backend: positions with what rounding has left out of them, velocities, warm start, commands held.
+//! state vector of a backend: positions with what rounding has left out of them, velocities, warm start, commands held, and
+//! the parameters that vary.
 
 use crate::backend::{COUNTERS, Precision};
 

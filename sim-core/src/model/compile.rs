@@ -78,10 +78,19 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     // MuJoCo scales costs by 1 / (mean inertia × dofs)
     constants.solver.tolerance =
         scene.solver.tolerance * reference.mean_inertia * constants.dofs.len() as f64;
+    let mut locked_over_free = reference.locked_over_free;
+    if scene.params.contains(&Param::JointArmature) {
+        // armatures hide what the links do to each other, and a world may have none
+        let mut bare = constants.clone();
+        bare.dofs.iter_mut().for_each(|dof| dof.armature = 0.0);
+        let bare = inverse_weight::at_reference(&bare, &builder.dof_names);
+        let without = bare.map_or(f64::INFINITY, |bare| bare.locked_over_free);
+        locked_over_free = locked_over_free.max(without);
+    }
     // a pass takes an error of 1e-3 to 1e-6, one of 1e-1 to 1e-2 or 1e-3
     constants.solver.refinements = [1.0, 100.0, 1000.0]
         .iter()
-        .filter(|&times| reference.locked_over_free > times * LOCKED_OVER_FREE_MAX)
+        .filter(|&times| locked_over_free > times * LOCKED_OVER_FREE_MAX)
         .count();
     add_rows(
         &mut constants,

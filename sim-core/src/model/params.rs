@@ -66,12 +66,12 @@ macro_rules! params {
 
 params! {
     Gravity "gravity" Per::Entry(3), "m/s²" None, "Gravity in world axes.";
-    BodyMassScale "body_mass_scale" Per::Body(1), "–" Some(MASS_SCALE_MIN), "Mass and inertia of each link over those of the scene. What derives from masses at the reference pose, such as the softness of contacts and limits, stays.";
-    JointArmature "joint_armature" Per::Dof, "kg·m² or kg" Some(0.0), "Inertia of the drive.";
+    BodyMassScale "body_mass_scale" Per::Body(1), "–" Some(MASS_SCALE_MIN), "Mass and inertia of each link over those of the scene. What derives from masses at the reference pose, such as the softness of contacts and limits, stays, and so does the point that the velocity of a free joint is of: the centre of mass that the scene has.";
+    JointArmature "joint_armature" Per::Dof, "kg·m² or kg" Some(0.0), "Inertia of the drive; of a free joint, mass and inertia that are added to its body's without weight.";
     JointDamping "joint_damping" Per::Dof, "N·m·s/rad or N·s/m" Some(0.0), "Passive damping.";
-    JointTargetKe "joint_target_ke" Per::Dof, "N·m/rad or N/m" Some(0.0), "Proportional gain of the drive.";
-    JointTargetKd "joint_target_kd" Per::Dof, "N·m·s/rad or N·s/m" Some(0.0), "Derivative gain of the drive.";
-    JointEffortLimit "joint_effort_limit" Per::Dof, "N·m or N" Some(0.0), "Bound of the drive's force; 1e30 where there is none.";
+    JointTargetKe "joint_target_ke" Per::Dof, "N·m/rad or N/m" Some(0.0), "Proportional gain of the drive. Free joints have no drive.";
+    JointTargetKd "joint_target_kd" Per::Dof, "N·m·s/rad or N·s/m" Some(0.0), "Derivative gain of the drive. Free joints have no drive.";
+    JointEffortLimit "joint_effort_limit" Per::Dof, "N·m or N" Some(0.0), "Bound of the drive's force; 1e30 where there is none. Free joints have no drive.";
     ShapeMu "shape_mu" Per::Shape, "–" Some(0.0), "Coefficient of sliding friction of each collision shape; of two shapes the larger counts.";
     BodyF "body_f" Per::Body(6), "N, N·m" None, "Force on each link at its centre of mass, then torque, in world axes, until it is written again; a reset clears it.";
 }

@@ -55,8 +55,11 @@ pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
         // the last stage: nobody needs the mass matrix after it
         for (j, dof) in m.dofs.iter().enumerate() {
             // a clamped drive keeps its damping here, as under MuJoCo's `actfrcrange`
-            let passive = param(m, &b.params, Param::JointDamping, j, dof.damping);
-            let damping = passive + param(m, &b.params, Param::JointTargetKd, j, dof.kd);
+            let mut damping = param(m, &b.params, Param::JointDamping, j, dof.damping);
+            // nothing drives a free body
+            if m.bodies[dof.body].motion != Motion::Free {
+                damping = damping + param(m, &b.params, Param::JointTargetKd, j, dof.kd);
+            }
             let diagonal = m.pattern.at(j, j);
             w.mass_matrix[diagonal] = dt.fma(damping, w.mass_matrix[diagonal]);
             acceleration[j] = w.smooth_force[j] + cx.get(&b.constraint_force[j]);
