@@ -23,8 +23,9 @@ class Params:
     all worlds, `write` in some. What is written holds from the next step on, over resets too (but for ``body_f``, which
     a reset clears).
 
-    Free joints have no drive: their gains and effort limits have no effect. `Sim.inverse_dynamics` and the other functions
-    of a state use the scene's numbers, not these. Reading takes a snapshot, for which this client must be in control.
+    Free joints have no drive: their gains and effort limits have no effect. `Sim.inverse_dynamics` and the other
+    functions of a state use the scene's numbers, not these. Reading takes a snapshot, for which this client must be in
+    control.
 
     ``gravity`` (worlds, 3) [m/s²], ``body_mass_scale`` (worlds, bodies) [–], ``joint_armature`` [kg·m² or kg],
     ``joint_damping``, ``joint_target_kd`` [N·m·s/rad or N·s/m], ``joint_target_ke`` [N·m/rad or N/m],
