@@ -29,7 +29,7 @@ demo: wheel
 	$(PYTHON) examples/franka_grasp.py --worlds $(WORLDS)
 	$(PYTHON) examples/randomized_push.py --worlds $(WORLDS)
 	@echo && echo "The same in process, without daemon and Python:"
-	@cargo run --release --quiet --example franka_lesson -- $(WORLDS)
+	@cargo build --release --quiet --workspace --example franka_lesson && target/release/examples/franka_lesson $(WORLDS)
 
 test: wheel $(VENV)/.dev
 	cargo fmt --all --check
