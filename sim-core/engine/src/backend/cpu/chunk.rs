@@ -299,9 +299,6 @@ impl<F: Lane> Chunk<F> {
         let stride = shape.total() * F::WIDTH;
         for block in 0..self.worlds.len().div_ceil(F::WIDTH) {
             let state = block * stride..(block + 1) * stride;
-            if job.faults.resets && substeps > 0 {
-                self.reset_frozen(job, block);
-            }
             self.load(state.clone());
             for pass in 0..=substeps {
                 let evaluates = pass == substeps;
@@ -349,6 +346,10 @@ impl<F: Lane> Chunk<F> {
                         _ => transfer::export(self, &job.constants, slot, rows, arena),
                     }
                 }
+            }
+            // now that its trouble was shown, and before the commands of its first step come
+            if job.faults.resets && substeps > 0 {
+                self.reset_frozen(job, block);
             }
         }
     }
