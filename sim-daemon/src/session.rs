@@ -192,8 +192,7 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
         ("joint-q-max", serve.joint_q_max),
         ("joint-qd-max", serve.joint_qd_max),
     ] {
-        // false for NaN too
-        if !(value > 0.0) {
+        if value <= 0.0 || value.is_nan() {
             let problem = "give a number above 0, or leave it out for none".to_owned();
             return wrong(argument, &value, problem);
         }

@@ -71,8 +71,7 @@ impl Simulation {
             ..
         } = options.faults;
         for (bound, value) in [("joint_q", joint_q_max), ("joint_qd", joint_qd_max)] {
-            // false for NaN too
-            if !(value > 0.0) {
+            if value <= 0.0 || value.is_nan() {
                 return Err(BackendError::Bound { bound, value });
             }
         }
