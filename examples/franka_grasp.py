@@ -3,9 +3,9 @@
     python examples/franka_grasp.py --worlds 4096
 
 The arm follows recorded targets, the same in every world. What differs is the cube: where it stands, by a few
-millimetres, how it is turned, and its friction. Friction is the model's, so each coefficient is a launch of its own
-with its share of the worlds; the smallest is too slippery to be lifted. World 0 of each has the cube where the record
-has it, and that with the lesson's friction is compared with the recorded run (MuJoCo C in float64), where there is one.
+millimetres, how it is turned, and its friction. Each coefficient is a launch of its own with its share of the worlds;
+the smallest is too slippery to be lifted. World 0 of each has the cube where the record has it, and that with the
+lesson's friction is compared with the recorded run (MuJoCo C in float64), where there is one.
 """
 
 from __future__ import annotations

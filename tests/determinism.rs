@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Demo, Run, command, lesson};
+use common::{Demo, Run, command, lesson, noise};
 use sim_core::batch::Field;
 use sim_core::model::{Description, Model, UrdfOptions};
 use sim_engine::backend::{Values, cpu};
@@ -17,16 +17,6 @@ const FIELDS: [Field; 6] = [
     Field::MassMatrix,
     Field::EfcForce,
 ];
-
-/// A number in [-1, 1) from a world's seed: no shared generator, so worlds can be moved about.
-fn noise(seed: usize, k: usize) -> f64 {
-    let mut x = (seed as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (k as u64) << 32;
-    for _ in 0..3 {
-        x ^= x >> 31;
-        x = x.wrapping_mul(0xd6e8_feb8_6659_fd93);
-    }
-    (x >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-}
 
 /// The lesson, and the same with a narrow range of the first joint as its only constraint: some worlds are
 /// within it, for whom the solver does nothing, while others beside them bounce off its ends.

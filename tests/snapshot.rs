@@ -2,8 +2,8 @@
 
 mod common;
 
-use common::shapes::shapes;
 use common::{Demo, Run, lesson_with_table};
+use common::{noise, shapes::shapes};
 use sim_core::batch::{Field, status};
 use sim_core::model::{Body, Collision, Cone, Description, Model, Pose, Shape, UrdfOptions};
 use sim_engine::backend::{COUNTERS, Values, cpu};
@@ -30,16 +30,6 @@ const FIELDS: [Field; 13] = [
 /// Frames before the snapshot: contacts of the lesson begin in frame 14.
 const BEFORE: usize = 16;
 const AFTER: usize = 12;
-
-/// A number in [-1, 1) from a world's seed: no shared generator, so worlds can be moved about.
-fn noise(seed: usize, k: usize) -> f64 {
-    let mut x = (seed as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (k as u64) << 32;
-    for _ in 0..3 {
-        x ^= x >> 31;
-        x = x.wrapping_mul(0xd6e8_feb8_6659_fd93);
-    }
-    (x >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-}
 
 /// The arm with a cube, a robot with every kind of joint, and bodies of every shape.
 fn models() -> [Arc<Model>; 3] {

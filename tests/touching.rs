@@ -2,8 +2,8 @@
 
 mod common;
 
-use common::Run;
 use common::shapes::shapes;
+use common::{Run, noise};
 use sim_core::batch::{Field, status};
 use sim_core::model::{Cone, Description, Model};
 use sim_engine::backend::{Values, cpu};
@@ -24,16 +24,6 @@ const FIELDS: [Field; 11] = [
     Field::BodyContactForce,
 ];
 const FRAMES: usize = 15;
-
-/// A number in [-1, 1) from a world's seed: no shared generator, so worlds can be moved about.
-fn noise(seed: usize, k: usize) -> f64 {
-    let mut x = (seed as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (k as u64) << 32;
-    for _ in 0..3 {
-        x ^= x >> 31;
-        x = x.wrapping_mul(0xd6e8_feb8_6659_fd93);
-    }
-    (x >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-}
 
 /// Worlds in which both bodies are somewhere else among the shapes that stand still, turned and moving; world w by `seeds[w]`.
 fn started(model: &Arc<Model>, seeds: &[usize], options: Options) -> Run {

@@ -33,6 +33,16 @@ pub fn lesson_with_table(demo: Demo, has_cube: bool) -> Description {
     scene
 }
 
+/// A number in [-1, 1) from a world's seed: no shared generator, so worlds can be moved about.
+pub fn noise(seed: usize, k: usize) -> f64 {
+    let mut x = (seed as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (k as u64) << 32;
+    for _ in 0..3 {
+        x ^= x >> 31;
+        x = x.wrapping_mul(0xd6e8_feb8_6659_fd93);
+    }
+    (x >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
 /// A path in the repository.
 pub fn repo(path: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(path)

@@ -62,6 +62,8 @@ def test_bounds_freeze_a_world_and_on_fault_resets_it(pendulum):
 def test_wrong_bounds_are_refused_by_name(pendulum):
     with pytest.raises(tl.ArgumentError, match=r"bounds has 'speed'; give joint_q and joint_qd"):
         tl.launch(pendulum, worlds=1, bounds={"speed": 1.0})
+    with pytest.raises(tl.ArgumentError, match=r"bounds is 3; give a dict"):
+        tl.launch(pendulum, worlds=1, bounds=3)  # pyright: ignore[reportArgumentType]
     with pytest.raises(tl.ArgumentError, match=r"bounds of joint_q is -1; it must be above 0"):
         tl.launch(pendulum, worlds=1, bounds={"joint_q": -1.0})
     with pytest.raises(tl.ArgumentError, match=r"on-fault.*`?panic`?.*use freeze or reset"):

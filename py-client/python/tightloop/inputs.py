@@ -18,14 +18,24 @@ def as_array(field: str, robot: str | None, value: Any, worlds: int, columns: in
         CommandRefused: The shape is neither ``(worlds, columns)`` nor ``(columns,)``, or these are no real numbers.
     """
     what = field if robot is None else f"{field} of robot `{robot}`"
-    given = _numpy(what, value)
-    if given.dtype.kind not in "fiu":
-        raise CommandRefused(f"{what}: dtype {given.dtype} is not a real number; give float32 or float64")
+    given = real_numbers(what, value)
     if given.shape not in ((worlds, columns), (columns,)):
         expected = f"expected shape {(worlds, columns)}, or {(columns,)} for every world alike"
         raise CommandRefused(f"{what}: {expected}; got {given.shape}")
     with np.errstate(over="ignore"):  # float128 may become inf, which is refused by name
         return np.array(np.broadcast_to(given, (worlds, columns)), dtype=np.float64, order="C")
+
+
+def real_numbers(what: str, value: Any) -> NDArray[Any]:
+    """Any array of real numbers, as it is.
+
+    Raises:
+        CommandRefused: These are no real numbers, or no array.
+    """
+    given = _numpy(what, value)
+    if given.dtype.kind not in "fiu":
+        raise CommandRefused(f"{what}: dtype {given.dtype} is not a real number; give float32 or float64")
+    return given
 
 
 def as_mask(value: Any, worlds: int) -> NDArray[np.bool_]:

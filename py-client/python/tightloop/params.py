@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop import _core
 from tightloop._core import Frame
 from tightloop.errors import CommandRefused, UnknownField
+from tightloop.inputs import real_numbers
 
 #: Numbers of a link in a parameter that has several.
 LINK_PARTS = {"body_f": 6}
@@ -90,12 +91,7 @@ class Params:
         """
         self._varying(name)
         shape = self._shape(name)
-        try:
-            given = np.asarray(value)
-        except (ValueError, TypeError) as problem:
-            raise CommandRefused(f"{name}: is no array: {problem}") from None
-        if given.dtype.kind not in "fiu":
-            raise CommandRefused(f"{name}: dtype {given.dtype} is not a real number; give float32 or float64")
+        given = real_numbers(name, value)
         if given.shape not in (shape, shape[1:], ()):
             raise CommandRefused(
                 f"{name}: expected shape {shape}, {shape[1:]} for every world alike, or a number; got {given.shape}"

@@ -317,7 +317,9 @@ def launch(
         "frames-held": checks.integer("launch: frames_held", frames_held, error=ArgumentError),
     }
     arguments["on-fault"] = checks.text("launch: on_fault", on_fault, error=ArgumentError)
-    for bound, value in ({} if bounds is None else bounds).items():
+    if bounds is not None and not isinstance(bounds, Mapping):
+        raise ArgumentError(f'launch: bounds is {bounds!r}; give a dict, such as {{"joint_qd": 50.0}}')
+    for bound, value in (bounds or {}).items():
         if bound not in ("joint_q", "joint_qd"):
             raise ArgumentError(f"launch: bounds has {bound!r}; give joint_q and joint_qd, or one of them")
         name_of = f"launch: bounds of {bound}"
