@@ -9,7 +9,7 @@ use crate::error::DaemonError;
 use crate::export::{self, Advance};
 
 /// Serves until somebody asks to end.
-pub(crate) fn run(mut simulation: Simulation, mut host: Host) -> Result<(), DaemonError> {
+pub(crate) fn run(mut simulation: Simulation, host: &mut Host) -> Result<(), DaemonError> {
     let mut mask = Vec::with_capacity(simulation.worlds());
     let mut scratch = Vec::new();
     loop {

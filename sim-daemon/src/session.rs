@@ -41,7 +41,7 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
             })
             .inspect_err(announce_error)?;
     }
-    let (simulation, host) = open(serve, &stop).inspect_err(announce_error)?;
+    let (simulation, mut host) = open(serve, &stop).inspect_err(announce_error)?;
     let description = host.description();
     news.tell(&format!(
         "{}: {} worlds on {}, {} threads, {:.0} MB of shared memory; pid {}",
@@ -66,8 +66,10 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
     }});
     let watchdog = Watchdog::start(Arc::clone(&stop), serve.parent, host.janitor())?;
     announce(&ready);
-    let result = server::run(simulation, host);
+    let result = server::run(simulation, &mut host);
+    // its janitor must not look at the shared folder while the host takes that away
     drop(watchdog);
+    drop(host);
     match &result {
         Ok(()) => news.tell("ended"),
         Err(error) => news.tell(&format!("failed: {error}")),
