@@ -85,6 +85,10 @@ impl Simulation {
                         least: param.row().least.unwrap_or_default(),
                     });
                 }
+                let most = self.model().command_delay_max();
+                if param == Param::CommandDelay && value > most as f64 {
+                    return Err(BackendError::Delay { world, value, most });
+                }
                 if param == Param::JointTargetKe
                     && value > 0.0
                     && !self.model().constants().dofs[column].follows_position
@@ -117,10 +121,13 @@ impl Simulation {
     fn param_name(&self, param: Param, column: usize) -> String {
         let model = self.model();
         match param.row().per {
+            Per::Entry(1) => "the world".to_owned(),
             Per::Entry(_) => ["x", "y", "z"][column.min(2)].to_owned(),
             Per::Dof => model.dof_names()[column].clone(),
             Per::Body(n) => model.body_names()[column / n].clone(),
             Per::Shape => model.shape_names()[column].clone(),
+            Per::Site(n) => model.site_names()[column / n].clone(),
+            Per::ContactSensor => model.contact_sensors()[column].name.clone(),
         }
     }
 }

@@ -15,15 +15,37 @@ pub enum Stream {
     StartPosition = 0,
     /// Velocities after a reset; the index is a dof.
     StartVelocity = 1,
+    /// Of `joint_f` in a frame; the index is a dof. Streams of frames begin here.
+    ForceNoise = 128,
+    /// Of `joint_target_q`, likewise.
+    TargetNoise,
+    /// Of `joint_target_qd`, likewise.
+    TargetRateNoise,
+    /// Of `joint_q_measured`; the index is a dof.
+    PositionNoise,
+    /// Of `joint_qd_measured`, likewise.
+    VelocityNoise,
+    /// Of `joint_torque`, likewise.
+    TorqueNoise,
+    /// Of `site_q`; the index is six times the site's, and three of the position, three of the turn.
+    SitePoseNoise,
+    /// Of `site_qd`; the index is the column.
+    SiteVelocityNoise,
+    /// Of `gyro`; the index is the column.
+    GyroNoise,
+    /// Of `accelerometer`; the index is the column.
+    AccelerometerNoise,
+    /// Of `contact_sensor`; the index is the column.
+    ContactSensorNoise,
 }
 
 /// The numbers of one stream in one episode of one world, each with its index.
 #[derive(Clone, Copy, Debug)]
 pub struct Draw {
     key: [u32; 2],
-    world: u32,
-    episode: u32,
-    stream: u32,
+    counter: [u32; 3],
+    /// Added to the index.
+    offset: u32,
 }
 
 impl Draw {
@@ -31,9 +53,19 @@ impl Draw {
     pub fn new(seed: u64, world: u32, episode: u32, stream: Stream) -> Draw {
         Draw {
             key: [seed as u32, (seed >> 32) as u32],
-            world,
-            episode,
-            stream: stream as u32,
+            counter: [world, episode, stream as u32],
+            offset: 0,
+        }
+    }
+
+    /// Numbers of a frame of a world's episode, those of one of the streams of frames; indices below 2²⁴. After 2³² steps the
+    /// first come again.
+    pub fn at_step(seed: u64, world: u32, episode: u32, step: u64, stream: Stream) -> Draw {
+        Draw {
+            key: [seed as u32, (seed >> 32) as u32],
+            counter: [world, episode, step as u32],
+            // its highest bit is set, which no index of the other streams reaches
+            offset: (stream as u32) << 24,
         }
     }
 
@@ -62,7 +94,8 @@ impl Draw {
 
     /// Two independent numbers in [0, 1), multiples of 2⁻⁵³.
     fn units(&self, index: u32) -> [f64; 2] {
-        let [a, b, c, d] = philox([self.world, self.episode, self.stream, index], self.key);
+        let [world, episode, third] = self.counter;
+        let [a, b, c, d] = philox([world, episode, third, self.offset + index], self.key);
         let unit = |high: u32, low: u32| {
             let bits = u64::from(high) << 32 | u64::from(low);
             (bits >> 11) as f64 / (1u64 << 53) as f64

@@ -146,7 +146,10 @@ impl Simulation {
         // state and commands of a world, its counters; see backend/cpu/chunk.rs
         worlds
             .saturating_mul(
-                (5 * model.dofs() + 2 * model.coords() + m.varying.len()) as u64 * real + 28,
+                ((5 + 3 * m.delay.frames) * model.dofs() + 2 * model.coords() + m.varying.len())
+                    as u64
+                    * real
+                    + 28,
             )
             .saturating_add(scratch)
     }

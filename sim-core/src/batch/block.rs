@@ -44,6 +44,13 @@ pub struct Block<F, V> {
     pub joint_target_qd: Vec<F>,
     /// Numbers of the model that vary; see [`crate::model::params::Varying`].
     pub params: Vec<F>,
+    /// Substeps since the start of the control frame. `(1)` [–]
+    pub substep: Vec<V>,
+    /// Commands of the frames before, the last one first, each as `joint_f`, `joint_target_q`, `joint_target_qd`; empty where
+    /// none come late. `(frames, 3, dofs)`
+    pub command_history: Vec<F>,
+    /// Noise of the commands of the frame; empty where there is none. `(3, dofs)`
+    pub command_noise: Vec<F>,
     /// What the stages leave for each other.
     pub work: Workspace<F>,
 }
@@ -77,6 +84,18 @@ pub struct Workspace<F> {
     pub link_center: Vec<Vec3<F>>,
     /// Velocity of each link's centre of mass, then angular velocity. `(frames, 2, 3)` [m/s, rad/s]
     pub body_qd: Vec<Spatial<F>>,
+    /// Commands that act in the substep, where that is not what was sent. `(3, dofs)`
+    pub applied: Vec<F>,
+    /// Applied and drive forces, for output. `(dofs)` [N·m or N]
+    pub joint_torque: Vec<F>,
+    /// Sites: position, quaternion (x, y, z, w). `(sites, 7)` [m, –]
+    pub site_q: Vec<[F; 7]>,
+    /// Velocity of each site, then angular velocity. `(sites, 2, 3)` [m/s, rad/s]
+    pub site_qd: Vec<Spatial<F>>,
+    /// Angular velocity of each site, in its axes. `(sites, 3)` [rad/s]
+    pub gyro: Vec<Vec3<F>>,
+    /// Acceleration of each site less gravity, in its axes. `(sites, 3)` [m/s²]
+    pub accelerometer: Vec<Vec3<F>>,
     /// Velocity of each body at the reference point. `(bodies, 2, 3)`
     pub velocity: Vec<Spatial<F>>,
     /// Scratch of a stage: acceleration, then force of each body. `(bodies, 2, 3)`
@@ -122,6 +141,14 @@ pub enum Slot {
     JointTargetQd,
     /// [`Block::params`]
     Params,
+    /// [`Block::substep`]
+    Substep,
+    /// [`Block::command_history`]
+    CommandHistory,
+    /// [`Block::command_noise`]
+    CommandNoise,
+    /// [`Workspace::applied`]
+    Applied,
     /// [`Workspace::rotation`]
     Rotation,
     /// [`Workspace::origin`]
@@ -156,6 +183,18 @@ pub enum Slot {
     LinkCenter,
     /// [`Workspace::body_qd`]
     BodyQd,
+    /// [`Workspace::orientation`]
+    Orientation,
+    /// [`Workspace::joint_torque`]
+    JointTorque,
+    /// [`Workspace::site_q`]
+    SiteQ,
+    /// [`Workspace::site_qd`]
+    SiteQd,
+    /// [`Workspace::gyro`]
+    Gyro,
+    /// [`Workspace::accelerometer`]
+    Accelerometer,
 }
 
 /// The numbers of a slot, flat.
@@ -193,6 +232,9 @@ impl<F: Num, V: Copy> Block<F, V> {
             joint_f: vec![zero; n],
             joint_target_q: vec![zero; n],
             joint_target_qd: vec![zero; n],
+            substep: vec![cell; 1],
+            command_history: vec![zero; m.delay.frames * 3 * n],
+            command_noise: vec![zero; when(m.noisy_commands(), 3 * n)],
             params: m.varying.starts().iter().map(|&(_, x)| F::c(x)).collect(),
             work: Workspace {
                 rotation: vec![[[zero; 3]; 3]; bodies],
@@ -208,6 +250,12 @@ impl<F: Num, V: Copy> Block<F, V> {
                 body_q: vec![[zero; 7]; m.frames.len()],
                 link_center: vec![[zero; 3]; m.frames.len()],
                 body_qd: vec![[[zero; 3]; 2]; m.frames.len()],
+                applied: vec![zero; when(m.alters_commands(), 3 * n)],
+                joint_torque: vec![zero; n],
+                site_q: vec![[zero; 7]; m.sites.len()],
+                site_qd: vec![[[zero; 3]; 2]; m.sites.len()],
+                gyro: vec![[zero; 3]; m.sites.len()],
+                accelerometer: vec![[zero; 3]; m.sites.len()],
                 velocity: vec![[[zero; 3]; 2]; bodies],
                 force: vec![[[zero; 3]; 2]; bodies],
                 hessian: vec![zero; packed],
@@ -242,6 +290,10 @@ impl<F: Num, V: Copy> Block<F, V> {
             Slot::JointTargetQ => Values(&mut self.joint_target_q),
             Slot::JointTargetQd => Values(&mut self.joint_target_qd),
             Slot::Params => Values(&mut self.params),
+            Slot::Substep => Cells(&mut self.substep),
+            Slot::CommandHistory => Values(&mut self.command_history),
+            Slot::CommandNoise => Values(&mut self.command_noise),
+            Slot::Applied => Values(&mut w.applied),
             Slot::Rotation => Values(w.rotation.as_flattened_mut().as_flattened_mut()),
             Slot::Origin => Values(w.origin.as_flattened_mut()),
             Slot::Reference => Values(w.reference.as_flattened_mut()),
@@ -259,6 +311,12 @@ impl<F: Num, V: Copy> Block<F, V> {
             Slot::LinkCenter => Values(w.link_center.as_flattened_mut()),
             Slot::BodyQd => Values(w.body_qd.as_flattened_mut().as_flattened_mut()),
             Slot::BodyQ => Values(w.body_q.as_flattened_mut()),
+            Slot::Orientation => Values(w.orientation.as_flattened_mut()),
+            Slot::JointTorque => Values(&mut w.joint_torque),
+            Slot::SiteQ => Values(w.site_q.as_flattened_mut()),
+            Slot::SiteQd => Values(w.site_qd.as_flattened_mut().as_flattened_mut()),
+            Slot::Gyro => Values(w.gyro.as_flattened_mut()),
+            Slot::Accelerometer => Values(w.accelerometer.as_flattened_mut()),
         }
     }
 }

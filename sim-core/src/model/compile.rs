@@ -5,7 +5,7 @@
 //! from mass are evaluated at the reference pose q = 0.
 
 use super::constants::{
-    Body, Constants, Coupled, Dof, Frame, MassEntry, Motion, Newton, Part, Tree,
+    Body, Constants, Coupled, Delay, Dof, Frame, MassEntry, Motion, Newton, Part, Tree,
 };
 use super::contact::Contacts;
 use super::frozen::{Model, RobotRange, Start};
@@ -73,6 +73,8 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
             refinements: 0,
         },
         varying: Varying::default(),
+        delay: Delay::default(),
+        sites: scene.placed_sites(&builder.carriers)?,
     };
     let reference = inverse_weight::at_reference(&constants, &builder.dof_names)?;
     // MuJoCo scales costs by 1 / (mean inertia × dofs)
@@ -96,6 +98,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         &mut constants,
         &builder.joints,
         &reference.dof_inverse_weight,
+        scene.params.contains(&Param::JointFriction),
     );
     let shape_names = scene.shape_names();
     let borne = borne(scene, &builder.carriers, &constants);
@@ -106,9 +109,16 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     };
     add_contacts(&mut constants, scene, &borne, &rules)?;
     let surfaces: Vec<f64> = borne.iter().map(|shape| shape.surface.mu).collect();
+    let sensors = scene.sensed_shapes()?;
     for &param in &scene.params {
-        let numbers = param.starts(&constants, &surfaces);
+        let numbers = param.starts(&constants, &surfaces, sensors.len());
         constants.varying.add(param, numbers);
+    }
+    if scene.params.contains(&Param::CommandDelay) {
+        constants.delay = Delay {
+            frames: scene.delay_max().div_ceil(scene.substeps),
+            substeps: scene.substeps,
+        };
     }
     if scene.params.contains(&Param::BodyMassScale) {
         for (robot, (ours, carriers)) in scene
@@ -128,6 +138,9 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         coord_names: builder.coord_names,
         body_names: builder.body_names,
         shape_names,
+        site_names: scene.sites.iter().map(|site| site.name.clone()).collect(),
+        contact_sensors: sensors,
+        command_delay_max: scene.delay_max(),
         robots: builder.robots,
         start: builder.start,
         dof_inverse_weight: reference.dof_inverse_weight,

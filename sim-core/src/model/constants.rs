@@ -1,7 +1,8 @@
 //! What the text of physics reads of a model: numbers in the precision of the run.
 
 use super::contact::Contacts;
-use super::params::Varying;
+use super::mount::Site;
+use super::params::{COMMAND_NOISES, Varying};
 use crate::lane::Real;
 use crate::math::factor::Pattern;
 
@@ -46,6 +47,19 @@ pub struct Constants<R> {
     pub solver: Newton<R>,
     /// Which of all these numbers vary from world to world.
     pub varying: Varying,
+    /// How late commands may be.
+    pub delay: Delay,
+    /// Frames of interest.
+    pub sites: Vec<Site<R>>,
+}
+
+/// How late commands may be.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Delay {
+    /// Control frames back of which the commands are kept; 0 where nothing is late.
+    pub frames: usize,
+    /// Substeps of a control frame.
+    pub substeps: usize,
 }
 
 /// The pattern of a larger system that holds a smaller one.
@@ -253,7 +267,9 @@ pub struct Friction<R> {
     pub damping: R,
     /// Regularised stiffness D = 1/R.
     pub weight: R,
-    /// R × loss: beyond it the force is at its bound.
+    /// R = 1/D: beyond R × loss the force is at its bound.
+    pub regularizer: R,
+    /// R × loss.
     pub zone: R,
 }
 
@@ -387,6 +403,7 @@ impl<R: Real> Constants<R> {
                     loss: cast(f.loss),
                     damping: cast(f.damping),
                     weight: cast(f.weight),
+                    regularizer: cast(f.regularizer),
                     zone: cast(f.zone),
                 })
                 .collect(),
@@ -411,7 +428,23 @@ impl<R: Real> Constants<R> {
                 refinements: self.solver.refinements,
             },
             varying: self.varying.clone(),
+            delay: self.delay,
+            sites: self.sites.iter().map(Site::cast).collect(),
         }
+    }
+
+    /// Do commands come late, or with noise?
+    #[inline(always)]
+    pub fn alters_commands(&self) -> bool {
+        self.delay.frames > 0 || self.noisy_commands()
+    }
+
+    /// Is noise added to commands?
+    #[inline(always)]
+    pub fn noisy_commands(&self) -> bool {
+        COMMAND_NOISES
+            .iter()
+            .any(|&noise| self.varying.first(noise).is_some())
     }
 
     /// First coordinate of each quaternion.
@@ -430,6 +463,6 @@ impl<R: Real> Constants<R> {
     }
 }
 
-fn cast<R: Real, S: Real>(x: R) -> S {
+pub(super) fn cast<R: Real, S: Real>(x: R) -> S {
     S::of(x.to_f64())
 }

@@ -35,6 +35,36 @@ pub struct Description {
     pub rows_max: Option<usize>,
     /// Parameters that vary from world to world, and may be written while it runs.
     pub params: BTreeSet<Param>,
+    /// Largest delay of commands that a world may have, where that varies [substeps]; `None` is four control frames.
+    pub command_delay_max: Option<usize>,
+    /// Frames of interest.
+    pub sites: Vec<Site>,
+    /// Sums of contact forces.
+    pub contact_sensors: Vec<ContactSensor>,
+}
+
+/// A frame of interest: in the world, or on a link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Site {
+    /// Its name, unique among the sites.
+    pub name: String,
+    /// What carries it: a body, or `robot/link`; `None` is the world.
+    pub body: Option<String>,
+    /// Its frame in that of what carries it.
+    pub pose: Pose,
+    /// The site, body or `robot/link` that its pose and velocity are measured from; `None` is the world.
+    pub relative_to: Option<String>,
+}
+
+/// The sum of contact forces on some shapes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactSensor {
+    /// Its name, unique among the contact sensors.
+    pub name: String,
+    /// What the forces are on: a shape's name, or that of a robot, body or link for all its shapes.
+    pub of: String,
+    /// What they come from, named alike; `None` is everything.
+    pub against: Option<String>,
 }
 
 /// Options of the constraint solver, with MuJoCo's meaning.
@@ -376,6 +406,9 @@ impl Description {
             contacts_max: None,
             rows_max: None,
             params: BTreeSet::new(),
+            command_delay_max: None,
+            sites: Vec::new(),
+            contact_sensors: Vec::new(),
         }
     }
 }

@@ -27,10 +27,24 @@ pub struct Model {
     pub(super) coord_names: Vec<String>,
     pub(super) body_names: Vec<String>,
     pub(super) shape_names: Vec<String>,
+    pub(super) site_names: Vec<String>,
+    pub(super) contact_sensors: Vec<SensedShapes>,
+    pub(super) command_delay_max: usize,
     pub(super) robots: Vec<RobotRange>,
     pub(super) start: Start,
     pub(super) dof_inverse_weight: Vec<f64>,
     pub(super) hash: u64,
+}
+
+/// What a contact sensor adds up: forces on some shapes, from some.
+#[derive(Clone, Debug)]
+pub struct SensedShapes {
+    /// Its name.
+    pub name: String,
+    /// Of each shape: are forces on it meant?
+    pub of: Vec<bool>,
+    /// Of each shape: are forces from it meant?
+    pub against: Vec<bool>,
 }
 
 /// State and commands after a reset: positions one entry a coordinate, the rest one a dof.
@@ -76,6 +90,18 @@ impl Model {
     /// Names of the shapes, as [`super::Description::shape_names`] has them.
     pub fn shape_names(&self) -> &[String] {
         &self.shape_names
+    }
+    /// Names of the sites.
+    pub fn site_names(&self) -> &[String] {
+        &self.site_names
+    }
+    /// What each contact sensor adds up.
+    pub fn contact_sensors(&self) -> &[SensedShapes] {
+        &self.contact_sensors
+    }
+    /// Largest delay of commands that a world may have [substeps].
+    pub fn command_delay_max(&self) -> usize {
+        self.command_delay_max
     }
     /// Each robot's part of the arrays.
     pub fn robots(&self) -> &[RobotRange] {

@@ -16,6 +16,7 @@ pub mod geometry;
 pub mod hull_tables;
 mod inertia;
 mod inverse_weight;
+pub mod mount;
 mod pairs;
 pub mod params;
 mod paths;
@@ -23,6 +24,7 @@ mod pose;
 mod robot;
 mod rows;
 mod shapes;
+mod sites;
 mod surface;
 mod touching;
 mod tree;
@@ -31,12 +33,12 @@ mod validate;
 
 pub use body::Body;
 pub use description::{
-    Collision, Cone, Description, Inertial, Joint, JointDof, JointKind, Link, Mimic, Robot, Shape,
-    Solver, StaticShape, TargetMode,
+    Collision, Cone, ContactSensor, Description, Inertial, Joint, JointDof, JointKind, Link, Mimic,
+    Robot, Shape, Site, Solver, StaticShape, TargetMode,
 };
 pub use distribution::Distribution;
 pub use error::ModelError;
-pub use frozen::{Model, RobotRange, Start};
+pub use frozen::{Model, RobotRange, SensedShapes, Start};
 pub use inertia::principal_moments;
 pub use pose::Pose;
 pub use surface::Surface;

@@ -1,6 +1,6 @@
 //! Constraint rows of a model: their softness from mass at the reference pose.
 
-use super::constants::{Constants, Equality, Friction, Impedance, Limit, Soft};
+use super::constants::{Constants, Equality, Friction, Impedance, Limit, Motion, Soft};
 
 /// MuJoCo's default `solimp` (0.9, 0.95, 0.001, 0.5, 2).
 pub(super) const IMPEDANCE: Impedance<f64> = Impedance {
@@ -28,6 +28,7 @@ pub(super) fn add_rows(
     constants: &mut Constants<f64>,
     joints: &[DofJoint],
     inverse_weight: &[f64],
+    friction_varies: bool,
 ) {
     let dt = constants.dt;
     for (dof, joint) in joints.iter().enumerate() {
@@ -42,7 +43,8 @@ pub(super) fn add_rows(
                 soft,
             });
         }
-        if joint.friction > 0.0 {
+        let moves_freely = constants.bodies[constants.dofs[dof].body].motion == Motion::Free;
+        if joint.friction > 0.0 || friction_varies && !moves_freely {
             let soft = soft(SOLREF, weight, dt);
             // a friction row has no position: its impedance is d_min, its reference -b v
             let regularizer = (1.0 - IMPEDANCE.d_min) / IMPEDANCE.d_min * weight;
@@ -51,6 +53,7 @@ pub(super) fn add_rows(
                 loss: joint.friction,
                 damping: soft.damping,
                 weight: 1.0 / regularizer,
+                regularizer,
                 zone: regularizer * joint.friction,
             });
         }

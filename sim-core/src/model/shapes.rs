@@ -146,7 +146,8 @@ impl Description {
         let names = self.shape_names();
         let mut pairs = BTreeSet::new();
         for [first, second] in &self.filters {
-            let (first, second) = (named(first, &names)?, named(second, &names)?);
+            let of = |name| named("contact filter", name, &names);
+            let (first, second) = (of(first)?, of(second)?);
             for &a in &first {
                 for &b in second.iter().filter(|&&b| b != a) {
                     pairs.insert([a.min(b), a.max(b)]);
@@ -177,8 +178,8 @@ impl Description {
     }
 }
 
-/// The shape of this name, or all those of the robot, body or link of this name.
-fn named(name: &str, names: &[String]) -> Result<Vec<usize>, ModelError> {
+/// The shape of this name, or all those of the robot, body or link of this name; `owner` asks for it.
+pub(super) fn named(owner: &str, name: &str, names: &[String]) -> Result<Vec<usize>, ModelError> {
     if let Some(shape) = names.iter().position(|other| other == name) {
         return Ok(vec![shape]);
     }
@@ -189,7 +190,7 @@ fn named(name: &str, names: &[String]) -> Result<Vec<usize>, ModelError> {
     let shapes: Vec<usize> = (0..names.len()).filter(|&i| of_name(&names[i])).collect();
     if shapes.is_empty() {
         return Err(ModelError::UnknownName {
-            owner: "contact filter".to_owned(),
+            owner: owner.to_owned(),
             what: "shape, or robot, link or body with shapes,",
             name: name.to_owned(),
             known: first_few(names),

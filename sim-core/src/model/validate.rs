@@ -96,7 +96,8 @@ impl Description {
         let dofs = self.robots.iter().map(Robot::dof_count).sum();
         few("the scene".to_owned(), dofs, SCENE_DOFS_MAX)?;
         self.robots.iter().try_for_each(Robot::validate)?;
-        self.validate_shape_names()
+        self.validate_shape_names()?;
+        self.validate_sensors()
     }
 }
 
@@ -383,7 +384,7 @@ fn validate_dof(what: &str, dof: &JointDof) -> Result<(), ModelError> {
 }
 
 /// Refuses a frame with a number that is not finite, or a quaternion that is no rotation.
-fn pose(what: &str, pose: &Pose) -> Result<(), ModelError> {
+pub(super) fn pose(what: &str, pose: &Pose) -> Result<(), ModelError> {
     length(&format!("{what}: position"), pose.pos)?;
     for value in pose.quat {
         finite(&format!("{what}: quaternion"), value)?;

@@ -7,6 +7,7 @@
 //!
 //! The target of a ball is a rotation vector; its error is the rotation vector from here to there.
 
+use super::command::{Command, acting};
 use super::kinematics::read_quat;
 use super::{BlockOf, ConstantsOf, param};
 use crate::batch::Workspace;
@@ -14,32 +15,17 @@ use crate::lane::{Cx, Num};
 use crate::math::quat::{self, conjugate, mul};
 use crate::math::spatial::{power, sum};
 use crate::math::vec3::{Vec3, constant, cross_add, transform_add, zero};
-use crate::model::constants::{Constants, Motion};
+use crate::model::constants::{Body, Constants, Motion};
 use crate::model::params::Param;
 
 #[inline(always)]
 pub(super) fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     for body in &m.bodies {
-        match body.motion {
-            Motion::Revolute | Motion::Prismatic => {
-                let j = body.dof;
-                let error = b.joint_target_q[j] - cx.get(&b.joint_q[body.coord]);
-                drive(cx, m, b, j, error);
-            }
-            Motion::Ball => {
-                let errors = ball_error(cx, b, body.coord, body.dof);
-                for (j, error) in body.dofs().zip(errors) {
-                    drive(cx, m, b, j, error);
-                }
-            }
-            Motion::Free => {
-                for j in body.dofs() {
-                    let fixed = m.dofs[j].damping;
-                    let damping = param(m, &b.params, Param::JointDamping, j, fixed);
-                    let applied = cx.get(&b.joint_qd[j]).fnma(damping, b.joint_f[j]);
-                    b.work.smooth_force[j] = applied - b.work.bias_force[j];
-                }
-            }
+        let torques = torques(cx, m, b, body);
+        for (j, torque) in body.dofs().zip(torques) {
+            let damping = param(m, &b.params, Param::JointDamping, j, m.dofs[j].damping);
+            let applied = cx.get(&b.joint_qd[j]).fnma(damping, torque);
+            b.work.smooth_force[j] = applied - b.work.bias_force[j];
         }
     }
     if let Some(first) = m.varying.first(Param::BodyF) {
@@ -47,13 +33,53 @@ pub(super) fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
     }
 }
 
-/// The force of dof `j` at this position error.
+/// What the joints are driven by, for output.
 #[inline(always)]
-fn drive<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, j: usize, error: C::F) {
+pub(super) fn joint_torque<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    for body in &m.bodies {
+        let torques = torques(cx, m, b, body);
+        b.work.joint_torque[body.dofs()].copy_from_slice(&torques[..body.motion.dofs()]);
+    }
+}
+
+/// Applied and drive forces of the dofs of a body, as many as it has.
+#[inline(always)]
+fn torques<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    body: &Body<<C::F as Num>::Real>,
+) -> [C::F; 6] {
+    let mut torques = [C::F::c(0.0); 6];
+    let first = body.dof;
+    match body.motion {
+        Motion::Revolute | Motion::Prismatic => {
+            let target = acting::<C>(m, b, Command::Position, first);
+            let error = target - cx.get(&b.joint_q[body.coord]);
+            torques[0] = driven(cx, m, b, first, error);
+        }
+        Motion::Ball => {
+            let errors = ball_error(cx, m, b, body.coord, first);
+            for k in 0..3 {
+                torques[k] = driven(cx, m, b, first + k, errors[k]);
+            }
+        }
+        Motion::Free => {
+            for k in 0..6 {
+                torques[k] = acting::<C>(m, b, Command::Force, first + k);
+            }
+        }
+    }
+    torques
+}
+
+/// Applied and drive force of dof `j` at this position error.
+#[inline(always)]
+fn driven<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, j: usize, error: C::F) -> C::F {
     let dof = &m.dofs[j];
     let qd = cx.get(&b.joint_qd[j]);
     let rate = if dof.follows_velocity {
-        b.joint_target_qd[j] - qd
+        acting::<C>(m, b, Command::Velocity, j) - qd
     } else {
         -qd
     };
@@ -68,9 +94,7 @@ fn drive<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, j: usize, er
     if let Some(limit) = limit {
         drive = drive.min(limit).max(-limit);
     }
-    let damping = param(m, &b.params, Param::JointDamping, j, dof.damping);
-    let applied = qd.fnma(damping, b.joint_f[j] + drive);
-    b.work.smooth_force[j] = applied - b.work.bias_force[j];
+    acting::<C>(m, b, Command::Force, j) + drive
 }
 
 /// Adds the forces on links to those of the joints that carry them.
@@ -106,9 +130,18 @@ fn push<F: Num>(m: &Constants<F::Real>, params: &[F], first: usize, w: &mut Work
 
 /// log(q⁻¹ exp(target)), in the body's axes.
 #[inline(always)]
-fn ball_error<C: Cx>(cx: &mut C, b: &BlockOf<C>, coord: usize, dof: usize) -> Vec3<C::F> {
-    let t = &b.joint_target_q[dof..dof + 3];
-    let target = quat::exp([t[0], t[1], t[2]]);
+fn ball_error<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    coord: usize,
+    dof: usize,
+) -> Vec3<C::F> {
+    let mut turn = zero();
+    for k in 0..3 {
+        turn[k] = acting::<C>(m, b, Command::Position, dof + k);
+    }
+    let target = quat::exp(turn);
     let here = read_quat(cx, &b.joint_q, coord);
     quat::log(mul(conjugate(here), target))
 }

@@ -23,48 +23,8 @@ use crate::model::params::Param;
 /// The forces of `joint_qdd` at this state, into `vector[0]`.
 #[inline(always)]
 pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    let gravity = gravity(m, &b.params);
-    let base: Spatial<C::F> = [[-gravity[0], -gravity[1], -gravity[2]], zero()];
     // `force` holds the acceleration of a body's origin until its force is known
-    for (k, body) in m.bodies.iter().enumerate() {
-        let arm = arm(cx, b, k, body);
-        let w = &mut b.work;
-        let (above, spin) = match body.parent {
-            Some(parent) => (w.force[parent], w.velocity[parent][ANGULAR]),
-            None => (base, zero()),
-        };
-        let carried = [carried_along(above, spin, arm), above[ANGULAR]];
-        let [x, y, z] = w.rotation[k];
-        let d = body.dof;
-        w.force[k] = match body.motion {
-            Motion::Revolute => {
-                let turn = scale(z, cx.get(&b.joint_qd[d]));
-                let own = scale_add(z, cx.get(&b.joint_qdd[d]), cross(spin, turn));
-                [carried[LINEAR], add(carried[ANGULAR], own)]
-            }
-            Motion::Prismatic => {
-                let slide = scale(z, cx.get(&b.joint_qd[d]) * C::F::c(2.0));
-                let own = scale_add(z, cx.get(&b.joint_qdd[d]), cross(spin, slide));
-                [add(carried[LINEAR], own), carried[ANGULAR]]
-            }
-            Motion::Ball => {
-                let axes = [x, y, z];
-                let turn = transform(&axes, read::<C>(cx, &b.joint_qd, d));
-                let own = transform_add(&axes, read::<C>(cx, &b.joint_qdd, d), cross(spin, turn));
-                [carried[LINEAR], add(carried[ANGULAR], own)]
-            }
-            Motion::Free => {
-                let (linear, angular) = (
-                    read::<C>(cx, &b.joint_qdd, d),
-                    read::<C>(cx, &b.joint_qdd, d + 3),
-                );
-                let center = [add(base[LINEAR], linear), angular];
-                let back = sub(zero(), transform(&[x, y, z], constant(body.center)));
-                let omega = w.velocity[k][ANGULAR];
-                [carried_along(center, omega, back), angular]
-            }
-        };
-    }
+    proper_accelerations(cx, m, b);
     for (k, body) in m.bodies.iter().enumerate() {
         let w = &mut b.work;
         let (axes, omega) = (&w.rotation[k], w.velocity[k][ANGULAR]);
@@ -120,6 +80,57 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
     }
 }
 
+/// Accelerations of the origins of all bodies less gravity, and angular ones, into `force`; that of what stands still.
+#[inline(always)]
+pub(super) fn proper_accelerations<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+) -> Vec3<C::F> {
+    let gravity = gravity(m, &b.params);
+    let base: Spatial<C::F> = [[-gravity[0], -gravity[1], -gravity[2]], zero()];
+    for (k, body) in m.bodies.iter().enumerate() {
+        let arm = arm(cx, b, k, body);
+        let w = &mut b.work;
+        let (above, spin) = match body.parent {
+            Some(parent) => (w.force[parent], w.velocity[parent][ANGULAR]),
+            None => (base, zero()),
+        };
+        let carried = [carried_along(above, spin, arm), above[ANGULAR]];
+        let [x, y, z] = w.rotation[k];
+        let d = body.dof;
+        w.force[k] = match body.motion {
+            Motion::Revolute => {
+                let turn = scale(z, cx.get(&b.joint_qd[d]));
+                let own = scale_add(z, cx.get(&b.joint_qdd[d]), cross(spin, turn));
+                [carried[LINEAR], add(carried[ANGULAR], own)]
+            }
+            Motion::Prismatic => {
+                let slide = scale(z, cx.get(&b.joint_qd[d]) * C::F::c(2.0));
+                let own = scale_add(z, cx.get(&b.joint_qdd[d]), cross(spin, slide));
+                [add(carried[LINEAR], own), carried[ANGULAR]]
+            }
+            Motion::Ball => {
+                let axes = [x, y, z];
+                let turn = transform(&axes, read::<C>(cx, &b.joint_qd, d));
+                let own = transform_add(&axes, read::<C>(cx, &b.joint_qdd, d), cross(spin, turn));
+                [carried[LINEAR], add(carried[ANGULAR], own)]
+            }
+            Motion::Free => {
+                let (linear, angular) = (
+                    read::<C>(cx, &b.joint_qdd, d),
+                    read::<C>(cx, &b.joint_qdd, d + 3),
+                );
+                let center = [add(base[LINEAR], linear), angular];
+                let back = sub(zero(), transform(&[x, y, z], constant(body.center)));
+                let omega = w.velocity[k][ANGULAR];
+                [carried_along(center, omega, back), angular]
+            }
+        };
+    }
+    base[LINEAR]
+}
+
 /// The force that gives a mass its acceleration, and its moment about the origin of the frame that carries it.
 #[inline(always)]
 fn held<F: Num>(
@@ -142,7 +153,7 @@ fn held<F: Num>(
 
 /// Acceleration of a point `arm` away on a body that moves so: a + α × r + ω × (ω × r).
 #[inline(always)]
-fn carried_along<F: Num>(origin: Spatial<F>, omega: Vec3<F>, arm: Vec3<F>) -> Vec3<F> {
+pub(super) fn carried_along<F: Num>(origin: Spatial<F>, omega: Vec3<F>, arm: Vec3<F>) -> Vec3<F> {
     let swing = cross_add(origin[ANGULAR], arm, origin[LINEAR]);
     cross_add(omega, cross(omega, arm), swing)
 }

@@ -6,6 +6,7 @@
 mod actuation;
 mod bias;
 pub mod collide;
+mod command;
 mod constraint;
 mod contact_rows;
 mod integrate;
@@ -13,11 +14,12 @@ mod inverse_dynamics;
 mod kinematics;
 mod mass_matrix;
 mod poses;
+mod sites;
 mod solver;
 mod velocities;
 
 use crate::batch::{Block, WorkSlot as Slot};
-use crate::lane::{Cx, Num};
+use crate::lane::{Cx, Num, Real};
 use crate::math::vec3::Vec3;
 use crate::model::constants::Constants;
 use crate::model::contact::PAIR_KINDS;
@@ -31,6 +33,8 @@ pub type BlockOf<C> = Block<<C as Cx>::F, <C as Cx>::V>;
 /// A stage of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
+    /// Commands as they act in this substep.
+    Command,
     /// Frames, motion axes and inertias in the world.
     Kinematics,
     /// Coriolis, centrifugal and gravity forces.
@@ -59,10 +63,17 @@ pub enum Stage {
     Velocities,
     /// Accelerations for output, where the solver left them out.
     Accelerations,
+    /// What drives the joints, for output.
+    JointTorque,
+    /// Frames and velocities of sites, for output.
+    Sites,
+    /// What inertial measurement units in the sites show, for output.
+    Imu,
 }
 
 /// Stages before contacts are looked for.
-const BEFORE: [Stage; 6] = [
+const BEFORE: [Stage; 7] = [
+    Stage::Command,
     Stage::Kinematics,
     Stage::Bias,
     Stage::MassMatrix,
@@ -78,8 +89,14 @@ const SOLVED: usize = BEFORE.len() + KINDS + 3;
 pub const STAGES: [Stage; SOLVED + 1] = sequence([Stage::Integrate]);
 
 /// What evaluates a state without stepping: all derived fields.
-pub const FORWARD: [Stage; SOLVED + 3] =
-    sequence([Stage::Accelerations, Stage::Poses, Stage::Velocities]);
+pub const FORWARD: [Stage; SOLVED + 6] = sequence([
+    Stage::Accelerations,
+    Stage::JointTorque,
+    Stage::Poses,
+    Stage::Velocities,
+    Stage::Sites,
+    Stage::Imu,
+]);
 
 /// Stages up to the accelerations, then some more.
 const fn sequence<const N: usize, const MORE: usize>(more: [Stage; MORE]) -> [Stage; N] {
@@ -105,11 +122,14 @@ const fn sequence<const N: usize, const MORE: usize>(more: [Stage; MORE]) -> [St
 
 impl Stage {
     /// Every stage.
-    pub const ALL: [Stage; SOLVED + 4] = sequence([
+    pub const ALL: [Stage; SOLVED + 7] = sequence([
         Stage::Integrate,
         Stage::Accelerations,
+        Stage::JointTorque,
         Stage::Poses,
         Stage::Velocities,
+        Stage::Sites,
+        Stage::Imu,
     ]);
 
     /// Its place in [`Stage::ALL`].
@@ -119,8 +139,10 @@ impl Stage {
     }
 
     /// Has the model anything for it to do?
-    pub fn is_needed<R>(self, m: &Constants<R>) -> bool {
+    pub fn is_needed<R: Real>(self, m: &Constants<R>) -> bool {
         match self {
+            Stage::Command => m.alters_commands(),
+            Stage::Sites | Stage::Imu => !m.sites.is_empty(),
             Stage::Place | Stage::ContactRows => !m.contacts.groups.is_empty(),
             Stage::Touch(kinds) => m.contacts.group(kinds).is_some(),
             _ => true,
@@ -130,6 +152,7 @@ impl Stage {
     /// Its name, for timers and reports.
     pub fn name(self) -> &'static str {
         match self {
+            Stage::Command => "command",
             Stage::Kinematics => "kinematics",
             Stage::Bias => "bias",
             Stage::MassMatrix => "mass_matrix",
@@ -144,6 +167,9 @@ impl Stage {
             Stage::Poses => "poses",
             Stage::Velocities => "velocities",
             Stage::Accelerations => "accelerations",
+            Stage::JointTorque => "joint_torque",
+            Stage::Sites => "sites",
+            Stage::Imu => "imu",
         }
     }
 
@@ -151,6 +177,15 @@ impl Stage {
     pub fn reads(self) -> &'static [Slot] {
         use Slot::*;
         match self {
+            Stage::Command => &[
+                JointF,
+                JointTargetQ,
+                JointTargetQd,
+                Params,
+                Substep,
+                CommandHistory,
+                CommandNoise,
+            ],
             Stage::Kinematics => &[JointQ, Params],
             Stage::Bias => &[JointQd, Motion, Inertia, Params],
             Stage::MassMatrix => &[Motion, Inertia, Params],
@@ -160,19 +195,30 @@ impl Stage {
                 JointF,
                 JointTargetQ,
                 JointTargetQd,
+                Applied,
                 Params,
                 Rotation,
                 Origin,
                 Motion,
                 BiasForce,
             ],
-            Stage::Constraint => &[JointQ, JointQd],
+            Stage::JointTorque => &[
+                JointQ,
+                JointQd,
+                JointF,
+                JointTargetQ,
+                JointTargetQd,
+                Applied,
+                Params,
+            ],
+            Stage::Constraint => &[JointQ, JointQd, Params],
             Stage::Place => &[Params, Rotation, Origin, Reference],
             Stage::Touch(_) => &[],
             Stage::ContactRows => &[LeftOut, JointQd, Origin, Reference, Motion],
             Stage::Solver => &[
                 JointQdd,
                 Unconverged,
+                Params,
                 MassMatrix,
                 SmoothForce,
                 EfcWeight,
@@ -208,6 +254,8 @@ impl Stage {
             ],
             Stage::Poses => &[JointQ, Rotation, Origin, Reference],
             Stage::Velocities => &[Rotation, Origin, Velocity],
+            Stage::Sites => &[Rotation, Origin, Reference, Velocity, Orientation],
+            Stage::Imu => &[JointQ, JointQd, JointQdd, Params, Rotation, Velocity],
         }
     }
 
@@ -215,6 +263,7 @@ impl Stage {
     pub fn writes(self) -> &'static [Slot] {
         use Slot::*;
         match self {
+            Stage::Command => &[Substep, Applied],
             Stage::Kinematics => &[Rotation, Origin, Reference, Motion, Inertia],
             Stage::Bias => &[BiasForce, Velocity],
             Stage::MassMatrix => &[MassMatrix, Inertia],
@@ -225,8 +274,11 @@ impl Stage {
             Stage::Solver => &[JointQdd, Unconverged, EfcForce, ConstraintForce],
             Stage::Refine | Stage::Accelerations => &[JointQdd, EfcForce, ConstraintForce],
             Stage::Integrate => &[JointQ, JointQRest, JointQd, MassMatrix],
-            Stage::Poses => &[BodyQ],
+            Stage::JointTorque => &[JointTorque],
+            Stage::Poses => &[BodyQ, Orientation],
             Stage::Velocities => &[LinkCenter, BodyQd],
+            Stage::Sites => &[SiteQ, SiteQd],
+            Stage::Imu => &[Gyro, Accelerometer],
         }
     }
 
@@ -234,6 +286,7 @@ impl Stage {
     #[inline(always)]
     pub fn run<C: Cx>(self, cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         match self {
+            Stage::Command => command::arrive(cx, m, b),
             Stage::Kinematics => kinematics::kinematics(cx, m, b),
             Stage::Bias => bias::bias_force(cx, m, b),
             Stage::MassMatrix => mass_matrix::mass_matrix(m, &b.params, &mut b.work),
@@ -248,6 +301,9 @@ impl Stage {
             Stage::Poses => poses::body_q(cx, m, b),
             Stage::Velocities => velocities::body_qd(m, &mut b.work),
             Stage::Accelerations => solver::accelerations(cx, m, b),
+            Stage::JointTorque => actuation::joint_torque(cx, m, b),
+            Stage::Sites => sites::site_q(m, &mut b.work),
+            Stage::Imu => sites::imu(cx, m, b),
         }
     }
 }

@@ -165,6 +165,18 @@ pub enum BackendError {
         /// The least that it may be.
         least: f64,
     },
+    /// A delay of commands for which there is no room.
+    #[error(
+        "command_delay is {value} in world {world}; nothing was written, give at most {most}, or more room with the scene's command_delay_max"
+    )]
+    Delay {
+        /// The world.
+        world: usize,
+        /// The value [substeps].
+        value: f64,
+        /// The most that it may be [substeps].
+        most: usize,
+    },
     /// A position gain of a drive that follows velocities.
     #[error(
         "joint_target_ke of `{name}` is {value}, but its drive follows velocity targets only; give 0, or another target mode in the scene"

@@ -2,7 +2,7 @@
 
 use super::super::ConstantsOf;
 use super::contacts;
-use super::rows::{Law, dry_friction, equality, one_sided};
+use super::rows::{Law, bounds, dry_friction, equality, one_sided};
 use crate::lane::{Cx, Num, Real};
 use crate::model::constants::Constants;
 use crate::{break_if, times};
@@ -24,6 +24,7 @@ pub(super) struct Line<'a, F> {
     pub noise: F,
     /// Has any world contacts?
     touches: bool,
+    params: &'a [F],
     weight: &'a [F],
     jar: &'a [F],
     jv: &'a [F],
@@ -45,6 +46,7 @@ impl<'a, F: Num> Line<'a, F> {
     pub fn new<C: Cx<F = F>>(
         cx: &mut C,
         m: &Constants<F::Real>,
+        params: &'a [F],
         curvature: F,
         power: F,
         [weight, jar, jv, aref]: [&'a [F]; 4],
@@ -54,7 +56,7 @@ impl<'a, F: Num> Line<'a, F> {
         let (mut descent, mut size) = (curvature, curvature);
         let mut terms = power;
         for r in 0..m.rows() {
-            let law = law(m, r, jar[r], weight[r]);
+            let law = law(m, params, r, jar[r], weight[r]);
             descent = (law.stiffness * jv[r]).fma(jv[r], descent);
             size = size + (law.force * jv[r]).abs();
             let rounded = (jar[r] + aref[r]).abs() + aref[r].abs();
@@ -71,6 +73,7 @@ impl<'a, F: Num> Line<'a, F> {
             descent,
             noise,
             touches: corrects.is_some(),
+            params,
             weight,
             jar,
             jv,
@@ -94,8 +97,8 @@ impl<'a, F: Num> Line<'a, F> {
         // equalities have one piece only
         for r in m.equalities.len()..m.rows() {
             let (jv, weight) = (self.jv[r], self.weight[r]);
-            let start = law(m, r, self.jar[r], weight);
-            let here = law(m, r, alpha.fma(jv, self.jar[r]), weight);
+            let start = law(m, self.params, r, self.jar[r], weight);
+            let here = law(m, self.params, r, alpha.fma(jv, self.jar[r]), weight);
             let model = (start.stiffness * alpha).fnma(jv, start.force);
             // exactly nothing where the piece is the same, whatever rounding says
             let moved = F::c(0.5).lt((here.state - start.state).abs());
@@ -122,14 +125,15 @@ impl<'a, F: Num> Line<'a, F> {
 
 /// The law of a row by its number.
 #[inline(always)]
-fn law<F: Num>(m: &Constants<F::Real>, r: usize, jar: F, weight: F) -> Law<F> {
+fn law<F: Num>(m: &Constants<F::Real>, params: &[F], r: usize, jar: F, weight: F) -> Law<F> {
     let frictions = m.equalities.len();
     let limits = frictions + m.frictions.len();
     if r < frictions {
         equality(jar, weight)
     } else if r < limits {
         let friction = &m.frictions[r - frictions];
-        dry_friction(jar, weight, F::k(friction.zone), F::k(friction.loss))
+        let [zone, loss] = bounds(m, params, friction);
+        dry_friction(jar, weight, zone, loss)
     } else {
         one_sided(jar, weight)
     }

@@ -78,6 +78,7 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         residual(m, &w.limit_side, aref, a, jar);
         assemble(
             m,
+            &b.params,
             &w.limit_side,
             weight,
             aref,
@@ -99,7 +100,7 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         }
         let [jar, jar_minimum, weight, aref] = &mut w.row;
         residual(m, &w.limit_side, aref, minimum, jar_minimum);
-        let mut moved = cx.var(changes(m, weight, jar, jar_minimum));
+        let mut moved = cx.var(changes(m, &b.params, weight, jar, jar_minimum));
         let mut curved = cx.var(zero);
         if corrects.is_some() {
             contacts::residual(cx, t, minimum, row::AHEAD);
@@ -130,7 +131,7 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
                 jar_minimum[r] = jar_minimum[r] - jar[r];
             }
             let rows = [&weight[..], jar, jar_minimum, aref];
-            let line = Line::new(cx, m, curvature, power, rows, corrects);
+            let line = Line::new(cx, m, &b.params, curvature, power, rows, corrects);
             search::<C>(cx, m, &line, &mut length);
             // The model promises a gain of ½ |p'(0)|. Below the tolerance the step is not taken, as in
             // MuJoCo, but for the first; below what rounding makes it is the last that can help. In `f32` it is the last
@@ -209,7 +210,7 @@ fn constraint_forces<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) 
         joint[j] = C::F::c(0.0);
     }
     residual(m, &w.limit_side, aref, a, jar);
-    forces(m, &w.limit_side, weight, jar, force, joint);
+    forces(m, &b.params, &w.limit_side, weight, jar, force, joint);
     for r in 0..m.rows() {
         cx.set(&mut b.efc_force[r], force[r]);
     }
@@ -375,8 +376,8 @@ fn choose_start<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     for j in 0..n {
         gauss = ahead[j].fma(pull[j], gauss);
     }
-    let mut cost_warm = cx.var(gauss.fma(C::F::c(0.5), cost(m, weight, jar)));
-    let mut cost_smooth = cx.var(cost(m, weight, jar_smooth));
+    let mut cost_warm = cx.var(gauss.fma(C::F::c(0.5), cost(m, &b.params, weight, jar)));
+    let mut cost_smooth = cx.var(cost(m, &b.params, weight, jar_smooth));
     contacts::residual(cx, &m.contacts, warm, row::JAR);
     contacts::residual(cx, &m.contacts, smooth, row::AHEAD);
     contacts::cost(cx, &m.contacts, row::JAR, &mut cost_warm);

@@ -67,6 +67,7 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     residual(m, &w.limit_side, aref, a, jar);
     assemble(
         m,
+        &b.params,
         &w.limit_side,
         weight,
         aref,
@@ -87,7 +88,7 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         joint[j] = C::F::c(0.0);
     }
     residual(m, &w.limit_side, aref, a, jar);
-    forces(m, &w.limit_side, weight, jar, force, joint);
+    forces(m, &b.params, &w.limit_side, weight, jar, force, joint);
     for r in 0..m.rows() {
         cx.set(&mut b.efc_force[r], force[r]);
     }

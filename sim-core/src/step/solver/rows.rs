@@ -1,7 +1,9 @@
 //! Laws of the constraint rows, and sums over them.
 
 use crate::lane::Num;
-use crate::model::constants::Constants;
+use crate::model::constants::{Constants, Friction};
+use crate::model::params::Param;
+use crate::step::param;
 
 /// What a row does at `jar`: force -s', stiffness s'', and which piece of s it is on.
 pub(super) struct Law<F> {
@@ -32,6 +34,20 @@ pub(super) fn dry_friction<F: Num>(jar: F, weight: F, zone: F, loss: F) -> Law<F
         stiffness: F::select(slides, zero, weight),
         state: F::select(below, -one, F::select(above, one, zero)),
     }
+}
+
+/// Zone and loss of a dry friction.
+#[inline(always)]
+pub(super) fn bounds<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    friction: &Friction<F::Real>,
+) -> [F; 2] {
+    if m.varying.first(Param::JointFriction).is_none() {
+        return [F::k(friction.zone), F::k(friction.loss)];
+    }
+    let loss = param(m, params, Param::JointFriction, friction.dof, friction.loss);
+    [loss * F::k(friction.regularizer), loss]
 }
 
 /// s = ½ D jar² where jar < 0, else 0. A row of weight 0 is never active.
@@ -86,6 +102,7 @@ fn pull<F: Num>(law: &Law<F>, jar: F, aref: F, corrects: Option<F::Mask>) -> F {
 #[inline(always)]
 pub(super) fn assemble<F: Num>(
     m: &Constants<F::Real>,
+    params: &[F],
     side: &[F],
     weight: &[F],
     aref: &[F],
@@ -110,7 +127,8 @@ pub(super) fn assemble<F: Num>(
         r += 1;
     }
     for f in &m.frictions {
-        let law = dry_friction(jar[r], weight[r], F::k(f.zone), F::k(f.loss));
+        let [zone, loss] = bounds(m, params, f);
+        let law = dry_friction(jar[r], weight[r], zone, loss);
         let diagonal = m.pattern.at(f.dof, f.dof);
         hessian[diagonal] = hessian[diagonal] + law.stiffness;
         rhs[f.dof] = rhs[f.dof] + pull(&law, jar[r], aref[r], corrects);
@@ -128,11 +146,17 @@ pub(super) fn assemble<F: Num>(
 
 /// How many rows are on another piece of their cost.
 #[inline(always)]
-pub(super) fn changes<F: Num>(m: &Constants<F::Real>, weight: &[F], jar: &[F], other: &[F]) -> F {
+pub(super) fn changes<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    weight: &[F],
+    jar: &[F],
+    other: &[F],
+) -> F {
     let mut sum = F::c(0.0);
     let mut r = m.equalities.len();
     for f in &m.frictions {
-        let (zone, loss) = (F::k(f.zone), F::k(f.loss));
+        let [zone, loss] = bounds(m, params, f);
         let before = dry_friction(jar[r], weight[r], zone, loss).state;
         let after = dry_friction(other[r], weight[r], zone, loss).state;
         sum = sum + (before - after).abs();
@@ -151,6 +175,7 @@ pub(super) fn changes<F: Num>(m: &Constants<F::Real>, weight: &[F], jar: &[F], o
 #[inline(always)]
 pub(super) fn forces<F: Num>(
     m: &Constants<F::Real>,
+    params: &[F],
     side: &[F],
     weight: &[F],
     jar: &[F],
@@ -165,7 +190,8 @@ pub(super) fn forces<F: Num>(
         r += 1;
     }
     for f in &m.frictions {
-        force[r] = dry_friction(jar[r], weight[r], F::k(f.zone), F::k(f.loss)).force;
+        let [zone, loss] = bounds(m, params, f);
+        force[r] = dry_friction(jar[r], weight[r], zone, loss).force;
         joint[f.dof] = joint[f.dof] + force[r];
         r += 1;
     }
@@ -178,7 +204,7 @@ pub(super) fn forces<F: Num>(
 
 /// Σ s(jar)
 #[inline(always)]
-pub(super) fn cost<F: Num>(m: &Constants<F::Real>, weight: &[F], jar: &[F]) -> F {
+pub(super) fn cost<F: Num>(m: &Constants<F::Real>, params: &[F], weight: &[F], jar: &[F]) -> F {
     let half = F::c(0.5);
     let mut sum = F::c(0.0);
     let mut r = 0;
@@ -187,9 +213,9 @@ pub(super) fn cost<F: Num>(m: &Constants<F::Real>, weight: &[F], jar: &[F]) -> F
         r += 1;
     }
     for f in &m.frictions {
-        let (zone, size) = (F::k(f.zone), jar[r].abs());
+        let ([zone, loss], size) = (bounds(m, params, f), jar[r].abs());
         let inside = half * weight[r] * jar[r] * jar[r];
-        let outside = F::k(f.loss) * half.fnma(zone, size);
+        let outside = loss * half.fnma(zone, size);
         sum = sum + F::select(zone.lt(size), outside, inside);
         r += 1;
     }

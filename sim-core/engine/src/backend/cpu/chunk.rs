@@ -1,14 +1,16 @@
 //! A run of blocks that one thread works on: their state in lane order, and one workspace.
 
 use super::contacts;
+use super::noise::Noise;
+use super::state::{Shape, StateField};
 use super::transfer::{self, Arena};
 use crate::backend::{Faults, Values};
 use crate::start::StartDraw;
 use sim_core::batch::{Block, Field, Layout};
 use sim_core::compiled::Stages;
 use sim_core::lane::{Lane, Real};
-use sim_core::model::Model;
 use sim_core::model::constants::Constants;
+use sim_core::model::{Model, SensedShapes};
 use sim_core::step::{FORWARD, STAGES, Stage};
 use std::ops::Range;
 
@@ -32,59 +34,10 @@ pub(super) struct Job<F: Lane> {
     pub start: Vec<F::Real>,
     /// What is drawn over it.
     pub draw: StartDraw,
-}
-
-/// State and commands of a block: groups of one number a dof, then positions and their rests, one a coordinate, then the
-/// parameters that vary.
-#[derive(Clone, Copy)]
-pub(super) enum StateField {
-    Qd,
-    Qdd,
-    F,
-    TargetQ,
-    TargetQd,
-    Q,
-    QRest,
-    Params,
-}
-
-/// Numbers of a world's state and commands.
-#[derive(Clone, Copy)]
-pub(super) struct Shape {
-    dofs: usize,
-    coords: usize,
-    params: usize,
-}
-
-impl Shape {
-    pub(super) fn of<R: Real>(m: &Constants<R>) -> Shape {
-        Shape {
-            dofs: m.dofs.len(),
-            coords: m.coords,
-            params: m.varying.len(),
-        }
-    }
-    pub(super) fn start(self, field: StateField) -> usize {
-        let groups = (field as usize).min(StateField::Q as usize);
-        let coords = (field as usize).saturating_sub(StateField::Q as usize);
-        groups * self.dofs + coords * self.coords
-    }
-    pub(super) fn total(self) -> usize {
-        self.start(StateField::Params) + self.params
-    }
-}
-
-impl StateField {
-    pub(super) fn of(field: Field) -> StateField {
-        match field {
-            Field::JointQ => StateField::Q,
-            Field::JointQd => StateField::Qd,
-            Field::JointF => StateField::F,
-            Field::JointTargetQ => StateField::TargetQ,
-            Field::JointTargetQd => StateField::TargetQd,
-            other => unreachable!("`{}` is not written from outside", other.row().name),
-        }
-    }
+    /// What is added to commands and sensors.
+    pub noise: Noise,
+    /// What the contact sensors add up.
+    pub contact_sensors: Vec<SensedShapes>,
 }
 
 impl<F: Lane> Job<F> {
@@ -100,6 +53,10 @@ impl<F: Lane> Job<F> {
             for (to, from) in reset[shape.start(field)..].iter_mut().zip(values) {
                 *to = F::Real::of(*from);
             }
+        }
+        let (sent, history) = (shape.start(StateField::F), shape.start(StateField::History));
+        for k in 0..shape.history {
+            reset[history + k] = reset[sent + k % (3 * shape.dofs)];
         }
         for (k, &(_, x)) in model.constants().varying.starts().iter().enumerate() {
             reset[shape.start(StateField::Params) + k] = F::Real::of(x);
@@ -121,6 +78,8 @@ impl<F: Lane> Job<F> {
             faults: Faults::default(),
             start: reset,
             draw: StartDraw::new(model),
+            noise: Noise::new(model),
+            contact_sensors: model.contact_sensors().to_vec(),
         }
     }
 }
@@ -130,27 +89,35 @@ fn stages_for(layout: &Layout) -> Vec<Stage> {
     let mut last = None;
     let mut output = Vec::new();
     for slot in &layout.slots {
-        let (needs, shows) = match slot.field {
-            Field::BodyQ => (Stage::Kinematics, Some(Stage::Poses)),
-            Field::BodyQd | Field::BodyJacobian => (Stage::Bias, Some(Stage::Velocities)),
-            Field::BiasForce => (Stage::Bias, None),
-            Field::MassMatrix => (Stage::MassMatrix, None),
-            Field::SmoothForce => (Stage::Actuation, None),
-            Field::EfcJ | Field::EfcD | Field::EfcAref => (Stage::Constraint, None),
+        let (needs, shows): (Stage, &[Stage]) = match slot.field {
+            Field::BodyQ => (Stage::Kinematics, &[Stage::Poses]),
+            Field::BodyQd | Field::BodyJacobian => (Stage::Bias, &[Stage::Velocities]),
+            Field::BiasForce => (Stage::Bias, &[]),
+            Field::MassMatrix => (Stage::MassMatrix, &[]),
+            Field::SmoothForce => (Stage::Actuation, &[]),
+            Field::EfcJ | Field::EfcD | Field::EfcAref => (Stage::Constraint, &[]),
             Field::ContactCount
             | Field::ContactPos
             | Field::ContactNormal
             | Field::ContactDistance
-            | Field::ContactPair => (Stage::ContactRows, None),
+            | Field::ContactPair => (Stage::ContactRows, &[]),
             Field::ConstraintForce
             | Field::EfcForce
             | Field::ContactForce
-            | Field::BodyContactForce => (Stage::Refine, None),
-            Field::JointQdd => (Stage::Accelerations, None),
+            | Field::BodyContactForce
+            | Field::ContactSensor => (Stage::Refine, &[]),
+            Field::JointQdd => (Stage::Accelerations, &[]),
+            Field::JointTorque => (Stage::Command, &[Stage::JointTorque]),
+            Field::SiteQ | Field::SiteQd => (Stage::Bias, &[Stage::Poses, Stage::Sites]),
+            Field::Gyro | Field::Accelerometer => (Stage::Accelerations, &[Stage::Imu]),
             _ => continue,
         };
         last = last.max(FORWARD.iter().position(|&stage| stage == needs));
-        output.extend(shows.filter(|stage| !output.contains(stage)));
+        for &stage in shows {
+            if !output.contains(&stage) {
+                output.push(stage);
+            }
+        }
     }
     let mut stages = FORWARD[..last.map_or(0, |last| last + 1)].to_vec();
     stages.extend(output);
@@ -300,11 +267,15 @@ impl<F: Lane> Chunk<F> {
         for block in 0..self.worlds.len().div_ceil(F::WIDTH) {
             let state = block * stride..(block + 1) * stride;
             self.load(state.clone());
+            if substeps > 0 {
+                self.draw_command_noise(job, block);
+            }
             for pass in 0..=substeps {
                 let evaluates = pass == substeps;
                 if evaluates {
                     if substeps > 0 {
                         self.note(job, block, state.clone());
+                        self.age_commands(job, block, state.clone());
                     }
                     // before the evaluation, which moves the warm start: what is read must not change the run
                     self.store(shape, state.clone());
@@ -330,21 +301,24 @@ impl<F: Lane> Chunk<F> {
                 // SAFETY: the arena holds the layout, and these worlds are this chunk's alone.
                 unsafe {
                     match slot.field {
-                        Field::Time => arena.put(slot, rows, |w| {
+                        Field::Time => arena.put(slot, rows.clone(), |w| {
                             self.steps[w - self.worlds.start] as f64 * job.frame_s
                         }),
-                        Field::Step => arena.put(slot, rows, |w| self.steps[w - self.worlds.start]),
+                        Field::Step => {
+                            arena.put(slot, rows.clone(), |w| self.steps[w - self.worlds.start])
+                        }
                         Field::Status => {
-                            arena.put(slot, rows, |w| self.status[w - self.worlds.start])
+                            arena.put(slot, rows.clone(), |w| self.status[w - self.worlds.start])
                         }
                         Field::ContactsLeftOut => {
-                            arena.put(slot, rows, |w| self.left_out[w - self.worlds.start])
+                            arena.put(slot, rows.clone(), |w| self.left_out[w - self.worlds.start])
                         }
                         field if contacts::is_of_contacts(field) => {
-                            contacts::export(self, &job.constants, slot, rows, arena)
+                            contacts::export(self, job, slot, rows.clone(), arena)
                         }
-                        _ => transfer::export(self, &job.constants, slot, rows, arena),
+                        _ => transfer::export(self, &job.constants, slot, rows.clone(), arena),
                     }
+                    self.add_noise(job, slot, rows, arena);
                 }
             }
             // now that its trouble was shown, and before the commands of its first step come
@@ -366,6 +340,7 @@ impl<F: Lane> Chunk<F> {
             &mut b.joint_target_qd,
             &mut b.joint_q,
             &mut b.joint_q_rest,
+            &mut b.command_history,
             &mut b.params,
         ];
         let mut from = self.state[state].chunks_exact(F::WIDTH);
@@ -376,6 +351,8 @@ impl<F: Lane> Chunk<F> {
         }
         b.unconverged[0] = F::c(0.0);
         b.left_out[0] = F::c(0.0);
+        b.substep[0] = F::c(0.0);
+        b.command_noise.fill(F::c(0.0));
     }
 
     /// The state of a block out of its workspace; commands did not change.

@@ -1,9 +1,10 @@
 //! Contacts out of a block: lists of each world by itself, one class after the other.
 
-use super::chunk::Chunk;
+use super::chunk::{Chunk, Job};
 use super::transfer::Arena;
 use sim_core::batch::{Dtype, Field, Slot};
 use sim_core::lane::{Lane, Real};
+use sim_core::model::SensedShapes;
 use sim_core::model::constants::Constants;
 use sim_core::model::contact::{Class, Memory, row};
 use std::ops::Range;
@@ -67,6 +68,7 @@ pub(super) fn is_of_contacts(field: Field) -> bool {
             | Field::ContactForce
             | Field::ContactPair
             | Field::BodyContactForce
+            | Field::ContactSensor
     )
 }
 
@@ -76,11 +78,12 @@ pub(super) fn is_of_contacts(field: Field) -> bool {
 /// As [`Arena::rows`].
 pub(super) unsafe fn export<F: Lane>(
     chunk: &Chunk<F>,
-    m: &Constants<F::Real>,
+    job: &Job<F>,
     slot: &Slot,
     worlds: Range<usize>,
     arena: Arena,
 ) {
+    let m = &job.constants;
     let n: usize = slot.shape[1..].iter().product();
     if slot.dtype == Dtype::I32 {
         // SAFETY: by contract.
@@ -108,6 +111,10 @@ pub(super) unsafe fn export<F: Lane>(
         let contacts = world.contacts(&m.contacts.classes);
         if slot.field == Field::BodyContactForce {
             add_forces(&world, m, contacts, to);
+            continue;
+        }
+        if slot.field == Field::ContactSensor {
+            add_sensed(&world, m, &job.contact_sensors, contacts, to);
             continue;
         }
         let size = if slot.field == Field::ContactDistance {
@@ -139,6 +146,29 @@ fn world<'a, F: Lane>(chunk: &'a Chunk<F>, m: &'a Constants<F::Real>, lane: usiz
         memory: &m.contacts.memory,
         cells: &chunk.memory,
         lane,
+    }
+}
+
+/// What the contact sensors add up, `(contact_sensors, 3)` [N].
+fn add_sensed<'c, F: Lane>(
+    world: &World<'_, F>,
+    m: &Constants<F::Real>,
+    sensors: &[SensedShapes],
+    contacts: impl Iterator<Item = Contact<'c, F::Real>>,
+    to: &mut [F::Real],
+) {
+    for contact in contacts {
+        let force = world.force(contact.row);
+        let [a, b] = m.contacts.pairs[world.pair(contact.row)].shapes;
+        for (sensor, to) in sensors.iter().zip(to.chunks_exact_mut(3)) {
+            for (on, from, sign) in [(b, a, 1.0), (a, b, -1.0)] {
+                if sensor.of[on] && sensor.against[from] {
+                    for i in 0..3 {
+                        to[i] = Real::of(to[i].to_f64() + sign * force[i]);
+                    }
+                }
+            }
+        }
     }
 }
 

@@ -4,21 +4,25 @@
 
 mod chunk;
 mod contacts;
+mod delay;
 mod dispatch;
+mod noise;
 mod records;
 mod reset;
+mod state;
 mod transfer;
 mod trouble;
 
 pub use dispatch::{available, create};
 
 use super::{Backend, BackendError, Faults, Lanes, Precision, Values};
-use chunk::{Chunk, Job, StateField};
+use chunk::{Chunk, Job};
 use dispatch::{Program, RunChunk};
 use rayon::prelude::*;
 use sim_core::batch::{Field, Layout};
 use sim_core::lane::Lane;
 use sim_core::model::Model;
+use state::StateField;
 use std::ops::Range;
 
 /// Chunks a thread: enough that a slow block does not leave the others idle.

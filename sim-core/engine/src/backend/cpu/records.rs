@@ -1,6 +1,7 @@
 //! Worlds out of lanes and back: records of a snapshot, which are the same whatever the lanes and threads.
 
-use super::chunk::{Chunk, Job, Shape, StateField};
+use super::chunk::{Chunk, Job};
+use super::state::{Shape, StateField};
 use crate::backend::COUNTERS;
 use sim_core::lane::{Lane, Real};
 use std::array;

@@ -110,14 +110,19 @@ pub(super) unsafe fn export<F: Lane>(
 fn stage<F: Lane>(chunk: &mut Chunk<F>, m: &Constants<F::Real>, field: Field, n: usize) {
     let (b, w, to) = (&chunk.block, &chunk.block.work, &mut chunk.staging[..n]);
     match field {
-        Field::JointQ => to.copy_from_slice(&b.joint_q),
-        Field::JointQd => to.copy_from_slice(&b.joint_qd),
+        Field::JointQ | Field::JointQMeasured => to.copy_from_slice(&b.joint_q),
+        Field::JointQd | Field::JointQdMeasured => to.copy_from_slice(&b.joint_qd),
         Field::JointQdd => to.copy_from_slice(&b.joint_qdd),
         Field::JointF => to.copy_from_slice(&b.joint_f),
         Field::JointTargetQ => to.copy_from_slice(&b.joint_target_q),
         Field::JointTargetQd => to.copy_from_slice(&b.joint_target_qd),
         Field::BodyQ => to.copy_from_slice(w.body_q.as_flattened()),
         Field::BodyQd => to.copy_from_slice(w.body_qd.as_flattened().as_flattened()),
+        Field::JointTorque => to.copy_from_slice(&w.joint_torque),
+        Field::SiteQ => to.copy_from_slice(w.site_q.as_flattened()),
+        Field::SiteQd => to.copy_from_slice(w.site_qd.as_flattened().as_flattened()),
+        Field::Gyro => to.copy_from_slice(w.gyro.as_flattened()),
+        Field::Accelerometer => to.copy_from_slice(w.accelerometer.as_flattened()),
         Field::BodyJacobian => body_jacobian(m, w, to),
         Field::BiasForce => to.copy_from_slice(&w.bias_force),
         Field::SmoothForce => to.copy_from_slice(&w.smooth_force),

@@ -1,0 +1,51 @@
+//! Commands that act late: those of the frames before are kept.
+
+use super::chunk::{Chunk, Job};
+use super::state::{Shape, StateField};
+use sim_core::batch::status::FROZEN;
+use sim_core::lane::Lane;
+use std::ops::Range;
+
+impl<F: Lane> Chunk<F> {
+    /// Makes the commands of this frame those of the frame before, in the worlds that are not frozen; `state` is the block's.
+    ///
+    /// What is then evaluated shows what acts next if nothing else is sent.
+    #[inline(always)]
+    pub(super) fn age_commands(&mut self, job: &Job<F>, block: usize, state: Range<usize>) {
+        let shape = Shape::of(&job.constants);
+        if shape.history == 0 {
+            return;
+        }
+        let numbers = &mut self.state[state];
+        let first = shape.start(StateField::History) * F::WIDTH;
+        let sent = shape.start(StateField::F) * F::WIDTH;
+        let frame = 3 * shape.dofs * F::WIDTH;
+        let end = first + shape.history * F::WIDTH;
+        let status = &self.status;
+        let stays = |lane: usize| {
+            let world = block * F::WIDTH + lane;
+            status
+                .get(world)
+                .is_some_and(|&status| status & FROZEN != 0)
+        };
+        if (0..F::WIDTH).any(stays) {
+            // from the oldest on, since each takes the place of the one before
+            for place in (first..end).rev().filter(|place| !stays(place % F::WIDTH)) {
+                let from = if place < first + frame {
+                    place - first + sent
+                } else {
+                    place - frame
+                };
+                numbers[place] = numbers[from];
+            }
+        } else {
+            numbers.copy_within(first..end - frame, first + frame);
+            numbers.copy_within(sent..sent + frame, first);
+        }
+        let history = numbers[first..end].chunks_exact(F::WIDTH);
+        for (x, from) in self.block.command_history.iter_mut().zip(history) {
+            *x = F::load(from);
+        }
+        self.block.substep[0] = F::c(0.0);
+    }
+}
