@@ -5,7 +5,8 @@ mod common;
 use common::shapes::shapes;
 use common::{Demo, Run, command, lesson_with_table};
 use sim_core::batch::Field;
-use sim_core::model::{Cone, Distribution};
+use sim_core::model::params::Param;
+use sim_core::model::{Cone, Distribution, Pose, Site};
 use sim_engine::backend::Values;
 use sim_engine::simulation::{Options, Precision};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -40,10 +41,21 @@ fn taken(work: impl FnOnce()) -> usize {
     TAKEN.with(Cell::get) - before
 }
 
+/// Commands that come late and with noise, and a noisy sensor.
+const NOISY: [Param; 3] = [Param::CommandDelay, Param::JointFNoise, Param::SiteQNoise];
+
 #[test]
 fn command_step_and_forward_take_no_memory() {
     assert!(taken(|| drop(vec![1u8])) == 1, "the count works");
-    let lesson = lesson_with_table(Demo::Target, true).compile().unwrap();
+    let mut lesson = lesson_with_table(Demo::Target, true);
+    lesson.params.extend(NOISY);
+    lesson.sites.push(Site {
+        name: "tip".to_owned(),
+        body: Some("cube".to_owned()),
+        pose: Pose::identity(),
+        relative_to: None,
+    });
+    let lesson = lesson.compile().unwrap();
     let (_, row) = command(Demo::Target, 20);
     let shapes = shapes(Cone::Elliptic).compile().unwrap();
     for (model, field, row) in [
@@ -59,6 +71,13 @@ fn command_step_and_forward_take_no_memory() {
                 ..Options::default()
             };
             let mut run = Run::new(&model, options);
+            for param in model.constants().varying.params() {
+                let columns = param.columns(&model);
+                let ones = vec![1e-3; 100 * columns];
+                run.sim
+                    .write_param(param, 0..columns, Values::F64(&ones), None)
+                    .unwrap();
+            }
             let values: Vec<f64> = (0..100).flat_map(|_| row.iter().copied()).collect();
             let count = taken(|| {
                 for _ in 0..3 {

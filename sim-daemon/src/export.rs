@@ -82,6 +82,11 @@ pub(crate) fn description(
         coord_names: model.coord_names().to_vec(),
         body_names: model.body_names().to_vec(),
         shape_names: model.shape_names().to_vec(),
+        site_names: model.site_names().to_vec(),
+        contact_sensor_names: {
+            let sensors = model.contact_sensors().iter();
+            sensors.map(|sensor| sensor.name.clone()).collect()
+        },
         robots: model
             .robots()
             .iter()

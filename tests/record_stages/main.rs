@@ -32,7 +32,7 @@ type Scalar = Block<f32, f32>;
 type OnTape = Block<Recorded, RecordedVariable>;
 
 /// What stages leave for each other, and the state.
-const SLOTS: [WorkSlot; 27] = {
+const SLOTS: [WorkSlot; 37] = {
     use WorkSlot::*;
     [
         JointQ,
@@ -45,6 +45,10 @@ const SLOTS: [WorkSlot; 27] = {
         JointTargetQ,
         JointTargetQd,
         Params,
+        Substep,
+        CommandHistory,
+        CommandNoise,
+        Applied,
         Rotation,
         Origin,
         Reference,
@@ -62,6 +66,12 @@ const SLOTS: [WorkSlot; 27] = {
         Velocity,
         LinkCenter,
         BodyQd,
+        Orientation,
+        JointTorque,
+        SiteQ,
+        SiteQd,
+        Gyro,
+        Accelerometer,
     ]
 };
 
@@ -246,11 +256,14 @@ fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
             // poses belong to the state before it moves on
             let last = [
                 Stage::Accelerations,
+                Stage::JointTorque,
                 Stage::Poses,
                 Stage::Velocities,
+                Stage::Sites,
+                Stage::Imu,
                 Stage::Integrate,
             ];
-            for stage in needed(m, before_integrate()).chain(last) {
+            for stage in needed(m, before_integrate()).chain(needed(m, &last)) {
                 let recording = recordings[stage.number()].as_ref().expect("it is needed");
                 let what = format!("{}: {}", case.name, stage.name());
                 let inputs = gathered(&mut block, stage.reads());
@@ -370,6 +383,9 @@ fn a_control_frame_is_recorded_as_a_loop_over_substeps() {
             JointTargetQ,
             JointTargetQd,
             Params,
+            Substep,
+            CommandHistory,
+            CommandNoise,
         ];
         let writes = [JointQ, JointQRest, JointQd, JointQdd, Unconverged, LeftOut];
         let start = Instant::now();

@@ -4,7 +4,7 @@ use crate::{SUBSTEPS, Scalar, scene, toy};
 use sim_core::batch::Block;
 use sim_core::model::constants::{Constants, Motion};
 use sim_core::model::params::Param;
-use sim_core::model::{Body, Collision, Cone, Description, Model, Pose, Shape, UrdfOptions};
+use sim_core::model::{Body, Collision, Cone, Description, Model, Pose, Shape, Site, UrdfOptions};
 use std::path::Path;
 
 /// A model, and where its random states are.
@@ -38,7 +38,8 @@ pub fn fr3() -> Case {
 
 /// Every kind of joint on a floating base, with accelerations refined.
 pub fn every_joint() -> Case {
-    let scene = robot("tests/record_stages/every_joint.urdf", 0.0, true);
+    let mut scene = robot("tests/record_stages/every_joint.urdf", 0.0, true);
+    add_sites(&mut scene);
     let m = constants(&scene.compile().unwrap());
     assert!(m.solver.refinements > 0);
     for motion in [
@@ -113,6 +114,7 @@ fn arm_at_cube(name: &'static str, params: impl IntoIterator<Item = Param>) -> C
         .push((Collision::new(None, cube, Pose::identity()), 400.0));
     scene.add_body(body).unwrap();
     scene.params.extend(params);
+    add_sites(&mut scene);
     let model = scene.compile().unwrap();
     Case {
         name,
@@ -123,6 +125,24 @@ fn arm_at_cube(name: &'static str, params: impl IntoIterator<Item = Param>) -> C
             apart: 0.02,
             turn: 0.1,
         }),
+    }
+}
+
+/// A site in the world and one on each link, each measured from the one before it but for the first of three.
+fn add_sites(scene: &mut Description) {
+    let robot = &scene.robots[0];
+    let links = robot
+        .links
+        .iter()
+        .map(|link| format!("{}/{}", robot.name, link.name));
+    let bodies: Vec<_> = std::iter::once(None).chain(links.map(Some)).collect();
+    for (k, body) in bodies.into_iter().enumerate() {
+        scene.sites.push(Site {
+            name: format!("site {k}"),
+            body,
+            pose: Pose::from_rpy([0.1, -0.2, 0.3], [0.4, 0.5, -0.6]),
+            relative_to: (k % 3 > 0).then(|| format!("site {}", k - 1)),
+        });
     }
 }
 
@@ -191,10 +211,19 @@ impl Case {
             block.joint_target_qd[j] = number(1.0);
         }
         for (x, (param, start)) in block.params.iter_mut().zip(m.varying.starts()) {
-            *x = match param.is_load() {
-                true => number(5.0),
-                false => *start as f32 * (1.0 + number(0.3)),
+            *x = match param {
+                Param::BodyF => number(5.0),
+                Param::CommandDelay => number(40.0).abs(),
+                Param::JointFriction => number(3.0).abs(),
+                _ => *start as f32 * (1.0 + number(0.3)),
             };
+        }
+        for x in block
+            .command_history
+            .iter_mut()
+            .chain(&mut block.command_noise)
+        {
+            *x = number(1.0);
         }
         let apart = self.near.as_ref().map_or(5.0, |near| near.apart);
         for body in m.bodies.iter().filter(|body| body.motion == Motion::Free) {

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     )
     from tightloop.robot import Link, Robot
     from tightloop.scene import Scene
+    from tightloop.sensed import ContactSensor, Site
     from tightloop.shapes import Shape, Surface
     from tightloop.sim import FrameCopy, Sim, attach, launch
     from tightloop.snapshot import Snapshot
@@ -74,6 +75,7 @@ _HOMES = {
     ),
     "tightloop.robot": ("Link", "Robot"),
     "tightloop.scene": ("Scene",),
+    "tightloop.sensed": ("ContactSensor", "Site"),
     "tightloop.shapes": ("Shape", "Surface"),
     "tightloop.sim": ("FrameCopy", "Sim", "attach", "launch"),
     "tightloop.snapshot": ("Snapshot",),
@@ -84,6 +86,7 @@ __all__ = [
     "ArgumentError",
     "Body",
     "CommandRefused",
+    "ContactSensor",
     "DaemonLost",
     "DaemonRestarted",
     "Dynamics",
@@ -103,6 +106,7 @@ __all__ = [
     "Shape",
     "Sim",
     "SimClosed",
+    "Site",
     "Snapshot",
     "SnapshotError",
     "Surface",

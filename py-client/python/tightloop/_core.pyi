@@ -72,6 +72,25 @@ class Frame:
     """The two shapes, as places in ``sim.shape_names`` [–]; -1 in a row not in use, ``(worlds, contacts, 2)``."""
     body_contact_force: NDArray[Any]
     """Sum of the contact forces on each link, in world axes [N], ``(worlds, bodies, 3)``."""
+    joint_q_measured: NDArray[Any]
+    """Joint positions with the noise of ``params.joint_q_noise`` [rad or m], ``(worlds, coords)``."""
+    joint_qd_measured: NDArray[Any]
+    """Joint velocities with the noise of ``params.joint_qd_noise`` [rad/s or m/s], ``(worlds, dofs)``."""
+    joint_torque: NDArray[Any]
+    """What ``joint_f`` and the drive, clamped by its effort limit, give [N·m or N], ``(worlds, dofs)``. Damping, friction
+    and contacts are not in it."""
+    site_q: NDArray[Any]
+    """Sites: position [m], then quaternion (x, y, z, w), in the world or the frame that a site is relative to,
+    ``(worlds, sites, 7)``."""
+    site_qd: NDArray[Any]
+    """Velocity of each site [m/s], then its angular velocity [rad/s], ``(worlds, sites, 6)``: in world axes, or as seen
+    from the frame that it is relative to, in its axes."""
+    gyro: NDArray[Any]
+    """Angular velocity of each site, in its own axes [rad/s], ``(worlds, sites, 3)``."""
+    accelerometer: NDArray[Any]
+    """Acceleration of each site less gravity, in its own axes [m/s²], ``(worlds, sites, 3)``; 9.81 upwards at rest."""
+    contact_sensor: NDArray[Any]
+    """Sum of the contact forces of each contact sensor, in world axes [N], ``(worlds, contact_sensors, 3)``."""
     time: NDArray[np.float64]
     """Simulated time since the world's reset [s], ``(worlds,)``."""
     step: NDArray[np.uint64]

@@ -13,8 +13,10 @@ from tightloop._core import Frame
 from tightloop.errors import CommandRefused, UnknownField
 from tightloop.inputs import real_numbers
 
-#: Numbers of a link in a parameter that has several.
-LINK_PARTS = {"body_f": 6}
+#: Numbers of a link or site in a parameter that has several.
+PARTS = {"body_f": 6, "site_q_noise": 2, "site_qd_noise": 2}
+#: Parameters with one number a world.
+SINGLE = ("command_delay",)
 
 
 class Params:
@@ -30,8 +32,15 @@ class Params:
 
     ``gravity`` (worlds, 3) [m/s²], ``body_mass_scale`` (worlds, bodies) [–], ``joint_armature`` [kg·m² or kg],
     ``joint_damping``, ``joint_target_kd`` [N·m·s/rad or N·s/m], ``joint_target_ke`` [N·m/rad or N/m],
-    ``joint_effort_limit`` [N·m or N; 1e30 is none], each (worlds, dofs), ``shape_mu`` (worlds, shapes) [–],
-    ``body_f`` (worlds, bodies, 6) [N, N·m].
+    ``joint_effort_limit`` [N·m or N; 1e30 is none], ``joint_friction`` [N·m or N], each (worlds, dofs),
+    ``shape_mu`` (worlds, shapes) [–], ``body_f`` (worlds, bodies, 6) [N, N·m].
+
+    ``command_delay`` (worlds,) [substeps]: when ``joint_f`` and targets of a frame begin to act; at most
+    ``Scene.command_delay_max``. Standard deviations of normal noise, drawn for each frame from (seed, world, episode,
+    step): of commands ``joint_f_noise``, ``joint_target_q_noise``, ``joint_target_qd_noise``, of measured fields
+    ``joint_q_noise``, ``joint_qd_noise``, ``joint_torque_noise``, each (worlds, dofs), in the unit of what it is added
+    to; ``site_q_noise`` [m, rad] and ``site_qd_noise`` [m/s, rad/s] (worlds, sites, 2), ``gyro_noise`` [rad/s] and
+    ``accelerometer_noise`` [m/s²] (worlds, sites), ``contact_sensor_noise`` [N] (worlds, contact_sensors).
 
     Raises:
         UnknownField: There is no parameter of that name.
@@ -111,7 +120,9 @@ class Params:
 
     def _shape(self, name: str) -> tuple[int, ...]:
         columns = self._known[name]["info"]["columns"]
-        parts = LINK_PARTS.get(name)
+        if name in SINGLE:
+            return (self._worlds,)
+        parts = PARTS.get(name)
         return (self._worlds, columns) if parts is None else (self._worlds, columns // parts, parts)
 
     def __repr__(self) -> str:

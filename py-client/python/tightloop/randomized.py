@@ -8,7 +8,7 @@ from typing import Any
 from tightloop.distributions import Distribution, Normal, Uniform, from_table
 from tightloop.errors import SceneError
 from tightloop.robot import Robot
-from tightloop.shaped import Shaped
+from tightloop.sensed import Sensed
 
 _POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 _VELOCITY = ("vx", "vy", "vz", "wx", "wy", "wz")
@@ -17,7 +17,7 @@ Offsets = Mapping[str, Distribution]
 BodyOffsets = Mapping[str, Mapping[str, Distribution]]
 
 
-class Randomized(Shaped):
+class Randomized(Sensed):
     """The part of a scene that is about randomness."""
 
     __slots__ = ("_offsets",)

@@ -53,12 +53,23 @@ class Scene(Randomized):
         rows_max: Most constraint rows of contacts that a world has room for, 1 to 16384; None is as many as its
             contacts need.
         params: Numbers of the model that vary from world to world, besides those named at launch; see `launch`.
+        command_delay_max: Largest ``command_delay`` that a world may have, where that varies [substeps]; None is four
+            control frames. Each frame of it takes memory for a frame's commands in every world.
 
     Raises:
         SceneError: A value is out of range; the message names it.
     """
 
-    __slots__ = ("_contacts_max", "_dt", "_gravity", "_params", "_rows_max", "_solver", "_substeps")
+    __slots__ = (
+        "_command_delay_max",
+        "_contacts_max",
+        "_dt",
+        "_gravity",
+        "_params",
+        "_rows_max",
+        "_solver",
+        "_substeps",
+    )
 
     def __init__(
         self,
@@ -69,6 +80,7 @@ class Scene(Randomized):
         contacts_max: int | None = None,
         rows_max: int | None = None,
         params: Iterable[str] = (),
+        command_delay_max: int | None = None,
     ) -> None:
         super().__init__()
         self.dt = dt
@@ -77,6 +89,7 @@ class Scene(Randomized):
         self.contacts_max = contacts_max
         self.rows_max = rows_max
         self.params = params
+        self.command_delay_max = command_delay_max
         self._solver = Solver()
 
     @property
@@ -116,6 +129,16 @@ class Scene(Randomized):
         if isinstance(params, str) or not isinstance(params, Iterable):
             raise SceneError(f"Scene: params is {params!r}; give a list of names")
         self._params = tuple(checks.text("Scene: an entry of params", param) for param in params)
+
+    @property
+    def command_delay_max(self) -> int | None:
+        """Largest ``command_delay`` that a world may have [substeps]; None is four control frames."""
+        return self._command_delay_max
+
+    @command_delay_max.setter
+    def command_delay_max(self, command_delay_max: SupportsIndex | None) -> None:
+        most = 1000 * self.substeps
+        self._command_delay_max = _capacity("command_delay_max", command_delay_max, most)
 
     @property
     def contacts_max(self) -> int | None:
@@ -322,7 +345,7 @@ class Scene(Randomized):
         """
         file = checks.path("load: path", path)
         data = json.loads(_core.load_scene(str(file)))
-        options = ("dt", "substeps", "gravity", "contacts_max", "rows_max", "params")
+        options = ("dt", "substeps", "gravity", "contacts_max", "rows_max", "params", "command_delay_max")
         scene = cls(**{option: data[option] for option in options if option in data})
         scene.solver(**data["solver"])
         for table in data.get("robot", ()):
@@ -339,6 +362,10 @@ class Scene(Randomized):
             getattr(scene, f"add_{shape.pop('type')}")(**shape)
         for pair in data.get("contact_filters", ()):
             scene.filter_contacts(*pair)
+        for site in data.get("site", ()):
+            scene.add_site(**site)
+        for sensor in data.get("contact_sensor", ()):
+            scene.add_contact_sensor(**sensor)
         scene._load_offsets(data.get("randomize", {}))
         return scene
 
@@ -357,6 +384,7 @@ class Scene(Randomized):
                 "substeps": self.substeps,
                 "gravity": self.gravity,
                 "params": self.params,
+                "command_delay_max": self.command_delay_max,
                 "contacts_max": self.contacts_max,
                 "rows_max": self.rows_max,
                 "contact_filters": self.filters,
@@ -365,6 +393,7 @@ class Scene(Randomized):
                 "shape": [shape.table() for shape in self.shapes.values()],
                 "robot": [robot.table() for robot in self.robots.values()],
                 "body": [body.table() for body in self.bodies.values()],
+                **self._sensor_tables(),
             }
         )
 

@@ -193,7 +193,8 @@ class Shaped:
         Raises:
             SceneError: There is no such thing in the scene; what is filtered must be there before.
         """
-        self.filters.append((self._touching(a), self._touching(b)))
+        what = "filter_contacts"
+        self.filters.append((self._touching(what, a), self._touching(what, b)))
 
     def _add_shape(
         self,
@@ -241,18 +242,18 @@ class Shaped:
             raise SceneError(f"{what}: body is {bearer!r}, which is no body of this scene; there are: {known}")
         return bearer
 
-    def _touching(self, thing: Touching) -> str:
-        """Name of something whose contacts can be filtered."""
+    def _touching(self, what: str, thing: Touching) -> str:
+        """Name of something that may touch; `what` is for messages."""
         if isinstance(thing, Shape):
             if self.shapes.get(thing.name) is not thing:
-                raise SceneError(f"filter_contacts: shape `{thing.name}` is of another scene; give one of this scene's")
+                raise SceneError(f"{what}: shape `{thing.name}` is of another scene; give one of this scene's")
             return thing.full_name
         if isinstance(thing, Robot):
             if self.robots.get(thing.name) is not thing:
-                raise SceneError(f"filter_contacts: robot `{thing.name}` is of another scene; give one of this scene's")
+                raise SceneError(f"{what}: robot `{thing.name}` is of another scene; give one of this scene's")
             return thing.name
         if isinstance(thing, (Body, Link)):
-            return self._bearer("filter_contacts", thing)
+            return self._bearer(what, thing)
         shapes = [shape.full_name for shape in self.shapes.values()]
         names = [*shapes, *self.robots, *self.bodies]
         for robot in self.robots.values():
@@ -260,7 +261,7 @@ class Shaped:
         if thing not in names:
             known = ", ".join(f"`{name}`" for name in (*shapes, *self.robots, *self.bodies)) or "none yet"
             raise SceneError(
-                f"filter_contacts: there is no shape, robot, body or link {thing!r}; there are: {known}, and the "
+                f"{what}: there is no shape, robot, body or link {thing!r}; there are: {known}, and the "
                 "robots' links and shapes (robot.link_names, robot.shape_names)"
             )
         return thing

@@ -54,6 +54,8 @@ class Sim:
         body_names: ``robot/link`` of each body.
         shape_names: Each collision shape: ``shape`` of static ones, which come first, ``robot/link/shape``,
             ``body/shape``.
+        site_names: Sites of the scene, in the order of ``site_q`` and the other fields of sites.
+        contact_sensor_names: Its contact sensors, in the order of ``contact_sensor``.
         dofs: Slice of each robot's dofs, by robot name.
         coords: Slice of each robot's coordinates.
         bodies: Slice of each robot's bodies.
@@ -78,6 +80,8 @@ class Sim:
         self.coord_names: list[str] = self.info["coord_names"]
         self.body_names: list[str] = self.info["body_names"]
         self.shape_names: list[str] = self.info["shape_names"]
+        self.site_names: list[str] = self.info["site_names"]
+        self.contact_sensor_names: list[str] = self.info["contact_sensor_names"]
         self.dofs, self.coords, self.bodies = (
             {robot["name"]: slice(*robot[range_]) for robot in self.info["robots"]}
             for range_ in ("dofs", "coords", "bodies")
@@ -280,9 +284,8 @@ def launch(
         fields: What frames carry besides ``time``, ``step``, ``status`` and ``contacts_left_out``: names of `Frame`
             attributes.
         params: Numbers of the model that vary from world to world and may be written while it runs, besides those that
-            the scene names: of ``gravity``, ``body_mass_scale``, ``joint_armature``, ``joint_damping``,
-            ``joint_target_ke``, ``joint_target_kd``, ``joint_effort_limit``, ``shape_mu``, ``body_f``; see
-            `Sim.params`.
+            the scene names, such as ``"shape_mu"``, ``"joint_friction"``, ``"command_delay"``, ``"gyro_noise"``;
+            `Sim.params` lists them all.
         bounds: Largest ``"joint_q"`` [rad or m] and ``"joint_qd"`` [rad/s or m/s], in size; a world beyond one is
             frozen at its state before that frame, with bit 8 of ``status``. None if left out.
         on_fault: What becomes of a frozen world: ``"freeze"`` keeps it until it is reset, ``"reset"`` resets it

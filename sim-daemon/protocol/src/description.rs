@@ -39,6 +39,10 @@ pub struct Description {
     pub body_names: Vec<String>,
     /// Collision shapes: `shape`, `body/shape` or `robot/link/shape`.
     pub shape_names: Vec<String>,
+    /// Sites.
+    pub site_names: Vec<String>,
+    /// Contact sensors.
+    pub contact_sensor_names: Vec<String>,
     /// The robots with their ranges in the lists above.
     pub robots: Vec<RobotRange>,
     /// Rows of the field table: what every frame carries, in this order.
@@ -131,6 +135,10 @@ impl Description {
         self.coord_names.iter().for_each(|name| hash.text(name));
         self.body_names.iter().for_each(|name| hash.text(name));
         self.shape_names.iter().for_each(|name| hash.text(name));
+        self.site_names.iter().for_each(|name| hash.text(name));
+        self.contact_sensor_names
+            .iter()
+            .for_each(|name| hash.text(name));
         for field in &self.fields {
             hash.text(&field.name);
             hash.number(field.dtype as u64);

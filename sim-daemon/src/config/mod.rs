@@ -7,6 +7,7 @@ mod number;
 pub(crate) mod paths;
 mod randomize;
 mod robots;
+mod sensors;
 mod shapes;
 mod summary;
 mod surface;
@@ -21,6 +22,7 @@ pub use bodies::BodyTable;
 pub use number::{Number, PerDof};
 pub use randomize::{DistributionTable, RandomizeTable};
 pub use robots::{ModeName, RobotTable};
+pub use sensors::{ContactSensorTable, SiteTable};
 pub use shapes::{ShapeName, ShapeTable};
 pub use sim_core::batch::Field;
 pub use sim_core::model::UrdfOptions;
@@ -93,6 +95,9 @@ pub struct SceneFile {
     /// Parameters that vary from world to world, by their names.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub params: Vec<String>,
+    /// Largest delay of commands that a world may have, where that varies [substeps]; left out, four control frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command_delay_max: Option<usize>,
     /// Most contacts that a world has room for; left out, as many as its shapes suggest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contacts_max: Option<usize>,
@@ -117,6 +122,16 @@ pub struct SceneFile {
     /// Rigid bodies, in the order of their dofs, after all robots.
     #[serde(default, rename = "body", skip_serializing_if = "Vec::is_empty")]
     pub bodies: Vec<BodyTable>,
+    /// Frames of interest.
+    #[serde(default, rename = "site", skip_serializing_if = "Vec::is_empty")]
+    pub sites: Vec<SiteTable>,
+    /// Sums of contact forces.
+    #[serde(
+        default,
+        rename = "contact_sensor",
+        skip_serializing_if = "Vec::is_empty"
+    )]
+    pub contact_sensors: Vec<ContactSensorTable>,
 }
 
 fn gravity() -> [Number; 3] {
@@ -260,6 +275,7 @@ impl SceneFile {
             description.params.insert(param(name)?);
         }
         description.filters = self.contact_filters.clone();
+        description.command_delay_max = self.command_delay_max;
         description.contacts_max = self.contacts_max;
         description.rows_max = self.rows_max;
         description.solver = Solver {
@@ -295,6 +311,9 @@ impl SceneFile {
         for table in &self.bodies {
             description.add_body(table.body(&self.shapes, base_dir)?)?;
         }
+        description.sites = self.sites.iter().map(SiteTable::site).collect();
+        let sensors = self.contact_sensors.iter();
+        description.contact_sensors = sensors.map(ContactSensorTable::sensor).collect();
         self.randomize.write(&mut description)?;
         description.validate()?;
         Ok(description)

@@ -7,6 +7,7 @@ plane or free child: these are made by hand, a plane as slide, slide, hinge.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -107,8 +108,10 @@ def in_plane(normal: Array) -> tuple[Array, Array]:
     return rotation[:, 0], rotation[:, 1]
 
 
-def judge_of(scene: tl.Scene, trees: dict[str, Tree]) -> mujoco.MjModel:
-    """MuJoCo's model of a scene of these robots, with its drives, limits and poses."""
+def judge_of(
+    scene: tl.Scene, trees: dict[str, Tree], add: Callable[[mujoco.MjSpec], None] = lambda spec: None
+) -> mujoco.MjModel:
+    """MuJoCo's model of a scene of these robots, with its drives, limits and poses, and what `add` gives it."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     option = spec.option
@@ -131,6 +134,7 @@ def judge_of(scene: tl.Scene, trees: dict[str, Tree]) -> mujoco.MjModel:
                 drive(spec, robot, dof, mujoco_joint.name)
             elif mujoco_joint.type == mujoco.mjtJoint.mjJNT_BALL:
                 mujoco_joint.armature = robot.joint_armature[dof]
+    add(spec)
     model = spec.compile()
     # MuJoCo gives what weighs nothing the centre of what it carries; ours is the origin of its frame
     model.body_ipos[model.body_mass == 0] = 0.0

@@ -47,6 +47,8 @@ fn description() -> Description {
         coord_names: Vec::new(),
         body_names: Vec::new(),
         shape_names: Vec::new(),
+        site_names: Vec::new(),
+        contact_sensor_names: Vec::new(),
         robots: Vec::new(),
         fields: Vec::new(),
         known_fields: Vec::new(),

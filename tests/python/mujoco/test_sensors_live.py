@@ -1,0 +1,168 @@
+"""Sites, inertial measurement units, joint torques and dry friction of each world against MuJoCo, on random robots."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from judge import DOUBLE, SINGLE
+from numpy.random import Generator
+from piles import Judge, Pile
+from robots import Coordinates, judge_of
+from test_every_joint import command, off, random_commands, random_scene, random_state
+from twin import Array
+
+import tightloop as tl
+
+SITES = 12
+STATES = 4
+SCENES = pytest.mark.parametrize(("seed", "dofs"), [(0, 7), (1, 12), (3, 30), (6, 24), (9, 18), (11, 40), (12, 30)])
+PRECISIONS = pytest.mark.parametrize("precision", ["f64", "f32"])
+FIELDS = ("joint_q", "joint_qd", "site_q", "site_qd", "gyro", "accelerometer", "joint_torque", "joint_qdd")
+SENSORS = {
+    "pos": mujoco.mjtSensor.mjSENS_FRAMEPOS,
+    "quat": mujoco.mjtSensor.mjSENS_FRAMEQUAT,
+    "linvel": mujoco.mjtSensor.mjSENS_FRAMELINVEL,
+    "angvel": mujoco.mjtSensor.mjSENS_FRAMEANGVEL,
+    "gyro": mujoco.mjtSensor.mjSENS_GYRO,
+    "accelerometer": mujoco.mjtSensor.mjSENS_ACCELEROMETER,
+}
+
+
+def add_sites(rng: Generator, scene: tl.Scene) -> None:
+    """Sites in the world and on links, half of them measured from another site or from a link."""
+    links = [f"{name}/{link}" for name, robot in scene.robots.items() for link in robot.link_names]
+    for number in range(SITES):
+        others: list[str | None] = [*scene.sites, *links]
+        quat = rng.normal(size=4)
+        scene.add_site(
+            body=None if rng.random() < 0.15 else str(rng.choice(links)),
+            pos=tuple(rng.uniform(-0.3, 0.3, 3)),
+            quat=tuple(quat / np.linalg.norm(quat)),
+            relative_to=str(rng.choice(others)) if rng.random() < 0.5 else None,
+            name=f"s{number}",
+        )
+
+
+def give_sites(scene: tl.Scene, spec: mujoco.MjSpec) -> None:
+    """The same in MuJoCo, with its sensors."""
+    for site in scene.sites.values():
+        owner = spec.worldbody if site.body is None else spec.body(site.body)
+        owner.add_site(name=site.name, pos=site.pos, quat=np.roll(site.quat, 1))
+    for site in scene.sites.values():
+        for name, kind in SENSORS.items():
+            sensor = spec.add_sensor(name=f"{site.name}/{name}", type=kind, objname=site.name)
+            sensor.objtype = mujoco.mjtObj.mjOBJ_SITE
+            if site.relative_to is not None and name not in ("gyro", "accelerometer"):
+                is_site = site.relative_to in scene.sites
+                sensor.reftype = mujoco.mjtObj.mjOBJ_SITE if is_site else mujoco.mjtObj.mjOBJ_XBODY
+                sensor.refname = site.relative_to
+
+
+def shown(data: mujoco.MjData, name: str) -> Array:
+    """A sensor of every site, ``(sites, entries)``."""
+    return np.array([data.sensor(f"s{number}/{name}").data for number in range(SITES)])
+
+
+@PRECISIONS
+@SCENES
+def test_sites_and_torques_of_random_robots_are_mujocos(tmp_path: Path, seed: int, dofs: int, precision: str):
+    tolerances = DOUBLE if precision == "f64" else SINGLE
+    scene, trees, rng = random_scene(tmp_path, seed, dofs)
+    add_sites(rng, scene)
+    model = judge_of(scene, trees, lambda spec: give_sites(scene, spec))
+    with tl.launch(scene, worlds=1, precision=precision, fields=FIELDS) as sim:
+        assert sim.site_names == [f"s{number}" for number in range(SITES)]
+        to, data = Coordinates(model, sim), mujoco.MjData(model)
+        for _ in range(STATES):
+            q, qd = random_state(rng, sim)
+            commands = random_commands(rng, sim)
+            sim.step(**{name: values[None] for name, values in commands.items()})
+            frame = sim.write(joint_q=q[None], joint_qd=qd[None])
+            q, qd = frame.joint_q[0].astype(float), frame.joint_qd[0].astype(float)
+            dtype = frame.joint_q.dtype
+            command(to, data, q, {name: values.astype(dtype).astype(float) for name, values in commands.items()})
+            data.qpos[:], data.qvel[:] = to.positions(q), to.to_qvel(q) @ qd
+            mujoco.mj_forward(model, data)
+            poses = frame.site_q[0].astype(float)
+            # sensors of MuJoCo take their units from the file: metres here
+            assert np.abs(poses[:, :3] - shown(data, "pos")).max() < tolerances.pose * 10
+            quats = np.roll(shown(data, "quat"), -1, axis=1)
+            assert (1 - np.abs((poses[:, 3:] * quats).sum(axis=1))).max() < tolerances.pose
+            speeds = np.hstack([shown(data, "linvel"), shown(data, "angvel")])
+            assert off(frame.site_qd[0], speeds) < tolerances.dynamics
+            assert off(frame.gyro[0], shown(data, "gyro")) < tolerances.dynamics
+            assert off(frame.accelerometer[0], shown(data, "accelerometer")) < tolerances.acceleration
+            torque = to.to_qvel(q).T @ (data.qfrc_actuator + data.qfrc_applied)
+            assert off(frame.joint_torque[0], torque) < tolerances.dynamics
+
+
+@PRECISIONS
+@pytest.mark.parametrize(("seed", "dofs"), [(1, 12), (3, 30), (5, 9), (11, 40)])
+def test_dry_friction_of_each_world_is_mujocos(tmp_path: Path, seed: int, dofs: int, precision: str):
+    tolerances = DOUBLE if precision == "f64" else SINGLE
+    scene, trees, rng = random_scene(tmp_path, seed, dofs)
+    model = judge_of(scene, trees)
+    worlds = 6
+    with tl.launch(scene, worlds=worlds, precision=precision, params=("joint_friction",), fields=FIELDS) as sim:
+        to, data = Coordinates(model, sim), mujoco.MjData(model)
+        held = {name: values[None].repeat(worlds, 0) for name, values in random_commands(rng, sim).items()}
+        sim.step(**held)
+        states = [random_state(rng, sim) for _ in range(worlds)]
+        losses = rng.uniform(0.1, 3.0, (worlds, dofs))
+        for kind, _, _, _, own, _ in to.joints:
+            # MuJoCo has one friction for a joint
+            losses[:, own] = losses[:, own[:1]] * (kind != mujoco.mjtJoint.mjJNT_FREE)
+        sim.write(joint_q=np.array([q for q, _ in states]), joint_qd=np.array([qd for _, qd in states]))
+        frame = sim.params.write(joint_friction=losses)
+        losses = losses.astype(frame.joint_q.dtype).astype(float)
+        for world in range(worlds):
+            q, qd = frame.joint_q[world].astype(float), frame.joint_qd[world].astype(float)
+            for _, _, at, _, own, _ in to.joints:
+                model.dof_frictionloss[at : at + len(own)] = losses[world, own]
+            command(to, data, q, {name: values[0].astype(frame.joint_q.dtype) for name, values in held.items()})
+            convert = to.to_qvel(q)
+            data.qpos[:], data.qvel[:] = to.positions(q), convert @ qd
+            mujoco.mj_forward(model, data)
+            theirs = np.linalg.solve(convert, data.qacc - to.drift(q, qd))
+            assert off(frame.joint_qdd[world], theirs) < tolerances.acceleration
+
+
+@PRECISIONS
+def test_contact_sensors_add_up_what_mujoco_has_of_each_contact(precision: str):
+    rng = np.random.default_rng(8)
+    pile = Pile()
+    pile.shape("plane", "ground", {})
+    for number, height in enumerate((0.049, 0.147)):
+        pile.body(f"b{number}", np.array([0.01 * number, 0, height]), np.array([0, 0, 0, 1.0]))
+        pile.shape("box", f"s{number}", {"half_extents": (0.05, 0.05, 0.05)}, body=f"b{number}")
+    model = pile.compile()
+    pairs = [("b0", None), ("b0", "b1"), ("b1/s1", "b0"), ("ground", None), ("b1", "ground")]
+    for of, against in pairs:
+        pile.scene.add_contact_sensor(of=of, against=against)
+    with tl.launch(
+        pile.scene, worlds=1, precision=precision, fields=("joint_q", "joint_qd", "contact_sensor", "contact_count")
+    ) as sim:
+        assert sim.contact_sensor_names == ["contact", *(f"contact_{k}" for k in range(2, 6))]
+        frame = sim.write(joint_qd=rng.uniform(-0.1, 0.1, (1, 12)))
+        judge = Judge(model, sim)
+        _, count = judge.at(frame.joint_q[0].astype(float), frame.joint_qd[0].astype(float))
+        assert count == frame.contact_count[0] == 8
+        expected = np.zeros((len(pairs), 3))
+        for number, contact in enumerate(judge.data.contact):
+            wrench = np.zeros(6)
+            mujoco.mj_contactForce(model, judge.data, number, wrench)
+            # on the second geom, along the contact's axes
+            force = contact.frame.reshape(3, 3).T @ wrench[:3]
+            first, second = (model.geom(geom).name for geom in contact.geom)
+            for row, (of, against) in enumerate(pairs):
+                for on, by, sign in ((second, first, 1.0), (first, second, -1.0)):
+                    if on.startswith(of) and by.startswith(against or ""):
+                        expected[row] += sign * force
+        assert np.abs(expected[:4, 2]).min() > 1.0
+        largest = np.abs(expected).max()
+        assert np.abs(frame.contact_sensor[0] - expected).max() < largest * (1e-8 if precision == "f64" else 1e-3)
+        # nothing of the upper box touches the ground
+        assert not frame.contact_sensor[0, 4].any()

@@ -1,0 +1,242 @@
+//! Sites, delay and noise: the same in every width and number of threads, no memory a frame, and names that are refused.
+
+mod common;
+
+use common::{Demo, Run, command, lesson_with_table, noise};
+use sim_core::batch::Field;
+use sim_core::model::params::Param;
+use sim_core::model::{ContactSensor, Description, Pose, Site};
+use sim_engine::backend::{Values, cpu};
+use sim_engine::simulation::{Lanes, Options, Precision};
+
+const FIELDS: [Field; 10] = [
+    Field::JointQ,
+    Field::JointQd,
+    Field::JointQMeasured,
+    Field::JointQdMeasured,
+    Field::JointTorque,
+    Field::SiteQ,
+    Field::SiteQd,
+    Field::Gyro,
+    Field::Accelerometer,
+    Field::ContactSensor,
+];
+const WORLDS: usize = 21;
+const FRAMES: usize = 12;
+
+/// The arm over a table with a cube on it, sites on both, and every parameter of delay and noise.
+fn scene() -> Description {
+    let mut scene = lesson_with_table(Demo::Target, true);
+    let robot = &scene.robots[0];
+    let hand = format!("{}/{}", robot.name, robot.links.last().unwrap().name);
+    for (name, body, relative_to) in [
+        ("camera", None, None),
+        ("tip", Some(hand.as_str()), None),
+        ("on cube", Some("cube"), Some("tip")),
+        ("seen", Some("cube"), Some("camera")),
+    ] {
+        scene.sites.push(Site {
+            name: name.to_owned(),
+            body: body.map(str::to_owned),
+            pose: Pose::from_rpy([0.01, 0.02, 0.03], [0.3, -0.2, 0.1]),
+            relative_to: relative_to.map(str::to_owned),
+        });
+    }
+    scene.contact_sensors.push(ContactSensor {
+        name: "load".to_owned(),
+        of: "table".to_owned(),
+        against: Some("cube".to_owned()),
+    });
+    scene.params.extend([
+        Param::CommandDelay,
+        Param::JointFriction,
+        Param::JointFNoise,
+        Param::JointTargetQNoise,
+        Param::JointTargetQdNoise,
+        Param::JointQNoise,
+        Param::JointQdNoise,
+        Param::JointTorqueNoise,
+        Param::SiteQNoise,
+        Param::SiteQdNoise,
+        Param::GyroNoise,
+        Param::AccelerometerNoise,
+        Param::ContactSensorNoise,
+    ]);
+    scene
+}
+
+/// Parameters of each world: a delay, and noise in two of three.
+fn vary(run: &mut Run) {
+    let model = run.sim.model().clone();
+    for param in model.constants().varying.params() {
+        let columns = param.columns(&model);
+        let values: Vec<f64> = (0..run.sim.worlds() * columns)
+            .map(|k| {
+                let (world, column) = (k / columns, k % columns);
+                let number = noise(world + 7, param as usize * 100 + column).abs();
+                match param {
+                    Param::CommandDelay => (30.0 * number).floor(),
+                    Param::JointFriction => 0.5 * number,
+                    _ if world % 3 == 0 => 0.0,
+                    _ => 0.01 * number,
+                }
+            })
+            .collect();
+        run.sim
+            .write_param(param, 0..columns, Values::F64(&values), None)
+            .unwrap();
+    }
+}
+
+/// Some frames of the demo, targets a little off in each world, and what they show.
+fn play(run: &mut Run, frames: std::ops::Range<usize>) -> Vec<Vec<u64>> {
+    let (worlds, dofs) = (run.sim.worlds(), run.sim.model().dofs());
+    frames
+        .map(|frame| {
+            let (field, row) = command(Demo::Target, 20 * frame);
+            let values: Vec<f64> = (0..worlds * dofs)
+                .map(|k| {
+                    row.get(k % dofs)
+                        .map_or(0.0, |x| x + 0.1 * noise(k / dofs, k % dofs))
+                })
+                .collect();
+            run.sim
+                .command(field, 0..dofs, Values::F64(&values))
+                .unwrap();
+            run.step();
+            shown(run)
+        })
+        .collect()
+}
+
+/// Bits of all fields of each world.
+fn shown(run: &Run) -> Vec<u64> {
+    let worlds = 0..run.sim.worlds();
+    let numbers =
+        worlds.flat_map(|world| FIELDS.iter().flat_map(move |&field| run.get(field, world)));
+    numbers.map(f64::to_bits).collect()
+}
+
+fn options(precision: Precision, lanes: Lanes, threads: usize) -> Options {
+    Options {
+        worlds: WORLDS,
+        precision,
+        lanes,
+        threads: Some(threads),
+        fields: FIELDS.to_vec(),
+        ..Options::default()
+    }
+}
+
+#[test]
+fn delay_noise_and_sensors_have_the_same_bits_in_every_width_and_on_two_threads() {
+    let model = scene().compile().unwrap();
+    let mut first = None;
+    for lanes in [Lanes::Scalar, Lanes::Eight, Lanes::Sixteen] {
+        if !cpu::available(lanes) {
+            continue;
+        }
+        for threads in [1, 2] {
+            let mut run = Run::new(&model, options(Precision::F32, lanes, threads));
+            vary(&mut run);
+            let frames = play(&mut run, 0..FRAMES);
+            let expected = first.get_or_insert_with(|| frames.clone());
+            assert!(frames == *expected, "{lanes:?}, {threads} threads");
+        }
+    }
+}
+
+#[test]
+fn what_is_on_its_way_goes_with_a_snapshot_into_any_width() {
+    let model = scene().compile().unwrap();
+    let mut run = Run::new(&model, options(Precision::F32, Lanes::Scalar, 1));
+    vary(&mut run);
+    play(&mut run, 0..FRAMES);
+    let snapshot = run.sim.snapshot();
+    let expected = play(&mut run, FRAMES..2 * FRAMES);
+    for lanes in [Lanes::Eight, Lanes::Sixteen] {
+        if cpu::available(lanes) {
+            let mut other = Run::new(&model, options(Precision::F32, lanes, 2));
+            other.sim.restore(&snapshot, None, None).unwrap();
+            assert!(
+                play(&mut other, FRAMES..2 * FRAMES) == expected,
+                "{lanes:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn evaluating_shows_the_same_again_and_changes_nothing() {
+    let model = scene().compile().unwrap();
+    for precision in [Precision::F32, Precision::F64] {
+        let mut run = Run::new(&model, options(precision, Lanes::Auto, 1));
+        vary(&mut run);
+        let frames = play(&mut run, 0..FRAMES);
+        let snapshot = run.sim.snapshot();
+        run.forward();
+        assert!(shown(&run) == *frames.last().unwrap());
+        assert!(run.sim.snapshot() == snapshot);
+    }
+}
+
+#[test]
+fn single_precision_shows_what_double_does_to_its_rounding() {
+    let model = scene().compile().unwrap();
+    let shown = [Precision::F64, Precision::F32].map(|precision| {
+        let mut run = Run::new(&model, options(precision, Lanes::Auto, 1));
+        vary(&mut run);
+        run.forward();
+        let fields = FIELDS
+            .iter()
+            .filter(|field| **field != Field::ContactSensor);
+        fields
+            .flat_map(|&field| run.get(field, 1))
+            .collect::<Vec<f64>>()
+    });
+    for (double, single) in shown[0].iter().zip(&shown[1]) {
+        assert!(
+            (double - single).abs() < 1e-4 * double.abs().max(1.0),
+            "{double} {single}"
+        );
+    }
+}
+
+#[test]
+fn names_that_nothing_has_are_refused() {
+    let refusal = |change: fn(&mut Description)| {
+        let mut scene = scene();
+        change(&mut scene);
+        scene.compile().unwrap_err().to_string()
+    };
+    for (message, parts) in [
+        (
+            refusal(|s| s.sites[0].body = Some("cup".to_owned())),
+            ["site `camera`", "`cup`", "`cube`"],
+        ),
+        (
+            refusal(|s| s.sites[1].relative_to = Some("cup".to_owned())),
+            ["site `tip`", "`cup`", "`cube`"],
+        ),
+        (
+            refusal(|s| s.sites[1].name = "camera".to_owned()),
+            ["site", "`camera`", "two"],
+        ),
+        (
+            refusal(|s| s.contact_sensors[0].of = "cup".to_owned()),
+            ["contact sensor `load`", "`cup`", "`table`"],
+        ),
+        (
+            refusal(|s| s.sites[0].pose.pos[1] = f64::NAN),
+            ["site `camera`", "position", "NaN"],
+        ),
+        (
+            refusal(|s| s.command_delay_max = Some(8001)),
+            ["command_delay_max", "8001", "1000 control frames"],
+        ),
+    ] {
+        for part in parts {
+            assert!(message.contains(part), "{message}");
+        }
+    }
+}
