@@ -96,7 +96,8 @@ impl Description {
         let dofs = self.robots.iter().map(Robot::dof_count).sum();
         few("the scene".to_owned(), dofs, SCENE_DOFS_MAX)?;
         self.robots.iter().try_for_each(Robot::validate)?;
-        self.validate_shape_names()
+        self.validate_shape_names()?;
+        self.param_draws().map(drop)
     }
 }
 
