@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from tightloop.errors import (
         ArgumentError,
         CommandRefused,
+        ConstantParameter,
         DaemonLost,
         DaemonRestarted,
         FramesHeld,
@@ -54,6 +55,7 @@ _HOMES = {
     "tightloop.errors": (
         "ArgumentError",
         "CommandRefused",
+        "ConstantParameter",
         "DaemonLost",
         "DaemonRestarted",
         "FramesHeld",
@@ -84,6 +86,7 @@ __all__ = [
     "ArgumentError",
     "Body",
     "CommandRefused",
+    "ConstantParameter",
     "DaemonLost",
     "DaemonRestarted",
     "Dynamics",

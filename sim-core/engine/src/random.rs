@@ -6,15 +6,35 @@
 //! index).
 
 use sim_core::model::Distribution;
+use sim_core::model::params::Param;
 
 /// What numbers are for; those of different streams have nothing to do with each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
 pub enum Stream {
     /// Positions after a reset; the index is a dof.
-    StartPosition = 0,
+    StartPosition,
     /// Velocities after a reset; the index is a dof.
-    StartVelocity = 1,
+    StartVelocity,
+    /// A parameter after a reset; the index is a column of it.
+    Param(Param),
+}
+
+impl Stream {
+    /// Its part of the counter.
+    pub fn number(self) -> u32 {
+        match self {
+            Stream::StartPosition => 0,
+            Stream::StartVelocity => 1,
+            // FNV-1a of its name, so that a row that joins the table moves no draw; the upper half is the parameters'
+            Stream::Param(param) => {
+                let name = param.row().name.bytes();
+                let hash = name.fold(0x811c_9dc5_u32, |hash, byte| {
+                    (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+                });
+                1 << 31 | hash
+            }
+        }
+    }
 }
 
 /// The numbers of one stream in one episode of one world, each with its index.
@@ -33,7 +53,7 @@ impl Draw {
             key: [seed as u32, (seed >> 32) as u32],
             world,
             episode,
-            stream: stream as u32,
+            stream: stream.number(),
         }
     }
 

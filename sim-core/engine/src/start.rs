@@ -1,14 +1,26 @@
-//! The state that a world starts from, where it is a draw around the scene's.
+//! What a world starts from, where that is drawn: its state, around the scene's, and its parameters.
 
 use crate::random::{Draw, Stream};
 use sim_core::batch::Field;
 use sim_core::model::constants::Motion;
+use sim_core::model::params::Param;
 use sim_core::model::{Distribution, Model, Pose};
 
-/// What of the start state is drawn.
+/// What of the start is drawn.
 #[derive(Clone, Debug)]
 pub struct StartDraw {
     joints: Vec<DrawnJoint>,
+    params: Vec<DrawnParam>,
+}
+
+/// A parameter of which something is drawn.
+#[derive(Clone, Debug)]
+struct DrawnParam {
+    param: Param,
+    /// Where its numbers begin among those of all parameters that vary.
+    first: usize,
+    /// Its columns that are drawn.
+    columns: Vec<(usize, Distribution)>,
 }
 
 /// A joint of which something is drawn.
@@ -74,8 +86,21 @@ impl StartDraw {
                     .collect(),
             }
         });
+        let params = start.params.chunk_by(|a, b| a.param == b.param);
+        let params = params.map(|draws| DrawnParam {
+            param: draws[0].param,
+            first: m
+                .varying
+                .first(draws[0].param)
+                .expect("what is drawn varies"),
+            columns: draws
+                .iter()
+                .map(|draw| (draw.column, draw.distribution))
+                .collect(),
+        });
         StartDraw {
             joints: joints.collect(),
+            params: params.collect(),
         }
     }
 
@@ -93,6 +118,24 @@ impl StartDraw {
         for joint in &self.joints {
             joint.draw_position(&positions, &mut put);
             joint.draw_velocity(&velocities, &mut put);
+        }
+    }
+
+    /// Draws the parameters of a world's episode: gives `put` each number with its place among those of all that vary.
+    pub fn draw_params(
+        &self,
+        seed: u64,
+        world: u32,
+        episode: u32,
+        mut put: impl FnMut(usize, f64),
+    ) {
+        for drawn in &self.params {
+            let draw = Draw::new(seed, world, episode, Stream::Param(drawn.param));
+            let least = drawn.param.row().least.unwrap_or(f64::NEG_INFINITY);
+            for &(column, distribution) in &drawn.columns {
+                let value = draw.sample(column as u32, distribution).max(least);
+                put(drawn.first + column, value);
+            }
         }
     }
 }
