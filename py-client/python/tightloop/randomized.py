@@ -38,8 +38,8 @@ class Randomized(Shaped):
     ) -> None:
         """Draw what worlds start from, at the launch and at each `Sim.reset`, instead of giving all the same.
 
-        What is drawn of the state is an offset from the scene's start; what is drawn of a parameter replaces the scene's
-        number. `Sim.reset` says what a draw depends on.
+        What is drawn of the state is an offset from the scene's start; a parameter drawn replaces the scene's number.
+        `Sim.reset` says what a draw depends on.
 
         >>> scene.randomize(
         ...     joint_q={"arm": tl.Uniform(-0.1, 0.1), "arm/fr3_joint4": tl.Normal(0.0, 0.02)},

@@ -129,22 +129,25 @@ fn with_owners(shape: String) -> Vec<String> {
     names
 }
 
-/// Why a name is that of no number, and which there are.
+/// Why a name is that of no number, and which there are: of the robot that it begins with, or else of robots.
 fn unknown(name: &str, names: &[Vec<String>]) -> String {
-    let known: Vec<&String> = names.iter().filter_map(|all| all.last()).collect();
-    match (&known[..], name) {
-        ([only], _) if only.is_empty() => {
-            "it is one number; give the distribution without a name".to_owned()
-        }
-        (_, "") => format!(
-            "give distributions by name; there are: {}",
-            first_few(&known)
-        ),
-        _ => format!(
-            "nothing that it varies has this name; there are: {}",
-            first_few(&known)
-        ),
+    if names == [[""]] {
+        return "it is one number; give the distribution without a name".to_owned();
     }
+    let robot = |name: &str| name.split('/').next().map(str::to_owned);
+    let special = names.iter().filter_map(|all| all.last());
+    let mut known: Vec<&String> = special
+        .filter(|other| robot(other) == robot(name))
+        .collect();
+    if known.is_empty() {
+        known = names.iter().filter_map(|all| all.first()).collect();
+        known.dedup();
+    }
+    let problem = match name {
+        "" => "give distributions by name",
+        _ => "nothing that it varies has this name",
+    };
+    format!("{problem}; there are: {}", first_few(&known))
 }
 
 /// Refuses what no number of the parameter can be drawn from.
