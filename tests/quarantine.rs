@@ -6,7 +6,7 @@ use common::{Demo, Run, command, lesson_with_table};
 use sim_core::batch::{Field, status};
 use sim_core::model::{Body, Collision, Description, Pose, Shape};
 use sim_engine::backend::{Values, cpu};
-use sim_engine::simulation::{Faults, Lanes, Options, Precision, Simulation};
+use sim_engine::simulation::{Faults, FirstFrozen, Frozen, Lanes, Options, Precision, Simulation};
 
 const WORLDS: usize = 37;
 const FIELDS: [Field; 8] = [
@@ -281,5 +281,62 @@ fn bounds_that_no_world_keeps_are_refused() {
         };
         let error = Simulation::new(model.clone(), &options).err().unwrap();
         assert!(error.to_string().starts_with("the bound of joint_q is"));
+    }
+}
+
+#[test]
+fn worlds_that_are_frozen_are_counted_once() {
+    const WORLDS: usize = 100;
+    let model = lesson_with_table(Demo::Torque, false).compile().unwrap();
+    let dofs = model.dofs();
+    for (resets, threads) in [(false, 1), (false, 2), (true, 2)] {
+        let faults = Faults {
+            joint_qd_max: 5.0,
+            resets,
+            ..Faults::default()
+        };
+        let options = Options {
+            worlds: WORLDS,
+            threads: Some(threads),
+            faults,
+            ..Options::default()
+        };
+        let mut run = Run::new(&model, options);
+        let strike = |run: &mut Run, torque: f64, struck: &[usize]| {
+            let mut rows = vec![0.0; WORLDS * dofs];
+            for world in struck {
+                rows[world * dofs] = torque;
+            }
+            let dofs = 0..dofs;
+            run.sim
+                .command(Field::JointF, dofs, Values::F64(&rows))
+                .unwrap();
+            run.step();
+        };
+        strike(&mut run, 0.0, &[]);
+        assert_eq!(run.sim.take_frozen(), Frozen::default());
+        strike(&mut run, 1e4, &[40, 70]);
+        strike(&mut run, blow(Precision::F32), &[3, 40, 99]);
+        let first = FirstFrozen {
+            frame: 2,
+            world: 40,
+            steps: 1,
+            is_finite: true,
+        };
+        // a world that stays frozen is not counted again, one that was reset is
+        let expected = Frozen {
+            not_finite: if resets { 3 } else { 2 },
+            out_of_bounds: 2,
+            first: Some(first),
+            now: if resets { 0 } else { 4 },
+        };
+        assert_eq!(
+            run.sim.take_frozen(),
+            expected,
+            "{threads} threads, resets: {resets}"
+        );
+        strike(&mut run, 0.0, &[]);
+        run.forward();
+        assert_eq!(run.sim.take_frozen(), Frozen::default());
     }
 }

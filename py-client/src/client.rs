@@ -76,7 +76,7 @@ impl Client {
         let mut inputs = Inputs::new(&self.description);
         inputs.add("joint_q", Axis::Coords, joint_q)?;
         inputs.add("joint_qd", Axis::Dofs, joint_qd)?;
-        let mask = Mask::new(mask, self.description.worlds)?;
+        let mask = Mask::new("mask", mask, self.description.worlds)?;
         let (commands, mask) = (inputs.commands()?, mask.as_slice()?);
         frame(py, |hook| connection.write(&commands, mask, hook))
     }
@@ -93,7 +93,7 @@ impl Client {
         for (name, value) in params {
             inputs.add_ready(name.extract()?, &value)?;
         }
-        let mask = Mask::new(mask, self.description.worlds)?;
+        let mask = Mask::new("mask", mask, self.description.worlds)?;
         let (commands, mask) = (inputs.commands()?, mask.as_slice()?);
         frame(py, |hook| connection.write(&commands, mask, hook))
     }
@@ -105,7 +105,7 @@ impl Client {
         seed: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Frame> {
         let connection = self.connection(py)?;
-        let mask = Mask::new(mask, self.description.worlds)?;
+        let mask = Mask::new("mask", mask, self.description.worlds)?;
         let seed = Seed::new(seed, self.description.worlds)?;
         let (mask, seed) = (mask.as_slice()?, seed.as_slice()?);
         frame(py, |hook| connection.reset(mask, seed, hook))
@@ -129,7 +129,7 @@ impl Client {
         from_world: Option<u64>,
     ) -> PyResult<Frame> {
         let connection = self.connection(py)?;
-        let mask = Mask::new(mask, self.description.worlds)?;
+        let mask = Mask::new("worlds", mask, self.description.worlds)?;
         let mask = mask.as_slice()?;
         frame(py, |hook| connection.restore(path, mask, from_world, hook))
     }

@@ -194,7 +194,12 @@ impl<'a, 'py> Inputs<'a, 'py> {
 pub(crate) struct Mask<'py>(Option<PyReadonlyArrayDyn<'py, bool>>);
 
 impl<'py> Mask<'py> {
-    pub(crate) fn new(mask: Option<&Bound<'py, PyAny>>, worlds: usize) -> PyResult<Mask<'py>> {
+    /// `name` is the argument's, for messages.
+    pub(crate) fn new(
+        name: &str,
+        mask: Option<&Bound<'py, PyAny>>,
+        worlds: usize,
+    ) -> PyResult<Mask<'py>> {
         let Some(mask) = mask else {
             return Ok(Mask(None));
         };
@@ -202,7 +207,7 @@ impl<'py> Mask<'py> {
             .py()
             .import("tightloop.inputs")?
             .getattr("as_mask")?
-            .call1((mask, worlds))?;
+            .call1((name, mask, worlds))?;
         Ok(Mask(Some(
             checked.cast_into::<PyArrayDyn<bool>>()?.try_readonly()?,
         )))

@@ -48,12 +48,22 @@ def test_a_file_holds_all_distributions(scene, tmp_path):
         joint_qd={"dog": tl.Normal(-1, 2)},
         body_q={"cube": {"x": SOME, "yaw": tl.Uniform(-math.pi, math.pi)}, "dog": {"z": SOME}},
         body_qd={"dog": {"vx": tl.Normal(0.5, 0), "wz": SOME}},
+        params={"gravity": {"z": tl.Normal(-9.81, 0.1)}, "joint_damping": {"arm": tl.Uniform(0, 1)}},
     )
     file = tmp_path / "scene.toml"
     scene.save(file)
     assert tl.Scene.load(file).to_toml() == scene.to_toml()
     assert "[randomize.joint_q.arm]\nnormal = [0.0, 0.1]\n" in file.read_text()
     assert '[randomize.joint_q."arm/ball.wy"]\nuniform = [0.0, 0.3333333333333333]\n' in file.read_text()
+
+
+def test_ranges_of_a_parameter_are_added_and_replaced_by_name(scene):
+    scene.randomize(params={"joint_damping": {"arm": tl.Uniform(0, 1), "dog": tl.Uniform(0, 2)}})
+    scene.randomize(params={"joint_damping": {"dog": tl.Uniform(0, 3)}, "gravity": {"z": SOME}})
+    text = scene.to_toml()
+    for name, high in (("arm", 1.0), ("dog", 3.0)):
+        assert f"[randomize.params.joint_damping.{name}]\nuniform = [0.0, {high}]\n" in text
+    assert "uniform = [0.0, 2.0]" not in text and "[randomize.params.gravity.z]" in text
 
 
 def test_a_later_call_adds_and_replaces(scene, tmp_path):
@@ -87,7 +97,15 @@ def test_a_scene_without_distributions_says_nothing_of_them(scene):
         ({"joint_qd": {"arm/follow": SOME}}, "joint_qd of 'arm/follow': it follows `lead`; give `arm/lead`"),
         ({"joint_q": {"dog/floating_base": SOME}}, "there is no joint|it is a floating joint; give body_q"),
         ({"joint_q": {"cube": SOME}}, "'cube': it is a body; give body_q or body_qd"),
-        ({"joint_q": {"arm/": SOME}}, "'arm/'"),
+        ({"joint_q": {"arm/": SOME}}, "joint_q of 'arm/': the name is incomplete; give 'arm' for the whole"),
+        ({"joint_qd": {"dog//": SOME}}, "joint_qd of 'dog//': the name is incomplete; give 'dog' for the whole"),
+        ({"body_q": {"dog/": {"x": SOME}}}, "body_q of 'dog/': the name is incomplete; give 'dog' for the whole"),
+        ({"params": {"shape_mu": 0.5}}, r"randomize: shape_mu is 0\.5; give a dict of distributions by name"),
+        ({"params": {"shape_mu": {}}}, r"randomize: shape_mu is \{\}; give distributions by name"),
+        ({"params": {"shape_mu": {"cube": 0.5}}}, r"shape_mu of 'cube' is 0\.5; give a tightloop.Uniform"),
+        ({"params": {"shape_mu": {3: SOME}}}, "randomize: shape_mu has the key 3; give names"),
+        ({"params": [SOME]}, "randomize: params is .*; give a dict"),
+        ({"params": {3: {"cube": SOME}}}, "randomize: params has the key 3; give names"),
         ({"joint_q": {"arm": 0.1}}, r"joint_q of 'arm' is 0\.1; give a tightloop.Uniform or a tightloop.Normal"),
         ({"joint_q": {"arm": (0, 1)}}, r"is \(0, 1\); give a tightloop.Uniform"),
         ({"joint_q": [SOME]}, "joint_q is .*; give a dict of distributions by name"),

@@ -7,6 +7,7 @@ mod cli;
 pub mod config;
 mod error;
 mod export;
+mod faults;
 mod inspect;
 mod news;
 mod server;

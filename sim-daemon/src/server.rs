@@ -7,20 +7,40 @@ use sim_protocol::host::{Host, Next};
 
 use crate::error::DaemonError;
 use crate::export::{self, Advance};
+use crate::faults::FaultNews;
+use crate::news::News;
 
 /// Serves until somebody asks to end.
-pub(crate) fn run(mut simulation: Simulation, host: &mut Host) -> Result<(), DaemonError> {
+pub(crate) fn run(
+    mut simulation: Simulation,
+    host: &mut Host,
+    news: &mut News,
+) -> Result<(), DaemonError> {
+    let mut faults = FaultNews::default();
+    let result = serve(&mut simulation, host, news, &mut faults);
+    faults.end(&mut simulation, news);
+    result
+}
+
+fn serve(
+    simulation: &mut Simulation,
+    host: &mut Host,
+    news: &mut News,
+    faults: &mut FaultNews,
+) -> Result<(), DaemonError> {
     let mut mask = Vec::with_capacity(simulation.worlds());
     let mut scratch = Vec::new();
     loop {
         match host.wait()? {
             Next::Command => {
                 let started = Instant::now();
-                match export::apply(&mut simulation, host.inbox(), &mut mask) {
+                match export::apply(simulation, host.inbox(), &mut mask) {
                     Ok(Advance::Step) => host.answer(started, |arena| simulation.step(arena)),
                     Ok(Advance::Forward) => host.answer(started, |arena| simulation.forward(arena)),
                     Err(refusal) => host.refuse(refusal.kind, &refusal.reason),
                 }
+                // the client has its frame, and need not wait for it
+                faults.tell(simulation, news, started);
             }
             Next::Watch => {
                 // nobody steps now, so there is time to evaluate what observers have not seen

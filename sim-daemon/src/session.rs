@@ -66,7 +66,7 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
     }});
     let watchdog = Watchdog::start(Arc::clone(&stop), serve.parent, host.janitor())?;
     announce(&ready);
-    let result = server::run(simulation, &mut host);
+    let result = server::run(simulation, &mut host, &mut news);
     // its janitor must not look at the shared folder while the host takes that away
     drop(watchdog);
     drop(host);

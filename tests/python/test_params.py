@@ -145,6 +145,22 @@ def test_constants_and_wrong_values_are_refused_by_name(pendulum):
         assert (sim.params.body_mass_scale == 1.0).all()
 
 
+def test_a_constant_is_no_attribute(pendulum):
+    with tl.launch(pendulum, worlds=1, params=("gravity",)) as sim:
+        assert hasattr(sim.params, "gravity") and not hasattr(sim.params, "shape_mu")
+        assert getattr(sim.params, "joint_armature", None) is None
+        with pytest.raises(tl.ConstantParameter, match=r'name it at launch: params=\("shape_mu",\)') as refused:
+            _ = sim.params.shape_mu
+        assert isinstance(refused.value, tl.CommandRefused) and isinstance(refused.value, AttributeError)
+
+
+def test_two_names_in_one_entry_are_refused(pendulum):
+    with pytest.raises(tl.ArgumentError, match="an entry of params is 'gravity,shape_mu'; give each name as an entry"):
+        tl.launch(pendulum, worlds=1, params=("gravity,shape_mu",))
+    with pytest.raises(tl.ArgumentError, match="an entry of fields is 'joint_q,joint_qd'; give each name as an entry"):
+        tl.launch(pendulum, worlds=1, fields=("joint_q,joint_qd",))
+
+
 def test_unknown_names_are_refused_at_launch(pendulum):
     with pytest.raises(tl.SceneError, match=r"parameter `mass`.*gravity, body_mass_scale"):
         tl.launch(pendulum, worlds=1, params=["mass"])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -40,6 +43,52 @@ def test_one_world_that_blows_up_is_frozen_and_comes_back_by_reset(pendulum, pre
         frame = sim.step(joint_f=torque)
         assert not frame.status.any() and frame.step.tolist() == np.where(well, 5, 1).tolist()
         assert np.array_equal(frame.joint_q[sick], before.joint_q[sick]), "as in its first frame"
+
+
+def frozen_lines(log: Path) -> list[str]:
+    return [line for line in log.read_text().splitlines() if line.startswith("frozen: ")]
+
+
+def test_the_log_counts_frozen_worlds_and_does_not_list_them(pendulum, tmp_path):
+    worlds, log = 4096, tmp_path / "daemon.log"
+    sick = np.arange(worlds) % 41 == 7  # 100 of them, from world 7 on
+    assert sick.sum() == 100
+    torque = np.zeros((worlds, 2), np.float32)
+    with tl.launch(pendulum, worlds=worlds, bounds={"joint_qd": 50.0}, log=log) as sim:
+        for _ in range(3):
+            sim.step(joint_f=torque)
+        assert not frozen_lines(log)
+        torque[sick] = 1e37
+        begun = time.monotonic()
+        sim.step(joint_f=torque)
+        for world in np.flatnonzero(sick)[:5] + 1:  # more of them, but too soon for a line of their own
+            torque[world] = 1e4
+            sim.step(joint_f=torque)
+        lines, passed = frozen_lines(log), time.monotonic() - begun
+    # a line may come late, and be told by the next command or at the end
+    assert lines[0] == (
+        "frozen: 100 worlds (100 no longer finite), the first of them world 7, no longer finite after its step 3; "
+        "frozen now: 100 of 4096"
+    )
+    assert len(lines) <= 1 + passed
+    told = frozen_lines(log)
+    assert len(told) <= 2 + passed
+    assert sum(int(line.split()[1]) for line in told) == 105
+    assert told[-1].endswith("frozen now: 105 of 4096") and "beyond the bounds" in told[-1]
+
+
+def test_the_log_counts_worlds_that_are_reset_by_themselves_each_time(pendulum, tmp_path):
+    log = tmp_path / "daemon.log"
+    faults = 0
+    with tl.launch(pendulum, worlds=9, bounds={"joint_qd": 3.0}, on_fault="reset", log=log) as sim:
+        push = np.zeros((9, 2))
+        push[4] = 2.0
+        for _ in range(200):
+            faults += np.count_nonzero(sim.step(joint_f=push).status)
+            sim.forward()
+    told = frozen_lines(log)
+    assert faults > 3 and sum(int(line.split()[1]) for line in told) == faults
+    assert all("world 4, beyond the bounds" in line and line.endswith("frozen now: 0 of 9") for line in told)
 
 
 def test_bounds_freeze_a_world_and_on_fault_resets_it(pendulum):

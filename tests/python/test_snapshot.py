@@ -217,7 +217,7 @@ def test_what_does_not_fit_is_refused_and_the_daemon_goes_on(small, pendulum):
             small.restore(wrong, **arguments)
         assert bits(small.forward()) == bits(before), named
     refusals = [
-        ({"worlds": [True]}, r"mask: expected shape \(2,\)"),
+        ({"worlds": [True]}, r"worlds: expected shape \(2,\)"),
         ({"worlds": [1, 0]}, "not bool"),
         ({"from_world": -1}, "from_world is -1"),
         ({"from_world": 0.5}, "from_world is 0.5"),

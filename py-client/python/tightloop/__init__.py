@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from tightloop.errors import (
         ArgumentError,
         CommandRefused,
+        ConstantParameter,
         DaemonLost,
         DaemonRestarted,
         FramesHeld,
@@ -55,6 +56,7 @@ _HOMES = {
     "tightloop.errors": (
         "ArgumentError",
         "CommandRefused",
+        "ConstantParameter",
         "DaemonLost",
         "DaemonRestarted",
         "FramesHeld",
@@ -86,6 +88,7 @@ __all__ = [
     "ArgumentError",
     "Body",
     "CommandRefused",
+    "ConstantParameter",
     "ContactSensor",
     "DaemonLost",
     "DaemonRestarted",

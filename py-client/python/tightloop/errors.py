@@ -67,6 +67,10 @@ class CommandRefused(TightloopError, ValueError):
     """A command has a wrong shape, dtype or value; the message names field, world and dof. The daemon goes on."""
 
 
+class ConstantParameter(CommandRefused, AttributeError):
+    """A parameter is a constant of this run; the message says how to let it vary."""
+
+
 class SnapshotError(TightloopError, ValueError):
     """A snapshot is damaged, of something else, or cannot be written; the message says which. No world was changed."""
 

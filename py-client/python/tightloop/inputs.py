@@ -38,17 +38,17 @@ def real_numbers(what: str, value: Any) -> NDArray[Any]:
     return given
 
 
-def as_mask(value: Any, worlds: int) -> NDArray[np.bool_]:
-    """A bool for every world, contiguous, shape ``(worlds,)``.
+def as_mask(name: str, value: Any, worlds: int) -> NDArray[np.bool_]:
+    """The argument of that name as a bool for every world, contiguous, shape ``(worlds,)``.
 
     Raises:
         CommandRefused: Another shape or dtype.
     """
-    given = _numpy("mask", value)
+    given = _numpy(name, value)
     if given.dtype != np.bool_:
-        raise CommandRefused(f"mask: dtype {given.dtype} is not bool; give True for the worlds meant")
+        raise CommandRefused(f"{name}: dtype {given.dtype} is not bool; give True for the worlds meant")
     if given.shape != (worlds,):
-        raise CommandRefused(f"mask: expected shape {(worlds,)}; got {given.shape}")
+        raise CommandRefused(f"{name}: expected shape {(worlds,)}; got {given.shape}")
     return np.ascontiguousarray(given)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core
 from tightloop._core import Frame
-from tightloop.errors import CommandRefused, UnknownField
+from tightloop.errors import CommandRefused, ConstantParameter, UnknownField
 from tightloop.inputs import real_numbers
 
 #: Numbers of a link or site in a parameter that has several.
@@ -20,11 +20,11 @@ SINGLE = ("command_delay",)
 
 
 class Params:
-    """What `Sim.params` is: each parameter named in ``launch(params=...)`` or by the scene is an attribute.
+    """What `Sim.params` is: each parameter that the scene draws or names, or ``launch(params=...)``, is an attribute.
 
     Reading one gives an array, shape ``(worlds, ...)``, read-only (``.copy()`` is yours); assigning to one writes it in
-    all worlds, `write` in some. What is written holds from the next step on, over resets too (but for ``body_f``, which
-    a reset clears).
+    all worlds, `write` in some. What is written holds from the next step on, over resets too, but for ``body_f``, which
+    a reset clears, and numbers that `Scene.randomize` draws, which a reset draws anew.
 
     Free joints have no drive: their gains and effort limits have no effect. `Sim.inverse_dynamics` and the other
     functions of a state use the scene's numbers, not these. Reading takes a snapshot, for which this client must be in
@@ -44,7 +44,8 @@ class Params:
 
     Raises:
         UnknownField: There is no parameter of that name.
-        CommandRefused: It is a constant of this run, or the values do not fit; nothing was written.
+        ConstantParameter: It is a constant of this run; it is an AttributeError, so that `hasattr` is false.
+        CommandRefused: The values do not fit; nothing was written.
     """
 
     __slots__ = ("_client", "_known", "_numbers", "_state", "_worlds")
@@ -112,7 +113,7 @@ class Params:
             raise UnknownField(f"there is no parameter {name!r}; there are: {', '.join(self._known)}")
         if self._known[name]["place"] is None:
             named = ", ".join(self.names) or "none does"
-            raise CommandRefused(
+            raise ConstantParameter(
                 f"`{name}` is the same constant in all worlds of this run; to read or write it, name it at launch: "
                 f'params=("{name}",) (of this run vary: {named})'
             )

@@ -15,6 +15,7 @@ _VELOCITY = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 Offsets = Mapping[str, Distribution]
 BodyOffsets = Mapping[str, Mapping[str, Distribution]]
+ParamRanges = Mapping[str, Distribution | Mapping[str, Distribution]]
 
 
 class Randomized(Sensed):
@@ -33,14 +34,17 @@ class Randomized(Sensed):
         joint_qd: Offsets | None = None,
         body_q: BodyOffsets | None = None,
         body_qd: BodyOffsets | None = None,
+        params: ParamRanges | None = None,
     ) -> None:
-        """Draw the state that worlds start from, at the launch and at each `Sim.reset`, instead of giving all the same.
+        """Draw what worlds start from, at the launch and at each `Sim.reset`, instead of giving all the same.
 
-        What is drawn is an offset from the scene's start. `Sim.reset` says what a draw depends on.
+        What is drawn of the state is an offset from the scene's start; a parameter drawn replaces the scene's number.
+        `Sim.reset` says what a draw depends on.
 
         >>> scene.randomize(
         ...     joint_q={"arm": tl.Uniform(-0.1, 0.1), "arm/fr3_joint4": tl.Normal(0.0, 0.02)},
         ...     body_q={"cube": {"x": tl.Uniform(-0.05, 0.05), "yaw": tl.Uniform(-3.14, 3.14)}},
+        ...     params={"shape_mu": {"cube/box": tl.Uniform(0.1, 1.0)}, "gravity": {"z": tl.Normal(-9.81, 0.1)}},
         ... )
 
         Args:
@@ -55,23 +59,31 @@ class Randomized(Sensed):
                 orientation.
             body_qd: Their velocities in world axes: ``vx``, ``vy``, ``vz`` [m/s] of the centre of mass (of all links
                 fixed to the body, as in the frame's ``joint_qd``), ``wx``, ``wy``, ``wz`` [rad/s].
+            params: Parameters by name, as `launch` lists them, each by what its numbers are of: ``"robot"`` or a body
+                for all that it has, ``"robot/joint"``, ``"robot/link"``, a shape as in `Sim.shape_names`; ``x``, ``y``,
+                ``z`` of gravity; where a parameter is one number a world, its distribution alone. The more special name
+                holds. They vary without being named at launch; `Sim.params` reads them, and what it writes holds until
+                the world's next reset. A normal draw below the least that a parameter may be is that least. A load,
+                ``body_f``, cannot be drawn.
                 A later call adds to an earlier one, and replaces what it names again.
 
         Raises:
             SceneError: A name that nothing in the scene has, or no distribution; the message names it. Nothing is
-                changed then.
+                changed then. Names and numbers of ``params`` are checked at the launch, when all shapes are known.
         """
         given = {
             "joint_q": self._joints("joint_q", joint_q),
             "joint_qd": self._joints("joint_qd", joint_qd),
             "body_q": self._bodies("body_q", body_q, _POSE),
             "body_qd": self._bodies("body_qd", body_qd, _VELOCITY),
+            "params": _ranges(params),
         }
         for field, tables in given.items():
             if tables:
                 old = self._offsets.setdefault(field, {})
                 for name, table in tables.items():
-                    old[name] = old.get(name, {}) | table if field in ("body_q", "body_qd") else table
+                    parts = old.get(name, {})
+                    old[name] = table if _is_alone(table) or _is_alone(parts) else parts | table
 
     def _joints(self, field: str, offsets: Offsets | None) -> dict[str, Any]:
         tables = {}
@@ -88,8 +100,9 @@ class Randomized(Sensed):
         found = self._robot(what, robot)
         kinds, leaders = found.joint_types, found.joint_leaders
         own = [joint for joint, kind in kinds.items() if kind != "floating" and joint not in leaders]
+        _check_complete(what, name)
         if not joint:
-            if "/" in name or not own:
+            if not own:
                 raise SceneError(f"{what}: it has no joints but floating and following ones")
             return
         parts = [dof for dof in found.dof_names if dof.rpartition(".")[0] in kinds]
@@ -121,6 +134,7 @@ class Randomized(Sensed):
             return
         robot, _, joint = name.partition("/")
         kinds = self._robot(what, robot).joint_types
+        _check_complete(what, name)
         floating = [joint for joint, kind in kinds.items() if kind == "floating"]
         if not floating:
             raise SceneError(f"{what}: it does not move freely; add_urdf(floating=True) lets a robot float")
@@ -138,14 +152,38 @@ class Randomized(Sensed):
         """Takes what a scene file has."""
         fields: dict[str, Any] = {}
         for field, named in tables.items():
-            if field in ("body_q", "body_qd"):
-                read = {
-                    name: {part: from_table(table) for part, table in parts.items()} for name, parts in named.items()
-                }
-            else:
-                read = {name: from_table(table) for name, table in named.items()}
-            fields[field] = read
+            fields[field] = {
+                name: from_table(table)
+                if _is_alone(table)
+                else {part: from_table(of_part) for part, of_part in table.items()}
+                for name, table in named.items()
+            }
         self.randomize(**fields)
+
+
+def _is_alone(table: Mapping[str, Any]) -> bool:
+    """Whether this is the table of a distribution, not tables by name."""
+    return any(isinstance(value, list) for value in table.values())
+
+
+def _check_complete(what: str, name: str) -> None:
+    if name.endswith("/"):
+        robot = name.rstrip("/")
+        raise SceneError(f"{what}: the name is incomplete; give {robot!r} for the whole, or the joint after the slash")
+
+
+def _ranges(params: ParamRanges | None) -> dict[str, Any]:
+    tables = {}
+    for param, given in _items("randomize: params", params):
+        what = f"randomize: {param}"
+        if isinstance(given, Uniform | Normal):
+            tables[param] = given.table()
+        else:
+            named = _items(what, given)
+            if not named:
+                raise SceneError(f"{what} is {given!r}; give distributions by name")
+            tables[param] = {name: _table(f"{what} of {name!r}", distribution) for name, distribution in named}
+    return tables
 
 
 def _items(what: str, given: Any) -> list[tuple[str, Any]]:

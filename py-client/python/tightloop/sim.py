@@ -129,9 +129,9 @@ class Sim:
 
         It frees a world that was frozen when it was no longer finite (bit 1 of ``status``).
 
-        What `Scene.randomize` has distributions of is drawn anew. A draw depends on the world's number, its seed and
-        its episode, which counts its resets since it got the seed, and on nothing else: neither on the number of worlds
-        nor on precision or threads. A launch draws episode 0 of seed 0.
+        What `Scene.randomize` has distributions of is drawn anew, parameters too; other parameters stay. A draw depends
+        on the world's number, its seed and its episode, which counts its resets since it got the seed, and on nothing
+        else: neither on the number of worlds nor on precision or threads. A launch draws episode 0 of seed 0.
 
         Args:
             mask: Which worlds, bool, shape ``(worlds,)``; all if left out.
@@ -285,13 +285,14 @@ def launch(
             attributes.
         params: Numbers of the model that vary from world to world and may be written while it runs, besides those that
             the scene names, such as ``"shape_mu"``, ``"joint_friction"``, ``"command_delay"``, ``"gyro_noise"``;
-            `Sim.params` lists them all.
+            `Sim.params` lists them all. Those that `Scene.randomize` draws vary too.
         bounds: Largest ``"joint_q"`` [rad or m] and ``"joint_qd"`` [rad/s or m/s], in size; a world beyond one is
             frozen at its state before that frame, with bit 8 of ``status``. None if left out.
         on_fault: What becomes of a frozen world: ``"freeze"`` keeps it until it is reset, ``"reset"`` resets it
             before its next step, so that its ``status`` is seen once.
         name: Name of the daemon, for `attach`; a unique one if left out.
-        log: File for the daemon's news; warnings and errors go to stderr if left out.
+        log: File for the daemon's news, such as how many worlds were frozen, at most one line a second; warnings and
+            errors go to stderr if left out.
         frames_held: How many frames may be alive at once, at least 1.
 
     Raises:
@@ -312,8 +313,8 @@ def launch(
         "worlds": checks.integer("launch: worlds", worlds, error=ArgumentError),
         "device": checks.text("launch: device", device, error=ArgumentError),
         "precision": checks.text("launch: precision", precision, error=ArgumentError),
-        "fields": ",".join(checks.text("launch: an entry of fields", field, error=ArgumentError) for field in fields),
-        "params": ",".join(checks.text("launch: an entry of params", name, error=ArgumentError) for name in params),
+        "fields": _joined("fields", fields),
+        "params": _joined("params", params),
         "name": f"sim-{os.getpid()}-{secrets.token_hex(4)}"
         if name is None
         else checks.text("launch: name", name, error=ArgumentError),
@@ -337,6 +338,14 @@ def launch(
     except BaseException:
         daemon.stop()
         raise
+
+
+def _joined(argument: str, names: Iterable[str]) -> str:
+    checked = [checks.text(f"launch: an entry of {argument}", name, error=ArgumentError) for name in names]
+    for name in checked:
+        if "," in name:
+            raise ArgumentError(f"launch: an entry of {argument} is {name!r}; give each name as an entry of its own")
+    return ",".join(checked)
 
 
 def attach(name: str) -> Sim:

@@ -6,17 +6,19 @@
 //! index).
 
 use sim_core::model::Distribution;
+use sim_core::model::params::Param;
 
 /// What numbers are for; those of different streams have nothing to do with each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
 pub enum Stream {
     /// Positions after a reset; the index is a dof.
-    StartPosition = 0,
+    StartPosition,
     /// Velocities after a reset; the index is a dof.
-    StartVelocity = 1,
+    StartVelocity,
+    /// A parameter after a reset; the index is a column of it.
+    Param(Param),
     /// Of `joint_f` in a frame; the index is a dof. Streams of frames begin here.
-    ForceNoise = 128,
+    ForceNoise,
     /// Of `joint_target_q`, likewise.
     TargetNoise,
     /// Of `joint_target_qd`, likewise.
@@ -39,6 +41,35 @@ pub enum Stream {
     ContactSensorNoise,
 }
 
+impl Stream {
+    /// Its part of the counter.
+    pub fn number(self) -> u32 {
+        match self {
+            Stream::StartPosition => 0,
+            Stream::StartVelocity => 1,
+            Stream::ForceNoise => 128,
+            Stream::TargetNoise => 129,
+            Stream::TargetRateNoise => 130,
+            Stream::PositionNoise => 131,
+            Stream::VelocityNoise => 132,
+            Stream::TorqueNoise => 133,
+            Stream::SitePoseNoise => 134,
+            Stream::SiteVelocityNoise => 135,
+            Stream::GyroNoise => 136,
+            Stream::AccelerometerNoise => 137,
+            Stream::ContactSensorNoise => 138,
+            // FNV-1a of its name, so that a row that joins the table moves no draw; the upper half is the parameters'
+            Stream::Param(param) => {
+                let name = param.row().name.bytes();
+                let hash = name.fold(0x811c_9dc5_u32, |hash, byte| {
+                    (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+                });
+                1 << 31 | hash
+            }
+        }
+    }
+}
+
 /// The numbers of one stream in one episode of one world, each with its index.
 #[derive(Clone, Copy, Debug)]
 pub struct Draw {
@@ -53,7 +84,7 @@ impl Draw {
     pub fn new(seed: u64, world: u32, episode: u32, stream: Stream) -> Draw {
         Draw {
             key: [seed as u32, (seed >> 32) as u32],
-            counter: [world, episode, stream as u32],
+            counter: [world, episode, stream.number()],
             offset: 0,
         }
     }
@@ -65,7 +96,7 @@ impl Draw {
             key: [seed as u32, (seed >> 32) as u32],
             counter: [world, episode, step as u32],
             // its highest bit is set, which no index of the other streams reaches
-            offset: (stream as u32) << 24,
+            offset: stream.number() << 24,
         }
     }
 

@@ -1,6 +1,6 @@
 //! Many worlds of one model: reset, write, step, read.
 
-pub use crate::backend::{Faults, Lanes, Precision};
+pub use crate::backend::{Faults, FirstFrozen, Frozen, Lanes, Precision};
 
 use crate::backend::{Backend, BackendError, Values, cpu};
 use crate::snapshot::{self, Head, SnapshotError};
@@ -193,7 +193,7 @@ impl Simulation {
 
     /// Back to the start state, `joint_f` 0 and targets as in the scene, in the worlds of the mask (none = all).
     ///
-    /// What of the state the scene has distributions of is drawn from (seed, world, episode). A reset starts the next episode
+    /// What of state and parameters the scene has distributions of is drawn from (seed, world, episode). A reset starts the next episode
     /// of a world; with a seed, one for all or one a world, the first one of that seed. Seed and episode are 0 at first.
     ///
     /// # Errors
@@ -215,6 +215,11 @@ impl Simulation {
         }
         self.backend.reset(mask, seed);
         Ok(())
+    }
+
+    /// The worlds that were frozen since this was asked last, counted for people.
+    pub fn take_frozen(&mut self) -> Frozen {
+        self.backend.take_frozen()
     }
 
     /// All worlds as bytes, from which a run resumes bit for bit; [`crate::snapshot`] says how they lie.

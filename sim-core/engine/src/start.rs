@@ -1,14 +1,28 @@
-//! The state that a world starts from, where it is a draw around the scene's.
+//! What a world starts from, where that is drawn: its state, around the scene's, and its parameters.
 
 use crate::random::{Draw, Stream};
 use sim_core::batch::Field;
 use sim_core::model::constants::Motion;
+use sim_core::model::params::Param;
 use sim_core::model::{Distribution, Model, Pose};
 
-/// What of the start state is drawn.
+/// What of the start is drawn.
 #[derive(Clone, Debug)]
 pub struct StartDraw {
     joints: Vec<DrawnJoint>,
+    params: Vec<DrawnParam>,
+}
+
+/// A parameter of which something is drawn.
+#[derive(Clone, Debug)]
+struct DrawnParam {
+    param: Param,
+    /// Where its numbers begin among those of all parameters that vary.
+    first: usize,
+    /// The least and the most that a number may be.
+    bounds: [f64; 2],
+    /// Its columns that are drawn.
+    columns: Vec<(usize, Distribution)>,
 }
 
 /// A joint of which something is drawn.
@@ -74,8 +88,28 @@ impl StartDraw {
                     .collect(),
             }
         });
+        let params = start.params.chunk_by(|a, b| a.param == b.param);
+        let params = params.map(|draws| DrawnParam {
+            param: draws[0].param,
+            first: m
+                .varying
+                .first(draws[0].param)
+                .expect("what is drawn varies"),
+            bounds: [
+                (draws[0].param.row().least).unwrap_or(f64::NEG_INFINITY),
+                match draws[0].param {
+                    Param::CommandDelay => model.command_delay_max() as f64,
+                    _ => f64::INFINITY,
+                },
+            ],
+            columns: draws
+                .iter()
+                .map(|draw| (draw.column, draw.distribution))
+                .collect(),
+        });
         StartDraw {
             joints: joints.collect(),
+            params: params.collect(),
         }
     }
 
@@ -93,6 +127,24 @@ impl StartDraw {
         for joint in &self.joints {
             joint.draw_position(&positions, &mut put);
             joint.draw_velocity(&velocities, &mut put);
+        }
+    }
+
+    /// Draws the parameters of a world's episode: gives `put` each number with its place among those of all that vary.
+    pub fn draw_params(
+        &self,
+        seed: u64,
+        world: u32,
+        episode: u32,
+        mut put: impl FnMut(usize, f64),
+    ) {
+        for drawn in &self.params {
+            let draw = Draw::new(seed, world, episode, Stream::Param(drawn.param));
+            for &(column, distribution) in &drawn.columns {
+                let [least, most] = drawn.bounds;
+                let value = draw.sample(column as u32, distribution);
+                put(drawn.first + column, value.max(least).min(most));
+            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Random numbers: the generator's bits, and what the numbers made of them are distributed like.
 
 use sim_core::model::Distribution;
+use sim_core::model::params::Param;
 use sim_engine::random::{Draw, Stream, philox};
 
 /// Numbers of a sample: each statistic below is known to a few thousandths.
@@ -33,6 +34,21 @@ fn philox_gives_the_known_answers_of_random123() {
     ] {
         assert_eq!(philox(counter, key), expected);
     }
+}
+
+#[test]
+fn streams_have_numbers_of_their_own_that_stay() {
+    let params = Param::ALL.map(|param| Stream::Param(param).number());
+    let mut all = [Stream::StartPosition, Stream::StartVelocity]
+        .map(Stream::number)
+        .to_vec();
+    all.extend(params);
+    all.sort_unstable();
+    all.dedup();
+    assert_eq!(all.len(), Param::ALL.len() + 2);
+    assert!(params.iter().all(|number| number >> 31 == 1));
+    // FNV-1a of "gravity" with the highest bit set, worked out apart
+    assert_eq!(Stream::Param(Param::Gravity).number(), 0xd209_ff45);
 }
 
 #[test]

@@ -27,7 +27,10 @@ impl Description {
     /// Whatever [`Description::validate`] finds, and a mass matrix that is not positive definite.
     pub fn compile(&self) -> Result<Arc<Model>, ModelError> {
         self.validate()?;
-        compile(self).map(Arc::new)
+        let mut scene = self.clone();
+        // what is drawn differs from world to world
+        scene.params.extend(self.param_ranges.keys());
+        compile(&scene).map(Arc::new)
     }
 }
 
@@ -142,7 +145,10 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         contact_sensors: sensors,
         command_delay_max: scene.delay_max(),
         robots: builder.robots,
-        start: builder.start,
+        start: Start {
+            params: scene.param_draws()?,
+            ..builder.start
+        },
         dof_inverse_weight: reference.dof_inverse_weight,
         hash: 0,
     };

@@ -10,6 +10,7 @@ use super::distribution::Distribution;
 use super::geometry::Mesh;
 use super::params::Param;
 use super::pose::Pose;
+use super::ranges::ParamRanges;
 use super::surface::Surface;
 
 /// Everything a simulation starts from.
@@ -35,6 +36,8 @@ pub struct Description {
     pub rows_max: Option<usize>,
     /// Parameters that vary from world to world, and may be written while it runs.
     pub params: BTreeSet<Param>,
+    /// What the numbers of parameters are drawn from at each reset; such a parameter varies, named above or not.
+    pub param_ranges: ParamRanges,
     /// Largest delay of commands that a world may have, where that varies [substeps]; `None` is four control frames.
     pub command_delay_max: Option<usize>,
     /// Frames of interest.
@@ -406,6 +409,7 @@ impl Description {
             contacts_max: None,
             rows_max: None,
             params: BTreeSet::new(),
+            param_ranges: ParamRanges::new(),
             command_delay_max: None,
             sites: Vec::new(),
             contact_sensors: Vec::new(),

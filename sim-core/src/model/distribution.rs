@@ -26,6 +26,15 @@ pub enum Distribution {
 }
 
 impl Distribution {
+    /// Are all its draws 0?
+    pub(super) fn is_always_0(&self) -> bool {
+        let numbers = match *self {
+            Distribution::Uniform { low, high } => [low, high],
+            Distribution::Normal { mean, std } => [mean, std],
+        };
+        numbers == [0.0; 2]
+    }
+
     /// Checks its numbers; `what` is whose they are.
     ///
     /// # Errors

@@ -396,6 +396,15 @@ pub enum ModelError {
         high: f64,
     },
 
+    /// A range of a parameter that its numbers cannot be drawn from.
+    #[error("{culprit}: {problem}")]
+    ParamRange {
+        /// The entry.
+        culprit: String,
+        /// What is wrong, and the cure.
+        problem: String,
+    },
+
     /// Joints that mimic one another in a circle.
     #[error(
         "robot `{robot}`: joints {} mimic one another in a circle; let one of them lead",

@@ -2,6 +2,7 @@
 
 use super::constants::Constants;
 use super::distribution::Distribution;
+use super::ranges::ParamDraw;
 use std::ops::Range;
 
 /// Where a robot's rows lie in the arrays of the scene.
@@ -60,6 +61,8 @@ pub struct Start {
     pub joint_q_offset: Vec<Option<Distribution>>,
     /// What is drawn and added to the velocities, which are 0.
     pub joint_qd_offset: Vec<Option<Distribution>>,
+    /// What is drawn of the parameters.
+    pub params: Vec<ParamDraw>,
 }
 
 impl Model {

@@ -97,7 +97,8 @@ impl Description {
         few("the scene".to_owned(), dofs, SCENE_DOFS_MAX)?;
         self.robots.iter().try_for_each(Robot::validate)?;
         self.validate_shape_names()?;
-        self.validate_sensors()
+        self.validate_sensors()?;
+        self.param_draws().map(drop)
     }
 }
 

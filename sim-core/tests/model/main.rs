@@ -7,6 +7,7 @@ mod meshes;
 mod mimic;
 mod oddities;
 mod pose;
+mod ranges;
 mod refused;
 mod shapes;
 mod urdf;

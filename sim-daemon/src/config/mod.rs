@@ -20,7 +20,7 @@ use sim_core::model::{Cone, Description, ModelError, Pose, Solver};
 
 pub use bodies::BodyTable;
 pub use number::{Number, PerDof};
-pub use randomize::{DistributionTable, RandomizeTable};
+pub use randomize::{DistributionTable, ParamTable, RandomizeTable};
 pub use robots::{ModeName, RobotTable};
 pub use sensors::{ContactSensorTable, SiteTable};
 pub use shapes::{ShapeName, ShapeTable};
@@ -110,7 +110,7 @@ pub struct SceneFile {
     /// Options of the constraint solver.
     #[serde(default)]
     pub solver: SolverTable,
-    /// What a reset draws of the start state.
+    /// What a reset draws of the start state and of parameters.
     #[serde(default, skip_serializing_if = "RandomizeTable::is_empty")]
     pub randomize: RandomizeTable,
     /// Shapes: static ones, and those of bodies and links.

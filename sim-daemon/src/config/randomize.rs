@@ -1,16 +1,16 @@
-//! What a reset draws of the start state, by name.
+//! What a reset draws of the start state and of parameters, by name.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use sim_core::model::{Description, Distribution, Joint, JointDof, JointKind, Robot};
 
-use super::{ConfigError, Number};
+use super::{ConfigError, Number, param};
 
 /// Distributions by the names of what they are of; of a robot and of one of its joints, the joint's holds.
 type Named<T> = BTreeMap<String, T>;
 
-/// Offsets from the start state that a reset draws.
+/// Offsets from the start state, and parameters, that a reset draws.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RandomizeTable {
@@ -27,6 +27,22 @@ pub struct RandomizeTable {
     /// Of their velocities: `vx`, `vy`, `vz` [m/s], `wx`, `wy`, `wz` [rad/s], in the world's axes.
     #[serde(skip_serializing_if = "Named::is_empty")]
     pub body_qd: Named<Named<DistributionTable>>,
+    /// Of parameters, which are replaced, not offset.
+    #[serde(skip_serializing_if = "Named::is_empty")]
+    pub params: Named<ParamTable>,
+}
+
+/// Distributions of the numbers of a parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected distributions by name, such as { arm = { uniform = [0, 1] } }, or of uniform or normal one alone where the parameter is one number"
+)]
+pub enum ParamTable {
+    /// Of a parameter that is one number.
+    Alone(DistributionTable),
+    /// By what they are of: a robot or body for all that it has, `robot/joint`, `robot/link`, a shape; of gravity `x`, `y`, `z`.
+    Named(Named<DistributionTable>),
 }
 
 /// A distribution.
@@ -46,8 +62,8 @@ const POSE: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
 type Set = fn(&mut JointDof, Distribution);
 
 impl DistributionTable {
-    fn checked(self, what: &str) -> Result<Distribution, ConfigError> {
-        let distribution = match self {
+    fn distribution(self) -> Distribution {
+        match self {
             DistributionTable::Uniform([low, high]) => Distribution::Uniform {
                 low: low.0,
                 high: high.0,
@@ -56,7 +72,11 @@ impl DistributionTable {
                 mean: mean.0,
                 std: std.0,
             },
-        };
+        }
+    }
+
+    fn checked(self, what: &str) -> Result<Distribution, ConfigError> {
+        let distribution = self.distribution();
         distribution.validate(what)?;
         Ok(distribution)
     }
@@ -102,6 +122,15 @@ impl RandomizeTable {
                     set(&mut joint.dofs[dof], distribution);
                 }
             }
+        }
+        for (name, table) in &self.params {
+            let ranges = match table {
+                ParamTable::Alone(alone) => [(String::new(), alone.distribution())].into(),
+                ParamTable::Named(named) => (named.iter())
+                    .map(|(name, table)| (name.clone(), table.distribution()))
+                    .collect(),
+            };
+            scene.param_ranges.insert(param(name)?, ranges);
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Scene files: what is read, what is written back, what is refused.
 
 mod contacts;
+mod param_ranges;
 mod randomize;
 
 use std::path::{Path, PathBuf};

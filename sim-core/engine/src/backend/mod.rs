@@ -2,8 +2,10 @@
 
 pub mod cpu;
 mod error;
+mod frozen;
 
 pub use error::BackendError;
+pub use frozen::{FirstFrozen, Frozen};
 
 use sim_core::batch::Field;
 use std::ops::Range;
@@ -129,6 +131,8 @@ pub trait Backend: Send {
     /// Back to the start, in the worlds of the mask (none = all): of their next episode, or of the first one of new seeds, one
     /// for all or one a world. What is drawn is [`crate::start::StartDraw`]'s.
     fn reset(&mut self, mask: Option<&[bool]>, seeds: Option<&[u64]>);
+    /// The worlds that were frozen since this was asked last.
+    fn take_frozen(&mut self) -> Frozen;
     /// Runs `substeps` substeps (none = evaluates only), then writes every field of the layout
     /// into the arena, 8-byte words. No allocation, no error.
     fn run(&mut self, substeps: usize, arena: &mut [u64]);

@@ -4,7 +4,7 @@ use super::contacts;
 use super::noise::Noise;
 use super::state::{Shape, StateField};
 use super::transfer::{self, Arena};
-use crate::backend::{Faults, Values};
+use crate::backend::{Faults, Frozen, Values};
 use crate::start::StartDraw;
 use sim_core::batch::{Block, Field, Layout};
 use sim_core::compiled::Stages;
@@ -137,6 +137,10 @@ pub(super) struct Chunk<F: Lane> {
     pub(super) seeds: Vec<u64>,
     /// Resets of each world since it got its seed.
     pub(super) episodes: Vec<u32>,
+    /// Control frames so far.
+    pub(super) frames: u64,
+    /// Worlds that were frozen since somebody asked.
+    pub(super) frozen: Frozen,
     pub block: Block<F, F>,
     /// Scratch memory of the machine.
     pub memory: Vec<F>,
@@ -162,6 +166,8 @@ impl<F: Lane> Chunk<F> {
             left_out: vec![0; worlds.len()],
             seeds: vec![0; worlds.len()],
             episodes: vec![0; worlds.len()],
+            frames: 0,
+            frozen: Frozen::default(),
             block: Block::new(&job.constants, F::default()),
             memory: vec![F::default(); job.constants.contacts.memory.len],
             staging: vec![F::default(); elements],
@@ -264,6 +270,7 @@ impl<F: Lane> Chunk<F> {
     pub unsafe fn run(&mut self, job: &Job<F>, substeps: usize, arena: Arena) {
         let shape = Shape::of(&job.constants);
         let stride = shape.total() * F::WIDTH;
+        self.frames += u64::from(substeps > 0);
         for block in 0..self.worlds.len().div_ceil(F::WIDTH) {
             let state = block * stride..(block + 1) * stride;
             self.load(state.clone());

@@ -15,7 +15,7 @@ mod trouble;
 
 pub use dispatch::{available, create};
 
-use super::{Backend, BackendError, Faults, Lanes, Precision, Values};
+use super::{Backend, BackendError, Faults, Frozen, Lanes, Precision, Values};
 use chunk::{Chunk, Job};
 use dispatch::{Program, RunChunk};
 use rayon::prelude::*;
@@ -91,6 +91,18 @@ impl<F: Lane> Cpu<F> {
     }
 }
 
+impl<F: Lane> Cpu<F> {
+    /// Does something with every chunk, on all threads.
+    fn for_each(&mut self, work: impl Fn(&mut Chunk<F>, &Job<F>) + Send + Sync) {
+        let job = &self.job;
+        let work = |chunk: &mut Chunk<F>| work(chunk, job);
+        match &self.pool {
+            None => self.chunks.iter_mut().for_each(work),
+            Some(pool) => pool.install(|| self.chunks.par_iter_mut().for_each(work)),
+        }
+    }
+}
+
 impl<F: Lane> Backend for Cpu<F> {
     fn device(&self) -> &str {
         &self.device
@@ -129,9 +141,19 @@ impl<F: Lane> Backend for Cpu<F> {
     }
 
     fn reset(&mut self, mask: Option<&[bool]>, seeds: Option<&[u64]>) {
+        self.for_each(|chunk, job| chunk.reset(job, mask, seeds));
+    }
+
+    fn take_frozen(&mut self) -> Frozen {
+        let mut all = Frozen::default();
         for chunk in &mut self.chunks {
-            chunk.reset(&self.job, mask, seeds);
+            all.join(chunk.take_frozen());
         }
+        // looked for only where there is something to tell
+        if all.first.is_some() {
+            all.now = self.chunks.iter().map(Chunk::frozen_now).sum();
+        }
+        all
     }
 
     fn numbers(&self) -> usize {
@@ -156,15 +178,11 @@ impl<F: Lane> Backend for Cpu<F> {
             "the arena is smaller than the layout"
         );
         let arena = transfer::Arena::new(arena);
-        let (run, job) = (self.run, &self.job);
-        let step = |chunk: &mut Chunk<F>| {
+        let run = self.run;
+        self.for_each(|chunk, job| {
             // SAFETY: `dispatch` chose `run` for instructions that this processor has; the arena holds
             // the layout (asserted) and outlives the call; each chunk writes its own worlds' rows only.
             unsafe { run(chunk, job, substeps, arena) }
-        };
-        match &self.pool {
-            None => self.chunks.iter_mut().for_each(step),
-            Some(pool) => pool.install(|| self.chunks.par_iter_mut().for_each(step)),
-        }
+        });
     }
 }

@@ -53,7 +53,7 @@ impl<F: Lane> Chunk<F> {
         self.left_out[world] = 0;
     }
 
-    /// State and commands of a lane as the scene starts them; parameters stay as they are, but for loads.
+    /// State and commands of a lane as the scene starts them; parameters stay as they are, but for loads and what is drawn.
     fn reset_lane(&mut self, job: &Job<F>, lane: usize) {
         let params = Shape::of(&job.constants).start(StateField::Params);
         let starts = job.constants.varying.starts();
@@ -68,7 +68,7 @@ impl<F: Lane> Chunk<F> {
         }
     }
 
-    /// What is drawn of the state.
+    /// What is drawn of the state and of the parameters.
     fn draw_start(&mut self, job: &Job<F>, world: usize) {
         let shape = Shape::of(&job.constants);
         let (seed, episode) = (self.seeds[world], self.episodes[world]);
@@ -78,5 +78,9 @@ impl<F: Lane> Chunk<F> {
                 let place = self.place(shape, world, StateField::of(field), column);
                 self.state[place] = F::Real::of(value);
             });
+        job.draw.draw_params(seed, outside, episode, |k, value| {
+            let place = self.place(shape, world, StateField::Params, k);
+            self.state[place] = F::Real::of(value);
+        });
     }
 }

@@ -2,6 +2,7 @@
 
 use super::chunk::{Chunk, Job};
 use super::state::{Shape, StateField};
+use crate::backend::{FirstFrozen, Frozen};
 use sim_core::batch::status;
 use sim_core::lane::{Lane, Real};
 use std::ops::Range;
@@ -42,6 +43,9 @@ impl<F: Lane> Chunk<F> {
                 found
             };
             if trouble & status::FROZEN != 0 {
+                if !self.is_frozen(world) {
+                    self.count_frozen(world, trouble);
+                }
                 self.status[world] = trouble;
                 self.lanes[lane] = F::Real::of(1.0);
                 frozen = true;
@@ -52,6 +56,29 @@ impl<F: Lane> Chunk<F> {
         if frozen {
             self.put_back(Shape::of(&job.constants), state);
         }
+    }
+
+    /// Counts a world that is frozen now, and was not.
+    #[cold]
+    fn count_frozen(&mut self, world: usize, trouble: u32) {
+        let first = FirstFrozen {
+            frame: self.frames,
+            world: self.worlds.start + world,
+            steps: self.steps[world],
+            is_finite: trouble & status::NOT_FINITE == 0,
+        };
+        self.frozen.count(first);
+    }
+
+    /// The worlds that were frozen since this was asked last.
+    pub fn take_frozen(&mut self) -> Frozen {
+        std::mem::take(&mut self.frozen)
+    }
+
+    /// How many worlds are frozen.
+    pub fn frozen_now(&self) -> usize {
+        let worlds = 0..self.worlds.len();
+        worlds.filter(|&world| self.is_frozen(world)).count()
     }
 
     /// Resets the worlds of a block that are frozen: their next episode begins.
