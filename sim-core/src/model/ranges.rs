@@ -135,7 +135,10 @@ impl Description {
                         .map(|part| vec![name.clone(), format!("{name}.{part}")])
                         .to_vec(),
                 };
-                self.sites.iter().flat_map(|site| parts(&site.name)).collect()
+                self.sites
+                    .iter()
+                    .flat_map(|site| parts(&site.name))
+                    .collect()
             }
             Per::ContactSensor => {
                 let sensors = self.contact_sensors.iter();
