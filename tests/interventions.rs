@@ -337,3 +337,111 @@ fn a_world_that_exploded_is_as_good_as_new_after_a_reset() {
             .try_for_each(|world| old.differs(world, &new, world))
     });
 }
+
+/// Numbers that no run takes, or none of `f32`.
+fn bad(precision: Precision) -> Vec<f64> {
+    let mut bad = vec![f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+    if precision == Precision::F32 {
+        bad.extend([1e39, -1e300]);
+    }
+    bad
+}
+
+#[test]
+fn numbers_that_are_not_finite_are_refused_everywhere_and_change_nothing() {
+    for_seeds(CASES, |seed| {
+        let mut case = Case::new(seed)?;
+        let ops = case.program(3);
+        let mut run = play(&case.model, &case.options, &ops)?.run;
+        let before = run.sim.snapshot();
+        let worlds = case.options.worlds;
+        let inputs = [
+            Field::JointF,
+            Field::JointTargetQ,
+            Field::JointTargetQd,
+            Field::JointQ,
+            Field::JointQd,
+        ];
+        let varying: Vec<Param> = case.model.constants().varying.params().collect();
+        for bad in bad(case.options.precision) {
+            let world = case.dice.below(worlds);
+            let mut mask = vec![false; worlds];
+            mask[world] = true;
+            let mut good = mask.clone();
+            good.fill(true);
+            good[world] = worlds == 1;
+            let mut check =
+                |name: &str, columns: usize, set: &mut dyn FnMut(&[f64]) -> Result<(), String>| {
+                    if columns == 0 {
+                        return Ok(());
+                    }
+                    // drives that follow velocities have no position gain
+                    let fill = if name == "joint_target_ke" { 0.0 } else { 0.5 };
+                    let mut numbers = vec![fill; worlds * columns];
+                    numbers[world * columns + case.dice.below(columns)] = bad;
+                    match set(&numbers) {
+                        Err(why)
+                            if why.contains(name) && why.contains(&format!("world {world} ")) =>
+                        {
+                            Ok(())
+                        }
+                        Err(why) => Err(format!("{name} of {bad}: {why}")),
+                        Ok(()) => Err(format!("{name} of {bad} in world {world} was taken")),
+                    }
+                };
+            for field in inputs {
+                let columns = field.elements(&case.model);
+                check(field.row().name, columns, &mut |numbers| {
+                    let values = Values::F64(numbers);
+                    let done = match field {
+                        Field::JointQ | Field::JointQd => {
+                            run.sim.write(field, 0..columns, values, Some(&mask))
+                        }
+                        _ => run.sim.command(field, 0..columns, values),
+                    };
+                    done.map_err(|e| e.to_string())
+                })?;
+            }
+            for &param in &varying {
+                let columns = param.columns(&case.model);
+                check(param.row().name, columns, &mut |numbers| {
+                    let done =
+                        run.sim
+                            .write_param(param, 0..columns, Values::F64(numbers), Some(&mask));
+                    done.map_err(|e| e.to_string())
+                })?;
+            }
+            if run.sim.snapshot() != before {
+                return Err(format!("{bad} changed something"));
+            }
+        }
+        Ok(())
+    });
+}
+
+#[test]
+fn worlds_of_these_programs_touch_overflow_explode_and_live_on() {
+    let (mut shown, mut touching, mut full, mut frozen, mut lost) = (0, 0, 0, 0, 0);
+    for seed in 1..=40 {
+        let mut case = Case::new(seed).unwrap();
+        let huge = case.huge();
+        let (_, _, ops) = case.with_and_without(Some(huge));
+        let played = play(&case.model, &case.options, &ops).unwrap();
+        for (_, frame) in &played.frames {
+            for world in 0..case.options.worlds {
+                let of = |field| played.counter(frame, world, field);
+                let status = of(Field::Status) as u32;
+                shown += 1;
+                touching += usize::from(of(Field::ContactCount) > 0);
+                full += usize::from(status & status::CONTACTS_LEFT_OUT != 0);
+                frozen += usize::from(status & status::FROZEN != 0);
+                lost += usize::from(status & status::NOT_FINITE != 0);
+            }
+        }
+    }
+    let counts = [touching, full, frozen, lost, shown - frozen];
+    assert!(
+        counts.iter().all(|&count| count > 100),
+        "{counts:?} of {shown}"
+    );
+}

@@ -70,12 +70,33 @@ impl Rows {
     }
 
     /// World-major numbers, and the mask if some worlds are left alone. Theirs are NaN, which nobody may look at.
-    fn flat(&self) -> (Vec<f64>, Option<Vec<bool>>) {
+    fn flat(&self, precision: Precision) -> (Numbers, Option<Vec<bool>>) {
         let nothing = vec![f64::NAN; self.columns.len()];
         let rows = self.rows.iter().map(|row| row.as_ref().unwrap_or(&nothing));
         let mask: Vec<bool> = self.rows.iter().map(Option::is_some).collect();
-        let numbers = rows.flatten().copied().collect();
+        let numbers = rows.flatten().copied();
+        // a run of f32 takes both
+        let is_single = precision == Precision::F32 && self.columns.len() % 2 == 0;
+        let numbers = match is_single {
+            true => Numbers::F32(numbers.map(|x| x as f32).collect()),
+            false => Numbers::F64(numbers.collect()),
+        };
         (numbers, mask.contains(&false).then_some(mask))
+    }
+}
+
+/// Numbers in either precision.
+enum Numbers {
+    F32(Vec<f32>),
+    F64(Vec<f64>),
+}
+
+impl Numbers {
+    fn values(&self) -> Values<'_> {
+        match self {
+            Numbers::F32(numbers) => Values::F32(numbers),
+            Numbers::F64(numbers) => Values::F64(numbers),
+        }
     }
 }
 
@@ -167,38 +188,43 @@ impl Played {
         foreign: &BTreeMap<usize, Vec<u8>>,
     ) -> Result<(), String> {
         let run = &mut self.run;
-        let why = |error: &dyn std::fmt::Display| error.to_string();
-        match op {
-            Op::Step => run.step(),
-            Op::Forward => run.forward(),
+        let precision = run.sim.precision();
+        let done = match op {
+            Op::Step => {
+                run.step();
+                Ok(())
+            }
+            Op::Forward => {
+                run.forward();
+                Ok(())
+            }
             Op::Command(field, rows) => {
-                let (numbers, _) = rows.flat();
-                let columns = rows.columns.clone();
-                let done = run.sim.command(*field, columns, Values::F64(&numbers));
-                done.map_err(|e| why(&e))?;
+                let (numbers, _) = rows.flat(precision);
+                run.sim
+                    .command(*field, rows.columns.clone(), numbers.values())
             }
             Op::Write(field, rows) => {
-                let (numbers, mask) = rows.flat();
-                let columns = rows.columns.clone();
-                let values = Values::F64(&numbers);
-                let done = run.sim.write(*field, columns, values, mask.as_deref());
-                done.map_err(|e| why(&e))?;
+                let (numbers, mask) = rows.flat(precision);
+                run.sim.write(
+                    *field,
+                    rows.columns.clone(),
+                    numbers.values(),
+                    mask.as_deref(),
+                )
             }
             Op::Param(param, rows) => {
-                let (numbers, mask) = rows.flat();
-                let columns = rows.columns.clone();
-                let values = Values::F64(&numbers);
-                let done = run
-                    .sim
-                    .write_param(*param, columns, values, mask.as_deref());
-                done.map_err(|e| why(&e))?;
+                let (numbers, mask) = rows.flat(precision);
+                run.sim.write_param(
+                    *param,
+                    rows.columns.clone(),
+                    numbers.values(),
+                    mask.as_deref(),
+                )
             }
-            Op::Reset(mask, seeds) => {
-                let done = run.sim.reset(Some(mask), seeds.as_deref());
-                done.map_err(|e| why(&e))?;
-            }
+            Op::Reset(mask, seeds) => run.sim.reset(Some(mask), seeds.as_deref()),
             Op::Snapshot(number) => {
                 self.kept.insert(*number, run.sim.snapshot());
+                Ok(())
             }
             Op::Restore(number, mask, from) => {
                 let other = foreign.get(&place).filter(|_| from.is_some());
@@ -206,12 +232,13 @@ impl Played {
                     return Err(format!("there is no snapshot {number}"));
                 };
                 self.restored.insert(place, bytes.clone());
-                run.sim
+                return run
+                    .sim
                     .restore(bytes, Some(mask), *from)
-                    .map_err(|e| why(&e))?;
+                    .map_err(|e| e.to_string());
             }
-        }
-        Ok(())
+        };
+        done.map_err(|e| e.to_string())
     }
 
     /// The state shown is finite; a frozen world stands where it was, and one that is not has made its step.
@@ -261,7 +288,8 @@ impl Played {
         digits.fold(0, |number, &byte| number << 8 | u64::from(byte))
     }
 
-    fn numbers(&self, bytes: &[u8]) -> Vec<f64> {
+    /// A field's bytes as numbers of the run's precision.
+    pub fn numbers(&self, bytes: &[u8]) -> Vec<f64> {
         match self.run.sim.precision() {
             Precision::F32 => {
                 let words = bytes.as_chunks().0.iter();
