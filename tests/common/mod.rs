@@ -1,9 +1,13 @@
 //! What several tests share: the lesson's scene, and frames of a simulation as numbers.
 #![allow(dead_code)] // each test binary uses its part
 
+pub mod any_program;
+pub mod any_scene;
+pub mod dice;
 pub mod drawn;
 #[path = "../../examples/lesson/mod.rs"]
 mod lesson_scene;
+pub mod program;
 pub mod shapes;
 
 #[allow(unused_imports)] // as above

@@ -62,7 +62,7 @@ pub fn shapes(cone: Cone) -> Description {
 }
 
 /// One shape of every kind but the plane, about as large as a ball of this radius [m].
-fn every_kind(size: f64) -> [Shape; 5] {
+pub fn every_kind(size: f64) -> [Shape; 5] {
     let [x, y, z] = [0.9 * size, 0.7 * size, 1.1 * size];
     let corners = [
         [x, 0.0, 0.0],

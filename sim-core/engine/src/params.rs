@@ -67,13 +67,14 @@ impl Simulation {
         for world in (0..self.worlds()).filter(|&world| mask.is_none_or(|mask| mask[world])) {
             for column in columns.clone() {
                 let value = values.at(world * columns.len() + column - columns.start);
+                let rounded = self.precision().round(value);
                 let name = || self.param_name(param, column);
-                if !value.is_finite() {
+                if !rounded.is_finite() {
                     return Err(BackendError::NotFinite {
                         field: param.row().name,
                         world,
                         name: name(),
-                        value,
+                        value: rounded,
                     });
                 }
                 if value < least {

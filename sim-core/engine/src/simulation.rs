@@ -312,17 +312,17 @@ impl Simulation {
         };
         let row_of = |world: usize| world * columns.len()..(world + 1) * columns.len();
         let not_finite = match mask {
-            None => values.first_not_finite(0..values.len()),
+            None => values.first_not_finite(0..values.len(), self.precision),
             Some(mask) => (0..self.worlds)
                 .filter(|&world| mask[world])
-                .find_map(|world| values.first_not_finite(row_of(world))),
+                .find_map(|world| values.first_not_finite(row_of(world), self.precision)),
         };
         if let Some(place) = not_finite {
             return Err(BackendError::NotFinite {
                 field: row.name,
                 world: place / columns.len(),
                 name: names[columns.start + place % columns.len()].clone(),
-                value: values.at(place),
+                value: self.precision.round(values.at(place)),
             });
         }
         match field {

@@ -45,12 +45,12 @@ impl Values<'_> {
         }
     }
 
-    /// The first of a part that is not finite, counted from the first of all.
-    pub fn first_not_finite(&self, part: Range<usize>) -> Option<usize> {
+    /// The first of a part that is not finite in a precision, counted from the first of all.
+    pub fn first_not_finite(&self, part: Range<usize>, precision: Precision) -> Option<usize> {
         let first = part.start;
         let place = match self {
             Values::F32(v) => v[part].iter().position(|x| !x.is_finite()),
-            Values::F64(v) => v[part].iter().position(|x| !x.is_finite()),
+            Values::F64(v) => (v[part].iter()).position(|&x| !precision.round(x).is_finite()),
         };
         place.map(|place| first + place)
     }
@@ -64,6 +64,16 @@ pub enum Precision {
     F32,
     /// Double: the reference, scalar.
     F64,
+}
+
+impl Precision {
+    /// A number as a run of this precision keeps it.
+    pub fn round(self, x: f64) -> f64 {
+        match self {
+            Precision::F32 => f64::from(x as f32),
+            Precision::F64 => x,
+        }
+    }
 }
 
 /// Worlds a block on the CPU.

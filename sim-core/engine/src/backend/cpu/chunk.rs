@@ -229,7 +229,7 @@ impl<F: Lane> Chunk<F> {
                     let place = self.place(shape, world, StateField::QRest, coord);
                     self.state[place] = F::Real::default();
                 }
-                self.normalize(job, world);
+                self.normalize(job, world, columns);
             }
         }
     }
@@ -246,10 +246,11 @@ impl<F: Lane> Chunk<F> {
         }
     }
 
-    /// Makes the quaternions of a world unit.
-    fn normalize(&mut self, job: &Job<F>, world: usize) {
+    /// Makes the quaternions of a world in these columns unit.
+    fn normalize(&mut self, job: &Job<F>, world: usize, columns: &Range<usize>) {
         let shape = Shape::of(&job.constants);
-        for first in job.constants.quaternions() {
+        let written = job.constants.quaternions();
+        for first in written.filter(|first| columns.contains(first)) {
             let place = self.place(shape, world, StateField::Q, first);
             let at = |i: usize| place + i * F::WIDTH;
             let square: f64 = (0..4).map(|i| self.state[at(i)].to_f64().powi(2)).sum();

@@ -30,8 +30,9 @@ impl<F: Lane> Chunk<F> {
             counters[12..16].copy_from_slice(&self.left_out[world].to_le_bytes());
             counters[16..24].copy_from_slice(&self.seeds[world].to_le_bytes());
             counters[24..].copy_from_slice(&self.episodes[world].to_le_bytes());
+            // of a scene in which nothing moves, there are none
             let first = self.place(shape, world, StateField::Qd, 0);
-            let state = self.state[first..].iter().step_by(F::WIDTH);
+            let state = self.state.iter().skip(first).step_by(F::WIDTH);
             let to = numbers.chunks_exact_mut(size_of::<F::Real>());
             for (to, x) in to.zip(state) {
                 if F::Real::DOUBLE {
@@ -65,7 +66,7 @@ impl<F: Lane> Chunk<F> {
             self.seeds[world] = u64::from_le_bytes(array::from_fn(|i| counters[16 + i]));
             self.episodes[world] = u32::from_le_bytes(array::from_fn(|i| counters[24 + i]));
             let first = self.place(shape, world, StateField::Qd, 0);
-            let state = self.state[first..].iter_mut().step_by(F::WIDTH);
+            let state = self.state.iter_mut().skip(first).step_by(F::WIDTH);
             for (x, from) in state.zip(numbers.chunks_exact(size_of::<F::Real>())) {
                 *x = if F::Real::DOUBLE {
                     F::Real::of(f64::from_le_bytes(array::from_fn(|i| from[i])))

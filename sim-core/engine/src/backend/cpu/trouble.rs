@@ -7,10 +7,13 @@ use sim_core::batch::status;
 use sim_core::lane::{Lane, Real};
 use std::ops::Range;
 
+/// Least square of a quaternion that is still a rotation: steps keep it at 1 to the last bits [–].
+const UNIT_LEAST: f64 = 0.5;
+
 impl<F: Lane> Chunk<F> {
     /// Counts a frame, and notes its trouble. `state` is the block's before the frame.
     ///
-    /// A world that is no longer finite, or beyond the bounds of the run, is frozen: it goes back to that state, its steps
+    /// A world that is no longer finite, rotations included, or beyond the bounds of the run, is frozen: it goes back to that state, its steps
     /// stand still, and so it stays until it is reset.
     #[inline(always)]
     pub(super) fn note(&mut self, job: &Job<F>, block: usize, state: Range<usize>) {
@@ -30,6 +33,12 @@ impl<F: Lane> Chunk<F> {
                 trouble = F::select(x.abs().lt(infinity), trouble, lost);
                 outside = F::select(bound.lt(x.abs()), beyond, outside);
             }
+        }
+        // a turn beyond all numbers leaves a quaternion of zeros
+        for first in job.constants.quaternions() {
+            let parts = self.block.joint_q[first..first + 4].iter();
+            let square = parts.fold(zero, |sum, &x| x.fma(x, sum));
+            trouble = F::select(F::c(UNIT_LEAST).lt(square), trouble, lost);
         }
         self.flag(block, self.block.unconverged[0], status::NOT_CONVERGED);
         let worlds = self.worlds_of(block);
