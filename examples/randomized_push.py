@@ -2,9 +2,9 @@
 
     python examples/randomized_push.py --worlds 4096
 
-One launch, one program: in each world the ground has a friction and the box a mass of its own, and where the box starts
-is drawn from the seed. While a force F acts for T seconds, a box of mass m is accelerated by F/m - μ g, and then slowed
-down by μ g; a box that F cannot move stays. The plot has the worlds, and that law.
+One launch, one program: in each world the ground has a friction of its own, the box a mass and a start, all drawn from
+the seed. While a force F acts for T seconds, a box of mass m is accelerated by F/m - μ g, and then slowed down by μ g; a
+box that F cannot move stays. The plot has the worlds, and that law.
 """
 
 from __future__ import annotations
@@ -34,13 +34,16 @@ CLOSE = 0.02  # of the law, beside 1 cm [–]
 
 def scene() -> tl.Scene:
     """A ground, and a box on it that starts somewhere near the origin, turned anyhow about z."""
-    scene = tl.Scene(dt=1 / 480, substeps=8, params=("body_mass_scale", "shape_mu"))
+    scene = tl.Scene(dt=1 / 480, substeps=8)
     # of two that touch the larger friction counts: the ground's
     scene.add_ground(mu=FRICTIONS[0])
     scene.add_body(name="box", pos=(0.0, 0.0, HALF[2]))
     scene.add_box(body="box", half_extents=HALF, density=DENSITY, mu=0.0)
     around = tl.Uniform(-STARTS, STARTS)
-    scene.randomize(body_q={"box": {"x": around, "y": around, "yaw": tl.Uniform(-np.pi, np.pi)}})
+    scene.randomize(
+        body_q={"box": {"x": around, "y": around, "yaw": tl.Uniform(-np.pi, np.pi)}},
+        params={"shape_mu": {"ground": tl.Uniform(*FRICTIONS)}, "body_mass_scale": {"box": tl.Uniform(*SCALES)}},
+    )
     return scene
 
 
@@ -69,16 +72,13 @@ class Run:
 
 
 def run(*, worlds: int, seed: int, precision: str, threads: int | None) -> Run:
-    """Launch the scene, give each world its friction and mass, and push."""
-    rng = np.random.default_rng(seed)
-    mu, scale = rng.uniform(*FRICTIONS, worlds), rng.uniform(*SCALES, worlds)
+    """Launch the scene, draw each world's friction and mass, and push."""
     with tl.launch(
         scene(), worlds=worlds, precision=precision, threads=threads, params=("body_f",), fields=("joint_q",)
     ) as sim:
-        frictions = sim.params.shape_mu.copy()
-        frictions[:, sim.shape_names.index("ground")] = mu
-        sim.params.write(shape_mu=frictions, body_mass_scale=scale[:, None])
         start = sim.reset(seed=seed).joint_q.copy()
+        mu = sim.params.shape_mu[:, sim.shape_names.index("ground")].astype(float)
+        scale = sim.params.body_mass_scale[:, 0].astype(float)
         push = np.zeros((worlds, len(sim.body_names), 6))
         push[:, 0, 0] = FORCE
         status, seconds = np.zeros(worlds, np.uint32), 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from pathlib import Path
 
@@ -126,6 +127,46 @@ def test_a_wrong_name_is_refused_and_nothing_changes(scene, arguments, named):
     with pytest.raises(tl.SceneError, match=named):
         scene.randomize(**{"joint_qd": {"dog": SOME}} | arguments)
     assert scene.to_toml() == before
+
+
+def test_whatever_is_given_is_taken_or_refused_by_name(scene):
+    """Every argument with everything that is no distribution, alone, under a name, and under a name in a name."""
+    scene.randomize(joint_q={"arm": SOME}, params={"gravity": {"z": SOME}})
+    kept = copy.deepcopy(scene._offsets)
+    leaves = [None, True, 0, math.nan, "", "arm", b"arm", (), [], {}, [SOME], (SOME, SOME), tl.Uniform, object(), SOME]
+    names = [
+        "arm",
+        "dog",
+        "cube",
+        "post",
+        "gravity",
+        "x",
+        "",
+        "/",
+        "arm/",
+        "/lead",
+        "arm/lead",
+        "uniform",
+        "\0",
+        "\ud800",
+    ]
+    names += [3, None, ("arm",), 2.5]
+    under = [{name: leaf} for name in names for leaf in leaves]
+    twice = [{name: table} for name in names for table in under]
+    taken = 0
+    for argument in ("joint_q", "joint_qd", "body_q", "body_qd", "params"):
+        for given in [*leaves, *under, *twice]:
+            try:
+                scene.randomize(**{argument: given})
+            except tl.SceneError as error:
+                assert argument in str(error) or "randomize: " in str(error), given
+                assert scene._offsets == kept, given
+            else:
+                taken += scene._offsets != kept
+                assert tl.Scene.to_toml(scene)
+                scene._offsets = copy.deepcopy(kept)
+    # a distribution under each name that there is, and of parameters under any that can be written
+    assert taken > 20
 
 
 @pytest.mark.parametrize(

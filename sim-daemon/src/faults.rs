@@ -16,7 +16,8 @@ pub(crate) struct FaultNews {
 }
 
 impl FaultNews {
-    /// Tells of the worlds that were frozen since the last line, unless that was just said.
+    /// Tells of the worlds that were frozen since the last line, unless that was just said: then the next command or the end
+    /// tells them.
     pub(crate) fn tell(&mut self, simulation: &mut Simulation, news: &mut News, now: Instant) {
         if self
             .told

@@ -47,6 +47,7 @@ fn serve(
                 scratch.resize(simulation.layout().bytes.div_ceil(8), 0);
                 simulation.forward(&mut scratch);
                 host.show(&scratch);
+                faults.tell(simulation, news, Instant::now());
             }
             Next::End => return Ok(()),
         }

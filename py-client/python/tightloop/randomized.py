@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from tightloop import checks
 from tightloop.distributions import Distribution, Normal, Uniform, from_table
 from tightloop.errors import SceneError
 from tightloop.robot import Robot
@@ -194,6 +195,7 @@ def _items(what: str, given: Any) -> list[tuple[str, Any]]:
     for name in given:
         if not isinstance(name, str):
             raise SceneError(f"{what} has the key {name!r}; give names")
+        checks.text(f"{what}: a name", name)
     return list(given.items())
 
 

@@ -1,5 +1,6 @@
 //! Ranges of parameters: what names mean, which one holds, and what is refused.
 
+use proptest::prelude::*;
 use sim_core::model::params::Param;
 use sim_core::model::{
     Body, Collision, Description, Distribution, ParamDraw, Pose, Shape, UrdfOptions,
@@ -251,5 +252,68 @@ fn ranges_that_cannot_be_are_refused_by_name() {
     ] {
         let refused = with(&[(param, name, distribution)]).validate().unwrap_err();
         assert_eq!(refused.to_string(), message);
+    }
+}
+
+/// Numbers of every kind, those that make sense more often.
+fn any_number() -> impl Strategy<Value = f64> {
+    prop_oneof![3 => 0.0..10.0f64, 1 => -1e7..1e7f64, 1 => any::<f64>()]
+}
+
+fn any_distribution() -> impl Strategy<Value = Distribution> {
+    (any::<bool>(), any_number(), any_number()).prop_map(|(is_uniform, a, b)| match is_uniform {
+        true => Distribution::Uniform { low: a, high: b },
+        false => Distribution::Normal { mean: a, std: b },
+    })
+}
+
+fn any_name() -> impl Strategy<Value = String> {
+    let known = [
+        "", "x", "z", "arm", "arm/hinge", "arm/ball", "arm/ball.wx", "arm/upper", "dog", "cube",
+        "cube/body", "cube/box", "ground", "arm/lower/tip", "arm/", "/",
+    ];
+    let known = prop::sample::select(known.map(str::to_owned).to_vec());
+    prop_oneof![9 => known, 1 => ".{0,6}"]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_range_is_refused_by_name_or_drawn_within_its_parameter(
+        ranges in prop::collection::vec(
+            (prop::sample::select(Param::ALL.to_vec()), any_name(), any_distribution()),
+            1..4,
+        ),
+    ) {
+        let mut scene = scene();
+        for (param, name, distribution) in &ranges {
+            let of_param = scene.param_ranges.entry(*param).or_default();
+            of_param.insert(name.clone(), *distribution);
+        }
+        match scene.compile() {
+            Err(error) => {
+                let message = error.to_string();
+                let names = ranges.iter().map(|(param, ..)| format!("randomize: {}", param.row().name));
+                prop_assert!(names.into_iter().any(|name| message.starts_with(&name)), "{}", message);
+            }
+            Ok(model) => {
+                for draw in &model.start().params {
+                    prop_assert!(!draw.param.is_load() && draw.column < draw.param.columns(&model));
+                    let least = draw.param.row().least.unwrap_or(f64::NEG_INFINITY);
+                    let number = match draw.distribution {
+                        Distribution::Uniform { low, high } => {
+                            prop_assert!(low <= high && high <= 1e6);
+                            low
+                        }
+                        Distribution::Normal { mean, std } => {
+                            prop_assert!((0.0..=1e6).contains(&std));
+                            mean
+                        }
+                    };
+                    prop_assert!(number >= least && number.abs() <= 1e6);
+                }
+            }
+        }
     }
 }
