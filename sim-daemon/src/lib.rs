@@ -9,6 +9,7 @@ mod error;
 mod export;
 mod inspect;
 mod news;
+mod recording;
 mod server;
 mod session;
 mod snapshot;

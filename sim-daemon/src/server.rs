@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use sim_engine::simulation::Simulation;
+use sim_protocol::Op;
 use sim_protocol::host::{Host, Next};
 
 use crate::error::DaemonError;
@@ -16,7 +17,12 @@ pub(crate) fn run(mut simulation: Simulation, host: &mut Host) -> Result<(), Dae
         match host.wait()? {
             Next::Command => {
                 let started = Instant::now();
-                match export::apply(&mut simulation, host.inbox(), &mut mask) {
+                let applied = export::apply(&mut simulation, host.inbox(), &mut mask);
+                // its file may be gone when the recording is replayed
+                if host.is_recorded() && applied.is_ok() && host.inbox().op() == Op::Restore {
+                    host.record_state(&simulation.snapshot(), true);
+                }
+                match applied {
                     Ok(Advance::Step) => host.answer(started, |arena| simulation.step(arena)),
                     Ok(Advance::Forward) => host.answer(started, |arena| simulation.forward(arena)),
                     Err(refusal) => host.refuse(refusal.kind, &refusal.reason),
@@ -28,6 +34,7 @@ pub(crate) fn run(mut simulation: Simulation, host: &mut Host) -> Result<(), Dae
                 simulation.forward(&mut scratch);
                 host.show(&scratch);
             }
+            Next::Record => host.record_state(&simulation.snapshot(), false),
             Next::End => return Ok(()),
         }
     }

@@ -59,6 +59,9 @@ fn description() -> Description {
         notes: Vec::new(),
         frames_held: 2,
         watch_worlds: 1,
+        joint_q_max: None,
+        joint_qd_max: None,
+        on_fault: "freeze".to_owned(),
         schema: 0,
     }
 }
@@ -78,6 +81,7 @@ fn serve(place: &Place, stop: Arc<AtomicBool>, ready: Sender<()>) {
                 host.answer(Instant::now(), |arena| arena[..2].fill(count));
             }
             Next::Watch => host.show(&[count; 8]),
+            Next::Record => host.record_state(&[count as u8; 1000], false),
             Next::End => break,
         }
     }
