@@ -14,7 +14,7 @@ pub fn digests_of(frame: &Table) -> usize {
     frame.rows().iter().map(|row| row.shape[0]).sum()
 }
 
-/// Writes the digests of a frame: the lower half of XXH3 of each row of each array.
+/// Writes the digests of a frame: the lower half of XXH3 of each row of each array, or the row itself where it has 4 bytes.
 ///
 /// # Panics
 /// When `arena` is smaller than `frame` says, or `digests` are not as many as [`digests_of`] says.
@@ -28,12 +28,15 @@ pub fn digest(frame: &Table, arena: &[u64], digests: &mut [u32]) {
         rest = others;
         let array = &bytes[row.offset - head..][..row.bytes];
         let of_world = row.bytes / row.shape[0];
-        if of_world == 0 {
-            digests.fill(0);
-            continue;
-        }
-        for (digest, part) in digests.iter_mut().zip(array.chunks_exact(of_world)) {
-            *digest = xxh3_64(part) as u32;
+        match of_world {
+            0 => digests.fill(0),
+            4 => digests.copy_from_slice(bytemuck::cast_slice(array)),
+            _ => {
+                let parts = array.chunks_exact(of_world);
+                for (digest, part) in digests.iter_mut().zip(parts) {
+                    *digest = xxh3_64(part) as u32;
+                }
+            }
         }
     }
 }

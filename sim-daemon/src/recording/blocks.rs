@@ -36,10 +36,16 @@ pub(super) fn pack(records: &[u64], block: &mut Vec<u8>) {
     block.resize(BLOCK_HEAD + get_maximum_output_size(raw.len()), 0);
     let stored = compress_into(raw, &mut block[BLOCK_HEAD..]).expect("there is room for it");
     block.truncate(BLOCK_HEAD + stored);
-    block[8..12].copy_from_slice(&(raw.len() as u32).to_le_bytes());
-    block[12..16].copy_from_slice(&(stored as u32).to_le_bytes());
-    let sum = checksum(&block[8..]);
-    block[..8].copy_from_slice(&sum.to_le_bytes());
+    let of_records = sum(&block[BLOCK_HEAD..]);
+    for (at, number) in [(4, of_records), (8, raw.len() as u32), (12, stored as u32)] {
+        block[at..at + 4].copy_from_slice(&number.to_le_bytes());
+    }
+    let of_head = sum(&block[4..BLOCK_HEAD]);
+    block[..4].copy_from_slice(&of_head.to_le_bytes());
+}
+
+fn sum(bytes: &[u8]) -> u32 {
+    checksum(bytes) as u32
 }
 
 /// Writes a file's head.
@@ -104,29 +110,30 @@ impl<R: Read> Blocks<R> {
             BLOCK_HEAD => {}
             _ => return Ok(Next::Cut),
         }
-        let number = |at: usize| {
-            u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]) as usize
-        };
-        let (raw, stored) = (number(8), number(12));
+        let number =
+            |at: usize| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
+        let (raw, stored) = (number(8) as usize, number(12) as usize);
         // nothing is taken that the file could not fill
-        if raw % 8 != 0 || raw > BLOCK_MAX || raw > stored.saturating_mul(RATIO_MAX) {
+        if number(0) != sum(&head[4..])
+            || raw % 8 != 0
+            || raw > BLOCK_MAX
+            || raw > stored.saturating_mul(RATIO_MAX)
+        {
             return Ok(Next::Damaged);
         }
         self.stored.clear();
-        self.stored.extend(&head[8..]);
         let got = (&mut self.file)
             .take(stored as u64)
             .read_to_end(&mut self.stored)?;
         if got < stored {
             return Ok(Next::Cut);
         }
-        let sum = u64::from_le_bytes(std::array::from_fn(|index| head[index]));
-        if checksum(&self.stored) != sum {
+        if number(4) != sum(&self.stored) {
             return Ok(Next::Damaged);
         }
         records.clear();
         records.resize(raw / 8, 0);
-        match decompress_into(&self.stored[8..], bytemuck::cast_slice_mut(records)) {
+        match decompress_into(&self.stored, bytemuck::cast_slice_mut(records)) {
             Ok(bytes) if bytes == raw => {
                 self.good += (BLOCK_HEAD + stored) as u64;
                 Ok(Next::Block)

@@ -2,10 +2,11 @@
 //!
 //! ```text
 //! file     magic 8 · version u32 · 0 u32 · blocks
-//! block    checksum u64 · bytes as records u32 · bytes stored u32 · records in LZ4
+//! block    checksum of the rest of this line u32 · checksum of the records u32 · bytes as records u32 · bytes stored u32
+//!          records in LZ4
 //! record   kind u32 · 0 u32 · words u64 · words
 //! ```
-//! Numbers are little endian. The checksum is the XXH3 of all that follows it in its block. A block ends after 256 kB of records
+//! Numbers are little endian. Checksums are the lower halves of XXH3. A block ends after 256 kB of records
 //! or 0.1 s, so that a recorder that is killed loses no more; each holds whole records, hence whole frames. The first record
 //! is the head (JSON: what the daemon tells of itself), the second the state of all worlds; then come the commands in order,
 //! each with the digests of its frame, gaps where entries were lost, the state after each restore, and why the recording ended.
@@ -15,6 +16,8 @@ mod compare;
 mod record;
 mod records;
 mod replay;
+#[cfg(test)]
+mod tests;
 mod writer;
 
 use std::path::Path;

@@ -33,7 +33,8 @@ struct Head {
 }
 
 /// Why a replay ends before anything differs.
-enum End {
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum End {
     /// The recording does: why it was ended, if that is known.
     Recording(Option<String>),
     /// As many frames as asked.
@@ -48,6 +49,13 @@ enum End {
 
 /// Runs the command. Prints one line to stdout when all frames are equal.
 pub(crate) fn run(args: &cli::Replay) -> Result<(), DaemonError> {
+    let mut replay = open(args)?;
+    let end = replay.go()?;
+    replay.tell_end(end)
+}
+
+/// Opens the file.
+pub(super) fn open(args: &cli::Replay) -> Result<Replay<'_, BufReader<File>>, DaemonError> {
     let path = args.file.as_path();
     if args
         .threads
@@ -68,29 +76,28 @@ pub(crate) fn run(args: &cli::Replay) -> Result<(), DaemonError> {
         ));
     }
     let blocks = Blocks::open(BufReader::new(file)).map_err(|problem| unreadable(path, problem))?;
-    let mut replay = Replay {
+    Ok(Replay {
         args,
         blocks,
         run: None,
         frames: 0,
         told: Instant::now(),
-    };
-    let end = replay.go()?;
-    replay.tell_end(end)
+    })
 }
 
 /// A replay at work.
-struct Replay<'a, R> {
+pub(super) struct Replay<'a, R> {
     args: &'a cli::Replay,
     blocks: Blocks<R>,
     run: Option<Run>,
     /// Frames that were equal.
-    frames: u64,
+    pub(super) frames: u64,
     told: Instant,
 }
 
 impl<R: Read> Replay<'_, R> {
-    fn go(&mut self) -> Result<End, DaemonError> {
+    /// Does the recording again, to its end or to the first frame that differs.
+    pub(super) fn go(&mut self) -> Result<End, DaemonError> {
         let path = self.args.file.as_path();
         let damaged = |what: &str| unreadable(path, format!("is damaged: {what}; copy it again"));
         let mut block = Vec::new();
@@ -130,7 +137,7 @@ impl<R: Read> Replay<'_, R> {
     }
 
     /// Says what was compared, and how it ended.
-    fn tell_end(&self, end: End) -> Result<(), DaemonError> {
+    pub(super) fn tell_end(&self, end: End) -> Result<(), DaemonError> {
         let (path, frames) = (self.args.file.as_path(), self.frames);
         let Some(run) = self.run.as_ref().filter(|run| run.has_state) else {
             return Err(unreadable(
