@@ -41,7 +41,7 @@ enum Command {
     Record(Record),
     /// Run a recording again, without a daemon, and compare every frame bit for bit.
     ///
-    /// Exit code 0: all frames are equal. 1: the first frame, world and field that differ are named, or a gap, where it stops. 2: the
+    /// Exit code 0: all frames are equal. 1: the first frame (counted from 0), world and field that differ are named, or a gap, where it stops. 2: the
     /// file cannot be replayed.
     ///
     /// Example: tightloop replay run.tlrec
@@ -280,6 +280,8 @@ mod tests {
     fn help_says_what_it_said() {
         for (name, file, said) in [
             ("serve", "serve_help.txt", include_str!("serve_help.txt")),
+            ("record", "record_help.txt", include_str!("record_help.txt")),
+            ("replay", "replay_help.txt", include_str!("replay_help.txt")),
             (
                 "inspect",
                 "inspect_help.txt",

@@ -25,8 +25,6 @@ pub struct JournalHeader {
     pub session: u64,
     /// 0, 1, 2 … within a journal: a number that does not come was lost.
     pub entry: u64,
-    /// Frames evaluated since the daemon started, this one included.
-    pub frame: u64,
     /// Bytes of the command; in a piece of a state, bytes of the whole of it.
     pub bytes: u64,
     /// In a piece of a state, the first of its bytes that are here.
@@ -42,7 +40,7 @@ pub struct JournalHeader {
     /// Zero.
     pub reserved: u32,
 }
-const _: () = assert!(size_of::<JournalHeader>() == 64 && align_of::<JournalHeader>() == 8);
+const _: () = assert!(size_of::<JournalHeader>() == 56 && align_of::<JournalHeader>() == 8);
 
 impl JournalHeader {
     /// Whether this is a piece of the state of all worlds.

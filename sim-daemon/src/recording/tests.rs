@@ -163,7 +163,11 @@ fn a_file_cut_at_any_byte_has_its_whole_blocks() {
         let whole = ends.iter().filter(|&&end| end <= length).count();
         assert_eq!(blocks, recording.blocks[..whole], "{length}");
         let is_between = length == blocks::HEAD || ends.contains(&length);
-        assert_eq!(next, if is_between { Next::End } else { Next::Cut }, "{length}");
+        assert_eq!(
+            next,
+            if is_between { Next::End } else { Next::Cut },
+            "{length}"
+        );
     }
 }
 
@@ -196,7 +200,10 @@ fn a_file_that_ends_before_its_state_is_told() {
             frames: None,
         };
         let error = super::replay(&args).unwrap_err();
-        assert!(error.to_string().contains("ends before the state"), "{error}");
+        assert!(
+            error.to_string().contains("ends before the state"),
+            "{error}"
+        );
         assert_eq!(error.exit_code(), 2);
     }
     std::fs::remove_file(path).unwrap();
@@ -238,8 +245,14 @@ fn a_forged_command_is_told_by_frame_world_and_field() {
     numbers[place] += 0.25;
     let error = recording.replay("forged").unwrap_err();
     let told = error.to_string();
-    assert!(told.contains("frame 5, of a step: world 1: `joint_q`["), "{told}");
-    assert!(told.contains("recorded is") && !told.contains("worlds differ"), "{told}");
+    assert!(
+        told.contains("frame 5, of a step: world 1: `joint_q`["),
+        "{told}"
+    );
+    assert!(
+        told.contains("recorded is") && !told.contains("worlds differ"),
+        "{told}"
+    );
     assert_eq!(error.exit_code(), 1);
 }
 
@@ -251,7 +264,10 @@ fn a_forged_frame_is_told_by_frame_world_and_field() {
     let numbers: &mut [u32] = bytemuck::cast_slice_mut(&mut recording.frame(3)[digests..]);
     numbers[WORLDS + 2] ^= 1;
     let told = recording.replay("digest").unwrap_err().to_string();
-    assert!(told.contains("frame 3, of a step: world 2: `joint_qd` differs;"), "{told}");
+    assert!(
+        told.contains("frame 3, of a step: world 2: `joint_qd` differs;"),
+        "{told}"
+    );
     // the last of the numbers of joint_q
     let mut recording = record();
     let frame = recording.frame(4);
@@ -260,7 +276,10 @@ fn a_forged_frame_is_told_by_frame_world_and_field() {
     let bytes: &mut [u8] = bytemuck::cast_slice_mut(frame);
     bytes[first + WORLDS * DOFS * 4 - 1] ^= 0x80;
     let told = recording.replay("observed").unwrap_err().to_string();
-    assert!(told.contains("frame 4, of a step: world 2: `joint_q`[8] is "), "{told}");
+    assert!(
+        told.contains("frame 4, of a step: world 2: `joint_q`[8] is "),
+        "{told}"
+    );
 }
 
 #[test]
@@ -277,7 +296,10 @@ fn nonsense_is_refused_with_its_reason() {
     let good = record();
     let says = |recording: &Recording, words: &str| {
         let error = recording.replay("nonsense").unwrap_err();
-        assert!(error.to_string().contains(words), "{words} is not in: {error}");
+        assert!(
+            error.to_string().contains(words),
+            "{words} is not in: {error}"
+        );
         assert_eq!(error.exit_code(), 2, "{error}");
     };
     let with = |block: usize, word: usize, value: u64| {
@@ -288,9 +310,12 @@ fn nonsense_is_refused_with_its_reason() {
     says(&with(2, 0, 77), "a record makes no sense");
     says(&with(2, 1, u64::MAX), "a record makes no sense");
     says(&with(2, 3, u64::MAX), "a record makes no sense");
-    says(&with(2, 2, 99 | 1 << 32), "frame 0: a command that was carried out is refused: unknown operation 99");
+    says(
+        &with(2, 2, 99 | 1 << 32),
+        "frame 0: a command that was carried out is refused: unknown operation 99",
+    );
     says(&with(2, 2, 1 | 9 << 32), "is refused");
-    says(&with(1, 9, 0), "the snapshot is");
+    says(&with(1, 5, 0), "the snapshot is damaged");
     let mut recording = good.clone();
     recording.blocks.remove(1);
     says(&recording, "out of order");
@@ -300,7 +325,10 @@ fn nonsense_is_refused_with_its_reason() {
     for (bytes, words) in [
         (&b""[..], "is no recording"),
         (b"[[robot]]\nname = \"arm\"\n", "is no recording"),
-        (b"tlrec\r\n\x1a\x09\0\0\0\0\0\0\0", "is of format 9, this release reads format 1"),
+        (
+            b"tlrec\r\n\x1a\x09\0\0\0\0\0\0\0",
+            "is of format 9, this release reads format 1",
+        ),
     ] {
         let error = replay("format", bytes).unwrap_err();
         assert!(error.to_string().contains(words), "{error}");

@@ -18,8 +18,10 @@ pub(super) const RECORDERS_MAX: usize = 4;
 const JOIN_MAX: Duration = Duration::from_secs(2);
 /// Shared memory of one journal, if entries are small enough [bytes].
 const JOURNAL: usize = 32 << 20;
-/// Fewest and most entries that wait for a recorder. A state takes up to five, and the rest is time to take them.
+/// Fewest and most entries that wait for a recorder.
 const DEPTH: std::ops::RangeInclusive<usize> = 16..=1024;
+/// A state takes up to so many of them: of a dof it has five numbers more than the commands have.
+const STATE_ENTRIES: usize = 5;
 
 /// The journals of a daemon.
 #[derive(Debug, Default)]
@@ -46,7 +48,6 @@ struct Journal {
 /// What all entries of a frame have in common.
 pub(super) struct Occasion<'a> {
     pub(super) description: &'a Description,
-    pub(super) frame: u64,
     pub(super) inbox: &'a Inbox,
     pub(super) table: &'a Table,
 }
@@ -60,10 +61,11 @@ impl Journals {
         (slot, (JOURNAL / slot).clamp(*DEPTH.start(), *DEPTH.end()))
     }
 
-    /// Shared memory that a journal takes [bytes].
-    pub(super) fn bytes(description: &Description, frame: &Table, observed: u64) -> usize {
+    /// Shared memory that a journal takes, and memory of our own for a state [bytes].
+    pub(super) fn bytes(description: &Description, frame: &Table, observed: u64) -> (usize, u64) {
         let (slot, depth) = Journals::size(description, frame, observed);
-        memory::journal_bytes(slot, journal_slots(depth))
+        let shared = memory::journal_bytes(slot, journal_slots(depth));
+        (shared, (STATE_ENTRIES * slot) as u64)
     }
 
     pub(super) fn are_full(&self) -> bool {
@@ -117,11 +119,11 @@ impl Journals {
     }
 
     /// Sends the state of all worlds to those who wait for one, or to `all`.
-    pub(super) fn state(&mut self, session: u64, frame: u64, state: &[u8], all: bool) {
+    pub(super) fn state(&mut self, session: u64, state: &[u8], all: bool) {
         for journal in &mut self.open {
             if journal.joined && (all || !journal.begun) {
                 journal.begun = true;
-                journal.state(session, frame, state);
+                journal.state(session, state);
             }
         }
     }
@@ -135,11 +137,10 @@ impl Journals {
 }
 
 impl Journal {
-    fn state(&mut self, session: u64, frame: u64, state: &[u8]) {
+    fn state(&mut self, session: u64, state: &[u8]) {
         for (index, piece) in state.chunks(self.slot_bytes).enumerate() {
             let header = JournalHeader {
                 session,
-                frame,
                 bytes: state.len() as u64,
                 first: (index * self.slot_bytes) as u64,
                 ..JournalHeader::default()
@@ -160,7 +161,6 @@ impl Journal {
         };
         let header = JournalHeader {
             session: occasion.description.session,
-            frame: occasion.frame,
             bytes: command.len() as u64,
             observed: observed as u64,
             op: inbox.op() as u32,

@@ -198,8 +198,8 @@ impl Host {
     /// Gives recorders the state of all worlds, from which they go on: those who wait for one, or `all` of them after a
     /// command that others could not carry out again.
     pub fn record_state(&mut self, state: &[u8], all: bool) {
-        let (session, frame) = (self.state.description.session, self.state.frames);
-        self.state.journals.state(session, frame, state, all);
+        let session = self.state.description.session;
+        self.state.journals.state(session, state, all);
     }
 
     /// Answers the command with a refusal.

@@ -115,8 +115,8 @@ impl State {
                 "{RECORDERS_MAX} recorders are at work, which is the limit; end one of them"
             ));
         }
-        let needed = Journals::bytes(&self.description, &self.frame, observed);
-        match memory::check(memory::free(), needed, 0, "the journal of a recorder") {
+        let (shared, own) = Journals::bytes(&self.description, &self.frame, observed);
+        match memory::check(memory::free(), shared, own, "the journal of a recorder") {
             Err(
                 ProtocolError::SharedMemory { free, needed, .. }
                 | ProtocolError::Memory { free, needed, .. },
@@ -231,7 +231,6 @@ impl State {
         if self.journals.are_read() {
             let occasion = Occasion {
                 description: &self.description,
-                frame: self.frames,
                 inbox: &self.inbox,
                 table: &self.frame,
             };

@@ -2,239 +2,26 @@
 //!
 //! `TIGHTLOOP_RECORD_FRAMES` sets the frames of the long run.
 
+#[path = "../common/mod.rs"]
 mod common;
+#[path = "../daemon/mod.rs"]
 mod daemon;
+mod run;
 
-use std::io::{BufRead, BufReader, Read};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Output};
-use std::time::{Duration, Instant};
+use std::io::{BufRead, Read};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
-use common::noise;
-use daemon::{Daemon, attach, freeze, scene, send, tightloop, unique};
+use daemon::{Daemon, attach, freeze, send, tightloop};
+use run::{Folder, Recorder, act, files, frames, replay, run, soon, step, under_way};
 use rustix::process::Signal;
-use sim_protocol::{Client, Command, Values, keep_waiting};
-
-const WORLDS: usize = 64;
-const DOFS: usize = 9;
+use sim_protocol::keep_waiting;
 
 /// Not a test by itself: the process that other tests start as a daemon, a recorder or a replay.
 #[test]
 fn daemon_process() {
     daemon::serve_if_asked();
-}
-
-/// A folder of a test, which goes with it.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(test: &str) -> Folder {
-        let path = std::env::temp_dir().join(format!("tightloop-{}", unique(test)));
-        std::fs::create_dir(&path).unwrap();
-        Folder(path)
-    }
-
-    fn file(&self, name: &str) -> String {
-        self.0.join(name).to_str().unwrap().to_owned()
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        std::fs::remove_dir_all(&self.0).unwrap();
-    }
-}
-
-/// A recorder that has begun.
-struct Recorder {
-    child: Child,
-    news: BufReader<std::process::ChildStderr>,
-}
-
-impl Recorder {
-    fn start(name: &str, out: &str, flags: &[&str]) -> Recorder {
-        let line = [&["record", name, out], flags].concat();
-        let mut child = tightloop(&line).spawn().unwrap();
-        let mut news = BufReader::new(child.stderr.take().unwrap());
-        let mut said = String::new();
-        news.read_line(&mut said).unwrap();
-        assert!(said.contains("recording "), "{said}");
-        Recorder { child, news }
-    }
-
-    /// Waits for its end; what it said on both streams, and its exit code.
-    fn finish(mut self) -> (String, i32) {
-        let mut said = String::new();
-        let mut stdout = self.child.stdout.take().unwrap();
-        stdout.read_to_string(&mut said).unwrap();
-        self.news.read_to_string(&mut said).unwrap();
-        let code = self.child.wait().unwrap().code().unwrap_or(-1);
-        (said, code)
-    }
-
-    /// Asks it to end, and waits for that.
-    fn stop(self) -> (String, i32) {
-        send(self.child.id(), Signal::TERM);
-        self.finish()
-    }
-
-    fn kill(&mut self) {
-        self.child.kill().unwrap();
-        self.child.wait().unwrap();
-    }
-}
-
-impl Drop for Recorder {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-/// What a command line said on both streams, and its exit code.
-fn run(line: &[&str]) -> (String, i32) {
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = tightloop(line).output().unwrap();
-    let said = String::from_utf8(stdout).unwrap() + &String::from_utf8(stderr).unwrap();
-    (said, status.code().unwrap_or(-1))
-}
-
-/// Replays a file that must be equal; what it said.
-fn replay(file: &str) -> String {
-    let (said, code) = run(&["replay", file]);
-    assert!(
-        code == 0 && said.contains("equal, bit for bit"),
-        "{code}: {said}"
-    );
-    said
-}
-
-/// The number of frames in "FILE: 123 frames …".
-fn frames(said: &str) -> u64 {
-    let before = said.split_once(" frames").expect(said).0;
-    before.rsplit(' ').next().unwrap().parse().expect(said)
-}
-
-/// Numbers between -1 and 1, `(WORLDS, columns)`, another set for each `key`.
-fn numbers(columns: usize, key: usize) -> Vec<f32> {
-    let rows =
-        (0..WORLDS).flat_map(|w| (0..columns).map(move |k| noise(w + 1, k + 64 * key) as f32));
-    rows.collect()
-}
-
-fn array<'a>(field: &'a str, columns: usize, values: &'a [f32]) -> Command<'a> {
-    Command {
-        field,
-        columns: 0..columns,
-        values: Values::F32(values),
-    }
-}
-
-fn step(client: &Client, key: usize) {
-    let targets = numbers(DOFS, key);
-    client
-        .step(
-            &[array("joint_target_q", DOFS, &targets)],
-            &mut keep_waiting(),
-        )
-        .unwrap();
-}
-
-/// The `key`th command of a run in which everything that a client can ask for comes.
-fn act(client: &Client, folder: &Folder, key: usize) {
-    let hook = &mut keep_waiting();
-    let description = client.description();
-    let columns = |name: &str| {
-        let mut inputs = description.writes.iter().chain(&description.commands);
-        inputs.find(|input| input.name == name).expect(name).columns
-    };
-    let mask: Vec<bool> = (0..WORLDS).map(|w| noise(w, key) > 0.5).collect();
-    let seeds: Vec<u64> = (0..WORLDS as u64).map(|w| w + 1000 * key as u64).collect();
-    let file = folder.file("worlds");
-    let done = match key % 100 {
-        7 => client.reset(Some(&mask), None, hook),
-        17 => client.reset(Some(&mask), Some(&seeds), hook),
-        27 => client.write(
-            &[array("joint_qd", DOFS, &numbers(DOFS, key))],
-            Some(&mask),
-            hook,
-        ),
-        37 => {
-            let gains: Vec<f32> = numbers(DOFS, key)
-                .iter()
-                .map(|x| 1000.0 + 500.0 * x)
-                .collect();
-            client.write(&[array("joint_target_ke", DOFS, &gains)], Some(&mask), hook)
-        }
-        47 => {
-            let pushes = numbers(columns("body_f"), key);
-            client.step(&[array("body_f", columns("body_f"), &pushes)], hook)
-        }
-        57 => client.snapshot(&file, hook),
-        67 if key > 100 => client.restore(&file, Some(&mask), None, hook),
-        77 if key > 100 => client.restore(&file, None, Some(key as u64 % WORLDS as u64), hook),
-        87 => client.forward(hook),
-        97 => {
-            let all = [numbers(DOFS, key), numbers(DOFS, key + 1)];
-            client.step(
-                &[
-                    array("joint_f", DOFS, &all[0]),
-                    array("joint_target_q", DOFS, &all[1]),
-                ],
-                hook,
-            )
-        }
-        _ => client.step(&[array("joint_target_q", DOFS, &numbers(DOFS, key))], hook),
-    };
-    done.unwrap();
-}
-
-/// The scene with start states that are drawn.
-fn drawn() -> String {
-    format!(
-        "{}[randomize.joint_q]\narm = {{ uniform = [-0.1, 0.1] }}\n",
-        scene()
-    )
-}
-
-/// A daemon of 64 worlds in which [`act`] may do everything, and a client that has done some of it.
-fn under_way(name: &str, folder: &Folder) -> (Daemon, Client) {
-    let flags = [
-        "--worlds",
-        "64",
-        "--params",
-        "joint_target_ke,body_f",
-        "--joint-qd-max",
-        "20",
-        "--on-fault",
-        "reset",
-    ];
-    let daemon = Daemon::start_scene(name, &drawn(), &flags);
-    let client = daemon.attach();
-    for key in 0..120 {
-        act(&client, folder, key);
-    }
-    (daemon, client)
-}
-
-/// Tries until it works or some seconds are over.
-fn soon<T>(what: &str, mut attempt: impl FnMut() -> Option<T>) -> T {
-    let start = Instant::now();
-    loop {
-        if let Some(done) = attempt() {
-            return done;
-        }
-        assert!(start.elapsed() < Duration::from_secs(20), "{what}");
-        std::thread::sleep(Duration::from_millis(2));
-    }
-}
-
-/// Files in shared memory that are of this daemon.
-fn files(daemon: &Daemon) -> usize {
-    daemon.leftovers().len()
 }
 
 #[test]
@@ -325,29 +112,21 @@ fn a_full_disk_ends_the_recording_with_an_error_and_not_the_simulation() {
     let daemon = Daemon::start("record-full", &["--worlds", "64"]);
     let client = daemon.attach();
     let file = folder.file("full.tlrec");
-    let line = ["record", &daemon.name, &file];
-    // 400 kB; the shell becomes the recorder
-    let limited = tightloop(&line);
-    let program = limited.get_program().to_owned();
-    let arguments: Vec<_> = limited
-        .get_args()
-        .map(|a| a.to_str().unwrap().to_owned())
-        .collect();
-    let mut shell = std::process::Command::new("bash");
-    shell
-        .args(["-c", "ulimit -f 400; exec \"$0\" \"$@\""])
-        .arg(program)
-        .args(arguments);
-    shell.envs(
-        limited
-            .get_envs()
-            .filter_map(|(key, value)| Some((key, value?))),
-    );
-    shell.stdin(std::process::Stdio::null());
-    shell
-        .stdout(std::process::Stdio::piped())
-        .stderr(std::process::Stdio::piped());
-    let mut child = shell.spawn().unwrap();
+    // 2 MB; the shell becomes the recorder
+    let line = tightloop(&["record", &daemon.name, &file]);
+    let mut child = Command::new("bash")
+        .args(["-c", "ulimit -f 2000; exec \"$0\" \"$@\""])
+        .arg(line.get_program())
+        .args(line.get_args())
+        .envs(
+            line.get_envs()
+                .filter_map(|(key, value)| Some((key, value?))),
+        )
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
     soon("it writes", || {
         std::fs::metadata(&file)
             .ok()
@@ -421,7 +200,6 @@ fn a_recording_ends_well_with_its_daemon_and_tells_of_one_that_is_not_there() {
     let file = folder.file("run.tlrec");
     let recorder = Recorder::start(&daemon.name, &file, &["--fields", "joint_q"]);
     (0..500).for_each(|key| step(&client, key));
-    std::thread::sleep(Duration::from_millis(300));
     // it is there, and stays as it is
     let (said, code) = run(&["record", &daemon.name, &file]);
     assert_eq!(code, 1, "{said}");
