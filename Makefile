@@ -59,6 +59,7 @@ bench: wheel $(VENV)/.dev
 	$(PYTHON) benches/legged.py
 	$(PYTHON) benches/round_trip.py
 	$(PYTHON) benches/snapshot.py
+	$(PYTHON) benches/recording.py
 
 check: wheel $(VENV)/.dev
 	cargo fmt --all --check

@@ -28,7 +28,7 @@ const ORDER: [(&str, &[&str]); 2] = [
 ];
 
 /// The only door of each heavy package.
-const DOORS: [(&str, &str); 13] = [
+const DOORS: [(&str, &str); 15] = [
     ("urdf_rs", "sim-core/src/model/urdf"),
     ("faer", "sim-core/src/model"),
     ("parry3d_f64", "sim-core/src/model/geometry"),
@@ -38,6 +38,8 @@ const DOORS: [(&str, &str); 13] = [
     ("crc32fast", "sim-core/engine/src/snapshot.rs"),
     ("iceoryx2", "sim-daemon/protocol/src"),
     ("clap", "sim-daemon/src/cli.rs"),
+    ("lz4_flex", "sim-daemon/src/recording/blocks.rs"),
+    ("xxhash_rust", "sim-daemon/protocol/src/digest.rs"),
     ("noto_sans_mono_bitmap", "sim-daemon/src/inspect/picture"),
     ("png", "sim-daemon/src/inspect/picture"),
     ("pyo3", "py-client/src"),

@@ -9,7 +9,7 @@ use sim_protocol::{AttachOptions, Client, keep_waiting};
 
 use crate::config::MeshOptions;
 use crate::error::DaemonError;
-use crate::{inspect, session};
+use crate::{inspect, recording, session};
 
 /// Batched robot simulation, served over shared memory.
 #[derive(Debug, Parser)]
@@ -33,6 +33,19 @@ enum Command {
     ///
     /// Example: tightloop inspect robot.urdf --package-dir ~/robots
     Inspect(Inspect),
+    /// Write what a daemon does into a file, from which `replay` does it again: commands, resets, parameters, digests of frames.
+    ///
+    /// Runs until stopped (Ctrl-C), or until the daemon ends. The daemon never waits for it: what is lost is a gap, and is told.
+    ///
+    /// Example: tightloop record franka run.tlrec --frames 10000
+    Record(Record),
+    /// Run a recording again, without a daemon, and compare every frame bit for bit.
+    ///
+    /// Exit code 0: all frames are equal. 1: the first frame (counted from 0), world and field that differ are named, or a gap, where it stops. 2: the
+    /// file cannot be replayed.
+    ///
+    /// Example: tightloop replay run.tlrec
+    Replay(Replay),
     /// List the daemons that run, one name a line.
     ///
     /// Example: tightloop list
@@ -109,6 +122,47 @@ pub(crate) struct Serve {
     pub(crate) log: Option<PathBuf>,
 }
 
+/// Arguments of `record` as given; `recording` checks them.
+#[derive(Debug, Args)]
+pub(crate) struct Record {
+    /// Name of the daemon.
+    pub(crate) name: String,
+
+    /// File to write, such as run.tlrec.
+    pub(crate) out: PathBuf,
+
+    /// Fields of the daemon's frames to write whole, separated by commas, so that a replay tells both numbers.
+    #[arg(long, value_delimiter = ',')]
+    pub(crate) fields: Vec<String>,
+
+    /// End after so many frames.
+    #[arg(long)]
+    pub(crate) frames: Option<u64>,
+
+    /// End after so many seconds.
+    #[arg(long)]
+    pub(crate) seconds: Option<f64>,
+
+    /// Overwrite the file if it is there.
+    #[arg(long)]
+    pub(crate) force: bool,
+}
+
+/// Arguments of `replay` as given; `recording` checks them.
+#[derive(Debug, Args)]
+pub(crate) struct Replay {
+    /// File that `record` wrote.
+    pub(crate) file: PathBuf,
+
+    /// Threads of a step; one a core if left out. The bits are the same with any number.
+    #[arg(long)]
+    pub(crate) threads: Option<usize>,
+
+    /// End after so many frames.
+    #[arg(long)]
+    pub(crate) frames: Option<u64>,
+}
+
 /// Arguments of `inspect` as given; `inspect` checks them.
 #[derive(Debug, Args)]
 pub(crate) struct Inspect {
@@ -178,6 +232,8 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
     let result = match &cli.command {
         Command::Serve(serve) => session::run(serve),
         Command::Inspect(args) => inspect::run(args),
+        Command::Record(args) => recording::record(args),
+        Command::Replay(args) => recording::replay(args),
         Command::List => list(),
         Command::Stop { name } => stop(name),
     };
@@ -224,6 +280,8 @@ mod tests {
     fn help_says_what_it_said() {
         for (name, file, said) in [
             ("serve", "serve_help.txt", include_str!("serve_help.txt")),
+            ("record", "record_help.txt", include_str!("record_help.txt")),
+            ("replay", "replay_help.txt", include_str!("replay_help.txt")),
             (
                 "inspect",
                 "inspect_help.txt",

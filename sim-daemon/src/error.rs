@@ -55,6 +55,44 @@ pub enum DaemonError {
         /// What is wrong, and the cure.
         problem: String,
     },
+    /// The recording cannot be made, or not go on.
+    #[error("{}: {problem}", path.display())]
+    Recording {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What is wrong, and the cure.
+        problem: String,
+    },
+    /// The recording cannot be replayed, or not further.
+    #[error("{}: {problem}", path.display())]
+    Replay {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What is wrong, and the cure.
+        problem: String,
+    },
+    /// A frame is not as it was recorded.
+    #[error("{}: frame {frame}, of a {op}: {difference}; the {frame} frames before it are equal, bit for bit", path.display())]
+    Differs {
+        /// The file.
+        path: std::path::PathBuf,
+        /// The frame, counted from 0.
+        frame: u64,
+        /// The command that made it.
+        op: String,
+        /// World and field, and both numbers where they are known.
+        difference: String,
+    },
+    /// Something that happened was not recorded.
+    #[error("{}: before frame {frames} a gap: {lost} entries were lost; the {frames} frames before it are equal, bit for bit", path.display())]
+    Gap {
+        /// The file.
+        path: std::path::PathBuf,
+        /// Frames before it.
+        frames: u64,
+        /// How many entries.
+        lost: u64,
+    },
     /// The system refuses something that every system has.
     #[error("{action}: {problem}")]
     System {
@@ -79,12 +117,15 @@ impl DaemonError {
                 "ResourceError"
             }
             Read { .. } | Config(_) | Model(_) => "SceneError",
+            Recording { .. } | Replay { .. } | Differs { .. } | Gap { .. } => "RecordingError",
             Backend(_) | Protocol(_) | Log { .. } | Picture { .. } | System { .. } => "LaunchError",
         }
     }
 
-    /// Exit code: 2 when the command line was wrong, else 1.
+    /// Exit code: 2 when the command line was wrong or a recording cannot be replayed, else 1.
     pub fn exit_code(&self) -> i32 {
-        if self.kind() == "ArgumentError" { 2 } else { 1 }
+        let is_misuse =
+            self.kind() == "ArgumentError" || matches!(self, DaemonError::Replay { .. });
+        if is_misuse { 2 } else { 1 }
     }
 }

@@ -138,8 +138,20 @@ pub(crate) fn description(
         notes: notes(facts.scene),
         frames_held: facts.frames_held,
         watch_worlds: facts.watch_worlds.min(options.worlds),
+        joint_q_max: bound(options.faults.joint_q_max),
+        joint_qd_max: bound(options.faults.joint_qd_max),
+        on_fault: if options.faults.resets {
+            "reset".to_owned()
+        } else {
+            "freeze".to_owned()
+        },
         schema: 0,
     }
+}
+
+/// JSON has no infinity.
+fn bound(largest: f64) -> Option<f64> {
+    largest.is_finite().then_some(largest)
 }
 
 fn param_info(model: &Model, param: Param) -> InputInfo {

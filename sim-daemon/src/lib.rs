@@ -10,6 +10,7 @@ mod export;
 mod faults;
 mod inspect;
 mod news;
+mod recording;
 mod server;
 mod session;
 mod snapshot;

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use sim_engine::simulation::Simulation;
+use sim_protocol::Op;
 use sim_protocol::host::{Host, Next};
 
 use crate::error::DaemonError;
@@ -34,7 +35,12 @@ fn serve(
         match host.wait()? {
             Next::Command => {
                 let started = Instant::now();
-                match export::apply(simulation, host.inbox(), &mut mask) {
+                let applied = export::apply(simulation, host.inbox(), &mut mask);
+                // its file may be gone when the recording is replayed
+                if host.is_recorded() && applied.is_ok() && host.inbox().op() == Op::Restore {
+                    host.record_state(&simulation.snapshot(), true);
+                }
+                match applied {
                     Ok(Advance::Step) => host.answer(started, |arena| simulation.step(arena)),
                     Ok(Advance::Forward) => host.answer(started, |arena| simulation.forward(arena)),
                     Err(refusal) => host.refuse(refusal.kind, &refusal.reason),
@@ -49,6 +55,7 @@ fn serve(
                 host.show(&scratch);
                 faults.tell(simulation, news, Instant::now());
             }
+            Next::Record => host.record_state(&simulation.snapshot(), false),
             Next::End => return Ok(()),
         }
     }

@@ -39,6 +39,23 @@ pub fn scene() -> String {
     )
 }
 
+/// A process of this very program that runs a command line, its name left out.
+pub fn tightloop(line: &[&str]) -> Command {
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    command
+        .args([
+            "daemon_process",
+            "--exact",
+            "--nocapture",
+            "--test-threads=1",
+        ])
+        .env(COMMAND_LINE, format!("tightloop\n{}", line.join("\n")))
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
 impl Daemon {
     /// Starts a daemon of [`scene`] and waits for its line. In a test binary, a test named `daemon_process` must call
     /// [`serve_if_asked`]; in a bench, `main` must.
@@ -54,18 +71,10 @@ impl Daemon {
 
     /// As [`Daemon::start_scene`], under exactly this name.
     pub fn start_as(name: &str, scene: &str, flags: &[&str]) -> Daemon {
-        let mut line = vec!["tightloop", "serve", "-", "--name", name];
+        let mut line = vec!["serve", "-", "--name", name];
         line.extend(flags);
-        let mut child = Command::new(std::env::current_exe().unwrap())
-            .args([
-                "daemon_process",
-                "--exact",
-                "--nocapture",
-                "--test-threads=1",
-            ])
-            .env(COMMAND_LINE, line.join("\n"))
+        let mut child = tightloop(&line)
             .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
             .unwrap();

@@ -9,6 +9,7 @@ use crate::command::Call;
 use crate::control::{Request, Response};
 use crate::controller::Controller;
 use crate::frame::Alive;
+use crate::journal::Journal;
 use crate::link::{ANSWER_MAX, Link, S, lock, malformed};
 use crate::liveness::Peer;
 use crate::observer::Observer;
@@ -381,6 +382,17 @@ impl Client {
             empty => empty.insert(Observer::open(&self.link, &self.description)?),
         };
         call(observer)
+    }
+
+    /// Subscribes to every command that the daemon carries out from now on, by whomever it is given, with digests of its
+    /// frame and the arrays of `fields`.
+    ///
+    /// # Errors
+    /// [`ProtocolError::NoField`]; [`ProtocolError::SharedMemory`] where it does not fit; [`ProtocolError::CommandRefused`]
+    /// when there are as many recorders as a daemon serves; [`ProtocolError::DaemonLost`] and its kin.
+    pub fn journal(&self, fields: &[String], hook: Hook<'_>) -> Result<Journal, ProtocolError> {
+        self.check_process()?;
+        Journal::open(&self.link, &self.description, fields, hook)
     }
 
     /// Lets a test send what it likes through the ports of the lease, and reads the answer.

@@ -30,6 +30,11 @@ pub enum Request {
         /// The lease.
         epoch: u64,
     },
+    /// Let me record what you do, in a journal of my own.
+    Journal {
+        /// Fields whose arrays come with each entry: a bit each, in the order of the frame.
+        observed: u64,
+    },
     /// End the daemon.
     Shutdown,
 }
@@ -54,12 +59,17 @@ pub enum Response {
         /// Who.
         pid: u32,
     },
-    /// The slots for a new lease do not fit.
+    /// The slots for a new lease, or a journal, do not fit.
     NoMemory {
         /// Bytes free.
         free: u64,
         /// Bytes needed.
         needed: u64,
+    },
+    /// A journal is yours to open.
+    Journal {
+        /// Its number.
+        journal: u64,
     },
     /// Answer to [`Request::Heartbeat`] and [`Request::Release`]: whether that lease is the present one.
     Lease {
@@ -68,7 +78,7 @@ pub enum Response {
     },
     /// Answer to [`Request::Shutdown`].
     Ending,
-    /// The request could not be read.
+    /// The request could not be read, or not be met.
     Refused {
         /// One sentence.
         reason: String,

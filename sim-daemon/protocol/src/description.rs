@@ -67,6 +67,12 @@ pub struct Description {
     pub frames_held: usize,
     /// Worlds that observers see: the first ones.
     pub watch_worlds: usize,
+    /// Largest |joint_q| of a world before it is frozen [rad or m], if there is one.
+    pub joint_q_max: Option<f64>,
+    /// Largest |joint_qd| of a world before it is frozen [rad/s or m/s], if there is one.
+    pub joint_qd_max: Option<f64>,
+    /// What becomes of a frozen world: "freeze" or "reset".
+    pub on_fault: String,
     /// Hash over the fields, inputs, worlds and dofs; see [`Description::schema_hash`].
     pub schema: u64,
 }

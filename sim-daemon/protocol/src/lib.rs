@@ -2,16 +2,19 @@
 //!
 //! ```text
 //!            wake (event)  ◄───────────────── notify ──────────────────┐
-//!            control (request-response, JSON) ◄── describe · acquire · heartbeat · release · shutdown
+//!            control (request-response, JSON) ◄── describe · acquire · heartbeat · release · journal · shutdown
 //!  daemon    act/<epoch>   (pub-sub, 1 : 1)   ◄── command: header, field table, arrays ──   controller
 //!            obs/<epoch>   (pub-sub, 1 : 1)   ──► frame:   header, field table, arrays ──►
 //!            watch         (pub-sub, 1 : n)   ──► frames of the first worlds, at a limited rate ──► observers
+//!            journal/<n>   (pub-sub, 1 : 1)   ──► each command carried out, and digests of its frame ──► recorder
 //! ```
 //!
 //! - A sample is lines of eight words: a field table, then arrays, world-major and 64-byte aligned ([`header`], [`table`]).
 //! - Steps are lock-step: the client sends `seq = n`, the daemon answers `ack_seq = n` with a frame or a refusal.
 //! - A lease is one `epoch`, with services of its own; it ends by release, by death, or when another client asks for it
 //!   after the heartbeats stopped. Reset, write, forward, snapshot and restore travel as commands too, so that they keep their order.
+//! - A recorder has a journal of its own, with the memory of it; the daemon never waits for it, and counts its entries, so that
+//!   what a slow recorder loses shows.
 //! - A daemon's presence is a lock on `ROOT/NAME.lock` ([`place`], [`tenancy`]); its run is a random `session`.
 //! - Clients know no physics: the [`Description`] names what can be sent and what frames carry.
 //! - Every process here belongs to one user. A hostile process of that user is outside what shared memory can stop; against
@@ -25,12 +28,14 @@ mod command;
 mod control;
 mod controller;
 mod description;
+pub mod digest;
 mod error;
 mod frame;
 pub mod hash;
 pub mod header;
 mod heart;
 pub mod host;
+pub mod journal;
 mod link;
 mod liveness;
 mod loan;
@@ -48,6 +53,7 @@ pub use frame::{Entry, Frame, View};
 pub use header::{
     ALIGNMENT, CommandHeader, Dtype, FrameHeader, Line, Op, PROTOCOL_VERSION, RefusalKind, Row,
 };
+pub use journal::{Entry as JournalEntry, Journal, JournalHeader};
 pub use place::running;
 pub use table::{ROWS_MAX, Table};
 pub use tenancy::{cleanup_after_death, sweep};

@@ -14,7 +14,7 @@ use iceoryx2::prelude::*;
 use iceoryx2::service::builder::event::EventOpenError;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 
-use crate::{ALIGNMENT, CommandHeader, FrameHeader, Line, ProtocolError};
+use crate::{ALIGNMENT, CommandHeader, FrameHeader, JournalHeader, Line, ProtocolError};
 
 /// Clients that may be attached at once, controllers and observers together.
 pub(crate) const CLIENTS_MAX: usize = 32;
@@ -31,6 +31,12 @@ pub(crate) type FrameSubscriber<S> = Subscriber<S, [Line], FrameHeader>;
 pub(crate) type CommandPublisher<S> = Publisher<S, [Line], CommandHeader>;
 /// Commands on their way in: at the daemon.
 pub(crate) type CommandSubscriber<S> = Subscriber<S, [Line], CommandHeader>;
+/// Entries of a journal on their way out: from the daemon.
+pub(crate) type JournalPublisher<S> = Publisher<S, [Line], JournalHeader>;
+/// Entries of a journal on their way in: at a recorder.
+pub(crate) type JournalSubscriber<S> = Subscriber<S, [Line], JournalHeader>;
+/// Service that carries the entries of a journal.
+pub(crate) type JournalService<S> = publish_subscribe::PortFactory<S, [Line], JournalHeader>;
 /// Service that carries frames.
 pub(crate) type FrameService<S> = publish_subscribe::PortFactory<S, [Line], FrameHeader>;
 /// Service that carries commands.
@@ -233,6 +239,69 @@ pub(crate) fn command_subscriber<S: Service>(
         .subscriber_builder()
         .create()
         .map_err(|error| ProtocolError::transport("create a command subscriber", error))
+}
+
+/// Number of slots of a journal in which `depth` entries may wait.
+pub(crate) fn journal_slots(depth: usize) -> usize {
+    depth + 1 + LOANS
+}
+
+/// Service of the entries of journal `number`, in which the oldest goes when `depth` wait.
+pub(crate) fn create_journal<S: Service>(
+    node: &Node<S>,
+    number: u64,
+    depth: usize,
+) -> Result<JournalService<S>, ProtocolError> {
+    node.service_builder(&service_name(&format!("journal/{number}"))?)
+        .publish_subscribe::<[Line]>()
+        .user_header::<JournalHeader>()
+        .enable_safe_overflow(true)
+        .subscriber_max_buffer_size(depth)
+        .subscriber_max_borrowed_samples(1)
+        .history_size(0)
+        .max_publishers(1)
+        .max_subscribers(1)
+        .max_nodes(4)
+        .create()
+        .map_err(|error| {
+            ProtocolError::transport(format!("create service journal/{number}"), error)
+        })
+}
+
+/// Opens what [`create_journal`] created.
+pub(crate) fn open_journal<S: Service>(
+    node: &Node<S>,
+    number: u64,
+) -> Result<JournalService<S>, ProtocolError> {
+    node.service_builder(&service_name(&format!("journal/{number}"))?)
+        .publish_subscribe::<[Line]>()
+        .user_header::<JournalHeader>()
+        .open()
+        .map_err(|error| ProtocolError::transport(format!("open service journal/{number}"), error))
+}
+
+/// The end of a journal that sends; `bytes` are those of the largest entry.
+pub(crate) fn journal_publisher<S: Service>(
+    service: &JournalService<S>,
+    bytes: usize,
+) -> Result<JournalPublisher<S>, ProtocolError> {
+    service
+        .publisher_builder()
+        .initial_max_slice_len(bytes.div_ceil(ALIGNMENT))
+        .max_loaned_samples(LOANS)
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .create()
+        .map_err(|error| ProtocolError::transport("create a journal publisher", error))
+}
+
+/// The end of a journal that receives.
+pub(crate) fn journal_subscriber<S: Service>(
+    service: &JournalService<S>,
+) -> Result<JournalSubscriber<S>, ProtocolError> {
+    service
+        .subscriber_builder()
+        .create()
+        .map_err(|error| ProtocolError::transport("create a journal subscriber", error))
 }
 
 /// Creates an event service; `attributes` are the handshake's facts.

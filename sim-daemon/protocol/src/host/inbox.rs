@@ -1,7 +1,7 @@
 //! A command at the daemon: copied once, then checked; nothing is read from shared memory twice.
 
-use crate::command::{FROM_WORLD, MASK, PATH};
-use crate::{CommandHeader, Dtype, Op, Row, Table};
+use crate::command::{FROM_WORLD, MASK, PATH, command_bytes};
+use crate::{CommandHeader, Description, Dtype, Op, Row, Table};
 
 /// The last command received.
 #[derive(Debug)]
@@ -25,7 +25,12 @@ pub enum Numbers<'a> {
 }
 
 impl Inbox {
-    pub(super) fn new(capacity_bytes: usize) -> Inbox {
+    /// Room for the commands of a daemon.
+    pub fn for_commands_of(description: &Description) -> Inbox {
+        Inbox::new(command_bytes(description))
+    }
+
+    fn new(capacity_bytes: usize) -> Inbox {
         Inbox {
             header: CommandHeader::default(),
             op: Op::Forward,
@@ -36,7 +41,10 @@ impl Inbox {
     }
 
     /// Copies a payload and checks its table, unless the table is the one that was checked last.
-    pub(super) fn take(&mut self, header: CommandHeader, payload: &[u64]) -> Result<(), String> {
+    ///
+    /// # Errors
+    /// One sentence about the first thing that is wrong.
+    pub fn take(&mut self, header: CommandHeader, payload: &[u64]) -> Result<(), String> {
         self.header = header;
         self.used = 0;
         self.op =
@@ -68,6 +76,11 @@ impl Inbox {
         }
         self.used = payload.len();
         Ok(())
+    }
+
+    /// The command as it came: field table and arrays.
+    pub(super) fn payload(&self) -> &[u64] {
+        &self.words[..self.used]
     }
 
     /// What is asked for.

@@ -28,6 +28,11 @@ pub(crate) fn lease_bytes(description: &Description, frame: &Table) -> usize {
     frames + COMMAND_SLOTS * (command_bytes(description) + SLOT_HEAD)
 }
 
+/// Bytes of a journal.
+pub(crate) fn journal_bytes(slot: usize, slots: usize) -> usize {
+    slots * (slot + SLOT_HEAD)
+}
+
 /// What observers see of a frame: the first worlds.
 pub(crate) fn watch_table(description: &Description, frame: &Table) -> Table {
     Table::lay_out(frame.rows().iter().map(|row| {

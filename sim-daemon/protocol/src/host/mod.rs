@@ -3,6 +3,7 @@
 
 mod inbox;
 mod janitor;
+mod journal;
 mod lane;
 pub(crate) mod memory;
 mod state;
@@ -19,10 +20,10 @@ use iceoryx2::prelude::ipc;
 pub use inbox::{Inbox, Numbers};
 pub use janitor::Janitor;
 
+use self::journal::Journals;
 use self::lane::Lane;
 use self::state::State;
 use crate::apart::Apart;
-use crate::command::command_bytes;
 use crate::control::Response;
 use crate::pace::{Pace, cores};
 use crate::tenancy::Tenancy;
@@ -52,6 +53,8 @@ pub enum Next {
     Command,
     /// An observer wants to see the present state: [`Host::show`].
     Watch,
+    /// A recorder wants the state of all worlds to begin with: [`Host::record_state`].
+    Record,
     /// Somebody asked the daemon to end.
     End,
 }
@@ -102,7 +105,7 @@ impl Host {
         // last: from here on clients may come
         tenancy.announce(session)?;
 
-        let inbox = Inbox::new(command_bytes(&description));
+        let inbox = Inbox::for_commands_of(&description);
         let state = State {
             node,
             description,
@@ -110,6 +113,7 @@ impl Host {
             frame,
             watch_table,
             lane: Some(lane),
+            journals: Journals::default(),
             epochs: 1,
             responder,
             watch,
@@ -184,6 +188,18 @@ impl Host {
     /// `started` is when work on the command began.
     pub fn answer(&mut self, started: Instant, fill: impl FnOnce(&mut [u64])) {
         self.state.answer(started, fill);
+    }
+
+    /// Whether somebody records what is done.
+    pub fn is_recorded(&self) -> bool {
+        self.state.journals.are_read()
+    }
+
+    /// Gives recorders the state of all worlds, from which they go on: those who wait for one, or `all` of them after a
+    /// command that others could not carry out again.
+    pub fn record_state(&mut self, state: &[u8], all: bool) {
+        let session = self.state.description.session;
+        self.state.journals.state(session, state, all);
     }
 
     /// Answers the command with a refusal.

@@ -8,6 +8,7 @@ use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{Node, PortFactory};
 
+use super::journal::{Journals, Occasion, RECORDERS_MAX};
 use super::lane::Lane;
 use super::{Inbox, Janitor, Next, S, memory};
 use crate::apart::Apart;
@@ -29,6 +30,7 @@ pub(super) struct State {
     pub(super) frame: Table,
     pub(super) watch_table: Table,
     pub(super) lane: Option<Lane>,
+    pub(super) journals: Journals,
     pub(super) epochs: u64,
     pub(super) responder: Responder<S>,
     pub(super) watch: FramePublisher<S>,
@@ -105,6 +107,30 @@ impl State {
         }
     }
 
+    /// Opens a journal, if there is room for it.
+    fn journal(&mut self, observed: u64) -> Response {
+        let refused = |reason| Response::Refused { reason };
+        if self.journals.are_full() {
+            return refused(format!(
+                "{RECORDERS_MAX} recorders are at work, which is the limit; end one of them"
+            ));
+        }
+        let (shared, own) = Journals::bytes(&self.description, &self.frame, observed);
+        match memory::check(memory::free(), shared, own, "the journal of a recorder") {
+            Err(
+                ProtocolError::SharedMemory { free, needed, .. }
+                | ProtocolError::Memory { free, needed, .. },
+            ) => return Response::NoMemory { free, needed },
+            Err(error) => return refused(error.to_string()),
+            Ok(()) => {}
+        }
+        let (node, description) = (&self.node, &self.description);
+        match self.journals.open(node, description, &self.frame, observed) {
+            Ok(journal) => Response::Journal { journal },
+            Err(error) => refused(error.to_string()),
+        }
+    }
+
     /// Answers the control requests that are there.
     fn control(&mut self) -> Option<Next> {
         let mut end = false;
@@ -135,6 +161,7 @@ impl State {
                     lane.into_iter().for_each(Lane::joined);
                     continue;
                 }
+                Ok(Request::Journal { observed }) => Some(self.journal(observed)),
                 Ok(Request::Shutdown) => {
                     end = true;
                     Some(Response::Ending)
@@ -156,13 +183,14 @@ impl State {
 
     pub(super) fn answer(&mut self, started: Instant, fill: impl FnOnce(&mut [u64])) {
         let Some(lane) = &mut self.lane else {
-            return;
+            return self.record(None);
         };
         let Ok(mut loan) = lane
             .publisher
             .loan_slice_uninit(self.frame.total_bytes() / ALIGNMENT)
         else {
             // the holder keeps more frames than it said: it is told that its lease is lost
+            self.record(None);
             return self.renew();
         };
         let words = loan::words(loan.payload_mut());
@@ -171,6 +199,7 @@ impl State {
         fill(arena);
         self.frames += 1;
         self.unseen = true;
+        self.record(Some(arena));
         let now = Instant::now();
         let due = self.watchers > 0 && now.duration_since(self.shown) > WATCH_PERIOD;
         if due {
@@ -195,6 +224,18 @@ impl State {
         }
         // a holder that cannot be notified looks by itself after 50 ms
         let _ = lane.notifier.notify();
+    }
+
+    /// Tells recorders what was carried out; without a frame where nobody is left to get one.
+    fn record(&mut self, arena: Option<&[u64]>) {
+        if self.journals.are_read() {
+            let occasion = Occasion {
+                description: &self.description,
+                inbox: &self.inbox,
+                table: &self.frame,
+            };
+            self.journals.entry(&occasion, arena);
+        }
     }
 
     /// Shows observers the first worlds of an arena.
@@ -256,7 +297,7 @@ impl State {
         let _ = lane.notifier.notify();
     }
 
-    /// Looks at control requests, leases and observers.
+    /// Looks at control requests, leases, observers and recorders.
     pub(super) fn look_around(&mut self) -> Option<Next> {
         let gap = self.looked.elapsed();
         self.looked = Instant::now();
@@ -279,7 +320,8 @@ impl State {
         // new observers get the frame shown last, dead ones give their slots back
         let _ = self.watch.update_connections();
         self.watchers = self.watch_service.dynamic_config().number_of_subscribers();
-        next
+        let waits = self.journals.refresh();
+        next.or(waits.then_some(Next::Record))
     }
 }
 

@@ -15,6 +15,9 @@ use crate::{
 
 type Clients = iceoryx2::prelude::ipc_threadsafe::Service;
 
+/// Bytes of the state of the daemon below: several entries long.
+const STATE: usize = 40_000;
+
 /// A daemon on a thread: it answers every command with the number of commands so far.
 struct Fake {
     name: String,
@@ -61,6 +64,9 @@ fn description() -> Description {
         notes: Vec::new(),
         frames_held: 2,
         watch_worlds: 1,
+        joint_q_max: None,
+        joint_qd_max: None,
+        on_fault: "freeze".to_owned(),
         schema: 0,
     }
 }
@@ -80,6 +86,7 @@ fn serve(place: &Place, stop: Arc<AtomicBool>, ready: Sender<()>) {
                 host.answer(Instant::now(), |arena| arena[..2].fill(count));
             }
             Next::Watch => host.show(&[count; 8]),
+            Next::Record => host.record_state(&[count as u8; STATE], false),
             Next::End => break,
         }
     }
@@ -252,6 +259,59 @@ fn hostile_commands_are_refused_with_a_reason_and_the_host_goes_on() {
         "nothing that was refused was carried out"
     );
     assert_eq!(count(&client.step(&[], &mut keep_waiting()).unwrap()), 3);
+}
+
+#[test]
+fn a_journal_tells_what_was_carried_out_and_counts_what_was_lost() {
+    let fake = Fake::start("journal");
+    let (client, recorder) = (fake.attach(), fake.attach());
+    assert_eq!(count(&client.step(&[], &mut keep_waiting()).unwrap()), 1);
+    let mut journal = recorder.journal(&[], &mut keep_waiting()).unwrap();
+    let mut next = || {
+        let entry = journal.next(std::time::Duration::from_secs(5), &mut keep_waiting());
+        entry.unwrap().expect("an entry within seconds")
+    };
+    let mut state: Vec<u8> = Vec::new();
+    while state.len() < STATE {
+        let piece = next();
+        let header = *piece.header();
+        assert!(header.is_state() && header.bytes == STATE as u64 && piece.lost == 0);
+        assert_eq!(header.first, state.len() as u64);
+        assert!(piece.piece().len() < STATE, "in pieces");
+        state.extend(piece.piece());
+    }
+    assert_eq!(state, [1; STATE]);
+    let numbers = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+    let torque = crate::Command {
+        field: "joint_f",
+        columns: 0..3,
+        values: crate::Values::F32(&numbers),
+    };
+    client.step(&[torque], &mut keep_waiting()).unwrap();
+    let entry = next();
+    assert_eq!(
+        (entry.header().op, entry.header().rows),
+        (Op::Step as u32, 1)
+    );
+    let table = Table::parse(entry.command(), 1).unwrap();
+    let first = table.row("joint_f").unwrap().offset / 4;
+    let sent: &[f32] = bytemuck::cast_slice(entry.command());
+    assert_eq!(sent[first..first + 6], numbers);
+    let digest = crate::digest::checksum(&2_u64.to_le_bytes()) as u32;
+    assert_eq!(entry.digests(), [digest; 2]);
+    drop(entry);
+    let mut left = 3000;
+    for _ in 0..left {
+        client.step(&[], &mut keep_waiting()).unwrap();
+    }
+    let first = next();
+    assert!(first.lost > 0, "{}", first.lost);
+    left -= first.lost + 1;
+    drop(first);
+    while left > 0 {
+        assert_eq!(next().lost, 0, "{left}");
+        left -= 1;
+    }
 }
 
 #[test]

@@ -1,0 +1,222 @@
+//! Journals: to each recorder what its daemon has carried out. Without one, this is a look at an empty list.
+
+use std::time::{Duration, Instant};
+
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::prelude::{Node, PortFactory};
+
+use super::{Inbox, S, memory};
+use crate::digest::{digest, digests_of};
+use crate::journal::JournalHeader;
+use crate::loan;
+use crate::transport::{self, JournalPublisher, JournalService, journal_slots};
+use crate::{ALIGNMENT, Description, ProtocolError, Row, Table};
+
+/// Recorders that one daemon serves at once.
+pub(super) const RECORDERS_MAX: usize = 4;
+/// A recorder that was granted a journal and did not open it within this time is gone.
+const JOIN_MAX: Duration = Duration::from_secs(2);
+/// Shared memory of one journal, if entries are small enough [bytes].
+const JOURNAL: usize = 32 << 20;
+/// Fewest and most entries that wait for a recorder.
+const DEPTH: std::ops::RangeInclusive<usize> = 16..=1024;
+/// A state takes up to so many of them: of a dof it has five numbers more than the commands have.
+const STATE_ENTRIES: usize = 5;
+
+/// The journals of a daemon.
+#[derive(Debug, Default)]
+pub(super) struct Journals {
+    open: Vec<Journal>,
+    opened: u64,
+}
+
+/// One recorder's.
+#[derive(Debug)]
+struct Journal {
+    service: JournalService<S>,
+    publisher: JournalPublisher<S>,
+    /// Rows of the frame that it wants whole: a bit each.
+    observed: u64,
+    slot_bytes: usize,
+    since: Instant,
+    joined: bool,
+    /// It has the state from which it goes on.
+    begun: bool,
+    entries: u64,
+}
+
+/// What all entries of a frame have in common.
+pub(super) struct Occasion<'a> {
+    pub(super) description: &'a Description,
+    pub(super) inbox: &'a Inbox,
+    pub(super) table: &'a Table,
+}
+
+impl Journals {
+    /// Bytes of an entry, and how many of them wait at most.
+    fn size(description: &Description, frame: &Table, observed: u64) -> (usize, usize) {
+        let digests = (digests_of(frame) * size_of::<u32>()).next_multiple_of(ALIGNMENT);
+        let observed: usize = rows(frame, observed).map(padded).sum();
+        let slot = crate::command::command_bytes(description) + digests + observed;
+        (slot, (JOURNAL / slot).clamp(*DEPTH.start(), *DEPTH.end()))
+    }
+
+    /// Shared memory that a journal takes, and memory of our own for a state [bytes].
+    pub(super) fn bytes(description: &Description, frame: &Table, observed: u64) -> (usize, u64) {
+        let (slot, depth) = Journals::size(description, frame, observed);
+        let shared = memory::journal_bytes(slot, journal_slots(depth));
+        (shared, (STATE_ENTRIES * slot) as u64)
+    }
+
+    pub(super) fn are_full(&self) -> bool {
+        self.open.len() >= RECORDERS_MAX
+    }
+
+    /// Opens the next journal and takes its memory; returns its number.
+    pub(super) fn open(
+        &mut self,
+        node: &Node<S>,
+        description: &Description,
+        frame: &Table,
+        observed: u64,
+    ) -> Result<u64, ProtocolError> {
+        let (slot_bytes, depth) = Journals::size(description, frame, observed);
+        self.opened += 1;
+        let service = transport::create_journal(node, self.opened, depth)?;
+        let publisher = transport::journal_publisher(&service, slot_bytes)?;
+        let prefix = node.config().global.prefix.to_string();
+        memory::reserve(&prefix, publisher.id().value(), "the journal of a recorder")?;
+        self.open.push(Journal {
+            service,
+            publisher,
+            observed,
+            slot_bytes,
+            since: Instant::now(),
+            joined: false,
+            begun: false,
+            entries: 0,
+        });
+        Ok(self.opened)
+    }
+
+    /// Meets new recorders and forgets those that went. Returns whether one waits for the state to begin with.
+    pub(super) fn refresh(&mut self) -> bool {
+        self.open.retain_mut(|journal| {
+            let recorders = journal.service.dynamic_config().number_of_subscribers();
+            journal.joined |= recorders > 0;
+            // a recorder that cannot be reached is one that went: the next look tells
+            let _ = journal.publisher.update_connections();
+            recorders > 0 || (!journal.joined && journal.since.elapsed() < JOIN_MAX)
+        });
+        self.open
+            .iter()
+            .any(|journal| journal.joined && !journal.begun)
+    }
+
+    /// Whether somebody records.
+    pub(super) fn are_read(&self) -> bool {
+        self.open.iter().any(|journal| journal.begun)
+    }
+
+    /// Sends the state of all worlds to those who wait for one, or to `all`.
+    pub(super) fn state(&mut self, session: u64, state: &[u8], all: bool) {
+        for journal in &mut self.open {
+            if journal.joined && (all || !journal.begun) {
+                journal.begun = true;
+                journal.state(session, state);
+            }
+        }
+    }
+
+    /// Sends what was carried out, with the digests of the frame in `arena` if there is one.
+    pub(super) fn entry(&mut self, occasion: &Occasion<'_>, arena: Option<&[u64]>) {
+        for journal in self.open.iter_mut().filter(|journal| journal.begun) {
+            journal.entry(occasion, arena);
+        }
+    }
+}
+
+impl Journal {
+    fn state(&mut self, session: u64, state: &[u8]) {
+        for (index, piece) in state.chunks(self.slot_bytes).enumerate() {
+            let header = JournalHeader {
+                session,
+                bytes: state.len() as u64,
+                first: (index * self.slot_bytes) as u64,
+                ..JournalHeader::default()
+            };
+            self.send(header, piece.len(), |bytes| {
+                bytes[..piece.len()].copy_from_slice(piece);
+            });
+        }
+    }
+
+    fn entry(&mut self, occasion: &Occasion<'_>, arena: Option<&[u64]>) {
+        let (inbox, frame) = (occasion.inbox, occasion.table);
+        let command: &[u8] = bytemuck::cast_slice(inbox.payload());
+        let digests = arena.map_or(0, |_| digests_of(frame));
+        let observed: usize = match arena {
+            Some(_) => rows(frame, self.observed).map(padded).sum(),
+            None => 0,
+        };
+        let header = JournalHeader {
+            session: occasion.description.session,
+            bytes: command.len() as u64,
+            observed: observed as u64,
+            op: inbox.op() as u32,
+            rows: inbox.header().rows,
+            digests: digests as u32,
+            ..JournalHeader::default()
+        };
+        let of_command = command.len().next_multiple_of(ALIGNMENT);
+        let of_digests = (digests * size_of::<u32>()).next_multiple_of(ALIGNMENT);
+        let wanted = self.observed;
+        self.send(header, of_command + of_digests + observed, |bytes| {
+            bytes[..command.len()].copy_from_slice(command);
+            let Some(arena) = arena else {
+                return;
+            };
+            let bytes = &mut bytes[of_command..];
+            let room = &mut bytes[..digests * size_of::<u32>()];
+            digest(frame, arena, bytemuck::cast_slice_mut(room));
+            let mut rest = &mut bytes[of_digests..];
+            let (from, head): (&[u8], _) = (
+                bytemuck::cast_slice(arena),
+                Table::head_bytes(frame.rows().len()),
+            );
+            for row in rows(frame, wanted) {
+                let (array, others) = rest.split_at_mut(padded(row));
+                array[..row.bytes].copy_from_slice(&from[row.offset - head..][..row.bytes]);
+                rest = others;
+            }
+        });
+    }
+
+    /// Sends an entry of at most `slot_bytes`. One that cannot be sent is a number that does not come.
+    fn send(&mut self, header: JournalHeader, bytes: usize, fill: impl FnOnce(&mut [u8])) {
+        let entry = self.entries;
+        self.entries += 1;
+        let Ok(mut loan) = self.publisher.loan_slice_uninit(bytes.div_ceil(ALIGNMENT)) else {
+            return;
+        };
+        fill(bytemuck::cast_slice_mut(loan::words(loan.payload_mut())));
+        *loan.user_header_mut() = JournalHeader { entry, ..header };
+        // a recorder that cannot be reached is one that went: the next look tells
+        let _ = loan::send(loan);
+    }
+}
+
+/// The rows of a frame that are wanted whole.
+fn rows(frame: &Table, observed: u64) -> impl Iterator<Item = &Row> {
+    let wanted = move |(index, _): &(usize, &Row)| observed >> index & 1 == 1;
+    frame
+        .rows()
+        .iter()
+        .enumerate()
+        .filter(wanted)
+        .map(|(_, row)| row)
+}
+
+fn padded(row: &Row) -> usize {
+    row.bytes.next_multiple_of(ALIGNMENT)
+}

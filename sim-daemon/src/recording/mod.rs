@@ -1,0 +1,44 @@
+//! Recordings: what a daemon did, in a file, from which it is done again and compared bit for bit.
+//!
+//! ```text
+//! file     magic 8 · version u32 · 0 u32 · blocks
+//! block    checksum of the rest of this line u32 · checksum of the records u32 · bytes as records u32 · bytes stored u32
+//!          records in LZ4
+//! record   kind u32 · 0 u32 · words u64 · words
+//! ```
+//! Numbers are little endian. Checksums are the lower halves of XXH3. A block ends after 256 kB of records
+//! or 0.1 s, so that a recorder that is killed loses no more; each holds whole records, hence whole frames. The first record
+//! is the head (JSON: what the daemon tells of itself), the second the state of all worlds; then come the commands in order,
+//! each with the digests of its frame, gaps where entries were lost, the state after each restore, and why the recording ended.
+
+mod blocks;
+mod compare;
+mod record;
+mod records;
+mod replay;
+#[cfg(test)]
+mod tests;
+mod writer;
+
+use std::path::Path;
+
+pub(crate) use record::run as record;
+pub(crate) use replay::run as replay;
+
+use crate::error::DaemonError;
+
+/// The recording cannot be made, or not go on.
+fn failed(path: &Path, problem: impl Into<String>) -> DaemonError {
+    DaemonError::Recording {
+        path: path.to_owned(),
+        problem: problem.into(),
+    }
+}
+
+/// The recording cannot be replayed, or not further.
+fn unreadable(path: &Path, problem: impl Into<String>) -> DaemonError {
+    DaemonError::Replay {
+        path: path.to_owned(),
+        problem: problem.into(),
+    }
+}

@@ -1,0 +1,137 @@
+"""Recordings of real daemons: everything that Python can ask for is replayed bit for bit, from the command line."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tightloop as tl
+
+WORLDS = 21
+COMMAND = [sys.executable, "-m", "tightloop"]
+
+
+class Recorder:
+    """`tightloop record`, once it has begun."""
+
+    def __init__(self, sim: tl.Sim, out: Path, *flags: str) -> None:
+        command = [*COMMAND, "record", sim.name, str(out), *flags]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert self.process.stderr is not None
+        said = self.process.stderr.readline()
+        assert "recording" in said, said
+
+    def finish(self) -> str:
+        """What it said once it ended, as asked."""
+        said, news = self.process.communicate(timeout=60)
+        assert self.process.returncode == 0, news
+        return said
+
+    def stop(self, with_signal: int) -> str:
+        """As `finish`, after a signal."""
+        self.process.send_signal(with_signal)
+        return self.finish()
+
+
+def replay(out: Path, *flags: str) -> tuple[int, str]:
+    """Exit code and all that was said."""
+    done = subprocess.run(
+        [*COMMAND, "replay", str(out), *flags], capture_output=True, text=True, timeout=60, check=False
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+def act(sim: tl.Sim, snapshots: list[tl.Snapshot], count: int, seed: int) -> bool:
+    """Commands of every kind; whether a world got into trouble."""
+    rng = np.random.default_rng(seed)
+    kinds: list[Callable[[], object]] = [
+        lambda: sim.reset(mask=rng.random(WORLDS) > 0.5),
+        lambda: sim.reset(seed=rng.integers(0, 100, WORLDS)),
+        lambda: sim.write(joint_q=rng.normal(size=(WORLDS, 2)), mask=rng.random(WORLDS) > 0.5),
+        lambda: sim.params.write(body_mass_scale=rng.uniform(0.5, 2, (WORLDS, 3))),
+        lambda: sim.step(body_f=rng.normal(size=(WORLDS, 3, 6))),
+        lambda: snapshots.append(sim.snapshot()),
+        lambda: sim.restore(snapshots[-1], worlds=rng.random(WORLDS) > 0.5),
+        lambda: sim.restore(snapshots[0], from_world=int(rng.integers(WORLDS))),
+        sim.forward,
+        # far beyond the bounds, in which a world is frozen and, where the run says so, reset
+        lambda: sim.step(joint_f=rng.normal(size=(WORLDS, 2)) * 1e5 * (rng.random((WORLDS, 1)) > 0.9)),
+    ]
+    trouble = False
+    for _ in range(count):
+        kind = rng.integers(4 * len(kinds))
+        done = kinds[kind]() if kind < len(kinds) else sim.step(joint_f=rng.normal(size=(WORLDS, 2)))
+        trouble |= isinstance(done, tl.Frame) and bool(done.status.any())
+    return trouble
+
+
+@pytest.mark.parametrize("precision", ["f32", "f64"])
+@pytest.mark.parametrize("on_fault", ["freeze", "reset"])
+def test_everything_is_replayed_with_the_same_bits(pendulum, tmp_path, precision, on_fault):
+    pendulum.randomize(joint_q={"arm": tl.Uniform(-0.2, 0.2)})
+    out = tmp_path / "run.tlrec"
+    params, bounds = ("body_mass_scale", "body_f"), {"joint_qd": 50}
+    with tl.launch(
+        pendulum, worlds=WORLDS, precision=precision, params=params, bounds=bounds, on_fault=on_fault
+    ) as sim:
+        snapshots = [sim.snapshot()]
+        act(sim, snapshots, 50, seed=1)
+        recorder = Recorder(sim, out, "--frames", "400", "--fields", "joint_q,status")
+        assert act(sim, snapshots, 400, seed=2), "worlds went beyond the bounds"
+        said = recorder.finish()
+        assert "400 frames" in said and "no gaps" in said
+    code, said = replay(out)
+    assert code == 0 and "400 frames of 21 worlds are equal, bit for bit" in said, said
+    assert replay(out, "--threads", "1", "--frames", "5")[1].count(" 5 frames of 21 worlds are equal") == 1
+
+
+def test_ctrl_c_ends_a_recording_and_another_may_take_its_place_when_forced(pendulum, tmp_path):
+    out = tmp_path / "run.tlrec"
+    with tl.launch(pendulum, worlds=WORLDS) as sim:
+        recorder = Recorder(sim, out)
+        for _ in range(30):
+            sim.step()
+        time.sleep(0.3)
+        assert "30 frames" in recorder.stop(signal.SIGINT)
+        again = [*COMMAND, "record", sim.name, str(out)]
+        done = subprocess.run(again, capture_output=True, text=True, check=False)
+        assert done.returncode == 1 and "is there already" in done.stderr
+        assert "30 frames" in replay(out)[1]
+        recorder = Recorder(sim, out, "--force", "--seconds", "0.5")
+        for _ in range(7):
+            sim.step()
+        assert "7 frames" in recorder.finish()
+        assert "7 frames" in replay(out)[1]
+
+
+def test_a_killed_recorder_leaves_a_file_and_a_daemon_that_go_on(pendulum, tmp_path):
+    out = tmp_path / "run.tlrec"
+    with tl.launch(pendulum, worlds=WORLDS) as sim:
+        recorder = Recorder(sim, out)
+        for _ in range(2000):
+            sim.step(joint_f=np.ones(2))
+        recorder.process.kill()
+        recorder.process.communicate()
+        for _ in range(20):
+            sim.step()
+        code, said = replay(out)
+        assert code == 0 and "its recorder was killed" in said, said
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(b"", "is no recording"), (b"dt = 0.002\n", "is no recording"), (None, "No such file")],
+)
+def test_what_is_no_recording_is_refused_with_code_2(tmp_path, content, words):
+    out = tmp_path / "run.tlrec"
+    if content is not None:
+        out.write_bytes(content)
+    code, said = replay(out)
+    assert code == 2 and words in said and "run.tlrec" in said
