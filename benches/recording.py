@@ -3,15 +3,18 @@
     python benches/recording.py
 
 The target demo of the lesson, each world with targets of its own, through `tightloop.launch`. First 60 frames a second,
-in turns with and without `tightloop record`: the difference of the median times of a step is what recording costs. Then
-as fast as it goes, in 4096 and in 64 worlds: frames that were lost are counted from what the recorder says. The last
-recording of each kind is replayed, unless it has a gap. Writes benches/results/MACHINE/recording.csv, and ends with 1
-when recording costs more than the 3 % asked or a replay is not equal.
+in turns with and without `tightloop record`: what the daemon's process takes more of the processor for a frame, as
+Linux counts it, is what recording costs the simulation; other programs do not count there. Beside it the time of a step as
+the caller sees it, to which they do, and what the recorder takes for a frame. Then as fast as it goes, in 4096 and in 64
+worlds: frames that were lost are counted from what the recorder says. The last recording of each kind is replayed,
+unless it has a gap. Writes benches/results/MACHINE/recording.csv with the load of the machine, and ends with 1 when
+recording costs more than the 3 % asked or a replay is not equal.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import subprocess
 import sys
@@ -58,17 +61,42 @@ class Recorder:
         return int(found[1]), int(found[3] or 0), float(found[2])
 
 
-def step(sim: tl.Sim, commands: list[NDArray[np.float32]], frames: int, *, rate_hz: float | None) -> list[float]:
-    """Seconds of each step."""
-    times = []
-    for frame in range(frames):
-        begin = time.perf_counter()
-        sim.step(joint_target_q=commands[frame % FRAMES])
-        end = time.perf_counter()
-        times.append(end - begin)
-        if rate_hz:
-            time.sleep(max(0.0, begin + 1 / rate_hz - end))
-    return times
+def processor_ms(pid: int) -> float:
+    """Time that all threads of a process have had on a processor [ms]."""
+    threads = Path(f"/proc/{pid}/task").iterdir()
+    return sum(int((thread / "schedstat").read_text().split()[0]) for thread in threads) / 1e6
+
+
+class Times:
+    """What frames took with or without a recorder: of the caller, of the daemon's processor, of the recorder's."""
+
+    def __init__(self) -> None:
+        self.step_ms: list[float] = []
+        self.daemon_ms: list[float] = []
+        self.recorder_ms: list[float] = []
+
+    def measure(
+        self,
+        sim: tl.Sim,
+        commands: list[NDArray[np.float32]],
+        frames: int,
+        *,
+        rate_hz: float | None,
+        recorder: Recorder | None = None,
+    ) -> None:
+        """One turn."""
+        pids = [sim.pid] + ([recorder.process.pid] if recorder else [])
+        before = [processor_ms(pid) for pid in pids]
+        for frame in range(frames):
+            begin = time.perf_counter()
+            sim.step(joint_target_q=commands[frame % FRAMES])
+            end = time.perf_counter()
+            self.step_ms.append(1e3 * (end - begin))
+            if rate_hz:
+                time.sleep(max(0.0, begin + 1 / rate_hz - end))
+        taken = [(processor_ms(pid) - start) / frames for pid, start in zip(pids, before, strict=True)]
+        self.daemon_ms.append(taken[0])
+        self.recorder_ms += taken[1:]
 
 
 def replay(out: Path) -> bool:
@@ -80,38 +108,44 @@ def replay(out: Path) -> bool:
 
 def measure(worlds: int, *, rounds: int, frames: int, rate_hz: float | None) -> tuple[dict[str, str | int], bool]:
     """One kind of run, for people and files, and whether its last recording replays."""
-    rng = np.random.default_rng(1)
-    amplitudes = rng.uniform(0.5, 1.5, worlds)
+    amplitudes = np.random.default_rng(1).uniform(0.5, 1.5, worlds)
     commands = [targets(frame, amplitudes) for frame in range(FRAMES)]
-    without: list[float] = []
-    recorded: list[float] = []
+    plain, recorded = Times(), Times()
     kept = lost = missing = 0
     megabytes = 0.0
     what = "as fast as it goes" if rate_hz is None else f"{rate_hz:.0f} frames/s"
     with tempfile.TemporaryDirectory() as folder, tl.launch(scene(driven=True), worlds=worlds) as sim:
         out = Path(folder) / "run.tlrec"
-        step(sim, commands, FRAMES, rate_hz=None)  # warms caches and clocks
+        Times().measure(sim, commands, FRAMES, rate_hz=None)  # warms caches and clocks
         for _ in tqdm(range(rounds), desc=f"{worlds} worlds, {what}", disable=None):
-            without += step(sim, commands, frames, rate_hz=rate_hz)
+            plain.measure(sim, commands, frames, rate_hz=rate_hz)
             recorder = Recorder(sim, out)
-            recorded += step(sim, commands, frames, rate_hz=rate_hz)
+            recorded.measure(sim, commands, frames, rate_hz=rate_hz, recorder=recorder)
             in_file, missing, size = recorder.stop()
             kept, lost, megabytes = kept + in_file, lost + missing, megabytes + size
         # what is lost shows as a gap, at which a replay stops: there is nothing to compare behind it
         equal = bool(missing) or replay(out)
-    plain, beside = 1e3 * np.median(without), 1e3 * np.median(recorded)
+    cost = np.median(np.array(recorded.daemon_ms) / plain.daemon_ms)
     row: dict[str, str | int] = {
         "what": what,
         "worlds": worlds,
-        "median_ms": f"{plain:.3f}",
-        "recorded_ms": f"{beside:.3f}",
-        "cost_percent": f"{100 * (beside / plain - 1):.1f}",
+        "daemon_cpu_ms": f"{np.median(plain.daemon_ms):.3f}",
+        "recorded_cpu_ms": f"{np.median(recorded.daemon_ms):.3f}",
+        "cost_percent": f"{100 * (cost - 1):.1f}",
         "asked_percent": f"{ASKED_PERCENT:.0f}" if rate_hz else "–",
+        "recorder_cpu_ms": f"{np.median(recorded.recorder_ms):.3f}",
+        "step_ms": f"{np.median(plain.step_ms):.3f}",
+        "recorded_step_ms": f"{np.median(recorded.step_ms):.3f}",
         "frames": kept + lost,
         "lost": lost,
-        "kB_a_frame": f"{1e3 * megabytes / max(kept, 1):.0f}",
+        "kB_a_frame": f"{1e3 * megabytes / max(kept, 1):.1f}",
     }
     return row, equal
+
+
+def loads() -> str:
+    """How many threads wanted a processor in the last minute."""
+    return f"{os.getloadavg()[0]:.1f} of {os.cpu_count()} cores"
 
 
 def main() -> int:
@@ -120,13 +154,14 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=10, help="turns with and without a recorder (default 10)")
     rounds = parser.parse_args().rounds
     kinds = [(4096, 120, RATE_HZ), (4096, 500, None), (64, 10_000, None)]
-    rows, equal = [], True
+    rows, equal, load = [], True, loads()
     for worlds, frames, rate_hz in kinds:
         row, is_equal = measure(worlds, rounds=rounds, frames=frames, rate_hz=rate_hz)
         rows.append(row)
         equal &= is_equal
     print_table(rows)
-    write_results("recording", rows, {"command": f"python benches/recording.py --rounds {rounds}"})
+    facts = {"command": f"python benches/recording.py --rounds {rounds}", "load_before": load, "load_after": loads()}
+    write_results("recording", rows, facts)
     costs = float(rows[0]["cost_percent"])
     if costs > ASKED_PERCENT:
         print(f"recording at {RATE_HZ:.0f} frames/s costs {costs} %, asked {ASKED_PERCENT:.0f}")

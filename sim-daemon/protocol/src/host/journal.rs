@@ -128,6 +128,12 @@ impl Journals {
         }
     }
 
+    /// Leaves out an entry that cannot be told, so that a gap shows.
+    pub(super) fn skip(&mut self) {
+        let begun = self.open.iter_mut().filter(|journal| journal.begun);
+        begun.for_each(|journal| journal.entries += 1);
+    }
+
     /// Sends what was carried out, with the digests of the frame in `arena` if there is one.
     pub(super) fn entry(&mut self, occasion: &Occasion<'_>, arena: Option<&[u64]>) {
         for journal in self.open.iter_mut().filter(|journal| journal.begun) {

@@ -183,14 +183,14 @@ impl State {
 
     pub(super) fn answer(&mut self, started: Instant, fill: impl FnOnce(&mut [u64])) {
         let Some(lane) = &mut self.lane else {
-            return self.record(None);
+            return self.record_inputs();
         };
         let Ok(mut loan) = lane
             .publisher
             .loan_slice_uninit(self.frame.total_bytes() / ALIGNMENT)
         else {
             // the holder keeps more frames than it said: it is told that its lease is lost
-            self.record(None);
+            self.record_inputs();
             return self.renew();
         };
         let words = loan::words(loan.payload_mut());
@@ -199,7 +199,6 @@ impl State {
         fill(arena);
         self.frames += 1;
         self.unseen = true;
-        self.record(Some(arena));
         let now = Instant::now();
         let due = self.watchers > 0 && now.duration_since(self.shown) > WATCH_PERIOD;
         if due {
@@ -219,23 +218,32 @@ impl State {
         if let Some(holder) = &mut lane.holder {
             holder.beat = now;
         }
-        if loan::send(loan).is_err() {
+        let Ok(sent) = loan::send_kept(&mut lane.publisher, loan) else {
+            self.journals.skip();
             return self.renew(); // the holder cannot be reached: it is told that its lease is lost
-        }
+        };
         // a holder that cannot be notified looks by itself after 50 ms
         let _ = lane.notifier.notify();
-    }
-
-    /// Tells recorders what was carried out; without a frame where nobody is left to get one.
-    fn record(&mut self, arena: Option<&[u64]>) {
+        // last: nobody waits for it
         if self.journals.are_read() {
             let occasion = Occasion {
                 description: &self.description,
                 inbox: &self.inbox,
                 table: &self.frame,
             };
-            self.journals.entry(&occasion, arena);
+            let head = Table::head_bytes(self.frame.rows().len()) / 8;
+            self.journals.entry(&occasion, Some(&sent[head..]));
         }
+    }
+
+    /// Tells recorders that the inputs of a command were set, and nobody is left to get a frame.
+    fn record_inputs(&mut self) {
+        let occasion = Occasion {
+            description: &self.description,
+            inbox: &self.inbox,
+            table: &self.frame,
+        };
+        self.journals.entry(&occasion, None);
     }
 
     /// Shows observers the first worlds of an arena.
