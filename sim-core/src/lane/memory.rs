@@ -169,7 +169,8 @@ impl<F: Lane> Cx for Cpu<'_, F> {
     }
     #[inline(always)]
     fn add_triples(&mut self, t: Table, row: usize, k: usize, by: [F; 3], cells: &mut [F]) {
-        let (first, mask, zero) = (t.base + row * t.stride + k, self.mask, F::c(0.0));
+        // -0 + x is x, where 0 + x would make 0 of -0: what other worlds add changes no bit
+        let (first, mask, zero) = (t.base + row * t.stride + k, self.mask, F::c(-0.0));
         // one check of the bounds instead of one a number
         let (triples, _) = self.memory[first..first + 3 * cells.len()].as_chunks::<3>();
         for (cell, triple) in cells.iter_mut().zip(triples) {
