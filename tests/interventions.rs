@@ -229,9 +229,8 @@ fn a_run_goes_on_from_a_snapshot_in_any_lanes_and_threads() {
         let ops = case.program(9);
         let (before, after) = ops.split_at(case.dice.below(ops.len()));
         let first = play(&case.model, &case.options, before)?;
-        let mut rest = vec![Op::Snapshot(0), Op::Forward];
-        // numbers of snapshots before this one stay
-        rest[0] = Op::Snapshot(usize::MAX);
+        // beside the snapshots of the program
+        let mut rest = vec![Op::Snapshot(usize::MAX), Op::Forward];
         rest.extend(after.iter().cloned());
         let kept = first.kept.clone();
         let went_on = play_on(first.run, &rest, first.kept, &BTreeMap::new())?;

@@ -340,3 +340,49 @@ fn worlds_that_are_frozen_are_counted_once() {
         assert_eq!(run.sim.take_frozen(), Frozen::default());
     }
 }
+
+#[test]
+fn a_world_whose_rotation_is_lost_is_frozen_and_a_write_leaves_its_rotations_alone() {
+    let mut scene = Description::new(1.0 / 480.0, 2);
+    for name in ["top", "other"] {
+        let mut body = Body::new(name, Pose::identity());
+        body.mass = Some(1.0);
+        scene.add_body(body).unwrap();
+    }
+    let model = scene.compile().unwrap();
+    for (lanes, precision) in machines() {
+        // spins from those that a step survives to those whose square is infinite, one a world
+        let most = blow(precision).log10();
+        let spins: Vec<f64> = (0..WORLDS)
+            .map(|world| 10f64.powf(most * world as f64 / WORLDS as f64))
+            .collect();
+        let options = Options {
+            worlds: WORLDS,
+            precision,
+            lanes,
+            threads: Some(1),
+            fields: FIELDS[..3].to_vec(),
+            ..Options::default()
+        };
+        let mut run = Run::new(&model, options);
+        run.sim
+            .write(Field::JointQd, 4..5, Values::F64(&spins), None)
+            .unwrap();
+        let places: Vec<f64> = (0..3 * WORLDS).map(|k| k as f64).collect();
+        let mut frozen = 0;
+        for _ in 0..4 {
+            run.step();
+            for world in 0..WORLDS {
+                let rotation = &run.get(Field::JointQ, world)[3..7];
+                let square: f64 = rotation.iter().map(|x| x * x).sum();
+                assert!((square - 1.0).abs() < 1e-5, "world {world}: {rotation:?}");
+                frozen += usize::from(run.get(Field::Status, world)[0] > 0.0);
+            }
+            // of the other body
+            run.sim
+                .write(Field::JointQ, 7..10, Values::F64(&places), None)
+                .unwrap();
+        }
+        assert!(0 < frozen && frozen < 4 * WORLDS, "{frozen}");
+    }
+}

@@ -435,3 +435,18 @@ fn numbers_that_are_not_finite_are_refused_in_the_worlds_asked_for() {
         }
     }
 }
+
+#[test]
+fn a_scene_in_which_nothing_moves_has_snapshots_too() {
+    let mut scene = Description::new(1.0 / 480.0, 1);
+    scene.add_ground("ground", 0.0);
+    let model = scene.compile().unwrap();
+    for (precision, lanes) in machines() {
+        let mut run = Run::new(&model, options(precision, lanes, 1, 5));
+        run.step();
+        let snapshot = run.sim.snapshot();
+        let first = go_on(&mut run);
+        run.sim.restore(&snapshot, None, None).unwrap();
+        assert!(go_on(&mut run) == first, "{precision:?} {lanes:?}");
+    }
+}

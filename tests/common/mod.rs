@@ -7,6 +7,7 @@ pub mod dice;
 pub mod drawn;
 #[path = "../../examples/lesson/mod.rs"]
 mod lesson_scene;
+pub mod played;
 pub mod program;
 pub mod shapes;
 

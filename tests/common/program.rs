@@ -1,10 +1,10 @@
 //! Programs: what is done to the worlds of a simulation, op by op, and the frames that come of it.
 
 use super::Run;
-use sim_core::batch::{Field, Group, status};
+use sim_core::batch::Field;
 use sim_core::model::Model;
 use sim_core::model::params::Param;
-use sim_engine::backend::{COUNTERS, Values};
+use sim_engine::backend::Values;
 use sim_engine::simulation::{Options, Precision};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -239,127 +239,5 @@ impl Played {
             }
         };
         done.map_err(|e| e.to_string())
-    }
-
-    /// The state shown is finite; a frozen world stands where it was, and one that is not has made its step.
-    fn check_frozen(&self, before: &[u64], is_set: &[bool]) -> Result<(), String> {
-        let frame = &self.run.arena;
-        for (world, is_set) in is_set.iter().enumerate() {
-            let states = self
-                .fields(frame, world)
-                .into_iter()
-                .zip(self.fields(before, world));
-            let states = states.filter(|((field, _), _)| field.row().group == Group::State);
-            let is_frozen =
-                |frame| self.counter(frame, world, Field::Status) as u32 & status::FROZEN != 0;
-            let [last, step] = [before, frame].map(|frame| self.counter(frame, world, Field::Step));
-            // by itself, after a frame with trouble
-            let was_reset = is_frozen(before) && step < 2;
-            if !is_set && !was_reset {
-                if is_frozen(before) && !is_frozen(frame) {
-                    return Err(format!(
-                        "world {world} is no longer frozen, though nobody reset it"
-                    ));
-                }
-                if step != last + u64::from(!is_frozen(frame)) {
-                    return Err(format!("world {world}: step {step} after {last}"));
-                }
-            }
-            for ((field, now), (_, then)) in states {
-                if !self.numbers(now).iter().all(|x| x.is_finite()) {
-                    return Err(format!("world {world}: {field:?} is not finite"));
-                }
-                if is_frozen(frame) && !is_set && !was_reset && now != then {
-                    return Err(format!("world {world}: {field:?} moves while frozen"));
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// A counter of a world in a frame.
-    pub fn counter(&self, frame: &[u64], world: usize, counter: Field) -> u64 {
-        let fields = self.fields(frame, world);
-        let (_, bytes) = fields
-            .iter()
-            .find(|(field, _)| *field == counter)
-            .expect("every frame has it");
-        let digits = bytes.iter().rev();
-        digits.fold(0, |number, &byte| number << 8 | u64::from(byte))
-    }
-
-    /// A field's bytes as numbers of the run's precision.
-    pub fn numbers(&self, bytes: &[u8]) -> Vec<f64> {
-        match self.run.sim.precision() {
-            Precision::F32 => {
-                let words = bytes.as_chunks().0.iter();
-                words.map(|&x| f64::from(f32::from_le_bytes(x))).collect()
-            }
-            Precision::F64 => bytes
-                .as_chunks()
-                .0
-                .iter()
-                .map(|&x| f64::from_le_bytes(x))
-                .collect(),
-        }
-    }
-
-    /// Bytes of each field of a world in a frame.
-    pub fn fields<'a>(&self, frame: &'a [u64], world: usize) -> Vec<(Field, &'a [u8])> {
-        let bytes: &[u8] = bytemuck::cast_slice(frame);
-        let slots = self.run.sim.layout().slots.iter();
-        slots
-            .map(|slot| {
-                let size = slot.bytes / slot.shape[0];
-                (slot.field, &bytes[slot.offset + world * size..][..size])
-            })
-            .collect()
-    }
-
-    /// Bytes of a world in a snapshot: its counters, then its numbers.
-    fn record<'a>(&self, snapshot: &'a [u8], world: usize) -> (&'a [u8], &'a [u8]) {
-        const HEAD: usize = 40;
-        let size = (snapshot.len() - HEAD) / self.run.sim.worlds();
-        snapshot[HEAD + world * size..][..size].split_at(COUNTERS)
-    }
-
-    /// What of a world differs from a world of another run, in the frames of both and at the end.
-    pub fn differs(&self, world: usize, other: &Played, its: usize) -> Result<(), String> {
-        if self.frames.len() != other.frames.len() {
-            return Err(format!(
-                "{} and {} frames",
-                self.frames.len(),
-                other.frames.len()
-            ));
-        }
-        for (k, (one, two)) in self.frames.iter().zip(&other.frames).enumerate() {
-            let (mine, others) = (self.fields(&one.1, world), other.fields(&two.1, its));
-            for (field, bytes) in &mine {
-                let Some((_, found)) = others.iter().find(|(of, _)| of == field) else {
-                    continue;
-                };
-                if bytes != found {
-                    let at = bytes.iter().zip(*found).position(|(a, b)| a != b);
-                    return Err(format!(
-                        "world {world}, frame {k}: {field:?} differs from byte {} on: {:?} and {:?}",
-                        at.unwrap_or(0),
-                        self.numbers(bytes),
-                        self.numbers(found),
-                    ));
-                }
-            }
-        }
-        let ((counters, numbers), (others, found)) =
-            (self.record(&self.end, world), other.record(&other.end, its));
-        if counters != others {
-            return Err(format!(
-                "world {world} at the end: counters {counters:?} and {others:?}"
-            ));
-        }
-        if numbers != found {
-            let (a, b) = (self.numbers(numbers), self.numbers(found));
-            return Err(format!("world {world} at the end: numbers {a:?} and {b:?}"));
-        }
-        Ok(())
     }
 }

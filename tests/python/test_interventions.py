@@ -95,7 +95,7 @@ def programs(rng: np.random.Generator, sim: tl.Sim, sick: Mask, huge: float | No
     return plain, changed
 
 
-def play(sim: tl.Sim, ops: list[Op], kept: tl.Snapshot) -> list[tl.Frame]:
+def play(sim: tl.Sim, ops: list[Op], kept: tl.Snapshot) -> list[tl.FrameCopy]:
     """The frame after each step; what is restored is the same in every run."""
     frames = []
     for name, arguments in ops:
@@ -110,8 +110,8 @@ def play(sim: tl.Sim, ops: list[Op], kept: tl.Snapshot) -> list[tl.Frame]:
     return frames
 
 
-def differing(one: list[tl.Frame], two: list[tl.Frame], worlds: Mask) -> list[str]:
-    def bits(frame: tl.Frame, name: str) -> bytes:
+def differing(one: list[tl.FrameCopy], two: list[tl.FrameCopy], worlds: Mask) -> list[str]:
+    def bits(frame: tl.FrameCopy, name: str) -> bytes:
         return np.ascontiguousarray(getattr(frame, name)[worlds]).tobytes()
 
     return [

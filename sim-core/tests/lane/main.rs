@@ -54,6 +54,30 @@ fn solve<C: Cx>(cx: &mut C, x: &[C::F]) -> Vec<C::F> {
     vec![cx.get(&at), cx.get(&rounds), cx.pushed(&points)]
 }
 
+const TRIPLES: Table = Table {
+    base: 0,
+    stride: 3,
+    rows: 1,
+};
+
+/// Adds the row of a list, which only worlds with a positive input have, to -0.
+#[inline(always)]
+fn add_to_zero<C: Cx>(cx: &mut C, x: &[C::F]) -> Vec<C::F> {
+    let c = C::F::c;
+    let mut list = cx.list(TRIPLES.rows);
+    push!(cx, list, c(0.0).lt(x[0]), row, {
+        for k in 0..3 {
+            cx.init(TRIPLES, row, k, c(1.0));
+        }
+    });
+    let mut cell = [cx.var(c(-0.0))];
+    each!(cx, row in list, {
+        let by = cx.only(x[0]);
+        cx.add_triples(TRIPLES, row, 0, [by; 3], &mut cell);
+    });
+    vec![cx.get(&cell[0])]
+}
+
 fn inputs(n: usize) -> Vec<[f32; 3]> {
     toy::worlds(&mut toy::Random(11), n)
 }
@@ -100,6 +124,14 @@ mod wide {
     #[target_feature(enable = "avx512f")]
     pub fn run_by_sixteen(steps: &[toy::Step], worlds: &[[f32; toy::INPUTS]]) -> Vec<Vec<f32>> {
         toy::on_cpu::<F32x16>(steps, worlds)
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub fn add_by_eight(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
+        let (scratch, tables) = (POINTS_SCRATCH, Tables::default());
+        toy::on_cpu_with(worlds, scratch, &tables, |cx, x: &[F32x8]| {
+            add_to_zero(cx, x)
+        })
     }
 
     pub fn has_eight() -> bool {
@@ -378,4 +410,18 @@ fn a_row_outside_its_table_is_found_in_debug_builds() {
         row,
         1,
     );
+}
+
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn what_other_worlds_add_leaves_the_sign_of_a_zero() {
+    if wide::has_eight() {
+        let worlds: Vec<[f32; 3]> = (0..8).map(|k| [k as f32 - 3.5, 0.0, 0.0]).collect();
+        // SAFETY: the machine has the features, as was just asked
+        let found = unsafe { wide::add_by_eight(&worlds) };
+        for (world, sum) in worlds.iter().zip(&found) {
+            let expected = if world[0] > 0.0 { 3.0 * world[0] } else { -0.0 };
+            assert_eq!(sum[0].to_bits(), expected.to_bits(), "{world:?}");
+        }
+    }
 }
