@@ -269,8 +269,22 @@ fn any_distribution() -> impl Strategy<Value = Distribution> {
 
 fn any_name() -> impl Strategy<Value = String> {
     let known = [
-        "", "x", "z", "arm", "arm/hinge", "arm/ball", "arm/ball.wx", "arm/upper", "dog", "cube",
-        "cube/body", "cube/box", "ground", "arm/lower/tip", "arm/", "/",
+        "",
+        "x",
+        "z",
+        "arm",
+        "arm/hinge",
+        "arm/ball",
+        "arm/ball.wx",
+        "arm/upper",
+        "dog",
+        "cube",
+        "cube/body",
+        "cube/box",
+        "ground",
+        "arm/lower/tip",
+        "arm/",
+        "/",
     ];
     let known = prop::sample::select(known.map(str::to_owned).to_vec());
     prop_oneof![9 => known, 1 => ".{0,6}"]
