@@ -3,8 +3,8 @@
     python examples/randomized_push.py --worlds 4096
 
 One launch, one program: in each world the ground has a friction of its own, the box a mass and a start, all drawn from
-the seed. While a force F acts for T seconds, a box of mass m is accelerated by F/m - μ g, and then slowed down by μ g; a
-box that F cannot move stays. The plot has the worlds, and that law.
+the seed. While a force F acts for T seconds, a box of mass m is accelerated by F/m - μ g, and then slowed down by μ g;
+a box that F cannot move stays. The plot has the worlds, and that law.
 """
 
 from __future__ import annotations

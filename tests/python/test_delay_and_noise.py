@@ -266,3 +266,36 @@ def rotation_vector(before: NDArray[np.float64], after: NDArray[np.float64]) -> 
     )
     sine = np.linalg.norm(vector, axis=-1, keepdims=True)
     return vector * 2 * np.arcsin(sine) / sine
+
+
+def test_a_reset_draws_delays_and_noises_from_their_ranges(urdf: Path):
+    scene = pendulum(urdf, SUBSTEPS)
+    scene.add_site(body="p/lower", name="tip")
+    scene.randomize(
+        params={
+            "command_delay": tl.Uniform(2, 16),
+            "joint_friction": {"p/elbow": tl.Uniform(0.1, 0.2)},
+            "site_q_noise": {"tip": tl.Uniform(0.5, 0.6), "tip.angular": tl.Uniform(0.01, 0.02)},
+        }
+    )
+    with tl.launch(scene, worlds=2000, params=("joint_q_noise",)) as sim:
+        assert set(sim.params.names) == {"command_delay", "joint_friction", "site_q_noise", "joint_q_noise"}
+        delay = sim.params.command_delay
+        assert delay.min() >= 2 and delay.max() <= 16 and abs(delay.mean() - 9) < 0.5
+        friction, noise = sim.params.joint_friction, sim.params.site_q_noise
+        assert not friction[:, 0].any() and friction[:, 1].min() >= 0.1 and friction[:, 1].max() <= 0.2
+        assert noise[:, 0, 0].min() >= 0.5 and noise[:, 0, 1].max() <= 0.02
+        sim.reset(mask=np.arange(2000) < 1000)
+        again = sim.params.command_delay
+        assert (again[:1000] != delay[:1000]).all() and (again[1000:] == delay[1000:]).all()
+    for ranges, message in [
+        ({"command_delay": tl.Uniform(2, 17)}, r"randomize: command_delay: high is 17; give at most 16"),
+        ({"command_delay": {"p": tl.Uniform(2, 3)}}, r"command_delay.*it is one number"),
+        ({"joint_friction": {"p": tl.Uniform(-1, 3)}}, r"joint_friction of `p`: low is -1; give at least 0"),
+        ({"gyro_noise": {"top": tl.Uniform(0, 1)}}, r"gyro_noise of `top`.*`tip`"),
+    ]:
+        wrong = pendulum(urdf, SUBSTEPS)
+        wrong.add_site(body="p/lower", name="tip")
+        wrong.randomize(params=ranges)
+        with pytest.raises(tl.TightloopError, match=message):
+            tl.launch(wrong, worlds=1).close()

@@ -77,8 +77,8 @@ class Frame:
     joint_qd_measured: NDArray[Any]
     """Joint velocities with the noise of ``params.joint_qd_noise`` [rad/s or m/s], ``(worlds, dofs)``."""
     joint_torque: NDArray[Any]
-    """What ``joint_f`` and the drive, clamped by its effort limit, give [N·m or N], ``(worlds, dofs)``. Damping, friction
-    and contacts are not in it."""
+    """What ``joint_f`` and the drive, clamped by its effort limit, give [N·m or N], ``(worlds, dofs)``. Damping,
+    friction and contacts are not in it."""
     site_q: NDArray[Any]
     """Sites: position [m], then quaternion (x, y, z, w), in the world or the frame that a site is relative to,
     ``(worlds, sites, 7)``."""
