@@ -14,8 +14,8 @@ use crate::{ALIGNMENT, Description, ProtocolError, Row, Table};
 
 /// Recorders that one daemon serves at once.
 pub(super) const RECORDERS_MAX: usize = 4;
-/// A recorder that was granted a journal and did not open it within this time is gone.
-const JOIN_MAX: Duration = Duration::from_secs(2);
+/// A recorder that was granted a journal and did not join within this time, in which it takes the memory, is gone.
+const JOIN_MAX: Duration = Duration::from_secs(10);
 /// Shared memory of one journal, if entries are small enough [bytes].
 const JOURNAL: usize = 32 << 20;
 /// Fewest and most entries that wait for a recorder.
