@@ -14,8 +14,9 @@ use crate::link::{Link, S, malformed};
 use crate::transport::{self, JournalSubscriber, SLICE};
 use crate::{ALIGNMENT, Description, Line, ProtocolError, RefusalKind};
 
-/// Entries are looked for this often while none comes: the daemon wakes nobody for them.
-const NAP: Duration = Duration::from_millis(1);
+/// Entries are looked for this often while none comes: the daemon wakes nobody for them, and a thread that wakes often takes
+/// a core from its step.
+const NAP: Duration = Duration::from_millis(5);
 
 /// Head of an entry of a journal.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq, ZeroCopySend)]
