@@ -4,11 +4,11 @@
 
 The target demo of the lesson, each world with targets of its own, through `tightloop.launch`. First 60 frames a second,
 in turns with and without `tightloop record`: what the daemon's process takes more of the processor for a frame, as
-Linux counts it, is what recording costs the simulation; other programs do not count there. Beside it the time of a step as
-the caller sees it, to which they do, and what the recorder takes for a frame. Then as fast as it goes, in 4096 and in 64
-worlds: frames that were lost are counted from what the recorder says. The last recording of each kind is replayed,
-unless it has a gap. Writes benches/results/MACHINE/recording.csv with the load of the machine, and ends with 1 when
-recording costs more than the 3 % asked or a replay is not equal.
+Linux counts it, is what recording costs the simulation; other programs do not count there. Beside it the time of a step
+as the caller sees it, to which they do, and what the recorder takes for a frame. Then as fast as it goes, in 4096 and
+in 64 worlds: frames that were lost are counted from what the recorder says. The last recording of each kind is
+replayed, unless it has a gap. Writes benches/results/MACHINE/recording.csv with the load of the machine, and ends with
+1 when recording costs more than the 3 % asked or a replay is not equal.
 """
 
 from __future__ import annotations

@@ -70,6 +70,8 @@ pub enum Response {
     Journal {
         /// Its number.
         journal: u64,
+        /// The port that sends, as its higher and lower half. Its memory is the recorder's to take: that takes a while.
+        port: [u64; 2],
     },
     /// Answer to [`Request::Heartbeat`] and [`Request::Release`]: whether that lease is the present one.
     Lease {

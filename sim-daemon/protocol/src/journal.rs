@@ -9,12 +9,14 @@ use iceoryx2::sample::Sample;
 
 use crate::client::Hook;
 use crate::control::{Request, Response};
+use crate::host::memory::reserve;
 use crate::link::{Link, S, malformed};
 use crate::transport::{self, JournalSubscriber, SLICE};
 use crate::{ALIGNMENT, Description, Line, ProtocolError, RefusalKind};
 
-/// Entries are looked for this often while none comes: the daemon wakes nobody for them.
-const NAP: Duration = Duration::from_millis(1);
+/// Entries are looked for this often while none comes: the daemon wakes nobody for them, and a thread that wakes often takes
+/// a core from its step.
+const NAP: Duration = Duration::from_millis(5);
 
 /// Head of an entry of a journal.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq, ZeroCopySend)]
@@ -147,8 +149,10 @@ impl Journal {
             };
             observed |= 1 << row;
         }
-        let journal = match link.ask(&Request::Journal { observed }, hook)? {
-            Response::Journal { journal } => journal,
+        let (journal, port) = match link.ask(&Request::Journal { observed }, hook)? {
+            Response::Journal { journal, port } => {
+                (journal, u128::from(port[0]) << 64 | u128::from(port[1]))
+            }
             Response::NoMemory { free, needed } => {
                 return Err(ProtocolError::SharedMemory {
                     path: crate::place::SHARED_MEMORY.to_owned(),
@@ -164,6 +168,8 @@ impl Journal {
             _ => return Err(malformed("the answer to journal")),
         };
         let subscriber = link.with_node(|node| {
+            let prefix = node.config().global.prefix.to_string();
+            reserve(&prefix, port, "the journal of a recorder")?;
             transport::journal_subscriber(&transport::open_journal(node, journal)?)
         });
         let subscriber = match subscriber {

@@ -14,8 +14,8 @@ use crate::{ALIGNMENT, Description, ProtocolError, Row, Table};
 
 /// Recorders that one daemon serves at once.
 pub(super) const RECORDERS_MAX: usize = 4;
-/// A recorder that was granted a journal and did not open it within this time is gone.
-const JOIN_MAX: Duration = Duration::from_secs(2);
+/// A recorder that was granted a journal and did not join within this time, in which it takes the memory, is gone.
+const JOIN_MAX: Duration = Duration::from_secs(10);
 /// Shared memory of one journal, if entries are small enough [bytes].
 const JOURNAL: usize = 32 << 20;
 /// Fewest and most entries that wait for a recorder.
@@ -72,20 +72,20 @@ impl Journals {
         self.open.len() >= RECORDERS_MAX
     }
 
-    /// Opens the next journal and takes its memory; returns its number.
+    /// Opens the next journal; returns its number and the port that sends, whose memory the recorder takes before it
+    /// joins: 33 MB are 20 ms, which the worlds would wait.
     pub(super) fn open(
         &mut self,
         node: &Node<S>,
         description: &Description,
         frame: &Table,
         observed: u64,
-    ) -> Result<u64, ProtocolError> {
+    ) -> Result<(u64, u128), ProtocolError> {
         let (slot_bytes, depth) = Journals::size(description, frame, observed);
         self.opened += 1;
         let service = transport::create_journal(node, self.opened, depth)?;
         let publisher = transport::journal_publisher(&service, slot_bytes)?;
-        let prefix = node.config().global.prefix.to_string();
-        memory::reserve(&prefix, publisher.id().value(), "the journal of a recorder")?;
+        let port = publisher.id().value();
         self.open.push(Journal {
             service,
             publisher,
@@ -96,7 +96,7 @@ impl Journals {
             begun: false,
             entries: 0,
         });
-        Ok(self.opened)
+        Ok((self.opened, port))
     }
 
     /// Meets new recorders and forgets those that went. Returns whether one waits for the state to begin with.

@@ -126,7 +126,10 @@ impl State {
         }
         let (node, description) = (&self.node, &self.description);
         match self.journals.open(node, description, &self.frame, observed) {
-            Ok(journal) => Response::Journal { journal },
+            Ok((journal, port)) => Response::Journal {
+                journal,
+                port: [(port >> 64) as u64, port as u64],
+            },
             Err(error) => refused(error.to_string()),
         }
     }
