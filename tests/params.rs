@@ -122,8 +122,9 @@ fn written_parameters_equal_constants_bit_for_bit() {
 fn parameters_at_their_start_change_nothing() {
     let constant = arm([]).compile().unwrap();
     let all = Param::ALL.into_iter();
-    // of a body of several links, masses that vary are added up in another order
-    let exact: Vec<Param> = all.filter(|p| *p != Param::BodyMassScale).collect();
+    // of a body of several links, masses that vary are added up in another order; friction that may be is a row to solve
+    let others = [Param::BodyMassScale, Param::JointFriction];
+    let exact: Vec<Param> = all.filter(|p| !others.contains(p)).collect();
     let model = arm(exact).compile().unwrap();
     assert_ne!(constant.hash(), model.hash(), "what varies is part of it");
     for precision in [Precision::F64, Precision::F32] {
@@ -134,8 +135,8 @@ fn parameters_at_their_start_change_nothing() {
         });
         assert_eq!(runs[0], runs[1], "{precision:?}");
     }
-    let scaled = arm([Param::BodyMassScale]).compile().unwrap();
-    let [fixed, run] = [&constant, &scaled].map(|model| {
+    let near = arm(others).compile().unwrap();
+    let [fixed, run] = [&constant, &near].map(|model| {
         let mut run = Run::reference(model, &FIELDS);
         play(&mut run, 0..40);
         run
@@ -273,8 +274,11 @@ fn a_masked_write_leaves_the_other_worlds_as_they_were() {
     play(&mut untouched, 0..6);
     play(&mut run, 0..3);
     for param in Param::ALL {
-        let mut numbers = own(&model, param, &(0..20).collect::<Vec<_>>());
         let columns = param.columns(&model);
+        if columns == 0 {
+            continue;
+        }
+        let mut numbers = own(&model, param, &(0..20).collect::<Vec<_>>());
         // rows outside the mask are not looked at
         for world in (0..20).filter(|&world| !mask[world]) {
             numbers[world * columns] = f64::NAN;

@@ -212,11 +212,11 @@ fn names_that_nothing_has_are_refused() {
     for (message, parts) in [
         (
             refusal(|s| s.sites[0].body = Some("cup".to_owned())),
-            ["site `camera`", "`cup`", "`cube`"],
+            ["site `camera`", "`cup`", "`arm/base`"],
         ),
         (
             refusal(|s| s.sites[1].relative_to = Some("cup".to_owned())),
-            ["site `tip`", "`cup`", "`cube`"],
+            ["site `tip`", "`cup`", "`arm/base`"],
         ),
         (
             refusal(|s| s.sites[1].name = "camera".to_owned()),

@@ -4,8 +4,8 @@ use super::dice::Dice;
 use super::shapes::every_kind;
 use sim_core::model::params::Param;
 use sim_core::model::{
-    Body, Collision, Cone, Description, Distribution, Inertial, Joint, JointDof, JointKind, Link,
-    Mimic, Pose, Robot, Solver, Surface, TargetMode,
+    Body, Collision, Cone, ContactSensor, Description, Distribution, Inertial, Joint, JointDof,
+    JointKind, Link, Mimic, Pose, Robot, Site, Solver, Surface, TargetMode,
 };
 
 /// Kinds of joints, the usual ones more often.
@@ -57,6 +57,7 @@ pub fn any_scene(dice: &mut Dice, is_drawn: bool) -> Description {
     if names.len() > 1 && dice.chance(0.2) {
         scene.filters.push([dice.pick(&names), dice.pick(&names)]);
     }
+    add_sensors(dice, &mut scene, &names);
     let share = dice.pick(&[0.0, 0.4, 1.0]);
     let varies = |_: &Param| dice.chance(share);
     scene.params.extend(Param::ALL.into_iter().filter(varies));
@@ -64,6 +65,36 @@ pub fn any_scene(dice: &mut Dice, is_drawn: bool) -> Description {
         draw_starts(dice, &mut scene);
     }
     scene
+}
+
+/// Sites in the world and on links, some measured from the one before; sums of contact forces.
+fn add_sensors(dice: &mut Dice, scene: &mut Description, shapes: &[String]) {
+    let links = scene.robots.iter().flat_map(|robot| {
+        let is_body = robot.links.len() == 1 && robot.links[0].name == "body";
+        let name = move |link: &Link| match is_body {
+            true => robot.name.clone(),
+            false => format!("{}/{}", robot.name, link.name),
+        };
+        robot.links.iter().map(name)
+    });
+    let links: Vec<String> = links.collect();
+    for k in 0..dice.below(4) {
+        let is_borne = !links.is_empty() && dice.chance(0.8);
+        let site = Site {
+            name: format!("s{k}"),
+            body: is_borne.then(|| dice.pick(&links)),
+            pose: any_pose(dice, 0.3),
+            relative_to: (k > 0 && dice.chance(0.5)).then(|| format!("s{}", k - 1)),
+        };
+        scene.sites.push(site);
+    }
+    if !shapes.is_empty() && dice.chance(0.5) {
+        scene.contact_sensors.push(ContactSensor {
+            name: "sum".to_owned(),
+            of: dice.pick(shapes),
+            against: dice.chance(0.3).then(|| dice.pick(shapes)),
+        });
+    }
 }
 
 fn any_pose(dice: &mut Dice, size: f64) -> Pose {

@@ -284,6 +284,8 @@ impl<F: Lane> Chunk<F> {
                     if substeps > 0 {
                         self.note(job, block, state.clone());
                         self.age_commands(job, block, state.clone());
+                        // what is evaluated is a function of the state: the noise of the next frame is not drawn yet
+                        self.block.command_noise.fill(F::c(0.0));
                     }
                     // before the evaluation, which moves the warm start: what is read must not change the run
                     self.store(shape, state.clone());
@@ -326,7 +328,10 @@ impl<F: Lane> Chunk<F> {
                         }
                         _ => transfer::export(self, &job.constants, slot, rows.clone(), arena),
                     }
-                    self.add_noise(job, slot, rows, arena);
+                    if let Some(noise) = job.noise.of(slot.field) {
+                        let numbers = arena.rows(slot, &rows);
+                        self.add_noise(job, noise, rows, numbers);
+                    }
                 }
             }
             // now that its trouble was shown, and before the commands of its first step come

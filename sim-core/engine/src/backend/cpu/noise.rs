@@ -5,9 +5,8 @@
 
 use super::chunk::{Chunk, Job};
 use super::state::{Shape, StateField};
-use super::transfer::Arena;
 use crate::random::{Draw, Stream};
-use sim_core::batch::{Dtype, Field, Slot};
+use sim_core::batch::Field;
 use sim_core::lane::{Lane, Real};
 use sim_core::math::quat::{self, Quat};
 use sim_core::model::Model;
@@ -15,12 +14,14 @@ use sim_core::model::constants::Motion;
 use sim_core::model::params::{COMMAND_NOISES, Param};
 use std::ops::Range;
 
+/// A field that has noise, its stream, and the place of its first standard deviation.
+pub(super) type FieldNoise = (Field, Stream, usize);
+
 /// Where the standard deviations are among the parameters of a world.
 pub(super) struct Noise {
     /// Of each command: its stream, and the place of that of its first dof.
     commands: [(Stream, Option<usize>); 3],
-    /// Of each field that has noise.
-    fields: Vec<(Field, Stream, usize)>,
+    fields: Vec<FieldNoise>,
     /// Joints, by their first dof and coordinate.
     joints: Vec<(Motion, usize, usize)>,
 }
@@ -79,6 +80,13 @@ impl Noise {
     }
 }
 
+impl Noise {
+    /// The noise of a field, if it has some.
+    pub fn of(&self, field: Field) -> Option<&FieldNoise> {
+        self.fields.iter().find(|(noisy, ..)| *noisy == field)
+    }
+}
+
 impl<F: Lane> Chunk<F> {
     /// Draws what is added to the commands of the frame.
     pub(super) fn draw_command_noise(&mut self, job: &Job<F>, block: usize) {
@@ -99,29 +107,19 @@ impl<F: Lane> Chunk<F> {
         }
     }
 
-    /// Adds noise to a field that has some, in the worlds of `rows`.
-    ///
-    /// # Safety
-    /// As [`Arena::rows`].
-    pub(super) unsafe fn add_noise(
+    /// Adds noise to a field, as the table has it: `numbers` are those of the worlds of `rows`.
+    pub(super) fn add_noise(
         &self,
         job: &Job<F>,
-        slot: &Slot,
+        &(field, stream, first): &FieldNoise,
         rows: Range<usize>,
-        arena: Arena,
+        numbers: &mut [F::Real],
     ) {
-        let noises = &job.noise.fields;
-        let Some(&(field, stream, first)) = noises.iter().find(|(f, ..)| *f == slot.field) else {
-            return;
-        };
-        let columns: usize = slot.shape[1..].iter().product();
+        let columns = numbers.len() / rows.len().max(1);
         if columns == 0 {
             return;
         }
-        debug_assert!(matches!(slot.dtype, Dtype::F32 | Dtype::F64));
         let shape = Shape::of(&job.constants);
-        // SAFETY: by contract.
-        let numbers = unsafe { arena.rows::<F::Real>(slot, &rows) };
         for (outside, row) in rows.zip(numbers.chunks_exact_mut(columns)) {
             let world = outside - self.worlds.start;
             let draw = self.draw(world, stream);
