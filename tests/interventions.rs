@@ -6,7 +6,7 @@ mod common;
 
 use common::Run;
 use common::any_program::{Scope, any_program, with_interventions};
-use common::any_scene::any_scene;
+use common::any_scene::{any_scene, is_noise};
 use common::dice::{Dice, for_seeds};
 use common::program::{Kept, Op, Played, play, play_on};
 use sim_core::batch::{Field, status};
@@ -25,6 +25,7 @@ struct Case {
     dice: Dice,
     model: Arc<Model>,
     options: Options,
+    /// Do starts or noise depend on the number of a world?
     is_drawn: bool,
 }
 
@@ -50,11 +51,12 @@ impl Case {
             fields: Field::ALL.to_vec(),
             faults,
         };
+        let is_noisy = model.constants().varying.params().any(is_noise);
         Ok(Case {
             dice,
             model,
             options,
-            is_drawn,
+            is_drawn: is_drawn || is_noisy,
         })
     }
 
@@ -165,7 +167,7 @@ fn many_worlds_equal_runs_of_one_or_some_of_them_in_any_order() {
         let ops = case.program(8);
         let all = play(&case.model, &case.options, &ops)?;
         let worlds = case.options.worlds;
-        // a world starts where its number says, so that only the last ones can be left out
+        // a world starts where its number says, and so does its noise, so that only the last ones can be left out
         let last = case.dice.below(worlds);
         let mut turned: Vec<usize> = (0..worlds).collect();
         turned.rotate_left(last);

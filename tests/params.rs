@@ -213,6 +213,9 @@ fn own(model: &Model, param: Param, seeds: &[usize]) -> Vec<f64> {
             let share = ((seed * 31 + k * 7 + param as usize * 5) % 37) as f64 / 37.0;
             numbers.push(match param {
                 Param::BodyF => 4.0 * (share - 0.5),
+                Param::CommandDelay => (30.0 * share).floor(),
+                Param::JointFriction => share,
+                Param::JointFNoise | Param::JointTargetQNoise | Param::JointTargetQdNoise => 0.0,
                 Param::JointEffortLimit if *start == NO_LIMIT => 60.0 + 20.0 * share,
                 _ => start * (0.8 + 0.5 * share),
             });

@@ -59,12 +59,18 @@ pub fn any_scene(dice: &mut Dice, is_drawn: bool) -> Description {
     }
     add_sensors(dice, &mut scene, &names);
     let share = dice.pick(&[0.0, 0.4, 1.0]);
-    let varies = |_: &Param| dice.chance(share);
+    let has_noise = dice.chance(0.3);
+    let varies = |param: &Param| dice.chance(share) && (has_noise || !is_noise(*param));
     scene.params.extend(Param::ALL.into_iter().filter(varies));
     if is_drawn {
         draw_starts(dice, &mut scene);
     }
     scene
+}
+
+/// Is it the size of what is drawn for each frame?
+pub fn is_noise(param: Param) -> bool {
+    param.row().name.ends_with("_noise")
 }
 
 /// Sites in the world and on links, some measured from the one before; sums of contact forces.
