@@ -76,7 +76,7 @@ impl Rows {
         let mask: Vec<bool> = self.rows.iter().map(Option::is_some).collect();
         let numbers = rows.flatten().copied();
         // a run of f32 takes both
-        let is_single = precision == Precision::F32 && self.columns.len() % 2 == 0;
+        let is_single = precision == Precision::F32 && self.columns.len().is_multiple_of(2);
         let numbers = match is_single {
             true => Numbers::F32(numbers.map(|x| x as f32).collect()),
             false => Numbers::F64(numbers.collect()),

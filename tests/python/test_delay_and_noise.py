@@ -16,8 +16,8 @@ FRAMES = 12
 PRECISIONS = pytest.mark.parametrize("precision", ["f64", "f32"])
 
 
-def pendulum(path: Path, substeps: int, **options: object) -> tl.Scene:
-    scene = tl.Scene(dt=1 / 400, substeps=substeps, **options)
+def pendulum(path: Path, substeps: int, command_delay_max: int | None = None) -> tl.Scene:
+    scene = tl.Scene(dt=1 / 400, substeps=substeps, command_delay_max=command_delay_max)
     scene.add_urdf(path, name="p")
     scene.robots["p"].joint_target_ke = [20.0, 10.0]
     scene.robots["p"].joint_target_kd = [1.0, 0.5]
@@ -56,7 +56,8 @@ def test_a_command_acts_after_its_delay_to_the_substep(urdf: Path, precision: st
                     name: np.array([values[due[w], w] if due[w] >= 0 else start[name] for w in range(worlds)])
                     for name, values in sent.items()
                 }
-                frame = sim.step(**now)
+                sim.step(**now)
+            frame = sim.forward()
             assert np.array_equal(frame.joint_q, frames[n].joint_q), n
             assert np.array_equal(frame.joint_qd, frames[n].joint_qd), n
 
@@ -131,11 +132,11 @@ def slider(tmp_path: Path) -> tl.Scene:
     return scene
 
 
-def forces_felt(sim: tl.Sim, frames: int, **held: object) -> NDArray[np.float64]:
+def forces_felt(sim: tl.Sim, frames: int, joint_f: list[float] | None = None) -> NDArray[np.float64]:
     """Mean force on each slider in each frame, ``(frames, worlds, dofs)``."""
     before, felt = sim.forward().joint_qd.astype(float), []
     for _ in range(frames):
-        after = sim.step(**held).joint_qd.astype(float)
+        after = sim.step(joint_f=joint_f).joint_qd.astype(float)
         felt.append((after - before) / (sim.substeps * sim.dt))
         before = after
     return np.array(felt)
