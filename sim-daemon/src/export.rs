@@ -145,6 +145,7 @@ pub(crate) fn description(
         } else {
             "freeze".to_owned()
         },
+        state_bytes: 0,
         schema: 0,
     }
 }

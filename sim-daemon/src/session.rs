@@ -110,6 +110,7 @@ fn open(serve: &Serve, stop: &Arc<AtomicBool>) -> Result<(Simulation, Host), Dae
     check_memory(&told, &table, Simulation::memory_of(&model, &options))?;
     let simulation = Simulation::new(model, &options)?;
     (told.device, told.threads) = (simulation.device().to_owned(), simulation.threads());
+    told.state_bytes = simulation.snapshot_bytes() as u64;
     let host = Host::open(tenancy, told, table, Arc::clone(stop))?;
     Ok((simulation, host))
 }

@@ -92,6 +92,29 @@ def test_everything_is_replayed_with_the_same_bits(pendulum, tmp_path, precision
     assert replay(out, "--threads", "1", "--frames", "5")[1].count(" 5 frames of 21 worlds are equal") == 1
 
 
+@pytest.mark.parametrize("worlds", [1, 300])
+def test_states_much_larger_than_commands_are_recorded(pendulum, tmp_path, worlds):
+    # with 700 frames of commands on their way; noise, delays and sensors are replayed too
+    pendulum.command_delay_max = 700 * pendulum.substeps
+    pendulum.add_site(body="arm/lower")
+    pendulum.randomize(params={"command_delay": tl.Uniform(0, 700 * pendulum.substeps)})
+    out = tmp_path / "run.tlrec"
+    params, fields = ("joint_f_noise", "gyro_noise"), ("joint_q", "site_q", "gyro", "accelerometer")
+    with tl.launch(pendulum, worlds=worlds, params=params, fields=fields) as sim:
+        sim.params.write(joint_f_noise=0.3, gyro_noise=0.1)
+        rng = np.random.default_rng(3)
+        recorder = Recorder(sim, out, "--frames", "100")
+        kept = sim.snapshot()
+        for frame in range(100):
+            sim.step(joint_f=rng.normal(size=(worlds, 2)))
+            if frame == 50:
+                sim.restore(kept)
+        said = recorder.finish()
+    assert "no gaps" in said, said
+    code, said = replay(out)
+    assert code == 0 and "100 frames" in said, said
+
+
 def test_ctrl_c_ends_a_recording_and_another_may_take_its_place_when_forced(pendulum, tmp_path):
     out = tmp_path / "run.tlrec"
     with tl.launch(pendulum, worlds=WORLDS) as sim:

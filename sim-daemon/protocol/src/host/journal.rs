@@ -20,8 +20,8 @@ const JOIN_MAX: Duration = Duration::from_secs(10);
 const JOURNAL: usize = 32 << 20;
 /// Fewest and most entries that wait for a recorder.
 const DEPTH: std::ops::RangeInclusive<usize> = 16..=1024;
-/// A state takes up to so many of them: of a dof it has five numbers more than the commands have.
-const STATE_ENTRIES: usize = 5;
+/// Entries that wait for a recorder besides the state of all worlds, whose pieces come at once.
+const BESIDE_STATE: usize = 8;
 
 /// The journals of a daemon.
 #[derive(Debug, Default)]
@@ -58,14 +58,16 @@ impl Journals {
         let digests = (digests_of(frame) * size_of::<u32>()).next_multiple_of(ALIGNMENT);
         let observed: usize = rows(frame, observed).map(padded).sum();
         let slot = crate::command::command_bytes(description) + digests + observed;
-        (slot, (JOURNAL / slot).clamp(*DEPTH.start(), *DEPTH.end()))
+        let pieces = (description.state_bytes as usize).div_ceil(slot);
+        let depth = (JOURNAL / slot).clamp(*DEPTH.start(), *DEPTH.end());
+        (slot, depth.max(pieces + BESIDE_STATE))
     }
 
     /// Shared memory that a journal takes, and memory of our own for a state [bytes].
     pub(super) fn bytes(description: &Description, frame: &Table, observed: u64) -> (usize, u64) {
         let (slot, depth) = Journals::size(description, frame, observed);
         let shared = memory::journal_bytes(slot, journal_slots(depth));
-        (shared, (STATE_ENTRIES * slot) as u64)
+        (shared, description.state_bytes)
     }
 
     pub(super) fn are_full(&self) -> bool {
