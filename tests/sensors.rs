@@ -203,6 +203,30 @@ fn single_precision_shows_what_double_does_to_its_rounding() {
 }
 
 #[test]
+fn a_scene_in_which_nothing_moves_takes_delays_and_noise_too() {
+    let mut scene = Description::new(0.01, 2);
+    scene.add_ground("ground", 0.0);
+    scene.params.extend(Param::ALL);
+    scene.sites.push(Site {
+        name: "camera".to_owned(),
+        body: None,
+        pose: Pose::at([1.0, 2.0, 3.0]),
+        relative_to: None,
+    });
+    let model = scene.compile().unwrap();
+    for precision in [Precision::F32, Precision::F64] {
+        let mut run = Run::new(&model, options(precision, Lanes::Auto, 1));
+        vary(&mut run);
+        run.step();
+        assert_eq!(
+            run.get(Field::SiteQ, 0),
+            [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]
+        );
+        assert_eq!(run.get(Field::Accelerometer, 0)[2].round(), 10.0);
+    }
+}
+
+#[test]
 fn names_that_nothing_has_are_refused() {
     let refusal = |change: fn(&mut Description)| {
         let mut scene = scene();

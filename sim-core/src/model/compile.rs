@@ -117,7 +117,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         let numbers = param.starts(&constants, &surfaces, sensors.len());
         constants.varying.add(param, numbers);
     }
-    if scene.params.contains(&Param::CommandDelay) {
+    if scene.params.contains(&Param::CommandDelay) && !constants.dofs.is_empty() {
         constants.delay = Delay {
             frames: scene.delay_max().div_ceil(scene.substeps),
             substeps: scene.substeps,

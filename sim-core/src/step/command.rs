@@ -23,7 +23,8 @@ pub(super) fn arrive<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) 
     applied[..n].copy_from_slice(&b.joint_f);
     applied[n..2 * n].copy_from_slice(&b.joint_target_q);
     applied[2 * n..].copy_from_slice(&b.joint_target_qd);
-    if let Some(delay) = m.varying.first(Param::CommandDelay) {
+    let delay = m.varying.first(Param::CommandDelay);
+    if let Some(delay) = delay.filter(|_| m.delay.frames > 0) {
         let substep = cx.get(&b.substep[0]);
         let late = b.params[delay] - substep;
         for (age, sent) in b.command_history.chunks_exact(3 * n).enumerate() {
