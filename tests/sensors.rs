@@ -204,7 +204,7 @@ fn single_precision_shows_what_double_does_to_its_rounding() {
 
 #[test]
 fn a_scene_in_which_nothing_moves_takes_delays_and_noise_too() {
-    let mut scene = Description::new(0.01, 2);
+    let mut scene = Description::new(0.01, 8);
     scene.add_ground("ground", 0.0);
     scene.params.extend(Param::ALL);
     scene.sites.push(Site {
