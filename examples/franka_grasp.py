@@ -3,9 +3,10 @@
     python examples/franka_grasp.py --worlds 4096
 
 The arm follows recorded targets, the same in every world. What differs is the cube: where it stands, by a few
-millimetres, how it is turned, and its friction. Each coefficient is a launch of its own with its share of the worlds;
-the smallest is too slippery to be lifted. World 0 of each has the cube where the record has it, and that with the
-lesson's friction is compared with the recorded run (MuJoCo C in float64), where there is one.
+millimetres, how it is turned, and how everything rubs. It is one launch, in which each coefficient of friction has its
+share of the worlds; the smallest is too slippery to be lifted. The first world of each share has the cube where the
+record has it, and that with the lesson's friction is compared with the recorded run (MuJoCo C in float64), if there is
+one.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ RECORD = REFERENCE / "mujoco_grasp.csv"
 FINGER = "arm/fr3_leftfinger"
 
 
-def scene(*, mu: float = 1.0, urdf: Path = URDF) -> tl.Scene:
-    """The arm, a table and a cube on it, all of one friction: of two that touch the larger counts."""
-    scene = arm_on_its_stand(driven=True, urdf=urdf, mu=mu)
-    scene.add_table(mu=mu)
-    scene.add_cube(mu=mu)
+def scene(*, urdf: Path = URDF) -> tl.Scene:
+    """The arm, a table and a cube on it, all of friction 1: of two that touch the larger counts."""
+    scene = arm_on_its_stand(driven=True, urdf=urdf)
+    scene.add_table()
+    scene.add_cube()
     return scene
 
 
@@ -59,15 +60,13 @@ def cubes(worlds: int, seed: int = 0) -> NDArray[np.float64]:
 
 @dataclass
 class Run:
-    """What a launch measured. Heights and forces are of frames 0 (the start) to 180."""
+    """What was measured of the worlds of a friction. Heights and forces are of frames 0 (the start) to 180."""
 
     mu: float
     height: NDArray[np.float64]  # of the cube's centre, (frames + 1, worlds) [m]
     grip: NDArray[np.float64]  # contact force on a finger, (frames + 1, worlds) [N]
-    first: NDArray[np.float64]  # joint_q of world 0, (frames + 1, 16) [rad or m]
+    first: NDArray[np.float64]  # joint_q of the first world, (frames + 1, 16) [rad or m]
     status: NDArray[np.uint32]  # every bit that was ever set, (worlds,)
-    seconds: float
-    substeps: int
 
     @property
     def lifted(self) -> NDArray[np.bool_]:
@@ -75,13 +74,12 @@ class Run:
         return self.height[-1] > LIFTED
 
     def print(self) -> None:
-        """Say how many worlds lifted the cube, how fast that was, and what the worlds complained of."""
+        """Say how many worlds lifted the cube, and what the worlds complained of."""
         worlds = len(self.lifted)
         bits = {1: "not finite", 4: "contacts left out", 2: "solver out of iterations"}
         trouble = ", ".join(f"{what} in {(self.status & bit > 0).sum()}" for bit, what in bits.items())
         rows = {
             "lifted": f"{self.lifted.sum()} of {worlds} worlds",
-            "physics steps/s": f"{worlds * self.substeps * FRAMES / self.seconds:,.0f}",
             "status": f"{trouble} of {worlds} worlds",
         }
         print(f"\nfriction {self.mu:g}")
@@ -89,33 +87,46 @@ class Run:
             print(f"  {what:<24}{value}")
 
 
-def run(mu: float, goals: NDArray[np.float32], *, worlds: int, precision: str, threads: int | None) -> Run:
-    """Launch the scene with one friction, and grasp."""
-    fields = ("joint_q", "body_contact_force")
-    with tl.launch(scene(mu=mu), worlds=worlds, precision=precision, threads=threads, fields=fields) as sim:
+def run(
+    mus: list[float], goals: NDArray[np.float32], *, share: int, precision: str, threads: int | None
+) -> tuple[list[Run], float]:
+    """Grasp with every friction in so many worlds each; also how many physics steps a second all worlds made."""
+    fields, worlds = ("joint_q", "body_contact_force"), share * len(mus)
+    with tl.launch(
+        scene(), worlds=worlds, precision=precision, threads=threads, fields=fields, params=("shape_mu",)
+    ) as sim:
         cube, finger = sim.coords["cube"], sim.body_names.index(FINGER)
-        frame = sim.reset()
-        if sim.worlds > 1:
-            # world 0 keeps the scene's start to the last bit
-            frame = sim.write(joint_q={"cube": cubes(sim.worlds)}, mask=np.arange(sim.worlds) > 0)
-        height, grip, first, seconds = [], [], [], 0.0
-        status = np.zeros(sim.worlds, np.uint32)
+        sim.params.shape_mu = np.repeat(mus, share)[:, None] * np.ones(len(sim.shape_names))
+        # the first of each share keeps the scene's start to the last bit
+        others = np.arange(worlds) % share > 0
+        frame = sim.write(joint_q={"cube": np.tile(cubes(share), (len(mus), 1))}, mask=others)
+        height, grip, firsts, seconds = [], [], [], 0.0
+        status = np.zeros(worlds, np.uint32)
 
         def note(frame: tl.Frame) -> None:
             height.append(frame.joint_q[:, cube.start + 2].copy())
             grip.append(np.linalg.norm(frame.body_contact_force[:, finger], axis=1))
-            first.append(frame.joint_q[0].copy())
+            firsts.append(frame.joint_q[::share].copy())
             np.bitwise_or(status, frame.status, out=status)
 
         note(frame)
-        for goal in tqdm(goals, desc=f"friction {mu:g}", unit="frame", disable=None):
+        for goal in tqdm(goals, desc="grasp", unit="frame", disable=None):
             start = time.perf_counter()
             frame = sim.step(joint_target_q={"arm": goal})
             seconds += time.perf_counter() - start
             note(frame)
-        shown = {"height": height, "grip": grip, "first": first}
-        arrays = {name: np.array(values, float) for name, values in shown.items()}
-        return Run(mu=mu, status=status, seconds=seconds, substeps=sim.substeps, **arrays)
+        of_share = [slice(place * share, (place + 1) * share) for place in range(len(mus))]
+        runs = [
+            Run(
+                mu=mu,
+                height=np.array(height, float)[:, own],
+                grip=np.array(grip, float)[:, own],
+                first=np.array(firsts, float)[:, place],
+                status=status[own],
+            )
+            for place, (mu, own) in enumerate(zip(mus, of_share, strict=True))
+        ]
+        return runs, worlds * sim.substeps * len(goals) / seconds
 
 
 def recorded() -> NDArray[np.float64] | None:
@@ -128,10 +139,10 @@ def recorded() -> NDArray[np.float64] | None:
 
 
 def compare(run: Run, record: NDArray[np.float64]) -> None:
-    """Say how far world 0 is from the recorded run, before and after it holds the cube."""
+    """Say how far the first world is from the recorded run, before and after it holds the cube."""
     off = np.abs(run.first - record)
     joints, cube = off[:, :9], off[:, 9:12]
-    print(f"\ndistance from MuJoCo C of world 0, friction {run.mu:g}, the largest of frames")
+    print(f"\ndistance from MuJoCo C of the first world, friction {run.mu:g}, the largest of frames")
     print(f"  {'0 to 90':<24}{joints[:91].max():.1e} rad or m, cube {cube[:91].max():.1e} m")
     print(f"  {f'91 to {FRAMES}':<24}{joints[91:].max():.1e} rad or m, cube {cube[91:].max():.1e} m")
 
@@ -169,12 +180,11 @@ def main() -> None:
     args = parser.parse_args()
 
     share = max(1, args.worlds // len(args.mu))
-    runs = []
-    for mu in args.mu:
-        runs.append(run(mu, targets(), worlds=share, precision=args.precision, threads=args.threads))
-        runs[-1].print()
+    runs, rate = run(args.mu, targets(), share=share, precision=args.precision, threads=args.threads)
+    for alike in runs:
+        alike.print()
     lifted = sum(int(run.lifted.sum()) for run in runs)
-    print(f"\n{lifted} of {share * len(runs)} worlds lifted the cube")
+    print(f"\n{lifted} of {share * len(runs)} worlds lifted the cube, at {rate:,.0f} physics steps a second")
 
     record = recorded()
     for alike in runs:

@@ -37,10 +37,10 @@ START = np.array(
 STIFFNESS = np.array([4500.0, 4500, 3500, 3500, 2000, 2000, 2000, 100, 100])  # [N·m/rad, N/m]
 
 
-def scene(*, driven: bool, urdf: Path = URDF, mu: float | None = None) -> tl.Scene:
+def scene(*, driven: bool, urdf: Path = URDF) -> tl.Scene:
     """The arm on its stand; ``driven`` says whether its drives hold targets or only torques move it."""
     scene = tl.Scene(dt=1 / 480, substeps=8)
-    arm = scene.add_urdf(urdf, name="arm", pos=(-0.5, -0.5, 0.1), mu=mu)
+    arm = scene.add_urdf(urdf, name="arm", pos=(-0.5, -0.5, 0.1))
     arm.joint_q = START
     arm.joint_target_ke = STIFFNESS if driven else 0.0
     arm.joint_target_kd = STIFFNESS / 10 if driven else 0.0
