@@ -42,6 +42,7 @@ impl Case {
             joint_q_max: bound(dice.order(1.0, 100.0)),
             joint_qd_max: bound(dice.order(1.0, 100.0)),
             resets: dice.chance(0.4),
+            freezes_nan: false,
         };
         let options = Options {
             worlds: dice.pick(&[2, 5, 8, 9, 16, 17, 33, 40]),

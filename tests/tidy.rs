@@ -22,6 +22,7 @@ const ORDER: [(&str, &[&str]); 2] = [
             "snapshot",
             "simulation",
             "params",
+            "command",
             "dynamics",
         ],
     ),

@@ -105,6 +105,10 @@ pub(crate) struct Serve {
     #[arg(long, default_value = "freeze")]
     pub(crate) on_fault: String,
 
+    /// What becomes of a command that is NaN or infinite in some world: refuse refuses it for all worlds, freeze freezes that world.
+    #[arg(long, default_value = "refuse")]
+    pub(crate) on_nan: String,
+
     /// Frames that a client may hold at once.
     #[arg(long, default_value_t = 4)]
     pub(crate) frames_held: usize,

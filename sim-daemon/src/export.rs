@@ -145,6 +145,11 @@ pub(crate) fn description(
         } else {
             "freeze".to_owned()
         },
+        on_nan: if options.faults.freezes_nan {
+            "freeze".to_owned()
+        } else {
+            "refuse".to_owned()
+        },
         state_bytes: 0,
         schema: 0,
     }
@@ -258,6 +263,9 @@ pub(crate) fn apply(
             for row in inbox.arrays().filter(|_| !alone) {
                 let (target, columns, values) = input(simulation, inbox, row)?;
                 match (target, inbox.op()) {
+                    (Target::Param(param), Op::Step) => {
+                        simulation.check_load(param, &columns, values)?;
+                    }
                     (Target::Param(param), _) => {
                         simulation.check_param(param, &columns, values, masked)?;
                     }
@@ -272,6 +280,9 @@ pub(crate) fn apply(
             for row in inbox.arrays() {
                 let (target, columns, values) = input(simulation, inbox, row)?;
                 match (target, inbox.op()) {
+                    (Target::Param(param), Op::Step) => {
+                        simulation.load(param, columns, values)?;
+                    }
                     (Target::Param(param), _) => {
                         simulation.write_param(param, columns, values, masked)?;
                     }

@@ -191,6 +191,10 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
         let problem = "unknown; use freeze or reset".to_owned();
         return wrong("on-fault", &serve.on_fault, problem);
     }
+    if !matches!(serve.on_nan.as_str(), "refuse" | "freeze") {
+        let problem = "unknown; use refuse or freeze".to_owned();
+        return wrong("on-nan", &serve.on_nan, problem);
+    }
     for (argument, value) in [
         ("joint-q-max", serve.joint_q_max),
         ("joint-qd-max", serve.joint_qd_max),
@@ -211,6 +215,7 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
             joint_q_max: serve.joint_q_max,
             joint_qd_max: serve.joint_qd_max,
             resets: serve.on_fault == "reset",
+            freezes_nan: serve.on_nan == "freeze",
         },
     })
 }

@@ -45,6 +45,53 @@ def test_one_world_that_blows_up_is_frozen_and_comes_back_by_reset(pendulum, pre
         assert np.array_equal(frame.joint_q[sick], before.joint_q[sick]), "as in its first frame"
 
 
+@pytest.mark.parametrize("precision", ["f32", "f64"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("name", ["joint_f", "joint_target_q", "body_f"])
+def test_a_world_whose_command_is_no_number_is_frozen_where_asked(pendulum, precision, bad, name):
+    worlds, sick = 19, 5
+    well = np.arange(worlds) != sick
+    pendulum.robots["arm"].joint_target_ke = 10.0
+    good = np.full((worlds, 3, 6) if name == "body_f" else (worlds, 2), 0.1)
+    spoilt = good.copy()
+    spoilt[sick, -1] = bad
+    fields = ("joint_q", "joint_qd", "joint_qdd", "body_q")
+    for on_fault in ("freeze", "reset"):
+        with tl.launch(
+            pendulum,
+            worlds=worlds,
+            precision=precision,
+            fields=fields,
+            params=("body_f",),
+            on_nan="freeze",
+            on_fault=on_fault,
+        ) as sim:
+            plain = [sim.step(**{name: good}).copy() for _ in range(2)]
+            sim.reset()
+            sim.step(**{name: good})
+            struck = sim.step(**{name: spoilt}).copy()
+            assert np.array_equal(struck.status, np.where(well, 0, FROZEN))
+            for field in fields:
+                assert np.isfinite(getattr(struck, field)).all(), field
+                assert np.array_equal(getattr(struck, field)[well], getattr(plain[1], field)[well]), field
+            # at its last state, with the command that it had
+            assert struck.step[sick] == 1 and np.array_equal(struck.joint_q[sick], plain[0].joint_q[sick])
+            assert np.array_equal(struck.joint_qdd[sick], plain[0].joint_qdd[sick])
+            after = sim.step(**{name: good}).copy()
+            assert after.status[sick] == (FROZEN if on_fault == "freeze" else 0) and after.step[sick] == 1
+            if on_fault == "freeze":
+                sim.reset(mask=~well)
+                after = sim.step(**{name: good})
+                assert not after.status.any()
+            assert np.array_equal(after.joint_q[sick], plain[0].joint_q[sick]), "as new"
+    with tl.launch(pendulum, worlds=worlds, precision=precision, params=("body_f",)) as sim:
+        with pytest.raises(tl.CommandRefused, match=rf"{name}. is -?(NaN|inf) in world {sick} "):
+            sim.step(**{name: spoilt})
+        assert not sim.forward().status.any()
+    with pytest.raises(tl.ArgumentError, match=r"on-nan.*refuse or freeze"):
+        tl.launch(pendulum, worlds=1, on_nan="ignore")
+
+
 def frozen_lines(log: Path) -> list[str]:
     return [line for line in log.read_text().splitlines() if line.startswith("frozen: ")]
 

@@ -269,6 +269,7 @@ def launch(
     params: Sequence[str] = (),
     bounds: Mapping[str, float] | None = None,
     on_fault: str = "freeze",
+    on_nan: str = "refuse",
     name: str | None = None,
     log: str | os.PathLike[str] | None = None,
     frames_held: int = 4,
@@ -290,6 +291,8 @@ def launch(
             frozen at its state before that frame, with bit 8 of ``status``. None if left out.
         on_fault: What becomes of a frozen world: ``"freeze"`` keeps it until it is reset, ``"reset"`` resets it
             before its next step, so that its ``status`` is seen once.
+        on_nan: What becomes of a command that is NaN or infinite in some world: ``"refuse"`` refuses it for all worlds,
+            ``"freeze"`` freezes that world as one that is no longer finite, and the others go on.
         name: Name of the daemon, for `attach`; a unique one if left out.
         log: File for the daemon's news, such as how many worlds were frozen, at most one line a second; warnings and
             errors go to stderr if left out.
@@ -321,6 +324,7 @@ def launch(
         "frames-held": checks.integer("launch: frames_held", frames_held, error=ArgumentError),
     }
     arguments["on-fault"] = checks.text("launch: on_fault", on_fault, error=ArgumentError)
+    arguments["on-nan"] = checks.text("launch: on_nan", on_nan, error=ArgumentError)
     if bounds is not None and not isinstance(bounds, Mapping):
         raise ArgumentError(f'launch: bounds is {bounds!r}; give a dict, such as {{"joint_qd": 50.0}}')
     for bound, value in (bounds or {}).items():

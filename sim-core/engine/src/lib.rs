@@ -1,11 +1,12 @@
 //! Worlds of a model: a [`simulation::Simulation`] keeps many and steps them on a [`backend`]; [`dynamics::Dynamics`] are
 //! functions of given states.
 //!
-//! Imports run one way: `random ← start ← backend ← snapshot ← simulation ← params ← dynamics`. The physics is the text of
+//! Imports run one way: `random ← start ← backend ← snapshot ← simulation ← params ← command ← dynamics`. The physics is the text of
 //! `sim-core`, which `sim-core/stages` compile for the machine.
 //! `sim-core/stages` compile for the machine.
 
 pub mod backend;
+mod command;
 pub mod dynamics;
 mod params;
 pub mod random;

@@ -49,6 +49,7 @@ pub struct Simulation {
     worlds: usize,
     precision: Precision,
     layout: Layout,
+    freezes_nan: bool,
     backend: Box<dyn Backend>,
 }
 
@@ -86,6 +87,7 @@ impl Simulation {
             worlds,
             precision,
             layout,
+            freezes_nan: options.faults.freezes_nan,
             backend,
         })
     }
@@ -95,6 +97,9 @@ impl Simulation {
     }
     pub(crate) fn backend_mut(&mut self) -> &mut dyn Backend {
         &mut *self.backend
+    }
+    pub(crate) fn freezes_nan(&self) -> bool {
+        self.freezes_nan
     }
     /// The model.
     pub fn model(&self) -> &Arc<Model> {
@@ -152,24 +157,6 @@ impl Simulation {
                     + 28,
             )
             .saturating_add(scratch)
-    }
-
-    /// Sets columns of a command; it holds until it is set again or the world is reset.
-    ///
-    /// `values` is `(worlds, columns)`, world-major.
-    ///
-    /// # Errors
-    /// A field that is no command, columns or length that do not fit, a value that is not finite;
-    /// nothing is written then.
-    pub fn command(
-        &mut self,
-        field: Field,
-        columns: Range<usize>,
-        values: Values<'_>,
-    ) -> Result<(), BackendError> {
-        self.check(field, Group::Command, &columns, values, None)?;
-        self.backend.write(field, columns, values, None);
-        Ok(())
     }
 
     /// Sets columns of the state in the worlds of the mask (none = all), and clears their warm start.
@@ -317,7 +304,8 @@ impl Simulation {
                 .filter(|&world| mask[world])
                 .find_map(|world| values.first_not_finite(row_of(world), self.precision)),
         };
-        if let Some(place) = not_finite {
+        let is_kept_out = self.freezes_nan && group == Group::Command;
+        if let Some(place) = not_finite.filter(|_| !is_kept_out) {
             return Err(BackendError::NotFinite {
                 field: row.name,
                 world: place / columns.len(),

@@ -73,6 +73,8 @@ pub struct Description {
     pub joint_qd_max: Option<f64>,
     /// What becomes of a frozen world: "freeze" or "reset".
     pub on_fault: String,
+    /// What becomes of a command that is NaN or infinite: "refuse" for all worlds, or "freeze" the world.
+    pub on_nan: String,
     /// Size of the state of all worlds, as recorders get it [bytes].
     pub state_bytes: u64,
     /// Hash over the fields, inputs, worlds and dofs; see [`Description::schema_hash`].

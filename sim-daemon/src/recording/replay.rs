@@ -254,6 +254,7 @@ impl Run {
                 joint_q_max: told.joint_q_max.unwrap_or(f64::INFINITY),
                 joint_qd_max: told.joint_qd_max.unwrap_or(f64::INFINITY),
                 resets: told.on_fault == "reset",
+                freezes_nan: told.on_nan == "freeze",
             },
         };
         let simulation =

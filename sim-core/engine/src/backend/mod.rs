@@ -99,6 +99,8 @@ pub struct Faults {
     pub joint_qd_max: f64,
     /// Is it reset before its next step, or frozen until somebody resets it?
     pub resets: bool,
+    /// Is a world frozen whose command is NaN or infinite? Otherwise such a command is refused for all worlds.
+    pub freezes_nan: bool,
 }
 
 impl Default for Faults {
@@ -107,6 +109,7 @@ impl Default for Faults {
             joint_q_max: f64::INFINITY,
             joint_qd_max: f64::INFINITY,
             resets: false,
+            freezes_nan: false,
         }
     }
 }
@@ -119,6 +122,8 @@ pub trait Backend: Send {
     fn threads(&self) -> usize;
     /// When worlds are frozen from now on, and what becomes of them.
     fn set_faults(&mut self, faults: Faults);
+    /// Freezes the worlds that are not marked, at their present state, as no longer finite.
+    fn freeze_others(&mut self, good: &[bool]);
     /// Sets columns of a state or command field in the worlds of the mask (none = all);
     /// a written state clears the warm start of its worlds.
     fn write(

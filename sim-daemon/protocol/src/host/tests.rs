@@ -67,6 +67,7 @@ fn description() -> Description {
         joint_q_max: None,
         joint_qd_max: None,
         on_fault: "freeze".to_owned(),
+        on_nan: "refuse".to_owned(),
         state_bytes: 0,
         schema: 0,
     }

@@ -116,6 +116,12 @@ impl<F: Lane> Backend for Cpu<F> {
         self.job.faults = faults;
     }
 
+    fn freeze_others(&mut self, good: &[bool]) {
+        for chunk in &mut self.chunks {
+            chunk.freeze_others(good);
+        }
+    }
+
     fn write(
         &mut self,
         field: Field,

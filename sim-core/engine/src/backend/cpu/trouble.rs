@@ -67,6 +67,16 @@ impl<F: Lane> Chunk<F> {
         }
     }
 
+    /// Freezes the worlds of all that are not marked, for a command that is not finite.
+    pub fn freeze_others(&mut self, good: &[bool]) {
+        for world in 0..self.worlds.len() {
+            if !good[self.worlds.start + world] && !self.is_frozen(world) {
+                self.count_frozen(world, status::NOT_FINITE);
+                self.status[world] = status::NOT_FINITE;
+            }
+        }
+    }
+
     /// Counts a world that is frozen now, and was not.
     #[cold]
     fn count_frozen(&mut self, world: usize, trouble: u32) {
