@@ -98,8 +98,8 @@ class Frame:
     status: NDArray[np.uint32]
     """Trouble of the world, as bits [–], ``(worlds,)``; 0 is none.
 
-    1: it was no longer finite (or, with ``on_nan="freeze"``, a command of it was not), 8: it was beyond the bounds of the
-    run: it is frozen until it is reset or restored.
+    1: it was no longer finite (or, with ``on_nan="freeze"``, a command of it was not), 8: it was beyond the bounds of
+    the run: it is frozen until it is reset or restored.
     2: the solver used up its iterations in some physics step of the last frame. 4: contacts did not fit into the
     scene's ``contacts_max`` or ``rows_max``, and were left out.
     """
