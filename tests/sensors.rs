@@ -1,4 +1,4 @@
-//! Sites, delay and noise: the same in every width and number of threads, no memory a frame, and names that are refused.
+//! Sites, delay and noise: the same in every width and number of threads, and names that are refused.
 
 mod common;
 

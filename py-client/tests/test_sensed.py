@@ -48,7 +48,10 @@ def test_wrong_ones_are_refused_by_name_and_leave_nothing(scene: tl.Scene):
     far = other.add_site()
     for wrong, message in [
         ({"body": "cup"}, r"site `site`: body is 'cup', which is no body of this scene; there are: `cube`"),
-        ({"relative_to": "cup"}, r"site `site`: relative_to: body is 'cup'"),
+        (
+            {"relative_to": "cup"},
+            r"site `site`: relative_to is 'cup', which is no site or body .* there are: `cube`, and",
+        ),
         ({"relative_to": far}, r"site `site`: site `site` is of another scene"),
         ({"pos": (1, 2)}, r"site `site`: pos"),
         ({"quat": (0, 0, 0, 2)}, r"site `site`: quat .* has length 2"),

@@ -44,6 +44,8 @@ enum Command {
     /// Exit code 0: all frames are equal. 1: the first frame (counted from 0), world and field that differ are named, or a gap, where it stops. 2: the
     /// file cannot be replayed.
     ///
+    /// The robot files and meshes of the scene are not in the recording: they must be where they were, and as they were.
+    ///
     /// Example: tightloop replay run.tlrec
     Replay(Replay),
     /// List the daemons that run, one name a line.

@@ -55,9 +55,14 @@ fn line(frozen: &Frozen, worlds: usize) -> Option<String> {
     } else {
         "no longer finite"
     };
+    let what = match count {
+        1 => "1 world".to_owned(),
+        // where worlds are reset by themselves, some are frozen again
+        _ if count > worlds as u64 => format!("worlds {count} times"),
+        _ => format!("{count} worlds"),
+    };
     Some(format!(
-        "frozen: {count} {} ({}), the first of them world {}, {cause} after its step {}; frozen now: {} of {worlds}",
-        if count == 1 { "world" } else { "worlds" },
+        "frozen: {what} ({}), the first of them world {}, {cause} after its step {}; frozen now: {} of {worlds}",
         causes.join(", "),
         first.world,
         first.steps,

@@ -62,7 +62,9 @@ pub fn any_scene(dice: &mut Dice, is_drawn: bool) -> Description {
     let has_noise = dice.chance(0.3);
     let varies = |param: &Param| dice.chance(share) && (has_noise || !is_noise(*param));
     scene.params.extend(Param::ALL.into_iter().filter(varies));
+    scene.command_delay_max = dice.chance(0.3).then(|| 1 + dice.below(3 * scene.substeps));
     if is_drawn {
+        draw_params(dice, &mut scene);
         draw_starts(dice, &mut scene);
     }
     scene
@@ -249,6 +251,32 @@ fn any_dof(dice: &mut Dice) -> JointDof {
         target_ke: sometimes(dice, 1.0, 1000.0),
         target_kd: sometimes(dice, 0.1, 50.0),
         ..JointDof::default()
+    }
+}
+
+/// Parameters that a reset draws: gravity, a delay, and masses and damping of whole robots.
+fn draw_params(dice: &mut Dice, scene: &mut Description) {
+    let (low, high) = (dice.between(0.5, 1.0), dice.between(1.0, 2.0));
+    let uniform = |low: f64, high: f64| Distribution::Uniform { low, high };
+    let mut draw = |param: Param, name: &str, distribution| {
+        let ranges = scene.param_ranges.entry(param).or_default();
+        ranges.insert(name.to_owned(), distribution);
+    };
+    if dice.chance(0.5) {
+        draw(Param::Gravity, "z", uniform(-12.0, -3.0));
+    }
+    if dice.chance(0.3) {
+        draw(Param::CommandDelay, "", uniform(0.0, 1.0));
+    }
+    for robot in scene
+        .robots
+        .iter()
+        .map(|robot| robot.name.clone())
+        .collect::<Vec<_>>()
+    {
+        if dice.chance(0.3) {
+            draw(Param::BodyMassScale, &robot, uniform(low, high));
+        }
     }
 }
 

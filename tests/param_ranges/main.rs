@@ -38,7 +38,7 @@ fn range(scene: &mut Description, param: Param, name: &str, distribution: Distri
     ranges.insert(name.to_owned(), distribution);
 }
 
-/// The same, with something drawn of every parameter that can be.
+/// The same, with something drawn of parameters of every kind.
 fn drawn() -> Description {
     let mut scene = plain();
     range(&mut scene, Param::Gravity, "z", normal(-9.81, 0.1));

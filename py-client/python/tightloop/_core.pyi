@@ -99,7 +99,8 @@ class Frame:
     """Trouble of the world, as bits [–], ``(worlds,)``; 0 is none.
 
     1: it was no longer finite (or, with ``on_nan="freeze"``, a command of it was not), 8: it was beyond the bounds of
-    the run: it is frozen until it is reset or restored.
+    the run: it is frozen until it is reset or restored. What is evaluated of a frozen world, such as ``joint_qdd``,
+    need not be finite while the commands or parameters are there that broke it.
     2: the solver used up its iterations in some physics step of the last frame. 4: contacts did not fit into the
     scene's ``contacts_max`` or ``rows_max``, and were left out.
     """

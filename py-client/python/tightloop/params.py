@@ -26,20 +26,22 @@ class Params:
     all worlds, `write` in some. What is written holds from the next step on, over resets too, but for ``body_f``, which
     a reset clears, and numbers that `Scene.randomize` draws, which a reset draws anew.
 
-    Free joints have no drive: their gains and effort limits have no effect. `Sim.inverse_dynamics` and the other
-    functions of a state use the scene's numbers, not these. Reading takes a snapshot, for which this client must be in
-    control.
+    Free joints have no drive and no dry friction: their gains, effort limits, ``joint_friction`` and noises of targets
+    have no effect. `Sim.inverse_dynamics` and the other functions of a state use the scene's numbers, not these.
+    Reading takes a snapshot, for which this client must be in control.
 
     ``gravity`` (worlds, 3) [m/s²], ``body_mass_scale`` (worlds, bodies) [–], ``joint_armature`` [kg·m² or kg],
     ``joint_damping``, ``joint_target_kd`` [N·m·s/rad or N·s/m], ``joint_target_ke`` [N·m/rad or N/m],
     ``joint_effort_limit`` [N·m or N; 1e30 is none], ``joint_friction`` [N·m or N], each (worlds, dofs),
     ``shape_mu`` (worlds, shapes) [–], ``body_f`` (worlds, bodies, 6) [N, N·m].
 
-    ``command_delay`` (worlds,) [substeps]: when ``joint_f`` and targets of a frame begin to act; at most
-    ``Scene.command_delay_max``. Standard deviations of normal noise, drawn for each frame from (seed, world, episode,
-    step): of commands ``joint_f_noise``, ``joint_target_q_noise``, ``joint_target_qd_noise``, of measured fields
-    ``joint_q_noise``, ``joint_qd_noise``, ``joint_torque_noise``, each (worlds, dofs), in the unit of what it is added
-    to; ``site_q_noise`` [m, rad] and ``site_qd_noise`` [m/s, rad/s] (worlds, sites, 2), ``gyro_noise`` [rad/s] and
+    ``command_delay`` (worlds,) [substeps]: when ``joint_f`` and targets of a frame begin to act, a fraction counting as
+    a whole substep; at most ``Scene.command_delay_max``.
+
+    Standard deviations of normal noise, drawn for each frame from (seed, world, episode, step): of commands
+    ``joint_f_noise``, ``joint_target_q_noise``, ``joint_target_qd_noise``, of measured fields ``joint_q_noise``,
+    ``joint_qd_noise``, ``joint_torque_noise``, each (worlds, dofs), in the unit of what it is added to;
+    ``site_q_noise`` [m, rad] and ``site_qd_noise`` [m/s, rad/s] (worlds, sites, 2), ``gyro_noise`` [rad/s] and
     ``accelerometer_noise`` [m/s²] (worlds, sites), ``contact_sensor_noise`` [N] (worlds, contact_sensors).
 
     Raises:

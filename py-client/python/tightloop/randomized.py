@@ -65,8 +65,10 @@ class Randomized(Sensed):
                 ``z`` of gravity; where a parameter is one number a world, its distribution alone. The more special name
                 holds. They vary without being named at launch; `Sim.params` reads them, and what it writes holds until
                 the world's next reset. A normal draw below the least that a parameter may be is that least. A load,
-                ``body_f``, cannot be drawn.
-                A later call adds to an earlier one, and replaces what it names again.
+                ``body_f``, cannot be drawn; a delay above ``Scene.command_delay_max`` is that, and its fractions count
+                as whole substeps.
+
+        A later call adds to an earlier one, and replaces what it names again.
 
         Raises:
             SceneError: A name that nothing in the scene has, or no distribution; the message names it. Nothing is

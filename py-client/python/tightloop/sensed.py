@@ -136,6 +136,12 @@ class Sensed(Shaped):
             return frame.name
         if isinstance(frame, str) and frame in self.sites:
             return frame
+        if isinstance(frame, str) and "/" not in frame and frame not in self.bodies:
+            known = ", ".join(f"`{name}`" for name in (*self.sites, *self.bodies)) or "none yet"
+            raise SceneError(
+                f"{what}: relative_to is {frame!r}, which is no site or body of this scene; there are: {known}, "
+                "and the robots' links (robot.link(…))"
+            )
         return self._bearer(f"{what}: relative_to", frame)
 
     def _free_sensor(self, kind: str, taken: dict[str, Any]) -> str:

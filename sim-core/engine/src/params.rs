@@ -122,7 +122,7 @@ impl Simulation {
     fn param_name(&self, param: Param, column: usize) -> String {
         let model = self.model();
         match param.row().per {
-            Per::Entry(1) => "the world".to_owned(),
+            Per::Entry(1) => "all its commands".to_owned(),
             Per::Entry(_) => ["x", "y", "z"][column.min(2)].to_owned(),
             Per::Dof => model.dof_names()[column].clone(),
             Per::Body(n) => model.body_names()[column / n].clone(),

@@ -3,7 +3,7 @@
 //!
 //! Philox4x32-10 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC 2011): ten rounds of
 //! multiplications turn a counter into 128 random bits under a key. The key is a seed, the counter (world, episode, stream,
-//! index).
+//! index), or for what is drawn in each frame (world, episode, step, stream and index).
 
 use sim_core::model::Distribution;
 use sim_core::model::params::Param;

@@ -189,7 +189,7 @@ fields! {
     BodyContactForce "body_contact_force" Derived [Bodies, Size(3)] "N" REAL, "Sum of the contact forces on each link, in world axes.";
     JointQMeasured "joint_q_measured" Derived [Coords] "rad or m" REAL, "Joint positions with the noise that joint_q_noise gives.";
     JointQdMeasured "joint_qd_measured" Derived [Dofs] "rad/s or m/s" REAL, "Joint velocities with the noise that joint_qd_noise gives.";
-    JointTorque "joint_torque" Derived [Dofs] "N·m or N" REAL, "Torque that joint_f and the drive give, clamped by the effort limit as they are; damping, friction and contacts are not in it.";
+    JointTorque "joint_torque" Derived [Dofs] "N·m or N" REAL, "What joint_f and the drive, clamped by its effort limit, give; damping, friction and contacts are not in it.";
     SiteQ "site_q" Derived [Sites, Size(7)] "m, –" REAL, "Sites: position, then quaternion (x, y, z, w), in the world, or in the frame that a site is relative to.";
     SiteQd "site_qd" Derived [Sites, Size(6)] "m/s, rad/s" REAL, "Velocity of each site, then its angular velocity, in world axes, or as seen from and in the axes of the frame that it is relative to.";
     Gyro "gyro" Derived [Sites, Size(3)] "rad/s" REAL, "Angular velocity of each site, in its own axes.";
@@ -197,7 +197,7 @@ fields! {
     ContactSensor "contact_sensor" Derived [ContactSensors, Size(3)] "N" REAL, "Sum of the contact forces that each contact sensor is about, in world axes.";
     Time "time" Counter [] "s" F64, "Simulated time since the world's reset.";
     Step "step" Counter [] "–" U64, "Control frames since the world's reset.";
-    Status "status" Counter [] "–" U32, "Trouble of the world, as bits: 1 = it was no longer finite, 8 = it was beyond the bounds of the run: it is frozen at its state before that frame, and `step`, until it is reset; 2 = the solver used up its iterations, 4 = contacts were left out; 0 = none.";
+    Status "status" Counter [] "–" U32, "Trouble of the world, as bits: 1 = it was no longer finite, or a command of it where the run freezes for that, 8 = it was beyond the bounds of the run: it is frozen at its state before that frame, and `step`, until it is reset; 2 = the solver used up its iterations, 4 = contacts were left out; 0 = none.";
     ContactsLeftOut "contacts_left_out" Counter [] "–" U32, "Contacts that did not fit into contacts_max or rows_max: the most of any substep of the last frame, and of the state shown where contact fields are asked for.";
 }
 

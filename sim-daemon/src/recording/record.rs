@@ -30,6 +30,8 @@ const TELL_PERIOD: Duration = Duration::from_millis(500);
 struct Tally {
     frames: u64,
     gaps: u64,
+    /// Frames before the first of them.
+    whole: u64,
     lost: u64,
 }
 
@@ -225,6 +227,9 @@ impl Recorder<'_> {
         let header = entry.header();
         if entry.lost > 0 {
             self.state.clear();
+            if self.tally.gaps == 0 {
+                self.tally.whole = self.tally.frames;
+            }
             self.tally.gaps += 1;
             self.tally.lost += entry.lost;
             self.news(&format!(
@@ -290,7 +295,12 @@ impl Recorder<'_> {
             .writer
             .put(&Record::End(&why))
             .and_then(|()| self.writer.flush());
-        let Tally { frames, gaps, lost } = self.tally;
+        let Tally {
+            frames,
+            gaps,
+            lost,
+            whole,
+        } = self.tally;
         let out = &self.args.out;
         let bytes = self.writer.close().map_err(|error| {
             let problem = format!(
@@ -303,8 +313,12 @@ impl Recorder<'_> {
         }
         let gaps = match gaps {
             0 => "no gaps".to_owned(),
-            1 => format!("1 gap of {lost} lost entries"),
-            _ => format!("{gaps} gaps of {lost} lost entries"),
+            1 => format!(
+                "1 gap of {lost} lost entries, before which a replay stops: after {whole} frames"
+            ),
+            _ => format!(
+                "{gaps} gaps of {lost} lost entries, at the first of which a replay stops: after {whole} frames"
+            ),
         };
         let megabytes = bytes as f64 / 1e6;
         // whoever reads us may have stopped reading

@@ -67,6 +67,13 @@ pub(super) fn open(args: &cli::Replay) -> Result<Replay<'_, BufReader<File>>, Da
             problem: "ask for 1 to 1024, or leave it out".to_owned(),
         });
     }
+    if args.frames == Some(0) {
+        return Err(DaemonError::Argument {
+            argument: "frames",
+            value: "0".to_owned(),
+            problem: "ask for at least 1, or leave it out for all".to_owned(),
+        });
+    }
     let failed = |error: std::io::Error| unreadable(path, format!("cannot be read: {error}"));
     let file = File::open(path).map_err(failed)?;
     if file.metadata().map_err(failed)?.is_dir() {
@@ -223,18 +230,29 @@ impl Run {
         let scene = scene.map_err(|error| failed(error.to_string()))?;
         let description = scene.describe(Path::new(&told.scene_folder));
         let model = description
-            .map_err(|error| failed(error.to_string()))?
+            .map_err(|error| {
+                failed(format!(
+                    "needs the scene's robots and meshes where they were: {error}"
+                ))
+            })?
             .compile()
             .map_err(|error| failed(error.to_string()))?;
         if model.hash() != told.model_hash {
+            let (then, now) = (told.model_hash, model.hash());
+            let ours = env!("CARGO_PKG_VERSION");
+            let cause = match told.release == ours {
+                true => {
+                    "a robot file or a mesh of its scene has changed since; put back what it was"
+                        .to_owned()
+                }
+                false => format!(
+                    "a robot file or a mesh of its scene has changed since, or release {} makes another of it than \
+                     ours, {ours}; replay it with that one",
+                    told.release
+                ),
+            };
             return Err(failed(format!(
-                "is of another model ({:016x}, here {:016x}): a robot file or a mesh under {} has changed since, or \
-                 release {} is not ours, {}",
-                told.model_hash,
-                model.hash(),
-                told.scene_folder,
-                told.release,
-                env!("CARGO_PKG_VERSION")
+                "is of another model ({then:016x}, here {now:016x}): {cause}"
             )));
         }
         let fields = told.fields.iter().map(|field| {

@@ -110,6 +110,8 @@ impl State {
     /// Opens a journal, if there is room for it.
     fn journal(&mut self, observed: u64) -> Response {
         let refused = |reason| Response::Refused { reason };
+        // those that ended since somebody looked
+        self.journals.refresh();
         if self.journals.are_full() {
             return refused(format!(
                 "{RECORDERS_MAX} recorders are at work, which is the limit; end one of them"
