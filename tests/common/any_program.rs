@@ -226,7 +226,9 @@ fn any_param(dice: &mut Dice, scope: &Scope<'_>, param: Param, column: usize) ->
             Some(_) => dice.pick(&[1e6, 1e30]),
             None => dice.pick(&[0.0, 0.5, 2.0]),
         },
-        Param::CommandDelay => dice.pick(&[0.0, 1.0, 2.5, scope.model.command_delay_max() as f64]),
+        Param::CommandDelay => {
+            scope.model.command_delay_max() as f64 * dice.pick(&[0.0, 0.3, 0.5, 1.0])
+        }
         _ if huge.is_some() => dice.pick(&[0.0, 1e10, 1e30]),
         _ => start * dice.between(0.5, 1.5) + dice.pick(&[0.0, 0.1]),
     }

@@ -152,7 +152,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         dof_inverse_weight: reference.dof_inverse_weight,
         hash: 0,
     };
-    model.hash = hash(&model);
+    model.hash = model.own_hash();
     Ok(model)
 }
 
@@ -480,24 +480,4 @@ impl Pose {
         }
         .mul(self)
     }
-}
-
-/// FNV-1a over everything that a run depends on.
-fn hash(model: &Model) -> u64 {
-    let text = format!(
-        "{:?} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {}",
-        model.constants,
-        model.dt,
-        model.substeps,
-        model.dof_names,
-        model.body_names,
-        model.start,
-        model.shape_names,
-        model.site_names,
-        model.contact_sensors,
-        model.command_delay_max
-    );
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| {
-        (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
-    })
 }

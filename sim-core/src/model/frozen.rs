@@ -142,4 +142,24 @@ impl Model {
     pub fn hash(&self) -> u64 {
         self.hash
     }
+
+    /// FNV-1a over everything that a run depends on.
+    pub(super) fn own_hash(&self) -> u64 {
+        let text = format!(
+            "{:?} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {}",
+            self.constants,
+            self.dt,
+            self.substeps,
+            self.dof_names,
+            self.body_names,
+            self.start,
+            self.shape_names,
+            self.site_names,
+            self.contact_sensors,
+            self.command_delay_max
+        );
+        text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| {
+            (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
+        })
+    }
 }
