@@ -19,7 +19,7 @@ const JOIN_MAX: Duration = Duration::from_secs(10);
 /// Shared memory of one journal, if entries are small enough [bytes].
 const JOURNAL: usize = 32 << 20;
 /// Fewest and most entries that wait for a recorder.
-const DEPTH: std::ops::RangeInclusive<usize> = 16..=1024;
+const DEPTH: std::ops::RangeInclusive<usize> = 16..=8192;
 /// Entries that wait for a recorder besides the state of all worlds, whose pieces come at once.
 const BESIDE_STATE: usize = 8;
 
