@@ -26,14 +26,7 @@ fn arm(params: impl IntoIterator<Item = Param>) -> Description {
 }
 
 fn options(worlds: usize, precision: Precision, lanes: Lanes, threads: usize) -> Options {
-    Options {
-        worlds,
-        precision,
-        lanes,
-        threads: Some(threads),
-        fields: FIELDS.to_vec(),
-        ..Options::default()
-    }
+    common::options(&FIELDS, worlds, precision, lanes, threads)
 }
 
 /// Bits of all fields of a world.

@@ -120,14 +120,7 @@ fn shown(run: &Run) -> Vec<u64> {
 }
 
 fn options(precision: Precision, lanes: Lanes, threads: usize) -> Options {
-    Options {
-        worlds: WORLDS,
-        precision,
-        lanes,
-        threads: Some(threads),
-        fields: FIELDS.to_vec(),
-        ..Options::default()
-    }
+    common::options(&FIELDS, WORLDS, precision, lanes, threads)
 }
 
 #[test]

@@ -53,6 +53,24 @@ pub fn repo(path: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
+/// So many worlds with these fields, in this precision, width and number of threads.
+pub fn options(
+    fields: &[Field],
+    worlds: usize,
+    precision: Precision,
+    lanes: Lanes,
+    threads: usize,
+) -> Options {
+    Options {
+        worlds,
+        precision,
+        lanes,
+        threads: Some(threads),
+        fields: fields.to_vec(),
+        ..Options::default()
+    }
+}
+
 /// A simulation and the arena of its frames.
 pub struct Run {
     /// The simulation.

@@ -75,14 +75,7 @@ fn drawn() -> Description {
 }
 
 fn options(worlds: usize, precision: Precision, lanes: Lanes, threads: usize) -> Options {
-    Options {
-        worlds,
-        precision,
-        lanes,
-        threads: Some(threads),
-        fields: FIELDS.to_vec(),
-        ..Options::default()
-    }
+    common::options(&FIELDS, worlds, precision, lanes, threads)
 }
 
 fn launched(model: &Arc<Model>, worlds: usize, precision: Precision) -> Run {

@@ -1,5 +1,6 @@
 //! The services of one daemon and their limits, said once for both sides. The only file that knows iceoryx2's builders.
 
+use std::fmt::Debug;
 use std::sync::Once;
 use std::time::Duration;
 
@@ -102,18 +103,7 @@ pub(crate) fn create_frames<S: Service>(
     epoch: u64,
     frames_held: usize,
 ) -> Result<FrameService<S>, ProtocolError> {
-    node.service_builder(&service_name(&format!("obs/{epoch}"))?)
-        .publish_subscribe::<[Line]>()
-        .user_header::<FrameHeader>()
-        .enable_safe_overflow(true)
-        .subscriber_max_buffer_size(BUFFER)
-        .subscriber_max_borrowed_samples(borrowed(frames_held))
-        .history_size(0)
-        .max_publishers(1)
-        .max_subscribers(1)
-        .max_nodes(4)
-        .create()
-        .map_err(|error| ProtocolError::transport(format!("create service obs/{epoch}"), error))
+    create_lines(node, &format!("obs/{epoch}"), BUFFER, borrowed(frames_held))
 }
 
 /// Opens what [`create_frames`] created.
@@ -121,18 +111,55 @@ pub(crate) fn open_frames<S: Service>(
     node: &Node<S>,
     epoch: u64,
 ) -> Result<FrameService<S>, ProtocolError> {
-    open_frame_service(node, &format!("obs/{epoch}"))
+    open_lines(node, &format!("obs/{epoch}"))
 }
 
-fn open_frame_service<S: Service>(
+/// Opens a service of lines with a header.
+fn open_lines<S: Service, H: Debug + ZeroCopySend>(
     node: &Node<S>,
     name: &str,
-) -> Result<FrameService<S>, ProtocolError> {
+) -> Result<publish_subscribe::PortFactory<S, [Line], H>, ProtocolError> {
     node.service_builder(&service_name(name)?)
         .publish_subscribe::<[Line]>()
-        .user_header::<FrameHeader>()
+        .user_header::<H>()
         .open()
         .map_err(|error| ProtocolError::transport(format!("open service {name}"), error))
+}
+
+/// Service of lines with a header from one to one, in which the oldest goes when `depth` wait.
+fn create_lines<S: Service, H: Debug + ZeroCopySend>(
+    node: &Node<S>,
+    name: &str,
+    depth: usize,
+    held: usize,
+) -> Result<publish_subscribe::PortFactory<S, [Line], H>, ProtocolError> {
+    node.service_builder(&service_name(name)?)
+        .publish_subscribe::<[Line]>()
+        .user_header::<H>()
+        .enable_safe_overflow(true)
+        .subscriber_max_buffer_size(depth)
+        .subscriber_max_borrowed_samples(held)
+        .history_size(0)
+        .max_publishers(1)
+        .max_subscribers(1)
+        .max_nodes(4)
+        .create()
+        .map_err(|error| ProtocolError::transport(format!("create service {name}"), error))
+}
+
+/// The end of a service that sends up to so many lines at once; `what` it sends is for messages.
+fn publisher<S: Service, H: Debug + Default + ZeroCopySend>(
+    service: &publish_subscribe::PortFactory<S, [Line], H>,
+    lines: usize,
+    what: &str,
+) -> Result<Publisher<S, [Line], H>, ProtocolError> {
+    service
+        .publisher_builder()
+        .initial_max_slice_len(lines)
+        .max_loaned_samples(LOANS)
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .create()
+        .map_err(|error| ProtocolError::transport(format!("create a {what} publisher"), error))
 }
 
 /// Service of frames for observers.
@@ -156,7 +183,7 @@ pub(crate) fn create_watch<S: Service>(
 
 /// Opens what [`create_watch`] created.
 pub(crate) fn open_watch<S: Service>(node: &Node<S>) -> Result<FrameService<S>, ProtocolError> {
-    open_frame_service(node, "watch")
+    open_lines(node, "watch")
 }
 
 /// The end of a service of frames that sends.
@@ -164,13 +191,7 @@ pub(crate) fn frame_publisher<S: Service>(
     service: &FrameService<S>,
     bytes: usize,
 ) -> Result<FramePublisher<S>, ProtocolError> {
-    service
-        .publisher_builder()
-        .initial_max_slice_len(bytes / ALIGNMENT)
-        .max_loaned_samples(LOANS)
-        .backpressure_strategy(BackpressureStrategy::DiscardData)
-        .create()
-        .map_err(|error| ProtocolError::transport("create a frame publisher", error))
+    publisher(service, bytes / ALIGNMENT, "frame")
 }
 
 /// The end of a service of frames that receives; `history` is 1 for observers, who want the newest frame at once.
@@ -191,18 +212,7 @@ pub(crate) fn create_commands<S: Service>(
     node: &Node<S>,
     epoch: u64,
 ) -> Result<CommandService<S>, ProtocolError> {
-    node.service_builder(&service_name(&format!("act/{epoch}"))?)
-        .publish_subscribe::<[Line]>()
-        .user_header::<CommandHeader>()
-        .enable_safe_overflow(true)
-        .subscriber_max_buffer_size(COMMAND_BUFFER)
-        .subscriber_max_borrowed_samples(1)
-        .history_size(0)
-        .max_publishers(1)
-        .max_subscribers(1)
-        .max_nodes(4)
-        .create()
-        .map_err(|error| ProtocolError::transport(format!("create service act/{epoch}"), error))
+    create_lines(node, &format!("act/{epoch}"), COMMAND_BUFFER, 1)
 }
 
 /// Opens what [`create_commands`] created.
@@ -210,11 +220,7 @@ pub(crate) fn open_commands<S: Service>(
     node: &Node<S>,
     epoch: u64,
 ) -> Result<CommandService<S>, ProtocolError> {
-    node.service_builder(&service_name(&format!("act/{epoch}"))?)
-        .publish_subscribe::<[Line]>()
-        .user_header::<CommandHeader>()
-        .open()
-        .map_err(|error| ProtocolError::transport(format!("open service act/{epoch}"), error))
+    open_lines(node, &format!("act/{epoch}"))
 }
 
 /// The end of a service of commands that sends.
@@ -222,13 +228,7 @@ pub(crate) fn command_publisher<S: Service>(
     service: &CommandService<S>,
     bytes: usize,
 ) -> Result<CommandPublisher<S>, ProtocolError> {
-    service
-        .publisher_builder()
-        .initial_max_slice_len(bytes / ALIGNMENT)
-        .max_loaned_samples(LOANS)
-        .backpressure_strategy(BackpressureStrategy::DiscardData)
-        .create()
-        .map_err(|error| ProtocolError::transport("create a command publisher", error))
+    publisher(service, bytes / ALIGNMENT, "command")
 }
 
 /// The end of a service of commands that receives.
@@ -252,20 +252,7 @@ pub(crate) fn create_journal<S: Service>(
     number: u64,
     depth: usize,
 ) -> Result<JournalService<S>, ProtocolError> {
-    node.service_builder(&service_name(&format!("journal/{number}"))?)
-        .publish_subscribe::<[Line]>()
-        .user_header::<JournalHeader>()
-        .enable_safe_overflow(true)
-        .subscriber_max_buffer_size(depth)
-        .subscriber_max_borrowed_samples(1)
-        .history_size(0)
-        .max_publishers(1)
-        .max_subscribers(1)
-        .max_nodes(4)
-        .create()
-        .map_err(|error| {
-            ProtocolError::transport(format!("create service journal/{number}"), error)
-        })
+    create_lines(node, &format!("journal/{number}"), depth, 1)
 }
 
 /// Opens what [`create_journal`] created.
@@ -273,11 +260,7 @@ pub(crate) fn open_journal<S: Service>(
     node: &Node<S>,
     number: u64,
 ) -> Result<JournalService<S>, ProtocolError> {
-    node.service_builder(&service_name(&format!("journal/{number}"))?)
-        .publish_subscribe::<[Line]>()
-        .user_header::<JournalHeader>()
-        .open()
-        .map_err(|error| ProtocolError::transport(format!("open service journal/{number}"), error))
+    open_lines(node, &format!("journal/{number}"))
 }
 
 /// The end of a journal that sends; `bytes` are those of the largest entry.
@@ -285,13 +268,7 @@ pub(crate) fn journal_publisher<S: Service>(
     service: &JournalService<S>,
     bytes: usize,
 ) -> Result<JournalPublisher<S>, ProtocolError> {
-    service
-        .publisher_builder()
-        .initial_max_slice_len(bytes.div_ceil(ALIGNMENT))
-        .max_loaned_samples(LOANS)
-        .backpressure_strategy(BackpressureStrategy::DiscardData)
-        .create()
-        .map_err(|error| ProtocolError::transport("create a journal publisher", error))
+    publisher(service, bytes.div_ceil(ALIGNMENT), "journal")
 }
 
 /// The end of a journal that receives.
