@@ -3,6 +3,7 @@
 //! Thin on purpose: arguments are checked in Python (`python/tightloop`), numbers by the daemon. What is here is what has
 //! to be fast (a step) or has to be Rust (views of shared memory, scene files, the command line).
 
+mod arrays;
 mod client;
 mod dynamics;
 mod errors;
@@ -24,6 +25,8 @@ fn command_line(py: Python<'_>, arguments: Vec<OsString>) -> i32 {
 mod core {
     use super::*;
 
+    #[pymodule_export]
+    use super::arrays::{drive, pack};
     #[pymodule_export]
     use super::client::{Client, sweep};
     #[pymodule_export]

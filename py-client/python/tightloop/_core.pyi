@@ -1,5 +1,6 @@
 """Types of the Rust module."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -148,6 +149,23 @@ class Dynamics:
         /,
     ) -> NDArray[np.float64]: ...
 
+def pack(
+    out: NDArray[np.float32],
+    parts: Sequence[NDArray[Any]],
+    low: NDArray[np.float32],
+    high: NDArray[np.float32],
+    /,
+) -> None: ...
+def drive(
+    out: NDArray[np.float32],
+    first: int,
+    action: NDArray[np.float32],
+    scale: NDArray[np.float32],
+    start: NDArray[np.float32] | None,
+    low: NDArray[np.float32],
+    high: NDArray[np.float32],
+    /,
+) -> None: ...
 def sweep(name: str, /) -> bool: ...
 def command_line(arguments: list[str], /) -> int: ...
 def read_urdf(

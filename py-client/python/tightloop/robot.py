@@ -206,6 +206,17 @@ class Robot(Placed):
         return {joint: mimic["joint"] for joint, mimic in joints if mimic is not None}
 
     @property
+    def joint_range(self) -> NDArray[np.float64]:
+        """Least and largest position of each dof [rad or m], shape ``(dofs, 2)``; infinite where there is no limit."""
+        unlimited = [-np.inf, np.inf]
+        return self._of_dofs([unlimited if range_ is None else range_ for range_ in self._summary["joint_range"]])
+
+    @property
+    def joint_velocity_limit(self) -> NDArray[np.float64]:
+        """Velocity limit of each dof's joint [rad/s or m/s], shape ``(dofs,)``, infinite without one; not enforced."""
+        return self._of_dofs(self._summary["joint_velocity_limit"])
+
+    @property
     def dof_names(self) -> list[str]:
         """Dofs: the joint, and for one with several ``joint.part``."""
         return list(self._summary["dof_names"])
@@ -268,6 +279,11 @@ class Robot(Placed):
             "convex_decomposition": self.convex_decomposition,
             **self.surface,
         } | own
+
+    def _of_dofs(self, joints: list[Any]) -> NDArray[np.float64]:
+        """What each moving joint has, for each dof."""
+        own = dict(zip(self.joint_names, joints, strict=True))
+        return np.array([own[dof if dof in own else dof.rpartition(".")[0]] for dof in self.dof_names], dtype=float)
 
     def _urdf_values(self, name: str) -> Any:
         if name == "joint_target_mode":

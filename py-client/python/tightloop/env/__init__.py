@@ -1,0 +1,35 @@
+"""Reinforcement learning: tasks in thousands of worlds, as gymnasium environments.
+
+>>> import gymnasium
+>>> envs = gymnasium.make_vec("tightloop/FrankaReach-v0", num_envs=4096)
+>>> obs, _ = envs.reset(seed=0)
+>>> obs, reward, terminated, truncated, infos = envs.step(envs.action_space.sample())
+"""
+
+from __future__ import annotations
+
+from gymnasium.vector import AutoresetMode
+
+from tightloop.env.controls import EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
+from tightloop.env.names import Names
+from tightloop.env.single import Env
+from tightloop.env.task import Observed, Task, Worlds
+from tightloop.env.vector import VectorEnv
+from tightloop.registration import register
+
+__all__ = [
+    "AutoresetMode",
+    "EndEffectorDelta",
+    "Env",
+    "Gripper",
+    "JointDelta",
+    "JointTarget",
+    "JointTorque",
+    "Names",
+    "Observed",
+    "Task",
+    "VectorEnv",
+    "Worlds",
+]
+
+register()

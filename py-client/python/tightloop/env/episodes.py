@@ -1,0 +1,111 @@
+"""Seeds and episodes of the worlds, and the random numbers that tasks get of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop import _core
+from tightloop.env.task import Task, Worlds
+from tightloop.errors import ArgumentError
+
+#: Stream of the numbers that goals are made of.
+_GOALS = 0
+
+
+class Episodes:
+    """Which episode of which seed each world is in, how long it has gone on, and its goal.
+
+    The daemon counts the same way, so that a world's start and its goals are functions of its seed and episode alone.
+
+    Attributes:
+        elapsed: Control steps since the reset, shape ``(worlds,)``, int32.
+        goal: Goals, shape ``(worlds, …)``.
+    """
+
+    def __init__(self, task: Task, worlds: int, first_env: int) -> None:
+        self._task, self._first = task, first_env
+        self._seeds = np.zeros(worlds, np.uint64)
+        self._episodes = np.zeros(worlds, np.uint32)
+        self._goals = np.zeros(worlds, np.uint32)  # of this episode so far
+        self.elapsed = np.zeros(worlds, np.int32)
+        self.goal: NDArray[Any] = np.zeros((worlds, 0), np.float32)
+        self._known = False
+
+    def seed(
+        self, seed: int | Sequence[int | None] | None, mask: NDArray[np.bool_], entropy: np.random.Generator
+    ) -> NDArray[np.uint64] | None:
+        """Take new seeds of the worlds under the mask, and count their episodes.
+
+        Returns:
+            Seeds of all worlds if some are new, for `Sim.reset`; None if each world begins its next episode.
+
+        Raises:
+            ArgumentError: These are no seeds.
+        """
+        worlds = len(self._seeds)
+        if seed is None and self._known:
+            self._episodes[mask] += 1
+            return None
+        given = _seeds(seed, worlds, self._first)
+        for world in np.flatnonzero(mask):
+            own = given[world]
+            self._seeds[world] = entropy.integers(2**63) if own is None else own
+        self._episodes[mask] = 0
+        # worlds outside a mask have had no seed yet
+        self._known = self._known or bool(mask.all())
+        return self._seeds
+
+    def next(self, mask: NDArray[np.bool_]) -> None:
+        """Count the next episode of the worlds under the mask, as `Sim.reset` without seeds does."""
+        self._episodes[mask] += 1
+
+    def begin(self, mask: NDArray[np.bool_], worlds: Worlds) -> None:
+        """Begin episodes of the worlds under the mask, which is their state now, and give them goals."""
+        self.elapsed[mask] = 0
+        self._goals[mask] = 0
+        self._draw(np.flatnonzero(mask), worlds)
+
+    def due(self) -> NDArray[np.bool_] | None:
+        """Which worlds are due for their next goal; None if none can be."""
+        steps = self._task.goal_steps
+        return None if steps is None else self.elapsed == steps * (self._goals + 1)
+
+    def renew(self, mask: NDArray[np.bool_], worlds: Worlds) -> None:
+        """Give the worlds under the mask their next goal."""
+        self._goals[mask] += 1
+        self._draw(np.flatnonzero(mask), worlds)
+
+    def _draw(self, rows: NDArray[np.intp], worlds: Worlds) -> None:
+        count, place = self._task.goal_draws, self._goals[rows].astype(np.intp)
+        most = int(place.max()) + 1
+        drawn = _core.draw(self._seeds[rows], self._episodes[rows], _GOALS, count * most)
+        own = drawn.reshape(len(rows), most, count)[np.arange(len(rows)), place]
+        goal = np.asarray(self._task.goal(np, worlds.rows(rows), own.astype(np.float32)))
+        if self.goal.shape[1:] != goal.shape[1:]:
+            self.goal = np.zeros((len(self._seeds), *goal.shape[1:]), np.float32)
+        self.goal[rows] = goal
+
+
+def _seeds(seed: Any, worlds: int, first: int) -> list[int | None]:
+    if seed is None:
+        return [None] * worlds
+    entries: list[Any]
+    if isinstance(seed, int | np.integer) and not isinstance(seed, bool):
+        entries = [int(seed) + first + world for world in range(worlds)]
+    elif isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
+        entries = list(seed)
+    else:
+        raise ArgumentError(f"reset: seed is {seed!r}; give a whole number, or a list with one an environment")
+    if len(entries) != worlds:
+        raise ArgumentError(f"reset: {len(entries)} seeds for {worlds} environments; give a number, or one each")
+    for world, entry in enumerate(entries):
+        whole = isinstance(entry, int | np.integer) and not isinstance(entry, bool)
+        if entry is not None and not (whole and 0 <= entry < 2**64):
+            raise ArgumentError(
+                f"reset: seed of environment {world} is {entry!r}; give a whole number from 0 to 2**64 - 1"
+            )
+    return entries

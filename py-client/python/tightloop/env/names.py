@@ -1,0 +1,58 @@
+"""Where things are in the arrays of a simulation, by name."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tightloop.errors import ArgumentError
+
+
+class Names:
+    """Places in the arrays of frames and commands.
+
+    Attributes:
+        coords: Slice of each robot's or free body's entries of ``joint_q``.
+        dofs: Slice of its entries of ``joint_qd`` and of commands.
+        bodies: Slice of its bodies.
+        dof_names: ``robot/joint`` of each dof.
+    """
+
+    def __init__(self, info: dict[str, Any]) -> None:
+        self.dof_names: list[str] = info["dof_names"]
+        self.coords, self.dofs, self.bodies = (
+            {robot["name"]: slice(*robot[places]) for robot in info["robots"]}
+            for places in ("coords", "dofs", "bodies")
+        )
+        self._places = {
+            "coordinate": info["coord_names"],
+            "dof": info["dof_names"],
+            "body": info["body_names"],
+            "site": info["site_names"],
+            "contact sensor": info["contact_sensor_names"],
+        }
+
+    def coord(self, name: str) -> int:
+        """Place of a coordinate, ``robot/joint``, in ``joint_q``."""
+        return self._place("coordinate", name)
+
+    def dof(self, name: str) -> int:
+        """Place of a dof, ``robot/joint``, in ``joint_qd`` and in commands."""
+        return self._place("dof", name)
+
+    def body(self, name: str) -> int:
+        """Place of a body, ``robot/link``, in ``body_q`` and its like."""
+        return self._place("body", name)
+
+    def site(self, name: str) -> int:
+        """Place of a site in ``site_q`` and its like."""
+        return self._place("site", name)
+
+    def contact_sensor(self, name: str) -> int:
+        """Place of a contact sensor in ``contact_sensor``."""
+        return self._place("contact sensor", name)
+
+    def _place(self, kind: str, name: str) -> int:
+        names = self._places[kind]
+        if name not in names:
+            raise ArgumentError(f"there is no {kind} {name!r} in the scene; there are: {', '.join(names) or 'none'}")
+        return names.index(name)

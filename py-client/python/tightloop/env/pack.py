@@ -1,0 +1,39 @@
+"""Parts of an observation, side by side in one array."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop import _core
+from tightloop.env.task import Array, Observed
+from tightloop.errors import ArgumentError
+
+
+class Packer:
+    """Writes what `Task.observe` returns into one array, within the bounds of `Task.observed`.
+
+    Attributes:
+        size: Numbers of an observation.
+    """
+
+    def __init__(self, parts: Sequence[Observed]) -> None:
+        self._parts = list(parts)
+        self.size = sum(part.size for part in self._parts)
+        self._low, self._high = (np.ascontiguousarray(np.concatenate([p.bounds[end] for p in parts])) for end in (0, 1))
+
+    def pack(self, arrays: Sequence[Array], out: NDArray[np.float32]) -> None:
+        """Write the parts into ``out``, shape ``(worlds, size)``. NaN stays NaN.
+
+        Raises:
+            ArgumentError: There are more or fewer parts than `Task.observed` lists, or one has another shape.
+        """
+        if len(arrays) != len(self._parts):
+            raise ArgumentError(f"observe: {len(arrays)} parts; `observed` lists {len(self._parts)}")
+        for part, array in zip(self._parts, arrays, strict=True):
+            shape = (len(out),) if part.size == 1 and array.ndim == 1 else (len(out), part.size)
+            if array.shape != shape:
+                raise ArgumentError(f"observe: `{part.name}` has shape {array.shape}; `observed` says {shape}")
+        _core.pack(out, [np.asarray(array) for array in arrays], self._low, self._high)

@@ -1,0 +1,53 @@
+"""One environment, as gymnasium has it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import ArrayLike, NDArray
+
+from tightloop.env.task import Task
+from tightloop.env.vector import VectorEnv
+
+
+class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+    """A task in one world; its arrays are new ones in each step.
+
+    With the same seed it does what the world of that seed does in a `VectorEnv`.
+
+    Attributes:
+        vector: The `VectorEnv` of one world that it is made of.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
+
+    def __init__(self, task: Task | type[Task] | str, **options: Any) -> None:
+        """A task in one world; ``options`` are those of `VectorEnv`, but for ``num_envs`` and ``autoreset_mode``."""
+        options.setdefault("threads", 1)
+        self.vector = VectorEnv(
+            task, None if "daemon" in options else 1, autoreset_mode=AutoresetMode.DISABLED, **options
+        )
+        self.render_mode = None
+        self.observation_space = self.vector.single_observation_space
+        self.action_space = self.vector.single_action_space
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin an episode: the first one of a seed, or the next one."""
+        super().reset(seed=seed)
+        obs, _ = self.vector.reset(seed=seed)
+        return obs[0], {}
+
+    def step(self, action: ArrayLike) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Advance by one control step. Raises as `VectorEnv.step` does."""
+        obs, reward, terminated, truncated, infos = self.vector.step(np.asarray(action)[None])
+        info = {name: value[0] for name, value in infos.items() if not name.startswith("_") and infos[f"_{name}"][0]}
+        return obs[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
+
+    def close(self) -> None:
+        """End the simulation."""
+        self.vector.close()

@@ -1,0 +1,325 @@
+"""Many environments at once: a task in the worlds of a daemon, as `gymnasium.vector` has it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector import VectorEnv as GymVectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike, NDArray
+
+from tightloop.env.arena import Arena
+from tightloop.env.controls import Commands
+from tightloop.env.episodes import Episodes
+from tightloop.env.names import Names
+from tightloop.env.pack import Packer
+from tightloop.env.registry import make_task
+from tightloop.env.slots import Slot, Slots
+from tightloop.env.start import begin
+from tightloop.env.task import Task, Worlds, episode_steps
+from tightloop.errors import ArgumentError, CommandRefused
+
+#: Bits of ``status`` of a world that is frozen: no longer finite, or beyond the bounds of the run.
+FROZEN = 1 | 8
+
+Step = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
+
+
+class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+    """A task in many worlds.
+
+    Observations are float32, shape ``(num_envs, size)``, within the bounds of ``single_observation_space``; actions
+    float32 in [-1, 1], shape ``(num_envs, actions)``, and what is beyond counts as the bound. Rewards are float32.
+
+    ``infos["success"]`` says in which worlds the task is done now, where the task knows. A world that failed (no longer
+    finite, or beyond the task's bounds) is terminated, and ``infos["fault"]`` holds the bits of its ``status``.
+
+    Attributes:
+        sim: The simulation.
+        task: The task.
+        autoreset_mode: When a world whose episode ended begins the next one.
+        max_episode_steps: Control steps after which an episode is truncated; None for never.
+        control_dt: Length of a step [s].
+    """
+
+    def __init__(
+        self,
+        task: Task | type[Task] | str,
+        num_envs: int | None = None,
+        *,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        copy: bool = True,
+        slots: int = 2,
+        device: str = "auto",
+        precision: str = "f32",
+        threads: int | None = None,
+        max_episode_steps: float | None = None,
+        daemon: str | None = None,
+        first_env: int = 0,
+        render_mode: str | None = None,
+        **options: Any,
+    ) -> None:
+        """Launch a daemon with that many worlds, or join one.
+
+        Args:
+            task: A `Task`, its class, or the name of one of `tightloop.tasks`, such as ``"FrankaReach"``.
+            num_envs: How many worlds; those of the daemon if one is joined, else 1.
+            autoreset_mode: ``NEXT_STEP``, ``SAME_STEP`` or ``DISABLED``, as gymnasium defines them.
+            copy: Whether each step returns new arrays. Otherwise they are views of a ring, overwritten by the step
+                that comes ``slots`` steps later: for loops that have read them by then.
+            slots: Slots of that ring, at least 2.
+            device: ``"cpu"``, or ``"auto"`` for the best there is.
+            precision: ``"f32"``, or ``"f64"`` for the physics in double precision.
+            threads: Most threads a step may use; all cores if left out.
+            max_episode_steps: Steps after which an episode is truncated, ``math.inf`` for never; the task's if left
+                out.
+            daemon: Name of a running daemon to join, which `tightloop.env.serve` started for that task. It goes on
+                when this process ends, however it ends. None launches one that ends with this process.
+            first_env: Number of the first world among those that ``reset(seed=…)`` counts, for groups of environments.
+            render_mode: None: rendering is not there yet.
+            **options: What the task's class takes.
+
+        Raises:
+            ArgumentError: An argument is not valid; the message names it.
+            LaunchError: The daemon did not start. Other errors are those of `launch` and `attach`.
+        """
+        if render_mode is not None:
+            raise ArgumentError(f"render_mode is {render_mode!r}; environments cannot be rendered yet, leave it out")
+        if slots < 2:
+            raise ArgumentError(f"slots is {slots}; a ring has at least 2")
+        self.task = make_task(task, options)
+        self.autoreset_mode = _mode(autoreset_mode)
+        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
+        self.render_mode = None
+        self.max_episode_steps = episode_steps(self.task, max_episode_steps)
+        controls = list(self.task.controls())
+        scene, self.sim = begin(
+            self.task, controls, num_envs, device=device, precision=precision, threads=threads, daemon=daemon
+        )
+        self.num_envs = self.sim.worlds
+        self.control_dt = self.sim.dt * self.sim.substeps
+
+        names = Names(self.sim.info)
+        self.task.bind(names)
+        self._commands = Commands(scene, names, self.num_envs)
+        self._controls, place = [], 0
+        for control in controls:
+            control.bind(names, self._commands)
+            self._controls.append((control, slice(place, place + control.size)))
+            place += control.size
+        low, high = np.concatenate([part.bounds for part in self.task.observed()], axis=1)
+        self.single_observation_space = Box(low, high, dtype=np.float32)
+        self.single_action_space = Box(-1.0, 1.0, (place,), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+
+        self._packer = Packer(self.task.observed())
+        self._copy, self._slots = copy, None if copy else Slots(self.num_envs, len(low), slots)
+        self._episodes = Episodes(self.task, self.num_envs, first_env)
+        self._action = np.zeros((self.num_envs, place), np.float32)
+        self._previous_action = np.zeros_like(self._action)
+        self._arena, self._tapes = Arena(), {name: [] for name in ("observe", "reward", "terminated", "success")}
+        self._done = np.zeros(self.num_envs, np.bool_)
+        self._all = np.ones(self.num_envs, np.bool_)
+        self._frame: Any = None
+        self._ready = self._in_flight = False
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin episodes in all worlds, or in those of ``options["reset_mask"]``.
+
+        An episode is a function of its seed and of how many the world has had with it: ``reset(seed=…)`` begins the
+        same ones again, whatever the number of worlds and wherever a world stands among them.
+
+        Args:
+            seed: World i gets the seed ``seed + i``; or a list with one a world, None for one by chance. Left out,
+                worlds go on to their next episode; the first time they get seeds by chance.
+            options: ``{"reset_mask": mask}``, a bool array of shape ``(num_envs,)`` with at least one True. The
+                observations of the other worlds stay what they are.
+
+        Raises:
+            ArgumentError: The mask or the seed is not valid.
+        """
+        super().reset(seed=seed if isinstance(seed, int) else None)
+        self._check_idle("reset")
+        mask = self._mask(options)
+        seeds = self._episodes.seed(seed, mask, self.np_random)
+        self._begin(mask, self.sim.reset(mask=mask, seed=seeds))
+        self._done[mask] = False
+        self._ready = True
+        slot = self._next_slot()
+        self._observe(slot.obs)
+        return slot.obs, {}
+
+    def step(self, actions: ArrayLike) -> Step:
+        """Advance all worlds by one control step: `send`, then `recv`."""
+        self.send(actions)
+        return self.recv()
+
+    def send(self, actions: ArrayLike) -> None:
+        """Send the actions of a step, and return at once; `recv` waits for what becomes of them.
+
+        Args:
+            actions: Shape ``(num_envs, actions)``, in [-1, 1]. NaN makes a world fail, and no other.
+
+        Raises:
+            ArgumentError: The shape is another, or these are no numbers.
+            CommandRefused: There was no reset, or a step is on its way, or, without autoreset, an episode has ended.
+        """
+        self._check_idle("send")
+        if not self._ready:
+            raise CommandRefused("send: no episode has begun; call reset first")
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._done.any():
+            world = int(np.argmax(self._done))
+            problem = f"send: the episode of environment {world} has ended"
+            raise CommandRefused(f'{problem}; call reset(options={{"reset_mask": …}}) for those that ended')
+        given = np.asarray(actions)
+        if given.shape != self._action.shape or given.dtype.kind not in "fiu":
+            expected = f"expected real numbers of shape {self._action.shape}"
+            raise ArgumentError(f"actions: {expected}; got {given.dtype} of shape {given.shape}")
+        self._action, self._previous_action = self._previous_action, self._action
+        np.clip(given, -1.0, 1.0, out=self._action, casting="same_kind")
+        for control, numbers in self._controls:
+            control.apply(self._action[:, numbers], self._frame)
+        self.sim.send(**self._commands.sent)
+        self._in_flight = True
+
+    def recv(self) -> Step:
+        """What became of the actions sent last.
+
+        Returns:
+            ``obs, reward, terminated, truncated, infos``. In the mode ``SAME_STEP``, ``infos["final_obs"]`` holds, in the
+            rows of ``infos["_final_obs"]``, the last observations of episodes that ended, zeros elsewhere.
+
+        Raises:
+            CommandRefused: There is no step on its way.
+            DaemonLost: The daemon went away; its state is lost.
+        """
+        if not self._in_flight:
+            raise CommandRefused("recv: no step is on its way; call send first")
+        frame = self.sim.recv()
+        self._in_flight = False
+        slot, infos = self._next_slot(), {}
+        begun = self._done if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._done.any() else None
+        if begun is None:
+            self._see(frame)
+        else:
+            begun = begun.copy()
+            self._episodes.next(begun)
+            self._begin(begun, self.sim.reset(mask=begun))
+        self._episodes.elapsed += 1 if begun is None else ~begun
+        self._score(slot, infos, begun)
+        np.logical_or(slot.terminated, slot.truncated, out=self._done)
+        due = self._episodes.due()
+        if due is not None and (due := due & ~self._done).any():
+            self._episodes.renew(due, self._worlds)
+            self._see(self._frame)
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._done.any():
+            self._end(slot, infos)
+        self._observe(slot.obs)
+        return slot.obs, slot.reward, slot.terminated, slot.truncated, infos
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """End the simulation, or leave the daemon that was joined."""
+        self.sim.close()
+
+    def _end(self, slot: Slot, infos: dict[str, Any]) -> None:
+        """Keep the last observations of episodes that ended, and begin the next ones."""
+        ended = self._done.copy()
+        self._observe(slot.final_obs)
+        slot.final_obs[~ended] = 0.0
+        infos["final_obs"], infos["_final_obs"] = slot.final_obs, ended
+        final = {name: value for name, value in infos.items() if name in ("success", "fault")}
+        infos["final_info"] = final | {f"_{name}": ended.copy() for name in final}
+        infos["_final_info"] = ended
+        self._episodes.next(ended)
+        self._begin(ended, self.sim.reset(mask=ended))
+
+    def _begin(self, mask: NDArray[np.bool_], frame: Any) -> None:
+        """Begin episodes of worlds that the daemon has reset."""
+        self._commands.begin(mask)
+        self._action[mask] = 0.0
+        self._previous_action[mask] = 0.0
+        self._see(frame)
+        self._episodes.begin(mask, self._worlds)
+        self._see(frame)
+
+    def _see(self, frame: Any) -> None:
+        """Make a frame what the task's functions see."""
+        self._frame, wrap = frame, self._arena.wrap
+        self._worlds = Worlds(
+            action=wrap(self._action),
+            previous_action=wrap(self._previous_action),
+            goal=wrap(self._episodes.goal),
+            elapsed=wrap(self._episodes.elapsed),
+            **{name: wrap(getattr(frame, name)) for name in self.task.fields},
+        )
+
+    def _call(self, name: str) -> Any:
+        """What a function of the task says of the worlds; valid until it is called again."""
+        self._arena.play(self._tapes[name])
+        return getattr(self.task, name)(np, self._worlds)
+
+    def _observe(self, out: NDArray[np.float32]) -> None:
+        self._packer.pack(self._call("observe"), out)
+        frozen = self._frame.status & FROZEN
+        if frozen.any():
+            # what is derived from a frozen state need not be finite
+            out[frozen > 0] = np.nan_to_num(out[frozen > 0], nan=0.0)
+
+    def _score(self, slot: Slot, infos: dict[str, Any], begun: NDArray[np.bool_] | None) -> None:
+        """Reward and ends of the step; worlds that have just begun have neither."""
+        np.copyto(slot.reward, self._call("reward"), casting="same_kind")
+        terminated = self._call("terminated")
+        np.copyto(slot.terminated, False if terminated is None else terminated)
+        if self.max_episode_steps is None:
+            slot.truncated[:] = False
+        else:
+            np.greater_equal(self._episodes.elapsed, self.max_episode_steps, out=slot.truncated)
+        success = self._call("success")
+        fault = self._frame.status & FROZEN
+        if fault.any():
+            failed = fault > 0
+            slot.terminated |= failed
+            slot.reward[failed & ~np.isfinite(slot.reward)] = 0.0
+            infos["fault"], infos["_fault"] = self._frame.status.copy(), failed
+        if begun is not None:
+            slot.reward[begun] = 0.0
+            slot.terminated[begun] = slot.truncated[begun] = False
+        if success is not None:
+            infos["success"], infos["_success"] = np.array(success, np.bool_), self._all.copy()
+            if begun is not None:
+                infos["success"][begun] = False
+
+    def _next_slot(self) -> Slot:
+        if self._slots is None:
+            return Slot(self.num_envs, self._packer.size)
+        return self._slots.next()
+
+    def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
+        if options is None or "reset_mask" not in options:
+            return self._all
+        mask = options["reset_mask"]
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
+            raise ArgumentError(f"reset_mask: give a NumPy array of bool, shape {(self.num_envs,)}; got {mask!r}")
+        if not mask.any():
+            raise ArgumentError("reset_mask: no environment is to be reset; set at least one to True")
+        if not self._ready and not mask.all():
+            raise ArgumentError("reset_mask: the first reset is of all environments; leave the mask out")
+        return mask
+
+    def _check_idle(self, call: str) -> None:
+        if self._in_flight:
+            raise CommandRefused(f"{call}: a step is on its way; call recv first")
+
+
+def _mode(mode: AutoresetMode | str) -> AutoresetMode:
+    modes = {name: mode for mode in AutoresetMode for name in (mode, mode.name, mode.value)}
+    if mode not in modes:
+        raise ArgumentError(f"autoreset_mode is {mode!r}; give NEXT_STEP, SAME_STEP or DISABLED")
+    return modes[mode]

@@ -1,0 +1,1 @@
+"""Tasks that come with tightloop; their names are those of `tightloop.registration`."""

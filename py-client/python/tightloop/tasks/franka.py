@@ -1,0 +1,60 @@
+"""The arm of the manipulation tasks: a Franka Research 3 with its hand, on the ground at the origin, facing +x."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import tightloop as tl
+from tightloop.env.controls import Control, EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
+from tightloop.errors import ArgumentError
+
+URDF = Path(__file__).parents[1] / "assets" / "fr3" / "fr3_franka_hand.urdf"
+#: The arm's dofs, and the fingers'.
+ARM = [f"arm/fr3_joint{number}" for number in range(1, 8)]
+FINGERS = ["arm/fr3_finger_joint1", "arm/fr3_finger_joint2"]
+#: Frame between the finger tips; its z axis points away from the hand.
+TCP = "tcp"
+#: What `controls` knows.
+CONTROLS = ("joint_target", "joint_delta", "end_effector_delta", "torque")
+#: Torques of an action of 1 [N·m]: an eighth of what the drives can.
+_TORQUE = [87 / 8] * 4 + [12 / 8] * 3
+
+
+def add_arm(scene: tl.Scene, start: list[float], *, driven: bool = True) -> tl.Robot:
+    """Add the arm and the site ``tcp``.
+
+    Args:
+        scene: The scene.
+        start: Where its nine joints start [rad or m].
+        driven: Whether the arm's drives hold their targets; without, it follows torques.
+    """
+    arm = scene.add_urdf(URDF, name="arm")
+    arm.joint_q = start
+    ke, kd = (1000.0, 100.0) if driven else (0.0, 0.0)
+    arm.joint_target_ke = [ke] * 7 + [1000.0] * 2
+    arm.joint_target_kd = [kd] * 7 + [100.0] * 2
+    arm.joint_armature = [0.195] * 4 + [0.074] * 3 + [0.1] * 2
+    scene.add_site(body=arm.link("fr3_hand_tcp"), name=TCP)
+    return arm
+
+
+def controls(name: str, *, scale: float, gripper: Gripper | None = None) -> list[Control]:
+    """What an action does to the arm: seven numbers (``end_effector_delta``: six), and one for the gripper if given.
+
+    Args:
+        name: One of `CONTROLS`.
+        scale: Of ``joint_target``: how far from the start [rad]; of ``joint_delta``: how far a step [rad].
+        gripper: The control of the fingers.
+
+    Raises:
+        ArgumentError: There is no such control.
+    """
+    arms = {
+        "joint_target": lambda: JointTarget(ARM, scale),
+        "joint_delta": lambda: JointDelta(ARM, scale),
+        "end_effector_delta": lambda: EndEffectorDelta(TCP, ARM, pos_scale=0.05, rot_scale=0.1),
+        "torque": lambda: JointTorque(ARM, _TORQUE),
+    }
+    if name not in arms:
+        raise ArgumentError(f"control is {name!r}; give one of {', '.join(CONTROLS)}")
+    return [arms[name](), *([] if gripper is None else [gripper])]

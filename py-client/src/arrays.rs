@@ -1,0 +1,119 @@
+//! Arrays of environments, in one pass each: observations out of their parts, commands out of actions.
+
+use numpy::ndarray::{ArrayView2, Axis};
+use numpy::{
+    Element, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray2,
+};
+use pyo3::prelude::*;
+
+use crate::errors::raise;
+
+/// Write parts, each `(worlds,)` or `(worlds, columns)`, side by side into `out`, `(worlds, size)`; numbers below `low` or
+/// above `high`, one a column, count as these. NaN stays NaN.
+#[pyfunction]
+pub(crate) fn pack(
+    py: Python<'_>,
+    mut out: PyReadwriteArray2<'_, f32>,
+    parts: Vec<Bound<'_, PyAny>>,
+    low: PyReadonlyArray1<'_, f32>,
+    high: PyReadonlyArray1<'_, f32>,
+) -> PyResult<()> {
+    let (low, high) = (low.as_slice()?, high.as_slice()?);
+    let size = low.len();
+    let out = out.as_slice_mut()?;
+    let mut first = 0;
+    for part in &parts {
+        let columns = None
+            .or_else(|| place(part, out, first, low, high, |x: f32| x))
+            .or_else(|| place(part, out, first, low, high, |x: f64| x as f32))
+            .or_else(|| place(part, out, first, low, high, |x: i32| x as f32))
+            .or_else(|| place(part, out, first, low, high, |x: i64| x as f32))
+            .or_else(|| place(part, out, first, low, high, |x: bool| f32::from(u8::from(x))));
+        let Some(columns) = columns else {
+            let problem =
+                format!("pack: the part at column {first} has a type or shape that does not fit");
+            return Err(raise(py, "ArgumentError", problem));
+        };
+        first += columns;
+    }
+    if first != size {
+        let problem = format!("pack: {first} columns for {size}");
+        return Err(raise(py, "ArgumentError", problem));
+    }
+    Ok(())
+}
+
+/// Copies a part into the columns from `first` on; how many it has, or `None` if its type or shape is another.
+fn place<T: Element + Copy>(
+    part: &Bound<'_, PyAny>,
+    out: &mut [f32],
+    first: usize,
+    low: &[f32],
+    high: &[f32],
+    real: impl Fn(T) -> f32,
+) -> Option<usize> {
+    let array = part.cast::<PyArrayDyn<T>>().ok()?.try_readonly().ok()?;
+    let view = array.as_array();
+    let view = match view.ndim() {
+        1 => view.insert_axis(Axis(1)),
+        _ => view,
+    };
+    let view: ArrayView2<'_, T> = view.into_dimensionality().ok()?;
+    let columns = first..first + view.ncols();
+    let (low, high) = (low.get(columns.clone())?, high.get(columns.clone())?);
+    let size = out.len().checked_div(view.nrows())?;
+    if size * view.nrows() != out.len() || columns.end > size {
+        return None;
+    }
+    let rows = out
+        .chunks_exact_mut(size)
+        .map(|row| &mut row[columns.clone()]);
+    if view.ncols() == 1 {
+        let (low, high) = (low[0], high[0]);
+        for (to, from) in rows.zip(view.column(0)) {
+            to[0] = real(*from).clamp(low, high);
+        }
+    } else {
+        for (to, from) in rows.zip(view.rows()) {
+            match from.as_slice() {
+                Some(from) => {
+                    for (k, to) in to.iter_mut().enumerate() {
+                        *to = real(from[k]).clamp(low[k], high[k]);
+                    }
+                }
+                None => {
+                    for (k, to) in to.iter_mut().enumerate() {
+                        *to = real(from[k]).clamp(low[k], high[k]);
+                    }
+                }
+            }
+        }
+    }
+    Some(columns.len())
+}
+
+/// Commands from actions: column k of `out`, from `first` on, becomes `base + scale * action`, within `low` and `high`, one a
+/// column of `action`. The base is `start`, one a column, or without it what stands there. NaN stays NaN.
+#[pyfunction]
+#[pyo3(signature = (out, first, action, scale, start, low, high, /))]
+#[allow(clippy::too_many_arguments)] // a call of Python's, with positions only
+pub(crate) fn drive(
+    mut out: PyReadwriteArray2<'_, f32>,
+    first: usize,
+    action: PyReadonlyArray2<'_, f32>,
+    scale: PyReadonlyArray1<'_, f32>,
+    start: Option<PyReadonlyArray1<'_, f32>>,
+    low: PyReadonlyArray1<'_, f32>,
+    high: PyReadonlyArray1<'_, f32>,
+) -> PyResult<()> {
+    let (scale, low, high) = (scale.as_slice()?, low.as_slice()?, high.as_slice()?);
+    let start = start.as_ref().map(|start| start.as_slice()).transpose()?;
+    let (mut out, action) = (out.as_array_mut(), action.as_array());
+    for (mut to, from) in out.rows_mut().into_iter().zip(action.rows()) {
+        for (k, number) in from.iter().enumerate() {
+            let base = start.map_or(to[first + k], |start| start[k]);
+            to[first + k] = (base + scale[k] * number).clamp(low[k], high[k]);
+        }
+    }
+    Ok(())
+}
