@@ -70,6 +70,41 @@ impl Stream {
     }
 }
 
+/// Whether the world's number is part of what a draw depends on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Draws {
+    /// It is: worlds of one seed draw different numbers.
+    #[default]
+    World,
+    /// 0 stands for it: worlds of one seed draw the same numbers, wherever they are.
+    Seed,
+}
+
+impl Draws {
+    /// The one of a name.
+    pub fn named(name: &str) -> Option<Draws> {
+        [Draws::World, Draws::Seed]
+            .into_iter()
+            .find(|draws| draws.name() == name)
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Draws::World => "world",
+            Draws::Seed => "seed",
+        }
+    }
+
+    /// What stands for a world in its draws.
+    pub fn number(self, world: usize) -> u32 {
+        match self {
+            Draws::World => world as u32,
+            Draws::Seed => 0,
+        }
+    }
+}
+
 /// The numbers of one stream in one episode of one world, each with its index.
 #[derive(Clone, Copy, Debug)]
 pub struct Draw {

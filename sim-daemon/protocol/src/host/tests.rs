@@ -68,6 +68,7 @@ fn description() -> Description {
         joint_qd_max: None,
         on_fault: "freeze".to_owned(),
         on_nan: "refuse".to_owned(),
+        draws: "world".to_owned(),
         state_bytes: 0,
         schema: 0,
     }
