@@ -25,7 +25,7 @@ class Hasty(CartPoleBalance):
     """Episodes of all kinds: some end by a fall, some by time, and goals change on the way."""
 
     max_episode_steps = 12
-    start = 0.15
+    start = 0.2
     goal_draws = 2
     goal_steps = 5
 
@@ -98,7 +98,7 @@ def test_agrees_with_gymnasiums_vector_of_single_environments(mode: AutoresetMod
     assert theirs.single_action_space == ours.single_action_space
     seeds: list[int | None] = [11, 3, 7, 7, 2**40]
     np.testing.assert_array_equal(ours.reset(seed=seeds)[0], theirs.reset(seed=seeds)[0])
-    ended = np.zeros(count, int)
+    ended, falls, cuts = np.zeros(count, int), 0, 0
     for action in actions(ours, steps):
         own, other = ours.step(action), theirs.step(action)
         for mine, yours in zip(own[:4], other[:4], strict=True):
@@ -106,12 +106,13 @@ def test_agrees_with_gymnasiums_vector_of_single_environments(mode: AutoresetMod
         same_infos(own[4], other[4])
         done = own[2] | own[3]
         ended += done
+        falls, cuts = falls + own[2].sum(), cuts + own[3].sum()
         if mode is AutoresetMode.DISABLED and done.any():
             again, against = (env.reset(options={"reset_mask": done.copy()}) for env in (ours, theirs))
             np.testing.assert_array_equal(again[0], against[0])
     theirs.close()
     assert ended.min() >= 3
-    assert ended.sum() > steps * count // 12 + count, "some episodes end by a fall"
+    assert falls and cuts, "episodes end in both ways"
 
 
 def same_infos(mine: dict[str, Any], yours: dict[str, Any]) -> None:
@@ -129,7 +130,9 @@ def same_infos(mine: dict[str, Any], yours: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
 def test_gymnasiums_wrappers_take_it(mode: AutoresetMode, envs: Any) -> None:
-    env = RecordEpisodeStatistics(NormalizeObservation(envs(Hasty, 6, autoreset_mode=mode)))
+    env = RecordEpisodeStatistics(envs(Hasty, 6, autoreset_mode=mode))
+    if mode is AutoresetMode.NEXT_STEP:  # the other modes it refuses
+        env = NormalizeObservation(env)
     env.reset(seed=1)
     lengths = []
     for action in actions(env.unwrapped, 50):
