@@ -119,6 +119,45 @@ class Sim:
         wrench = None if body_f is None else self.params.ready("body_f", body_f)
         return self._client.step(joint_f, joint_target_q, joint_target_qd, wrench)
 
+    def send(
+        self,
+        *,
+        joint_f: Command | None = None,
+        joint_target_q: Command | None = None,
+        joint_target_qd: Command | None = None,
+        body_f: Command | None = None,
+    ) -> None:
+        """Begin a step and return at once: the worlds advance while the caller does something else, until `recv`.
+
+        Until then every other command (a second ``send``, `step`, `reset`, `write`, `forward`, `snapshot`, `restore`,
+        and reading or writing ``params``) is refused and touches nothing.
+
+        Args:
+            joint_f: As of `step`; the arrays are copied, and may be written to again at once.
+            joint_target_q: As of `step`.
+            joint_target_qd: As of `step`.
+            body_f: As of `step`.
+
+        Raises:
+            CommandRefused: A wrong shape or dtype, or a step is in flight; nothing was sent. A wrong value, such as
+                NaN, shows in `recv`. Other errors are those of `step`.
+        """
+        wrench = None if body_f is None else self.params.ready("body_f", body_f)
+        self._client.send(joint_f, joint_target_q, joint_target_qd, wrench)
+
+    def recv(self) -> Frame:
+        """Wait for the frame of the step that `send` began. A wait that Ctrl-C ended may be taken up again.
+
+        Returns:
+            The frame that `step` would have returned.
+
+        Raises:
+            CommandRefused: A value was wrong, and no world was touched; or no step was sent.
+            LeaseLost: This client controlled the daemon, and no longer does.
+            DaemonLost: The daemon went away; its state is lost.
+        """
+        return self._client.recv()
+
     def reset(
         self,
         *,
