@@ -64,8 +64,12 @@ PRESETS = {
     "CartPoleBalance": Config(minutes=0.5, num_envs=512, hidden=64),
     "CartPoleSwingUp": Config(minutes=1.0, num_envs=1024, steps=32, hidden=64, evaluate=10.0),
     "FrankaReach": Config(minutes=3.0),
-    "FrankaPushCube": Config(15.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=30.0),
-    "FrankaPickCube": Config(60.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=60.0),
+    "FrankaPushCube": Config(
+        15.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=30.0
+    ),
+    "FrankaPickCube": Config(
+        60.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=60.0
+    ),
     "FrankaLift": Config(minutes=30.0, num_envs=2048, gamma=0.98, hidden=256, entropy=0.005, evaluate=60.0),
 }
 

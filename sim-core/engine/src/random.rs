@@ -8,6 +8,9 @@
 use sim_core::model::Distribution;
 use sim_core::model::params::Param;
 
+/// How many streams a task has, [`Stream::Task`].
+pub const TASK_STREAMS: u8 = 32;
+
 /// What numbers are for; those of different streams have nothing to do with each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stream {
@@ -17,6 +20,8 @@ pub enum Stream {
     StartVelocity,
     /// A parameter after a reset; the index is a column of it.
     Param(Param),
+    /// What a task draws for itself, such as goals; it has 32 streams, from 0, and says what the index is.
+    Task(u8),
     /// Of `joint_f` in a frame; the index is a dof. Streams of frames begin here.
     ForceNoise,
     /// Of `joint_target_q`, likewise.
@@ -47,6 +52,10 @@ impl Stream {
         match self {
             Stream::StartPosition => 0,
             Stream::StartVelocity => 1,
+            Stream::Task(stream) => {
+                assert!(stream < TASK_STREAMS, "a task has {TASK_STREAMS} streams");
+                64 + u32::from(stream)
+            }
             Stream::ForceNoise => 128,
             Stream::TargetNoise => 129,
             Stream::TargetRateNoise => 130,

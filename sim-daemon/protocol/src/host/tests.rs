@@ -313,7 +313,12 @@ fn a_client_that_goes_with_a_step_in_flight_makes_room_for_the_next() {
         assert!(matches!(error, ProtocolError::NothingSent), "{error}");
         client.send(&[], &mut keep_waiting()).unwrap();
         drop(client);
-        fake.attach().step(&[], &mut keep_waiting()).unwrap();
+        let (next, deadline) = (fake.attach(), Instant::now() + Duration::from_secs(2));
+        // a holder that came and went between two looks of the host is missed after `JOIN_MAX`
+        while let Err(error) = next.step(&[], &mut keep_waiting()) {
+            assert!(matches!(error, ProtocolError::LeaseHeld { .. }), "{error}");
+            assert!(Instant::now() < deadline, "{error}");
+        }
     }
 }
 
