@@ -84,10 +84,10 @@ class Observed:
 class Task:
     """What an environment is about; a subclass says it, see ``examples/own_task.py``.
 
-    `observe`, `reward`, `terminated`, `success`, `metrics` and `goal` are pure: arrays in, arrays out, for all worlds at
-    once. They use arithmetic and the functions of the namespace ``xp`` that NumPy and the array API share, so that they run on
-    arrays of torch and JAX too. What they return is valid until they are called again. They see no simulation and draw
-    no random numbers.
+    `observe`, `reward`, `terminated`, `success`, `metrics` and `goal` are pure: arrays in, arrays out, for all worlds
+    at once. They use arithmetic and the functions of the namespace ``xp`` that NumPy and the array API share, so that
+    they run on arrays of torch and JAX too. What they return is valid until they are called again. They see no
+    simulation and draw no random numbers.
 
     Attributes:
         fields: Fields of the frame that the functions read.

@@ -35,9 +35,9 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
     Observations are float32, shape ``(num_envs, size)``, within the bounds of ``single_observation_space``; actions
     float32 in [-1, 1], shape ``(num_envs, actions)``, and what is beyond counts as the bound. Rewards are float32.
 
-    ``infos["success"]`` says in which worlds the task is done now, where the task knows, as do its other `Task.metrics`;
-    ``infos["_success"]`` says in which rows that is told: not of worlds that have just begun. A world that failed (no longer
-    finite, or beyond the task's bounds) is terminated, and ``infos["fault"]`` holds the bits of its ``status``.
+    ``infos["success"]`` says in which worlds the task is done now, where the task knows; its `Task.metrics` are told
+    likewise, and ``infos["_success"]`` says in which rows: not of worlds that have just begun. A world that failed (no
+    longer finite, or beyond the task's bounds) is terminated, and ``infos["fault"]`` holds the bits of its ``status``.
 
     Attributes:
         sim: The simulation.
@@ -67,7 +67,8 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         """Launch a daemon with that many worlds, or join one.
 
         Args:
-            task: A `Task`, its class, or the name of one of `tightloop.tasks`, such as ``"FrankaReach"``.
+            task: A `Task`, its class, the name of one of `tightloop.tasks`, such as ``"FrankaReach"``, or
+                ``"own_task.py:Circle"``, a class in a file.
             num_envs: How many worlds; those of the daemon if one is joined, else 1.
             autoreset_mode: ``NEXT_STEP``, ``SAME_STEP`` or ``DISABLED``, as gymnasium defines them.
             copy: Whether each step returns new arrays. Otherwise they are views of a ring, overwritten by the step
