@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.env import VectorEnv
+from tightloop.tasks.lift import START
 
 Array = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ class PickCube:
         self._over |= (off[:, :2].max(1) < 0.01) & (off[:, 3:].max(1) < 0.1)
         close = self._over & ((off[:, 2] < 0.005) | (self._closed > 0))
         self._closed += close
-        place = cube[:, :3] + np.where(self._over, 0.0, 0.07)[:, None] * [0.0, 0.0, 1.0]
+        place = cube[:, :3] + np.where(self._over, 0.0, 0.07)[:, None] * np.array([0.0, 0.0, 1.0])
         # the cube, not the tcp, is to be at the goal
         place = np.where((self._closed > 4)[:, None], goal + tcp[:, :3] - cube[:, :3], place)
         turn = joint_turn(self._envs, np.c_[q, cube], displacement(tcp, place, self._yaw))
@@ -45,7 +46,7 @@ class PushCube:
         """Actions ``(worlds, 8)`` for these observations."""
         q, qd, tcp, goal, cube = obs[:, :9], obs[:, 9:16], obs[:, 18:25], obs[:, 25:28], obs[:, 28:35]
         if step < 18:
-            place = cube[:, :3] + [-0.06, 0.0, 0.08 if step < 10 else 0.0]
+            place = cube[:, :3] + np.array([-0.06, 0.0, 0.08 if step < 10 else 0.0])
         else:
             # the tcp, behind the cube, stops 0.03 m inside the goal's edge
             place = np.c_[np.minimum(tcp[:, 0] + 0.03, goal[:, 0] - 0.07), cube[:, 1], cube[:, 2]]
@@ -57,7 +58,7 @@ class Lift:
     """As `PickCube`, by targets about the start; the pose of the hand is found from the joints."""
 
     def __init__(self, envs: VectorEnv, obs: Array) -> None:
-        self._envs, self._start = envs, np.array(envs.task.start)
+        self._envs, self._start = envs, np.array(START)
         self._target = self._start[:7] + np.zeros((len(obs), 1))
 
     def __call__(self, obs: Array, step: int) -> Array:
@@ -66,10 +67,8 @@ class Lift:
         state = np.c_[q, cube, np.tile([0.0, 0.0, 0.0, 1.0], (len(obs), 1))]
         dynamics = self._envs.sim.dynamics
         tcp = dynamics.forward_kinematics(state)[:, dynamics.body_names.index(TCP)]
-        if step < 90:
-            place = cube + [0.0, 0.0, 0.08 if step < 40 else 0.0]
-        else:
-            place = goal + tcp[:, :3] - cube
+        over = np.array([0.0, 0.0, 0.08 if step < 40 else 0.0])
+        place = cube + over if step < 90 else goal + tcp[:, :3] - cube
         turn = joint_turn(self._envs, state, displacement(tcp, place, np.zeros(len(obs))))
         # a fifth of the way in each step: the drives lag by a tenth of a second
         self._target += np.clip(0.2 * turn, -0.04, 0.04)
