@@ -85,7 +85,8 @@ class FrankaReach(Task):
 
     def observe(self, xp: Namespace, worlds: Worlds) -> Sequence[Array]:
         """Joints, goal, last action."""
-        return worlds.joint_q - self._start, worlds.joint_qd, worlds.goal[:, :3], worlds.goal[:, 3:], worlds.action
+        turned = worlds.joint_q - xp.asarray(self._start)
+        return turned, worlds.joint_qd, worlds.goal[:, :3], worlds.goal[:, 3:], worlds.action
 
     def error(self, xp: Namespace, worlds: Worlds) -> Array:
         """Distance of the tcp from the goal [m], shape ``(worlds,)``."""
