@@ -3,7 +3,8 @@
     python examples/play.py FrankaReach out/train/FrankaReach-0/policy.onnx
 
 The file is ONNX with the input ``obs`` (worlds, size) and the output ``action`` (worlds, actions), as
-``examples/ppo.py`` leaves it. Every world plays one episode; the picture has the rewards, the actions and the first observations of a few.
+``examples/ppo.py`` leaves it. Every world plays one episode; the picture has the rewards, the
+actions and the first observations of a few.
 """
 
 from __future__ import annotations

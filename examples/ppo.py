@@ -9,7 +9,8 @@ divergence).
 
 In ``out/train/TASK-SEED`` it leaves a checkpoint every few seconds (``--resume`` goes on from it), the log for
 TensorBoard, the curve as CSV and PNG, and the policy as ONNX, which ``examples/play.py`` runs. With
-``--daemon NAME`` it joins worlds that ``python -m tightloop.env serve TASK --name NAME`` keeps, so that it can be killed and come back.
+``--daemon NAME`` it joins worlds that ``python -m tightloop.env serve TASK --name NAME`` keeps, so that it can be
+killed and come back.
 """
 
 from __future__ import annotations
