@@ -34,7 +34,8 @@ def cart_pole_balance(world: World) -> Told:
 
 def cart_pole_swing_up(world: World) -> Told:
     (x, angle), (_, rate), (force,) = world["joint_q"], world["joint_qd"], world["action"]
-    reward = (1 + math.cos(angle)) / 2 * (1 - x**2 / 11.5) - 0.001 * (rate**2 + force**2)
+    upright, quiet, middle = (1 + math.cos(angle)) / 2, 1 / (1 + rate**2 / 25), 1 - x**2 / 2.4**2
+    reward = upright * (1 + quiet) / 2 * (1 + middle) / 2 * (1 - force**2 / 5)
     upright = abs(math.remainder(angle, 2 * math.pi)) < 0.2
     return Told(cart_pole_balance(world).obs, reward, success=upright and abs(rate) < 1)
 

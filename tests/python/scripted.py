@@ -73,7 +73,7 @@ class Lift:
         # a fifth of the way in each step: the drives lag by a tenth of a second
         self._target += np.clip(0.2 * turn, -0.04, 0.04)
         self._target = np.clip(self._target, self._start[:7] - 1.5, self._start[:7] + 1.5)
-        action = (self._target - self._start[:7]) / 1.5
+        action = (self._target - self._start[:7]) / 0.5
         return np.c_[action, np.full(len(obs), OPEN if step < 75 else CLOSED)]
 
 

@@ -25,7 +25,7 @@ class Worlds:
     """All worlds at one instant, as the functions of a task see them; arrays have the worlds first.
 
     Attributes:
-        action: What was asked for in the step that led here, shape ``(worlds, actions)``, in [-1, 1]; 0 after a reset.
+        action: What was asked for in the step that led here, shape ``(worlds, actions)``; 0 after a reset.
         previous_action: What was asked for in the step before.
         goal: What `Task.goal` gave, shape ``(worlds, …)``.
         elapsed: Control steps since the reset, shape ``(worlds,)``, int32.

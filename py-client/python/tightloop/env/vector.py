@@ -33,7 +33,8 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
     """A task in many worlds.
 
     Observations are float32, shape ``(num_envs, size)``, within the bounds of ``single_observation_space``; actions
-    float32 in [-1, 1], shape ``(num_envs, actions)``, and what is beyond counts as the bound. Rewards are float32.
+    of shape ``(num_envs, actions)`` within those of ``single_action_space``, and what is beyond counts as the bound.
+    Rewards are float32.
 
     ``infos["success"]`` says in which worlds the task is done now, where the task knows; its `Task.metrics` are told
     likewise, and ``infos["_success"]`` says in which rows: not of worlds that have just begun. A world that failed (no
@@ -115,7 +116,10 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             place += control.size
         low, high = np.concatenate([part.bounds for part in self.task.observed()], axis=1)
         self.single_observation_space = Box(low, high, dtype=np.float32)
-        self.single_action_space = Box(-1.0, 1.0, (place,), np.float32)
+        limits = np.concatenate([np.full(control.size, control.limit, np.float32) for control in controls])
+        self.single_action_space = Box(-limits, limits, dtype=np.float32)
+        # one number where it does: NumPy takes long over rows of few
+        self._limits = limits[0] if (limits == limits[0]).all() else limits
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
@@ -170,7 +174,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         """Send the actions of a step, and return at once; `recv` waits for what becomes of them.
 
         Args:
-            actions: Shape ``(num_envs, actions)``, in [-1, 1]. NaN makes a world fail, and no other.
+            actions: Shape ``(num_envs, actions)``, within ``action_space``. NaN makes a world fail, and no other.
 
         Raises:
             ArgumentError: The shape is another, or these are no numbers.
@@ -188,7 +192,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             expected = f"expected real numbers of shape {self._action.shape}"
             raise ArgumentError(f"actions: {expected}; got {given.dtype} of shape {given.shape}")
         self._action, self._previous_action = self._previous_action, self._action
-        np.clip(given, -1.0, 1.0, out=self._action, casting="same_kind")
+        np.clip(given, -self._limits, self._limits, out=self._action, casting="same_kind")
         for control, numbers in self._controls:
             control.apply(self._action[:, numbers], self._frame)
         self.sim.send(**self._commands.sent)

@@ -27,9 +27,9 @@ DT = 1 / 200
 KE, KD = 1e4, 200.0
 #: Friction of cube and ground; and of the arm, which counts where it touches them [–].
 MU, MU_ARM = 0.3, 1.15
-#: How far from the start an action of ``joint_target`` goes [rad]: with 1 rad the hand comes to a quarter of the places
+#: Of actions of ``joint_target``, that is 1.5 rad from the start: with 1 rad the hand comes to a quarter of the places
 #: where `tightloop.tasks.lift` has its cube, with 1.25 rad to 99%.
-TARGETS = 1.5
+LIMIT = 3.0
 #: The contact sensors: the cube's force on each finger.
 TOUCH = ("touch_left", "touch_right")
 #: Least force on each finger that holds [N].
@@ -51,8 +51,9 @@ class CubeTask(Task):
 
     def __init__(self, control: str) -> None:
         self._control = control
-        scale = TARGETS if control == "joint_target" else 0.1
-        self._arm_controls = franka.controls(control, scale=scale, gripper=franka.gripper(binary=self.binary_gripper))
+        scale = 0.5 if control == "joint_target" else 0.1
+        gripper = franka.gripper(binary=self.binary_gripper)
+        self._arm_controls = franka.controls(control, scale=scale, limit=LIMIT, gripper=gripper)
 
     def scene(self) -> tl.Scene:
         """Arm and cube on the ground, and contact sensors of the fingers."""

@@ -49,19 +49,20 @@ def add_arm(
     return arm
 
 
-def controls(name: str, *, scale: float, gripper: Gripper | None = None) -> list[Control]:
+def controls(name: str, *, scale: float, gripper: Gripper | None = None, limit: float = 1.0) -> list[Control]:
     """What an action does to the arm: seven numbers (``end_effector_delta``: six), and one for the gripper if given.
 
     Args:
         name: One of `CONTROLS`.
         scale: Of ``joint_target``: how far from the start [rad]; of ``joint_delta``: how far a step [rad].
         gripper: The control of the fingers.
+        limit: How large an action of ``joint_target`` may be; of the others 1.
 
     Raises:
         ArgumentError: There is no such control.
     """
     arms = {
-        "joint_target": lambda: JointTarget(ARM, scale),
+        "joint_target": lambda: JointTarget(ARM, scale, limit=limit),
         "joint_delta": lambda: JointDelta(ARM, scale),
         "end_effector_delta": lambda: EndEffectorDelta(TCP, ARM, pos_scale=0.05, rot_scale=0.1),
         "torque": lambda: JointTorque(ARM, _TORQUE),

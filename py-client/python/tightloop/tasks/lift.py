@@ -3,8 +3,8 @@
 After Isaac Lab's ``Isaac-Lift-Cube-Franka-v0`` (its ranges, weights and rates, without the curriculum that raises the
 weights of the last two terms), with this project's arm and quaternions (x, y, z, w), and a cube of 4 cm. Control at
 50 Hz, episodes of 5 s, physics at 200 Hz, not 100 (`tightloop.tasks.cube` says why). The arm stands at the origin, the
-cube at x = 0.5 m, off by up to 0.1 m in x and 0.25 m in y, its sides along the axes. Isaac Lab's actions have no bounds
-and a scale of 0.5 rad; within ±0.5 rad of the start the hand comes to no cube, so that here 1 means 1.5 rad.
+cube at x = 0.5 m, off by up to 0.1 m in x and 0.25 m in y, its sides along the axes. Isaac Lab's actions have
+no bounds; here they end at ±3, 1.5 rad, where the hand comes to every cube: within ±1 it comes to none.
 
 | place | observation | range | unit |
 |---|---|---|---|
@@ -13,11 +13,11 @@ and a scale of 0.5 rad; within ±0.5 rad of the start the hand comes to no cube,
 | 18–20 | position of the cube | ±2 | m |
 | 21–23 | goal of the cube: position | x 0.4–0.6, y ±0.25, z 0.25–0.5 | m |
 | 24–27 | goal of the cube: orientation, upright, which nothing asks for | ±1 | – |
-| 28–35 | last action | ±1 | – |
+| 28–35 | last action | ±3; gripper ±1 | – |
 
 | action | range | what 1 means |
 |---|---|---|
-| 0–6 | ±1 | 1.5 rad from the start (``joint_target``), or what the chosen control means |
+| 0–6 | ±3 | 0.5 rad from the start (``joint_target``); ±1 with the other controls, and what they mean |
 | last | ±1 | target of the fingers: 4 cm, open, from 0 up; below it is -1 cm, closed |
 
 With the control ``end_effector_delta`` an action has one number less, and so has the observation.
@@ -63,12 +63,14 @@ class FrankaLift(CubeTask):
 
     def observed(self) -> Sequence[Observed]:
         """The table above."""
+        arm, _ = self.controls()
         return [
             *joints_observed(),
             Observed("cube: position", -2, 2, 3, "m"),
             Observed("goal: position", LOW, HIGH, 3, "m"),
             Observed("goal: orientation", -1, 1, 4),
-            Observed("last action", -1, 1, sum(control.size for control in self.controls())),
+            Observed("last action: arm", -arm.limit, arm.limit, arm.size, "–"),
+            Observed("last action: gripper", -1, 1),
         ]
 
     def bind(self, names: Names) -> None:
@@ -90,7 +92,8 @@ class FrankaLift(CubeTask):
             worlds.joint_q[:, self._pos],
             worlds.goal[:, :3],
             worlds.goal[:, 3:],
-            worlds.action,
+            worlds.action[:, :-1],
+            worlds.action[:, -1],
         )
 
     def error(self, xp: Namespace, worlds: Worlds) -> Array:
