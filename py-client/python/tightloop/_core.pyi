@@ -22,6 +22,11 @@ class Frame:
     as the precision of the run says. Only the fields asked for in ``launch(fields=...)`` are there, besides
     ``time``, ``step``, ``status`` and ``contacts_left_out``.
 
+    Every array begins at a multiple of 64 bytes, so other libraries take it as it is: ``np.from_dlpack``,
+    ``torch.from_dlpack`` and ``jax.device_put`` copy nothing, and what they return keeps the frame alive. torch knows
+    no read-only memory: writing to such a tensor ends the process, so ``clone()`` it first. JAX copies 64-bit arrays
+    unless it runs with ``jax_enable_x64``, and its ``from_dlpack`` refuses arrays that are read-only.
+
     Raises:
         UnknownField: The frame does not carry that field; the message lists those it carries.
     """
