@@ -59,7 +59,7 @@ class Config:
     clip: float = 0.2  # of the ratio of probabilities
     entropy: float = 0.0  # weight of the entropy in the loss
     lr: float = 1e-3  # learning rate at the start
-    kl: float = 0.01  # change of the policy that the learning rate aims at, a rollout
+    kl: float = 0.01  # change of the policy that the learning rate aims at, a rollout; a tenth of it at the end
     std: float = 0.6  # standard deviation of actions at the start
     grad_max: float = 1.0  # norm of a gradient, at most
     evaluate: float = 15.0  # seconds between evaluations
@@ -238,10 +238,11 @@ class Trainer:
     def _follow(self, kl: float) -> None:
         """Let the learning rate follow how much the policy changes."""
         group = self.optimizer.param_groups[0]
-        if kl > 2.0 * self.config.kl:
-            group["lr"] = max(1e-5, group["lr"] / 1.5)
-        elif 0.0 < kl < 0.5 * self.config.kl:
-            group["lr"] = min(1e-2, group["lr"] * 1.5)
+        aim = self.config.kl * (1.0 - 0.9 * min(1.0, self.seconds / (60.0 * self.config.minutes)))
+        if kl > 2.0 * aim:
+            group["lr"] = max(1e-5, group["lr"] / 1.2)
+        elif 0.0 < kl < 0.5 * aim:
+            group["lr"] = min(3e-3, group["lr"] * 1.2)
 
     @torch.no_grad()
     def evaluate(self) -> dict[str, float]:
