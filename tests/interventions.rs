@@ -13,7 +13,7 @@ use sim_core::batch::{Field, status};
 use sim_core::model::Model;
 use sim_core::model::params::Param;
 use sim_engine::backend::{Values, cpu};
-use sim_engine::simulation::{Faults, Lanes, Options, Precision};
+use sim_engine::simulation::{Draws, Faults, Lanes, Options, Precision};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -51,13 +51,14 @@ impl Case {
             lanes: dice.pick(&lanes(precision)),
             fields: Field::ALL.to_vec(),
             faults,
+            draws: dice.pick(&[Draws::World, Draws::Seed]),
         };
         let is_noisy = model.constants().varying.params().any(is_noise);
         Ok(Case {
             dice,
             model,
+            is_drawn: (is_drawn || is_noisy) && options.draws == Draws::World,
             options,
-            is_drawn: is_drawn || is_noisy,
         })
     }
 

@@ -54,15 +54,28 @@ impl Client {
         body_f: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Frame> {
         let connection = self.connection(py)?;
-        let mut inputs = Inputs::new(&self.description);
-        if let Some(body_f) = body_f {
-            inputs.add_ready("body_f", body_f)?;
-        }
-        inputs.add("joint_f", Axis::Dofs, joint_f)?;
-        inputs.add("joint_target_q", Axis::Dofs, joint_target_q)?;
-        inputs.add("joint_target_qd", Axis::Dofs, joint_target_qd)?;
+        let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], body_f)?;
         let commands = inputs.commands()?;
         frame(py, |hook| connection.step(&commands, hook))
+    }
+
+    fn send(
+        &self,
+        py: Python<'_>,
+        joint_f: Option<&Bound<'_, PyAny>>,
+        joint_target_q: Option<&Bound<'_, PyAny>>,
+        joint_target_qd: Option<&Bound<'_, PyAny>>,
+        body_f: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let connection = self.connection(py)?;
+        let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], body_f)?;
+        let commands = inputs.commands()?;
+        waiting(py, |hook| connection.send(&commands, hook))
+    }
+
+    fn recv(&self, py: Python<'_>) -> PyResult<Frame> {
+        let connection = self.connection(py)?;
+        frame(py, |hook| connection.recv(hook))
     }
 
     fn write(
@@ -146,6 +159,25 @@ impl Client {
 }
 
 impl Client {
+    /// The arrays of a step.
+    fn inputs<'py>(
+        &self,
+        by_dof: [Option<&Bound<'py, PyAny>>; 3],
+        body_f: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Inputs<'_, 'py>> {
+        let mut inputs = Inputs::new(&self.description);
+        if let Some(body_f) = body_f {
+            inputs.add_ready("body_f", body_f)?;
+        }
+        for (field, value) in ["joint_f", "joint_target_q", "joint_target_qd"]
+            .into_iter()
+            .zip(by_dof)
+        {
+            inputs.add(field, Axis::Dofs, value)?;
+        }
+        Ok(inputs)
+    }
+
     fn connection(&self, py: Python<'_>) -> PyResult<Arc<Connection>> {
         let name = &self.description.name;
         if std::process::id() != self.process {

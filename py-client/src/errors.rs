@@ -33,7 +33,9 @@ pub(crate) fn protocol(py: Python<'_>, error: &ProtocolError) -> PyErr {
             kind: RefusalKind::Snapshot,
             ..
         } => "SnapshotError",
-        NotAnInput { .. } | Shape { .. } | CommandRefused { .. } => "CommandRefused",
+        NotAnInput { .. } | Shape { .. } | CommandRefused { .. } | StepInFlight | NothingSent => {
+            "CommandRefused"
+        }
         SharedMemory { .. } | Memory { .. } => "ResourceError",
         Timeout { .. } => "WaitTimeout",
         Root { .. } | NameTaken { .. } => "LaunchError",

@@ -9,6 +9,7 @@ mod dynamics;
 mod errors;
 mod frame;
 mod input;
+mod random;
 mod scene;
 
 use std::ffi::OsString;
@@ -35,6 +36,8 @@ mod core {
     use super::dynamics::Dynamics;
     #[pymodule_export]
     use super::frame::{Frame, Sample};
+    #[pymodule_export]
+    use super::random::draw;
     #[pymodule_export]
     use super::scene::{load_scene, read_mesh, read_urdf, save_scene, scene_to_toml};
 

@@ -111,6 +111,10 @@ pub(crate) struct Serve {
     #[arg(long, default_value = "refuse")]
     pub(crate) on_nan: String,
 
+    /// What is drawn of a world depends on: world for its number and its seed, seed for its seed alone.
+    #[arg(long, default_value = "world")]
+    pub(crate) draws: String,
+
     /// Frames that a client may hold at once.
     #[arg(long, default_value_t = 4)]
     pub(crate) frames_held: usize,

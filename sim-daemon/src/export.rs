@@ -150,6 +150,7 @@ pub(crate) fn description(
         } else {
             "refuse".to_owned()
         },
+        draws: options.draws.name().to_owned(),
         state_bytes: 0,
         schema: 0,
     }

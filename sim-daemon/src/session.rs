@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde_json::json;
 use sim_core::batch::Field;
-use sim_engine::simulation::{Faults, Lanes, Options, Precision, Simulation};
+use sim_engine::simulation::{Draws, Faults, Lanes, Options, Precision, Simulation};
 use sim_protocol::host::{Host, check_memory};
 use sim_protocol::place::Place;
 use sim_protocol::tenancy::Tenancy;
@@ -195,6 +195,10 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
         let problem = "unknown; use refuse or freeze".to_owned();
         return wrong("on-nan", &serve.on_nan, problem);
     }
+    let Some(draws) = Draws::named(&serve.draws) else {
+        let problem = "unknown; use world or seed".to_owned();
+        return wrong("draws", &serve.draws, problem);
+    };
     for (argument, value) in [
         ("joint-q-max", serve.joint_q_max),
         ("joint-qd-max", serve.joint_qd_max),
@@ -217,6 +221,7 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
             resets: serve.on_fault == "reset",
             freezes_nan: serve.on_nan == "freeze",
         },
+        draws,
     })
 }
 

@@ -2,6 +2,7 @@
 
 #[path = "../daemon/mod.rs"]
 mod daemon;
+mod halves;
 mod mistakes;
 
 use std::ops::ControlFlow;

@@ -56,6 +56,35 @@ def test_starts_are_drawn_as_the_scene_says(scattered):
 
 
 @pytest.mark.parametrize("precision", ["f32", "f64"])
+def test_draws_by_seed_do_not_know_the_world(scattered, precision):
+    scattered.randomize(params={"joint_q_noise": {"arm": tl.Uniform(0.01, 0.1)}})
+    fields, torque = ("joint_q", "joint_qd", "joint_q_measured"), np.full(8, 0.2)
+
+    def play(worlds: int, draws: str, seed: int | list[int]) -> NDArray[np.float64]:
+        """(episodes and frames, worlds, numbers)"""
+        with tl.launch(scattered, worlds=worlds, precision=precision, draws=draws, fields=fields) as sim:
+            assert sim.info["draws"] == draws
+            frames = []
+            for episode in range(2):
+                sim.reset(seed=seed if episode == 0 else None)
+                frames += [sim.step(joint_f=torque).copy() for _ in range(3)]
+        return np.array([np.concatenate([getattr(frame, name) for name in fields], axis=1) for frame in frames])
+
+    seeds = [1, 2, 3, 4, 5, 77, 77, 8]
+    many, alone = play(8, "seed", seeds), play(1, "seed", 77)
+    assert np.array_equal(many[:, 5], alone[:, 0]) and np.array_equal(many[:, 6], alone[:, 0])
+    for world in (0, 1, 2, 3, 4, 7):
+        assert not (many[:, world] == alone[:, 0]).all(axis=1).any()
+    by_number = play(8, "world", seeds)
+    assert not (by_number[:, 5] == by_number[:, 6]).all(axis=1).any()
+    # one seed for all gives all of them the same
+    same = play(4, "seed", 77)
+    assert (same == alone).all()
+    with pytest.raises(tl.ArgumentError, match=r"draws.*use world or seed"):
+        tl.launch(scattered, worlds=1, draws="both")
+
+
+@pytest.mark.parametrize("precision", ["f32", "f64"])
 def test_a_seed_gives_the_same_starts_again(scattered, precision):
     with tl.launch(scattered, worlds=21, precision=precision) as sim:
         launch = state(sim.forward())

@@ -201,6 +201,8 @@ pub fn under_way(name: &str, folder: &Folder) -> (Daemon, Client) {
         "20",
         "--on-fault",
         "reset",
+        "--draws",
+        "seed",
     ];
     let daemon = Daemon::start_scene(name, &drawn(), &flags);
     let client = daemon.attach();

@@ -1,7 +1,7 @@
 """Types of the Rust module."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from tightloop.sim import FrameCopy
 
 __version__: str
+
+_Real = TypeVar("_Real", NDArray[np.float32], NDArray[np.float64])
 
 class Sample: ...
 
@@ -121,6 +123,8 @@ class Client:
     def __init__(self, name: str, *, lease: bool) -> None: ...
     def describe(self) -> str: ...
     def step(self, joint_f: Any, joint_target_q: Any, joint_target_qd: Any, body_f: Any, /) -> Frame: ...
+    def send(self, joint_f: Any, joint_target_q: Any, joint_target_qd: Any, body_f: Any, /) -> None: ...
+    def recv(self) -> Frame: ...
     def write(self, joint_q: Any, joint_qd: Any, mask: Any, /) -> Frame: ...
     def write_params(self, params: dict[str, NDArray[np.float64]], mask: Any, /) -> Frame: ...
     def reset(self, mask: Any, seed: Any, /) -> Frame: ...
@@ -166,6 +170,32 @@ def drive(
     high: NDArray[np.float32],
     /,
 ) -> None: ...
+@overload
+def draw(
+    seeds: NDArray[np.uint64], episodes: NDArray[np.uint32], stream: int, columns: int, out: None = None
+) -> NDArray[np.float64]: ...
+@overload
+def draw(seeds: NDArray[np.uint64], episodes: NDArray[np.uint32], stream: int, columns: int, out: _Real) -> _Real:
+    """Uniform numbers in [0, 1), the same for the same seed, episode, stream and column, whatever else is asked for.
+
+    Philox4x32-10 under the seed as key, at the counter (0, episode, 64 + stream, column). In float32 they are rounded
+    towards zero, so that they stay below 1.
+
+    Args:
+        seeds: Seed of each row, uint64, shape ``(n,)``.
+        episodes: Episode of each row, uint32, shape ``(n,)``.
+        stream: What the numbers are for, 0 to 31; those of different streams have nothing to do with each other.
+        columns: How many numbers a row gets, at most 2**24.
+        out: Where they go, float32 or float64, shape ``(n, columns)``, a part of another array if need be; a new
+            float64 array if left out.
+
+    Returns:
+        ``out``, or the new array, shape ``(n, columns)``.
+
+    Raises:
+        ArgumentError: A shape or the stream is not as above. A wrong dtype is a TypeError.
+    """
+
 def sweep(name: str, /) -> bool: ...
 def command_line(arguments: list[str], /) -> int: ...
 def read_urdf(

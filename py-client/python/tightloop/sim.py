@@ -119,6 +119,45 @@ class Sim:
         wrench = None if body_f is None else self.params.ready("body_f", body_f)
         return self._client.step(joint_f, joint_target_q, joint_target_qd, wrench)
 
+    def send(
+        self,
+        *,
+        joint_f: Command | None = None,
+        joint_target_q: Command | None = None,
+        joint_target_qd: Command | None = None,
+        body_f: Command | None = None,
+    ) -> None:
+        """Begin a step and return at once: the worlds advance while the caller does something else, until `recv`.
+
+        Until then every other command (a second ``send``, `step`, `reset`, `write`, `forward`, `snapshot`, `restore`,
+        and reading or writing ``params``) is refused and touches nothing.
+
+        Args:
+            joint_f: As of `step`; the arrays are copied, and may be written to again at once.
+            joint_target_q: As of `step`.
+            joint_target_qd: As of `step`.
+            body_f: As of `step`.
+
+        Raises:
+            CommandRefused: A wrong shape or dtype, or a step is in flight; nothing was sent. A wrong value, such as
+                NaN, shows in `recv`. Other errors are those of `step`.
+        """
+        wrench = None if body_f is None else self.params.ready("body_f", body_f)
+        self._client.send(joint_f, joint_target_q, joint_target_qd, wrench)
+
+    def recv(self) -> Frame:
+        """Wait for the frame of the step that `send` began. A wait that Ctrl-C ended may be taken up again.
+
+        Returns:
+            The frame that `step` would have returned.
+
+        Raises:
+            CommandRefused: A value was wrong, and no world was touched; or no step was sent.
+            LeaseLost: This client controlled the daemon, and no longer does.
+            DaemonLost: The daemon went away; its state is lost.
+        """
+        return self._client.recv()
+
     def reset(
         self,
         *,
@@ -131,12 +170,14 @@ class Sim:
 
         What `Scene.randomize` has distributions of is drawn anew, parameters too; other parameters stay. A draw depends
         on the world's number, its seed and its episode, which counts its resets since it got the seed, and on nothing
-        else: neither on the number of worlds nor on precision or threads. A launch draws episode 0 of seed 0.
+        else: neither on the number of worlds nor on precision or threads. A launch draws episode 0 of seed 0. With
+        ``launch(draws="seed")`` it does not depend on the world's number either.
 
         Args:
             mask: Which worlds, bool, shape ``(worlds,)``; all if left out.
             seed: Seed of these worlds from now on, beginning with its episode 0: an int from 0 to 2**64 - 1, which
-                gives each world other numbers, or a sequence with one a world. Their next episode if left out.
+                gives each world other numbers (the same ones with ``draws="seed"``), or a sequence with one a world.
+                Their next episode if left out.
 
         Returns:
             A frame evaluated at that state. Raises as `step` does.
@@ -270,6 +311,7 @@ def launch(
     bounds: Mapping[str, float] | None = None,
     on_fault: str = "freeze",
     on_nan: str = "refuse",
+    draws: str = "world",
     name: str | None = None,
     log: str | os.PathLike[str] | None = None,
     frames_held: int = 4,
@@ -293,6 +335,10 @@ def launch(
             before its next step, so that its ``status`` is seen once.
         on_nan: What becomes of a command that is NaN or infinite in some world: ``"refuse"`` refuses it for all worlds,
             ``"freeze"`` freezes that world as one that is no longer finite, and the others go on.
+        draws: What start states, parameters and noise that are drawn depend on, besides a world's episode and ``step``:
+            ``"world"`` its number and its seed, ``"seed"`` its seed alone, so that an environment has the same numbers
+            wherever it stands. Worlds of one seed are then alike, and so they begin, with seed 0: give
+            ``reset(seed=...)`` a sequence with one seed a world.
         name: Name of the daemon, for `attach`; a unique one if left out.
         log: File for the daemon's news, such as how many worlds were frozen, at most one line a second; warnings and
             errors go to stderr if left out.
@@ -325,6 +371,7 @@ def launch(
     }
     arguments["on-fault"] = checks.text("launch: on_fault", on_fault, error=ArgumentError)
     arguments["on-nan"] = checks.text("launch: on_nan", on_nan, error=ArgumentError)
+    arguments["draws"] = checks.text("launch: draws", draws, error=ArgumentError)
     if bounds is not None and not isinstance(bounds, Mapping):
         raise ArgumentError(f'launch: bounds is {bounds!r}; give a dict, such as {{"joint_qd": 50.0}}')
     for bound, value in (bounds or {}).items():

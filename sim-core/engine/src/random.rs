@@ -8,6 +8,9 @@
 use sim_core::model::Distribution;
 use sim_core::model::params::Param;
 
+/// How many streams a task has, [`Stream::Task`].
+pub const TASK_STREAMS: u8 = 32;
+
 /// What numbers are for; those of different streams have nothing to do with each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stream {
@@ -17,6 +20,8 @@ pub enum Stream {
     StartVelocity,
     /// A parameter after a reset; the index is a column of it.
     Param(Param),
+    /// What a task draws for itself, such as goals; it has 32 streams, from 0, and says what the index is.
+    Task(u8),
     /// Of `joint_f` in a frame; the index is a dof. Streams of frames begin here.
     ForceNoise,
     /// Of `joint_target_q`, likewise.
@@ -47,6 +52,10 @@ impl Stream {
         match self {
             Stream::StartPosition => 0,
             Stream::StartVelocity => 1,
+            Stream::Task(stream) => {
+                assert!(stream < TASK_STREAMS, "a task has {TASK_STREAMS} streams");
+                64 + u32::from(stream)
+            }
             Stream::ForceNoise => 128,
             Stream::TargetNoise => 129,
             Stream::TargetRateNoise => 130,
@@ -66,6 +75,41 @@ impl Stream {
                 });
                 1 << 31 | hash
             }
+        }
+    }
+}
+
+/// Whether the world's number is part of what a draw depends on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Draws {
+    /// It is: worlds of one seed draw different numbers.
+    #[default]
+    World,
+    /// 0 stands for it: worlds of one seed draw the same numbers, wherever they are.
+    Seed,
+}
+
+impl Draws {
+    /// The one of a name.
+    pub fn named(name: &str) -> Option<Draws> {
+        [Draws::World, Draws::Seed]
+            .into_iter()
+            .find(|draws| draws.name() == name)
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Draws::World => "world",
+            Draws::Seed => "seed",
+        }
+    }
+
+    /// What stands for a world in its draws.
+    pub fn number(self, world: usize) -> u32 {
+        match self {
+            Draws::World => world as u32,
+            Draws::Seed => 0,
         }
     }
 }

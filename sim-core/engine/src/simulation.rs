@@ -1,6 +1,7 @@
 //! Many worlds of one model: reset, write, step, read.
 
 pub use crate::backend::{Faults, FirstFrozen, Frozen, Lanes, Precision};
+pub use crate::random::Draws;
 
 use crate::backend::{Backend, BackendError, Values, cpu};
 use crate::snapshot::{self, Head, SnapshotError};
@@ -25,6 +26,8 @@ pub struct Options {
     pub fields: Vec<Field>,
     /// When a world is frozen, and what becomes of it.
     pub faults: Faults,
+    /// What the draws of a world depend on.
+    pub draws: Draws,
 }
 
 impl Default for Options {
@@ -36,6 +39,7 @@ impl Default for Options {
             lanes: Lanes::Auto,
             fields: vec![Field::JointQ, Field::JointQd, Field::BodyQ],
             faults: Faults::default(),
+            draws: Draws::default(),
         }
     }
 }
@@ -80,7 +84,8 @@ impl Simulation {
         let layout = Simulation::layout_of(&model, options);
         let threads = threads_of(options);
         let (worlds, precision) = (options.worlds, options.precision);
-        let mut backend = cpu::create(&model, worlds, precision, options.lanes, &layout, threads)?;
+        let (lanes, draws) = (options.lanes, options.draws);
+        let mut backend = cpu::create(&model, worlds, precision, lanes, &layout, threads, draws)?;
         backend.set_faults(options.faults);
         Ok(Simulation {
             model,
@@ -180,8 +185,8 @@ impl Simulation {
 
     /// Back to the start state, `joint_f` 0 and targets as in the scene, in the worlds of the mask (none = all).
     ///
-    /// What of state and parameters the scene has distributions of is drawn from (seed, world, episode). A reset starts the next episode
-    /// of a world; with a seed, one for all or one a world, the first one of that seed. Seed and episode are 0 at first.
+    /// What of state and parameters the scene has distributions of is drawn from (seed, world, episode), or with [`Draws::Seed`] from
+    /// (seed, episode). A reset starts the next episode of a world; with a seed, one for all or one a world, the first one of that seed. Seed and episode are 0 at first.
     ///
     /// # Errors
     /// A mask or seeds of the wrong length; no world is touched then.

@@ -2,7 +2,7 @@
 
 use sim_core::model::Distribution;
 use sim_core::model::params::Param;
-use sim_engine::random::{Draw, Stream, philox};
+use sim_engine::random::{Draw, Stream, TASK_STREAMS, philox};
 
 /// Numbers of a sample: each statistic below is known to a few thousandths.
 const SAMPLE: usize = 100_000;
@@ -43,9 +43,13 @@ fn streams_have_numbers_of_their_own_that_stay() {
         .map(Stream::number)
         .to_vec();
     all.extend(params);
+    all.extend((0..TASK_STREAMS).map(|stream| Stream::Task(stream).number()));
+    all.push(Stream::ForceNoise.number());
+    let count = all.len();
     all.sort_unstable();
     all.dedup();
-    assert_eq!(all.len(), Param::ALL.len() + 2);
+    assert_eq!(all.len(), count);
+    assert_eq!([0, 31].map(|k| Stream::Task(k).number()), [64, 95]);
     assert!(params.iter().all(|number| number >> 31 == 1));
     // FNV-1a of "gravity" with the highest bit set, worked out apart
     assert_eq!(Stream::Param(Param::Gravity).number(), 0xd209_ff45);

@@ -1,11 +1,11 @@
 //! A client: attaches to a running daemon, observes it, and controls it when it holds the lease.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::command::Call;
+use crate::command::{Call, Command};
 use crate::control::{Request, Response};
 use crate::controller::Controller;
 use crate::frame::Alive;
@@ -23,41 +23,6 @@ pub type Hook<'a> = &'a mut dyn FnMut() -> ControlFlow<()>;
 /// A [`Hook`] that never interrupts.
 pub fn keep_waiting() -> impl FnMut() -> ControlFlow<()> {
     || ControlFlow::Continue(())
-}
-
-/// Numbers for an input, row-major `(worlds, columns)`. The daemon gets them in the precision of its run.
-#[derive(Debug, Clone, Copy)]
-pub enum Values<'a> {
-    /// Single precision.
-    F32(&'a [f32]),
-    /// Double precision.
-    F64(&'a [f64]),
-}
-
-impl Values<'_> {
-    /// Number of entries.
-    pub fn len(&self) -> usize {
-        match self {
-            Values::F32(values) => values.len(),
-            Values::F64(values) => values.len(),
-        }
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-}
-
-/// One array that a step or a write sets.
-#[derive(Debug, Clone)]
-pub struct Command<'a> {
-    /// `joint_f`, `joint_target_q`, `joint_target_qd` for a step; `joint_q`, `joint_qd` for a write.
-    pub field: &'a str,
-    /// Dofs (or coordinates for `joint_q`) that the array covers.
-    pub columns: Range<usize>,
-    /// The numbers, `(worlds, columns)`.
-    pub values: Values<'a>,
 }
 
 /// How to attach.
@@ -215,7 +180,7 @@ impl Client {
         lock(&self.controller).is_some()
     }
 
-    /// Takes the lease; done by itself at the first [`Client::step`], [`Client::reset`], [`Client::write`],
+    /// Takes the lease; done by itself at the first [`Client::step`], [`Client::send`], [`Client::reset`], [`Client::write`],
     /// [`Client::forward`], [`Client::snapshot`] or [`Client::restore`]. From then on a thread of this client sends heartbeats.
     ///
     /// # Errors
@@ -258,6 +223,35 @@ impl Client {
     /// [`ProtocolError::DaemonRestarted`].
     pub fn step(&self, commands: &[Command<'_>], hook: Hook<'_>) -> Result<Frame, ProtocolError> {
         self.run(&Call::new(Op::Step, commands, None), hook)
+    }
+
+    /// The first half of a [`Client::step`]: sends its command and returns while the daemon steps. Until [`Client::recv`] has
+    /// taken the frame, every other command is refused.
+    ///
+    /// # Errors
+    /// As [`Client::step`], but for what only the daemon finds, such as an entry that is NaN: [`Client::recv`] has that. After
+    /// any error nothing is in flight that was not before.
+    pub fn send(&self, commands: &[Command<'_>], hook: Hook<'_>) -> Result<(), ProtocolError> {
+        let call = Call::new(Op::Step, commands, None);
+        self.with_controller(hook, |controller, hook| controller.send(&call, hook))
+    }
+
+    /// The second half: waits for the frame of the step that was sent.
+    ///
+    /// # Errors
+    /// [`ProtocolError::NothingSent`]. [`ProtocolError::CommandRefused`]: no world was touched, and the next step may be sent.
+    /// After [`ProtocolError::Interrupted`] and [`ProtocolError::Timeout`] it may be called again.
+    /// [`ProtocolError::LeaseLost`], [`ProtocolError::DaemonLost`], [`ProtocolError::DaemonRestarted`].
+    pub fn recv(&self, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
+        self.check_process()?;
+        let mut held = lock(&self.controller);
+        let Some(controller) = &mut *held else {
+            self.check_alive()?;
+            return Err(ProtocolError::NothingSent);
+        };
+        let result = controller.recv(hook);
+        forget_lost(&mut held, &result);
+        result
     }
 
     /// Puts the worlds under the mask (all without one) back to the start and returns the frame there.
@@ -336,17 +330,23 @@ impl Client {
     }
 
     fn run(&self, call: &Call<'_>, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
+        self.with_controller(hook, |controller, hook| controller.run(call, hook))
+    }
+
+    /// Takes the lease first, if this client has none.
+    fn with_controller<T>(
+        &self,
+        hook: Hook<'_>,
+        call: impl FnOnce(&mut Controller, Hook<'_>) -> Result<T, ProtocolError>,
+    ) -> Result<T, ProtocolError> {
         self.check_process()?;
         let mut held = lock(&self.controller);
         let controller = match &mut *held {
             Some(controller) => controller,
             empty => empty.insert(self.take_lease(hook)?),
         };
-        let result = controller.run(call, hook);
-        // a lost lease can be asked for again; a lost daemon cannot come back
-        if matches!(result, Err(ProtocolError::LeaseLost { .. })) {
-            held.take();
-        }
+        let result = call(controller, hook);
+        forget_lost(&mut held, &result);
         result
     }
 
@@ -438,6 +438,13 @@ impl Client {
             std::thread::sleep(Duration::from_millis(1));
         }
         Ok(())
+    }
+}
+
+/// A lost lease can be asked for again; a lost daemon cannot come back.
+fn forget_lost<T>(held: &mut Option<Controller>, result: &Result<T, ProtocolError>) {
+    if matches!(result, Err(ProtocolError::LeaseLost { .. })) {
+        held.take();
     }
 }
 

@@ -1,6 +1,7 @@
 //! What a command carries, and how it lies in a sample.
 
-use crate::client::{Command, Values};
+use std::ops::Range;
+
 use crate::header::encode_row;
 use crate::{ALIGNMENT, Description, Dtype, InputInfo, Op, ProtocolError, ROWS_MAX, Table};
 
@@ -14,6 +15,41 @@ pub(crate) const FROM_WORLD: &str = "from_world";
 pub(crate) const PATH_MAX: usize = 4096;
 /// Name of the seeds in a reset.
 const SEED: &str = "seed";
+
+/// Numbers for an input, row-major `(worlds, columns)`. The daemon gets them in the precision of its run.
+#[derive(Debug, Clone, Copy)]
+pub enum Values<'a> {
+    /// Single precision.
+    F32(&'a [f32]),
+    /// Double precision.
+    F64(&'a [f64]),
+}
+
+impl Values<'_> {
+    /// Number of entries.
+    pub fn len(&self) -> usize {
+        match self {
+            Values::F32(values) => values.len(),
+            Values::F64(values) => values.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// One array that a step or a write sets.
+#[derive(Debug, Clone)]
+pub struct Command<'a> {
+    /// `joint_f`, `joint_target_q`, `joint_target_qd` for a step; `joint_q`, `joint_qd` for a write.
+    pub field: &'a str,
+    /// Dofs (or coordinates for `joint_q`) that the array covers.
+    pub columns: Range<usize>,
+    /// The numbers, `(worlds, columns)`.
+    pub values: Values<'a>,
+}
 
 /// One call of a client, as it came.
 pub(crate) struct Call<'a> {

@@ -23,6 +23,17 @@ use crate::{ALIGNMENT, CommandHeader, Description, Frame, Op, ProtocolError, Ref
 /// A step that takes longer than this is taken for a daemon that stands.
 const ANSWER_MAX: Duration = Duration::from_secs(120);
 
+/// What became of the command sent last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Flight {
+    /// Its answer was taken, or there is none.
+    Landed,
+    /// A step that was sent for [`Controller::recv`].
+    Sent,
+    /// Its answer was not waited for, since the caller interrupted: the next command takes it first.
+    Abandoned(Op),
+}
+
 /// A held lease.
 #[derive(Debug)]
 pub(crate) struct Controller {
@@ -30,9 +41,9 @@ pub(crate) struct Controller {
     description: Arc<Description>,
     epoch: u64,
     seq: u64,
-    /// A command whose answer was not waited for, since the caller interrupted.
-    unanswered: bool,
-    paces: [Pace; Op::ALL.len()],
+    flight: Flight,
+    /// One an operation, and the last for steps of which the caller did something else meanwhile.
+    paces: [Pace; Op::ALL.len() + 1],
     apart: Apart,
     table: Option<Arc<Table>>,
     frames: Arc<Alive>,
@@ -106,7 +117,7 @@ impl Controller {
             description: Arc::clone(description),
             epoch,
             seq: 0,
-            unanswered: false,
+            flight: Flight::Landed,
             paces: std::array::from_fn(|_| Pace::new(free_core)),
             apart: Apart::new(),
             table: None,
@@ -121,14 +132,44 @@ impl Controller {
 
     /// Sends one command and waits for its frame.
     pub(crate) fn run(&mut self, call: &Call<'_>, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
-        call.check(&self.description)?;
-        self.frames.check(self.description.frames_held)?;
-        if self.unanswered {
-            drop(self.answer(call.op, hook)?);
-        }
-        self.send(call)?;
-        let sample = self.answer(call.op, hook)?;
+        self.make_ready(call, hook)?;
+        self.publish(call)?;
+        self.flight = Flight::Abandoned(call.op); // until it is answered
+        let sample = self.answer(call.op as usize - 1, hook)?;
         self.open(sample)
+    }
+
+    /// Sends a step, whose frame [`Controller::recv`] waits for.
+    pub(crate) fn send(&mut self, call: &Call<'_>, hook: Hook<'_>) -> Result<(), ProtocolError> {
+        self.make_ready(call, hook)?;
+        self.publish(call)?;
+        self.flight = Flight::Sent;
+        Ok(())
+    }
+
+    /// Waits for the frame of the step that was sent.
+    pub(crate) fn recv(&mut self, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
+        if self.flight != Flight::Sent {
+            self.link.peer.check()?;
+            return Err(ProtocolError::NothingSent);
+        }
+        let sample = self.answer(Op::ALL.len(), hook)?;
+        self.open(sample)
+    }
+
+    /// Checks a command, and that nothing is in the way of its frame.
+    fn make_ready(&mut self, call: &Call<'_>, hook: Hook<'_>) -> Result<(), ProtocolError> {
+        call.check(&self.description)?;
+        match self.flight {
+            Flight::Landed => {}
+            Flight::Sent => {
+                // that the daemon is lost explains more
+                self.link.peer.check()?;
+                return Err(ProtocolError::StepInFlight);
+            }
+            Flight::Abandoned(op) => drop(self.answer(op as usize - 1, hook)?),
+        }
+        self.frames.check(self.description.frames_held)
     }
 
     /// Lets a test send what it likes, and reads the answer.
@@ -140,11 +181,11 @@ impl Controller {
         self.seq += 1;
         send(&self.publisher, self.seq);
         self.link.notify();
-        let sample = self.answer(Op::Step, &mut crate::keep_waiting())?;
+        let sample = self.answer(Op::Step as usize - 1, &mut crate::keep_waiting())?;
         self.open(sample)
     }
 
-    fn send(&mut self, call: &Call<'_>) -> Result<(), ProtocolError> {
+    fn publish(&mut self, call: &Call<'_>) -> Result<(), ProtocolError> {
         let failed =
             |error: &dyn std::fmt::Debug| ProtocolError::transport("send a command", error);
         let mut loan = self
@@ -165,13 +206,12 @@ impl Controller {
             self.link.peer.check()?;
             return Err(self.link.peer.lease_lost());
         }
-        self.unanswered = true;
         self.link.notify();
         Ok(())
     }
 
-    /// Waits for the answer to the command sent last.
-    fn answer(&mut self, op: Op, hook: Hook<'_>) -> Result<FrameSample, ProtocolError> {
+    /// Waits for the answer to the command sent last, at a pace.
+    fn answer(&mut self, pace: usize, hook: Hook<'_>) -> Result<FrameSample, ProtocolError> {
         let mut waiting = Answer {
             seq: self.seq,
             epoch: self.epoch,
@@ -181,8 +221,8 @@ impl Controller {
             hook,
             since: Instant::now(),
         };
-        let sample = self.paces[op as usize - 1].wait(&self.listener, &mut waiting)?;
-        self.unanswered = false;
+        let sample = self.paces[pace].wait(&self.listener, &mut waiting)?;
+        self.flight = Flight::Landed;
         let shared = sample.user_header().core == self.apart.core();
         self.paces.iter_mut().for_each(|pace| pace.share(shared));
         Ok(sample)

@@ -75,6 +75,8 @@ pub struct Description {
     pub on_fault: String,
     /// What becomes of a command that is NaN or infinite: "refuse" for all worlds, or "freeze" the world.
     pub on_nan: String,
+    /// What the draws of a world depend on: its number and its seed ("world"), or its "seed" alone.
+    pub draws: String,
     /// Size of the state of all worlds, as recorders get it [bytes].
     pub state_bytes: u64,
     /// Hash over the fields, inputs, worlds and dofs; see [`Description::schema_hash`].

@@ -165,6 +165,14 @@ pub enum ProtocolError {
         reason: String,
     },
 
+    /// A step was sent, and its frame was not received yet; nothing was sent or touched.
+    #[error("a step was sent and its frame was not received; call recv first")]
+    StepInFlight,
+
+    /// There is no step whose frame could be received.
+    #[error("no step was sent whose frame could be received; call send first")]
+    NothingSent,
+
     /// The client was copied into a child process.
     #[error(
         "this client of daemon {name:?} belongs to process {pid}, which forked; attach again in this process"

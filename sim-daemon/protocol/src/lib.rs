@@ -10,7 +10,8 @@
 //! ```
 //!
 //! - A sample is lines of eight words: a field table, then arrays, world-major and 64-byte aligned ([`header`], [`table`]).
-//! - Steps are lock-step: the client sends `seq = n`, the daemon answers `ack_seq = n` with a frame or a refusal.
+//! - Steps are lock-step: the client sends `seq = n`, the daemon answers `ack_seq = n` with a frame or a refusal. One command is
+//!   in flight at a time; [`Client::send`] and [`Client::recv`] are the two halves of [`Client::step`].
 //! - A lease is one `epoch`, with services of its own; it ends by release, by death, or when another client asks for it
 //!   after the heartbeats stopped. Reset, write, forward, snapshot and restore travel as commands too, so that they keep their order.
 //! - A recorder has a journal of its own, with the memory of it; the daemon never waits for it, and counts its entries, so that
@@ -46,7 +47,8 @@ pub mod table;
 pub mod tenancy;
 mod transport;
 
-pub use client::{AttachOptions, Client, Command, Hook, Values, keep_waiting};
+pub use client::{AttachOptions, Client, Hook, keep_waiting};
+pub use command::{Command, Values};
 pub use description::{Description, FieldInfo, InputInfo, ParamInfo, RobotRange};
 pub use error::ProtocolError;
 pub use frame::{Entry, Frame, View};

@@ -29,6 +29,7 @@ pub use sim_core::model::UrdfOptions;
 pub use sim_core::model::geometry::MeshOptions;
 pub use sim_engine::backend::BackendError;
 pub use sim_engine::dynamics::Dynamics;
+pub use sim_engine::random::{Draw, Stream, TASK_STREAMS};
 pub(crate) use summary::{joint_type, mesh_facts, robot_summary};
 pub use summary::{mesh_summary, urdf_summary};
 

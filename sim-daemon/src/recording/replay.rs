@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 use sim_core::batch::Field;
-use sim_engine::simulation::{Faults, Lanes, Options, Precision, Simulation};
+use sim_engine::simulation::{Draws, Faults, Lanes, Options, Precision, Simulation};
 use sim_protocol::digest::{digest, digests_of};
 use sim_protocol::host::{Inbox, free_memory};
 use sim_protocol::{CommandHeader, Description, Op, Row, Table};
@@ -274,6 +274,8 @@ impl Run {
                 resets: told.on_fault == "reset",
                 freezes_nan: told.on_nan == "freeze",
             },
+            draws: Draws::named(&told.draws)
+                .ok_or_else(|| failed(format!("draws by `{}`, unknown here", told.draws)))?,
         };
         let simulation =
             Simulation::new(model, &options).map_err(|error| failed(error.to_string()))?;

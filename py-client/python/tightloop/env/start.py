@@ -10,6 +10,9 @@ from tightloop.env.controls import Control
 from tightloop.env.task import Task
 from tightloop.errors import ArgumentError
 
+#: A world whose action is NaN fails alone; one with the seed s draws the same wherever it stands.
+DAEMON_OPTIONS: dict[str, Any] = {"on_nan": "freeze", "draws": "seed"}
+
 
 def fields_of(task: Task, controls: Sequence[Control]) -> tuple[str, ...]:
     """Fields of the frame that functions and controls read, each once."""
@@ -31,8 +34,7 @@ def begin(
     """
     scene, fields = task.scene(), fields_of(task, controls)
     if daemon is None:
-        # a world whose action is NaN fails alone; a world with seed s draws the same wherever it stands
-        own = {"on_nan": "freeze", "draws": "seed"} | task.launch_options
+        own = DAEMON_OPTIONS | task.launch_options
         return scene, tl.launch(scene, worlds=1 if worlds is None else worlds, fields=fields, **own, **options)
     sim = tl.attach(daemon)
     try:
@@ -50,7 +52,8 @@ def _check(scene: tl.Scene, sim: tl.Sim, fields: tuple[str, ...], worlds: int | 
     missing = [field for field in fields if field not in sim.fields]
     if missing:
         raise ArgumentError(f"daemon `{sim.name}` does not show {', '.join(missing)}; {cure}")
-    if sim.info["draws"] != "seed" or sim.info["on_nan"] != "freeze":
-        raise ArgumentError(f"daemon `{sim.name}` has draws={sim.info['draws']}, on_nan={sim.info['on_nan']}; {cure}")
+    for option, value in DAEMON_OPTIONS.items():
+        if sim.info[option] != value:
+            raise ArgumentError(f"daemon `{sim.name}` has {option}={sim.info[option]}, not {value}; {cure}")
     if worlds is not None and worlds != sim.worlds:
         raise ArgumentError(f"num_envs is {worlds}, and daemon `{sim.name}` has {sim.worlds} worlds; leave it out")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -84,8 +84,8 @@ class Observed:
 class Task:
     """What an environment is about; a subclass says it, see ``examples/own_task.py``.
 
-    `observe`, `reward`, `terminated`, `success` and `goal` are pure: arrays in, arrays out, for all worlds at once. They
-    use arithmetic and the functions of the namespace ``xp`` that NumPy and the array API share, so that they run on
+    `observe`, `reward`, `terminated`, `success`, `metrics` and `goal` are pure: arrays in, arrays out, for all worlds at
+    once. They use arithmetic and the functions of the namespace ``xp`` that NumPy and the array API share, so that they run on
     arrays of torch and JAX too. What they return is valid until they are called again. They see no simulation and draw
     no random numbers.
 
@@ -133,6 +133,10 @@ class Task:
     def success(self, xp: Namespace, worlds: Worlds) -> Array | None:
         """Which worlds do what is asked for, bool, shape ``(worlds,)``; None if the task knows no success."""
         return None
+
+    def metrics(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
+        """What else is worth knowing of a step, by name, each of shape ``(worlds,)``; it goes into ``infos``."""
+        return {}
 
     def goal(self, xp: Namespace, worlds: Worlds, draws: Array) -> Array:
         """Goals of worlds that begin an episode, or the next goal of one.

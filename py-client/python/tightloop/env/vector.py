@@ -35,7 +35,8 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
     Observations are float32, shape ``(num_envs, size)``, within the bounds of ``single_observation_space``; actions
     float32 in [-1, 1], shape ``(num_envs, actions)``, and what is beyond counts as the bound. Rewards are float32.
 
-    ``infos["success"]`` says in which worlds the task is done now, where the task knows. A world that failed (no longer
+    ``infos["success"]`` says in which worlds the task is done now, where the task knows, as do its other `Task.metrics`;
+    ``infos["_success"]`` says in which rows that is told: not of worlds that have just begun. A world that failed (no longer
     finite, or beyond the task's bounds) is terminated, and ``infos["fault"]`` holds the bits of its ``status``.
 
     Attributes:
@@ -122,7 +123,10 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         self._episodes = Episodes(self.task, self.num_envs, first_env)
         self._action = np.zeros((self.num_envs, place), np.float32)
         self._previous_action = np.zeros_like(self._action)
-        self._arena, self._tapes = Arena(), {name: [] for name in ("observe", "reward", "terminated", "success")}
+        self._arena, self._tapes = (
+            Arena(),
+            {name: [] for name in ("observe", "reward", "terminated", "success", "metrics")},
+        )
         self._done = np.zeros(self.num_envs, np.bool_)
         self._all = np.ones(self.num_envs, np.bool_)
         self._frame: Any = None
@@ -203,8 +207,9 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         """What became of the actions sent last.
 
         Returns:
-            ``obs, reward, terminated, truncated, infos``. In the mode ``SAME_STEP``, ``infos["final_obs"]`` holds, in the
-            rows of ``infos["_final_obs"]``, the last observations of episodes that ended, zeros elsewhere.
+            ``obs, reward, terminated, truncated, infos``. In the mode ``SAME_STEP`` the rows that
+            ``infos["_final_obs"]`` names hold in ``infos["final_obs"]`` the last observation of the episode that
+            ended, and in ``infos["final_info"]`` what was told of it; the other rows are zeros.
 
         Raises:
             CommandRefused: There is no step on its way.
@@ -243,10 +248,13 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         ended = self._done.copy()
         self._observe(slot.final_obs)
         slot.final_obs[~ended] = 0.0
+        # of the worlds that go on, what is told is of this step; of those that ended, it was of their last one
+        infos["final_info"] = {name: mine & ended if name[0] == "_" else mine for name, mine in infos.items()}
+        for name in infos["final_info"]:
+            if name[0] == "_":
+                infos[name] = infos[name] & ~ended
         infos["final_obs"], infos["_final_obs"] = slot.final_obs, ended
-        final = {name: value for name, value in infos.items() if name in ("success", "fault")}
-        infos["final_info"] = final | {f"_{name}": ended.copy() for name in final}
-        infos["_final_info"] = ended
+        infos["_final_info"] = ended.copy()
         self._episodes.next(ended)
         self._begin(ended, self.sim.reset(mask=ended))
 
@@ -291,20 +299,20 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             slot.truncated[:] = False
         else:
             np.greater_equal(self._episodes.elapsed, self.max_episode_steps, out=slot.truncated)
-        success = self._call("success")
         fault = self._frame.status & FROZEN
         if fault.any():
             failed = fault > 0
             slot.terminated |= failed
             slot.reward[failed & ~np.isfinite(slot.reward)] = 0.0
-            infos["fault"], infos["_fault"] = self._frame.status.copy(), failed
+            infos["fault"], infos["_fault"] = fault, failed
         if begun is not None:
             slot.reward[begun] = 0.0
             slot.terminated[begun] = slot.truncated[begun] = False
-        if success is not None:
-            infos["success"], infos["_success"] = np.array(success, np.bool_), self._all.copy()
-            if begun is not None:
-                infos["success"][begun] = False
+        success = self._call("success")
+        told = dict(self._call("metrics")) | ({} if success is None else {"success": success})
+        for name, value in told.items():
+            infos[name] = np.array(value)
+            infos[f"_{name}"] = self._all.copy() if begun is None else ~begun
 
     def _next_slot(self) -> Slot:
         if self._slots is None:

@@ -11,8 +11,8 @@
 |---|---|---|
 | 0 | ±1 | a force of 10 N on the cart (swing-up: 20 N) |
 
-Balance (the rules of Barto, Sutton and Anderson 1983, with a force of any size): reward 1 a step, over when the pole is 0.21
-rad (12°) from upright or the cart 2.4 m from the middle. Swing-up: reward (1 + cos θ)/2 · (1 - x²/11.5) -
+Balance (the rules of Barto, Sutton and Anderson 1983, with a force of any size): reward 1 a step, over when the pole is
+0.21 rad (12°) from upright or the cart 2.4 m from the middle. Swing-up: reward (1 + cos θ)/2 · (1 - x²/11.5) -
 0.001 (θ̇² + a²), never over; a success is a pole within 0.2 rad of upright that turns slower than 1 rad/s.
 """
 

@@ -1,12 +1,20 @@
-"""The arm of the manipulation tasks: a Franka Research 3 with its hand, on the ground at the origin, facing +x."""
+"""The arm of the manipulation tasks: a Franka Research 3 with its hand, on the ground, facing +x."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import tightloop as tl
+from tightloop.checks import Vector
 from tightloop.env.controls import Control, EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
+from tightloop.env.task import Observed
 from tightloop.errors import ArgumentError
+from tightloop.shapes import ORIGIN, Surface
+
+if TYPE_CHECKING:
+    # typing has it from Python 3.11 on, the package runs on 3.10
+    from typing_extensions import Unpack
 
 URDF = Path(__file__).parents[1] / "assets" / "fr3" / "fr3_franka_hand.urdf"
 #: The arm's dofs, and the fingers'.
@@ -20,15 +28,19 @@ CONTROLS = ("joint_target", "joint_delta", "end_effector_delta", "torque")
 _TORQUE = [87 / 8] * 4 + [12 / 8] * 3
 
 
-def add_arm(scene: tl.Scene, start: list[float], *, driven: bool = True) -> tl.Robot:
+def add_arm(
+    scene: tl.Scene, start: list[float], *, driven: bool = True, pos: Vector = ORIGIN, **surface: Unpack[Surface]
+) -> tl.Robot:
     """Add the arm and the site ``tcp``.
 
     Args:
         scene: The scene.
         start: Where its nine joints start [rad or m].
         driven: Whether the arm's drives hold their targets; without, it follows torques.
+        pos: Where its base stands [m].
+        **surface: How it touches, as `tightloop.Surface` has it.
     """
-    arm = scene.add_urdf(URDF, name="arm")
+    arm = scene.add_urdf(URDF, name="arm", pos=pos, **surface)
     arm.joint_q = start
     ke, kd = (1000.0, 100.0) if driven else (0.0, 0.0)
     arm.joint_target_ke = [ke] * 7 + [1000.0] * 2
@@ -58,3 +70,21 @@ def controls(name: str, *, scale: float, gripper: Gripper | None = None) -> list
     if name not in arms:
         raise ArgumentError(f"control is {name!r}; give one of {', '.join(CONTROLS)}")
     return [arms[name](), *([] if gripper is None else [gripper])]
+
+
+def gripper(*, binary: bool = False) -> Gripper:
+    """One number for the fingers: open at 1; at -1 they press with 30 N on a cube of 4 cm, 10 N on each other.
+
+    Args:
+        binary: Whether there is nothing in between.
+    """
+    return Gripper(FINGERS, low=-0.01, high=0.04, binary=binary)
+
+
+def observed() -> list[Observed]:
+    """Positions and velocities of the nine joints."""
+    reach = [6.0] * 7 + [0.1] * 2
+    return [
+        Observed("joint positions", [-end for end in reach], reach, 9, "rad, m"),
+        Observed("joint velocities", -10, 10, 9, "rad/s, m/s"),
+    ]

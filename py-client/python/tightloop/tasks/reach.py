@@ -15,13 +15,13 @@ After Isaac Lab's ``Isaac-Reach-Franka-v0`` (its ranges, weights and rates), wit
 |---|---|---|
 | 0–6 | ±1 | 0.5 rad from the start (``joint_target``), or what the chosen control means |
 
-Reward: -0.2 |e| + 0.1 (1 - tanh(|e|/0.1)) - 0.1 φ - 1e-4 |a - a'|² - 1e-4 |q̇|², e the distance of the tcp from the goal [m],
-φ the angle between the orientations [rad], a' the action before. A success is |e| < 2 cm.
+Reward: -0.2 |e| + 0.1 (1 - tanh(|e|/0.1)) - 0.1 φ - 1e-4 |a - a'|² - 1e-4 |q̇|², e the distance of the tcp from the
+goal [m], φ the angle between the orientations [rad], a' the action before. A success is |e| < 2 cm.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -97,6 +97,10 @@ class FrankaReach(Task):
         turn = angle(xp, worlds.site_q[:, self._tcp, 3:], worlds.goal[:, 3:])
         effort = squares(xp, worlds.action - worlds.previous_action) + squares(xp, worlds.joint_qd)
         return -0.2 * error + 0.1 * (1.0 - xp.tanh(error / 0.1)) - 0.1 * turn - 1e-4 * effort
+
+    def metrics(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
+        """``error``, the distance from the goal [m]."""
+        return {"error": self.error(xp, worlds)}
 
     def success(self, xp: Namespace, worlds: Worlds) -> Array:
         """Within 2 cm."""

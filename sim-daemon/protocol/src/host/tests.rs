@@ -68,6 +68,7 @@ fn description() -> Description {
         joint_qd_max: None,
         on_fault: "freeze".to_owned(),
         on_nan: "refuse".to_owned(),
+        draws: "world".to_owned(),
         state_bytes: 0,
         schema: 0,
     }
@@ -261,6 +262,64 @@ fn hostile_commands_are_refused_with_a_reason_and_the_host_goes_on() {
         "nothing that was refused was carried out"
     );
     assert_eq!(count(&client.step(&[], &mut keep_waiting()).unwrap()), 3);
+}
+
+#[test]
+fn while_a_step_is_in_flight_every_other_command_is_refused_and_not_sent() {
+    let fake = Fake::start("halves");
+    let client = fake.attach();
+    let hook: Hook<'_> = &mut keep_waiting();
+    let early = client.recv(hook).unwrap_err();
+    assert!(matches!(early, ProtocolError::NothingSent), "{early}");
+    assert!(!client.holds_lease(), "recv alone takes no lease");
+    client.send(&[], hook).unwrap();
+    let refused = [
+        ("send", client.send(&[], hook).unwrap_err()),
+        ("step", client.step(&[], hook).unwrap_err()),
+        ("reset", client.reset(None, None, hook).unwrap_err()),
+        ("write", client.write(&[], None, hook).unwrap_err()),
+        ("forward", client.forward(hook).unwrap_err()),
+        ("snapshot", client.snapshot("/nowhere", hook).unwrap_err()),
+        (
+            "restore",
+            client.restore("/nowhere", None, None, hook).unwrap_err(),
+        ),
+    ];
+    for (command, error) in refused {
+        assert!(
+            matches!(error, ProtocolError::StepInFlight),
+            "{command}: {error}"
+        );
+        assert!(error.to_string().contains("call recv first"), "{error}");
+    }
+    assert_eq!(count(&client.recv(hook).unwrap()), 1);
+    let late = client.recv(hook).unwrap_err();
+    assert!(matches!(late, ProtocolError::NothingSent), "{late}");
+    assert_eq!(count(&client.step(&[], hook).unwrap()), 2);
+    for n in 3..100 {
+        client.send(&[], hook).unwrap();
+        assert_eq!(count(&client.recv(hook).unwrap()), n);
+    }
+}
+
+#[test]
+fn a_client_that_goes_with_a_step_in_flight_makes_room_for_the_next() {
+    let fake = Fake::start("gone");
+    for _ in 0..20 {
+        let client = fake.attach();
+        client.send(&[], &mut keep_waiting()).unwrap();
+        client.release();
+        let error = client.recv(&mut keep_waiting()).unwrap_err();
+        assert!(matches!(error, ProtocolError::NothingSent), "{error}");
+        client.send(&[], &mut keep_waiting()).unwrap();
+        drop(client);
+        let (next, deadline) = (fake.attach(), Instant::now() + Duration::from_secs(2));
+        // a holder that came and went between two looks of the host is missed after `JOIN_MAX`
+        while let Err(error) = next.step(&[], &mut keep_waiting()) {
+            assert!(matches!(error, ProtocolError::LeaseHeld { .. }), "{error}");
+            assert!(Instant::now() < deadline, "{error}");
+        }
+    }
 }
 
 #[test]

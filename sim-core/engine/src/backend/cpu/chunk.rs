@@ -5,6 +5,7 @@ use super::noise::Noise;
 use super::state::{Shape, StateField};
 use super::transfer::{self, Arena};
 use crate::backend::{Faults, Frozen, Values};
+use crate::random::Draws;
 use crate::start::StartDraw;
 use sim_core::batch::{Block, Field, Layout};
 use sim_core::compiled::Stages;
@@ -34,6 +35,8 @@ pub(super) struct Job<F: Lane> {
     pub start: Vec<F::Real>,
     /// What is drawn over it.
     pub draw: StartDraw,
+    /// What draws depend on.
+    pub draws: Draws,
     /// What is added to commands and sensors.
     pub noise: Noise,
     /// What the contact sensors add up.
@@ -41,7 +44,7 @@ pub(super) struct Job<F: Lane> {
 }
 
 impl<F: Lane> Job<F> {
-    pub fn new(model: &Model, layout: Layout, stages: Stages<F>) -> Job<F> {
+    pub fn new(model: &Model, layout: Layout, stages: Stages<F>, draws: Draws) -> Job<F> {
         let shape = Shape::of(model.constants());
         let start = model.start();
         let mut reset = vec![F::Real::default(); shape.total()];
@@ -78,6 +81,7 @@ impl<F: Lane> Job<F> {
             faults: Faults::default(),
             start: reset,
             draw: StartDraw::new(model),
+            draws,
             noise: Noise::new(model),
             contact_sensors: model.contact_sensors().to_vec(),
         }

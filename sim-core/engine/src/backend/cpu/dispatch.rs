@@ -3,6 +3,7 @@
 use super::chunk::{Chunk, Job};
 use super::transfer::Arena;
 use super::{Backend, BackendError, Cpu, Lanes, Layout, Precision};
+use crate::random::Draws;
 use sim_core::compiled::Stages;
 use sim_core::lane::Lane;
 use sim_core::model::Model;
@@ -15,6 +16,8 @@ pub(super) type RunChunk<F> = unsafe fn(&mut Chunk<F>, &Job<F>, usize, Arena);
 
 /// The text, compiled for an instruction set.
 pub(super) struct Program<F: Lane> {
+    /// For people.
+    pub instructions: &'static str,
     pub stages: Stages<F>,
     pub chunk: RunChunk<F>,
 }
@@ -76,6 +79,7 @@ pub fn create(
     lanes: Lanes,
     layout: &Layout,
     threads: usize,
+    draws: Draws,
 ) -> Result<Box<dyn Backend>, BackendError> {
     let lanes = match lanes {
         // a register that holds one world takes longer than a scalar, for the same bits
@@ -98,34 +102,41 @@ pub fn create(
     }
     match (precision, lanes) {
         (Precision::F64, _) => {
-            let program = least(stages_f64::STAGES);
-            boxed(model, worlds, layout, threads, "f64 scalar, FMA", program)
+            let program = least("f64 scalar, FMA", stages_f64::STAGES);
+            boxed(model, worlds, layout, threads, draws, program)
         }
         #[cfg(target_arch = "x86_64")]
         (Precision::F32, Lanes::Sixteen) => {
-            let (stages, chunk) = (stages_f32x16::STAGES, avx512);
-            let program = Program { stages, chunk };
-            boxed(model, worlds, layout, threads, "AVX-512", program)
+            let program = Program {
+                instructions: "AVX-512",
+                stages: stages_f32x16::STAGES,
+                chunk: avx512,
+            };
+            boxed(model, worlds, layout, threads, draws, program)
         }
         #[cfg(target_arch = "x86_64")]
         (Precision::F32, Lanes::Eight) => {
-            let program = least(stages_f32x8::STAGES);
-            boxed(model, worlds, layout, threads, "AVX2", program)
+            let program = least("AVX2", stages_f32x8::STAGES);
+            boxed(model, worlds, layout, threads, draws, program)
         }
         (Precision::F32, _) => {
-            let program = least(stages_f32::STAGES);
-            boxed(model, worlds, layout, threads, "f32 scalar, FMA", program)
+            let program = least("f32 scalar, FMA", stages_f32::STAGES);
+            boxed(model, worlds, layout, threads, draws, program)
         }
     }
 }
 
 /// What runs wherever the text does.
-fn least<F: Lane>(stages: Stages<F>) -> Program<F> {
+fn least<F: Lane>(instructions: &'static str, stages: Stages<F>) -> Program<F> {
     #[cfg(target_arch = "x86_64")]
     let chunk = avx2;
     #[cfg(not(target_arch = "x86_64"))]
     let chunk = portable;
-    Program { stages, chunk }
+    Program {
+        instructions,
+        stages,
+        chunk,
+    }
 }
 
 fn boxed<F: Lane>(
@@ -133,15 +144,10 @@ fn boxed<F: Lane>(
     worlds: usize,
     layout: &Layout,
     threads: usize,
-    instructions: &str,
+    draws: Draws,
     program: Program<F>,
 ) -> Result<Box<dyn Backend>, BackendError> {
     Ok(Box::new(Cpu::<F>::new(
-        model,
-        worlds,
-        layout,
-        threads,
-        instructions,
-        program,
+        model, worlds, layout, threads, draws, program,
     )?))
 }

@@ -16,6 +16,7 @@ mod trouble;
 pub use dispatch::{available, create};
 
 use super::{Backend, BackendError, Faults, Frozen, Lanes, Precision, Values};
+use crate::random::Draws;
 use chunk::{Chunk, Job};
 use dispatch::{Program, RunChunk};
 use rayon::prelude::*;
@@ -44,7 +45,7 @@ impl<F: Lane> Cpu<F> {
         worlds: usize,
         layout: &Layout,
         threads: usize,
-        instructions: &str,
+        draws: Draws,
         program: Program<F>,
     ) -> Result<Self, BackendError> {
         let blocks = worlds.div_ceil(F::WIDTH);
@@ -54,7 +55,7 @@ impl<F: Lane> Cpu<F> {
         } else {
             (threads * CHUNKS_PER_THREAD).min(blocks)
         };
-        let job = Job::new(model, layout.clone(), program.stages);
+        let job = Job::new(model, layout.clone(), program.stages, draws);
         let chunks = (0..parts)
             .map(|part| {
                 let first = part * blocks / parts * F::WIDTH;
@@ -81,7 +82,8 @@ impl<F: Lane> Cpu<F> {
             pool,
             threads,
             device: format!(
-                "cpu ({instructions}, {} world{} a block, {threads} thread{plural})",
+                "cpu ({}, {} world{} a block, {threads} thread{plural})",
+                program.instructions,
                 F::WIDTH,
                 if F::WIDTH == 1 { "" } else { "s" },
             ),

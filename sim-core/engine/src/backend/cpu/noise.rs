@@ -98,7 +98,7 @@ impl<F: Lane> Chunk<F> {
                 for (lane, world) in self.worlds_of(block).enumerate() {
                     let std = self.deviation(shape, world, first + dof);
                     if std > 0.0 {
-                        let noise = self.draw(world, stream).normal(dof as u32, 0.0, std);
+                        let noise = self.draw(job, world, stream).normal(dof as u32, 0.0, std);
                         self.lanes[lane] = F::Real::of(noise);
                     }
                 }
@@ -122,7 +122,7 @@ impl<F: Lane> Chunk<F> {
         let shape = Shape::of(&job.constants);
         for (outside, row) in rows.zip(numbers.chunks_exact_mut(columns)) {
             let world = outside - self.worlds.start;
-            let draw = self.draw(world, stream);
+            let draw = self.draw(job, world, stream);
             let of = |index: usize, number: usize| {
                 let std = self.deviation(shape, world, first + number);
                 if std > 0.0 {
@@ -158,10 +158,10 @@ impl<F: Lane> Chunk<F> {
         }
     }
 
-    fn draw(&self, world: usize, stream: Stream) -> Draw {
-        let outside = (self.worlds.start + world) as u32;
+    fn draw(&self, job: &Job<F>, world: usize, stream: Stream) -> Draw {
+        let number = job.draws.number(self.worlds.start + world);
         let (seed, episode) = (self.seeds[world], self.episodes[world]);
-        Draw::at_step(seed, outside, episode, self.steps[world], stream)
+        Draw::at_step(seed, number, episode, self.steps[world], stream)
     }
 
     /// A standard deviation, by its number among the parameters of a world.

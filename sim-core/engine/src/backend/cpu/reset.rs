@@ -72,13 +72,13 @@ impl<F: Lane> Chunk<F> {
     fn draw_start(&mut self, job: &Job<F>, world: usize) {
         let shape = Shape::of(&job.constants);
         let (seed, episode) = (self.seeds[world], self.episodes[world]);
-        let outside = (self.worlds.start + world) as u32;
+        let number = job.draws.number(self.worlds.start + world);
         job.draw
-            .draw(seed, outside, episode, |field, column, value| {
+            .draw(seed, number, episode, |field, column, value| {
                 let place = self.place(shape, world, StateField::of(field), column);
                 self.state[place] = F::Real::of(value);
             });
-        job.draw.draw_params(seed, outside, episode, |k, value| {
+        job.draw.draw_params(seed, number, episode, |k, value| {
             let place = self.place(shape, world, StateField::Params, k);
             self.state[place] = F::Real::of(value);
         });

@@ -1,0 +1,98 @@
+"""Runs a policy file in the loop, and draws what it did.
+
+    python examples/play.py FrankaReach out/train/FrankaReach-0/policy.onnx
+
+The file is ONNX with the input ``obs`` (worlds, size) and the output ``action`` (worlds, actions), as ``examples/ppo.py``
+leaves it. Every world plays one episode; the picture has the rewards, the actions and the first observations of a few.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+
+from tightloop.env import AutoresetMode, VectorEnv
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+
+SHOWN = 8  # worlds in the picture
+
+
+def play(envs: VectorEnv, policy: onnxruntime.InferenceSession, seed: int) -> dict[str, NDArray[np.float64]]:
+    """One episode in every world: what was seen, done, and got, ``(steps, worlds, …)``; NaN after an episode's end."""
+    obs, _ = envs.reset(seed=seed)
+    going, kept = np.ones(envs.num_envs, bool), {"obs": [], "action": [], "reward": [], "success": []}
+    while going.any():
+        (action,) = policy.run(["action"], {"obs": obs})
+        seen = obs
+        obs, reward, terminated, truncated, infos = envs.step(action)
+        step = {
+            "obs": seen,
+            "action": action,
+            "reward": reward,
+            "success": infos.get("success", np.zeros(envs.num_envs)),
+        }
+        for name, array in step.items():
+            array = np.array(array, float)
+            array[~going] = np.nan
+            kept[name].append(array)
+        going &= ~(terminated | truncated)
+    return {name: np.array(arrays) for name, arrays in kept.items()}
+
+
+def draw(path: Path, kept: dict[str, NDArray[np.float64]], envs: VectorEnv, title: str) -> None:
+    """Rewards, actions and observations of the first worlds over time."""
+    seconds = envs.control_dt * np.arange(len(kept["reward"]))
+    parts, place = [], 0
+    for part in envs.task.observed()[:4]:
+        parts.append((f"{part.name} [{part.unit}]", kept["obs"][:, :SHOWN, place : place + part.size]))
+        place += part.size
+    panels = [("reward", kept["reward"][:, :SHOWN, None]), ("action", kept["action"][:, :SHOWN]), *parts]
+    figure, axes = plt.subplots(2, 3, figsize=(12, 6), constrained_layout=True)
+    for axis, (name, values) in zip(axes.flat, panels, strict=False):
+        for world in range(values.shape[1]):
+            axis.plot(seconds, values[:, world], color=f"C{world}", lw=0.8, alpha=0.7)
+        axis.set(title=name, xlabel="time [s]")
+        axis.grid(alpha=0.3)
+    figure.suptitle(title)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=90)
+
+
+def main() -> None:
+    """Play, say how it went, and draw the picture."""
+    parser = argparse.ArgumentParser(description="Run a policy file in the loop.")
+    parser.add_argument("task", help="the task, such as FrankaReach")
+    parser.add_argument("policy", type=Path, help="ONNX file")
+    parser.add_argument("--num-envs", type=int, default=256, help="worlds (default 256)")
+    parser.add_argument("--seed", type=int, default=0, help="of the episodes (default 0)")
+    parser.add_argument("--out", type=Path, help="picture (default: beside the policy, play.png)")
+    args = parser.parse_args()
+    out = args.out or args.policy.with_name("play.png")
+
+    policy = onnxruntime.InferenceSession(args.policy, providers=["CPUExecutionProvider"])
+    envs = VectorEnv(args.task, args.num_envs, autoreset_mode=AutoresetMode.SAME_STEP)
+    try:
+        size = envs.single_observation_space.shape[0]
+        expected = policy.get_inputs()[0].shape[1]
+        if expected != size:
+            raise SystemExit(f"{args.policy} takes {expected} numbers, and {args.task} has {size}")
+        kept = play(envs, policy, args.seed)
+        returns = np.nansum(kept["reward"], axis=0)
+        last = np.isfinite(kept["reward"]).sum(axis=0) - 1
+        success = kept["success"][last, np.arange(args.num_envs)].mean()
+        title = f"{args.task}: return {returns.mean():.3g} ± {returns.std():.2g}, success at the end {success:.1%}"
+        draw(out, kept, envs, title)
+        print(f"{title}, {args.num_envs} worlds\npicture: {out}")
+    finally:
+        envs.close()
+
+
+if __name__ == "__main__":
+    main()

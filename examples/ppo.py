@@ -1,0 +1,385 @@
+"""Proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347) in one file, made for the zero-copy loop.
+
+    python examples/ppo.py FrankaReach --seed 0
+
+Observations are read where the environment puts them, a ring of slots; each is copied once, into the rollout. What an
+action led to is learned from with generalised advantages (arXiv 1506.02438); an episode that was cut off is continued by
+the critic's value of its last observation. The learning rate follows the change of the policy (its KL divergence).
+
+In ``out/train/TASK-SEED`` it leaves a checkpoint every few seconds (``--resume`` goes on from it), the log for TensorBoard,
+the curve as CSV and PNG, and the policy as ONNX, which ``examples/play.py`` runs. With ``--daemon NAME`` it joins worlds that
+``python -m tightloop.env serve TASK --name NAME`` keeps, so that it can be killed and come back.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+import time
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+from torch.utils.tensorboard import SummaryWriter
+from tqdm import tqdm
+
+from tightloop.env import AutoresetMode, VectorEnv
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+
+OUT = Path(__file__).resolve().parent.parent / "out" / "train"
+EVALUATED = 256  # worlds of an evaluation
+
+
+@dataclass(frozen=True)
+class Config:
+    """Numbers of a run; the command line changes any of them."""
+
+    minutes: float = 3.0  # how long to train, evaluations and waiting included
+    num_envs: int = 2048
+    steps: int = 24  # of a rollout, in every world
+    epochs: int = 5  # that a rollout is learned from
+    minibatches: int = 4  # of an epoch
+    hidden: int = 128  # units of each of two layers, in actor and critic
+    gamma: float = 0.99  # what a reward is worth one step later
+    lam: float = 0.95  # λ of the advantages
+    clip: float = 0.2  # of the ratio of probabilities
+    entropy: float = 0.0  # weight of the entropy in the loss
+    lr: float = 1e-3  # learning rate at the start
+    kl: float = 0.01  # change of the policy that the learning rate aims at, a rollout
+    std: float = 0.6  # standard deviation of actions at the start
+    grad_max: float = 1.0  # norm of a gradient, at most
+    evaluate: float = 15.0  # seconds between evaluations
+    threads: int = 2  # of torch and of the simulation
+
+
+PRESETS = {
+    "CartPoleBalance": Config(minutes=0.5, num_envs=512, hidden=64),
+    "CartPoleSwingUp": Config(minutes=1.0, num_envs=1024, steps=32, hidden=64, evaluate=10.0),
+    "FrankaReach": Config(minutes=3.0),
+    "FrankaPushCube": Config(
+        15.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=30.0
+    ),
+    "FrankaPickCube": Config(
+        60.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=60.0
+    ),
+    "FrankaLift": Config(minutes=30.0, num_envs=2048, gamma=0.98, hidden=256, entropy=0.005, evaluate=60.0),
+}
+
+
+class Normalizer(nn.Module):
+    """Shifts and scales observations by the mean and variance of all that were seen (Chan et al. 1979)."""
+
+    mean: Tensor
+    var: Tensor
+    count: Tensor
+
+    def __init__(self, size: int) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.zeros(size))
+        self.register_buffer("var", torch.ones(size))
+        self.register_buffer("count", torch.tensor(1e-4))
+
+    def see(self, obs: Tensor) -> None:
+        """Take observations ``(…, size)`` into account."""
+        obs = obs.reshape(-1, obs.shape[-1])
+        count, mean, var = len(obs), obs.mean(0), obs.var(0, correction=0)
+        total = self.count + count
+        apart = mean - self.mean
+        self.var.copy_((self.var * self.count + var * count + apart**2 * self.count * count / total) / total)
+        self.mean.add_(apart * count / total)
+        self.count.copy_(total)
+
+    def forward(self, obs: Tensor) -> Tensor:
+        return ((obs - self.mean) / torch.sqrt(self.var + 1e-6)).clamp(-10.0, 10.0)
+
+
+def mlp(inputs: int, hidden: int, outputs: int, last: float) -> nn.Sequential:
+    """Two hidden layers; orthogonal weights, those of the last layer scaled by ``last``."""
+    layers = [nn.Linear(inputs, hidden), nn.Linear(hidden, hidden), nn.Linear(hidden, outputs)]
+    for layer, gain in zip(layers, (math.sqrt(2.0), math.sqrt(2.0), last), strict=True):
+        nn.init.orthogonal_(layer.weight, gain)
+        nn.init.zeros_(layer.bias)
+    return nn.Sequential(layers[0], nn.ELU(), layers[1], nn.ELU(), layers[2])
+
+
+class Agent(nn.Module):
+    """An actor, whose actions are normal about its output, and a critic."""
+
+    def __init__(self, inputs: int, actions: int, config: Config) -> None:
+        super().__init__()
+        self.normalizer = Normalizer(inputs)
+        self.actor = mlp(inputs, config.hidden, actions, 0.01)
+        self.critic = mlp(inputs, config.hidden, 1, 1.0)
+        self.log_std = nn.Parameter(torch.full((actions,), math.log(config.std)))
+
+    def forward(self, obs: Tensor) -> Tensor:
+        """The most likely action, ``(…, actions)``."""
+        return self.actor(self.normalizer(obs))
+
+    def value(self, obs: Tensor) -> Tensor:
+        """What is still to come, ``(…,)``."""
+        return self.critic(self.normalizer(obs)).squeeze(-1)
+
+    def log_prob(self, mean: Tensor, action: Tensor) -> Tensor:
+        """Logarithm of the probability of actions about ``mean``, ``(…,)``."""
+        off = (action - mean) * torch.exp(-self.log_std)
+        return (-0.5 * off**2 - self.log_std - 0.5 * math.log(2.0 * math.pi)).sum(-1)
+
+
+class Rollout:
+    """What all worlds did for some steps, ``(steps, worlds, …)``."""
+
+    def __init__(self, steps: int, worlds: int, inputs: int, actions: int, device: torch.device) -> None:
+        def room(*shape: int) -> Tensor:
+            return torch.zeros((steps, worlds, *shape), device=device)
+
+        self.obs, self.mean, self.action = room(inputs), room(actions), room(actions)
+        self.reward, self.done, self.log_prob, self.value, self.advantage = (room() for _ in range(5))
+
+    def look_back(self, last: Tensor, config: Config) -> None:
+        """Advantages, from the last step to the first; ``last`` is the value of the observations after it."""
+        following, advantage = last, torch.zeros_like(last)
+        for step in reversed(range(len(self.reward))):
+            goes_on = 1.0 - self.done[step]
+            error = self.reward[step] + config.gamma * goes_on * following - self.value[step]
+            advantage = error + config.gamma * config.lam * goes_on * advantage
+            self.advantage[step] = advantage
+            following = self.value[step]
+
+
+class Trainer:
+    """A run: environment, agent, optimiser, and how far it is."""
+
+    def __init__(self, task: str, seed: int, config: Config, folder: Path, *, daemon: str | None, device: str) -> None:
+        torch.set_num_threads(config.threads)
+        torch.manual_seed(seed)
+        self.task, self.seed, self.config, self.folder = task, seed, config, folder
+        options: dict[str, Any] = {"threads": config.threads} if daemon is None else {"daemon": daemon}
+        self.envs = VectorEnv(task, config.num_envs, autoreset_mode=AutoresetMode.SAME_STEP, copy=False, **options)
+        self.judge = VectorEnv(
+            task, EVALUATED, autoreset_mode=AutoresetMode.SAME_STEP, copy=False, threads=config.threads
+        )
+        (inputs,), (actions,) = self.envs.single_observation_space.shape, self.envs.single_action_space.shape
+        self.device = torch.device(device)
+        self.agent = Agent(inputs, actions, config).to(self.device)
+        self.optimizer = torch.optim.Adam(self.agent.parameters(), lr=config.lr, eps=1e-5)
+        self.rollout = Rollout(config.steps, config.num_envs, inputs, actions, self.device)
+        self.seconds, self.steps = 0.0, 0
+        self.curve: list[dict[str, float]] = []
+
+    def collect(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Fill the rollout, from these observations on; returns those after it."""
+        agent, rollout = self.agent, self.rollout
+        std = torch.exp(agent.log_std)
+        for step in range(self.config.steps):
+            rollout.obs[step].copy_(torch.from_numpy(obs))
+            mean = agent(rollout.obs[step])
+            action = mean + std * torch.randn_like(mean)
+            rollout.mean[step], rollout.action[step] = mean, action
+            rollout.log_prob[step] = agent.log_prob(mean, action)
+            rollout.value[step] = agent.value(rollout.obs[step])
+            obs, reward, terminated, truncated, infos = self.envs.step(action.cpu().numpy())
+            rollout.reward[step].copy_(torch.from_numpy(reward))
+            rollout.done[step].copy_(torch.from_numpy(terminated | truncated))
+            cut = np.flatnonzero(truncated & ~terminated)
+            if len(cut):
+                last = torch.from_numpy(infos["final_obs"][cut]).to(self.device)
+                rollout.reward[step, torch.from_numpy(cut)] += self.config.gamma * agent.value(last)
+        rollout.look_back(agent.value(torch.from_numpy(obs).to(self.device)), self.config)
+        self.steps += self.config.steps * self.config.num_envs
+        return obs
+
+    def learn(self) -> dict[str, float]:
+        """Some epochs of minibatches over the rollout; returns what to log."""
+        config, agent, r = self.config, self.agent, self.rollout
+        obs, action, mean_old = (x.flatten(0, 1) for x in (r.obs, r.action, r.mean))
+        log_old, advantage, value_old = (x.flatten() for x in (r.log_prob, r.advantage, r.value))
+        target = advantage + value_old
+        advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+        std_old = torch.exp(agent.log_std.detach()).clone()
+        moved, losses = [], []
+        for _ in range(config.epochs):
+            for batch in torch.randperm(len(obs), device=self.device).chunk(config.minibatches):
+                mean, value = agent(obs[batch]), agent.value(obs[batch])
+                ratio = torch.exp(agent.log_prob(mean, action[batch]) - log_old[batch])
+                own = advantage[batch]
+                gain = torch.min(ratio * own, ratio.clamp(1.0 - config.clip, 1.0 + config.clip) * own).mean()
+                clipped = value_old[batch] + (value - value_old[batch]).clamp(-config.clip, config.clip)
+                off = torch.max((value - target[batch]) ** 2, (clipped - target[batch]) ** 2).mean()
+                loss = -gain + off - config.entropy * agent.log_std.sum()
+                self.optimizer.zero_grad()
+                loss.backward()
+                nn.utils.clip_grad_norm_(agent.parameters(), config.grad_max)
+                with torch.no_grad():
+                    std = torch.exp(agent.log_std)
+                    change = (std_old**2 + (mean - mean_old[batch]) ** 2) / (2.0 * std**2)
+                    kl = (torch.log(std / std_old) + change - 0.5).sum(-1).mean().item()
+                self._follow(kl)
+                self.optimizer.step()
+                moved.append(kl)
+                losses.append(off.item())
+        agent.normalizer.see(r.obs)
+        return {"kl": float(np.mean(moved)), "value_loss": float(np.mean(losses)), "std": float(std_old.mean())}
+
+    def _follow(self, kl: float) -> None:
+        """Let the learning rate follow how much the policy changes."""
+        group = self.optimizer.param_groups[0]
+        if kl > 2.0 * self.config.kl:
+            group["lr"] = max(1e-5, group["lr"] / 1.5)
+        elif 0.0 < kl < 0.5 * self.config.kl:
+            group["lr"] = min(1e-2, group["lr"] * 1.5)
+
+    @torch.no_grad()
+    def evaluate(self) -> dict[str, float]:
+        """One episode in each of 256 worlds, always the same ones, with the most likely actions."""
+        obs, _ = self.judge.reset(seed=1_000_000)
+        returns, going = np.zeros(EVALUATED), np.ones(EVALUATED, bool)
+        success, error = np.zeros(EVALUATED), np.zeros(EVALUATED)
+        while going.any():
+            action = self.agent(torch.from_numpy(obs).to(self.device)).cpu().numpy()
+            obs, reward, terminated, truncated, infos = self.judge.step(action)
+            returns[going] += reward[going]
+            if "success" in infos:
+                success[going] = infos["success"][going]
+            if "error" in infos:
+                error[going] = infos["error"][going]
+            going &= ~(terminated | truncated)
+        found = {"return": returns.mean(), "success": success.mean()}
+        return {
+            name: float(value) for name, value in (found | ({"error": error.mean()} if error.any() else {})).items()
+        }
+
+    def run(self, log: SummaryWriter) -> None:
+        """Train until the time is over; checkpoints and evaluations on the way."""
+        limit, begun, shown = 60.0 * self.config.minutes, time.perf_counter() - self.seconds, -math.inf
+        obs, _ = self.envs.reset(seed=self.seed + len(self.curve))
+        with tqdm(total=round(limit), initial=round(self.seconds), unit="s", desc=self.task, disable=None) as bar:
+            while self.seconds < limit:
+                with torch.no_grad():
+                    obs = self.collect(obs)
+                told = self.learn()
+                self.seconds = time.perf_counter() - begun
+                bar.update(round(self.seconds) - bar.n)
+                if self.seconds - shown >= self.config.evaluate or self.seconds >= limit:
+                    shown = self.seconds
+                    found = self.evaluate()
+                    self.curve.append({"seconds": self.seconds, "steps": self.steps, **found})
+                    self.save()
+                    bar.set_postfix({name: f"{value:.3g}" for name, value in found.items()} | {"steps": self.steps})
+                    told |= found
+                told |= {"reward": self.rollout.reward.mean().item(), "lr": self.optimizer.param_groups[0]["lr"]}
+                for name, value in told.items():
+                    log.add_scalar(name, value, self.steps)
+
+    def save(self) -> None:
+        """Write the checkpoint; what was there stays until the new one is whole."""
+        state = {
+            "task": self.task,
+            "config": asdict(self.config),
+            "agent": self.agent.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
+            "random": torch.get_rng_state(),
+            "seconds": self.seconds,
+            "steps": self.steps,
+            "curve": self.curve,
+        }
+        torch.save(state, self.folder / "checkpoint.new")
+        (self.folder / "checkpoint.new").replace(self.folder / "checkpoint.pt")
+
+    def resume(self) -> None:
+        """Go on from the checkpoint."""
+        state = torch.load(self.folder / "checkpoint.pt", weights_only=True)
+        if state["task"] != self.task:
+            raise SystemExit(f"{self.folder / 'checkpoint.pt'} is of {state['task']}, not of {self.task}")
+        self.agent.load_state_dict(state["agent"])
+        self.optimizer.load_state_dict(state["optimizer"])
+        torch.set_rng_state(state["random"])
+        self.seconds, self.steps, self.curve = state["seconds"], state["steps"], state["curve"]
+
+    def export(self) -> Path:
+        """Write the policy as ONNX: ``obs`` (worlds, size) in, ``action`` (worlds, actions) out."""
+        path = self.folder / "policy.onnx"
+        agent, obs = self.agent.cpu().eval(), torch.zeros(2, *self.envs.single_observation_space.shape)
+        shapes = {"obs": {0: torch.export.Dim("worlds")}}
+        torch.onnx.export(
+            agent,
+            (obs,),
+            path,
+            input_names=["obs"],
+            output_names=["action"],
+            dynamic_shapes=shapes,
+            verbose=False,
+            external_data=False,
+        )
+        return path
+
+    def close(self) -> None:
+        """End the environments."""
+        self.envs.close()
+        self.judge.close()
+
+
+def draw(curve: list[dict[str, float]], title: str, path: Path) -> None:
+    """The curve as CSV and PNG: return, and success or error, over minutes."""
+    names = [name for name in ("return", "success", "error") if name in curve[0]]
+    with path.with_suffix(".csv").open("w", newline="") as file:
+        table = csv.DictWriter(file, ["seconds", "steps", *names], lineterminator="\n")
+        table.writeheader()
+        table.writerows({name: f"{value:.6g}" for name, value in row.items()} for row in curve)
+    figure, axes = plt.subplots(1, len(names), figsize=(4 * len(names), 3), constrained_layout=True, squeeze=False)
+    minutes = [row["seconds"] / 60 for row in curve]
+    for axis, name in zip(axes[0], names, strict=True):
+        axis.plot(minutes, [row[name] for row in curve], marker=".")
+        axis.set(title=name, xlabel="time [min]")
+        axis.grid(alpha=0.3)
+    figure.suptitle(title)
+    figure.savefig(path, dpi=90)
+    plt.close(figure)
+
+
+def main() -> None:
+    """Train, evaluate, and leave the curve and the policy."""
+    parser = argparse.ArgumentParser(
+        description="Train a policy.", formatter_class=argparse.ArgumentDefaultsHelpFormatter
+    )
+    parser.add_argument("task", choices=PRESETS, help="what to learn")
+    parser.add_argument("--seed", type=int, default=0, help="of weights, actions and episodes")
+    parser.add_argument("--resume", action="store_true", help="go on from the checkpoint in the folder")
+    parser.add_argument("--daemon", help="name of a running daemon to join")
+    parser.add_argument("--device", default="cpu", help="where torch computes")
+    parser.add_argument("--out", type=Path, default=OUT, help="folder of all runs")
+    for option in fields(Config):
+        parser.add_argument(f"--{option.name.replace('_', '-')}", type=type(option.default), help="changes the preset")
+    args = parser.parse_args()
+    own = {option.name: getattr(args, option.name) for option in fields(Config)}
+    config = replace(PRESETS[args.task], **{name: value for name, value in own.items() if value is not None})
+
+    folder = args.out / f"{args.task}-{args.seed}"
+    folder.mkdir(parents=True, exist_ok=True)
+    trainer = Trainer(args.task, args.seed, config, folder, daemon=args.daemon, device=args.device)
+    try:
+        if args.resume and (folder / "checkpoint.pt").exists():
+            trainer.resume()
+            print(f"goes on after {trainer.seconds:.0f} s and {trainer.steps:,} steps")
+        with SummaryWriter(str(folder / "log")) as log:
+            trainer.run(log)
+        end = trainer.curve[-1]
+        title = f"{args.task}, seed {args.seed}: {end['steps'] / 1e6:.1f} M steps, {config.threads} threads"
+        draw(trainer.curve, title, folder / "curve.png")
+        policy = trainer.export()
+        print(", ".join(f"{name} {value:.4g}" for name, value in end.items()))
+        print(f"curve: {folder / 'curve.png'}; policy: {policy}; python examples/play.py {args.task} {policy}")
+    finally:
+        trainer.close()
+
+
+if __name__ == "__main__":
+    main()

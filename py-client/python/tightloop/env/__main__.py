@@ -1,0 +1,77 @@
+"""``python -m tightloop.env serve TASK``: the worlds of a task in a daemon that outlives those who train in it."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tightloop import _core
+from tightloop.env.registry import make_task
+from tightloop.env.start import DAEMON_OPTIONS, fields_of
+from tightloop.errors import ArgumentError
+from tightloop.registration import TASKS
+
+
+def arguments_of(task: str, options: Mapping[str, Any], extra: Sequence[str]) -> tuple[str, list[str]]:
+    """The scene of a task as TOML, and the arguments of ``tightloop serve`` for it."""
+    made = make_task(task, options)
+    arguments = ["--fields", ",".join(fields_of(made, made.controls()))]
+    own = DAEMON_OPTIONS | made.launch_options
+    for bound, value in own.pop("bounds", {}).items():
+        arguments += [f"--{bound.replace('_', '-')}-max", f"{value}"]
+    for name, value in own.items():
+        arguments += [f"--{name.replace('_', '-')}", f"{value}"]
+    return made.scene().to_toml(), [*arguments, *extra]
+
+
+def main() -> int:
+    """Serve a task until stopped; returns the exit code of ``tightloop serve``."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tightloop.env", description="Environments in a daemon of their own."
+    )
+    serve = parser.add_subparsers(required=True).add_parser(
+        "serve",
+        help="keep the worlds of a task for trainers to join, and outlive them",
+        epilog="Example: python -m tightloop.env serve FrankaReach --num-envs 2048 --name reach; then "
+        'VectorEnv("FrankaReach", daemon="reach"). `tightloop stop reach` ends it.',
+    )
+    serve.add_argument("task", choices=[*TASKS], help="the task")
+    serve.add_argument("--num-envs", type=int, default=1, help="number of worlds (default 1)")
+    serve.add_argument("--name", required=True, help="name under which trainers find it")
+    serve.add_argument(
+        "--option", action="append", default=[], metavar="NAME=VALUE", help="of the task: control=torque"
+    )
+    serve.add_argument("--device", default="auto", help="cpu, or auto for the best there is (default auto)")
+    serve.add_argument("--precision", default="f32", help="f32 or f64 (default f32)")
+    serve.add_argument("--threads", type=int, help="threads of a step; one a core if left out")
+    args = parser.parse_args()
+    options = dict(option.partition("=")[::2] for option in args.option)
+    extra = [
+        "--worlds",
+        f"{args.num_envs}",
+        "--name",
+        args.name,
+        "--device",
+        args.device,
+        "--precision",
+        args.precision,
+    ]
+    extra += [] if args.threads is None else ["--threads", f"{args.threads}"]
+    try:
+        scene, arguments = arguments_of(args.task, options, extra)
+    except ArgumentError as problem:
+        parser.exit(2, f"error: {problem}\n")
+    # `tightloop serve -` reads the scene from standard input
+    file = os.memfd_create("scene")
+    os.write(file, scene.encode())
+    os.lseek(file, 0, os.SEEK_SET)
+    os.dup2(file, 0)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    return _core.command_line(["tightloop", "serve", "-", *arguments])
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
