@@ -60,6 +60,7 @@ bench: wheel $(VENV)/.dev
 	$(PYTHON) benches/round_trip.py
 	$(PYTHON) benches/snapshot.py
 	$(PYTHON) benches/recording.py
+	$(PYTHON) benches/tasks.py
 
 check: wheel $(VENV)/.dev
 	cargo fmt --all --check

@@ -2,8 +2,9 @@
 
     python examples/play.py FrankaReach out/train/FrankaReach-0/policy.onnx
 
-The file is ONNX with the input ``obs`` (worlds, size) and the output ``action`` (worlds, actions), as ``examples/ppo.py``
-leaves it. Every world plays one episode; the picture has the rewards, the actions and the first observations of a few.
+The file is ONNX with the input ``obs`` (worlds, size) and the output ``action`` (worlds, actions), as
+``examples/ppo.py`` leaves it. Every world plays one episode; the picture has the rewards, the
+actions and the first observations of a few.
 """
 
 from __future__ import annotations
@@ -39,9 +40,7 @@ def play(envs: VectorEnv, policy: onnxruntime.InferenceSession, seed: int) -> di
             "success": infos.get("success", np.zeros(envs.num_envs)),
         }
         for name, array in step.items():
-            array = np.array(array, float)
-            array[~going] = np.nan
-            kept[name].append(array)
+            kept[name].append(np.where(going.reshape(-1, *[1] * (np.ndim(array) - 1)), array, np.nan))
         going &= ~(terminated | truncated)
     return {name: np.array(arrays) for name, arrays in kept.items()}
 

@@ -2,13 +2,15 @@
 
     python examples/ppo.py FrankaReach --seed 0
 
-Observations are read where the environment puts them, a ring of slots; each is copied once, into the rollout. What an
-action led to is learned from with generalised advantages (arXiv 1506.02438); an episode that was cut off is continued by
-the critic's value of its last observation. The learning rate follows the change of the policy (its KL divergence).
+Observations are read where the environment puts them, a ring of slots; each is copied once, into the rollout. What
+an action led to is learned from with generalised advantages (arXiv 1506.02438); an episode that was cut off is
+continued by the critic's value of its last observation. The learning rate follows the change of the policy (its KL
+divergence).
 
-In ``out/train/TASK-SEED`` it leaves a checkpoint every few seconds (``--resume`` goes on from it), the log for TensorBoard,
-the curve as CSV and PNG, and the policy as ONNX, which ``examples/play.py`` runs. With ``--daemon NAME`` it joins worlds that
-``python -m tightloop.env serve TASK --name NAME`` keeps, so that it can be killed and come back.
+In ``out/train/TASK-SEED`` it leaves a checkpoint every few seconds (``--resume`` goes on from it), the log for
+TensorBoard, the curve as CSV and PNG, and the policy as ONNX, which ``examples/play.py`` runs. With
+``--daemon NAME`` it joins worlds that ``python -m tightloop.env serve TASK --name NAME`` keeps, so that it can be
+killed and come back.
 """
 
 from __future__ import annotations
@@ -350,7 +352,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description="Train a policy.", formatter_class=argparse.ArgumentDefaultsHelpFormatter
     )
-    parser.add_argument("task", choices=PRESETS, help="what to learn")
+    parser.add_argument("task", help=f"what to learn: {', '.join(PRESETS)}, or a task of your own, FILE.py:CLASS")
     parser.add_argument("--seed", type=int, default=0, help="of weights, actions and episodes")
     parser.add_argument("--resume", action="store_true", help="go on from the checkpoint in the folder")
     parser.add_argument("--daemon", help="name of a running daemon to join")
@@ -360,9 +362,11 @@ def main() -> None:
         parser.add_argument(f"--{option.name.replace('_', '-')}", type=type(option.default), help="changes the preset")
     args = parser.parse_args()
     own = {option.name: getattr(args, option.name) for option in fields(Config)}
-    config = replace(PRESETS[args.task], **{name: value for name, value in own.items() if value is not None})
+    config = replace(
+        PRESETS.get(args.task, Config()), **{name: value for name, value in own.items() if value is not None}
+    )
 
-    folder = args.out / f"{args.task}-{args.seed}"
+    folder = args.out / f"{args.task.rpartition(':')[2]}-{args.seed}"
     folder.mkdir(parents=True, exist_ok=True)
     trainer = Trainer(args.task, args.seed, config, folder, daemon=args.daemon, device=args.device)
     try:

@@ -6,34 +6,78 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.env import VectorEnv
+from tightloop.tasks.lift import START
 
 Array = NDArray[np.float64]
 
 OPEN, CLOSED = 1.0, -1.0
 
 
-def pick_cube(envs: VectorEnv, obs: Array, step: int) -> Array:
-    """Above the cube, down, fingers closed, to the goal."""
-    q, tcp, goal, cube = obs[:, :9], obs[:, 19:26], obs[:, 26:29], obs[:, 29:36]
-    if step < 26:
-        place = cube[:, :3] + [0.0, 0.0, 0.06 if step < 12 else 0.0]
-    else:
+class PickCube:
+    """Above the cube, down, fingers closed, to the goal; begun with the observations of a reset."""
+
+    def __init__(self, envs: VectorEnv, obs: Array) -> None:
+        self._envs = envs
+        self._yaw = along(obs[:, 32:36])
+        self._over = np.zeros(len(obs), np.bool_)
+        self._closed = np.zeros(len(obs), np.intp)  # for how many steps
+
+    def __call__(self, obs: Array, step: int) -> Array:
+        """Actions ``(worlds, 8)`` for these observations."""
+        q, qd, tcp, goal, cube = obs[:, :9], obs[:, 9:16], obs[:, 19:26], obs[:, 26:29], obs[:, 29:36]
+        off = np.abs(displacement(tcp, cube[:, :3], self._yaw))
+        self._over |= (off[:, :2].max(1) < 0.01) & (off[:, 3:].max(1) < 0.1)
+        close = self._over & ((off[:, 2] < 0.005) | (self._closed > 0))
+        self._closed += close
+        place = cube[:, :3] + np.where(self._over, 0.0, 0.07)[:, None] * np.array([0.0, 0.0, 1.0])
         # the cube, not the tcp, is to be at the goal
-        place = goal + tcp[:, :3] - cube[:, :3]
-    turn = displacement(tcp, place, along(cube[:, 3:]) if step < 26 else None)
-    return np.c_[_delta(envs, q, cube, turn), np.full(len(obs), OPEN if step < 20 else CLOSED)]
+        place = np.where((self._closed > 4)[:, None], goal + tcp[:, :3] - cube[:, :3], place)
+        turn = joint_turn(self._envs, np.c_[q, cube], displacement(tcp, place, self._yaw))
+        return np.c_[delta(turn, qd), np.where(close, CLOSED, OPEN)]
 
 
-def push_cube(envs: VectorEnv, obs: Array, step: int) -> Array:
+class PushCube:
     """Fingers closed, behind the cube, down, ahead."""
-    q, tcp, goal, cube = obs[:, :9], obs[:, 18:25], obs[:, 25:28], obs[:, 28:35]
-    if step < 18:
-        place = cube[:, :3] + [-0.06, 0.0, 0.08 if step < 10 else 0.0]
-    else:
-        # the tcp stays behind the cube, 0.05 m beyond the goal's edge
-        place = np.c_[np.minimum(tcp[:, 0] + 0.03, goal[:, 0] - 0.07), cube[:, 1], cube[:, 2]]
-    turn = displacement(tcp, place, np.zeros(len(obs)))
-    return np.c_[_delta(envs, q, cube, turn), np.full(len(obs), CLOSED)]
+
+    def __init__(self, envs: VectorEnv, obs: Array) -> None:
+        self._envs = envs
+
+    def __call__(self, obs: Array, step: int) -> Array:
+        """Actions ``(worlds, 8)`` for these observations."""
+        q, qd, tcp, goal, cube = obs[:, :9], obs[:, 9:16], obs[:, 18:25], obs[:, 25:28], obs[:, 28:35]
+        if step < 18:
+            place = cube[:, :3] + np.array([-0.06, 0.0, 0.08 if step < 10 else 0.0])
+        else:
+            # the tcp, behind the cube, stops 0.03 m inside the goal's edge
+            place = np.c_[np.minimum(tcp[:, 0] + 0.03, goal[:, 0] - 0.07), cube[:, 1], cube[:, 2]]
+        turn = joint_turn(self._envs, np.c_[q, cube], displacement(tcp, place, np.zeros(len(obs))))
+        return np.c_[delta(turn, qd), np.full(len(obs), CLOSED)]
+
+
+class Lift:
+    """As `PickCube`, by targets about the start; the pose of the hand is found from the joints."""
+
+    def __init__(self, envs: VectorEnv, obs: Array) -> None:
+        self._envs, self._start = envs, np.array(START)
+        self._target = self._start[:7] + np.zeros((len(obs), 1))
+
+    def __call__(self, obs: Array, step: int) -> Array:
+        """Actions ``(worlds, 8)`` for these observations."""
+        q, cube, goal = obs[:, :9] + self._start, obs[:, 18:21], obs[:, 21:24]
+        state = np.c_[q, cube, np.tile([0.0, 0.0, 0.0, 1.0], (len(obs), 1))]
+        dynamics = self._envs.sim.dynamics
+        tcp = dynamics.forward_kinematics(state)[:, dynamics.body_names.index(TCP)]
+        over = np.array([0.0, 0.0, 0.08 if step < 40 else 0.0])
+        place = cube + over if step < 90 else goal + tcp[:, :3] - cube
+        turn = joint_turn(self._envs, state, displacement(tcp, place, np.zeros(len(obs))))
+        # a fifth of the way in each step: the drives lag by a tenth of a second
+        self._target += np.clip(0.2 * turn, -0.04, 0.04)
+        self._target = np.clip(self._target, self._start[:7] - 1.5, self._start[:7] + 1.5)
+        action = (self._target - self._start[:7]) / 0.5
+        return np.c_[action, np.full(len(obs), OPEN if step < 75 else CLOSED)]
+
+
+TCP = "arm/fr3_hand_tcp"
 
 
 def along(quats: Array) -> Array:
@@ -42,42 +86,39 @@ def along(quats: Array) -> Array:
     return (yaw + np.pi / 4) % (np.pi / 2) - np.pi / 4
 
 
-def displacement(tcp: Array, place: Array, yaw: Array | None) -> Array:
-    """From the tcp's pose to a place, the hand downwards and turned by ``yaw``, or as it is: shape ``(worlds, 6)``.
+def displacement(tcp: Array, place: Array, yaw: Array) -> Array:
+    """From the tcp's pose to a place, the hand downwards and turned by ``yaw``: shape ``(worlds, 6)``.
 
     A shift [m], then a rotation vector [rad], in world axes.
     """
-    shift = place - tcp[:, :3]
-    if yaw is None:
-        # level it only: what turns its z axis to -z
-        x, y, z, w = tcp[:, 3:].T
-        down = np.c_[2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
-        return np.c_[shift, np.cross(down, [0.0, 0.0, -1.0])]
-    zero = 0.0 * yaw
-    ax, ay, az, aw = np.cos(yaw / 2), np.sin(yaw / 2), zero, zero
-    bx, by, bz, bw = tcp[:, 3:].T * np.array([[-1.0], [-1.0], [-1.0], [1.0]])
-    x = aw * bx + ax * bw + ay * bz - az * by
-    y = aw * by - ax * bz + ay * bw + az * bx
-    z = aw * bz + ax * by - ay * bx + az * bw
-    w = aw * bw - ax * bx - ay * by - az * bz
-    return np.c_[shift, 2.0 * np.where(w < 0.0, -1.0, 1.0)[:, None] * np.c_[x, y, z]]
+    # the quaternion of the hand that is asked for, times the inverse of what it has
+    ax, ay = np.cos(yaw / 2), np.sin(yaw / 2)
+    bx, by, bz, bw = tcp[:, 3:].T
+    turn = np.c_[ax * bw - ay * bz, ay * bw + ax * bz, ay * bx - ax * by]
+    sign = np.where(ax * bx + ay * by < 0.0, -1.0, 1.0)
+    return np.c_[place - tcp[:, :3], 2.0 * sign[:, None] * turn]
 
 
-def joint_turn(envs: VectorEnv, q: Array, cube: Array, turn: Array) -> Array:
-    """Least squares of a displacement of the tcp over the arm's joints [rad], damped, shape ``(worlds, 7)``."""
+def joint_turn(envs: VectorEnv, state: Array, shift: Array) -> Array:
+    """Damped least squares of a displacement of the tcp over the arm's joints [rad], shape ``(worlds, 7)``.
+
+    Args:
+        envs: The environments.
+        state: Their ``joint_q``, shape ``(worlds, 16)``.
+        shift: As `displacement` gives it.
+    """
+    # observed in f32, a quaternion has length 1 only nearly
+    state = np.c_[state[:, :12], state[:, 12:] / np.linalg.norm(state[:, 12:], axis=1)[:, None]]
     dynamics = envs.sim.dynamics
-    tcp = dynamics.body_names.index("arm/fr3_hand_tcp")
-    jacobian = dynamics.body_jacobian(np.c_[q, unit(cube)])[:, tcp, :, :7]
-    # 0.01 m or rad of damping: a stretched arm does not whirl
+    jacobian = dynamics.body_jacobian(state)[:, dynamics.body_names.index(TCP), :, :7]
+    # so much that a stretched arm does not whirl
     square = jacobian @ jacobian.transpose(0, 2, 1) + 1e-4 * np.eye(6)
-    return np.einsum("wki,wk->wi", jacobian, np.linalg.solve(square, turn[:, :, None])[:, :, 0])
+    return np.einsum("wki,wk->wi", jacobian, np.linalg.solve(square, shift[:, :, None])[:, :, 0])
 
 
-def unit(pose: Array) -> Array:
-    """The pose with its quaternion brought to length 1, which an observation in f32 has only nearly."""
-    return np.c_[pose[:, :3], pose[:, 3:] / np.linalg.norm(pose[:, 3:], axis=1)[:, None]]
+def delta(turn: Array, qd: Array) -> Array:
+    """Action of ``joint_delta`` that goes some of the way, less the more the joints move already.
 
-
-def _delta(envs: VectorEnv, q: Array, cube: Array, turn: Array) -> Array:
-    """Action of ``joint_delta`` that goes most of the way, and then on, so that the arm's weight is made up for."""
-    return np.clip(0.6 * joint_turn(envs, q, cube, turn) / 0.1, -1.0, 1.0)
+    Steps add up, so that the arm's weight is made up for.
+    """
+    return np.clip((0.6 * turn - 0.06 * qd) / 0.1, -1.0, 1.0)

@@ -55,6 +55,11 @@ class Dynamics:
         self._core = core
         self.dof_names, self.coord_names, self.body_names = core.names
 
+    @property
+    def model_hash(self) -> int:
+        """Hash of the scene's model, as `Sim.info` has that of a daemon's."""
+        return self._core.model_hash
+
     def forward_kinematics(self, joint_q: ArrayLike) -> Array:
         """Link frames in the world: position [m], then quaternion (x, y, z, w).
 

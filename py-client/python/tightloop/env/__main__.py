@@ -38,7 +38,7 @@ def main() -> int:
         epilog="Example: python -m tightloop.env serve FrankaReach --num-envs 2048 --name reach; then "
         'VectorEnv("FrankaReach", daemon="reach"). `tightloop stop reach` ends it.',
     )
-    serve.add_argument("task", choices=[*TASKS], help="the task")
+    serve.add_argument("task", help=f"{', '.join(TASKS)}, or a class of your own, FILE.py:CLASS")
     serve.add_argument("--num-envs", type=int, default=1, help="number of worlds (default 1)")
     serve.add_argument("--name", required=True, help="name under which trainers find it")
     serve.add_argument(

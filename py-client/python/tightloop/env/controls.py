@@ -1,6 +1,7 @@
 """What a policy's numbers do: torques, joint targets, steps of joints or of the hand, a gripper.
 
-An action is in [-1, 1]; each control takes some of its numbers, scales them, and writes columns of the commands.
+Each control takes some of an action's numbers, in [-1, 1] but where it says otherwise, scales them, and writes columns
+of the commands.
 """
 
 from __future__ import annotations
@@ -58,6 +59,8 @@ class Control(Protocol):
 
     #: How many numbers of the action it takes.
     size: int
+    #: How large they may be.
+    limit: float
     #: Fields of the frame that it reads.
     fields: Sequence[str]
 
@@ -66,7 +69,7 @@ class Control(Protocol):
         ...
 
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
-        """Write commands: ``action`` is of shape ``(worlds, size)``, in [-1, 1]; the frame is the last one."""
+        """Write commands: ``action`` is of shape ``(worlds, size)``, within the limit; the frame is the last one."""
         ...
 
 
@@ -74,6 +77,7 @@ class _Joints:
     """A control of some dofs, one number each."""
 
     fields: Sequence[str] = ()
+    limit = 1.0
     _field = "joint_target_q"
 
     def __init__(self, dofs: Sequence[str], scale: ArrayLike) -> None:
@@ -124,6 +128,17 @@ class JointTorque(_Joints):
 
 class JointTarget(_Joints):
     """Drive targets about the scene's: ``start + scale * action`` [rad or m], within the joints' ranges."""
+
+    def __init__(self, dofs: Sequence[str], scale: ArrayLike, *, limit: float = 1.0) -> None:
+        """Drive targets of some dofs.
+
+        Args:
+            dofs: Their names, ``robot/joint``.
+            scale: What an action of 1 means [rad or m], for all or each of them.
+            limit: How large an action may be.
+        """
+        super().__init__(dofs, scale)
+        self.limit = limit
 
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
         """Write the targets."""

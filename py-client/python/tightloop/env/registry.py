@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 from typing import Any
 
 from tightloop.env.task import Task
@@ -12,7 +14,7 @@ from tightloop.registration import TASKS
 
 
 def make_task(task: Task | type[Task] | str, options: Mapping[str, Any]) -> Task:
-    """A task as it is, of its class, or by the name of one of `tightloop.tasks`.
+    """A task as it is, of its class, by the name of one of `tightloop.tasks`, or as ``FILE.py:CLASS``.
 
     Raises:
         ArgumentError: There is no such task, or it does not take these options.
@@ -22,13 +24,33 @@ def make_task(task: Task | type[Task] | str, options: Mapping[str, Any]) -> Task
             raise ArgumentError(f"{', '.join(options)}: unknown argument; options of a task go to its constructor")
         return task
     if isinstance(task, str):
-        if task not in TASKS:
-            raise ArgumentError(f"there is no task {task!r}; there are: {', '.join(TASKS)}, and those of your own")
-        module, _, name = TASKS[task].partition(":")
-        task = getattr(import_module(module), name)
+        task = _named(task)
     if not (isinstance(task, type) and issubclass(task, Task)):
         raise ArgumentError(f"task is {task!r}; give a Task, its class or a name")
     try:
         return task(**options)
     except TypeError as problem:
         raise ArgumentError(f"task {task.__name__}: {problem}") from None
+
+
+def _named(task: str) -> type[Task]:
+    file, _, name = task.rpartition(":")
+    if file.endswith(".py"):
+        return _of_file(Path(file), name)
+    if task not in TASKS:
+        known = ", ".join(TASKS)
+        raise ArgumentError(f"there is no task {task!r}; there are: {known}, and those of your own, FILE.py:CLASS")
+    module, _, name = TASKS[task].partition(":")
+    return getattr(import_module(module), name)
+
+
+def _of_file(path: Path, name: str) -> type[Task]:
+    if not path.is_file():
+        raise ArgumentError(f"there is no file {path}; give the task as FILE.py:CLASS")
+    spec = spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None, "the name ends in .py"
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    if not isinstance(found := getattr(module, name, None), type):
+        raise ArgumentError(f"{path} has no class {name!r}")
+    return found

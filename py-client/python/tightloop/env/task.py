@@ -25,7 +25,7 @@ class Worlds:
     """All worlds at one instant, as the functions of a task see them; arrays have the worlds first.
 
     Attributes:
-        action: What was asked for in the step that led here, shape ``(worlds, actions)``, in [-1, 1]; 0 after a reset.
+        action: What was asked for in the step that led here, shape ``(worlds, actions)``; 0 after a reset.
         previous_action: What was asked for in the step before.
         goal: What `Task.goal` gave, shape ``(worlds, …)``.
         elapsed: Control steps since the reset, shape ``(worlds,)``, int32.
@@ -84,10 +84,10 @@ class Observed:
 class Task:
     """What an environment is about; a subclass says it, see ``examples/own_task.py``.
 
-    `observe`, `reward`, `terminated`, `success`, `metrics` and `goal` are pure: arrays in, arrays out, for all worlds at
-    once. They use arithmetic and the functions of the namespace ``xp`` that NumPy and the array API share, so that they run on
-    arrays of torch and JAX too. What they return is valid until they are called again. They see no simulation and draw
-    no random numbers.
+    `observe`, `reward`, `terminated`, `success`, `metrics` and `goal` are pure: arrays in, arrays out, for all worlds
+    at once. They use arithmetic and the functions of the namespace ``xp`` that NumPy and the array API share, so that
+    they run on arrays of torch and JAX too. What they return is valid until they are called again. They see no
+    simulation and draw no random numbers.
 
     Attributes:
         fields: Fields of the frame that the functions read.

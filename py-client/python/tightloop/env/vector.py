@@ -33,11 +33,12 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
     """A task in many worlds.
 
     Observations are float32, shape ``(num_envs, size)``, within the bounds of ``single_observation_space``; actions
-    float32 in [-1, 1], shape ``(num_envs, actions)``, and what is beyond counts as the bound. Rewards are float32.
+    of shape ``(num_envs, actions)`` within those of ``single_action_space``, and what is beyond counts as the bound.
+    Rewards are float32.
 
-    ``infos["success"]`` says in which worlds the task is done now, where the task knows, as do its other `Task.metrics`;
-    ``infos["_success"]`` says in which rows that is told: not of worlds that have just begun. A world that failed (no longer
-    finite, or beyond the task's bounds) is terminated, and ``infos["fault"]`` holds the bits of its ``status``.
+    ``infos["success"]`` says in which worlds the task is done now, where the task knows; its `Task.metrics` are told
+    likewise, and ``infos["_success"]`` says in which rows: not of worlds that have just begun. A world that failed (no
+    longer finite, or beyond the task's bounds) is terminated, and ``infos["fault"]`` holds the bits of its ``status``.
 
     Attributes:
         sim: The simulation.
@@ -67,7 +68,8 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         """Launch a daemon with that many worlds, or join one.
 
         Args:
-            task: A `Task`, its class, or the name of one of `tightloop.tasks`, such as ``"FrankaReach"``.
+            task: A `Task`, its class, the name of one of `tightloop.tasks`, such as ``"FrankaReach"``, or
+                ``"own_task.py:Circle"``, a class in a file.
             num_envs: How many worlds; those of the daemon if one is joined, else 1.
             autoreset_mode: ``NEXT_STEP``, ``SAME_STEP`` or ``DISABLED``, as gymnasium defines them.
             copy: Whether each step returns new arrays. Otherwise they are views of a ring, overwritten by the step
@@ -114,7 +116,10 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             place += control.size
         low, high = np.concatenate([part.bounds for part in self.task.observed()], axis=1)
         self.single_observation_space = Box(low, high, dtype=np.float32)
-        self.single_action_space = Box(-1.0, 1.0, (place,), np.float32)
+        limits = np.concatenate([np.full(control.size, control.limit, np.float32) for control in controls])
+        self.single_action_space = Box(-limits, limits, dtype=np.float32)
+        # one number where it does: NumPy takes long over rows of few
+        self._limits = limits[0] if (limits == limits[0]).all() else limits
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
@@ -179,7 +184,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         """Send the actions of a step, and return at once; `recv` waits for what becomes of them.
 
         Args:
-            actions: Shape ``(num_envs, actions)``, in [-1, 1]. NaN makes a world fail, and no other.
+            actions: Shape ``(num_envs, actions)``, within ``action_space``. NaN makes a world fail, and no other.
 
         Raises:
             ArgumentError: The shape is another, or these are no numbers.
@@ -197,7 +202,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             expected = f"expected real numbers of shape {self._action.shape}"
             raise ArgumentError(f"actions: {expected}; got {given.dtype} of shape {given.shape}")
         self._action, self._previous_action = self._previous_action, self._action
-        np.clip(given, -1.0, 1.0, out=self._action, casting="same_kind")
+        np.clip(given, -self._limits, self._limits, out=self._action, casting="same_kind")
         for control, numbers in self._controls:
             control.apply(self._action[:, numbers], self._frame)
         self.sim.send(**self._commands.sent)

@@ -12,8 +12,9 @@
 | 0 | ±1 | a force of 10 N on the cart (swing-up: 20 N) |
 
 Balance (the rules of Barto, Sutton and Anderson 1983, with a force of any size): reward 1 a step, over when the pole is
-0.21 rad (12°) from upright or the cart 2.4 m from the middle. Swing-up: reward (1 + cos θ)/2 · (1 - x²/11.5) -
-0.001 (θ̇² + a²), never over; a success is a pole within 0.2 rad of upright that turns slower than 1 rad/s.
+0.21 rad (12°) from upright or the cart 2.4 m from the middle. Swing-up: reward (1 + cos θ)/2 · (1 + 1/(1 + θ̇²/25))/2 ·
+(1 + 1 - x²/2.4²)/2 · (1 - a²/5), in the manner of dm_control's cartpole (Tassa et al. 2018), never over; a success is a
+pole within 0.2 rad of upright that turns slower than 1 rad/s.
 """
 
 from __future__ import annotations
@@ -88,10 +89,11 @@ class CartPoleSwingUp(CartPoleBalance):
         return scene
 
     def reward(self, xp: Namespace, worlds: Worlds) -> Array:
-        """Upright, in the middle, and quiet."""
+        """Upright, in the middle, quiet, with little force."""
         x, angle, rate = worlds.joint_q[:, 0], worlds.joint_q[:, 1], worlds.joint_qd[:, 1]
         force = worlds.action[:, 0]
-        return 0.5 * (1.0 + xp.cos(angle)) * (1.0 - x * x / 11.5) - 0.001 * (rate * rate + force * force)
+        middle, quiet = 1.0 - (x / TRACK) ** 2, 1.0 / (1.0 + (rate / 5.0) ** 2)
+        return 0.25 * (1.0 + xp.cos(angle)) * (1.0 + quiet) * (0.5 + 0.5 * middle) * (1.0 - 0.2 * force * force)
 
     def terminated(self, xp: Namespace, worlds: Worlds) -> None:
         """It is never over before its time."""

@@ -1,74 +1,96 @@
 """A cube on the ground before the arm, and whether the fingers hold it.
 
-Contacts are those of a time step of 5 ms: their time constant of 10 ms is the shortest that is stable with it. A grasp of
-30 N then presses the pads 0.8 mm into the cube, where the default of 20 ms has 2.5 mm. At 100 Hz, which the sources of
-the tasks have, a scripted grasp holds the cube in 40% of the worlds, at 200 Hz in all: so these tasks make twice as many
-substeps, half as long.
+The sources of the tasks make steps of 10 ms. Here the fingers, which close with 0.34 m/s, would then go as far as 11 mm
+into the cube before its contacts stop them, and squeeze it out in 40% of the worlds, where a policy by hand grasps it
+at 200 Hz in all. So these tasks make twice as many substeps, half as long. The time constant of contacts is the
+shortest that is stable with them, 10 ms: a grasp of 30 N presses each pad 0.7 mm into the cube (3 mm for a moment,
+while it closes), with the default of 20 ms 2.5 mm.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 import tightloop as tl
+from tightloop.env.controls import Control
 from tightloop.env.names import Names
-from tightloop.env.task import Array, Namespace
-from tightloop.shapes import Surface
+from tightloop.env.task import Array, Namespace, Observed, Task
 from tightloop.tasks import franka
 
 #: Half the edge [m].
 HALF = 0.02
 #: Physics step [s].
 DT = 1 / 200
-#: How everything touches, but for friction.
-SURFACE: Surface = {"ke": 1e4, "kd": 200.0}
+#: Stiffness [1/s²] and damping [1/s] of all contacts.
+KE, KD = 1e4, 200.0
 #: Friction of cube and ground; and of the arm, which counts where it touches them [–].
 MU, MU_ARM = 0.3, 1.15
+#: Of actions of ``joint_target``, that is 1.5 rad from the start: with 1 rad the hand comes to a quarter of the places
+#: where `tightloop.tasks.lift` has its cube, with 1.25 rad to 99%.
+LIMIT = 3.0
 #: The contact sensors: the cube's force on each finger.
 TOUCH = ("touch_left", "touch_right")
-#: Least force on each finger that holds [N], and the square of the cosine of the largest angle to its way (85°).
-FORCE, COS_SQUARED = 0.5, 0.0871557**2
+#: Least force on each finger that holds [N].
+FORCE = 0.5
+#: Square of half the cosine of 85°, the largest angle between that force and the way in which the finger opens.
+LEAST = (0.5 * math.cos(math.radians(85.0))) ** 2
 
 
-def scene(
-    *, substeps: int, start: list[float], driven: bool, base: Sequence[float], cube: Sequence[float]
-) -> tuple[tl.Scene, tl.Robot]:
-    """An arm and a cube on the ground, and the contact sensors of the fingers.
+class CubeTask(Task):
+    """What tasks with an arm and a cube have in common. ``control`` is one of `tightloop.tasks.franka.CONTROLS`."""
 
-    Args:
-        substeps: Physics steps a control step.
-        start: Where the arm's joints start [rad or m].
-        driven: Whether its drives hold their targets.
-        base: Where it stands [m].
-        cube: Where the cube stands, x and y [m].
-    """
-    made = tl.Scene(dt=DT, substeps=substeps)
-    # MuJoCo's own panda has 10; at 1000 a step takes 1.6 times as long, and a held cube slips no less
-    made.solver(impratio=10.0)
-    arm = franka.add_arm(made, start, driven=driven, pos=tuple(base), mu=MU_ARM, **SURFACE)
-    made.add_ground(mu=MU, **SURFACE)
-    body = made.add_body(name="cube", pos=(*cube, HALF))
-    made.add_box(body=body, half_extents=(HALF, HALF, HALF), density=1000.0, mu=MU, **SURFACE)
-    for name, finger in zip(TOUCH, ("fr3_leftfinger", "fr3_rightfinger"), strict=True):
-        made.add_contact_sensor(of=arm.link(finger), against=body, name=name)
-    return made, arm
+    substeps: ClassVar[int]
+    start: ClassVar[list[float]]  # of the joints [rad, m]
+    base: ClassVar[tuple[float, float, float]]  # where the arm stands [m]
+    place: ClassVar[tuple[float, float]]  # where the cube stands, x and y [m]
+    noise: ClassVar[tl.Normal | None] = None  # of the arm's joints at the start [rad]
+    spread: ClassVar[Mapping[str, tl.Uniform]]  # of the cube about its place, as `Scene.randomize` has it
+    binary_gripper: ClassVar[bool] = False
 
+    def __init__(self, control: str) -> None:
+        self._control = control
+        scale = 0.5 if control == "joint_target" else 0.1
+        gripper = franka.gripper(binary=self.binary_gripper)
+        self._arm_controls = franka.controls(control, scale=scale, limit=LIMIT, gripper=gripper)
 
-class Places:
-    """Where arm and cube are in the arrays.
+    def scene(self) -> tl.Scene:
+        """Arm and cube on the ground, and contact sensors of the fingers."""
+        scene = tl.Scene(dt=DT, substeps=self.substeps)
+        # a held cube creeps by 0.2 mm in 5 s; by nothing at 1000, where a step takes 1.6 times as long
+        scene.solver(impratio=10.0)
+        driven = self._control != "torque"
+        arm = franka.add_arm(scene, self.start, driven=driven, pos=self.base, mu=MU_ARM, ke=KE, kd=KD)
+        scene.add_ground(mu=MU, ke=KE, kd=KD)
+        body = scene.add_body(name="cube", pos=(*self.place, HALF))
+        scene.add_box(body=body, half_extents=(HALF, HALF, HALF), density=1000.0, mu=MU, ke=KE, kd=KD)
+        for name, finger in zip(TOUCH, ("fr3_leftfinger", "fr3_rightfinger"), strict=True):
+            scene.add_contact_sensor(of=arm.link(finger), against=body, name=name)
+        if self.noise is not None:
+            scene.randomize(joint_q=dict.fromkeys(franka.ARM, self.noise))
+        scene.randomize(body_q={"cube": self.spread})
+        return scene
 
-    Attributes:
-        tcp: Place of the tcp in ``site_q``.
-        pos: Columns of the cube's position in ``joint_q``.
-        pose: Columns of its position and orientation.
-        touch: Places of the sensors in ``contact_sensor``, left and right.
-    """
+    def controls(self) -> Sequence[Control]:
+        """The arm and its fingers."""
+        return self._arm_controls
 
-    def __init__(self, names: Names) -> None:
+    def bind(self, names: Names) -> None:
+        """Look up tcp, cube and sensors."""
         first = names.coords["cube"].start
-        self.tcp = names.site(franka.TCP)
-        self.pos, self.pose = slice(first, first + 3), slice(first, first + 7)
-        self.touch = [names.contact_sensor(name) for name in TOUCH]
+        self._tcp = names.site(franka.TCP)
+        self._pos, self._quat = slice(first, first + 3), slice(first + 3, first + 7)
+        self._touch = [names.contact_sensor(name) for name in TOUCH]
+
+
+def joints_observed() -> list[Observed]:
+    """Positions and velocities of the nine joints."""
+    reach = [6.0] * 7 + [0.1] * 2
+    return [
+        Observed("joint positions", [-end for end in reach], reach, 9, "rad, m"),
+        Observed("joint velocities", -10, 10, 9, "rad/s, m/s"),
+    ]
 
 
 def grasped(xp: Namespace, quats: Array, left: Array, right: Array) -> Array:
@@ -84,12 +106,17 @@ def grasped(xp: Namespace, quats: Array, left: Array, right: Array) -> Array:
         bool, shape ``(worlds,)``.
     """
     x, y, z, w = (quats[:, part] for part in range(4))
-    way = 2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)
-    return _pressed(left, way, 1.0) & _pressed(right, way, -1.0)
+    # half the hand's y axis in world axes
+    way = x * y - w * z, 0.5 - (x * x + z * z), y * z + w * x
+    (left_along, left_square), (right_along, right_square) = _along(left, way), _along(right, way)
+    # f·y ≥ |f| cos 85°, squared with its sign
+    pressed = (left_along * abs(left_along) >= LEAST * left_square) & (
+        right_along * abs(right_along) <= -LEAST * right_square
+    )
+    return pressed & (xp.minimum(left_square, right_square) >= FORCE**2)
 
 
-def _pressed(force: Array, way: Sequence[Array], sign: float) -> Array:
-    fx, fy, fz = (force[:, axis] for axis in range(3))
-    along = sign * (fx * way[0] + fy * way[1] + fz * way[2])
-    square = fx * fx + fy * fy + fz * fz
-    return (square >= FORCE**2) & (along > 0.0) & (along * along >= COS_SQUARED * square)
+def _along(force: Array, way: Sequence[Array]) -> tuple[Array, Array]:
+    """Product of a force with a direction, and its square."""
+    x, y, z = (force[:, axis] for axis in range(3))
+    return x * way[0] + y * way[1] + z * way[2], x * x + y * y + z * z

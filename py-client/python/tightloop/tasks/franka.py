@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import tightloop as tl
 from tightloop.checks import Vector
 from tightloop.env.controls import Control, EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
-from tightloop.env.task import Observed
 from tightloop.errors import ArgumentError
 from tightloop.shapes import ORIGIN, Surface
 
@@ -50,19 +49,20 @@ def add_arm(
     return arm
 
 
-def controls(name: str, *, scale: float, gripper: Gripper | None = None) -> list[Control]:
+def controls(name: str, *, scale: float, gripper: Gripper | None = None, limit: float = 1.0) -> list[Control]:
     """What an action does to the arm: seven numbers (``end_effector_delta``: six), and one for the gripper if given.
 
     Args:
         name: One of `CONTROLS`.
         scale: Of ``joint_target``: how far from the start [rad]; of ``joint_delta``: how far a step [rad].
         gripper: The control of the fingers.
+        limit: How large an action of ``joint_target`` may be; of the others 1.
 
     Raises:
         ArgumentError: There is no such control.
     """
     arms = {
-        "joint_target": lambda: JointTarget(ARM, scale),
+        "joint_target": lambda: JointTarget(ARM, scale, limit=limit),
         "joint_delta": lambda: JointDelta(ARM, scale),
         "end_effector_delta": lambda: EndEffectorDelta(TCP, ARM, pos_scale=0.05, rot_scale=0.1),
         "torque": lambda: JointTorque(ARM, _TORQUE),
@@ -79,12 +79,3 @@ def gripper(*, binary: bool = False) -> Gripper:
         binary: Whether there is nothing in between.
     """
     return Gripper(FINGERS, low=-0.01, high=0.04, binary=binary)
-
-
-def observed() -> list[Observed]:
-    """Positions and velocities of the nine joints."""
-    reach = [6.0] * 7 + [0.1] * 2
-    return [
-        Observed("joint positions", [-end for end in reach], reach, 9, "rad, m"),
-        Observed("joint velocities", -10, 10, 9, "rad/s, m/s"),
-    ]

@@ -1,7 +1,8 @@
 """A Franka arm brings its hand to a pose that changes every four seconds.
 
 After Isaac Lab's ``Isaac-Reach-Franka-v0`` (its ranges, weights and rates), with this project's arm and quaternions
-(x, y, z, w). Physics at 60 Hz, control at 30 Hz, episodes of 12 s.
+(x, y, z, w). Physics at 60 Hz, control at 30 Hz, episodes of 12 s. Isaac Lab's actions have no bounds; here they end
+where all goals are in reach: within ±1, that is 0.5 rad of the start, the hand comes to two thirds of them.
 
 | place | observation | range | unit |
 |---|---|---|---|
@@ -9,11 +10,11 @@ After Isaac Lab's ``Isaac-Reach-Franka-v0`` (its ranges, weights and rates), wit
 | 9–17 | joint velocities | ±10 | rad/s, m/s |
 | 18–20 | goal: position of the tcp | x 0.35–0.65, y ±0.2, z 0.15–0.5 | m |
 | 21–24 | goal: orientation (x, y, z, w), downwards, turned by any angle about z | ±1 | – |
-| 25–31 | last action | ±1 | – |
+| 25–31 | last action | ±4 | – |
 
 | action | range | what 1 means |
 |---|---|---|
-| 0–6 | ±1 | 0.5 rad from the start (``joint_target``), or what the chosen control means |
+| 0–6 | ±4 | 0.5 rad from the start (``joint_target``); ±1 with the other controls, and what they mean |
 
 Reward: -0.2 |e| + 0.1 (1 - tanh(|e|/0.1)) - 0.1 φ - 1e-4 |a - a'|² - 1e-4 |q̇|², e the distance of the tcp from the
 goal [m], φ the angle between the orientations [rad], a' the action before. A success is |e| < 2 cm.
@@ -33,6 +34,7 @@ from tightloop.tasks import franka
 from tightloop.tasks.geometry import angle, distance, squares
 
 START = [0.0, -0.569, 0.0, -2.81, 0.0, 3.037, 0.741, 0.04, 0.04]  # [rad, m]
+LIMIT = 4.0  # of actions: 2 rad from the start
 LOW, HIGH = (0.35, -0.2, 0.15), (0.65, 0.2, 0.5)  # of the goals [m]
 
 
@@ -46,8 +48,8 @@ class FrankaReach(Task):
 
     def __init__(self, control: str = "joint_target") -> None:
         self._control = control
-        self._arm_controls = franka.controls(control, scale=0.5 if control == "joint_target" else 0.1)
-        self._size = sum(control.size for control in self._arm_controls)
+        self._arm_controls = franka.controls(control, scale=0.5 if control == "joint_target" else 0.1, limit=LIMIT)
+        (self._arm_control,) = self._arm_controls
 
     def scene(self) -> tl.Scene:
         """The arm alone; it starts within a quarter of a radian of the same place."""
@@ -68,7 +70,7 @@ class FrankaReach(Task):
             Observed("joint velocities", -10, 10, 9, "rad/s, m/s"),
             Observed("goal: position", LOW, HIGH, 3, "m"),
             Observed("goal: orientation", -1, 1, 4),
-            Observed("last action", -1, 1, self._size),
+            Observed("last action", -self._arm_control.limit, self._arm_control.limit, self._arm_control.size),
         ]
 
     def bind(self, names: Names) -> None:
@@ -85,7 +87,8 @@ class FrankaReach(Task):
 
     def observe(self, xp: Namespace, worlds: Worlds) -> Sequence[Array]:
         """Joints, goal, last action."""
-        return worlds.joint_q - self._start, worlds.joint_qd, worlds.goal[:, :3], worlds.goal[:, 3:], worlds.action
+        turned = worlds.joint_q - xp.asarray(self._start)
+        return turned, worlds.joint_qd, worlds.goal[:, :3], worlds.goal[:, 3:], worlds.action
 
     def error(self, xp: Namespace, worlds: Worlds) -> Array:
         """Distance of the tcp from the goal [m], shape ``(worlds,)``."""
