@@ -8,6 +8,6 @@
 | `tightloop.adapters.torchrl` | torchrl | `TorchRlEnv` | when torchrl resets them |
 | `tightloop.adapters.rllib` | RLlib | `register` | in the next step |
 
-All take a `tightloop.env.VectorEnv`, or a task and what `VectorEnv` takes besides. What they hand out belongs to the library,
-which may keep it or write into it: also where the environment itself has ``copy=False``.
+All take a `tightloop.env.VectorEnv`, or a task and what `VectorEnv` takes besides; `register` takes a task. What they
+hand out belongs to the library, which may keep it or write into it: also where the environment has ``copy=False``.
 """

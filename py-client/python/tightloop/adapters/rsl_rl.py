@@ -96,7 +96,7 @@ class RslRlVecEnv(rsl_env.VecEnv):
         """Advance all worlds by one control step.
 
         Args:
-            actions: Shape ``(num_envs, num_actions)``; what is beyond [-1, 1] counts as the bound.
+            actions: Shape ``(num_envs, num_actions)``; what is beyond the bounds of actions counts as the bound.
 
         Returns:
             Observations, rewards and ends (0 or 1), shape ``(num_envs,)``, and extras.

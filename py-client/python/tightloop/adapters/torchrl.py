@@ -26,11 +26,12 @@ torch = library("torch", install="torch")
 class TorchRlEnv(envs.EnvBase):
     """A `VectorEnv` of batch size ``(num_envs,)``; torchrl resets the worlds whose episodes ended.
 
-    Keys: ``observation`` and ``action``, ``reward``, ``done``, ``terminated``, ``truncated``, and ``success``, whether the
-    task is done now (always False where it does not know).
+    Keys: ``observation``, ``action``, ``reward``, ``done``, ``terminated`` and ``truncated``. What the environment
+    tells besides, such as ``success``, is in ``infos``: a key of its own would be handed to every policy.
 
     Attributes:
         env: The `VectorEnv`.
+        infos: Those of the last step.
     """
 
     def __init__(self, env: Given, num_envs: int | None = None, *, torch_device: str = "cpu", **options: Any) -> None:
@@ -48,18 +49,18 @@ class TorchRlEnv(envs.EnvBase):
         inner = environment(env, num_envs, AutoresetMode.DISABLED, options)
         super().__init__(device=torch.device(torch_device), batch_size=torch.Size([inner.num_envs]))
         self.env = inner
+        self.infos: dict[str, Any] = {}
         self._seed: int | None = None
         size = self.batch_size
+        spaces: dict[str, Any] = {"observation": inner.observation_space, "action": inner.action_space}
         bounds = {
             name: specs.Bounded(
                 low=self._tensor(space.low), high=self._tensor(space.high), dtype=torch.float32, device=self.device
             )
-            for name, space in (("observation", inner.observation_space), ("action", inner.action_space))
+            for name, space in spaces.items()
         }
         flag = specs.Categorical(2, dtype=torch.bool, shape=(*size, 1), device=self.device)
-        self.observation_spec = specs.Composite(
-            {"observation": bounds["observation"], "success": flag.clone()}, shape=size, device=self.device
-        )
+        self.observation_spec = specs.Composite({"observation": bounds["observation"]}, shape=size, device=self.device)
         self.action_spec = bounds["action"]
         self.reward_spec = specs.Unbounded(shape=(*size, 1), dtype=torch.float32, device=self.device)
         names = ("done", "terminated", "truncated")
@@ -72,17 +73,15 @@ class TorchRlEnv(envs.EnvBase):
         seed, self._seed = self._seed, None
         obs, _ = self.env.reset(seed=seed, options=None if mask is None else {"reset_mask": mask})
         never = np.zeros(self.env.num_envs, np.bool_)
-        return self._dict(observation=obs, success=never, done=never, terminated=never, truncated=never)
+        return self._dict(observation=obs, done=never, terminated=never, truncated=never)
 
     def _step(self, tensordict: Any) -> Any:
-        """Advance all worlds by one control step."""
+        """Advance all worlds by one control step; what is beyond the bounds of actions counts as the bound."""
         action = tensordict.get("action").detach().cpu().numpy()
-        obs, reward, terminated, truncated, infos = self.env.step(action)
-        success = infos.get("success", np.zeros(self.env.num_envs, np.bool_))
+        obs, reward, terminated, truncated, self.infos = self.env.step(action)
         return self._dict(
             observation=obs,
             reward=reward,
-            success=success,
             done=terminated | truncated,
             terminated=terminated,
             truncated=truncated,
