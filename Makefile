@@ -6,6 +6,7 @@
 #   make fuzz     random programs on random scenes, many more of them  (make fuzz CASES=1000 SEED=5000)
 #   make published   robots from PyPI against MuJoCo; 260 MB of wheels  (make published TIGHTLOOP_URDF=/path/robot.urdf)
 #   make bench    speed, side by side with what it is compared with
+#   make bench-env   environments beside envpool and gymnasium's, on all cores; 0.8 GB of wheels
 #   make check    formats, lints and types only
 
 SHELL  := /bin/bash
@@ -25,7 +26,7 @@ PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml -name '
 PYTHON_TREES   := py-client/python py-client/tests tests examples benches
 CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
-.PHONY: demo test test-rl fuzz published bench check wheel
+.PHONY: demo test test-rl fuzz published bench bench-env check wheel
 .NOTPARALLEL: # pip installs into one venv, cargo and the tests use all cores by themselves
 
 demo: wheel
@@ -67,6 +68,10 @@ bench: wheel $(VENV)/.dev
 	$(PYTHON) benches/recording.py
 	$(PYTHON) benches/tasks.py
 
+# Kept out of `bench`, which needs none of these wheels.
+bench-env: wheel $(VENV)/.dev $(VENV)/.peers
+	$(PYTHON) benches/env.py
+
 check: wheel $(VENV)/.dev
 	cargo fmt --all --check
 	$(CLIPPY)
@@ -92,6 +97,10 @@ $(VENV)/.dev: py-client/requirements-dev.txt $(VENV)/.demo
 	@touch $@
 
 $(VENV)/.rl: py-client/requirements-rl.txt $(VENV)/.dev
+	$(PIP) install --quiet -r $<
+	@touch $@
+
+$(VENV)/.peers: py-client/requirements-peers.txt $(VENV)/.dev
 	$(PIP) install --quiet -r $<
 	@touch $@
 

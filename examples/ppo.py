@@ -18,10 +18,14 @@ from __future__ import annotations
 import argparse
 import csv
 import math
+import os
 import time
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
+
+# Threads of torch that wait for each other by spinning take the processor from the simulation
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import matplotlib
 import numpy as np
@@ -64,8 +68,8 @@ class Config:
 
 PRESETS = {
     "CartPoleBalance": Config(minutes=0.5, num_envs=512, hidden=64),
-    "CartPoleSwingUp": Config(minutes=1.0, num_envs=1024, steps=32, hidden=64, evaluate=10.0),
-    "FrankaReach": Config(minutes=3.0),
+    "CartPoleSwingUp": Config(1.0, 256, 64, minibatches=8, hidden=64, gamma=0.98, std=1.0, evaluate=10.0),
+    "FrankaReach": Config(3.0, 512, 32, minibatches=16, gamma=0.9, kl=0.02, std=1.0),
     "FrankaPushCube": Config(
         15.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=30.0
     ),

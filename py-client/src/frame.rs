@@ -22,6 +22,11 @@ pub(crate) struct Sample(sim_protocol::Frame);
 ///
 /// A frame, and every array taken from it, stays valid and unchanged until dropped, even after the daemon died.
 /// At most ``frames_held`` frames may be alive; ``copy()`` is for those to keep.
+///
+/// Every array begins at a multiple of 64 bytes, so other libraries take it as it is: ``np.from_dlpack``,
+/// ``torch.from_dlpack`` and ``jax.device_put`` copy nothing, and what they return keeps the frame alive. torch knows no
+/// read-only memory: writing to such a tensor ends the process, so ``clone()`` it first. JAX copies 64-bit arrays unless
+/// it runs with ``jax_enable_x64``, and its ``from_dlpack`` refuses arrays that are read-only.
 #[pyclass(frozen, module = "tightloop")]
 pub(crate) struct Frame {
     // not the frame itself, which keeps the arrays made so far: that would be a circle

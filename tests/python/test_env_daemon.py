@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 import tightloop as tl
-from tightloop.env import VectorEnv
+from tightloop.env import VectorEnv, make_groups
 
 # A trainer: says what it saw first, and steps until it is killed
 TRAINER = """
 import sys, numpy as np
-from tightloop.env import VectorEnv
+from tightloop.env import VectorEnv, make_groups
 env = VectorEnv("FrankaReach", daemon=sys.argv[1])
 obs, _ = env.reset(seed=5)
 print(env.num_envs, obs.tobytes().hex(), flush=True)
@@ -114,7 +114,7 @@ def test_misuse_of_serve_is_told(unique: Callable[[], str]) -> None:
 def test_two_groups_do_what_one_does() -> None:
     """The policy works on one group while the other steps: the same numbers as one environment of all worlds."""
     whole = VectorEnv("FrankaReach", 10)
-    groups = [VectorEnv("FrankaReach", 5, first_env=first, threads=1) for first in (0, 5)]
+    groups = make_groups("FrankaReach", 10)
     rows = [slice(0, 5), slice(5, 10)]
     seen = whole.reset(seed=3)[0]
     np.testing.assert_array_equal(seen, np.concatenate([group.reset(seed=3)[0] for group in groups]))
@@ -134,6 +134,12 @@ def test_two_groups_do_what_one_does() -> None:
         seen = obs
     for env in (whole, *groups):
         env.close()
+
+
+def test_groups_that_are_not_even_are_refused() -> None:
+    for count in (3, 0, 11):
+        with pytest.raises(tl.ArgumentError, match="evenly"):
+            make_groups("FrankaReach", 10, count)
 
 
 def test_the_daemon_that_is_killed_is_told() -> None:

@@ -22,6 +22,11 @@ class Frame:
     as the precision of the run says. Only the fields asked for in ``launch(fields=...)`` are there, besides
     ``time``, ``step``, ``status`` and ``contacts_left_out``.
 
+    Every array begins at a multiple of 64 bytes, so other libraries take it as it is: ``np.from_dlpack``,
+    ``torch.from_dlpack`` and ``jax.device_put`` copy nothing, and what they return keeps the frame alive. torch knows
+    no read-only memory: writing to such a tensor ends the process, so ``clone()`` it first. JAX copies 64-bit arrays
+    unless it runs with ``jax_enable_x64``, and its ``from_dlpack`` refuses arrays that are read-only.
+
     Raises:
         UnknownField: The frame does not carry that field; the message lists those it carries.
     """
@@ -92,6 +97,12 @@ class Frame:
     """Angular velocity of each site, in its own axes [rad/s], ``(worlds, sites, 3)``."""
     accelerometer: NDArray[Any]
     """Acceleration of each site less gravity, in its own axes [m/s²], ``(worlds, sites, 3)``; 9.81 upwards at rest."""
+    site_inverse_jacobian: NDArray[Any]
+    """What takes a small displacement of each site to one of the joints [rad or m per m or rad], ``(worlds, sites,
+    dofs, 6)``: ``joint_qd * dt = site_inverse_jacobian @ d`` moves the site by about ``d``, three numbers of its origin
+    [m] and three of a rotation vector [rad], in the axes of ``site_qd``. Damped least squares, Jᵀ (J Jᵀ + λ² I)⁻¹,
+    where J takes ``joint_qd`` to ``site_qd`` and λ is the site's ``damping``. Zero for dofs that do not move the site;
+    those of a floating base do, and each joint of a mimic counts for itself."""
     contact_sensor: NDArray[Any]
     """Sum of the contact forces of each contact sensor, in world axes [N], ``(worlds, contact_sensors, 3)``."""
     time: NDArray[np.float64]

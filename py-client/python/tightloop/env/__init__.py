@@ -11,6 +11,7 @@ from __future__ import annotations
 from gymnasium.vector import AutoresetMode
 
 from tightloop.env.controls import EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
+from tightloop.env.groups import make_groups
 from tightloop.env.names import Names
 from tightloop.env.single import Env
 from tightloop.env.task import Observed, Task, Worlds
@@ -30,6 +31,7 @@ __all__ = [
     "Task",
     "VectorEnv",
     "Worlds",
+    "make_groups",
 ]
 
 register()
