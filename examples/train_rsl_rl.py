@@ -36,13 +36,15 @@ class Preset:
     steps: int = 24  # of a rollout, in every world
     hidden: int = 128  # units of each of two layers, in actor and critic
     gamma: float = 0.99  # what a reward is worth one step later
+    lam: float = 0.95  # λ of the advantages
+    kl: float = 0.01  # change of the policy that the learning rate aims at
     std: float = 1.0  # standard deviation of actions at the start
 
 
 PRESETS = {
     "CartPoleBalance": Preset(30, 512, hidden=64),
     "CartPoleSwingUp": Preset(75, 512, steps=64, hidden=64, gamma=0.98),
-    "FrankaReach": Preset(150, 512, gamma=0.95),
+    "FrankaReach": Preset(125, 512, gamma=0.9, lam=0.9, kl=0.02, std=0.6),
 }
 
 
@@ -61,10 +63,10 @@ def configuration(preset: Preset, seed: int) -> dict[str, Any]:
             "num_learning_epochs": 5,
             "num_mini_batches": 8,
             "gamma": preset.gamma,
-            "lam": 0.95,
+            "lam": preset.lam,
             "learning_rate": 1e-3,
             "schedule": "adaptive",
-            "desired_kl": 0.01,
+            "desired_kl": preset.kl,
             "entropy_coef": 0.0,
             # values are not of the size of 1, to which its clipping is made
             "use_clipped_value_loss": False,
