@@ -1,7 +1,8 @@
-# demo · test · fuzz · published · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
+# demo · test · test-rl · fuzz · published · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
 #
 #   make demo     the Franka lesson and a grasp in 4096 worlds, plots in out/  (make demo WORLDS=256)
 #   make test     every Rust and Python test
+#   make test-rl  adapters against their libraries, and short trainings; 6 GB of torch, Ray and others into .venv
 #   make fuzz     random programs on random scenes, many more of them  (make fuzz CASES=1000 SEED=5000)
 #   make published   robots from PyPI against MuJoCo; 260 MB of wheels  (make published TIGHTLOOP_URDF=/path/robot.urdf)
 #   make bench    speed, side by side with what it is compared with
@@ -25,7 +26,7 @@ PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml -name '
 PYTHON_TREES   := py-client/python py-client/tests tests examples benches
 CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
-.PHONY: demo test fuzz published bench bench-env check wheel
+.PHONY: demo test test-rl fuzz published bench bench-env check wheel
 .NOTPARALLEL: # pip installs into one venv, cargo and the tests use all cores by themselves
 
 demo: wheel
@@ -42,6 +43,10 @@ test: wheel $(VENV)/.dev
 	then set -x; cargo nextest run --release --workspace; \
 	else set -x; cargo test --release --workspace --lib --bins --tests; fi
 	$(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . py-client/tests tests/python
+
+# Kept out of `test`, which needs no torch. One thread of torch: two that share a busy core wait for each other.
+test-rl: wheel $(VENV)/.dev $(VENV)/.rl
+	OMP_NUM_THREADS=1 $(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . tests/rl
 
 # Seeds of failures are printed. Ten properties, about a minute for 100 cases of each.
 fuzz:
@@ -88,6 +93,10 @@ $(VENV)/.demo: py-client/requirements-demo.txt | $(PYTHON)
 	@touch $@
 
 $(VENV)/.dev: py-client/requirements-dev.txt $(VENV)/.demo
+	$(PIP) install --quiet -r $<
+	@touch $@
+
+$(VENV)/.rl: py-client/requirements-rl.txt $(VENV)/.dev
 	$(PIP) install --quiet -r $<
 	@touch $@
 

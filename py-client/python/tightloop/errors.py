@@ -31,6 +31,10 @@ class ResourceError(LaunchError):
     """There is not enough memory, or not enough room in shared memory, for that many worlds."""
 
 
+class MissingLibrary(TightloopError, ImportError):
+    """An adapter's library is not installed; the message says how to install it."""
+
+
 class UnknownDaemon(TightloopError, LookupError):
     """No daemon of that name is running; the message lists those that are."""
 

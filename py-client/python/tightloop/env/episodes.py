@@ -72,7 +72,8 @@ class Episodes:
     def due(self) -> NDArray[np.bool_] | None:
         """Which worlds are due for their next goal; None if none can be."""
         steps = self._task.goal_steps
-        return None if steps is None else self.elapsed == steps * (self._goals + 1)
+        # not `==`: `elapsed` may have been set ahead, and then the goals follow, one a step
+        return None if steps is None else self.elapsed >= steps * (self._goals + 1)
 
     def renew(self, mask: NDArray[np.bool_], worlds: Worlds) -> None:
         """Give the worlds under the mask their next goal."""

@@ -137,6 +137,16 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         self._frame: Any = None
         self._ready = self._in_flight = False
 
+    @property
+    def elapsed(self) -> NDArray[np.int32]:
+        """Control steps of each world's episode so far, shape ``(num_envs,)``; assigning spreads when episodes end."""
+        return self._episodes.elapsed
+
+    @elapsed.setter
+    def elapsed(self, steps: ArrayLike) -> None:
+        self._check_idle("elapsed")
+        self._episodes.elapsed[:] = steps
+
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:

@@ -1,0 +1,126 @@
+"""Train a policy with rsl_rl's PPO.
+
+    pip install rsl-rl-lib tqdm
+    python examples/train_rsl_rl.py CartPoleSwingUp --seed 0
+
+In ``out/rsl_rl/TASK-SEED`` it leaves ``model.pt`` for `OnPolicyRunner.load` and the policy as ``policy.onnx``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from rsl_rl.runners import OnPolicyRunner
+from tqdm import tqdm
+
+from evaluation import evaluate, told
+from tightloop.adapters.rsl_rl import GROUP, RslRlVecEnv
+
+OUT = Path(__file__).resolve().parent.parent / "out" / "rsl_rl"
+EVALUATED = 25  # iterations between two evaluations
+
+
+@dataclass(frozen=True)
+class Preset:
+    """What differs from task to task."""
+
+    iterations: int
+    num_envs: int
+    steps: int = 24  # of a rollout, in every world
+    hidden: int = 128  # units of each of two layers, in actor and critic
+    gamma: float = 0.99  # what a reward is worth one step later
+    lam: float = 0.95  # λ of the advantages
+    kl: float = 0.01  # change of the policy that the learning rate aims at
+    std: float = 1.0  # standard deviation of actions at the start
+
+
+PRESETS = {
+    "CartPoleBalance": Preset(30, 512, hidden=64),
+    "CartPoleSwingUp": Preset(75, 512, steps=64, hidden=64, gamma=0.98),
+    "FrankaReach": Preset(125, 512, gamma=0.9, lam=0.9, kl=0.02, std=0.6),
+}
+
+
+def configuration(preset: Preset, seed: int) -> dict[str, Any]:
+    """What `OnPolicyRunner` takes."""
+    model = {"class_name": "MLPModel", "hidden_dims": [preset.hidden] * 2, "obs_normalization": True}
+    return {
+        "seed": seed,
+        "num_steps_per_env": preset.steps,
+        "save_interval": 1_000_000,
+        "obs_groups": {"actor": [GROUP], "critic": [GROUP]},
+        "actor": model | {"distribution_cfg": {"class_name": "GaussianDistribution", "init_std": preset.std}},
+        "critic": model,
+        "algorithm": {
+            "class_name": "PPO",
+            "num_learning_epochs": 5,
+            "num_mini_batches": 8,
+            "gamma": preset.gamma,
+            "lam": preset.lam,
+            "learning_rate": 1e-3,
+            "schedule": "adaptive",
+            "desired_kl": preset.kl,
+            "entropy_coef": 0.0,
+            # values are not of the size of 1, to which its clipping is made
+            "use_clipped_value_loss": False,
+        },
+    }
+
+
+def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> dict[str, float]:
+    """Train, show how it goes, and save; returns the last evaluation."""
+    # of such small networks two threads of torch compute hardly faster, and wait for each other at full load
+    torch.set_num_threads(1)
+    torch.manual_seed(seed)
+    env = RslRlVecEnv(task, preset.num_envs, threads=threads)
+    try:
+        env.reset(seed=seed)
+        runner = OnPolicyRunner(env, configuration(preset, seed))
+
+        def act(obs: NDArray[np.float32]) -> NDArray[Any]:
+            policy = runner.get_inference_policy()
+            with torch.inference_mode():
+                return policy({GROUP: torch.tensor(obs)}).numpy()
+
+        found: dict[str, float] = {}
+        with tqdm(total=preset.iterations, desc=task, unit="it", disable=None) as bar:
+            for done in range(0, preset.iterations, EVALUATED):
+                count = min(EVALUATED, preset.iterations - done)
+                runner.learn(count, init_at_random_ep_len=done == 0)
+                found = evaluate(task, act, threads=threads)
+                bar.update(count)
+                bar.set_postfix(told(found))
+        runner.save(str(folder / "model.pt"))
+        runner.export_policy_to_onnx(str(folder))
+        return found
+    finally:
+        env.close()
+
+
+def main() -> None:
+    """Train, evaluate, and leave the policy."""
+    parser = argparse.ArgumentParser(description="Train a policy with rsl_rl.")
+    parser.add_argument("task", choices=PRESETS, help="what to learn")
+    parser.add_argument("--seed", type=int, default=0, help="of weights, actions and episodes (default 0)")
+    parser.add_argument("--threads", type=int, default=2, help="most threads of the simulation (default 2)")
+    parser.add_argument("--out", type=Path, default=OUT, help="folder of all runs (default out/rsl_rl/)")
+    args = parser.parse_args()
+
+    preset, folder = PRESETS[args.task], args.out / f"{args.task}-{args.seed}"
+    folder.mkdir(parents=True, exist_ok=True)
+    begun = time.perf_counter()
+    found = train(args.task, preset, args.seed, folder, args.threads)
+    steps = preset.iterations * preset.steps * preset.num_envs
+    print(f"{args.task}, seed {args.seed}: {steps / 1e6:.1f} M steps in {time.perf_counter() - begun:.0f} s")
+    print(", ".join(f"{name} {value}" for name, value in told(found).items()) + f"; {folder / 'model.pt'}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,121 @@
+"""rsl_rl: many worlds as its `VecEnv`.
+
+>>> from rsl_rl.runners import OnPolicyRunner
+>>> from tightloop.adapters.rsl_rl import RslRlVecEnv
+>>> OnPolicyRunner(RslRlVecEnv("FrankaReach", 1024), config, log_dir="out").learn(300)
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+
+from tightloop.adapters.needs import Given, environment, library
+from tightloop.errors import ArgumentError
+
+rsl_env = library("rsl_rl.env", install="rsl-rl-lib")
+tensordicts = library("tensordict", install="rsl-rl-lib")
+torch = library("torch", install="torch")
+
+#: Group of the observation, the one that rsl_rl takes where its ``obs_groups`` name no other.
+GROUP = "policy"
+
+
+class RslRlVecEnv(rsl_env.VecEnv):
+    """A `VectorEnv` as rsl_rl has it: a world whose episode ended begins the next one in the same step.
+
+    Observations are a TensorDict with the group ``"policy"``. ``extras["time_outs"]`` says where time was up, and
+    ``extras["log"]["/success"]`` which part of the episodes that ended had the task done, where the task knows.
+
+    Attributes:
+        env: The `VectorEnv`.
+        num_envs: How many worlds.
+        num_actions: How many numbers an action has.
+        max_episode_length: Steps after which an episode is truncated.
+        device: Where torch's tensors go.
+        cfg: What is logged as this environment's configuration.
+    """
+
+    def __init__(self, env: Given, num_envs: int | None = None, *, torch_device: str = "cpu", **options: Any) -> None:
+        """An environment of mode ``SAME_STEP``, or a task for one of its own.
+
+        Args:
+            env: A `VectorEnv`, or a task.
+            num_envs: How many worlds, for a task.
+            torch_device: Where torch's tensors go, such as ``"cuda:0"``; ``device`` is that of the physics.
+            **options: What `VectorEnv` takes besides, for a task.
+
+        Raises:
+            ArgumentError: The environment has another autoreset mode, or episodes without end.
+        """
+        self.env = environment(env, num_envs, AutoresetMode.SAME_STEP, options)
+        if self.env.max_episode_steps is None:
+            raise ArgumentError("max_episode_steps: rsl_rl needs episodes that end; give a number")
+        self.num_envs = self.env.num_envs
+        self.num_actions = int(np.prod(self.env.single_action_space.shape or ()))
+        self.max_episode_length = self.env.max_episode_steps
+        self.device = torch.device(torch_device)
+        self.cfg = {
+            "task": type(self.env.task).__name__,
+            "num_envs": self.num_envs,
+            "control_dt": self.env.control_dt,
+            "max_episode_steps": self.max_episode_length,
+        }
+        self._obs: Any = None
+
+    @property
+    def episode_length_buf(self) -> Any:
+        """Steps of each world's episode so far, int64, shape ``(num_envs,)``: a copy; assigning sets them.
+
+        rsl_rl does so that the first episodes do not all end at once.
+        """
+        return torch.tensor(self.env.elapsed, dtype=torch.long, device=self.device)
+
+    @episode_length_buf.setter
+    def episode_length_buf(self, steps: Any) -> None:
+        if self._obs is None:
+            self.reset()
+        self.env.elapsed = steps.cpu().numpy()
+
+    def reset(self, seed: int | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin episodes in all worlds; world i gets the seed ``seed + i``. Observations and no extras."""
+        obs, _ = self.env.reset(seed=seed)
+        self._obs = self._observation(obs)
+        return self._obs, {}
+
+    def get_observations(self) -> Any:
+        """The last observations, those of a reset at first."""
+        if self._obs is None:
+            self.reset()
+        return self._obs
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, dict[str, Any]]:
+        """Advance all worlds by one control step.
+
+        Args:
+            actions: Shape ``(num_envs, num_actions)``; what is beyond the bounds of actions counts as the bound.
+
+        Returns:
+            Observations, rewards and ends (0 or 1), shape ``(num_envs,)``, and extras.
+        """
+        obs, reward, terminated, truncated, infos = self.env.step(actions.detach().cpu().numpy())
+        done = terminated | truncated
+        self._obs = self._observation(obs)
+        extras: dict[str, Any] = {"time_outs": self._tensor(truncated & ~terminated)}
+        if done.any() and "success" in infos["final_info"]:
+            extras["log"] = {"/success": float(infos["final_info"]["success"][done].mean())}
+        return self._obs, self._tensor(reward), self._tensor(done).long(), extras
+
+    def close(self) -> None:
+        """End the simulation."""
+        self.env.close()
+
+    def _observation(self, obs: NDArray[np.float32]) -> Any:
+        return tensordicts.TensorDict({GROUP: self._tensor(obs)}, batch_size=[self.num_envs], device=self.device)
+
+    def _tensor(self, array: NDArray[Any]) -> Any:
+        # `torch.tensor` copies, unlike `from_numpy`: the algorithm keeps these beyond the next step
+        return torch.tensor(array, device=self.device)

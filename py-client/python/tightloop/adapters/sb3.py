@@ -1,0 +1,105 @@
+"""Stable-Baselines3: many worlds as its `VecEnv`.
+
+>>> from stable_baselines3 import PPO
+>>> from tightloop.adapters.sb3 import Sb3VecEnv
+>>> PPO("MlpPolicy", Sb3VecEnv("FrankaReach", 256)).learn(1_000_000)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+
+from tightloop.adapters.needs import Given, environment, library
+from tightloop.errors import ArgumentError
+
+vec_env = library("stable_baselines3.common.vec_env", install="stable-baselines3")
+
+
+class Sb3VecEnv(vec_env.VecEnv):
+    """A `VectorEnv` as Stable-Baselines3 has it: a world whose episode ended begins the next one in the same step.
+
+    The last observation of an episode is ``infos[i]["terminal_observation"]``; ``infos[i]["TimeLimit.truncated"]`` says
+    that time was up, and ``infos[i]["is_success"]`` whether the task was done then. All arrays belong to the caller.
+
+    Attributes:
+        env: The `VectorEnv`.
+    """
+
+    def __init__(self, env: Given, num_envs: int | None = None, **options: Any) -> None:
+        """An environment of mode ``SAME_STEP``, or a task for one of its own.
+
+        Args:
+            env: A `VectorEnv`, or a task.
+            num_envs: How many worlds, for a task.
+            **options: What `VectorEnv` takes besides, for a task.
+
+        Raises:
+            ArgumentError: The environment has another autoreset mode.
+        """
+        self.env = environment(env, num_envs, AutoresetMode.SAME_STEP, options)
+        super().__init__(self.env.num_envs, self.env.single_observation_space, self.env.single_action_space)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin episodes in all worlds, with the seeds of `seed` if it was called; shape ``(num_envs, size)``."""
+        seeds = None if all(seed is None for seed in self._seeds) else list(self._seeds)
+        obs, _ = self.env.reset(seed=seeds)
+        self._reset_seeds()
+        self._reset_options()
+        return obs.copy()
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Send actions, shape ``(num_envs, actions)``, and return at once."""
+        self.env.send(actions)
+
+    def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """What became of them: observations, rewards, ends and infos, the worlds first."""
+        obs, reward, terminated, truncated, infos = self.env.recv()
+        done = terminated | truncated
+        news: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        if done.any():
+            rows = np.flatnonzero(done)
+            last, late = infos["final_obs"][rows], truncated[rows] & ~terminated[rows]
+            success = infos["final_info"].get("success")
+            for row, world in enumerate(rows.tolist()):
+                news[world] = {"terminal_observation": last[row], "TimeLimit.truncated": bool(late[row])}
+                if success is not None:
+                    news[world]["is_success"] = bool(success[world])
+        return obs.copy(), reward.copy(), done, news
+
+    def close(self) -> None:
+        """End the simulation."""
+        self.env.close()
+
+    def get_images(self) -> list[None]:
+        """Nothing: environments cannot be rendered yet."""
+        return [None] * self.num_envs
+
+    def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
+        """An attribute of the `VectorEnv`, once for each world asked for."""
+        return [getattr(self.env, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None) -> None:
+        """Set an attribute of the `VectorEnv`, which all worlds share.
+
+        Raises:
+            ArgumentError: Only some of the worlds are meant.
+        """
+        if len(set(self._get_indices(indices))) != self.num_envs:
+            raise ArgumentError(f"set_attr: all worlds share {attr_name!r}; leave `indices` out")
+        setattr(self.env, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: int | Iterable[int] | None = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Call a method of the `VectorEnv` once, for all worlds; its result, once for each world asked for."""
+        result = getattr(self.env, method_name)(*method_args, **method_kwargs)
+        return [result for _ in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class: type[Any], indices: int | Iterable[int] | None = None) -> list[bool]:
+        """Worlds have no wrappers of their own; `VecMonitor` and its like go around this."""
+        return [False for _ in self._get_indices(indices)]
