@@ -54,6 +54,7 @@ fn command_step_and_forward_take_no_memory() {
         body: Some("cube".to_owned()),
         pose: Pose::identity(),
         relative_to: None,
+        damping: Site::DAMPING,
     });
     let lesson = lesson.compile().unwrap();
     let (_, row) = command(Demo::Target, 20);

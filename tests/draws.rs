@@ -32,6 +32,7 @@ fn scene() -> Description {
         body: Some("ball".to_owned()),
         pose: Pose::at([0.1, 0.0, 0.0]),
         relative_to: None,
+        damping: Site::DAMPING,
     });
     for (param, name, low, high) in [
         (Param::BodyMassScale, "r", 0.8, 1.2),

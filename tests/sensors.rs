@@ -5,11 +5,11 @@ mod common;
 use common::{Demo, Run, command, lesson_with_table, noise};
 use sim_core::batch::Field;
 use sim_core::model::params::Param;
-use sim_core::model::{ContactSensor, Description, Pose, Site};
+use sim_core::model::{Body, ContactSensor, Description, Pose, Site};
 use sim_engine::backend::{Values, cpu};
 use sim_engine::simulation::{Lanes, Options, Precision};
 
-const FIELDS: [Field; 10] = [
+const FIELDS: [Field; 11] = [
     Field::JointQ,
     Field::JointQd,
     Field::JointQMeasured,
@@ -19,6 +19,7 @@ const FIELDS: [Field; 10] = [
     Field::SiteQd,
     Field::Gyro,
     Field::Accelerometer,
+    Field::SiteInverseJacobian,
     Field::ContactSensor,
 ];
 /// Every parameter of delay and noise, and friction, which is a row of constraints.
@@ -56,6 +57,7 @@ fn scene() -> Description {
             body: body.map(str::to_owned),
             pose: Pose::from_rpy([0.01, 0.02, 0.03], [0.3, -0.2, 0.1]),
             relative_to: relative_to.map(str::to_owned),
+            damping: Site::DAMPING,
         });
     }
     scene.contact_sensors.push(ContactSensor {
@@ -198,6 +200,63 @@ fn single_precision_shows_what_double_does_to_its_rounding() {
 }
 
 #[test]
+fn the_inverse_of_a_free_body_at_its_centre_is_diagonal() {
+    // J = 1, so that J⁺ = 1 / (1 + λ²), turned into the axes of what a site is measured from
+    let mut scene = Description::new(0.01, 1);
+    for (name, is_measured_from) in [("cube", true), ("other", false)] {
+        let mut body = Body::new(name, Pose::at([3.0, -1.0, 2.0]));
+        body.mass = Some(2.0);
+        scene.add_body(body).unwrap();
+        scene.sites.push(Site {
+            name: format!("of {name}"),
+            body: Some(name.to_owned()),
+            pose: Pose::identity(),
+            relative_to: is_measured_from.then(|| "lamp".to_owned()),
+            damping: 0.3,
+        });
+    }
+    // at the same place, and turned
+    scene.sites.push(Site {
+        name: "lamp".to_owned(),
+        body: None,
+        pose: Pose::from_rpy([5.0, 5.0, 5.0], [0.0, 0.0, std::f64::consts::FRAC_PI_2]),
+        relative_to: None,
+        damping: 0.3,
+    });
+    let model = scene.compile().unwrap();
+    let expected = 1.0 / (1.0 + 0.3 * 0.3);
+    for (precision, roundings) in [
+        (Precision::F64, 8.0 * f64::EPSILON),
+        (Precision::F32, 8.0 * f64::from(f32::EPSILON)),
+    ] {
+        let mut run = Run::new(&model, options(precision, Lanes::Auto, 1));
+        run.forward();
+        let inverse = run.get(Field::SiteInverseJacobian, 20);
+        assert_eq!(inverse.len(), 3 * 12 * 6);
+        for (k, found) in inverse.iter().enumerate() {
+            let (site, dof, column) = (k / 72, k / 6 % 12, k % 6);
+            // in the axes of the lamp x of the world is -y, and y is x
+            let entry = match (site, dof / 6) {
+                (0, 0) => match (dof % 3, column % 3, dof % 6 / 3 == column / 3) {
+                    (0, 1, true) => -expected,
+                    (1, 0, true) | (2, 2, true) => expected,
+                    _ => 0.0,
+                },
+                (1, 1) if dof % 6 == column => expected,
+                _ => 0.0,
+            };
+            assert!(
+                (found - entry).abs() <= roundings,
+                "{site} {dof} {column}: {found}"
+            );
+        }
+    }
+    let hash = model.hash();
+    scene.sites[1].damping = 0.4;
+    assert_ne!(scene.compile().unwrap().hash(), hash, "damping is hashed");
+}
+
+#[test]
 fn a_scene_in_which_nothing_moves_takes_delays_and_noise_too() {
     let mut scene = Description::new(0.01, 8);
     scene.add_ground("ground", 0.0);
@@ -207,6 +266,7 @@ fn a_scene_in_which_nothing_moves_takes_delays_and_noise_too() {
         body: None,
         pose: Pose::at([1.0, 2.0, 3.0]),
         relative_to: None,
+        damping: Site::DAMPING,
     });
     let model = scene.compile().unwrap();
     for precision in [Precision::F32, Precision::F64] {
@@ -248,6 +308,22 @@ fn names_that_nothing_has_are_refused() {
         (
             refusal(|s| s.sites[0].pose.pos[1] = f64::NAN),
             ["site `camera`", "position", "NaN"],
+        ),
+        (
+            refusal(|s| s.sites[1].damping = 0.0),
+            ["site `tip`", "damping is 0", "between 1e-6 and 1e6"],
+        ),
+        (
+            refusal(|s| s.sites[1].damping = -0.1),
+            ["site `tip`", "damping is -0.1", "between 1e-6 and 1e6"],
+        ),
+        (
+            refusal(|s| s.sites[1].damping = 2e6),
+            ["site `tip`", "damping", "between 1e-6 and 1e6"],
+        ),
+        (
+            refusal(|s| s.sites[1].damping = f64::INFINITY),
+            ["site `tip`", "damping", "inf"],
         ),
         (
             refusal(|s| s.command_delay_max = Some(8001)),

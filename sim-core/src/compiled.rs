@@ -24,7 +24,7 @@ pub type Stages<F> = [RunStage<F>; Stage::ALL.len()];
 macro_rules! compiled {
     ($number:ty, $features:literal) => {
         $crate::compiled!(@ $number, $features,
-            0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30 31 32 33 34 35 36);
+            0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30 31 32 33 34 35 36 37);
     };
     (@ $number:ty, $features:literal, $($stage:literal)*) => {
         use $crate::batch::Block;

@@ -93,6 +93,7 @@ fn add_sensors(dice: &mut Dice, scene: &mut Description, shapes: &[String]) {
             body: is_borne.then(|| dice.pick(&links)),
             pose: any_pose(dice, 0.3),
             relative_to: (k > 0 && dice.chance(0.5)).then(|| format!("s{}", k - 1)),
+            damping: Site::DAMPING,
         };
         scene.sites.push(site);
     }

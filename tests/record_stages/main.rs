@@ -32,7 +32,7 @@ type Scalar = Block<f32, f32>;
 type OnTape = Block<Recorded, RecordedVariable>;
 
 /// What stages leave for each other, and the state.
-const SLOTS: [WorkSlot; 37] = {
+const SLOTS: [WorkSlot; 38] = {
     use WorkSlot::*;
     [
         JointQ,
@@ -72,6 +72,7 @@ const SLOTS: [WorkSlot; 37] = {
         SiteQd,
         Gyro,
         Accelerometer,
+        SiteInverse,
     ]
 };
 
@@ -261,6 +262,7 @@ fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
                 Stage::Velocities,
                 Stage::Sites,
                 Stage::Imu,
+                Stage::SiteInverse,
                 Stage::Integrate,
             ];
             for stage in needed(m, before_integrate()).chain(needed(m, &last)) {

@@ -142,6 +142,7 @@ fn add_sites(scene: &mut Description) {
             body,
             pose: Pose::from_rpy([0.1, -0.2, 0.3], [0.4, 0.5, -0.6]),
             relative_to: (k % 3 > 0).then(|| format!("site {}", k - 1)),
+            damping: Site::DAMPING,
         });
     }
 }

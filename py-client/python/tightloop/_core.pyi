@@ -89,6 +89,12 @@ class Frame:
     """Angular velocity of each site, in its own axes [rad/s], ``(worlds, sites, 3)``."""
     accelerometer: NDArray[Any]
     """Acceleration of each site less gravity, in its own axes [m/s²], ``(worlds, sites, 3)``; 9.81 upwards at rest."""
+    site_inverse_jacobian: NDArray[Any]
+    """What takes a small displacement of each site to one of the joints [rad or m per m or rad], ``(worlds, sites,
+    dofs, 6)``: ``joint_qd * dt = site_inverse_jacobian @ d`` moves the site by about ``d``, three numbers of its origin
+    [m] and three of a rotation vector [rad], in the axes of ``site_qd``. Damped least squares, Jᵀ (J Jᵀ + λ² I)⁻¹,
+    where J takes ``joint_qd`` to ``site_qd`` and λ is the site's ``damping``. Zero for dofs that do not move the site;
+    those of a floating base do, and each joint of a mimic counts for itself."""
     contact_sensor: NDArray[Any]
     """Sum of the contact forces of each contact sensor, in world axes [N], ``(worlds, contact_sensors, 3)``."""
     time: NDArray[np.float64]

@@ -24,6 +24,7 @@ class Site:
         pos: Position in the frame of what carries it [m].
         quat: Orientation there (x, y, z, w).
         relative_to: The site, body or ``robot/link`` that it is measured from; none for the world.
+        damping: Damping of its inverse Jacobian [m and rad alike].
     """
 
     name: str
@@ -31,6 +32,7 @@ class Site:
     pos: Triple
     quat: Quaternion
     relative_to: str | None
+    damping: float
 
 
 @dataclass(frozen=True)
@@ -65,12 +67,14 @@ class Sensed(Shaped):
         pos: Vector = ORIGIN,
         quat: Vector = UPRIGHT,
         relative_to: Site | Body | Link | str | None = None,
+        damping: float = 0.05,
         name: str | None = None,
     ) -> Site:
         """Add a frame of interest: a tool's tip, a camera, an inertial measurement unit.
 
-        Frames show it in the fields ``site_q``, ``site_qd``, ``gyro`` and ``accelerometer``, one row a site in the
-        order they were added, where ``launch(fields=...)`` asks for them; `Sim.params` has their noise.
+        Frames show it in the fields ``site_q``, ``site_qd``, ``gyro``, ``accelerometer`` and ``site_inverse_jacobian``,
+        one row a site in the order they were added, where ``launch(fields=...)`` asks for them; `Sim.params` has their
+        noise.
 
         Args:
             body: The body that carries it, a robot's link (``robot.link("hand")``), or the name of either (``"cube"``,
@@ -80,6 +84,10 @@ class Sensed(Shaped):
             relative_to: A site, body or link: ``site_q`` and ``site_qd`` are then measured from that frame, in its
                 axes, as MuJoCo's frame sensors with a reference are. None for the world. ``gyro`` and
                 ``accelerometer`` are in the site's own axes, whatever this is.
+            damping: Damping λ of ``site_inverse_jacobian``, Jᵀ (J Jᵀ + λ² I)⁻¹ [m and rad alike], from 1e-6 to 1e6: a
+                direction in which a unit of joint motion moves the site by λ keeps half of what would move it there,
+                one of less keeps less. Where the arm is stretched, ``f32`` keeps three digits with 0.01, and fewer
+                with less.
             name: Unique name; ``site``, ``site_2``, … if left out.
 
         Raises:
@@ -93,6 +101,7 @@ class Sensed(Shaped):
             pos=checks.triple(f"{what}: pos", pos),
             quat=checks.quaternion(f"{what}: quat", quat),
             relative_to=None if relative_to is None else self._frame(what, relative_to),
+            damping=checks.number(f"{what}: damping", damping, above=0.0),
         )
         self.sites[name] = site
         return site

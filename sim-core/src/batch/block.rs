@@ -96,6 +96,9 @@ pub struct Workspace<F> {
     pub gyro: Vec<Vec3<F>>,
     /// Acceleration of each site less gravity, in its axes. `(sites, 3)` [m/s²]
     pub accelerometer: Vec<Vec3<F>>,
+    /// What takes a small displacement of each site to one of the joints: a row a dof that moves it, in the order of
+    /// [`crate::model::mount::Site::columns`]. `(columns of all sites, 6)` [rad or m per m or rad]
+    pub site_inverse: Vec<[F; 6]>,
     /// Velocity of each body at the reference point. `(bodies, 2, 3)`
     pub velocity: Vec<Spatial<F>>,
     /// Scratch of a stage: acceleration, then force of each body. `(bodies, 2, 3)`
@@ -195,6 +198,8 @@ pub enum Slot {
     Gyro,
     /// [`Workspace::accelerometer`]
     Accelerometer,
+    /// [`Workspace::site_inverse`]
+    SiteInverse,
 }
 
 /// The numbers of a slot, flat.
@@ -256,6 +261,7 @@ impl<F: Num, V: Copy> Block<F, V> {
                 site_qd: vec![[[zero; 3]; 2]; m.sites.len()],
                 gyro: vec![[zero; 3]; m.sites.len()],
                 accelerometer: vec![[zero; 3]; m.sites.len()],
+                site_inverse: vec![[zero; 6]; m.sites.iter().map(|site| site.columns.len()).sum()],
                 velocity: vec![[[zero; 3]; 2]; bodies],
                 force: vec![[[zero; 3]; 2]; bodies],
                 hessian: vec![zero; packed],
@@ -317,6 +323,7 @@ impl<F: Num, V: Copy> Block<F, V> {
             Slot::SiteQd => Values(w.site_qd.as_flattened_mut().as_flattened_mut()),
             Slot::Gyro => Values(w.gyro.as_flattened_mut()),
             Slot::Accelerometer => Values(w.accelerometer.as_flattened_mut()),
+            Slot::SiteInverse => Values(w.site_inverse.as_flattened_mut()),
         }
     }
 }

@@ -194,6 +194,7 @@ fields! {
     SiteQd "site_qd" Derived [Sites, Size(6)] "m/s, rad/s" REAL, "Velocity of each site, then its angular velocity, in world axes, or as seen from and in the axes of the frame that it is relative to.";
     Gyro "gyro" Derived [Sites, Size(3)] "rad/s" REAL, "Angular velocity of each site, in its own axes.";
     Accelerometer "accelerometer" Derived [Sites, Size(3)] "m/s²" REAL, "Acceleration of each site less gravity, in its own axes: 9.81 upwards at rest.";
+    SiteInverseJacobian "site_inverse_jacobian" Derived [Sites, Dofs, Size(6)] "rad or m per m or rad" REAL, "What takes a small displacement of each site, of its origin, then of its rotation as a rotation vector, in the axes of site_qd, to one of the joints, as joint_qd has them: Jᵀ (J Jᵀ + λ² I)⁻¹, where J takes joint_qd to site_qd and λ is the site's damping. Zero for dofs that do not move the site.";
     ContactSensor "contact_sensor" Derived [ContactSensors, Size(3)] "N" REAL, "Sum of the contact forces that each contact sensor is about, in world axes.";
     Time "time" Counter [] "s" F64, "Simulated time since the world's reset.";
     Step "step" Counter [] "–" U64, "Control frames since the world's reset.";

@@ -48,6 +48,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     let kept: BTreeSet<usize> = mass_entries.iter().map(|entry| entry.place).collect();
     let mass_zeros = (0..pattern.len()).filter(|place| !kept.contains(place));
     let mass_zeros = mass_zeros.collect();
+    let sites = scene.placed_sites(&builder.carriers, &builder.bodies)?;
     let mut constants = Constants {
         dt: scene.dt,
         gravity: scene.gravity,
@@ -77,7 +78,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         },
         varying: Varying::default(),
         delay: Delay::default(),
-        sites: scene.placed_sites(&builder.carriers)?,
+        sites,
     };
     let reference = inverse_weight::at_reference(&constants, &builder.dof_names)?;
     // MuJoCo scales costs by 1 / (mean inertia × dofs)

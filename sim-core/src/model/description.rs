@@ -57,6 +57,13 @@ pub struct Site {
     pub pose: Pose,
     /// The site, body or `robot/link` that its pose and velocity are measured from; `None` is the world.
     pub relative_to: Option<String>,
+    /// Damping λ of its inverse Jacobian [m and rad alike].
+    pub damping: f64,
+}
+
+impl Site {
+    /// Damping where nothing is said [m and rad alike]: of directions in which a unit of joint motion moves the site by 0.05, the inverse keeps half.
+    pub const DAMPING: f64 = 0.05;
 }
 
 /// The sum of contact forces on some shapes.

@@ -10,6 +10,19 @@ pub struct Site<R> {
     pub mount: Mount<R>,
     /// What its pose and velocity are measured from; none for the world.
     pub relative_to: Option<Mount<R>>,
+    /// Damping λ of its inverse Jacobian [m and rad alike].
+    pub damping: R,
+    /// The dofs that move it against what it is measured from, rising.
+    pub columns: Vec<Column>,
+}
+
+/// A dof that moves a site against the frame that it is measured from.
+#[derive(Clone, Copy, Debug)]
+pub struct Column {
+    /// The dof.
+    pub dof: usize,
+    /// Does it move that frame, and not the site?
+    pub is_of_other: bool,
 }
 
 /// A frame on a body, or in the world.
@@ -32,6 +45,8 @@ impl<R: Real> Site<R> {
         Site {
             mount: self.mount.cast(),
             relative_to: self.relative_to.as_ref().map(Mount::cast),
+            damping: cast(self.damping),
+            columns: self.columns.clone(),
         }
     }
 }

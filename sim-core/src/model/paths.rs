@@ -1,6 +1,6 @@
 //! Bodies whose contacts share the columns of a Jacobian.
 
-use super::constants::Constants;
+use super::constants::{Body, Constants};
 
 /// Bodies of a tree that almost the same dofs move.
 pub(super) struct Cluster {
@@ -24,7 +24,7 @@ pub(super) fn clusters(
     let mut paths: Vec<(usize, Vec<usize>)> = Vec::new();
     for body in bodies {
         if paths.iter().all(|(known, _)| *known != body) {
-            paths.push((body, path(constants, body)));
+            paths.push((body, path(&constants.bodies, body)));
         }
     }
     paths.sort_by_key(|(body, path)| (usize::MAX - path.len(), *body));
@@ -62,12 +62,12 @@ pub(super) fn clusters(
 }
 
 /// The dofs that move a body, rising.
-fn path(constants: &Constants<f64>, body: usize) -> Vec<usize> {
+pub(super) fn path(bodies: &[Body<f64>], body: usize) -> Vec<usize> {
     let mut dofs = Vec::new();
     let mut next = Some(body);
     while let Some(b) = next {
-        dofs.extend(constants.bodies[b].dofs());
-        next = constants.bodies[b].parent;
+        dofs.extend(bodies[b].dofs());
+        next = bodies[b].parent;
     }
     dofs.sort_unstable();
     dofs

@@ -1,17 +1,21 @@
 //! What sensors are of: frames of interest, and sums of contact forces.
 
-use super::checks::{count, name, unique};
+use super::checks::{count, in_range, name, unique};
 use super::compile::Carrier;
+use super::constants::Body;
 use super::description::{ContactSensor, Description};
 use super::error::{ModelError, first_few};
 use super::frozen::SensedShapes;
-use super::mount::{Mount, Site};
+use super::mount::{Column, Mount, Site};
+use super::paths::path;
 use super::pose::Pose;
 use super::shapes;
 use super::validate::pose;
 
 /// Largest delay of commands [control frames].
 const DELAY_FRAMES_MAX: usize = 1000;
+/// Least and most damping of an inverse Jacobian [m and rad alike]: its square stays within `f32`, and so does what it is added to.
+const DAMPING: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 /// Control frames of delay that there is room for where nothing is said.
 const DELAY_FRAMES: usize = 4;
 
@@ -28,6 +32,12 @@ impl Description {
             pose(&what, &site.pose)?;
             self.bearer(&what, site.body.as_deref())?;
             self.frame(&what, site.relative_to.as_deref())?;
+            in_range(
+                &format!("{what}: damping"),
+                site.damping,
+                DAMPING.contains(&site.damping),
+                "it must be between 1e-6 and 1e6",
+            )?;
         }
         let sensors = self.contact_sensors.iter();
         let names = sensors.clone().map(|sensor| sensor.name.as_str());
@@ -91,10 +101,11 @@ impl Description {
         }
     }
 
-    /// The sites as the text reads them; `carriers` are of each link of each robot.
+    /// The sites as the text reads them; `carriers` are of each link of each robot, `bodies` those that move.
     pub(super) fn placed_sites(
         &self,
         carriers: &[Vec<Carrier>],
+        bodies: &[Body<f64>],
     ) -> Result<Vec<Site<f64>>, ModelError> {
         let mount = |bearer: Bearer, pose: &Pose| match bearer {
             None => mounted(None, None, pose),
@@ -113,9 +124,12 @@ impl Description {
                     Some(mount(bearer, &pose))
                 }
             };
+            let other = relative_to.as_ref().and_then(|other| other.body);
             Ok(Site {
+                columns: columns(bodies, own.body, other),
                 mount: own,
                 relative_to,
+                damping: site.damping,
             })
         });
         sites.collect()
@@ -127,6 +141,22 @@ impl Description {
         let sensors = self.contact_sensors.iter();
         sensors.map(|sensor| sensed(sensor, &shapes)).collect()
     }
+}
+
+/// The dofs that move one of two bodies and not the other, rising.
+fn columns(bodies: &[Body<f64>], own: Option<usize>, other: Option<usize>) -> Vec<Column> {
+    let [own, other] =
+        [own, other].map(|body| body.map_or_else(Vec::new, |body| path(bodies, body)));
+    let alone = |dofs: &[usize], without: &[usize], is_of_other| {
+        let alone = dofs.iter().copied().filter(|dof| !without.contains(dof));
+        alone
+            .map(|dof| Column { dof, is_of_other })
+            .collect::<Vec<_>>()
+    };
+    let mut columns = alone(&own, &other, false);
+    columns.extend(alone(&other, &own, true));
+    columns.sort_by_key(|column| column.dof);
+    columns
 }
 
 fn mounted(body: Option<usize>, tree: Option<usize>, pose: &Pose) -> Mount<f64> {

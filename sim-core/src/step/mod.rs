@@ -14,6 +14,7 @@ mod inverse_dynamics;
 mod kinematics;
 mod mass_matrix;
 mod poses;
+mod site_inverse;
 mod sites;
 mod solver;
 mod velocities;
@@ -69,6 +70,8 @@ pub enum Stage {
     Sites,
     /// What inertial measurement units in the sites show, for output.
     Imu,
+    /// What moves the sites by a little, for output.
+    SiteInverse,
 }
 
 /// Stages before contacts are looked for.
@@ -89,13 +92,14 @@ const SOLVED: usize = BEFORE.len() + KINDS + 3;
 pub const STAGES: [Stage; SOLVED + 1] = sequence([Stage::Integrate]);
 
 /// What evaluates a state without stepping: all derived fields.
-pub const FORWARD: [Stage; SOLVED + 6] = sequence([
+pub const FORWARD: [Stage; SOLVED + 7] = sequence([
     Stage::Accelerations,
     Stage::JointTorque,
     Stage::Poses,
     Stage::Velocities,
     Stage::Sites,
     Stage::Imu,
+    Stage::SiteInverse,
 ]);
 
 /// Stages up to the accelerations, then some more.
@@ -122,7 +126,7 @@ const fn sequence<const N: usize, const MORE: usize>(more: [Stage; MORE]) -> [St
 
 impl Stage {
     /// Every stage.
-    pub const ALL: [Stage; SOLVED + 7] = sequence([
+    pub const ALL: [Stage; SOLVED + 8] = sequence([
         Stage::Integrate,
         Stage::Accelerations,
         Stage::JointTorque,
@@ -130,6 +134,7 @@ impl Stage {
         Stage::Velocities,
         Stage::Sites,
         Stage::Imu,
+        Stage::SiteInverse,
     ]);
 
     /// Its place in [`Stage::ALL`].
@@ -142,7 +147,7 @@ impl Stage {
     pub fn is_needed<R: Real>(self, m: &Constants<R>) -> bool {
         match self {
             Stage::Command => m.alters_commands(),
-            Stage::Sites | Stage::Imu => !m.sites.is_empty(),
+            Stage::Sites | Stage::Imu | Stage::SiteInverse => !m.sites.is_empty(),
             Stage::Place | Stage::ContactRows => !m.contacts.groups.is_empty(),
             Stage::Touch(kinds) => m.contacts.group(kinds).is_some(),
             _ => true,
@@ -170,6 +175,7 @@ impl Stage {
             Stage::JointTorque => "joint_torque",
             Stage::Sites => "sites",
             Stage::Imu => "imu",
+            Stage::SiteInverse => "site_inverse",
         }
     }
 
@@ -256,6 +262,7 @@ impl Stage {
             Stage::Velocities => &[Rotation, Origin, Velocity],
             Stage::Sites => &[Rotation, Origin, Reference, Velocity, Orientation],
             Stage::Imu => &[JointQ, JointQd, JointQdd, Params, Rotation, Velocity],
+            Stage::SiteInverse => &[Rotation, Origin, Reference, Motion],
         }
     }
 
@@ -279,6 +286,7 @@ impl Stage {
             Stage::Velocities => &[LinkCenter, BodyQd],
             Stage::Sites => &[SiteQ, SiteQd],
             Stage::Imu => &[Gyro, Accelerometer],
+            Stage::SiteInverse => &[SiteInverse],
         }
     }
 
@@ -304,6 +312,7 @@ impl Stage {
             Stage::JointTorque => actuation::joint_torque(cx, m, b),
             Stage::Sites => sites::site_q(m, &mut b.work),
             Stage::Imu => sites::imu(cx, m, b),
+            Stage::SiteInverse => site_inverse::inverse_jacobian(m, &mut b.work),
         }
     }
 }

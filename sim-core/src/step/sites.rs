@@ -75,7 +75,7 @@ pub(super) fn imu<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
 
 /// Where it is, from the reference point of its robot.
 #[inline(always)]
-fn position<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
+pub(super) fn position<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
     let own = constant(mount.position);
     match mount.body {
         Some(body) => transform_add(&w.rotation[body], own, w.origin[body]),
@@ -85,7 +85,7 @@ fn position<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
 
 /// The reference point of its robot.
 #[inline(always)]
-fn reference<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
+pub(super) fn reference<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
     match mount.tree {
         Some(tree) => w.reference[tree],
         None => zero(),
@@ -115,7 +115,7 @@ fn velocity<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>, position: Vec3<F>)
 
 /// A vector of the world in the axes of a frame.
 #[inline(always)]
-fn back<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>, vector: Vec3<F>) -> Vec3<F> {
+pub(super) fn back<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>, vector: Vec3<F>) -> Vec3<F> {
     let [x, y, z] = mount.rotation;
     let own = [constant(x), constant(y), constant(z)];
     match mount.body {

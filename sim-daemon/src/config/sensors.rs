@@ -23,6 +23,13 @@ pub struct SiteTable {
     /// The site, body or `robot/link` that its pose and velocity are measured from; left out, the world.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relative_to: Option<String>,
+    /// Damping of its inverse Jacobian [m and rad alike].
+    #[serde(default = "damping")]
+    pub damping: Number,
+}
+
+fn damping() -> Number {
+    Number(Site::DAMPING)
 }
 
 /// The sum of contact forces on some shapes.
@@ -46,6 +53,7 @@ impl SiteTable {
             body: self.body.clone(),
             pose: pose(&self.pos, &self.quat),
             relative_to: self.relative_to.clone(),
+            damping: self.damping.0,
         }
     }
 }

@@ -42,6 +42,7 @@ def add_sites(rng: Generator, scene: tl.Scene) -> None:
             pos=tuple(rng.uniform(-0.3, 0.3, 3)),
             quat=tuple(quat / np.linalg.norm(quat)),
             relative_to=str(rng.choice(others)) if rng.random() < 0.5 else None,
+            damping=0.1 * (1 + number),
             name=f"s{number}",
         )
 
@@ -103,6 +104,48 @@ def test_sites_and_torques_of_random_robots_are_mujocos(tmp_path: Path, seed: in
             assert off(frame.accelerometer[0], accelerations) < tolerances.acceleration
             torque = to.to_qvel(q).T @ (data.qfrc_actuator + data.qfrc_applied)
             assert off(frame.joint_torque[0], torque) < tolerances.dynamics
+
+
+def jacobian(model: mujoco.MjModel, data: mujoco.MjData, scene: tl.Scene, site: tl.Site) -> Array:
+    """What takes qvel to the velocity of a site, as `site_qd` has it, ``(6, nv)``."""
+    rows = np.zeros((6, model.nv))
+    mujoco.mj_jacSite(model, data, rows[:3], rows[3:], model.site(site.name).id)
+    if site.relative_to is None:
+        return rows
+    # less what carries the same point along with the other frame, in that frame's axes
+    other, carried = scene.sites.get(site.relative_to), np.zeros((6, model.nv))
+    if other is None:
+        body, turn = model.body(site.relative_to).id, data.body(site.relative_to).xmat
+    else:
+        place = model.site(other.name).id
+        body, turn = model.site_bodyid[place], data.site_xmat[place]
+    mujoco.mj_jac(model, data, carried[:3], carried[3:], data.site(site.name).xpos, body)
+    back = turn.reshape(3, 3).T
+    return np.vstack([back @ (rows - carried)[:3], back @ (rows - carried)[3:]])
+
+
+@PRECISIONS
+@SCENES
+def test_inverse_jacobians_of_sites_of_random_robots_are_mujocos(tmp_path: Path, seed: int, dofs: int, precision: str):
+    scene, trees, rng = random_scene(tmp_path, seed, dofs)
+    add_sites(rng, scene)
+    model = judge_of(scene, trees, lambda spec: give_sites(scene, spec))
+    with tl.launch(scene, worlds=1, precision=precision, fields=("joint_q", "site_inverse_jacobian")) as sim:
+        to, data = Coordinates(model, sim), mujoco.MjData(model)
+        for _ in range(STATES):
+            q, _ = random_state(rng, sim)
+            frame = sim.write(joint_q=q[None])
+            q = frame.joint_q[0].astype(float)
+            data.qpos[:] = to.positions(q)
+            mujoco.mj_forward(model, data)
+            for number, site in enumerate(scene.sites.values()):
+                rows = jacobian(model, data, scene, site) @ to.to_qvel(q)
+                square = rows @ rows.T + site.damping**2 * np.eye(6)
+                # a solve multiplies the rounding of the recursions by the condition of the matrix
+                rounding = 1e-12 if precision == "f64" else 1e-6
+                inverse = rows.T @ np.linalg.inv(square)
+                limit = rounding * np.linalg.cond(square)
+                assert off(frame.site_inverse_jacobian[0, number], inverse) < limit, (site, limit)
 
 
 @PRECISIONS

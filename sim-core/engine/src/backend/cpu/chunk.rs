@@ -113,6 +113,7 @@ fn stages_for(layout: &Layout) -> Vec<Stage> {
             Field::JointQdd => (Stage::Accelerations, &[]),
             Field::JointTorque => (Stage::Command, &[Stage::JointTorque]),
             Field::SiteQ | Field::SiteQd => (Stage::Bias, &[Stage::Poses, Stage::Sites]),
+            Field::SiteInverseJacobian => (Stage::Kinematics, &[Stage::SiteInverse]),
             Field::Gyro | Field::Accelerometer => (Stage::Accelerations, &[Stage::Imu]),
             _ => continue,
         };

@@ -123,6 +123,7 @@ fn stage<F: Lane>(chunk: &mut Chunk<F>, m: &Constants<F::Real>, field: Field, n:
         Field::SiteQd => to.copy_from_slice(w.site_qd.as_flattened().as_flattened()),
         Field::Gyro => to.copy_from_slice(w.gyro.as_flattened()),
         Field::Accelerometer => to.copy_from_slice(w.accelerometer.as_flattened()),
+        Field::SiteInverseJacobian => inverse_jacobian(m, w, to),
         Field::BodyJacobian => body_jacobian(m, w, to),
         Field::BiasForce => to.copy_from_slice(&w.bias_force),
         Field::SmoothForce => to.copy_from_slice(&w.smooth_force),
@@ -164,6 +165,20 @@ fn body_jacobian<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, to: &mut [F])
                 }
             }
             next = m.bodies[b].parent;
+        }
+    }
+}
+
+/// Inverse Jacobians of the sites in full, `(sites, dofs, 6)`.
+#[inline(always)]
+fn inverse_jacobian<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, to: &mut [F]) {
+    let dofs = m.dofs.len();
+    to.fill(F::c(0.0));
+    let mut rows = w.site_inverse.iter();
+    for (k, site) in m.sites.iter().enumerate() {
+        for (column, row) in site.columns.iter().zip(rows.by_ref()) {
+            let at = 6 * (k * dofs + column.dof);
+            to[at..at + 6].copy_from_slice(row);
         }
     }
 }
