@@ -35,13 +35,13 @@ from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
+from evaluation import evaluate, told
 from tightloop.env import AutoresetMode, VectorEnv
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 OUT = Path(__file__).resolve().parent.parent / "out" / "train"
-EVALUATED = 256  # worlds of an evaluation
 
 
 @dataclass(frozen=True)
@@ -170,9 +170,6 @@ class Trainer:
         self.task, self.seed, self.config, self.folder = task, seed, config, folder
         options: dict[str, Any] = {"threads": config.threads} if daemon is None else {"daemon": daemon}
         self.envs = VectorEnv(task, config.num_envs, autoreset_mode=AutoresetMode.SAME_STEP, copy=False, **options)
-        self.judge = VectorEnv(
-            task, EVALUATED, autoreset_mode=AutoresetMode.SAME_STEP, copy=False, threads=config.threads
-        )
         (inputs,), (actions,) = self.envs.single_observation_space.shape, self.envs.single_action_space.shape
         self.device = torch.device(device)
         self.agent = Agent(inputs, actions, config).to(self.device)
@@ -245,24 +242,9 @@ class Trainer:
             group["lr"] = min(3e-3, group["lr"] * 1.2)
 
     @torch.no_grad()
-    def evaluate(self) -> dict[str, float]:
-        """One episode in each of 256 worlds, always the same ones, with the most likely actions."""
-        obs, _ = self.judge.reset(seed=1_000_000)
-        returns, going = np.zeros(EVALUATED), np.ones(EVALUATED, bool)
-        success, error = np.zeros(EVALUATED), np.zeros(EVALUATED)
-        while going.any():
-            action = self.agent(torch.from_numpy(obs).to(self.device)).cpu().numpy()
-            obs, reward, terminated, truncated, infos = self.judge.step(action)
-            returns[going] += reward[going]
-            if "success" in infos:
-                success[going] = infos["success"][going]
-            if "error" in infos:
-                error[going] = infos["error"][going]
-            going &= ~(terminated | truncated)
-        found = {"return": returns.mean(), "success": success.mean()}
-        return {
-            name: float(value) for name, value in (found | ({"error": error.mean()} if error.any() else {})).items()
-        }
+    def act(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The most likely actions."""
+        return self.agent(torch.from_numpy(obs).to(self.device)).cpu().numpy()
 
     def run(self, log: SummaryWriter) -> None:
         """Train until the time is over; checkpoints and evaluations on the way."""
@@ -272,18 +254,18 @@ class Trainer:
             while self.seconds < limit:
                 with torch.no_grad():
                     obs = self.collect(obs)
-                told = self.learn()
+                news = self.learn()
                 self.seconds = time.perf_counter() - begun
                 bar.update(round(self.seconds) - bar.n)
                 if self.seconds - shown >= self.config.evaluate or self.seconds >= limit:
                     shown = self.seconds
-                    found = self.evaluate()
+                    found = evaluate(self.task, self.act, threads=self.config.threads)
                     self.curve.append({"seconds": self.seconds, "steps": self.steps, **found})
                     self.save()
-                    bar.set_postfix({name: f"{value:.3g}" for name, value in found.items()} | {"steps": self.steps})
-                    told |= found
-                told |= {"reward": self.rollout.reward.mean().item(), "lr": self.optimizer.param_groups[0]["lr"]}
-                for name, value in told.items():
+                    bar.set_postfix(told(found) | {"steps": f"{self.steps:,}"})
+                    news |= found
+                news |= {"reward": self.rollout.reward.mean().item(), "lr": self.optimizer.param_groups[0]["lr"]}
+                for name, value in news.items():
                     log.add_scalar(name, value, self.steps)
 
     def save(self) -> None:
@@ -329,9 +311,8 @@ class Trainer:
         return path
 
     def close(self) -> None:
-        """End the environments."""
+        """End the environment."""
         self.envs.close()
-        self.judge.close()
 
 
 def draw(curve: list[dict[str, float]], title: str, path: Path) -> None:
@@ -384,7 +365,11 @@ def main() -> None:
         title = f"{args.task}, seed {args.seed}: {end['steps'] / 1e6:.1f} M steps, {config.threads} threads"
         draw(trainer.curve, title, folder / "curve.png")
         policy = trainer.export()
-        print(", ".join(f"{name} {value:.4g}" for name, value in end.items()))
+        found = {name: value for name, value in end.items() if name not in ("seconds", "steps")}
+        print(
+            f"{end['seconds']:.0f} s, {end['steps']:,} steps: "
+            + ", ".join(f"{name} {value}" for name, value in told(found).items())
+        )
         print(f"curve: {folder / 'curve.png'}; policy: {policy}; python examples/play.py {args.task} {policy}")
     finally:
         trainer.close()
