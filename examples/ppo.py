@@ -63,6 +63,7 @@ class Config:
     std: float = 0.6  # standard deviation of actions at the start
     grad_max: float = 1.0  # norm of a gradient, at most
     evaluate: float = 15.0  # seconds between evaluations
+    enough: float = 2.0  # success at which to stop before the time is over; above 1 it never does
     threads: int = 2  # of torch and of the simulation
 
 
@@ -251,7 +252,7 @@ class Trainer:
         limit, begun, shown = 60.0 * self.config.minutes, time.perf_counter() - self.seconds, -math.inf
         obs, _ = self.envs.reset(seed=self.seed + len(self.curve))
         with tqdm(total=round(limit), initial=round(self.seconds), unit="s", desc=self.task, disable=None) as bar:
-            while self.seconds < limit:
+            while self.seconds < limit and not (self.curve and self.curve[-1]["success"] >= self.config.enough):
                 with torch.no_grad():
                     obs = self.collect(obs)
                 news = self.learn()
