@@ -76,9 +76,9 @@ def main() -> int:
             task,
             {
                 "observe": lambda envs=envs, obs=obs: envs._observe(obs),
-                "reward": lambda envs=envs: envs._call("reward"),
-                "success": lambda envs=envs: envs._call("success"),
-                "terminated": lambda envs=envs: envs._call("terminated"),
+                "reward": lambda envs=envs: envs.evaluation.call("reward"),
+                "success": lambda envs=envs: envs.evaluation.call("success"),
+                "terminated": lambda envs=envs: envs.evaluation.call("terminated"),
             },
             rounds,
         )

@@ -250,7 +250,8 @@ class Trainer:
     def run(self, log: SummaryWriter) -> None:
         """Train until the time is over; checkpoints and evaluations on the way."""
         limit, begun, shown = 60.0 * self.config.minutes, time.perf_counter() - self.seconds, -math.inf
-        obs, _ = self.envs.reset(seed=self.seed + len(self.curve))
+        # episodes that no other seed has, and no run before this one
+        obs, _ = self.envs.reset(seed=(self.seed << 40) + (len(self.curve) << 24))
         with tqdm(total=round(limit), initial=round(self.seconds), unit="s", desc=self.task, disable=None) as bar:
             while self.seconds < limit and not (self.curve and self.curve[-1]["success"] >= self.config.enough):
                 with torch.no_grad():

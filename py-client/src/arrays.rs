@@ -20,15 +20,25 @@ pub(crate) fn pack(
 ) -> PyResult<()> {
     let (low, high) = (low.as_slice()?, high.as_slice()?);
     let size = low.len();
+    let rows = out.as_array().nrows();
+    let within = high.len() == size && low.iter().zip(high).all(|(low, high)| low <= high);
+    if out.as_array().ncols() != size || !within {
+        let problem = format!("pack: out or the bounds do not fit {size} columns");
+        return Err(raise(py, "ArgumentError", problem));
+    }
     let out = out.as_slice_mut()?;
     let mut first = 0;
     for part in &parts {
         let columns = None
-            .or_else(|| place(part, out, first, low, high, |x: f32| x))
-            .or_else(|| place(part, out, first, low, high, |x: f64| x as f32))
-            .or_else(|| place(part, out, first, low, high, |x: i32| x as f32))
-            .or_else(|| place(part, out, first, low, high, |x: i64| x as f32))
-            .or_else(|| place(part, out, first, low, high, |x: bool| f32::from(u8::from(x))));
+            .or_else(|| place(part, (&mut *out, rows), first, low, high, |x: f32| x))
+            .or_else(|| place(part, (&mut *out, rows), first, low, high, |x: f64| x as f32))
+            .or_else(|| place(part, (&mut *out, rows), first, low, high, |x: i32| x as f32))
+            .or_else(|| place(part, (&mut *out, rows), first, low, high, |x: i64| x as f32))
+            .or_else(|| {
+                place(part, (&mut *out, rows), first, low, high, |x: bool| {
+                    f32::from(u8::from(x))
+                })
+            });
         let Some(columns) = columns else {
             let problem =
                 format!("pack: the part at column {first} has a type or shape that does not fit");
@@ -46,7 +56,7 @@ pub(crate) fn pack(
 /// Copies a part into the columns from `first` on; how many it has, or `None` if its type or shape is another.
 fn place<T: Element + Copy>(
     part: &Bound<'_, PyAny>,
-    out: &mut [f32],
+    (out, rows): (&mut [f32], usize),
     first: usize,
     low: &[f32],
     high: &[f32],
@@ -61,10 +71,10 @@ fn place<T: Element + Copy>(
     let view: ArrayView2<'_, T> = view.into_dimensionality().ok()?;
     let columns = first..first + view.ncols();
     let (low, high) = (low.get(columns.clone())?, high.get(columns.clone())?);
-    let size = out.len().checked_div(view.nrows())?;
-    if size * view.nrows() != out.len() || columns.end > size {
+    if view.nrows() != rows || rows == 0 {
         return None;
     }
+    let size = out.len() / rows;
     let rows = out
         .chunks_exact_mut(size)
         .map(|row| &mut row[columns.clone()]);
@@ -98,6 +108,7 @@ fn place<T: Element + Copy>(
 #[pyo3(signature = (out, first, action, scale, start, low, high, /))]
 #[allow(clippy::too_many_arguments)] // a call of Python's, with positions only
 pub(crate) fn drive(
+    py: Python<'_>,
     mut out: PyReadwriteArray2<'_, f32>,
     first: usize,
     action: PyReadonlyArray2<'_, f32>,
@@ -109,6 +120,18 @@ pub(crate) fn drive(
     let (scale, low, high) = (scale.as_slice()?, low.as_slice()?, high.as_slice()?);
     let start = start.as_ref().map(|start| start.as_slice()).transpose()?;
     let (mut out, action) = (out.as_array_mut(), action.as_array());
+    let size = action.ncols();
+    let fits = first + size <= out.ncols() && action.nrows() == out.nrows();
+    let one_each = [
+        scale.len(),
+        low.len(),
+        high.len(),
+        start.map_or(size, <[f32]>::len),
+    ];
+    if !fits || one_each != [size; 4] || low.iter().zip(high).any(|(low, high)| !(low <= high)) {
+        let problem = format!("drive: shapes or bounds do not fit {size} columns from {first} on");
+        return Err(raise(py, "ArgumentError", problem));
+    }
     for (mut to, from) in out.rows_mut().into_iter().zip(action.rows()) {
         for (k, number) in from.iter().enumerate() {
             let base = start.map_or(to[first + k], |start| start[k]);

@@ -1,6 +1,6 @@
 //! Random numbers of tasks, made as those of a reset are.
 
-use numpy::ndarray::{ArrayView1, ArrayViewMut2};
+use numpy::ndarray::{Array1, ArrayView1, ArrayViewMut2};
 use numpy::{
     Element, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray2, PyUntypedArrayMethods,
 };
@@ -15,8 +15,8 @@ const COLUMNS_MAX: usize = 1 << 24;
 
 /// Uniform numbers in [0, 1), the same for the same seed, episode, stream and column, whatever else is asked for.
 ///
-/// Philox4x32-10 under the seed as key, at the counter (0, episode, 64 + stream, column). In float32 they are rounded
-/// towards zero, so that they stay below 1.
+/// Philox4x32-10 under the seed as key, at the counter (0, episode, 64 + stream, first + column). In float32 they are
+/// rounded towards zero, so that they stay below 1.
 ///
 /// Args:
 ///     seeds: Seed of each row, uint64, shape ``(n,)``.
@@ -25,6 +25,7 @@ const COLUMNS_MAX: usize = 1 << 24;
 ///     columns: How many numbers a row gets, at most 2**24.
 ///     out: Where they go, float32 or float64, shape ``(n, columns)``, a part of another array if need be; a new
 ///         float64 array if left out.
+///     firsts: Which number of the stream each row begins with, uint32, shape ``(n,)``; 0 if left out.
 ///
 /// Returns:
 ///     ``out``, or the new array, shape ``(n, columns)``.
@@ -32,7 +33,7 @@ const COLUMNS_MAX: usize = 1 << 24;
 /// Raises:
 ///     ArgumentError: A shape or the stream is not as above. A wrong dtype is a TypeError.
 #[pyfunction]
-#[pyo3(signature = (seeds, episodes, stream, columns, out = None))]
+#[pyo3(signature = (seeds, episodes, stream, columns, out = None, firsts = None))]
 pub(crate) fn draw<'py>(
     py: Python<'py>,
     seeds: PyReadonlyArray1<'py, u64>,
@@ -40,6 +41,7 @@ pub(crate) fn draw<'py>(
     stream: i64,
     columns: usize,
     out: Option<Bound<'py, PyAny>>,
+    firsts: Option<PyReadonlyArray1<'py, u32>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let refused = |problem: String| Err(raise(py, "ArgumentError", problem));
     let rows = seeds.len();
@@ -55,9 +57,20 @@ pub(crate) fn draw<'py>(
             "draw: stream is {stream}; give one from 0 to {last}"
         ));
     };
-    if columns > COLUMNS_MAX {
+    let firsts = match &firsts {
+        Some(firsts) if firsts.len() == rows => firsts.as_array().to_owned(),
+        Some(firsts) => {
+            let given = firsts.len();
+            return refused(format!(
+                "draw: firsts has shape ({given},) and seeds ({rows},); give one of each a row"
+            ));
+        }
+        None => Array1::zeros(rows),
+    };
+    let last = firsts.iter().copied().max().unwrap_or(0) as usize;
+    if columns.saturating_add(last) > COLUMNS_MAX {
         return refused(format!(
-            "draw: columns is {columns}; give at most {COLUMNS_MAX}"
+            "draw: columns is {columns}, from {last} on; a stream has {COLUMNS_MAX}"
         ));
     }
     let out = match out {
@@ -65,14 +78,20 @@ pub(crate) fn draw<'py>(
         None => PyArray2::<f64>::zeros(py, [rows, columns], false).into_any(),
     };
     let (seeds, episodes) = (seeds.as_array(), episodes.as_array());
+    let of = Rows {
+        seeds,
+        episodes,
+        firsts: firsts.view(),
+        stream: Stream::Task(stream),
+    };
     if let Ok(array) = out.cast::<PyArray2<f32>>() {
         let mut array = writable(array, rows, columns)?;
         let array = array.as_array_mut();
-        py.detach(|| fill(seeds, episodes, Stream::Task(stream), array, below));
+        py.detach(|| fill(of, array, below));
     } else if let Ok(array) = out.cast::<PyArray2<f64>>() {
         let mut array = writable(array, rows, columns)?;
         let array = array.as_array_mut();
-        py.detach(|| fill(seeds, episodes, Stream::Task(stream), array, |unit| unit));
+        py.detach(|| fill(of, array, |unit| unit));
     } else {
         let problem = "draw: out is no float32 or float64 array of two axes";
         return Err(PyTypeError::new_err(problem));
@@ -94,18 +113,19 @@ fn writable<'py, T: Element>(
     Ok(array.try_readwrite()?)
 }
 
-fn fill<T>(
-    seeds: ArrayView1<'_, u64>,
-    episodes: ArrayView1<'_, u32>,
+/// What the rows are drawn from.
+struct Rows<'a> {
+    seeds: ArrayView1<'a, u64>,
+    episodes: ArrayView1<'a, u32>,
+    firsts: ArrayView1<'a, u32>,
     stream: Stream,
-    mut out: ArrayViewMut2<'_, T>,
-    rounded: impl Fn(f64) -> T,
-) {
-    let rows = out.outer_iter_mut().zip(seeds.iter().zip(episodes));
-    for (mut row, (&seed, &episode)) in rows {
-        let draw = Draw::new(seed, 0, episode, stream);
-        for (column, entry) in row.iter_mut().enumerate() {
-            *entry = rounded(draw.uniform(column as u32, 0.0, 1.0));
+}
+
+fn fill<T>(of: Rows<'_>, mut out: ArrayViewMut2<'_, T>, rounded: impl Fn(f64) -> T) {
+    for (k, mut row) in out.outer_iter_mut().enumerate() {
+        let draw = Draw::new(of.seeds[k], 0, of.episodes[k], of.stream);
+        for (index, entry) in (of.firsts[k]..).zip(row.iter_mut()) {
+            *entry = rounded(draw.uniform(index, 0.0, 1.0));
         }
     }
 }

@@ -262,10 +262,14 @@ def test_bounds_of_observations_are_true(envs: Any) -> None:
 
 def test_actions_beyond_the_bounds_count_as_these(envs: Any) -> None:
     env, twin = envs("FrankaReach", 4), envs("FrankaReach", 4)
-    for each, size in ((env, 1.0), (twin, 7.5)):
-        each.reset(seed=0)
-        each.step(np.full((4, 7), size))
-    np.testing.assert_array_equal(*(each.step(np.zeros((4, 7)))[0] for each in (env, twin)))
+    limit = env.single_action_space.high
+    for size, same in ((1000.0, True), (0.99, False)):
+        for each, action in ((env, limit), (twin, size * limit)):
+            each.reset(seed=0)
+            seen = each.step(np.tile(action, (4, 1)))[0]
+            assert (seen[:, 25:] == limit).all() == (same or each is env)
+        alike = [each.step(np.zeros((4, 7)))[0] for each in (env, twin)]
+        assert (alike[0] == alike[1]).all() == same
 
 
 @pytest.mark.parametrize("mode", MODES[:2])

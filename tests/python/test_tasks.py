@@ -67,7 +67,7 @@ def test_observations_are_within_their_bounds_and_are_seldom_cut_off_there(envs:
     cut = np.zeros(len(low))
     for _ in range(200):
         assert envs.observation_space.contains(obs)
-        whole = np.concatenate([np.reshape(part, (WORLDS, -1)) for part in envs._call("observe")], 1)
+        whole = np.concatenate([np.reshape(part, (WORLDS, -1)) for part in envs.evaluation.call("observe")], 1)
         # the length of a quaternion is 1 to rounding
         cut += ((whole < low - 1e-6) | (whole > high + 1e-6)).mean(0) / 200
         obs, reward, _, _, infos = envs.step(rng.uniform(-1, 1, envs.action_space.shape).astype(np.float32))

@@ -183,14 +183,26 @@ def drive(
 ) -> None: ...
 @overload
 def draw(
-    seeds: NDArray[np.uint64], episodes: NDArray[np.uint32], stream: int, columns: int, out: None = None
+    seeds: NDArray[np.uint64],
+    episodes: NDArray[np.uint32],
+    stream: int,
+    columns: int,
+    out: None = None,
+    firsts: NDArray[np.uint32] | None = None,
 ) -> NDArray[np.float64]: ...
 @overload
-def draw(seeds: NDArray[np.uint64], episodes: NDArray[np.uint32], stream: int, columns: int, out: _Real) -> _Real:
+def draw(
+    seeds: NDArray[np.uint64],
+    episodes: NDArray[np.uint32],
+    stream: int,
+    columns: int,
+    out: _Real,
+    firsts: NDArray[np.uint32] | None = None,
+) -> _Real:
     """Uniform numbers in [0, 1), the same for the same seed, episode, stream and column, whatever else is asked for.
 
-    Philox4x32-10 under the seed as key, at the counter (0, episode, 64 + stream, column). In float32 they are rounded
-    towards zero, so that they stay below 1.
+    Philox4x32-10 under the seed as key, at the counter (0, episode, 64 + stream, first + column). In float32 they are
+    rounded towards zero, so that they stay below 1.
 
     Args:
         seeds: Seed of each row, uint64, shape ``(n,)``.
@@ -199,6 +211,7 @@ def draw(seeds: NDArray[np.uint64], episodes: NDArray[np.uint32], stream: int, c
         columns: How many numbers a row gets, at most 2**24.
         out: Where they go, float32 or float64, shape ``(n, columns)``, a part of another array if need be; a new
             float64 array if left out.
+        firsts: Which number of the stream each row begins with, uint32, shape ``(n,)``; 0 if left out.
 
     Returns:
         ``out``, or the new array, shape ``(n, columns)``.

@@ -1,4 +1,4 @@
-"""Names under which gymnasium finds the environments; it reads this page when it is imported."""
+"""Names under which gymnasium finds the environments, once `tightloop.env` has been imported."""
 
 from __future__ import annotations
 

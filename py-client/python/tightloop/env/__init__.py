@@ -1,6 +1,6 @@
 """Reinforcement learning: tasks in thousands of worlds, as gymnasium environments.
 
->>> import gymnasium
+>>> import gymnasium, tightloop.env
 >>> envs = gymnasium.make_vec("tightloop/FrankaReach-v0", num_envs=4096)
 >>> obs, _ = envs.reset(seed=0)
 >>> obs, reward, terminated, truncated, infos = envs.step(envs.action_space.sample())

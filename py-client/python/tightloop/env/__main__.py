@@ -23,7 +23,8 @@ def arguments_of(task: str, options: Mapping[str, Any], extra: Sequence[str]) ->
     for bound, value in own.pop("bounds", {}).items():
         arguments += [f"--{bound.replace('_', '-')}-max", f"{value}"]
     for name, value in own.items():
-        arguments += [f"--{name.replace('_', '-')}", f"{value}"]
+        text = value if isinstance(value, str) else ",".join(value) if isinstance(value, Sequence) else f"{value}"
+        arguments += [f"--{name.replace('_', '-')}", text]
     return made.scene().to_toml(), [*arguments, *extra]
 
 

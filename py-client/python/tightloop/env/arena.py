@@ -2,11 +2,12 @@
 
 A task's function does the same operations in every frame. The first time, the result of each is kept, in order; from
 then on operation k writes into what it made before. What does not repeat (another operation, shape or type at that
-place) is made anew, so the arithmetic is always NumPy's.
+place), and what somebody still holds, is made anew, so the arithmetic is always NumPy's.
 """
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -41,8 +42,9 @@ class Arena:
         self._place = place + 1
         if place < len(tape) and tape[place][0] == key:
             _, array, pooled = tape[place]
-            call(*inputs, out=array, **options)
-            return pooled
+            if (sys.getrefcount(array), sys.getrefcount(pooled)) == _FREE:
+                call(*inputs, out=array, **options)
+                return pooled
         result = call(*inputs, **options)
         if not isinstance(result, np.ndarray):
             result = np.asarray(result)
@@ -74,6 +76,9 @@ class Pooled(np.ndarray[Any, Any]):
             own = tuple(array.view(np.ndarray) if type(array) is Pooled else array for array in out)
             call(*plain, out=own, **options)
             return out[0] if len(out) == 1 else out
+        for name, option in options.items():
+            if isinstance(option, np.ndarray):  # `where`
+                arena, options[name] = None, option.view(np.ndarray)
         if arena is None or ufunc.nout != 1 or method not in ("__call__", "reduce"):
             return call(*plain, **options)
         if options:
@@ -83,6 +88,8 @@ class Pooled(np.ndarray[Any, Any]):
     def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
         if func is np.where and len(args) == 3 and not kwargs and self._arena is not None:
             plain = [array.view(np.ndarray) if type(array) is Pooled else array for array in args]
+            if getattr(plain[0], "dtype", None) != np.bool_:
+                return np.where(*plain)
             key = [func, *((array.shape, array.dtype) if type(array) is np.ndarray else type(array) for array in plain)]
             return self._arena.run(key, _where, plain, {})
         return super().__array_function__(func, types, args, kwargs)
@@ -94,3 +101,17 @@ def _where(condition: Any, yes: Any, no: Any, out: NDArray[Any] | None = None) -
     np.copyto(out, no)
     np.copyto(out, yes, where=condition)
     return out
+
+
+def _free() -> tuple[int, int]:
+    """Reference counts that `Arena.run` finds of a result that nobody holds; they differ from Python to Python."""
+    arena, tape = Arena(), []
+    for _ in range(2):
+        arena.play(tape)
+        arena.run([], np.negative, [np.ones(1)], {})
+    _, array, pooled = tape[0]
+    return sys.getrefcount(array), sys.getrefcount(pooled)
+
+
+_FREE = (-1, -1)
+_FREE = _free()

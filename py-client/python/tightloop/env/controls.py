@@ -12,46 +12,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import _core
+from tightloop import _core, checks
+from tightloop.env.commands import Commands
 from tightloop.env.names import Names
 from tightloop.errors import ArgumentError
-from tightloop.scene import Scene
-
-
-class Commands:
-    """The commands of all worlds; controls write into them.
-
-    Attributes:
-        start: Drive targets of the scene at the start [rad or m], shape ``(dofs,)``.
-        range: Least and largest position of each dof [rad or m], shape ``(dofs, 2)``; infinite without a limit.
-    """
-
-    def __init__(self, scene: Scene, names: Names, worlds: int) -> None:
-        dofs = len(names.dof_names)
-        self.start = np.zeros(dofs, np.float32)
-        self.range = np.tile(np.array([-np.inf, np.inf], np.float32), (dofs, 1))
-        for name, robot in scene.robots.items():
-            self.start[names.dofs[name]] = robot.joint_target_q
-            self.range[names.dofs[name]] = robot.joint_range
-        self._shape = (worlds, dofs)
-        self._arrays: dict[str, NDArray[np.float32]] = {}
-
-    def array(self, field: str) -> NDArray[np.float32]:
-        """The command ``joint_f`` or ``joint_target_q``, shape ``(worlds, dofs)``; from now on it is sent."""
-        if field not in self._arrays:
-            start = self.start if field == "joint_target_q" else np.zeros_like(self.start)
-            self._arrays[field] = np.tile(start, (self._shape[0], 1))
-        return self._arrays[field]
-
-    def begin(self, mask: NDArray[np.bool_]) -> None:
-        """Put the commands of worlds that begin an episode back to those of the start."""
-        for field, array in self._arrays.items():
-            np.copyto(array, self.start if field == "joint_target_q" else 0, where=mask[:, None])
-
-    @property
-    def sent(self) -> dict[str, NDArray[np.float32]]:
-        """What a step is given, by argument."""
-        return self._arrays
 
 
 class Control(Protocol):
@@ -62,7 +26,7 @@ class Control(Protocol):
     #: How large they may be.
     limit: float
     #: Fields of the frame that it reads.
-    fields: Sequence[str]
+    fields: tuple[str, ...]
 
     def bind(self, names: Names, commands: Commands) -> None:
         """Look up names, and take the commands that it writes."""
@@ -76,7 +40,7 @@ class Control(Protocol):
 class _Joints:
     """A control of some dofs, one number each."""
 
-    fields: Sequence[str] = ()
+    fields: tuple[str, ...] = ()
     limit = 1.0
     _field = "joint_target_q"
 
@@ -101,7 +65,7 @@ class _Joints:
         places = [names.dof(name) for name in self._dofs]
         if places != list(range(places[0], places[0] + self._count)):
             raise ArgumentError(f"{type(self).__name__}: dofs must stand side by side, in the order of the robot's")
-        self._array, self._first = commands.array(self._field), places[0]
+        self._array, self._first = commands.array(self._field, places), places[0]
         self._start = np.ascontiguousarray(commands.start[places])
         self._low, self._high = (np.ascontiguousarray(end) for end in commands.range[places].T)
 
@@ -111,9 +75,21 @@ class _Joints:
 
 
 class JointTorque(_Joints):
-    """Torques: ``joint_f = scale * action`` [N·m or N]."""
+    """Torques: ``joint_f = scale * action`` [N·m or N], and on request what holds the joints against gravity."""
 
     _field = "joint_f"
+
+    def __init__(self, dofs: Sequence[str], scale: ArrayLike, *, hold: bool = False) -> None:
+        """Torques of some dofs.
+
+        Args:
+            dofs: Their names, ``robot/joint``.
+            scale: What an action of 1 means [N·m or N], for all or each of them.
+            hold: Whether ``bias_force`` at the beginning of the step is added, as a Franka's own controller does.
+        """
+        super().__init__(dofs, scale)
+        self._hold = hold
+        self.fields: tuple[str, ...] = ("bias_force",) if hold else ()
 
     def bind(self, names: Names, commands: Commands) -> None:
         """Look up the dofs."""
@@ -123,7 +99,10 @@ class JointTorque(_Joints):
 
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
         """Write the torques."""
-        self._drive(action, self._start)
+        if self._hold:
+            dofs = slice(self._first, self._first + self._count)
+            np.copyto(self._array[:, dofs], frame.bias_force[:, dofs], casting="same_kind")
+        self._drive(action, None if self._hold else self._start)
 
 
 class JointTarget(_Joints):
@@ -138,7 +117,7 @@ class JointTarget(_Joints):
             limit: How large an action may be.
         """
         super().__init__(dofs, scale)
-        self.limit = limit
+        self.limit = checks.number("JointTarget: limit", limit, above=0.0, error=ArgumentError)
 
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
         """Write the targets."""
@@ -180,7 +159,10 @@ class Gripper(_Joints):
 
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
         """Write the targets."""
-        np.copyto(self._fingers, np.copysign(1.0, action) if self._binary else action)
+        if self._binary:
+            # the sum keeps NaN, which is to fail
+            action = np.where(action < 0.0, -1.0, 1.0) + 0.0 * action
+        np.copyto(self._fingers, action)
         self._drive(self._fingers, self._start)
 
 

@@ -72,8 +72,11 @@ class Episodes:
     def due(self) -> NDArray[np.bool_] | None:
         """Which worlds are due for their next goal; None if none can be."""
         steps = self._task.goal_steps
-        # not `==`: `elapsed` may have been set ahead, and then the goals follow, one a step
-        return None if steps is None else self.elapsed >= steps * (self._goals + 1)
+        if steps is None:
+            return None
+        # not `==`: `elapsed` may have been set ahead, and then the goals follow, one a step. An episode that is to end
+        # here keeps its goal in its last observation, whoever counts its steps
+        return (self.elapsed >= steps * (self._goals + 1)) & (self.elapsed != self._task.max_episode_steps)
 
     def renew(self, mask: NDArray[np.bool_], worlds: Worlds) -> None:
         """Give the worlds under the mask their next goal."""
@@ -81,11 +84,12 @@ class Episodes:
         self._draw(np.flatnonzero(mask), worlds)
 
     def _draw(self, rows: NDArray[np.intp], worlds: Worlds) -> None:
-        count, place = self._task.goal_draws, self._goals[rows].astype(np.intp)
-        most = int(place.max()) + 1
-        drawn = _core.draw(self._seeds[rows], self._episodes[rows], _GOALS, count * most)
-        own = drawn.reshape(len(rows), most, count)[np.arange(len(rows)), place]
-        goal = np.asarray(self._task.goal(np, worlds.rows(rows), own.astype(np.float32)))
+        count, draws = self._task.goal_draws, np.empty((len(rows), self._task.goal_draws), np.float32)
+        _core.draw(self._seeds[rows], self._episodes[rows], _GOALS, count, draws, self._goals[rows] * np.uint32(count))
+        goal = np.asarray(self._task.goal(np, worlds.rows(rows), draws))
+        if goal.ndim == 0 or len(goal) != len(rows) or goal.dtype.kind not in "fiub":
+            expected = f"expected numbers of {len(rows)} worlds"
+            raise ArgumentError(f"{type(self._task).__name__}.goal: {expected}; got {goal.dtype} of shape {goal.shape}")
         if self.goal.shape[1:] != goal.shape[1:]:
             self.goal = np.zeros((len(self._seeds), *goal.shape[1:]), np.float32)
         self.goal[rows] = goal

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
+from inspect import Parameter, signature
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +29,14 @@ def make_task(task: Task | type[Task] | str, options: Mapping[str, Any]) -> Task
         task = _named(task)
     if not (isinstance(task, type) and issubclass(task, Task)):
         raise ArgumentError(f"task is {task!r}; give a Task, its class or a name")
-    try:
-        return task(**options)
-    except TypeError as problem:
-        raise ArgumentError(f"task {task.__name__}: {problem}") from None
+    taken = signature(task).parameters
+    if not any(parameter.kind is Parameter.VAR_KEYWORD for parameter in taken.values()):
+        for name in options:
+            if name not in taken:
+                known = ", ".join(taken) or "none"
+                problem = f"{name}: no argument of environments, nor of task {task.__name__}, whose are: {known}"
+                raise ArgumentError(problem)
+    return task(**options)
 
 
 def _named(task: str) -> type[Task]:
@@ -47,9 +53,10 @@ def _named(task: str) -> type[Task]:
 def _of_file(path: Path, name: str) -> type[Task]:
     if not path.is_file():
         raise ArgumentError(f"there is no file {path}; give the task as FILE.py:CLASS")
-    spec = spec_from_file_location(path.stem, path)
+    # a name that no installed module has
+    spec = spec_from_file_location(f"tightloop_task_{path.stem}", path)
     assert spec is not None and spec.loader is not None, "the name ends in .py"
-    module = module_from_spec(spec)
+    module = sys.modules[spec.name] = module_from_spec(spec)
     spec.loader.exec_module(module)
     if not isinstance(found := getattr(module, name, None), type):
         raise ArgumentError(f"{path} has no class {name!r}")

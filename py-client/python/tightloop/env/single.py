@@ -26,10 +26,9 @@ class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def __init__(self, task: Task | type[Task] | str, **options: Any) -> None:
         """A task in one world; ``options`` are those of `VectorEnv`, but for ``num_envs`` and ``autoreset_mode``."""
-        options.setdefault("threads", 1)
-        self.vector = VectorEnv(
-            task, None if "daemon" in options else 1, autoreset_mode=AutoresetMode.DISABLED, **options
-        )
+        if options.get("daemon") is None:
+            options.setdefault("threads", 1)
+        self.vector = VectorEnv(task, 1, autoreset_mode=AutoresetMode.DISABLED, **options)
         self.render_mode = None
         self.observation_space = self.vector.single_observation_space
         self.action_space = self.vector.single_action_space

@@ -25,7 +25,9 @@ def begin(
     worlds: int | None,
     *,
     daemon: str | None,
-    **options: Any,
+    device: str,
+    precision: str | None,
+    threads: int | None,
 ) -> tuple[tl.Scene, tl.Sim]:
     """The task's scene, and a simulation of it.
 
@@ -34,26 +36,39 @@ def begin(
     """
     scene, fields = task.scene(), fields_of(task, controls)
     if daemon is None:
-        own = DAEMON_OPTIONS | task.launch_options
-        return scene, tl.launch(scene, worlds=1 if worlds is None else worlds, fields=fields, **own, **options)
+        return scene, tl.launch(
+            scene,
+            worlds=1 if worlds is None else worlds,
+            fields=fields,
+            device=device,
+            precision=precision or "f32",
+            threads=threads,
+            **DAEMON_OPTIONS | task.launch_options,
+        )
+    if device != "auto" or threads is not None:
+        raise ArgumentError(f"device and threads are those of the daemon `{daemon}`; leave them out")
     sim = tl.attach(daemon)
     try:
-        _check(scene, sim, fields, worlds)
+        _check(task, scene, sim, fields)
+        for name, given, own in (("precision", precision, sim.precision), ("num_envs", worlds, sim.worlds)):
+            if given is not None and given != own:
+                raise ArgumentError(f"{name} is {given}, and daemon `{daemon}` has {own}; leave it out")
     except ArgumentError:
         sim.close()
         raise
     return scene, sim
 
 
-def _check(scene: tl.Scene, sim: tl.Sim, fields: tuple[str, ...], worlds: int | None) -> None:
+def _check(task: Task, scene: tl.Scene, sim: tl.Sim, fields: tuple[str, ...]) -> None:
     cure = "start it with `python -m tightloop.env serve`"
     if tl.Dynamics(scene).model_hash != sim.info["model_hash"]:
         raise ArgumentError(f"daemon `{sim.name}` runs another scene than the task's; {cure}")
     missing = [field for field in fields if field not in sim.fields]
     if missing:
         raise ArgumentError(f"daemon `{sim.name}` does not show {', '.join(missing)}; {cure}")
-    for option, value in DAEMON_OPTIONS.items():
+    # what a description tells of them; a bound that is not given is infinite
+    bounds = {f"{name}_max": value for name, value in task.launch_options.get("bounds", {}).items()}
+    told = {name: value for name, value in (DAEMON_OPTIONS | task.launch_options).items() if name in sim.info}
+    for option, value in (told | bounds).items():
         if sim.info[option] != value:
             raise ArgumentError(f"daemon `{sim.name}` has {option}={sim.info[option]}, not {value}; {cure}")
-    if worlds is not None and worlds != sim.worlds:
-        raise ArgumentError(f"num_envs is {worlds}, and daemon `{sim.name}` has {sim.worlds} worlds; leave it out")

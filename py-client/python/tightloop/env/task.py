@@ -86,8 +86,7 @@ class Task:
 
     `observe`, `reward`, `terminated`, `success`, `metrics` and `goal` are pure: arrays in, arrays out, for all worlds
     at once. They use arithmetic and the functions of the namespace ``xp`` that NumPy and the array API share, so that
-    they run on arrays of torch and JAX too. What they return is valid until they are called again. They see no
-    simulation and draw no random numbers.
+    they run on arrays of torch and JAX too. They see no simulation and draw no random numbers.
 
     Attributes:
         fields: Fields of the frame that the functions read.
@@ -171,6 +170,7 @@ def episode_steps(task: Task, given: float | None) -> int | None:
     steps = task.max_episode_steps if given is None else given
     if steps == math.inf:
         return None
-    if isinstance(steps, bool) or steps != int(steps) or steps < 1:
+    whole = isinstance(steps, int | float | np.number) and not isinstance(steps, bool) and math.isfinite(steps)
+    if not whole or steps != int(steps) or steps < 1:
         raise ArgumentError(f"max_episode_steps is {steps!r}; give a whole number of at least 1, or math.inf")
     return int(steps)

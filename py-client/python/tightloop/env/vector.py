@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
+import copy as copying
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector import VectorEnv as GymVectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop.env.arena import Arena
-from tightloop.env.controls import Commands
+from tightloop import checks
+from tightloop.env.commands import Actions
 from tightloop.env.episodes import Episodes
+from tightloop.env.evaluation import Evaluation
 from tightloop.env.names import Names
-from tightloop.env.pack import Packer
 from tightloop.env.registry import make_task
 from tightloop.env.slots import Slot, Slots
 from tightloop.env.start import begin
-from tightloop.env.task import Task, Worlds, episode_steps
+from tightloop.env.task import Task, episode_steps
 from tightloop.errors import ArgumentError, CommandRefused
 
 #: Bits of ``status`` of a world that is frozen: no longer finite, or beyond the bounds of the run.
@@ -46,6 +46,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         autoreset_mode: When a world whose episode ended begins the next one.
         max_episode_steps: Control steps after which an episode is truncated; None for never.
         control_dt: Length of a step [s].
+        evaluation: Calls the task's functions with what the worlds are now.
     """
 
     def __init__(
@@ -57,7 +58,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         copy: bool = True,
         slots: int = 2,
         device: str = "auto",
-        precision: str = "f32",
+        precision: str | None = None,
         threads: int | None = None,
         max_episode_steps: float | None = None,
         daemon: str | None = None,
@@ -72,16 +73,16 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
                 ``"own_task.py:Circle"``, a class in a file.
             num_envs: How many worlds; those of the daemon if one is joined, else 1.
             autoreset_mode: ``NEXT_STEP``, ``SAME_STEP`` or ``DISABLED``, as gymnasium defines them.
-            copy: Whether each step returns new arrays. Otherwise they are views of a ring, overwritten by the step
-                that comes ``slots`` steps later: for loops that have read them by then.
+            copy: Whether each step returns new arrays. Otherwise they are views of a ring, overwritten by the step or
+                reset that comes ``slots`` of these later: for loops that have read them by then.
             slots: Slots of that ring, at least 2.
             device: ``"cpu"``, or ``"auto"`` for the best there is.
-            precision: ``"f32"``, or ``"f64"`` for the physics in double precision.
+            precision: ``"f32"``, or ``"f64"`` for the physics in double precision; that of a daemon that is joined.
             threads: Most threads a step may use; all cores if left out.
             max_episode_steps: Steps after which an episode is truncated, ``math.inf`` for never; the task's if left
                 out.
-            daemon: Name of a running daemon to join, which `tightloop.env.serve` started for that task. It goes on
-                when this process ends, however it ends. None launches one that ends with this process.
+            daemon: Name of a running daemon to join, which ``python -m tightloop.env serve`` started for that task. It
+                goes on when this process ends, however it ends. None launches one that ends with this process.
             first_env: Number of the first world among those that ``reset(seed=…)`` counts, for groups of environments.
             render_mode: None: rendering is not there yet.
             **options: What the task's class takes.
@@ -92,9 +93,12 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         """
         if render_mode is not None:
             raise ArgumentError(f"render_mode is {render_mode!r}; environments cannot be rendered yet, leave it out")
-        if slots < 2:
-            raise ArgumentError(f"slots is {slots}; a ring has at least 2")
-        self.task = make_task(task, options)
+        slots = checks.integer("slots", slots, least=2, error=ArgumentError)
+        first_env = checks.integer("first_env", first_env, least=0, error=ArgumentError)
+        if num_envs is not None:
+            num_envs = checks.integer("num_envs", num_envs, error=ArgumentError)
+        # a task is bound to one environment: another with the same one would write into its arrays
+        self.task = copying.deepcopy(make_task(task, options))
         self.autoreset_mode = _mode(autoreset_mode)
         self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
         self.render_mode = None
@@ -105,33 +109,20 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         )
         self.num_envs = self.sim.worlds
         self.control_dt = self.sim.dt * self.sim.substeps
-
-        names = Names(self.sim.info)
-        self.task.bind(names)
-        self._commands = Commands(scene, names, self.num_envs)
-        self._controls, place = [], 0
-        for control in controls:
-            control.bind(names, self._commands)
-            self._controls.append((control, slice(place, place + control.size)))
-            place += control.size
-        low, high = np.concatenate([part.bounds for part in self.task.observed()], axis=1)
-        self.single_observation_space = Box(low, high, dtype=np.float32)
-        limits = np.concatenate([np.full(control.size, control.limit, np.float32) for control in controls])
-        self.single_action_space = Box(-limits, limits, dtype=np.float32)
-        # one number where it does: NumPy takes long over rows of few
-        self._limits = limits[0] if (limits == limits[0]).all() else limits
+        try:
+            names = Names(self.sim.info)
+            self.task.bind(names)
+            self._actions = Actions(controls, scene, names, self.num_envs)
+            self.evaluation = Evaluation(self.task, self.num_envs)
+            self._episodes = Episodes(self.task, self.num_envs, first_env)
+        except BaseException:
+            self.sim.close()
+            raise
+        self.single_observation_space = self.evaluation.space
+        self.single_action_space = self._actions.space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-
-        self._packer = Packer(self.task.observed())
-        self._copy, self._slots = copy, None if copy else Slots(self.num_envs, len(low), slots)
-        self._episodes = Episodes(self.task, self.num_envs, first_env)
-        self._action = np.zeros((self.num_envs, place), np.float32)
-        self._previous_action = np.zeros_like(self._action)
-        self._arena, self._tapes = (
-            Arena(),
-            {name: [] for name in ("observe", "reward", "terminated", "success", "metrics")},
-        )
+        self._slots = None if copy else Slots(self.num_envs, self.evaluation.observed, slots)
         self._done = np.zeros(self.num_envs, np.bool_)
         self._all = np.ones(self.num_envs, np.bool_)
         self._frame: Any = None
@@ -197,15 +188,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             world = int(np.argmax(self._done))
             problem = f"send: the episode of environment {world} has ended"
             raise CommandRefused(f'{problem}; call reset(options={{"reset_mask": …}}) for those that ended')
-        given = np.asarray(actions)
-        if given.shape != self._action.shape or given.dtype.kind not in "fiu":
-            expected = f"expected real numbers of shape {self._action.shape}"
-            raise ArgumentError(f"actions: {expected}; got {given.dtype} of shape {given.shape}")
-        self._action, self._previous_action = self._previous_action, self._action
-        np.clip(given, -self._limits, self._limits, out=self._action, casting="same_kind")
-        for control, numbers in self._controls:
-            control.apply(self._action[:, numbers], self._frame)
-        self.sim.send(**self._commands.sent)
+        self.sim.send(**self._actions.take(actions, self._frame))
         self._in_flight = True
 
     def recv(self) -> Step:
@@ -222,7 +205,13 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         """
         if not self._in_flight:
             raise CommandRefused("recv: no step is on its way; call send first")
-        frame = self.sim.recv()
+        try:
+            frame = self.sim.recv()
+        except KeyboardInterrupt:
+            raise  # it may be called again
+        except BaseException:
+            self._in_flight = False
+            raise
         self._in_flight = False
         slot, infos = self._next_slot(), {}
         begun = self._done if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._done.any() else None
@@ -237,7 +226,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         np.logical_or(slot.terminated, slot.truncated, out=self._done)
         due = self._episodes.due()
         if due is not None and (due := due & ~self._done).any():
-            self._episodes.renew(due, self._worlds)
+            self._episodes.renew(due, self.evaluation.worlds)
             self._see(self._frame)
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._done.any():
             self._end(slot, infos)
@@ -265,31 +254,24 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
 
     def _begin(self, mask: NDArray[np.bool_], frame: Any) -> None:
         """Begin episodes of worlds that the daemon has reset."""
-        self._commands.begin(mask)
-        self._action[mask] = 0.0
-        self._previous_action[mask] = 0.0
+        self._actions.begin(mask)
         self._see(frame)
-        self._episodes.begin(mask, self._worlds)
+        self._episodes.begin(mask, self.evaluation.worlds)
         self._see(frame)
 
     def _see(self, frame: Any) -> None:
         """Make a frame what the task's functions see."""
-        self._frame, wrap = frame, self._arena.wrap
-        self._worlds = Worlds(
-            action=wrap(self._action),
-            previous_action=wrap(self._previous_action),
-            goal=wrap(self._episodes.goal),
-            elapsed=wrap(self._episodes.elapsed),
-            **{name: wrap(getattr(frame, name)) for name in self.task.fields},
+        self._frame = frame
+        self.evaluation.see(
+            frame,
+            action=self._actions.now,
+            previous_action=self._actions.before,
+            goal=self._episodes.goal,
+            elapsed=self._episodes.elapsed,
         )
 
-    def _call(self, name: str) -> Any:
-        """What a function of the task says of the worlds; valid until it is called again."""
-        self._arena.play(self._tapes[name])
-        return getattr(self.task, name)(np, self._worlds)
-
     def _observe(self, out: NDArray[np.float32]) -> None:
-        self._packer.pack(self._call("observe"), out)
+        self.evaluation.observe(out)
         frozen = self._frame.status & FROZEN
         if frozen.any():
             # what is derived from a frozen state need not be finite
@@ -297,9 +279,8 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
 
     def _score(self, slot: Slot, infos: dict[str, Any], begun: NDArray[np.bool_] | None) -> None:
         """Reward and ends of the step; worlds that have just begun have neither."""
-        np.copyto(slot.reward, self._call("reward"), casting="same_kind")
-        terminated = self._call("terminated")
-        np.copyto(slot.terminated, False if terminated is None else terminated)
+        self.evaluation.reward(slot.reward)
+        self.evaluation.terminated(slot.terminated)
         if self.max_episode_steps is None:
             slot.truncated[:] = False
         else:
@@ -313,15 +294,12 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         if begun is not None:
             slot.reward[begun] = 0.0
             slot.terminated[begun] = slot.truncated[begun] = False
-        success = self._call("success")
-        told = dict(self._call("metrics")) | ({} if success is None else {"success": success})
-        for name, value in told.items():
-            infos[name] = np.array(value)
-            infos[f"_{name}"] = self._all.copy() if begun is None else ~begun
+        for name, value in self.evaluation.told().items():
+            infos[name], infos[f"_{name}"] = value, self._all.copy() if begun is None else ~begun
 
     def _next_slot(self) -> Slot:
         if self._slots is None:
-            return Slot(self.num_envs, self._packer.size)
+            return Slot(self.num_envs, self.evaluation.observed)
         return self._slots.next()
 
     def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
@@ -342,7 +320,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
 
 
 def _mode(mode: AutoresetMode | str) -> AutoresetMode:
-    modes = {name: mode for mode in AutoresetMode for name in (mode, mode.name, mode.value)}
-    if mode not in modes:
-        raise ArgumentError(f"autoreset_mode is {mode!r}; give NEXT_STEP, SAME_STEP or DISABLED")
-    return modes[mode]
+    for known in AutoresetMode:
+        if mode in (known, known.name, known.value):
+            return known
+    raise ArgumentError(f"autoreset_mode is {mode!r}; give NEXT_STEP, SAME_STEP or DISABLED")

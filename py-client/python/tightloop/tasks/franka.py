@@ -23,7 +23,7 @@ FINGERS = ["arm/fr3_finger_joint1", "arm/fr3_finger_joint2"]
 TCP = "tcp"
 #: What `controls` knows.
 CONTROLS = ("joint_target", "joint_delta", "end_effector_delta", "torque")
-#: Torques of an action of 1 [N·m]: an eighth of what the drives can.
+#: Torques of an action of 1, beside what holds the arm [N·m]: an eighth of what the drives can.
 _TORQUE = [87 / 8] * 4 + [12 / 8] * 3
 
 
@@ -65,7 +65,7 @@ def controls(name: str, *, scale: float, gripper: Gripper | None = None, limit: 
         "joint_target": lambda: JointTarget(ARM, scale, limit=limit),
         "joint_delta": lambda: JointDelta(ARM, scale),
         "end_effector_delta": lambda: EndEffectorDelta(TCP, ARM, pos_scale=0.05, rot_scale=0.1),
-        "torque": lambda: JointTorque(ARM, _TORQUE),
+        "torque": lambda: JointTorque(ARM, _TORQUE, hold=True),
     }
     if name not in arms:
         raise ArgumentError(f"control is {name!r}; give one of {', '.join(CONTROLS)}")
