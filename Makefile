@@ -1,8 +1,9 @@
-# demo · test · test-rl · fuzz · published · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
+# demo · test · test-rl · train · fuzz · published · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
 #
 #   make demo     the Franka lesson and a grasp in 4096 worlds, plots in out/  (make demo WORLDS=256)
 #   make test     every Rust and Python test
 #   make test-rl  adapters against their libraries, and short trainings; 6 GB of torch, Ray and others into .venv
+#   make train    a policy for a task, from scratch  (make train TASK=FrankaReach SEED=0 MINUTES=3)
 #   make fuzz     random programs on random scenes, many more of them  (make fuzz CASES=1000 SEED=5000)
 #   make published   robots from PyPI against MuJoCo; 260 MB of wheels  (make published TIGHTLOOP_URDF=/path/robot.urdf)
 #   make bench    speed, side by side with what it is compared with
@@ -16,6 +17,7 @@ PIP    := $(PYTHON) -m pip --disable-pip-version-check
 WORLDS ?= 4096
 CASES  ?= 2000
 SEED   ?= 1
+TASK   ?= CartPoleSwingUp
 
 # The wheel, the tests and the lints build pyo3 with one environment; otherwise each would rebuild it for itself.
 export PYO3_PYTHON := $(CURDIR)/$(PYTHON)
@@ -26,7 +28,7 @@ PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml -name '
 PYTHON_TREES   := py-client/python py-client/tests tests examples benches
 CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
-.PHONY: demo test test-rl fuzz published bench bench-env check wheel
+.PHONY: demo test test-rl train fuzz published bench bench-env check wheel
 .NOTPARALLEL: # pip installs into one venv, cargo and the tests use all cores by themselves
 
 demo: wheel
@@ -47,6 +49,10 @@ test: wheel $(VENV)/.dev
 # Kept out of `test`, which needs no torch. One thread of torch: on busy cores several spin while they wait for each other.
 test-rl: wheel $(VENV)/.dev $(VENV)/.rl
 	OMP_NUM_THREADS=1 $(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . tests/rl
+
+# A policy from scratch, on two cores, with the time of the task's preset; into out/train.
+train: wheel $(VENV)/.rl
+	$(PYTHON) examples/ppo.py $(TASK) --seed $(SEED) $(if $(MINUTES),--minutes $(MINUTES)) $(if $(RESUME),--resume)
 
 # Seeds of failures are printed. Ten properties, about a minute for 100 cases of each.
 fuzz:

@@ -35,13 +35,13 @@ from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
 from tqdm import tqdm
 
+from evaluation import evaluate, told
 from tightloop.env import AutoresetMode, VectorEnv
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 OUT = Path(__file__).resolve().parent.parent / "out" / "train"
-EVALUATED = 256  # worlds of an evaluation
 
 
 @dataclass(frozen=True)
@@ -59,10 +59,11 @@ class Config:
     clip: float = 0.2  # of the ratio of probabilities
     entropy: float = 0.0  # weight of the entropy in the loss
     lr: float = 1e-3  # learning rate at the start
-    kl: float = 0.01  # change of the policy that the learning rate aims at, a rollout
+    kl: float = 0.01  # change of the policy that the learning rate aims at, a rollout; a tenth of it at the end
     std: float = 0.6  # standard deviation of actions at the start
     grad_max: float = 1.0  # norm of a gradient, at most
     evaluate: float = 15.0  # seconds between evaluations
+    enough: float = 2.0  # success at which to stop before the time is over; above 1 it never does
     threads: int = 2  # of torch and of the simulation
 
 
@@ -170,9 +171,6 @@ class Trainer:
         self.task, self.seed, self.config, self.folder = task, seed, config, folder
         options: dict[str, Any] = {"threads": config.threads} if daemon is None else {"daemon": daemon}
         self.envs = VectorEnv(task, config.num_envs, autoreset_mode=AutoresetMode.SAME_STEP, copy=False, **options)
-        self.judge = VectorEnv(
-            task, EVALUATED, autoreset_mode=AutoresetMode.SAME_STEP, copy=False, threads=config.threads
-        )
         (inputs,), (actions,) = self.envs.single_observation_space.shape, self.envs.single_action_space.shape
         self.device = torch.device(device)
         self.agent = Agent(inputs, actions, config).to(self.device)
@@ -238,51 +236,37 @@ class Trainer:
     def _follow(self, kl: float) -> None:
         """Let the learning rate follow how much the policy changes."""
         group = self.optimizer.param_groups[0]
-        if kl > 2.0 * self.config.kl:
-            group["lr"] = max(1e-5, group["lr"] / 1.5)
-        elif 0.0 < kl < 0.5 * self.config.kl:
-            group["lr"] = min(1e-2, group["lr"] * 1.5)
+        aim = self.config.kl * (1.0 - 0.9 * min(1.0, self.seconds / (60.0 * self.config.minutes)))
+        if kl > 2.0 * aim:
+            group["lr"] = max(1e-5, group["lr"] / 1.2)
+        elif 0.0 < kl < 0.5 * aim:
+            group["lr"] = min(3e-3, group["lr"] * 1.2)
 
     @torch.no_grad()
-    def evaluate(self) -> dict[str, float]:
-        """One episode in each of 256 worlds, always the same ones, with the most likely actions."""
-        obs, _ = self.judge.reset(seed=1_000_000)
-        returns, going = np.zeros(EVALUATED), np.ones(EVALUATED, bool)
-        success, error = np.zeros(EVALUATED), np.zeros(EVALUATED)
-        while going.any():
-            action = self.agent(torch.from_numpy(obs).to(self.device)).cpu().numpy()
-            obs, reward, terminated, truncated, infos = self.judge.step(action)
-            returns[going] += reward[going]
-            if "success" in infos:
-                success[going] = infos["success"][going]
-            if "error" in infos:
-                error[going] = infos["error"][going]
-            going &= ~(terminated | truncated)
-        found = {"return": returns.mean(), "success": success.mean()}
-        return {
-            name: float(value) for name, value in (found | ({"error": error.mean()} if error.any() else {})).items()
-        }
+    def act(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The most likely actions."""
+        return self.agent(torch.from_numpy(obs).to(self.device)).cpu().numpy()
 
     def run(self, log: SummaryWriter) -> None:
         """Train until the time is over; checkpoints and evaluations on the way."""
         limit, begun, shown = 60.0 * self.config.minutes, time.perf_counter() - self.seconds, -math.inf
         obs, _ = self.envs.reset(seed=self.seed + len(self.curve))
         with tqdm(total=round(limit), initial=round(self.seconds), unit="s", desc=self.task, disable=None) as bar:
-            while self.seconds < limit:
+            while self.seconds < limit and not (self.curve and self.curve[-1]["success"] >= self.config.enough):
                 with torch.no_grad():
                     obs = self.collect(obs)
-                told = self.learn()
+                news = self.learn()
                 self.seconds = time.perf_counter() - begun
                 bar.update(round(self.seconds) - bar.n)
                 if self.seconds - shown >= self.config.evaluate or self.seconds >= limit:
                     shown = self.seconds
-                    found = self.evaluate()
+                    found = evaluate(self.task, self.act, threads=self.config.threads)
                     self.curve.append({"seconds": self.seconds, "steps": self.steps, **found})
                     self.save()
-                    bar.set_postfix({name: f"{value:.3g}" for name, value in found.items()} | {"steps": self.steps})
-                    told |= found
-                told |= {"reward": self.rollout.reward.mean().item(), "lr": self.optimizer.param_groups[0]["lr"]}
-                for name, value in told.items():
+                    bar.set_postfix(told(found) | {"steps": f"{self.steps:,}"})
+                    news |= found
+                news |= {"reward": self.rollout.reward.mean().item(), "lr": self.optimizer.param_groups[0]["lr"]}
+                for name, value in news.items():
                     log.add_scalar(name, value, self.steps)
 
     def save(self) -> None:
@@ -328,9 +312,8 @@ class Trainer:
         return path
 
     def close(self) -> None:
-        """End the environments."""
+        """End the environment."""
         self.envs.close()
-        self.judge.close()
 
 
 def draw(curve: list[dict[str, float]], title: str, path: Path) -> None:
@@ -383,7 +366,11 @@ def main() -> None:
         title = f"{args.task}, seed {args.seed}: {end['steps'] / 1e6:.1f} M steps, {config.threads} threads"
         draw(trainer.curve, title, folder / "curve.png")
         policy = trainer.export()
-        print(", ".join(f"{name} {value:.4g}" for name, value in end.items()))
+        found = {name: value for name, value in end.items() if name not in ("seconds", "steps")}
+        print(
+            f"{end['seconds']:.0f} s, {end['steps']:,} steps: "
+            + ", ".join(f"{name} {value}" for name, value in told(found).items())
+        )
         print(f"curve: {folder / 'curve.png'}; policy: {policy}; python examples/play.py {args.task} {policy}")
     finally:
         trainer.close()

@@ -155,8 +155,8 @@ def test_an_arm_reaches_by_it(precision):
 @PRECISIONS
 @pytest.mark.parametrize("damping", [0.2, 0.05, 0.01, 1e-3, 1e-4, 1e-6])
 def test_where_the_arm_is_stretched_it_stays_within_its_bound(tmp_path, precision, damping):
-    # no singular value of J⁺ is above 1 / 2λ. A chain of six that lies straight cannot move in two directions; askew, so
-    # that J Jᵀ has rounding everywhere, in which the λ² of f32 would be lost
+    # no singular value of J⁺ is above 1 / 2λ. A chain of six that lies straight cannot move in two directions; it lies
+    # askew, so that J Jᵀ has rounding everywhere, in which the λ² of f32 would be lost
     inertia = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
     links = "".join(f"<link name='l{k}'>{inertia}</link>" for k in range(7))
     joints = "".join(

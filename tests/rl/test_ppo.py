@@ -23,7 +23,18 @@ def curve(folder: Path) -> list[dict[str, str]]:
 
 
 def test_it_learns_to_balance_and_its_policy_plays(tmp_path: Path) -> None:
-    done = run(f"{EXAMPLES}/ppo.py", "CartPoleBalance", "--minutes", "0.5", "--evaluate", "5", "--out", str(tmp_path), "--threads", "1")
+    done = run(
+        f"{EXAMPLES}/ppo.py",
+        "CartPoleBalance",
+        "--minutes",
+        "0.5",
+        "--evaluate",
+        "5",
+        "--out",
+        str(tmp_path),
+        "--threads",
+        "1",
+    )
     assert done.returncode == 0, done.stderr
     folder = tmp_path / "CartPoleBalance-0"
     rows = curve(folder)
