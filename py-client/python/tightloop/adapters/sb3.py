@@ -2,7 +2,8 @@
 
 >>> from stable_baselines3 import PPO
 >>> from tightloop.adapters.sb3 import Sb3VecEnv
->>> PPO("MlpPolicy", Sb3VecEnv("FrankaReach", 256)).learn(1_000_000)
+>>> env = Sb3VecEnv("FrankaReach", 512)
+>>> PPO("MlpPolicy", env, n_steps=24, batch_size=3072, gamma=0.9).learn(1_000_000)
 """
 
 from __future__ import annotations
