@@ -1,10 +1,4 @@
-"""A task of your own in one file: a Franka arm turns its hand in circles, one in each world's own time.
-
-python examples/own_task.py            # random actions, to see that it runs
-python examples/ppo.py own_task.py:Circle --minutes 3
-"""
-
-import numpy as np
+"""A task of your own, a hand that draws circles: `python examples/ppo.py examples/own_task.py:Circle` learns it."""
 
 import tightloop as tl
 from tightloop.env import JointDelta, Observed, Task, VectorEnv
@@ -13,11 +7,9 @@ from tightloop.tasks.geometry import distance
 
 
 class Circle(Task):
-    """Follow a point that goes around in front of the arm; what is random about it is how fast."""
-
-    fields = ("joint_q", "joint_qd", "site_q")  # of the frame, what the functions below read
+    fields = ("joint_q", "joint_qd", "site_q")  # of the frame: what the functions below read of `worlds`
     max_episode_steps = 200
-    goal_draws = 1  # random numbers a world and episode
+    goal_draws = 1  # random numbers that `goal` takes, a world and episode
 
     def scene(self):
         scene = tl.Scene(dt=1 / 200, substeps=10)  # a control step of 50 ms
@@ -25,14 +17,14 @@ class Circle(Task):
         scene.randomize(joint_q={"arm/fr3_joint1": tl.Uniform(-0.2, 0.2)})  # drawn at each reset
         return scene
 
-    def controls(self):
-        return [JointDelta(franka.ARM, scale=0.1)]  # actions in [-1, 1] move the drives' targets by 0.1 rad
+    def controls(self):  # what an action in [-1, 1] does
+        return [JointDelta(franka.ARM, scale=0.1)]
 
-    def observed(self):
+    def observed(self):  # name, least and largest value, how many
         return [Observed("joints", -4, 4, 9), Observed("velocities", -9, 9, 9), Observed("to the point", -2, 2, 3)]
 
     def goal(self, xp, worlds, draws):
-        return 0.5 + draws  # how fast it goes around [rad/s]
+        return 0.5 + draws  # how fast the point goes around [rad/s]
 
     def point(self, xp, worlds):
         turn = worlds.goal[:, 0] * worlds.elapsed * 0.05
@@ -49,5 +41,5 @@ if __name__ == "__main__":
     envs = VectorEnv(Circle, num_envs=1024)
     envs.reset(seed=0)
     rewards = [envs.step(envs.action_space.sample())[1].mean() for _ in range(200)]
-    print(f"{np.mean(rewards):.3f} is the mean reward of random actions in {envs.num_envs} worlds")
+    print(f"mean reward of random actions: {sum(rewards) / len(rewards):.3f}")
     envs.close()
