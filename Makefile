@@ -46,7 +46,7 @@ test: wheel $(VENV)/.dev
 	else set -x; cargo test --release --workspace --lib --bins --tests; fi
 	$(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . py-client/tests tests/python
 
-# Kept out of `test`, which needs no torch. One thread of torch: two that share a busy core wait for each other.
+# Kept out of `test`, which needs no torch. One thread of torch: on busy cores several spin while they wait for each other.
 test-rl: wheel $(VENV)/.dev $(VENV)/.rl
 	OMP_NUM_THREADS=1 $(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . tests/rl
 

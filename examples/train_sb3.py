@@ -88,7 +88,7 @@ class Progress(BaseCallback):
 
 def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> dict[str, float]:
     """Train, show how it goes, and save; returns the last evaluation."""
-    # of such small networks two threads of torch compute hardly faster, and wait for each other at full load
+    # threads of torch wait for each other by spinning: on busy cores two were two to five times as slow as one
     torch.set_num_threads(1)
     env = VecNormalize(Sb3VecEnv(task, preset.num_envs, threads=threads), gamma=preset.gamma)
     try:

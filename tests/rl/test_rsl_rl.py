@@ -85,8 +85,8 @@ def test_the_runner_learns_to_balance_the_same_over_ring_and_copies(vector: Call
 
     (weights, falls), (weights_ring, falls_ring) = trained(copy=True), trained(copy=False)
     assert torch.equal(weights, weights_ring) and falls == falls_ring
-    # poles fall less often
-    assert falls[-1] < 0.3 * falls[0], falls
+    # poles fall less than half as often
+    assert falls[-1] < 0.5 * falls[0], falls
 
 
 def test_another_autoreset_mode_is_refused(hasty: Any, vector: Callable[..., Any]) -> None:

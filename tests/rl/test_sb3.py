@@ -113,6 +113,14 @@ def test_a_seed_holds_for_one_reset(hasty: Any, made: Callable[[Any], Any]) -> N
     assert np.array_equal(env.reset(), first) and not np.array_equal(first, second)
 
 
+def test_options_of_a_reset_are_refused_once(hasty: Any, made: Callable[[Any], Any]) -> None:
+    env = made(Sb3VecEnv(hasty, 2))
+    env.set_options({"colour": "red"})
+    with pytest.raises(tl.ArgumentError, match="set_options"):
+        env.reset()
+    assert env.reset().shape == (2, 5)
+
+
 def test_another_autoreset_mode_is_refused(hasty: Any, vector: Callable[..., Any]) -> None:
     with pytest.raises(tl.ArgumentError, match="SAME_STEP"):
         Sb3VecEnv(vector(hasty, 2))

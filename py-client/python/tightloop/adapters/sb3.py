@@ -2,7 +2,8 @@
 
 >>> from stable_baselines3 import PPO
 >>> from tightloop.adapters.sb3 import Sb3VecEnv
->>> PPO("MlpPolicy", Sb3VecEnv("FrankaReach", 256)).learn(1_000_000)
+>>> env = Sb3VecEnv("FrankaReach", 512)
+>>> PPO("MlpPolicy", env, n_steps=24, batch_size=3072, gamma=0.9).learn(1_000_000)
 """
 
 from __future__ import annotations
@@ -45,11 +46,17 @@ class Sb3VecEnv(vec_env.VecEnv):
         super().__init__(self.env.num_envs, self.env.single_observation_space, self.env.single_action_space)
 
     def reset(self) -> NDArray[np.float32]:
-        """Begin episodes in all worlds, with the seeds of `seed` if it was called; shape ``(num_envs, size)``."""
+        """Begin episodes in all worlds, with the seeds of `seed` if it was called; shape ``(num_envs, size)``.
+
+        Raises:
+            ArgumentError: `set_options` was called with some.
+        """
+        if any(self._options):
+            self._reset_options()
+            raise ArgumentError("set_options: a reset of these environments has no options; call it with none")
         seeds = None if all(seed is None for seed in self._seeds) else list(self._seeds)
         obs, _ = self.env.reset(seed=seeds)
         self._reset_seeds()
-        self._reset_options()
         return obs.copy()
 
     def step_async(self, actions: NDArray[Any]) -> None:
