@@ -72,7 +72,7 @@ PRESETS = {
     "CartPoleSwingUp": Config(1.0, 256, 64, minibatches=8, hidden=64, gamma=0.98, std=1.0, evaluate=10.0),
     "FrankaReach": Config(3.0, 512, 32, minibatches=16, gamma=0.9, kl=0.02, std=1.0),
     "FrankaPushCube": Config(
-        15.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=30.0
+        15.0, 1024, 20, epochs=8, minibatches=32, gamma=0.9, lam=0.9, hidden=256, kl=0.02, evaluate=30.0
     ),
     "FrankaPickCube": Config(
         60.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=60.0
@@ -253,7 +253,9 @@ class Trainer:
         # episodes that no other seed has, and no run before this one
         obs, _ = self.envs.reset(seed=(self.seed << 40) + (len(self.curve) << 24))
         with tqdm(total=round(limit), initial=round(self.seconds), unit="s", desc=self.task, disable=None) as bar:
-            while self.seconds < limit and not (self.curve and self.curve[-1]["success"] >= self.config.enough):
+            while self.seconds < limit and not (
+                self.curve and self.curve[-1].get("success", 0.0) >= self.config.enough
+            ):
                 with torch.no_grad():
                     obs = self.collect(obs)
                 news = self.learn()

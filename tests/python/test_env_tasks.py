@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -105,7 +107,6 @@ def test_what_a_task_keeps_stays_what_it_was(envs: Any) -> None:
         lambda xp, a, m: xp.where(m, a, -a) + xp.where(m, 1.0, a),
         lambda xp, a, m: xp.sum(a, axis=1, where=a > 0.5),
         lambda xp, a, m: xp.sum(a, axis=1, where=np.asarray(m)),
-        lambda xp, a, m: xp.add(a, a, where=m),
         lambda xp, a, m: xp.max(a) + a.mean(axis=1) + xp.sum(a),
         lambda xp, a, m: xp.divmod(a, 0.3)[1],
         lambda xp, a, m: (a @ a.T)[:, 0] + xp.vecdot(a, a),
@@ -119,15 +120,8 @@ def test_arithmetic_on_an_arena_is_numpys(function: Any) -> None:
         array = rng.uniform(size=(5, 3))
         mask = array > 0.4
         arena.play(tape)
-        if "where=m" in str(function.__code__.co_consts):  # entries outside `where` are whatever they were
-            continue
         ours, theirs = function(np, arena.wrap(array), arena.wrap(mask)), function(np, array, mask)
-        where = (
-            np.asarray(mask)
-            if "add" in function.__code__.co_names and "where" in str(function.__code__.co_consts)
-            else ...
-        )
-        np.testing.assert_array_equal(np.asarray(ours)[where], np.asarray(theirs)[where])
+        np.testing.assert_array_equal(np.asarray(ours), theirs)
 
 
 def broken(**functions: Any) -> type[CartPoleBalance]:
@@ -145,7 +139,7 @@ def broken(**functions: Any) -> type[CartPoleBalance]:
         ({"metrics": lambda self, xp, w: {"height": 3.0}}, r"Broken\.metrics, 'height': got float"),
         ({"metrics": lambda self, xp, w: w.joint_q[:, 0]}, r"Broken\.metrics: got .*dict"),
         ({"observe": lambda self, xp, w: (1.0, 2.0, 3.0, 4.0, 5.0)}, "`position of the cart` is float"),
-        ({"observe": lambda self, xp, w: w.joint_q[:, 0]}, "5"),
+        ({"observe": lambda self, xp, w: w.joint_q[:, 0]}, "return the parts as a tuple"),
         ({"observe": lambda self, xp, w: [w.joint_q[:, 0].astype("f2")] * 5}, "float16"),
         ({"observe": lambda self, xp, w: [w.joint_q] * 5}, r"shape \(2, 2\)"),
         ({"observed": lambda self: []}, "observed: there is nothing"),
@@ -193,7 +187,7 @@ def test_nan_in_any_number_of_any_action_fails_that_world_alone(envs: Any) -> No
 def test_torques_hold_the_arm(envs: Any) -> None:
     """An action of 0 bears the arm's weight, as a Franka's own controller does."""
     env = envs("FrankaPickCube", 2, control="torque")
-    start = env.reset(seed=0)[0]
+    obs = start = env.reset(seed=0)[0]
     for _ in range(20):
         obs = env.step(np.zeros((2, 8)))[0]
     # without it the tcp falls to the ground within half a second
@@ -203,12 +197,12 @@ def test_torques_hold_the_arm(envs: Any) -> None:
 def test_goals_of_a_late_episode_cost_what_those_of_an_early_one_do() -> None:
     seeds, episodes = np.arange(5, dtype=np.uint64), np.zeros(5, np.uint32)
     whole = _core.draw(seeds, episodes, 0, 60)
-    some = np.empty((5, 3), np.float32)
+    some = np.empty((5, 3))
     firsts = np.array([0, 3, 57, 12, 6], np.uint32)
     _core.draw(seeds, episodes, 0, 3, some, firsts)
     for row, first in enumerate(firsts):
-        np.testing.assert_array_equal(some[row], whole[row, first : first + 3].astype(np.float32))
-    with pytest.raises(tl.ArgumentError, match="2?16777216|stream has"):
+        np.testing.assert_array_equal(some[row], whole[row, first : first + 3])
+    with pytest.raises(tl.ArgumentError, match="a stream has 16777216"):
         _core.draw(seeds, episodes, 0, 3, some, firsts + np.uint32(2**24))
     with pytest.raises(tl.ArgumentError, match="firsts"):
         _core.draw(seeds, episodes, 0, 3, some, firsts[:2])
@@ -246,7 +240,7 @@ def test_a_file_may_hold_the_task(tmp_path: Path, envs: Any) -> None:
     for name, said in ((f"{file}:Yours", "no class 'Yours'"), (f"{tmp_path}/no.py:Mine", "no file")):
         with pytest.raises(tl.ArgumentError, match=said):
             VectorEnv(name)
-    with pytest.raises(tl.ArgumentError, match="colour.*force"):
+    with pytest.raises(tl.ArgumentError, match=r"colour.*force"):
         VectorEnv(f"{file}:Mine", colour="red")
     example = envs(f"{REPOSITORY}/examples/own_task.py:Circle", 4)
     example.reset(seed=0)
@@ -257,11 +251,14 @@ def test_a_file_may_hold_the_task(tmp_path: Path, envs: Any) -> None:
 def test_a_gripper_closes_and_opens(binary: bool, envs: Any) -> None:
     fingers = ["arm/fr3_finger_joint1", "arm/fr3_finger_joint2"]
 
-    def controls(self: Any) -> Any:
-        return [Gripper(fingers, low=0.0, high=0.04, binary=binary)]
+    class Grip(FrankaReach):
+        def __init__(self) -> None:
+            super().__init__()
+            self._arm_control = Gripper(fingers, low=0.0, high=0.04, binary=binary)
+            self._arm_controls = [self._arm_control]
 
-    env = envs(type("Grip", (FrankaReach,), {"controls": controls}), 4)
-    env.reset(seed=0)
+    env = envs(Grip, 4)
+    obs = env.reset(seed=0)[0]
     for _ in range(60):
         obs = env.step(np.array([[-1.0], [-0.5], [0.5], [1.0]]))[0]
     # observed less the start, 0.04
@@ -270,9 +267,6 @@ def test_a_gripper_closes_and_opens(binary: bool, envs: Any) -> None:
 
 
 def test_an_error_of_recv_leaves_no_step_on_its_way() -> None:
-    import os
-    import signal
-
     env = VectorEnv("CartPoleBalance", 1)
     env.reset(seed=0)
     env.send(np.zeros((1, 1)))
@@ -292,7 +286,7 @@ def test_a_single_environment_joins_no_daemon_of_many(unique: Any) -> None:
 
     assert "--on-nan" in arguments_of("CartPoleBalance", {}, [])[1]
     with tl.launch(CartPoleBalance().scene(), worlds=4, name=unique(), draws="seed", on_nan="freeze") as sim:
-        with pytest.raises(tl.ArgumentError, match="num_envs is 1.*has 4"):
+        with pytest.raises(tl.ArgumentError, match=r"num_envs is 1.*has 4"):
             Env("CartPoleBalance", daemon=sim.name)
         with pytest.raises(tl.ArgumentError, match="precision is f64"):
             VectorEnv("CartPoleBalance", daemon=sim.name, precision="f64")

@@ -235,7 +235,9 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
 
     def close_extras(self, **kwargs: Any) -> None:
         """End the simulation, or leave the daemon that was joined."""
-        self.sim.close()
+        # gymnasium closes, too, what could not be made
+        if "sim" in vars(self):
+            self.sim.close()
 
     def _end(self, slot: Slot, infos: dict[str, Any]) -> None:
         """Keep the last observations of episodes that ended, and begin the next ones."""
