@@ -7,7 +7,7 @@ place), and what somebody still holds, is made anew, so the arithmetic is always
 
 from __future__ import annotations
 
-import sys
+from sys import getrefcount
 from typing import Any
 
 import numpy as np
@@ -17,37 +17,35 @@ from numpy.typing import NDArray
 class Arena:
     """Where the results of operations go: the tape of the function that runs."""
 
-    __slots__ = ("_place", "_tape")
+    __slots__ = ("_place", "_pooled", "_tape")
 
     def __init__(self) -> None:
-        self._tape: list[tuple[list[Any], NDArray[Any], Pooled]] = []
+        self._tape: list[tuple[Any, NDArray[Any], Pooled]] = []
         self._place = 0
+        # a type of its own, so that views of an array know their arena without being told
+        self._pooled: type[Pooled] = type("Pooled", (Pooled,), {"_arena": self})
 
     def play(self, tape: list[Any]) -> None:
         """Begin a function from the start of its tape, a list that is empty at first.
 
-        What the function returned the last time is overwritten.
+        What the function returned the last time is overwritten, unless somebody holds it.
         """
         self._tape, self._place = tape, 0
 
     def wrap(self, array: NDArray[Any]) -> Pooled:
         """A view of the array; all that is computed from it lies in this arena."""
-        pooled = array.view(Pooled)
-        pooled._arena = self
-        return pooled
+        return array.view(self._pooled)
 
-    def run(self, key: list[Any], call: Any, inputs: list[Any], options: dict[str, Any]) -> Any:
+    def run(self, key: tuple[Any, ...], call: Any, inputs: list[Any], options: dict[str, Any]) -> Any:
         """The result of an operation: where it was put the last time, if it is the same one."""
         tape, place = self._tape, self._place
         self._place = place + 1
-        if place < len(tape) and tape[place][0] == key:
-            _, array, pooled = tape[place]
-            if (sys.getrefcount(array), sys.getrefcount(pooled)) == _FREE:
+        if place < len(tape):
+            kept, array, pooled = tape[place]
+            if kept == key and getrefcount(array) == _ARRAY_FREE and getrefcount(pooled) == _POOLED_FREE:
                 call(*inputs, out=array, **options)
                 return pooled
-        result = call(*inputs, **options)
-        if not isinstance(result, np.ndarray):
-            result = np.asarray(result)
+        result = np.asarray(call(*inputs, **options))
         pooled = self.wrap(result)
         tape[place:] = [(key, result, pooled)]
         return pooled
@@ -56,43 +54,42 @@ class Arena:
 class Pooled(np.ndarray[Any, Any]):
     """An array of an `Arena`; `Arena.wrap` makes it."""
 
-    _arena: Arena | None = None
-
-    def __array_finalize__(self, parent: Any) -> None:
-        self._arena = getattr(parent, "_arena", None)
+    _arena: Arena
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
-        arena, plain, key = None, [], [ufunc, method]
-        for value in inputs:
-            array = value
-            if type(array) is Pooled:
-                arena = arena or array._arena
-                array = array.view(np.ndarray)
-            plain.append(array)
-            key += (array.shape, array.dtype) if type(array) is np.ndarray else (type(array),)
+        plain, key = _plain(inputs)
+        if not options and method == "__call__" and ufunc.nout == 1:
+            return self._arena.run((ufunc, *key), ufunc, plain, options)
         call = ufunc if method == "__call__" else getattr(ufunc, method)
         out = options.pop("out", None)
+        arrays = {name: option.view(np.ndarray) for name, option in options.items() if isinstance(option, np.ndarray)}
         if out is not None and any(array is not None for array in out):
-            own = tuple(array.view(np.ndarray) if type(array) is Pooled else array for array in out)
-            call(*plain, out=own, **options)
+            call(*plain, out=tuple(_plain(out)[0]), **options | arrays)
             return out[0] if len(out) == 1 else out
-        for name, option in options.items():
-            if isinstance(option, np.ndarray):  # `where`
-                arena, options[name] = None, option.view(np.ndarray)
-        if arena is None or ufunc.nout != 1 or method not in ("__call__", "reduce"):
-            return call(*plain, **options)
-        if options:
-            key.append(options)
-        return arena.run(key, call, plain, options)
+        if arrays or ufunc.nout != 1 or method not in ("__call__", "reduce"):
+            return call(*plain, **options | arrays)
+        return self._arena.run((ufunc, method, options, *key), call, plain, options)
 
     def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
-        if func is np.where and len(args) == 3 and not kwargs and self._arena is not None:
-            plain = [array.view(np.ndarray) if type(array) is Pooled else array for array in args]
+        if func is np.where and len(args) == 3 and not kwargs:
+            plain, key = _plain(args)
             if getattr(plain[0], "dtype", None) != np.bool_:
                 return np.where(*plain)
-            key = [func, *((array.shape, array.dtype) if type(array) is np.ndarray else type(array) for array in plain)]
-            return self._arena.run(key, _where, plain, {})
+            return self._arena.run((func, *key), _where, plain, kwargs)
         return super().__array_function__(func, types, args, kwargs)
+
+
+def _plain(values: tuple[Any, ...]) -> tuple[list[Any], list[Any]]:
+    """Arrays as NumPy's own, and of each its shape and type; of what is no array, its type."""
+    plain, key = [], []
+    for value in values:
+        array = value.view(np.ndarray) if isinstance(value, Pooled) else value
+        plain.append(array)
+        if type(array) is np.ndarray:
+            key += (array.shape, array.dtype)
+        else:
+            key.append(type(array))
+    return plain, key
 
 
 def _where(condition: Any, yes: Any, no: Any, out: NDArray[Any] | None = None) -> NDArray[Any]:
@@ -106,12 +103,10 @@ def _where(condition: Any, yes: Any, no: Any, out: NDArray[Any] | None = None) -
 def _free() -> tuple[int, int]:
     """Reference counts that `Arena.run` finds of a result that nobody holds; they differ from Python to Python."""
     arena, tape = Arena(), []
-    for _ in range(2):
-        arena.play(tape)
-        arena.run([], np.negative, [np.ones(1)], {})
+    arena.play(tape)
+    arena.run((), np.negative, [np.ones(1)], {})
     _, array, pooled = tape[0]
-    return sys.getrefcount(array), sys.getrefcount(pooled)
+    return getrefcount(array), getrefcount(pooled)
 
 
-_FREE = (-1, -1)
-_FREE = _free()
+_ARRAY_FREE, _POOLED_FREE = _free()
