@@ -73,6 +73,7 @@ bench: wheel $(VENV)/.dev
 	$(PYTHON) benches/snapshot.py
 	$(PYTHON) benches/recording.py
 	$(PYTHON) benches/tasks.py
+	$(PYTHON) benches/groups.py
 
 # Kept out of `bench`, which needs none of these wheels.
 bench-env: wheel $(VENV)/.dev $(VENV)/.peers
