@@ -68,8 +68,10 @@ class Config:
 
 
 PRESETS = {
-    "CartPoleBalance": Config(minutes=0.5, num_envs=512, hidden=64),
-    "CartPoleSwingUp": Config(1.0, 256, 64, minibatches=8, hidden=64, gamma=0.98, std=1.0, evaluate=10.0),
+    "CartPoleBalance": Config(minutes=0.5, num_envs=512, hidden=64, threads=1),
+    "CartPoleSwingUp": Config(
+        1.0, 256, 64, minibatches=8, hidden=64, gamma=0.98, kl=0.02, std=1.0, evaluate=10.0, threads=1
+    ),
     "FrankaReach": Config(3.0, 512, 32, minibatches=16, gamma=0.9, kl=0.02, std=1.0),
     "FrankaPushCube": Config(
         15.0, 1024, 20, epochs=8, minibatches=32, gamma=0.9, lam=0.9, hidden=256, kl=0.02, evaluate=30.0
