@@ -128,7 +128,8 @@ pub(crate) fn drive(
         high.len(),
         start.map_or(size, <[f32]>::len),
     ];
-    if !fits || one_each != [size; 4] || low.iter().zip(high).any(|(low, high)| !(low <= high)) {
+    let ordered = low.iter().zip(high).all(|(low, high)| low <= high);
+    if !fits || one_each != [size; 4] || !ordered {
         let problem = format!("drive: shapes or bounds do not fit {size} columns from {first} on");
         return Err(raise(py, "ArgumentError", problem));
     }
