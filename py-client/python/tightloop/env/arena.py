@@ -7,6 +7,7 @@ place), and what somebody still holds, is made anew, so the arithmetic is always
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from sys import getrefcount
 from typing import Any
 
@@ -36,7 +37,7 @@ class Arena:
         """A view of the array; all that is computed from it lies in this arena."""
         return array.view(self._pooled)
 
-    def run(self, key: tuple[Any, ...], call: Any, inputs: list[Any], options: dict[str, Any]) -> Any:
+    def run(self, key: tuple[Any, ...], call: Any, inputs: Sequence[Any], options: dict[str, Any]) -> Any:
         """The result of an operation: where it was put the last time, if it is the same one."""
         tape, place = self._tape, self._place
         self._place = place + 1
@@ -57,6 +58,12 @@ class Pooled(np.ndarray[Any, Any]):
     _arena: Arena
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        if not options and len(inputs) == 2 and method == "__call__" and ufunc.nout == 1:
+            # most of what tasks do, and so without lists
+            one, other = inputs
+            one = one.view(np.ndarray) if isinstance(one, Pooled) else one
+            other = other.view(np.ndarray) if isinstance(other, Pooled) else other
+            return self._arena.run((ufunc, _kind(one), _kind(other)), ufunc, (one, other), options)
         plain, key = _plain(inputs)
         if not options and method == "__call__" and ufunc.nout == 1:
             return self._arena.run((ufunc, *key), ufunc, plain, options)
@@ -80,16 +87,14 @@ class Pooled(np.ndarray[Any, Any]):
 
 
 def _plain(values: tuple[Any, ...]) -> tuple[list[Any], list[Any]]:
-    """Arrays as NumPy's own, and of each its shape and type; of what is no array, its type."""
-    plain, key = [], []
-    for value in values:
-        array = value.view(np.ndarray) if isinstance(value, Pooled) else value
-        plain.append(array)
-        if type(array) is np.ndarray:
-            key += (array.shape, array.dtype)
-        else:
-            key.append(type(array))
-    return plain, key
+    """Arrays as NumPy's own, and the kind of each value."""
+    plain = [value.view(np.ndarray) if isinstance(value, Pooled) else value for value in values]
+    return plain, [_kind(value) for value in plain]
+
+
+def _kind(value: Any) -> Any:
+    """Shape and type of an array; of what is none, its type."""
+    return (value.shape, value.dtype) if type(value) is np.ndarray else type(value)
 
 
 def _where(condition: Any, yes: Any, no: Any, out: NDArray[Any] | None = None) -> NDArray[Any]:
