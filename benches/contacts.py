@@ -86,22 +86,7 @@ def rival_of(demo: str, scene: tl.Scene) -> mujoco.MjModel:
     """MuJoCo's model of a demo: the record's where it is present, otherwise what it makes of our URDF."""
     if is_published():
         return mujoco.MjModel.from_binary_path(str(MODELS / f"{'torque' if demo == 'torque' else 'grasp'}.mjb"))
-    spec = mujoco.MjSpec()
-    spec.compiler.degree = False
-    option = spec.option
-    option.timestep, option.integrator = scene.dt, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    option.solver, option.cone, option.impratio = mujoco.mjtSolver.mjSOL_NEWTON, mujoco.mjtCone.mjCONE_ELLIPTIC, 1000.0
-    option.iterations, option.ls_iterations, option.tolerance = 20, 100, 1e-8
-    arm = scene.robots["arm"]
-    text = arm.urdf.read_text()
-    head = text.index(">", text.index("<robot")) + 1
-    child = mujoco.MjSpec.from_string(text[:head] + COMPILER + text[head:])
-    links = [geom for body in child.bodies for geom in body.geoms]
-    for number, geom in enumerate(links):
-        geom.name, geom.contype, geom.conaffinity = f"link{number}", 0, 0
-    spec.attach(child, prefix="arm/", frame=spec.worldbody.add_frame(pos=arm.pos))
-    for dof, name in enumerate(arm.joint_names):
-        add_drive(spec, arm, dof, f"arm/{name}")
+    spec, links = arm_of(scene, impratio=1000.0)
     add_box(spec.worldbody, "table", (0.0, -0.5, 0.05), (0.4, 0.4, 0.05))
     names = [geom.name for geom in links]
     for name in names:
@@ -118,10 +103,32 @@ def rival_of(demo: str, scene: tl.Scene) -> mujoco.MjModel:
     limits_in_force_space(model)
     bodies = model.geom_bodyid[np.stack([model.pair_geom1, model.pair_geom2])]
     weight = model.body_invweight0[bodies, 0].sum(axis=0)
-    softness = FRICTION_DAMPING * weight * ((1 - IMPEDANCE_MAX) / option.impratio + IMPEDANCE_MAX)
+    softness = FRICTION_DAMPING * weight * ((1 - IMPEDANCE_MAX) / spec.option.impratio + IMPEDANCE_MAX)
     # what stands still touches nothing that does
     model.pair_solreffriction[:] = np.stack([2 / np.maximum(softness, 1e-9), np.ones_like(softness)], axis=1)
     return model
+
+
+def arm_of(scene: tl.Scene, *, impratio: float) -> tuple[mujoco.MjSpec, list[mujoco.MjsGeom]]:
+    """MuJoCo's options of our scenes, and the scene's driven arm; also its shapes, which touch what pairs name."""
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    option = spec.option
+    option.timestep, option.integrator = scene.dt, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.solver, option.cone = mujoco.mjtSolver.mjSOL_NEWTON, mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio, option.tolerance = impratio, 1e-8
+    option.iterations, option.ls_iterations = 20, 100
+    arm = scene.robots["arm"]
+    text = arm.urdf.read_text()
+    head = text.index(">", text.index("<robot")) + 1
+    child = mujoco.MjSpec.from_string(text[:head] + COMPILER + text[head:])
+    shapes = [geom for body in child.bodies for geom in body.geoms]
+    for number, geom in enumerate(shapes):
+        geom.name, geom.contype, geom.conaffinity = f"{geom.parent.name}/{number}", 0, 0
+    spec.attach(child, prefix="arm/", frame=spec.worldbody.add_frame(pos=arm.pos))
+    for dof, name in enumerate(arm.joint_names):
+        add_drive(spec, arm, dof, f"arm/{name}")
+    return spec, shapes
 
 
 def add_box(body: mujoco.MjsBody, name: str, pos: tl.checks.Vector, size: tl.checks.Vector, **more: float) -> None:

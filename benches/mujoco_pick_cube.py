@@ -15,7 +15,7 @@ from typing import Any
 import gymnasium
 import mujoco
 import numpy as np
-from contacts import COMPILER, FRICTION_DAMPING, IMPEDANCE_MAX, add_drive
+from contacts import FRICTION_DAMPING, IMPEDANCE_MAX, arm_of
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 from record import REPOSITORY
@@ -36,22 +36,7 @@ NOISE = 0.02  # of the joints at the start [rad]
 def model() -> mujoco.MjModel:
     """MuJoCo's model of the task's scene."""
     scene = FrankaPickCube().scene()
-    arm = scene.robots["arm"]
-    spec = mujoco.MjSpec()
-    spec.compiler.degree = False
-    option = spec.option
-    option.timestep, option.integrator = scene.dt, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    option.solver, option.cone, option.impratio = mujoco.mjtSolver.mjSOL_NEWTON, mujoco.mjtCone.mjCONE_ELLIPTIC, 10.0
-    option.iterations, option.ls_iterations, option.tolerance = 20, 100, 1e-8
-    text = arm.urdf.read_text()
-    head = text.index(">", text.index("<robot")) + 1
-    child = mujoco.MjSpec.from_string(text[:head] + COMPILER + text[head:])
-    shapes = [geom for body in child.bodies for geom in body.geoms]
-    for number, geom in enumerate(shapes):
-        geom.name, geom.contype, geom.conaffinity = f"{geom.parent.name}/{number}", 0, 0
-    spec.attach(child, prefix="arm/", frame=spec.worldbody.add_frame(pos=arm.pos))
-    for dof, name in enumerate(arm.joint_names):
-        add_drive(spec, arm, dof, f"arm/{name}")
+    spec, shapes = arm_of(scene, impratio=10.0)
     off = {"contype": 0, "conaffinity": 0}
     spec.worldbody.add_geom(name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1), **off)
     body = spec.worldbody.add_body(name="cube", pos=(0.0, 0.0, cube.HALF))
@@ -75,7 +60,7 @@ def model() -> mujoco.MjModel:
     limits_in_force_space(made)
     bodies = made.geom_bodyid[np.stack([made.pair_geom1, made.pair_geom2])]
     weight = made.body_invweight0[bodies, 0].sum(axis=0)
-    softness = FRICTION_DAMPING * weight * ((1 - IMPEDANCE_MAX) / option.impratio + IMPEDANCE_MAX)
+    softness = FRICTION_DAMPING * weight * ((1 - IMPEDANCE_MAX) / spec.option.impratio + IMPEDANCE_MAX)
     made.pair_solreffriction[:] = np.stack([2 / softness, np.ones_like(softness)], axis=1)
     return made
 

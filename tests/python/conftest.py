@@ -8,12 +8,14 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import tightloop as tl
+from tightloop.env import VectorEnv
 
 REPOSITORY = Path(__file__).parents[2]
 URDF = REPOSITORY / "examples/assets/fr3/fr3_franka_hand.urdf"
@@ -54,6 +56,20 @@ def root() -> Iterator[Path]:
 def unique() -> Callable[[], str]:
     """Names that no other daemon has."""
     return lambda: f"test-{secrets.token_hex(6)}"
+
+
+@pytest.fixture
+def envs() -> Iterator[Any]:
+    """Makes environments, and closes them."""
+    made: list[VectorEnv] = []
+
+    def make(*args: Any, **kwargs: Any) -> VectorEnv:
+        made.append(VectorEnv(*args, **kwargs))
+        return made[-1]
+
+    yield make
+    for env in made:
+        env.close()
 
 
 @pytest.fixture

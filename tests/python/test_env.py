@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
 from typing import Any
 
 import gymnasium
@@ -42,20 +41,6 @@ class Hasty(CartPoleBalance):
 
     def success(self, xp: Any, worlds: Any) -> Any:
         return abs(worlds.joint_q[:, 1]) < 0.02
-
-
-@pytest.fixture
-def envs() -> Iterator[Any]:
-    """Makes environments, and closes them."""
-    made: list[VectorEnv] = []
-
-    def make(*args: Any, **kwargs: Any) -> VectorEnv:
-        made.append(VectorEnv(*args, **kwargs))
-        return made[-1]
-
-    yield make
-    for env in made:
-        env.close()
 
 
 def actions(env: Any, steps: int, seed: int = 0) -> np.ndarray[Any, Any]:

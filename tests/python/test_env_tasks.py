@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,20 +21,6 @@ from tightloop.tasks.cartpole import CartPoleBalance
 from tightloop.tasks.reach import FrankaReach
 
 REPOSITORY = Path(__file__).parents[2]
-
-
-@pytest.fixture
-def envs() -> Iterator[Any]:
-    """Makes environments, and closes them."""
-    made: list[VectorEnv] = []
-
-    def make(*args: Any, **kwargs: Any) -> VectorEnv:
-        made.append(VectorEnv(*args, **kwargs))
-        return made[-1]
-
-    yield make
-    for env in made:
-        env.close()
 
 
 def test_gymnasium_finds_them_as_readme_says() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,16 +13,18 @@ _ALIGNMENT = 64
 
 
 class Slot:
-    """Arrays of one step: ``obs`` (worlds, size), ``final_obs`` likewise, ``reward``, ``terminated``, ``truncated``."""
-
-    __slots__ = ("final_obs", "obs", "reward", "terminated", "truncated")
+    """Arrays of one step: ``obs`` (worlds, size), ``reward``, ``terminated``, ``truncated``, and ``final_obs``."""
 
     def __init__(self, worlds: int, size: int) -> None:
         self.obs = aligned((worlds, size), np.float32)
-        self.final_obs = aligned((worlds, size), np.float32)
         self.reward = aligned((worlds,), np.float32)
         self.terminated = aligned((worlds,), np.bool_)
         self.truncated = aligned((worlds,), np.bool_)
+
+    @cached_property
+    def final_obs(self) -> NDArray[np.float32]:
+        """Like ``obs``; most steps end no episode, and need none."""
+        return aligned(self.obs.shape, np.float32)
 
 
 class Slots:
@@ -38,8 +41,8 @@ class Slots:
 
 
 def aligned(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Zeros whose first byte lies at a multiple of 64."""
+    """An array whose first byte lies at a multiple of 64; its numbers are whatever they are."""
     count = int(np.prod(shape)) * np.dtype(dtype).itemsize
-    block = np.zeros(count + _ALIGNMENT, np.uint8)
+    block = np.empty(count + _ALIGNMENT, np.uint8)
     start = -block.ctypes.data % _ALIGNMENT
     return block[start : start + count].view(dtype).reshape(shape)

@@ -227,7 +227,6 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         due = self._episodes.due()
         if due is not None and (due := due & ~self._done).any():
             self._episodes.renew(due, self.evaluation.worlds)
-            self._see(self._frame)
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._done.any():
             self._end(slot, infos)
         self._observe(slot.obs)
@@ -259,6 +258,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         self._actions.begin(mask)
         self._see(frame)
         self._episodes.begin(mask, self.evaluation.worlds)
+        # the first goals of all are an array that was not there before
         self._see(frame)
 
     def _see(self, frame: Any) -> None:
