@@ -8,8 +8,6 @@ In ``out/rsl_rl/TASK-SEED`` it leaves ``model.pt`` for `OnPolicyRunner.load` and
 
 from __future__ import annotations
 
-import argparse
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +17,7 @@ import torch
 from numpy.typing import NDArray
 from rsl_rl.runners import OnPolicyRunner
 from tqdm import tqdm
+from training import command_line
 
 from evaluation import evaluate, told
 from tightloop.adapters.rsl_rl import GROUP, RslRlVecEnv
@@ -39,6 +38,11 @@ class Preset:
     lam: float = 0.95  # λ of the advantages
     kl: float = 0.01  # change of the policy that the learning rate aims at
     std: float = 1.0  # standard deviation of actions at the start
+
+    @property
+    def total(self) -> int:
+        """Env steps of all worlds together."""
+        return self.iterations * self.steps * self.num_envs
 
 
 PRESETS = {
@@ -104,23 +108,5 @@ def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> d
         env.close()
 
 
-def main() -> None:
-    """Train, evaluate, and leave the policy."""
-    parser = argparse.ArgumentParser(description="Train a policy with rsl_rl.")
-    parser.add_argument("task", choices=PRESETS, help="what to learn")
-    parser.add_argument("--seed", type=int, default=0, help="of weights, actions and episodes (default 0)")
-    parser.add_argument("--threads", type=int, default=2, help="most threads of the simulation (default 2)")
-    parser.add_argument("--out", type=Path, default=OUT, help="folder of all runs (default out/rsl_rl/)")
-    args = parser.parse_args()
-
-    preset, folder = PRESETS[args.task], args.out / f"{args.task}-{args.seed}"
-    folder.mkdir(parents=True, exist_ok=True)
-    begun = time.perf_counter()
-    found = train(args.task, preset, args.seed, folder, args.threads)
-    steps = preset.iterations * preset.steps * preset.num_envs
-    print(f"{args.task}, seed {args.seed}: {steps / 1e6:.1f} M steps in {time.perf_counter() - begun:.0f} s")
-    print(", ".join(f"{name} {value}" for name, value in told(found).items()) + f"; {folder / 'model.pt'}")
-
-
 if __name__ == "__main__":
-    main()
+    command_line("rsl_rl", PRESETS, OUT, train, "model.pt")

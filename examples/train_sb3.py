@@ -9,8 +9,6 @@ holds the means and variances by which the policy's observations were scaled.
 
 from __future__ import annotations
 
-import argparse
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +20,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 from tqdm import tqdm
+from training import command_line
 
 from evaluation import evaluate, told
 from tightloop.adapters.sb3 import Sb3VecEnv
@@ -42,6 +41,11 @@ class Preset:
     lam: float = 0.95  # λ of the advantages
     lr: float = 1e-3  # learning rate at the start; it falls to a tenth
     std: float = 1.0  # standard deviation of actions at the start
+
+    @property
+    def total(self) -> int:
+        """Env steps of all worlds together."""
+        return self.rollouts * self.steps * self.num_envs
 
 
 PRESETS = {
@@ -110,7 +114,7 @@ def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> d
             },
         )
         progress = Progress(task, preset.rollouts, env, threads)
-        model.learn(preset.rollouts * preset.steps * preset.num_envs, callback=progress, log_interval=None)
+        model.learn(preset.total, callback=progress, log_interval=None)
         model.save(folder / "model.zip")
         env.save(str(folder / "normalize.pkl"))
         return progress.found
@@ -118,23 +122,5 @@ def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> d
         env.close()
 
 
-def main() -> None:
-    """Train, evaluate, and leave the policy."""
-    parser = argparse.ArgumentParser(description="Train a policy with Stable-Baselines3.")
-    parser.add_argument("task", choices=PRESETS, help="what to learn")
-    parser.add_argument("--seed", type=int, default=0, help="of weights, actions and episodes (default 0)")
-    parser.add_argument("--threads", type=int, default=2, help="most threads of the simulation (default 2)")
-    parser.add_argument("--out", type=Path, default=OUT, help="folder of all runs (default out/sb3/)")
-    args = parser.parse_args()
-
-    preset, folder = PRESETS[args.task], args.out / f"{args.task}-{args.seed}"
-    folder.mkdir(parents=True, exist_ok=True)
-    begun = time.perf_counter()
-    found = train(args.task, preset, args.seed, folder, args.threads)
-    steps = preset.rollouts * preset.steps * preset.num_envs
-    print(f"{args.task}, seed {args.seed}: {steps / 1e6:.1f} M steps in {time.perf_counter() - begun:.0f} s")
-    print(", ".join(f"{name} {value}" for name, value in told(found).items()) + f"; {folder / 'model.zip'}")
-
-
 if __name__ == "__main__":
-    main()
+    command_line("Stable-Baselines3", PRESETS, OUT, train, "model.zip")

@@ -68,15 +68,21 @@ def as_seed(value: Any, worlds: int) -> NDArray[np.uint64]:
     seeds = []
     for world, entry in enumerate(entries):
         of = "" if alone else f" of world {world}"
-        try:
-            # a bool is an index too, and never meant as a seed
-            seed = None if isinstance(entry, bool | np.bool_) else operator.index(entry)
-        except TypeError:
-            seed = None
-        if seed is None or not 0 <= seed < 2**64:
+        seed = whole_seed(entry)
+        if seed is None:
             raise CommandRefused(f"seed{of} is {entry!r}; give a whole number from 0 to 2**64 - 1")
         seeds.append(seed)
     return np.array(seeds, dtype=np.uint64)
+
+
+def whole_seed(value: Any) -> int | None:
+    """A seed as an int; None if it is no whole number from 0 to 2**64 - 1."""
+    try:
+        # a bool is an index too, and never meant as a seed
+        seed = None if isinstance(value, bool | np.bool_) else operator.index(value)
+    except TypeError:
+        return None
+    return seed if seed is not None and 0 <= seed < 2**64 else None
 
 
 def _numpy(what: str, value: Any) -> NDArray[Any]:

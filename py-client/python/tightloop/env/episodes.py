@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tightloop import _core
 from tightloop.env.task import Task, Worlds
 from tightloop.errors import ArgumentError
+from tightloop.inputs import whole_seed
 
 #: Stream of the numbers that goals are made of.
 _GOALS = 0
@@ -108,8 +109,7 @@ def _seeds(seed: Any, worlds: int, first: int) -> list[int | None]:
     if len(entries) != worlds:
         raise ArgumentError(f"reset: {len(entries)} seeds for {worlds} environments; give a number, or one each")
     for world, entry in enumerate(entries):
-        whole = isinstance(entry, int | np.integer) and not isinstance(entry, bool)
-        if entry is not None and not (whole and 0 <= entry < 2**64):
+        if entry is not None and whole_seed(entry) is None:
             raise ArgumentError(
                 f"reset: seed of environment {world} is {entry!r}; give a whole number from 0 to 2**64 - 1"
             )

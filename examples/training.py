@@ -1,0 +1,56 @@
+"""The command line that ``train_sb3.py`` and ``train_rsl_rl.py`` have in common."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+from evaluation import told
+
+
+class Sized(Protocol):
+    """Numbers of a run."""
+
+    @property
+    def total(self) -> int:
+        """Env steps of all worlds together."""
+        ...
+
+
+P = TypeVar("P", bound=Sized)
+
+
+def command_line(
+    library: str,
+    presets: Mapping[str, P],
+    out: Path,
+    train: Callable[[str, P, int, Path, int], dict[str, float]],
+    model: str,
+) -> None:
+    """Train, evaluate, and leave the policy.
+
+    Args:
+        library: What trains.
+        presets: Numbers of a run, by task.
+        out: Folder of all runs, if none is given.
+        train: Takes the task, its preset, a seed, the folder of the run and the threads of the simulation; returns what
+            `evaluation.evaluate` found at the end.
+        model: Name of the file that it leaves.
+    """
+    parser = argparse.ArgumentParser(description=f"Train a policy with {library}.")
+    parser.add_argument("task", choices=presets, help="what to learn")
+    parser.add_argument("--seed", type=int, default=0, help="of weights, actions and episodes (default 0)")
+    parser.add_argument("--threads", type=int, default=2, help="most threads of the simulation (default 2)")
+    parser.add_argument("--out", type=Path, default=out, help=f"folder of all runs (default out/{out.name}/)")
+    args = parser.parse_args()
+
+    preset, folder = presets[args.task], args.out / f"{args.task}-{args.seed}"
+    folder.mkdir(parents=True, exist_ok=True)
+    begun = time.perf_counter()
+    found = train(args.task, preset, args.seed, folder, args.threads)
+    seconds = time.perf_counter() - begun
+    print(f"{args.task}, seed {args.seed}: {preset.total / 1e6:.1f} M steps in {seconds:.0f} s")
+    print(", ".join(f"{name} {value}" for name, value in told(found).items()) + f"; {folder / model}")
