@@ -9,14 +9,14 @@ mod toy;
 use models::{Case, arm_and_cube, every_joint, every_param, fr3, limits_only, shapes};
 use sim_core::batch::{Block, Numbers, WorkSlot};
 use sim_core::lane::memory::Cpu;
-use sim_core::lane::record::wgsl::{ProgramOptions, wgsl};
-use sim_core::lane::record::{Recorded, RecordedVariable, Recorder, Recording, record};
-use sim_core::lane::{Cx, Num};
 use sim_core::model::Cone;
 use sim_core::model::constants::Constants;
 use sim_core::model::contact::PAIR_KINDS;
 use sim_core::step::{STAGES, Stage};
 use sim_core::times;
+use sim_record::wgsl::{ProgramOptions, wgsl};
+use sim_record::{Recorder, Recording};
+use stages_recorded::{RecordedWorlds, SCRATCH, SLOTS};
 use std::time::Instant;
 
 /// Past this a GPU driver takes seconds to compile a kernel.
@@ -29,60 +29,6 @@ const STATES: usize = 50;
 const MANY_STATES: usize = 200;
 
 type Scalar = Block<f32, f32>;
-type OnTape = Block<Recorded, RecordedVariable>;
-
-/// What stages leave for each other, and the state.
-const SLOTS: [WorkSlot; 38] = {
-    use WorkSlot::*;
-    [
-        JointQ,
-        JointQRest,
-        JointQd,
-        JointQdd,
-        Unconverged,
-        LeftOut,
-        JointF,
-        JointTargetQ,
-        JointTargetQd,
-        Params,
-        Substep,
-        CommandHistory,
-        CommandNoise,
-        Applied,
-        Rotation,
-        Origin,
-        Reference,
-        Motion,
-        Inertia,
-        BiasForce,
-        MassMatrix,
-        SmoothForce,
-        EfcWeight,
-        EfcAref,
-        LimitSide,
-        EfcForce,
-        ConstraintForce,
-        BodyQ,
-        Velocity,
-        LinkCenter,
-        BodyQd,
-        Orientation,
-        JointTorque,
-        SiteQ,
-        SiteQd,
-        Gyro,
-        Accelerometer,
-        SiteInverse,
-    ]
-};
-
-/// Cells that a stage leaves to nobody.
-const SCRATCH: [WorkSlot; 4] = [
-    WorkSlot::System,
-    WorkSlot::CoupledSystem,
-    WorkSlot::Pull,
-    WorkSlot::Solution,
-];
 
 fn cases() -> [Case; 7] {
     [
@@ -96,16 +42,10 @@ fn cases() -> [Case; 7] {
     ]
 }
 
-/// A stage on a machine of one world. Here and below stands the only call, since each is the whole text of physics.
+/// A stage on a machine of one world. Here stands the only call, since it is the whole text of physics.
 #[inline(never)]
 fn run(stage: Stage, m: &Constants<f32>, block: &mut Scalar, memory: &mut [f32]) {
     let cx = &mut Cpu::new(memory, &m.contacts.tables);
-    stage.run(cx, m, block);
-}
-
-/// A stage on the machine that records.
-#[inline(never)]
-fn run_on_tape(stage: Stage, cx: &mut Recorder, m: &Constants<f32>, block: &mut OnTape) {
     stage.run(cx, m, block);
 }
 
@@ -139,52 +79,18 @@ fn gathered(block: &mut Scalar, slots: &[WorkSlot]) -> Vec<f32> {
         .collect()
 }
 
-/// A block whose slots are the inputs, in order.
-fn given(cx: &mut Recorder, m: &Constants<f32>, slots: &[WorkSlot], x: &[Recorded]) -> OnTape {
-    let cell = cx.var(Recorded::c(0.0));
-    let mut block = Block::new(m, cell);
-    // the block's cells are one variable so far, and each needs its own
-    for slot in SLOTS.into_iter().chain(SCRATCH) {
-        if let Numbers::Cells(cells) = block.numbers(slot) {
-            cells.fill_with(|| cx.var(Recorded::c(0.0)));
-        }
-    }
-    let mut inputs = x.iter().copied();
-    let mut next = || inputs.next().expect("an input for every number read");
-    for slot in slots {
-        match block.numbers(*slot) {
-            Numbers::Cells(cells) => cells.iter_mut().for_each(|v| cx.set(v, next())),
-            Numbers::Values(values) => values.iter_mut().for_each(|v| *v = next()),
-        }
-    }
-    block
-}
-
-fn results(cx: &mut Recorder, block: &mut OnTape, slots: &[WorkSlot]) -> Vec<Recorded> {
-    let mut results = Vec::new();
-    for slot in slots {
-        match block.numbers(*slot) {
-            Numbers::Cells(cells) => results.extend(cells.iter().map(|v| cx.get(v))),
-            Numbers::Values(values) => results.extend_from_slice(values),
-        }
-    }
-    results
-}
-
 /// The recording of a text between two sets of slots.
 fn recorded(
     m: &Constants<f32>,
     reads: &[WorkSlot],
     writes: &[WorkSlot],
-    text: impl FnOnce(&mut Recorder, &mut OnTape),
+    text: impl FnOnce(&mut Recorder, &mut RecordedWorlds),
 ) -> Recording {
-    let inputs = gathered(&mut Block::new(m, 0.0), reads).len();
-    record(inputs, |cx, x| {
-        let mut block = given(cx, m, reads, x);
-        text(cx, &mut block);
-        results(cx, &mut block, writes)
-    })
-    .unwrap_or_else(|e| panic!("refused: {e}"))
+    let recording = stages_recorded::between(m, reads, writes, |cx, b| {
+        text(cx, b);
+        Vec::new()
+    });
+    recording.unwrap_or_else(|e| panic!("refused: {e}"))
 }
 
 /// Equal in every bit but the sign of zeros: the recorder keeps every rounding of the text.
@@ -203,7 +109,7 @@ fn assert_same(got: &[f32], expected: &[f32], what: &str) {
 /// The recording of a stage.
 fn recorded_stage(m: &Constants<f32>, stage: Stage) -> Recording {
     recorded(m, stage.reads(), stage.writes(), |cx, b| {
-        run_on_tape(stage, cx, m, b);
+        stages_recorded::run(stage, cx, m, b);
     })
 }
 
@@ -394,7 +300,7 @@ fn a_control_frame_is_recorded_as_a_loop_over_substeps() {
         let recording = recorded(m, &reads, &writes, |cx, b| {
             times!(cx, SUBSTEPS, {
                 for stage in needed(m, &STAGES) {
-                    run_on_tape(stage, cx, m, b);
+                    stages_recorded::run(stage, cx, m, b);
                 }
             });
         });

@@ -3,13 +3,12 @@
 //! Equations are plain functions over [`Num`], one value per world. What needs control flow or
 //! scratch memory takes a machine [`Cx`] and the macros [`each!`], [`times!`], [`span!`], [`push!`],
 //! [`when!`] and [`break_if!`]. Three machines run the same text: [`scalar`] numbers (`f64`, the reference,
-//! and `f32`), [`simd`] registers with one world a lane, and [`record`], which turns it into WGSL.
+//! and `f32`), [`simd`] registers with one world a lane, and the recording one of crate `sim-record`, which turns it into WGSL.
 //!
 //! A run-time `if` on a world's value does not type-check: select with [`Num::select`], or open a
 //! block with [`when!`]. Loops over the tree and branches on model constants are native Rust.
 
 pub mod memory;
-pub mod record;
 pub mod scalar;
 pub mod simd;
 

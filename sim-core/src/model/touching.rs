@@ -400,9 +400,15 @@ impl Builder<'_> {
         let is_cylinder = |piece: &&Piece| piece.solid.kind == Kind::Cylinder;
         let cylinders = self.pieces.iter().filter(is_cylinder).count();
         let mut len = 0;
+        // bases and strides of four: a GPU then reads and writes four numbers at a time
         let mut table = |stride: usize, rows: usize| {
+            let stride = if stride == 1 {
+                1
+            } else {
+                stride.next_multiple_of(4)
+            };
             let base = len;
-            len += stride * rows;
+            len += (stride * rows).next_multiple_of(4);
             Table { base, stride, rows }
         };
         contacts.memory = Memory {

@@ -2,9 +2,9 @@
 
 use super::{Random, on_cpu_with};
 use sim_core::lane::memory::Cpu;
-use sim_core::lane::record::{Recording, record};
 use sim_core::lane::{Cx, Fixed, Lane, MaskOf, Num, Real, Table, Tables};
 use sim_core::{break_if, each, push, span, when};
+use sim_record::{Recording, record};
 
 /// Numbers that a program reads.
 pub const INPUTS: usize = 4;

@@ -3,6 +3,10 @@
 pub mod cpu;
 mod error;
 mod frozen;
+mod gather;
+mod noise;
+mod shown;
+mod state;
 
 pub use error::BackendError;
 pub use frozen::{FirstFrozen, Frozen};

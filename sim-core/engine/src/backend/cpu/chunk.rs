@@ -1,9 +1,10 @@
 //! A run of blocks that one thread works on: their state in lane order, and one workspace.
 
 use super::contacts;
-use super::noise::Noise;
-use super::state::{Shape, StateField};
 use super::transfer::{self, Arena};
+use crate::backend::noise::Noise;
+use crate::backend::shown::stages_for;
+use crate::backend::state::{self, Shape, StateField};
 use crate::backend::{Faults, Frozen, Values};
 use crate::random::Draws;
 use crate::start::StartDraw;
@@ -12,7 +13,7 @@ use sim_core::compiled::Stages;
 use sim_core::lane::{Lane, Real};
 use sim_core::model::constants::Constants;
 use sim_core::model::{Model, SensedShapes};
-use sim_core::step::{FORWARD, STAGES, Stage};
+use sim_core::step::{STAGES, Stage};
 use std::ops::Range;
 
 /// What all chunks share.
@@ -45,25 +46,6 @@ pub(super) struct Job<F: Lane> {
 
 impl<F: Lane> Job<F> {
     pub fn new(model: &Model, layout: Layout, stages: Stages<F>, draws: Draws) -> Job<F> {
-        let shape = Shape::of(model.constants());
-        let start = model.start();
-        let mut reset = vec![F::Real::default(); shape.total()];
-        for (field, values) in [
-            (StateField::Q, &start.joint_q),
-            (StateField::TargetQ, &start.joint_target_q),
-            (StateField::TargetQd, &start.joint_target_qd),
-        ] {
-            for (to, from) in reset[shape.start(field)..].iter_mut().zip(values) {
-                *to = F::Real::of(*from);
-            }
-        }
-        let (sent, history) = (shape.start(StateField::F), shape.start(StateField::History));
-        for k in 0..shape.history {
-            reset[history + k] = reset[sent + k % (3 * shape.dofs)];
-        }
-        for (k, &(_, x)) in model.constants().varying.starts().iter().enumerate() {
-            reset[shape.start(StateField::Params) + k] = F::Real::of(x);
-        }
         let constants = model.constants().cast();
         let numbers = |needed: &[Stage]| {
             let needed = needed.iter().filter(|stage| stage.is_needed(&constants));
@@ -79,54 +61,13 @@ impl<F: Lane> Job<F> {
             layout,
             frame_s: model.substeps() as f64 * model.dt(),
             faults: Faults::default(),
-            start: reset,
+            start: state::start(model),
             draw: StartDraw::new(model),
             draws,
             noise: Noise::new(model),
             contact_sensors: model.contact_sensors().to_vec(),
         }
     }
-}
-
-/// The leading stages of [`FORWARD`] that the fields need, and link frames and velocities where they are asked for.
-fn stages_for(layout: &Layout) -> Vec<Stage> {
-    let mut last = None;
-    let mut output = Vec::new();
-    for slot in &layout.slots {
-        let (needs, shows): (Stage, &[Stage]) = match slot.field {
-            Field::BodyQ => (Stage::Kinematics, &[Stage::Poses]),
-            Field::BodyQd | Field::BodyJacobian => (Stage::Bias, &[Stage::Velocities]),
-            Field::BiasForce => (Stage::Bias, &[]),
-            Field::MassMatrix => (Stage::MassMatrix, &[]),
-            Field::SmoothForce => (Stage::Actuation, &[]),
-            Field::EfcJ | Field::EfcD | Field::EfcAref => (Stage::Constraint, &[]),
-            Field::ContactCount
-            | Field::ContactPos
-            | Field::ContactNormal
-            | Field::ContactDistance
-            | Field::ContactPair => (Stage::ContactRows, &[]),
-            Field::ConstraintForce
-            | Field::EfcForce
-            | Field::ContactForce
-            | Field::BodyContactForce
-            | Field::ContactSensor => (Stage::Refine, &[]),
-            Field::JointQdd => (Stage::Accelerations, &[]),
-            Field::JointTorque => (Stage::Command, &[Stage::JointTorque]),
-            Field::SiteQ | Field::SiteQd => (Stage::Bias, &[Stage::Poses, Stage::Sites]),
-            Field::SiteInverseJacobian => (Stage::Kinematics, &[Stage::SiteInverse]),
-            Field::Gyro | Field::Accelerometer => (Stage::Accelerations, &[Stage::Imu]),
-            _ => continue,
-        };
-        last = last.max(FORWARD.iter().position(|&stage| stage == needs));
-        for &stage in shows {
-            if !output.contains(&stage) {
-                output.push(stage);
-            }
-        }
-    }
-    let mut stages = FORWARD[..last.map_or(0, |last| last + 1)].to_vec();
-    stages.extend(output);
-    stages
 }
 
 pub(super) struct Chunk<F: Lane> {

@@ -1,7 +1,7 @@
 //! Commands that act late: those of the frames before are kept.
 
 use super::chunk::{Chunk, Job};
-use super::state::{Shape, StateField};
+use crate::backend::state::{Shape, StateField};
 use sim_core::batch::status::FROZEN;
 use sim_core::lane::Lane;
 use std::ops::Range;

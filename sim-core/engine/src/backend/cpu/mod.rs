@@ -9,12 +9,12 @@ mod dispatch;
 mod noise;
 mod records;
 mod reset;
-mod state;
 mod transfer;
 mod trouble;
 
 pub use dispatch::{available, create};
 
+use super::state::StateField;
 use super::{Backend, BackendError, Faults, Frozen, Lanes, Precision, Values};
 use crate::random::Draws;
 use chunk::{Chunk, Job};
@@ -23,7 +23,6 @@ use rayon::prelude::*;
 use sim_core::batch::{Field, Layout};
 use sim_core::lane::Lane;
 use sim_core::model::Model;
-use state::StateField;
 use std::ops::Range;
 
 /// Chunks a thread: enough that a slow block does not leave the others idle.

@@ -1,8 +1,8 @@
 //! Worlds out of lanes and back: records of a snapshot, which are the same whatever the lanes and threads.
 
 use super::chunk::{Chunk, Job};
-use super::state::{Shape, StateField};
 use crate::backend::COUNTERS;
+use crate::backend::state::{Shape, StateField};
 use sim_core::lane::{Lane, Real};
 use std::array;
 

@@ -1,7 +1,7 @@
 //! Worlds go back to their start.
 
 use super::chunk::{Chunk, Job};
-use super::state::{Shape, StateField};
+use crate::backend::state::{Shape, StateField};
 use sim_core::lane::{Lane, Real};
 
 impl<F: Lane> Chunk<F> {

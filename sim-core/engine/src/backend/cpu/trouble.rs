@@ -1,7 +1,7 @@
 //! Trouble of worlds: told in their status, and kept from what comes after.
 
 use super::chunk::{Chunk, Job};
-use super::state::{Shape, StateField};
+use crate::backend::state::{Shape, StateField};
 use crate::backend::{FirstFrozen, Frozen};
 use sim_core::batch::status;
 use sim_core::lane::{Lane, Real};

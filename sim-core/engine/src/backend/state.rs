@@ -2,11 +2,12 @@
 
 use sim_core::batch::Field;
 use sim_core::lane::Real;
+use sim_core::model::Model;
 use sim_core::model::constants::Constants;
 
 /// Groups of numbers of a world, in their order.
-#[derive(Clone, Copy)]
-pub(super) enum StateField {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::backend) enum StateField {
     Qd,
     Qdd,
     F,
@@ -22,7 +23,7 @@ pub(super) enum StateField {
 
 /// Numbers of a world's state and commands.
 #[derive(Clone, Copy)]
-pub(super) struct Shape {
+pub(in crate::backend) struct Shape {
     pub dofs: usize,
     coords: usize,
     /// Numbers of the commands of the frames before.
@@ -31,7 +32,7 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    pub(super) fn of<R: Real>(m: &Constants<R>) -> Shape {
+    pub(in crate::backend) fn of<R: Real>(m: &Constants<R>) -> Shape {
         let dofs = m.dofs.len();
         Shape {
             dofs,
@@ -42,7 +43,7 @@ impl Shape {
     }
 
     /// The first number of a group.
-    pub(super) fn start(self, field: StateField) -> usize {
+    pub(in crate::backend) fn start(self, field: StateField) -> usize {
         let (dofs, coords) = (5 * self.dofs, self.coords);
         match field {
             StateField::Qd => 0,
@@ -57,13 +58,14 @@ impl Shape {
         }
     }
 
-    pub(super) fn total(self) -> usize {
+    /// Numbers of a world.
+    pub(in crate::backend) fn total(self) -> usize {
         self.start(StateField::Params) + self.params
     }
 }
 
 impl StateField {
-    pub(super) fn of(field: Field) -> StateField {
+    pub(in crate::backend) fn of(field: Field) -> StateField {
         match field {
             Field::JointQ => StateField::Q,
             Field::JointQd => StateField::Qd,
@@ -73,4 +75,28 @@ impl StateField {
             other => unreachable!("`{}` is not written from outside", other.row().name),
         }
     }
+}
+
+/// State and commands of a world after a reset, in the order of [`StateField`].
+pub(in crate::backend) fn start<R: Real>(model: &Model) -> Vec<R> {
+    let shape = Shape::of(model.constants());
+    let start = model.start();
+    let mut reset = vec![R::default(); shape.total()];
+    for (field, values) in [
+        (StateField::Q, &start.joint_q),
+        (StateField::TargetQ, &start.joint_target_q),
+        (StateField::TargetQd, &start.joint_target_qd),
+    ] {
+        for (to, from) in reset[shape.start(field)..].iter_mut().zip(values) {
+            *to = R::of(*from);
+        }
+    }
+    let (sent, history) = (shape.start(StateField::F), shape.start(StateField::History));
+    for k in 0..shape.history {
+        reset[history + k] = reset[sent + k % (3 * shape.dofs)];
+    }
+    for (k, &(_, x)) in model.constants().varying.starts().iter().enumerate() {
+        reset[shape.start(StateField::Params) + k] = R::of(x);
+    }
+    reset
 }

@@ -1,9 +1,9 @@
 //! Whole programs: their text, and their results against the scalar machine.
 
 use crate::{TABLE, accepted, c, toy};
-use sim_core::lane::record::wgsl::{ProgramOptions, wgsl};
-use sim_core::lane::record::{Recorded, record};
 use sim_core::lane::{Cx, Num};
+use sim_record::wgsl::{ProgramOptions, wgsl};
+use sim_record::{Recorded, record};
 
 #[test]
 fn constants_read_back_from_the_program_bit_for_bit() {

@@ -6,8 +6,8 @@
 
 use super::state::State;
 use super::tree::{Binary, Op, Operand, Unary};
-use crate::lane::Num;
 use Operand::Truth;
+use sim_core::lane::Num;
 
 fn number(x: f32) -> Operand {
     Operand::number(x)

@@ -2,10 +2,10 @@
 
 use crate::toy::{self, contacts};
 use crate::{TABLE, accepted, c, refused};
-use sim_core::lane::record::wgsl::{ProgramOptions, wgsl};
-use sim_core::lane::record::{Misuse, Recorded, Recorder, Recording, record};
 use sim_core::lane::{Cx, Fixed, Num, Table, Tables};
 use sim_core::{break_if, each, push, span, times, when};
+use sim_record::wgsl::{ProgramOptions, wgsl};
+use sim_record::{Misuse, Recorded, Recorder, Recording, record};
 
 const FIXED: Fixed = Fixed {
     base: 1,

@@ -7,7 +7,8 @@
 //! depends on is left out.
 //!
 //! ```
-//! use sim_core::lane::{Cx, Num, Tables, record::record};
+//! use sim_core::lane::{Cx, Num, Tables};
+//! use sim_record::record;
 //! use sim_core::times;
 //!
 //! let doubled_thrice = record(1, |cx, x| {

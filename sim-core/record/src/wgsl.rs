@@ -105,12 +105,12 @@ impl Printer<'_> {
         )?;
         writeln!(
             self.text,
-            "@group(0) @binding(0) var<storage, read_write> fields: array<f32>;"
+            "@group(0) @binding(0) var<storage, read_write> fields: array<vec4<f32>>;"
         )?;
         if self.recording.scratch() > 0 {
             writeln!(
                 self.text,
-                "@group(0) @binding(1) var<storage, read_write> scratch: array<f32>;"
+                "@group(0) @binding(1) var<storage, read_write> scratch: array<vec4<f32>>;"
             )?;
         }
         let (numbers, indices) = self.recording.reads_tables();
@@ -137,17 +137,13 @@ impl Printer<'_> {
         for i in self.recording.live_inputs() {
             line!(
                 self,
-                "let x{i} = fields[{}u * worlds + world];",
-                inputs[i as usize]
+                "let x{i} = {};",
+                field(inputs[i as usize])
             )?;
         }
         self.block(&self.recording.body)?;
-        for (x, field) in self.recording.outputs.iter().zip(outputs) {
-            line!(
-                self,
-                "fields[{field}u * worlds + world] = {};",
-                self.operand(*x)
-            )?;
+        for (x, place) in self.recording.outputs.iter().zip(outputs) {
+            line!(self, "{} = {};", field(*place), self.operand(*x))?;
         }
         writeln!(self.text, "}}")
     }
@@ -304,12 +300,42 @@ fn place(first: usize, stride: usize, row: Row) -> String {
     }
 }
 
+/// A component of four numbers.
+fn component(i: usize) -> &'static str {
+    ["x", "y", "z", "w"][i % 4]
+}
+
+fn field(i: u32) -> String {
+    format!(
+        "fields[{}u * worlds + world].{}",
+        i / 4,
+        component(i as usize)
+    )
+}
+
 fn scratch(cell: &Cell) -> String {
     let Cell { table, row, number } = cell;
-    let place = place(table.base + number, table.stride, *row);
+    let first = table.base + number;
     match row {
-        Row::At(_) => format!("scratch[{place} * worlds + world]"),
-        _ => format!("scratch[({place}) * worlds + world]"),
+        Row::At(i) => {
+            let place = first + i * table.stride;
+            format!(
+                "scratch[{}u * worlds + world].{}",
+                place / 4,
+                component(place)
+            )
+        }
+        _ if table.stride.is_multiple_of(4) => format!(
+            "scratch[({} * {}u + {}u) * worlds + world].{}",
+            index(*row),
+            table.stride / 4,
+            first / 4,
+            component(first)
+        ),
+        _ => {
+            let place = place(first, table.stride, *row);
+            format!("scratch[(({place}) / 4u) * worlds + world][({place}) % 4u]")
+        }
     }
 }
 

@@ -1,9 +1,9 @@
 //! Refused: values that leave their block, rounds that differ, constants. Each beside a good twin.
 
 use crate::{TABLE, accepted, c, evaluated, refused};
-use sim_core::lane::record::{Misuse, Recorded, Recorder, record};
 use sim_core::lane::{Cx, Num};
 use sim_core::{break_if, each, push, times, when};
+use sim_record::{Misuse, Recorded, Recorder, record};
 
 #[test]
 fn value_that_leaves_a_loop_is_refused() {

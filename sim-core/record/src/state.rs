@@ -8,7 +8,7 @@ use super::error::{Misuse, Place, RecordError};
 use super::facts::Facts;
 use super::handles::Owner;
 use super::tree::{Op, Operand, Statement};
-use crate::lane::Table;
+use sim_core::lane::Table;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -133,7 +133,7 @@ pub(super) fn with<R>(place: Place, f: impl FnOnce(&mut State) -> R) -> R {
     STATE.with(|s| {
         let mut state = s.borrow_mut();
         let state = state.as_mut().unwrap_or_else(|| {
-            panic!("{place}: recorded numbers can be used only inside `lane::record::record`")
+            panic!("{place}: recorded numbers can be used only inside `sim_record::record`")
         });
         state.place = place;
         f(state)

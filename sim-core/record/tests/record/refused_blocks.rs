@@ -1,9 +1,9 @@
 //! Refused: rows, breaks, variables and tables out of place. Each beside a good twin.
 
 use crate::{TABLE, accepted, c, evaluated, refused};
-use sim_core::lane::record::{MAX_NESTING, Misuse, Recorded, Recorder};
 use sim_core::lane::{Cx, Num, Table};
 use sim_core::{break_if, each, push, times, when};
+use sim_record::{MAX_NESTING, Misuse, Recorded, Recorder};
 
 #[test]
 fn row_used_under_another_list_is_refused() {

@@ -2,7 +2,7 @@
 
 use super::Recording;
 use super::tree::{Binary, Cell, Entry, Op, Operand, Rounds, Row, Statement, Unary};
-use crate::lane::{Num, Real, Tables};
+use sim_core::lane::{Num, Real, Tables};
 
 /// Should the statements after this one be run?
 #[derive(PartialEq)]

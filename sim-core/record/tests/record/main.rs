@@ -5,12 +5,12 @@ mod kept;
 mod programs;
 mod refusals;
 mod refused_blocks;
-#[path = "../toy/mod.rs"]
+#[path = "../../../tests/toy/mod.rs"]
 mod toy;
 
-use sim_core::lane::record::wgsl::{ProgramOptions, wgsl};
-use sim_core::lane::record::{Misuse, Recorded, Recorder, Recording, record};
 use sim_core::lane::{Num, Table, Tables};
+use sim_record::wgsl::{ProgramOptions, wgsl};
+use sim_record::{Misuse, Recorded, Recorder, Recording, record};
 
 const TABLE: Table = Table {
     base: 0,

@@ -1,0 +1,124 @@
+//! Fields out of a block: what a frame shows of a world, in the order of its row.
+
+use sim_core::batch::{Field, Workspace};
+use sim_core::lane::{Cx, Num};
+use sim_core::math::vec3::cross_add;
+use sim_core::model::constants::Constants;
+use sim_core::step::{BlockOf, ConstantsOf};
+
+/// Gathers a field that is neither of contacts nor a counter, one number an element.
+#[inline(always)]
+pub(super) fn gather<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    field: Field,
+    to: &mut [C::F],
+) {
+    let w = &b.work;
+    match field {
+        Field::JointQ | Field::JointQMeasured => cells(cx, &b.joint_q, to),
+        Field::JointQd | Field::JointQdMeasured => cells(cx, &b.joint_qd, to),
+        Field::JointQdd => cells(cx, &b.joint_qdd, to),
+        Field::JointF => to.copy_from_slice(&b.joint_f),
+        Field::JointTargetQ => to.copy_from_slice(&b.joint_target_q),
+        Field::JointTargetQd => to.copy_from_slice(&b.joint_target_qd),
+        Field::BodyQ => to.copy_from_slice(w.body_q.as_flattened()),
+        Field::BodyQd => to.copy_from_slice(w.body_qd.as_flattened().as_flattened()),
+        Field::JointTorque => to.copy_from_slice(&w.joint_torque),
+        Field::SiteQ => to.copy_from_slice(w.site_q.as_flattened()),
+        Field::SiteQd => to.copy_from_slice(w.site_qd.as_flattened().as_flattened()),
+        Field::Gyro => to.copy_from_slice(w.gyro.as_flattened()),
+        Field::Accelerometer => to.copy_from_slice(w.accelerometer.as_flattened()),
+        Field::SiteInverseJacobian => inverse_jacobian(m, w, to),
+        Field::BodyJacobian => body_jacobian(m, w, to),
+        Field::BiasForce => to.copy_from_slice(&w.bias_force),
+        Field::SmoothForce => to.copy_from_slice(&w.smooth_force),
+        Field::ConstraintForce => cells(cx, &b.constraint_force, to),
+        Field::EfcD => cells(cx, &b.efc_weight, to),
+        Field::EfcAref => cells(cx, &b.efc_aref, to),
+        Field::EfcForce => cells(cx, &b.efc_force, to),
+        Field::MassMatrix => mass_matrix(m, w, to),
+        Field::EfcJ => jacobian(cx, m, &b.efc_weight, &w.limit_side, to),
+        _ => unreachable!("`{}` is not gathered", field.row().name),
+    }
+}
+
+#[inline(always)]
+fn cells<C: Cx>(cx: &C, cells: &[C::V], to: &mut [C::F]) {
+    assert_eq!(cells.len(), to.len());
+    for (x, cell) in to.iter_mut().zip(cells) {
+        *x = cx.get(cell);
+    }
+}
+
+/// The joint-space inertia in full, `(dofs, dofs)`.
+#[inline(always)]
+fn mass_matrix<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, to: &mut [F]) {
+    let dofs = m.dofs.len();
+    for i in 0..dofs {
+        for j in 0..dofs {
+            to[i * dofs + j] = match m.pattern.find(i, j) {
+                Some(place) => w.mass_matrix[place],
+                None => F::c(0.0),
+            };
+        }
+    }
+}
+
+/// Link Jacobians in full, `(bodies, 6, dofs)`: the motion of each dof on the path to the root, at the link's centre of mass.
+#[inline(always)]
+fn body_jacobian<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, to: &mut [F]) {
+    let dofs = m.dofs.len();
+    to.fill(F::c(0.0));
+    for (k, frame) in m.frames.iter().enumerate() {
+        let rows = &mut to[k * 6 * dofs..(k + 1) * 6 * dofs];
+        let mut next = frame.body;
+        while let Some(b) = next {
+            for d in m.bodies[b].dofs() {
+                let [linear, angular] = w.motion[d];
+                let moved = cross_add(angular, w.link_center[k], linear);
+                for i in 0..3 {
+                    rows[i * dofs + d] = moved[i];
+                    rows[(3 + i) * dofs + d] = angular[i];
+                }
+            }
+            next = m.bodies[b].parent;
+        }
+    }
+}
+
+/// Inverse Jacobians of the sites in full, `(sites, dofs, 6)`.
+#[inline(always)]
+fn inverse_jacobian<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, to: &mut [F]) {
+    let dofs = m.dofs.len();
+    to.fill(F::c(0.0));
+    let mut rows = w.site_inverse.iter();
+    for (k, site) in m.sites.iter().enumerate() {
+        for (column, row) in site.columns.iter().zip(rows.by_ref()) {
+            let at = 6 * (k * dofs + column.dof);
+            to[at..at + 6].copy_from_slice(row);
+        }
+    }
+}
+
+/// The constraint Jacobian in full, `(rows, dofs)`.
+#[inline(always)]
+fn jacobian<C: Cx>(cx: &C, m: &ConstantsOf<C>, weight: &[C::V], side: &[C::F], to: &mut [C::F]) {
+    let (dofs, zero, one) = (m.dofs.len(), C::F::c(0.0), C::F::c(1.0));
+    to.fill(zero);
+    let mut row = 0;
+    for e in &m.equalities {
+        to[row * dofs + e.follower] = one;
+        to[row * dofs + e.leader] = -C::F::k(e.multiplier);
+        row += 1;
+    }
+    for f in &m.frictions {
+        to[row * dofs + f.dof] = one;
+        row += 1;
+    }
+    for (l, side) in m.limits.iter().zip(side) {
+        to[row * dofs + l.dof] = C::F::select(zero.lt(cx.get(&weight[row])), *side, zero);
+        row += 1;
+    }
+}
