@@ -26,9 +26,11 @@ export PYO3_BUILD_EXTENSION_MODULE := 1
 RUST_SOURCES   := $(shell find sim-core sim-daemon py-client/src py-client/Cargo.toml Cargo.toml rust-toolchain.toml -name '*.rs' -o -name '*.toml')
 PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml -name '*.py' -o -name '*.pyi' -o -name '*.toml')
 PYTHON_TREES   := py-client/python py-client/tests tests examples benches
+# Vulkan in software, and what checks its use: Debian's names.
+VULKAN         := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
 CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
-.PHONY: demo test test-rl train fuzz published bench bench-env check wheel
+.PHONY: demo test test-rl train fuzz published bench bench-env check wheel vulkan
 .NOTPARALLEL: # pip installs into one venv, cargo and the tests use all cores by themselves
 
 demo: wheel
@@ -38,7 +40,7 @@ demo: wheel
 	@echo && echo "The same in process, without daemon and Python:"
 	@cargo build --release --quiet --workspace --example franka_lesson && target/release/examples/franka_lesson $(WORLDS)
 
-test: wheel $(VENV)/.dev
+test: wheel $(VENV)/.dev vulkan
 	cargo fmt --all --check
 	$(CLIPPY)
 	@if cargo nextest --version >/dev/null 2>&1; \
@@ -64,8 +66,9 @@ published: wheel $(VENV)/.dev
 	PYTHONPATH=tests/python/published:tests/python/mujoco $(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . \
 	  -p options tests/python/published/agree.py
 
-bench: wheel $(VENV)/.dev
+bench: wheel $(VENV)/.dev vulkan
 	cargo bench --package tightloop --bench step
+	cargo bench --package sim-device --bench replay
 	$(PYTHON) benches/peers.py
 	$(PYTHON) benches/contacts.py
 	$(PYTHON) benches/legged.py
@@ -110,6 +113,13 @@ $(VENV)/.rl: py-client/requirements-rl.txt $(VENV)/.dev
 $(VENV)/.peers: py-client/requirements-peers.txt $(VENV)/.dev
 	$(PIP) install --quiet -r $<
 	@touch $@
+
+# The tests of the device need an adapter. Elsewhere than on Debian it is for you to install one: they say so where there is none.
+vulkan:
+	@if command -v dpkg >/dev/null && ! dpkg -s $(VULKAN) >/dev/null 2>&1; then \
+	  if [ "$$(id -u)" = 0 ]; then apt-get update -qq && apt-get install -y -qq $(VULKAN); \
+	  elif sudo -n true 2>/dev/null; then sudo apt-get update -qq && sudo apt-get install -y -qq $(VULKAN); \
+	  else echo "the tests need Vulkan in software: run 'sudo apt install $(VULKAN)', then make again"; exit 1; fi; fi
 
 # Debian splits ensurepip from python3; `python3 -m venv` then leaves half a folder behind.
 $(PYTHON):

@@ -1,0 +1,162 @@
+//! The adapters of this machine, and which of them is meant.
+
+use crate::error::DeviceError;
+use std::future::Future;
+use std::pin::pin;
+use std::task::{Context, Poll, Waker};
+
+/// What an adapter is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum AdapterKind {
+    /// A card with memory of its own.
+    Discrete,
+    /// Shares memory with the processor.
+    Integrated,
+    /// A share of a card.
+    Virtual,
+    /// Unknown.
+    Other,
+    /// The processor plays the accelerator.
+    Software,
+}
+
+/// One adapter and its limits.
+#[derive(Clone, Debug)]
+pub struct AdapterInfo {
+    /// Place in the list of `adapters`.
+    pub index: usize,
+    /// Name given by the driver.
+    pub name: String,
+    /// What it is made of.
+    pub kind: AdapterKind,
+    /// `vulkan`, `metal` or `dx12`.
+    pub backend: String,
+    /// Driver and its version.
+    pub driver: String,
+    /// Largest heap of device-local memory, where the driver tells [bytes].
+    pub memory: Option<u64>,
+    /// Largest range that a binding can show [bytes].
+    pub binding_max: u64,
+    /// Starts of the ranges of bindings are multiples of this [bytes].
+    pub binding_align: u64,
+    /// Most storage buffers of one program.
+    pub bindings_max: u32,
+    /// Most threads of a workgroup.
+    pub workgroup_max: u32,
+    /// Most workgroups of a dispatch.
+    pub workgroups_max: u32,
+    /// Host memory can be imported. In the list: the driver knows how; of an open device: it was tried with pages of shared memory.
+    pub imports: bool,
+}
+
+/// Which adapter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// The first of `adapters`: hardware if there is any.
+    First,
+    /// By place in the list.
+    Index(usize),
+    /// By part of its name, in upper or lower case.
+    Name(String),
+}
+
+/// All adapters: hardware first (discrete, integrated, virtual), software last. Empty where no driver is installed.
+pub fn adapters() -> Vec<AdapterInfo> {
+    list().into_iter().map(|(_, info)| info).collect()
+}
+
+/// The adapters with their handles, in the order of `adapters`.
+pub(crate) fn list() -> Vec<(wgpu::Adapter, AdapterInfo)> {
+    let mut options = wgpu::InstanceDescriptor::new_without_display_handle();
+    options.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
+    options.flags = wgpu::InstanceFlags::empty();
+    let backends = options.backends;
+    let instance = wgpu::Instance::new(options);
+    let mut found: Vec<_> = ready(instance.enumerate_adapters(backends))
+        .into_iter()
+        .map(|adapter| {
+            let info = describe(&adapter);
+            (adapter, info)
+        })
+        .collect();
+    found.sort_by_key(|(_, info)| info.kind);
+    for (index, (_, info)) in found.iter_mut().enumerate() {
+        info.index = index;
+    }
+    found
+}
+
+/// The adapter that is meant.
+pub(crate) fn choose(choice: &Choice) -> Result<(wgpu::Adapter, AdapterInfo), DeviceError> {
+    let mut found = list();
+    let place = match choice {
+        Choice::First => (!found.is_empty()).then_some(0),
+        Choice::Index(index) => (*index < found.len()).then_some(*index),
+        Choice::Name(name) => {
+            let name = name.to_lowercase();
+            found
+                .iter()
+                .position(|(_, info)| info.name.to_lowercase().contains(&name))
+        }
+    };
+    if found.is_empty() {
+        return Err(DeviceError::NoAdapter);
+    }
+    let Some(place) = place else {
+        let present: Vec<String> = found
+            .iter()
+            .map(|(_, info)| format!("{} `{}`", info.index, info.name))
+            .collect();
+        return Err(DeviceError::UnknownAdapter {
+            wanted: match choice {
+                Choice::Name(name) => format!("named `{name}`"),
+                Choice::Index(index) => format!("of index {index}"),
+                Choice::First => "at all".to_owned(),
+            },
+            present: present.join(", "),
+        });
+    };
+    Ok(found.swap_remove(place))
+}
+
+fn describe(adapter: &wgpu::Adapter) -> AdapterInfo {
+    let info = adapter.get_info();
+    let limits = adapter.limits();
+    let (memory, imports) = crate::vulkan::facts(adapter);
+    AdapterInfo {
+        index: 0,
+        name: info.name,
+        kind: match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => AdapterKind::Discrete,
+            wgpu::DeviceType::IntegratedGpu => AdapterKind::Integrated,
+            wgpu::DeviceType::VirtualGpu => AdapterKind::Virtual,
+            wgpu::DeviceType::Cpu => AdapterKind::Software,
+            wgpu::DeviceType::Other => AdapterKind::Other,
+        },
+        backend: info.backend.to_str().to_owned(),
+        driver: format!("{} {}", info.driver, info.driver_info)
+            .trim()
+            .to_owned(),
+        memory,
+        binding_max: limits.max_storage_buffer_binding_size,
+        binding_align: u64::from(limits.min_storage_buffer_offset_alignment),
+        bindings_max: limits.max_storage_buffers_per_shader_stage,
+        workgroup_max: limits
+            .max_compute_invocations_per_workgroup
+            .min(limits.max_compute_workgroup_size_x),
+        workgroups_max: limits.max_compute_workgroups_per_dimension,
+        imports,
+    }
+}
+
+/// Runs a future of wgpu to its end. Natively they are done when they are made.
+pub(crate) fn ready<F: Future>(future: F) -> F::Output {
+    let mut future = pin!(future);
+    let mut context = Context::from_waker(Waker::noop());
+    loop {
+        if let Poll::Ready(value) = future.as_mut().poll(&mut context) {
+            return value;
+        }
+        std::thread::yield_now();
+    }
+}

@@ -1,0 +1,293 @@
+//! Batches: dispatches and copies, checked once, run often.
+
+use crate::device::{Device, Inner};
+use crate::error::DeviceError;
+use crate::memory::{Buffer, Memory};
+use crate::portable;
+use crate::program::{Compiled, Program};
+use crate::vulkan::{Handle, Recording};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// How a batch gets to the device at each run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Replay {
+    /// Recorded once, where the route can (Vulkan); else as `Encoded`.
+    Recorded,
+    /// Encoded anew, through wgpu.
+    Encoded,
+}
+
+/// Commands that a device has accepted.
+///
+/// Each command sees what all commands before it wrote, in this batch and in those before it. It keeps its programs and buffers.
+pub struct Batch {
+    /// Goes first: what it names must outlive it.
+    pub(crate) way: Way,
+    pub(crate) commands: Vec<Command>,
+    /// Staging buffers: they are locked while the batch runs.
+    pub(crate) staging: Vec<Staged>,
+    pub(crate) device: Arc<Inner>,
+}
+
+/// How a batch runs.
+pub(crate) enum Way {
+    Recorded(Box<Recording>),
+    Encoded(Vec<wgpu::BindGroup>),
+}
+
+/// A staging buffer in a batch.
+#[derive(Clone)]
+pub(crate) struct Staged {
+    pub memory: Arc<Memory>,
+    pub written: bool,
+}
+
+/// One command, checked.
+pub(crate) enum Command {
+    Dispatch {
+        program: Arc<Compiled>,
+        slots: Vec<Slot>,
+        workgroups: u32,
+    },
+    Copy {
+        from: Arc<Memory>,
+        from_at: u64,
+        to: Arc<Memory>,
+        to_at: u64,
+        bytes: u64,
+    },
+}
+
+/// What a program sees at a binding.
+pub(crate) struct Slot {
+    pub binding: u32,
+    pub read_only: bool,
+    pub buffer: Arc<Memory>,
+    pub range: Range<u64>,
+}
+
+impl Memory {
+    /// Vulkan's name of it.
+    pub fn raw(&self) -> &Handle {
+        self.raw.as_ref().expect("recorded on the Vulkan route")
+    }
+}
+
+/// Gathers the commands of a batch. What is wrong with them is told by `finish`.
+pub struct BatchBuilder {
+    replay: Replay,
+    commands: Vec<Command>,
+    failure: Option<DeviceError>,
+    device: Arc<Inner>,
+}
+
+impl Device {
+    /// A batch without commands.
+    pub fn batch(&self, replay: Replay) -> BatchBuilder {
+        BatchBuilder {
+            replay,
+            commands: Vec::new(),
+            failure: None,
+            device: self.inner.clone(),
+        }
+    }
+}
+
+impl BatchBuilder {
+    /// Runs `workgroups` of a program, with a range [bytes] of a buffer at each binding. Bindings that it does not use are passed over.
+    pub fn dispatch(
+        &mut self,
+        program: &Program,
+        buffers: &[(u32, &Buffer, Range<u64>)],
+        workgroups: u32,
+    ) {
+        match self.dispatched(program, buffers, workgroups) {
+            Ok(command) => self.commands.push(command),
+            Err(reason) => self.fail(program.label(), reason),
+        }
+    }
+
+    /// Copies bytes; places and size are multiples of 4.
+    pub fn copy(&mut self, from: &Buffer, from_at: u64, to: &Buffer, to_at: u64, bytes: u64) {
+        match self.copied(from, from_at, to, to_at, bytes) {
+            Ok(command) => self.commands.push(command),
+            Err(reason) => self.fail(from.label(), reason),
+        }
+    }
+
+    /// Hands the commands to the driver.
+    ///
+    /// Errors: the first command that was wrong; out of memory; for `Encoded`, what compiling for wgpu brings.
+    pub fn finish(self) -> Result<Batch, DeviceError> {
+        if let Some(failure) = self.failure {
+            return Err(failure);
+        }
+        self.device.alive()?;
+        let way = match (&self.device.vulkan, self.replay) {
+            (Some(vulkan), Replay::Recorded) => {
+                Way::Recorded(vulkan.record(&self.commands).map_err(|e| {
+                    let reason = format!("recording: {e}");
+                    self.device.failed(&e, DeviceError::Driver { reason })
+                })?)
+            }
+            _ => Way::Encoded(portable::groups(&self.commands)?),
+        };
+        Ok(Batch {
+            way,
+            staging: staging(&self.commands),
+            commands: self.commands,
+            device: self.device,
+        })
+    }
+
+    fn fail(&mut self, label: &str, reason: String) {
+        let label = label.to_owned();
+        self.failure
+            .get_or_insert(DeviceError::Command { label, reason });
+    }
+
+    fn dispatched(
+        &self,
+        program: &Program,
+        buffers: &[(u32, &Buffer, Range<u64>)],
+        workgroups: u32,
+    ) -> Result<Command, String> {
+        let info = &self.device.info;
+        if !Arc::ptr_eq(&program.0.device, &self.device) {
+            return Err("the program is another device's".to_owned());
+        }
+        if workgroups == 0 || workgroups > info.workgroups_max {
+            let max = info.workgroups_max;
+            return Err(format!("{workgroups} workgroups; from 1 to {max} may be"));
+        }
+        let mut slots: Vec<Slot> = Vec::new();
+        for wanted in &program.0.bindings {
+            let number = wanted.number;
+            let mut given = buffers.iter().filter(|(binding, ..)| *binding == number);
+            let Some((_, buffer, range)) = given.next() else {
+                return Err(format!("nothing is given for binding {number}"));
+            };
+            if given.next().is_some() {
+                return Err(format!("binding {number} is given twice"));
+            }
+            let slot = Slot {
+                binding: number,
+                read_only: wanted.read_only,
+                buffer: buffer.0.clone(),
+                range: range.clone(),
+            };
+            self.check(&slot)
+                .map_err(|reason| format!("binding {number}, `{}`: {reason}", buffer.label()))?;
+            // wgpu refuses it, since one dispatch would read what it writes
+            if let Some(other) = slots.iter().find(|other| {
+                Arc::ptr_eq(&other.buffer, &slot.buffer) && other.read_only != slot.read_only
+            }) {
+                let other = other.binding;
+                return Err(format!(
+                    "`{}` is read-only at one of bindings {other} and {number} and written at the other",
+                    buffer.label()
+                ));
+            }
+            slots.push(slot);
+        }
+        Ok(Command::Dispatch {
+            program: program.0.clone(),
+            slots,
+            workgroups,
+        })
+    }
+
+    fn check(&self, slot: &Slot) -> Result<(), String> {
+        let info = &self.device.info;
+        let Range { start, end } = slot.range;
+        if !Arc::ptr_eq(&slot.buffer.device, &self.device) {
+            return Err("the buffer is another device's".to_owned());
+        }
+        if start >= end || end > slot.buffer.bytes {
+            let bytes = slot.buffer.bytes;
+            return Err(format!("range {start}..{end} of {bytes} bytes"));
+        }
+        if !start.is_multiple_of(info.binding_align) || !end.is_multiple_of(4) {
+            let align = info.binding_align;
+            return Err(format!(
+                "range {start}..{end} must start at a multiple of {align} and end at one of 4"
+            ));
+        }
+        if end - start > info.binding_max {
+            let max = info.binding_max;
+            return Err(format!(
+                "range {start}..{end} is larger than the adapter's {max} bytes"
+            ));
+        }
+        Ok(())
+    }
+
+    fn copied(
+        &self,
+        from: &Buffer,
+        from_at: u64,
+        to: &Buffer,
+        to_at: u64,
+        bytes: u64,
+    ) -> Result<Command, String> {
+        for (buffer, at) in [(from, from_at), (to, to_at)] {
+            let label = buffer.label();
+            if !Arc::ptr_eq(&buffer.0.device, &self.device) {
+                return Err(format!("`{label}` is another device's"));
+            }
+            if at.checked_add(bytes).is_none_or(|end| end > buffer.bytes()) || bytes == 0 {
+                let size = buffer.bytes();
+                return Err(format!(
+                    "{bytes} bytes at {at} of `{label}`, which has {size}"
+                ));
+            }
+            if !at.is_multiple_of(4) || !bytes.is_multiple_of(4) {
+                return Err(format!(
+                    "{bytes} bytes at {at} of `{label}`: not multiples of 4"
+                ));
+            }
+        }
+        if Arc::ptr_eq(&from.0, &to.0) {
+            return Err("copies within one buffer are not supported".to_owned());
+        }
+        Ok(Command::Copy {
+            from: from.0.clone(),
+            from_at,
+            to: to.0.clone(),
+            to_at,
+            bytes,
+        })
+    }
+}
+
+/// The staging buffers of some commands, each once.
+fn staging(commands: &[Command]) -> Vec<Staged> {
+    let mut found: Vec<Staged> = Vec::new();
+    let mut note = |memory: &Arc<Memory>, written: bool| {
+        if memory.host.is_none() {
+            return;
+        }
+        match found.iter_mut().find(|s| Arc::ptr_eq(&s.memory, memory)) {
+            Some(staged) => staged.written |= written,
+            None => found.push(Staged {
+                memory: memory.clone(),
+                written,
+            }),
+        }
+    };
+    for command in commands {
+        match command {
+            Command::Dispatch { slots, .. } => {
+                for slot in slots {
+                    note(&slot.buffer, !slot.read_only);
+                }
+            }
+            Command::Copy { from, to, .. } => {
+                note(from, false);
+                note(to, true);
+            }
+        }
+    }
+    found
+}

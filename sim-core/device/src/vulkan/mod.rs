@@ -1,0 +1,178 @@
+//! The Vulkan route: memory, pipelines and recorded commands of the driver itself, beside what wgpu keeps.
+//!
+//! wgpu opens the device, submits and waits, and tracks nothing of what is recorded here.
+
+mod memory;
+mod pipeline;
+mod recording;
+
+pub(crate) use memory::{Handle, Mapped, Place};
+pub(crate) use pipeline::Pipeline;
+pub(crate) use recording::Recording;
+
+use ash::vk;
+use thiserror::Error;
+use wgpu::hal::api::Vulkan as Api;
+
+/// What the driver answers instead of doing it.
+#[derive(Debug, Error)]
+pub(crate) enum Failure {
+    /// The device is gone.
+    #[error("the device is lost")]
+    Lost,
+    /// Anything else, most often that there is no room.
+    #[error("{0}")]
+    Other(vk::Result),
+}
+
+impl From<vk::Result> for Failure {
+    fn from(result: vk::Result) -> Failure {
+        match result {
+            vk::Result::ERROR_DEVICE_LOST => Failure::Lost,
+            other => Failure::Other(other),
+        }
+    }
+}
+
+/// Handles of an open device.
+pub(crate) struct Vulkan {
+    device: ash::Device,
+    family: u32,
+    heaps: vk::PhysicalDeviceMemoryProperties,
+    host: Option<ash::ext::external_memory_host::Device>,
+    /// Addresses and sizes of imported memory are multiples of this [bytes].
+    host_align: u64,
+    /// What the driver compiled; it locks it itself.
+    cache: vk::PipelineCache,
+    driver: String,
+}
+
+/// Largest device-local heap [bytes], and whether the driver knows how to import host memory.
+pub(crate) fn facts(adapter: &wgpu::Adapter) -> (Option<u64>, bool) {
+    // SAFETY: the handles are asked questions that change nothing, while `adapter` is borrowed.
+    unsafe {
+        let Some(hal) = adapter.as_hal::<Api>() else {
+            return (None, false);
+        };
+        let heaps = hal
+            .shared_instance()
+            .raw_instance()
+            .get_physical_device_memory_properties(hal.raw_physical_device());
+        let imports = hal
+            .physical_device_capabilities()
+            .supports_extension(ash::ext::external_memory_host::NAME);
+        let local = heaps
+            .memory_heaps_as_slice()
+            .iter()
+            .filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
+            .map(|heap| heap.size)
+            .max();
+        (local, imports)
+    }
+}
+
+/// Opens a device on this route; `None` where the adapter is another backend's.
+pub(crate) fn open(
+    adapter: &wgpu::Adapter,
+    wanted: &wgpu::DeviceDescriptor,
+) -> Option<Result<(wgpu::Device, wgpu::Queue, Vulkan), String>> {
+    // SAFETY: the callback adds an extension that the device has, and takes nothing away; the device goes to the adapter that made it.
+    unsafe {
+        let hal = adapter.as_hal::<Api>()?;
+        let imports = hal
+            .physical_device_capabilities()
+            .supports_extension(ash::ext::external_memory_host::NAME);
+        let opened = hal.open_with_callback(
+            wanted.required_features,
+            &wanted.required_limits,
+            &wanted.memory_hints,
+            Some(Box::new(move |arguments| {
+                if imports {
+                    arguments
+                        .extensions
+                        .push(ash::ext::external_memory_host::NAME);
+                }
+            })),
+        );
+        let opened = match opened {
+            Ok(opened) => opened,
+            Err(e) => return Some(Err(e.to_string())),
+        };
+        drop(hal);
+        let (device, queue) = match adapter.create_device_from_hal::<Api>(opened, wanted) {
+            Ok(both) => both,
+            Err(e) => return Some(Err(e.to_string())),
+        };
+        let vulkan = handles(&device, imports);
+        Some(Ok((device, queue, vulkan)))
+    }
+}
+
+/// # Safety
+/// `device` is Vulkan's, has the extension if `imports`, and outlives what is returned.
+unsafe fn handles(device: &wgpu::Device, imports: bool) -> Vulkan {
+    // SAFETY: as promised by the caller.
+    unsafe {
+        let hal = device.as_hal::<Api>().expect("opened on Vulkan");
+        let instance = hal.shared_instance().raw_instance().clone();
+        let raw = hal.raw_device().clone();
+        let physical = hal.raw_physical_device();
+        let mut host = vk::PhysicalDeviceExternalMemoryHostPropertiesEXT::default();
+        let mut all = vk::PhysicalDeviceProperties2::default();
+        if imports {
+            all = all.push_next(&mut host);
+        }
+        instance.get_physical_device_properties2(physical, &mut all);
+        let known = all.properties;
+        Vulkan {
+            host: imports.then(|| ash::ext::external_memory_host::Device::new(&instance, &raw)),
+            host_align: host.min_imported_host_pointer_alignment.max(1),
+            heaps: instance.get_physical_device_memory_properties(physical),
+            family: hal.queue_family_index(),
+            cache: vk::PipelineCache::null(),
+            driver: format!(
+                "{}-{:08x}",
+                known
+                    .pipeline_cache_uuid
+                    .map(|byte| format!("{byte:02x}"))
+                    .concat(),
+                known.driver_version
+            ),
+            device: raw,
+        }
+    }
+}
+
+impl Vulkan {
+    /// Device and driver version, in letters that a file's name may have.
+    pub fn driver(&self) -> &str {
+        &self.driver
+    }
+
+    /// Starts from what the driver compiled in an earlier run; data of another driver are passed over by it.
+    pub fn remember(&mut self, earlier: &[u8]) {
+        let data = vk::PipelineCacheCreateInfo::default().initial_data(earlier);
+        // SAFETY: the data are whole, since the cache compared their hash, and this driver's, since the file has its name.
+        let made = unsafe { self.device.create_pipeline_cache(&data, None) };
+        self.cache = made.unwrap_or_default();
+    }
+
+    /// What `remember` takes next time.
+    pub fn remembered(&self) -> Vec<u8> {
+        // SAFETY: the cache is this device's; without one there is nothing to ask.
+        unsafe {
+            if self.cache == vk::PipelineCache::null() {
+                return Vec::new();
+            }
+            let data = self.device.get_pipeline_cache_data(self.cache);
+            data.unwrap_or_default()
+        }
+    }
+}
+
+impl Drop for Vulkan {
+    fn drop(&mut self) {
+        // SAFETY: the cache is this device's, and no thread compiles: they keep the device alive.
+        unsafe { self.device.destroy_pipeline_cache(self.cache, None) };
+    }
+}

@@ -1,0 +1,200 @@
+//! Commands recorded once, as a secondary command buffer that runs as often as one likes.
+
+use super::{Api, Failure, Vulkan};
+use crate::batch::Command;
+use ash::vk;
+
+/// A recorded batch.
+pub(crate) struct Recording {
+    commands: vk::CommandBuffer,
+    pool: vk::CommandPool,
+    descriptors: vk::DescriptorPool,
+    device: ash::Device,
+}
+
+impl Vulkan {
+    /// Records commands that `batch` has checked. They, and so their buffers and programs, live longer than the recording.
+    pub fn record(&self, commands: &[Command]) -> Result<Box<Recording>, Failure> {
+        let device = &self.device;
+        let mut made = Box::new(Recording {
+            commands: vk::CommandBuffer::null(),
+            pool: vk::CommandPool::null(),
+            descriptors: vk::DescriptorPool::null(),
+            device: device.clone(),
+        });
+        // SAFETY: all handles are of this device and alive; pools are this recording's own, and go with it.
+        unsafe {
+            made.pool = device.create_command_pool(
+                &vk::CommandPoolCreateInfo::default().queue_family_index(self.family),
+                None,
+            )?;
+            let sets = self.sets(&mut made, commands)?;
+            made.commands = device.allocate_command_buffers(
+                &vk::CommandBufferAllocateInfo::default()
+                    .command_pool(made.pool)
+                    .level(vk::CommandBufferLevel::SECONDARY)
+                    .command_buffer_count(1),
+            )?[0];
+            let inherited = vk::CommandBufferInheritanceInfo::default();
+            device.begin_command_buffer(
+                made.commands,
+                &vk::CommandBufferBeginInfo::default()
+                    .flags(vk::CommandBufferUsageFlags::SIMULTANEOUS_USE)
+                    .inheritance_info(&inherited),
+            )?;
+            let mut sets = sets.into_iter();
+            for command in commands {
+                // before each command: so that the first waits for batches of before, and for what wgpu did
+                barrier(device, made.commands, false);
+                match command {
+                    Command::Dispatch {
+                        program,
+                        workgroups,
+                        ..
+                    } => {
+                        let pipeline = program.pipeline();
+                        let compute = vk::PipelineBindPoint::COMPUTE;
+                        let set = [sets.next().expect("a set a dispatch")];
+                        device.cmd_bind_pipeline(made.commands, compute, pipeline.pipeline);
+                        device.cmd_bind_descriptor_sets(
+                            made.commands,
+                            compute,
+                            pipeline.layout,
+                            0,
+                            &set,
+                            &[],
+                        );
+                        device.cmd_dispatch(made.commands, *workgroups, 1, 1);
+                    }
+                    Command::Copy {
+                        from,
+                        from_at,
+                        to,
+                        to_at,
+                        bytes,
+                    } => {
+                        let region = [vk::BufferCopy {
+                            src_offset: *from_at,
+                            dst_offset: *to_at,
+                            size: *bytes,
+                        }];
+                        device.cmd_copy_buffer(made.commands, from.raw().0, to.raw().0, &region);
+                    }
+                }
+            }
+            device.end_command_buffer(made.commands)?;
+        }
+        Ok(made)
+    }
+
+    /// Descriptor sets, one a dispatch.
+    ///
+    /// # Safety
+    /// None but that handles in `commands` are alive.
+    unsafe fn sets(
+        &self,
+        made: &mut Recording,
+        commands: &[Command],
+    ) -> Result<Vec<vk::DescriptorSet>, vk::Result> {
+        let dispatches: Vec<_> = commands
+            .iter()
+            .filter_map(|command| match command {
+                Command::Dispatch { program, slots, .. } => Some((program, slots)),
+                Command::Copy { .. } => None,
+            })
+            .collect();
+        if dispatches.is_empty() {
+            return Ok(Vec::new());
+        }
+        let buffers: usize = dispatches.iter().map(|(_, slots)| slots.len()).sum();
+        let sizes = [vk::DescriptorPoolSize {
+            ty: vk::DescriptorType::STORAGE_BUFFER,
+            descriptor_count: buffers as u32,
+        }];
+        let layouts: Vec<_> = dispatches.iter().map(|(p, _)| p.pipeline().set).collect();
+        // SAFETY: the pool has room for exactly these sets; each binding of a layout is written once.
+        unsafe {
+            made.descriptors = self.device.create_descriptor_pool(
+                &vk::DescriptorPoolCreateInfo::default()
+                    .max_sets(dispatches.len() as u32)
+                    .pool_sizes(&sizes),
+                None,
+            )?;
+            let sets = self.device.allocate_descriptor_sets(
+                &vk::DescriptorSetAllocateInfo::default()
+                    .descriptor_pool(made.descriptors)
+                    .set_layouts(&layouts),
+            )?;
+            for (set, (_, slots)) in sets.iter().zip(dispatches) {
+                for slot in slots {
+                    let range = [vk::DescriptorBufferInfo {
+                        buffer: slot.buffer.raw().0,
+                        offset: slot.range.start,
+                        range: slot.range.end - slot.range.start,
+                    }];
+                    let write = vk::WriteDescriptorSet::default()
+                        .dst_set(*set)
+                        .dst_binding(slot.binding)
+                        .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
+                        .buffer_info(&range);
+                    self.device.update_descriptor_sets(&[write], &[]);
+                }
+            }
+            Ok(sets)
+        }
+    }
+
+    /// Puts recordings into an encoder of wgpu, which holds nothing else; what they write is seen by all that follows, the host too.
+    ///
+    /// `false` where wgpu has no encoder to put them into: the device is lost.
+    pub fn execute(&self, encoder: &mut wgpu::CommandEncoder, recordings: &[&Recording]) -> bool {
+        let commands: Vec<_> = recordings.iter().map(|r| r.commands).collect();
+        // SAFETY: the recordings are of this device and live until `run` has waited; wgpu records nothing beside them.
+        unsafe {
+            encoder.as_hal_mut::<Api, _, _>(|encoder| {
+                let Some(encoder) = encoder else {
+                    return false;
+                };
+                let primary = encoder.raw_handle();
+                if !commands.is_empty() {
+                    self.device.cmd_execute_commands(primary, &commands);
+                }
+                barrier(&self.device, primary, true);
+                true
+            })
+        }
+    }
+}
+
+/// What was written before is seen after: by programs and copies, and by the host where asked for.
+///
+/// # Safety
+/// `commands` is being recorded.
+unsafe fn barrier(device: &ash::Device, commands: vk::CommandBuffer, host: bool) {
+    use vk::AccessFlags as Access;
+    use vk::PipelineStageFlags as Stage;
+    let work = Stage::COMPUTE_SHADER | Stage::TRANSFER;
+    let written = Access::SHADER_WRITE | Access::TRANSFER_WRITE;
+    let used = written | Access::SHADER_READ | Access::TRANSFER_READ;
+    let (to, reads) = if host {
+        (work | Stage::HOST, used | Access::HOST_READ)
+    } else {
+        (work, used)
+    };
+    let memory = [vk::MemoryBarrier::default()
+        .src_access_mask(written)
+        .dst_access_mask(reads)];
+    let flags = vk::DependencyFlags::empty();
+    // SAFETY: as promised by the caller.
+    unsafe { device.cmd_pipeline_barrier(commands, work, to, flags, &memory, &[], &[]) };
+}
+
+impl Drop for Recording {
+    fn drop(&mut self) {
+        // SAFETY: `run` waited for its end; null handles are passed over.
+        unsafe {
+            self.device.destroy_command_pool(self.pool, None);
+            self.device.destroy_descriptor_pool(self.descriptors, None);
+        }
+    }
+}

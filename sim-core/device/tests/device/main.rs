@@ -1,0 +1,8 @@
+//! The device against its word: on Vulkan and through wgpu alone, recorded and encoded.
+
+mod common;
+mod compile;
+mod memory;
+mod refusals;
+mod run;
+mod validation;

@@ -1,0 +1,161 @@
+//! Commands do what they say, in their order, on every route.
+
+use crate::common::{copy, fetch, numbers, program, scale_add, staged, ways};
+use sim_device::{Batch, Device, Replay};
+
+const COUNT: u32 = 1000;
+
+#[test]
+fn a_new_buffer_is_zero() {
+    for (device, _) in ways() {
+        let buffer = device.buffer("fresh", 4004).unwrap();
+        assert_eq!(fetch(&device, &buffer), vec![0.0; 1001]);
+        assert!(
+            device
+                .staging("fresh", 36)
+                .unwrap()
+                .read()
+                .iter()
+                .all(|&b| b == 0)
+        );
+    }
+}
+
+#[test]
+fn dispatches_and_copies_see_what_those_before_them_wrote() {
+    for (device, replay) in ways() {
+        let add = program(&device, scale_add(2.0, COUNT));
+        assert_eq!(add.bindings(), [0, 3]);
+        let input: Vec<f32> = (0..COUNT).map(|i| i as f32).collect();
+        let (from, to) = (staged(&device, &input), staged(&device, &vec![0.0; 1000]));
+        let [a, b] = ["a", "b"].map(|label| device.buffer(label, 4000).unwrap());
+        let mut batch = device.batch(replay);
+        batch.copy(&from, 0, &a, 0, 4000);
+        // b = 2a, a += 2b = 5a, b += 2a = 12a
+        for (x, y) in [(&a, &b), (&b, &a), (&a, &b)] {
+            batch.dispatch(
+                &add,
+                &[(0, x, 0..4000), (3, y, 0..4000)],
+                COUNT.div_ceil(32),
+            );
+        }
+        batch.copy(&b, 0, &to, 0, 4000);
+        let batch = batch.finish().unwrap();
+        let wanted: Vec<f32> = input.iter().map(|x| 12.0 * x).collect();
+        device.run(&[&batch]).unwrap();
+        assert_eq!(numbers(&to), wanted, "{replay:?}");
+        // b keeps its 12a: 2a + 12a; a = a + 2 * 14a; b = 14a + 2 * 29a
+        device.run(&[&batch]).unwrap();
+        let wanted: Vec<f32> = input.iter().map(|x| 72.0 * x).collect();
+        assert_eq!(numbers(&to), wanted, "{replay:?}");
+    }
+}
+
+#[test]
+fn batches_of_one_run_see_what_those_before_them_wrote_whatever_their_replay() {
+    let replays = [Replay::Recorded, Replay::Encoded];
+    for (device, _) in ways() {
+        let add = program(&device, scale_add(2.0, COUNT));
+        for mask in 0..8 {
+            let replay = |i: usize| replays[mask >> i & 1];
+            let (from, to) = (staged(&device, &[1.0; 1000]), staged(&device, &[0.0; 1000]));
+            let buffer = device.buffer("b", 4000).unwrap();
+            let first = copy(&device, replay(0), &from, &buffer);
+            let mut middle = device.batch(replay(1));
+            middle.dispatch(&add, &[(0, &from, 0..4000), (3, &buffer, 0..4000)], 32);
+            let last = copy(&device, replay(2), &buffer, &to);
+            let middle = middle.finish().unwrap();
+            device.run(&[&first, &middle, &middle, &last]).unwrap();
+            assert_eq!(numbers(&to), [5.0; 1000]);
+        }
+    }
+}
+
+#[test]
+fn a_batch_replayed_a_thousand_times_equals_one_that_is_encoded() {
+    // x ← x/3 + y, y ← y/3 + x: rounds at every step, so that a step too many, too few or too early shows in the bits
+    let run = |device: &Device, replay| {
+        let add = program(device, scale_add(1.0 / 3.0, COUNT));
+        let input: Vec<f32> = (0..COUNT).map(|i| 1.0 / (i + 1) as f32).collect();
+        let zero = staged(device, &[0.0; 1000]);
+        let [x, y] = ["x", "y"].map(|label| device.buffer(label, 4000).unwrap());
+        let from = staged(device, &input);
+        device
+            .run(&[
+                &copy(device, replay, &from, &x),
+                &copy(device, replay, &zero, &y),
+            ])
+            .unwrap();
+        let mut batch = device.batch(replay);
+        for _ in 0..5 {
+            batch.dispatch(&add, &[(0, &x, 0..4000), (3, &y, 0..4000)], 32);
+            batch.copy(&y, 0, &x, 400, 2000);
+        }
+        let batch = batch.finish().unwrap();
+        for _ in 0..1000 {
+            device.run(&[&batch]).unwrap();
+        }
+        let bits =
+            |buffer| -> Vec<u32> { fetch(device, buffer).iter().map(|x| x.to_bits()).collect() };
+        (bits(&x), bits(&y))
+    };
+    let all: Vec<_> = ways()
+        .into_iter()
+        .map(|(device, replay)| run(&device, replay))
+        .collect();
+    assert_eq!(all[0], all[1]);
+    assert_eq!(all[0], all[2]);
+    assert_ne!(all[0].0, all[0].1);
+}
+
+#[test]
+fn many_batches_live_side_by_side_and_keep_what_they_name() {
+    for (device, replay) in ways() {
+        let out = device.buffer("out", 16).unwrap();
+        let batches: Vec<Batch> = (0..500)
+            .map(|i| {
+                // program and buffers are dropped here: the batch alone holds them
+                let add = program(&device, scale_add(f64::from(i % 7), 4));
+                let one = staged(&device, &[1.0; 4]);
+                let mut batch = device.batch(replay);
+                batch.dispatch(&add, &[(0, &one, 0..16), (3, &out, 0..16)], 1);
+                batch.finish().unwrap()
+            })
+            .collect();
+        let backwards: Vec<&Batch> = batches.iter().rev().collect();
+        device.run(&backwards).unwrap();
+        let sum: u32 = (0..500).map(|i| i % 7).sum();
+        assert_eq!(fetch(&device, &out), [sum as f32; 4]);
+    }
+}
+
+#[test]
+fn an_empty_run_and_an_empty_batch_do_nothing() {
+    for (device, replay) in ways() {
+        let nothing = device.batch(replay).finish().unwrap();
+        device.run(&[]).unwrap();
+        device.run(&[&nothing, &nothing]).unwrap();
+    }
+}
+
+#[test]
+fn threads_run_batches_of_one_device_at_the_same_time() {
+    for (device, replay) in ways() {
+        std::thread::scope(|scope| {
+            for thread in 0..4 {
+                let device = device.clone();
+                scope.spawn(move || {
+                    let add = program(&device, scale_add(f64::from(thread), 100));
+                    let (one, sum) = (staged(&device, &[1.0; 100]), staged(&device, &[0.0; 100]));
+                    let mut batch = device.batch(replay);
+                    batch.dispatch(&add, &[(0, &one, 0..400), (3, &sum, 0..400)], 4);
+                    let batch = batch.finish().unwrap();
+                    for _ in 0..100 {
+                        device.run(&[&batch]).unwrap();
+                    }
+                    assert_eq!(numbers(&sum), [100.0 * thread as f32; 100]);
+                });
+            }
+        });
+    }
+}
