@@ -175,12 +175,15 @@ fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
                 let recording = recordings[stage.number()].as_ref().expect("it is needed");
                 let what = format!("{}: {}", case.name, stage.name());
                 let inputs = gathered(&mut block, stage.reads());
-                let mut scratch = memory.clone();
+                let before = memory.clone();
                 run(stage, m, &mut block, &mut memory);
                 let expected = gathered(&mut block, stage.writes());
-                let got = recording.evaluate(&inputs, &mut scratch, &m.contacts.tables);
-                assert_same(&got, &expected, &what);
-                assert_same(&scratch, &memory, &format!("{what}: memory"));
+                for recording in [recording, &recording.packed()] {
+                    let mut scratch = before.clone();
+                    let got = recording.evaluate(&inputs, &mut scratch, &m.contacts.tables);
+                    assert_same(&got, &expected, &what);
+                    assert_same(&scratch, &memory, &format!("{what}: memory"));
+                }
             }
         }
     }

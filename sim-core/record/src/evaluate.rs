@@ -1,8 +1,10 @@
 //! Runs a recording on the CPU, one world at a time: the check on the program where no GPU is.
 
 use super::Recording;
-use super::tree::{Binary, Cell, Entry, Op, Operand, Rounds, Row, Statement, Unary};
+use super::pack::WIDTH;
+use super::tree::{Binary, Cell, Entry, Op, Operand, Quad, Rounds, Row, Statement, Unary};
 use sim_core::lane::{Num, Real, Tables};
+use std::collections::HashMap;
 
 /// Should the statements after this one be run?
 #[derive(PartialEq)]
@@ -18,6 +20,8 @@ struct Machine<'a> {
     tables: &'a Tables<f32>,
     /// Results by number; masks are 1 or 0.
     values: Vec<f32>,
+    /// Results that are vectors, by number.
+    quads: HashMap<u32, [f32; WIDTH]>,
     /// Results that are indices, by number.
     indices: Vec<usize>,
     variables: Vec<f32>,
@@ -49,6 +53,7 @@ impl Recording {
             inputs,
             scratch,
             tables,
+            quads: HashMap::new(),
             indices: vec![0; self.values.len()],
             values: vec![0.0; self.values.len()],
             variables: vec![0.0; self.names],
@@ -65,12 +70,19 @@ impl Machine<'_> {
         for statement in body {
             match statement {
                 Statement::Let(number) => {
-                    let number = *number as usize;
+                    let (number, number_of) = (*number as usize, *number);
                     match self.recording.values[number] {
                         Op::Index { entry, end } => {
                             let index = self.tables.indices[self.place(&entry)] as usize;
                             assert!(index < end, "index {index} of {entry:?} is not below {end}");
                             self.indices[number] = index;
+                        }
+                        Op::Quad(quad) => {
+                            let first = self.first(&quad);
+                            // the last vector of a memory need not be whole
+                            let number = |k| self.scratch.get(first + k).copied().unwrap_or(0.0);
+                            let numbers = std::array::from_fn(number);
+                            self.quads.insert(number_of, numbers);
                         }
                         Op::After(row, x) => {
                             self.indices[number] = self.row(row) + self.operand(x).to_usize();
@@ -84,6 +96,16 @@ impl Machine<'_> {
                 Statement::Store { cell, value } => {
                     let address = self.address(cell);
                     self.scratch[address] = self.operand(*value);
+                }
+                Statement::StoreQuad { quad, numbers } => {
+                    let first = self.first(quad);
+                    for (k, number) in numbers.iter().enumerate() {
+                        if let Some(x) = number
+                            && first + k < self.scratch.len()
+                        {
+                            self.scratch[first + k] = self.operand(*x);
+                        }
+                    }
                 }
                 Statement::List { name } => self.counts[*name as usize] = 0,
                 Statement::When { mask, body } => {
@@ -175,7 +197,9 @@ impl Machine<'_> {
                 let row = x(row).to_usize();
                 self.tables.numbers[table.base + row * table.stride + number]
             }
+            Op::Part(four, k) => self.quads[&four][k],
             Op::Index { .. } | Op::After(..) => unreachable!("the value is an index"),
+            Op::Quad(_) => unreachable!("the value is a vector"),
         }
     }
 
@@ -193,6 +217,11 @@ impl Machine<'_> {
 
     fn address(&self, cell: &Cell) -> usize {
         cell.table.base + self.row(cell.row) * cell.table.stride + cell.number
+    }
+
+    /// Where the numbers of a vector begin.
+    fn first(&self, quad: &Quad) -> usize {
+        WIDTH * (self.row(quad.row) * quad.stride + quad.first)
     }
 
     fn place(&self, entry: &Entry) -> usize {

@@ -37,6 +37,7 @@ mod lists;
 mod live;
 mod loops;
 mod number;
+mod pack;
 mod recorder;
 mod rounds;
 mod state;
@@ -65,6 +66,8 @@ pub struct Recording {
     pub(crate) values: Vec<Op>,
     /// Variables, lists, indices and rows are numbered below this.
     pub(crate) names: usize,
+    /// Numbers of scratch memory that the tables reach.
+    pub(crate) scratch: usize,
     pub(crate) body: Vec<Statement>,
 }
 
@@ -135,13 +138,16 @@ pub fn record(
         return Err(error);
     }
     live::prune(&state.values, &mut body, &outputs, place)?;
-    Ok(Recording {
+    let mut recording = Recording {
         inputs,
         outputs,
         names: state.counters().names as usize,
         values: state.values.iter().map(|v| v.op).collect(),
+        scratch: 0,
         body,
-    })
+    };
+    recording.scratch = recording.reach();
+    Ok(recording)
 }
 
 impl Recording {
@@ -157,6 +163,10 @@ impl Recording {
 
     /// Numbers of scratch memory that the tables reach, per world.
     pub fn scratch(&self) -> usize {
+        self.scratch
+    }
+
+    fn reach(&self) -> usize {
         let mut end = 0;
         let mut reach = |cell: &Cell| {
             let rows = match cell.row {
@@ -202,13 +212,21 @@ impl Recording {
         };
         self.each_statement(&mut |statement| match statement {
             Statement::Let(number) => match self.values[*number as usize] {
-                Op::Load(_) | Op::Constant(_) | Op::Pick { .. } | Op::Index { .. } => n.loads += 1,
+                Op::Load(_)
+                | Op::Quad(_)
+                | Op::Constant(_)
+                | Op::Pick { .. }
+                | Op::Index { .. } => n.loads += 1,
                 op if op.is_inline() => {}
                 _ => n.lets += 1,
             },
             Statement::Var { .. } | Statement::List { .. } => n.variables += 1,
             Statement::Set { .. } => n.sets += 1,
             Statement::Store { .. } => n.stores += 1,
+            Statement::StoreQuad { numbers, .. } => {
+                let given = numbers.iter().flatten().count();
+                n.stores += if given == numbers.len() { 1 } else { given };
+            }
             Statement::When { .. } | Statement::Push { .. } => n.blocks += 1,
             Statement::Loop { .. } => n.loops += 1,
             Statement::Stop(_) => n.stops += 1,
@@ -219,26 +237,33 @@ impl Recording {
     /// Inputs that anything depends on, in order.
     pub(crate) fn live_inputs(&self) -> Vec<u32> {
         let mut used = vec![false; self.inputs];
-        let mut mark = |x: Operand| {
+        self.each_operand(&mut |x| {
             if let Operand::Value(number) = x
                 && (number as usize) < self.inputs
             {
                 used[number as usize] = true;
             }
-        };
-        self.outputs.iter().for_each(|x| mark(*x));
-        self.each_statement(&mut |statement| match statement {
-            Statement::Let(number) => self.values[*number as usize].each_operand(&mut mark),
-            Statement::Var { value, .. }
-            | Statement::Set { value, .. }
-            | Statement::Store { value, .. }
-            | Statement::Stop(value) => mark(*value),
-            Statement::When { mask, .. } | Statement::Push { mask, .. } => mark(*mask),
-            Statement::List { .. } | Statement::Loop { .. } => {}
         });
         (0..self.inputs as u32)
             .filter(|i| used[*i as usize])
             .collect()
+    }
+
+    /// Calls `f` with what each statement reads, and with the outputs.
+    pub(crate) fn each_operand(&self, mark: &mut impl FnMut(Operand)) {
+        self.outputs.iter().for_each(|x| mark(*x));
+        self.each_statement(&mut |statement| match statement {
+            Statement::Let(number) => self.values[*number as usize].each_operand(&mut *mark),
+            Statement::Var { value, .. }
+            | Statement::Set { value, .. }
+            | Statement::Store { value, .. }
+            | Statement::Stop(value) => mark(*value),
+            Statement::StoreQuad { numbers, .. } => {
+                numbers.iter().flatten().for_each(|x| mark(*x));
+            }
+            Statement::When { mask, .. } | Statement::Push { mask, .. } => mark(*mask),
+            Statement::List { .. } | Statement::Loop { .. } => {}
+        });
     }
 
     fn each_statement(&self, f: &mut impl FnMut(&Statement)) {

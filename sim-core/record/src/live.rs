@@ -90,6 +90,11 @@ impl Live<'_> {
                     self.mark(*value);
                     any = true;
                 }
+                Statement::StoreQuad { quad, numbers } => {
+                    quad.row.each_operand(|x| self.mark(x));
+                    numbers.iter().flatten().for_each(|x| self.mark(*x));
+                    any = true;
+                }
                 Statement::When { mask, body } => {
                     if self.walk(body) {
                         self.mark(*mask);
@@ -140,7 +145,7 @@ impl Live<'_> {
                 Statement::Var { name, .. }
                 | Statement::Set { name, .. }
                 | Statement::List { name } => self.names.contains(name),
-                Statement::Store { .. } => true,
+                Statement::Store { .. } | Statement::StoreQuad { .. } => true,
                 Statement::When { body, .. } => self.keep(body),
                 Statement::Push { list, body, .. } => self.keep(body) | self.names.contains(list),
                 Statement::Loop { body, .. } => self.keep(body),

@@ -82,6 +82,10 @@ pub(crate) enum Op {
     },
     /// The index that lies a whole number after another. The value is an index.
     After(Row, Operand),
+    /// Four numbers in scratch memory at this point. The value is a vector.
+    Quad(Quad),
+    /// A number of the vector that a value is.
+    Part(u32, usize),
 }
 
 impl Op {
@@ -90,6 +94,8 @@ impl Op {
         match *self {
             Op::Input(_) | Op::Get(_) | Op::Count(_) => {}
             Op::Load(cell) => cell.row.each_operand(f),
+            Op::Quad(quad) => quad.row.each_operand(f),
+            Op::Part(four, _) => f(Operand::Value(four)),
             Op::Number(row) => row.each_operand(f),
             Op::Constant(entry) | Op::Index { entry, .. } => entry.row.each_operand(f),
             Op::Unary(_, a) | Op::Pick { row: a, .. } => f(a),
@@ -111,7 +117,10 @@ impl Op {
 
     /// Is it written where it is used, instead of in a statement of its own?
     pub(crate) fn is_inline(&self) -> bool {
-        matches!(self, Op::Unary(Unary::Neg | Unary::Not, _) | Op::Input(_))
+        matches!(
+            self,
+            Op::Unary(Unary::Neg | Unary::Not, _) | Op::Input(_) | Op::Part(..)
+        )
     }
 }
 
@@ -150,6 +159,14 @@ pub(crate) struct Cell {
     pub number: usize,
 }
 
+/// Four numbers side by side in scratch memory: vector `row * stride + first`, counted in vectors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Quad {
+    pub row: Row,
+    pub stride: usize,
+    pub first: usize,
+}
+
 /// Which rounds a loop runs, at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rounds {
@@ -174,6 +191,11 @@ pub(crate) enum Statement {
     Store {
         cell: Cell,
         value: Operand,
+    },
+    /// Writes those numbers of a vector that are given.
+    StoreQuad {
+        quad: Quad,
+        numbers: [Option<Operand>; 4],
     },
     /// An empty list.
     List {

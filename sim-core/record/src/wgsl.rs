@@ -4,11 +4,14 @@
 //! neighbouring numbers. The number of worlds and the size of a workgroup are constants of the
 //! pipeline (`worlds`, `workgroup`): the program's text depends on neither.
 //!
-//! Binding 0 holds the fields: input i is `fields[inputs[i] * worlds + world]`. Binding 1 holds the
-//! rows: number k of row r of a table is `scratch[(base + r * stride + k) * worlds + world]`, and is
-//! declared only where a table is used. Bindings 2 and 3, too, are declared only where they are read: the
-//! tables of the model, the same for every world, of numbers (`numbers[base + r * stride + k]`) and of
-//! indices. They are buffers, not constants, so that a program does not grow with its model's tables.
+//! Memory comes in vectors of four numbers, since a driver's compile time grows with the accesses:
+//! number n of a world is component n % 4 of vector `(n / 4) * worlds + world`. Binding 0 holds the
+//! fields: input i is number `inputs[i]`. Binding 1 holds the rows: number k of row r of a table is
+//! number `base + r * stride + k`, and is declared only where a table is used. Both hold whole
+//! vectors: the last one is read and written although not all of it be used, but a number that the
+//! text does not write keeps its bits. Bindings 2 and 3, too, are declared only where they are read:
+//! the tables of the model, the same for every world, of numbers (`numbers[base + r * stride + k]`)
+//! and of indices. They are buffers, not constants, so that a program does not grow with its model's tables.
 //!
 //! What WGSL leaves open: an implementation may fuse a product with a sum, treat numbers below
 //! 2^-126 as 0, and assume that nothing is infinite or not a number. An infinite constant is
@@ -16,8 +19,13 @@
 //! by the recorder.
 
 use super::Recording;
-use super::tree::{Binary, Cell, Entry, Op, Operand, Rounds, Row, Statement, Unary};
+use super::pack::WIDTH;
+use super::tree::{Binary, Cell, Entry, Op, Operand, Quad, Rounds, Row, Statement, Unary};
+use std::collections::{BTreeMap, HashMap};
 use std::fmt::{self, Write};
+
+/// Names of a vector's components.
+const COMPONENTS: [char; WIDTH] = ['x', 'y', 'z', 'w'];
 
 /// What a program is called and where it finds its numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,8 +71,10 @@ pub fn wgsl(recording: &Recording, options: &ProgramOptions) -> String {
     };
     let inputs = fields(&options.inputs, 0, recording.inputs());
     let outputs = fields(&options.outputs, n, recording.outputs());
+    let recording = &recording.packed();
     let mut printer = Printer {
         recording,
+        single: recording.single_parts(),
         text: String::new(),
         indent: 1,
     };
@@ -76,6 +86,8 @@ pub fn wgsl(recording: &Recording, options: &ProgramOptions) -> String {
 
 struct Printer<'a> {
     recording: &'a Recording,
+    /// Vectors of which one number alone is used, and which: only that is read.
+    single: HashMap<u32, usize>,
     text: String,
     indent: usize,
 }
@@ -134,18 +146,76 @@ impl Printer<'_> {
         )?;
         line!(self, "let world = thread.x;")?;
         line!(self, "if (world >= worlds) {{ return; }}")?;
-        for i in self.recording.live_inputs() {
-            line!(
-                self,
-                "let x{i} = {};",
-                field(inputs[i as usize])
-            )?;
-        }
+        let read = self.inputs(inputs)?;
         self.block(&self.recording.body)?;
-        for (x, place) in self.recording.outputs.iter().zip(outputs) {
-            line!(self, "{} = {};", field(*place), self.operand(*x))?;
-        }
+        self.outputs(inputs, outputs, &read)?;
         writeln!(self.text, "}}")
+    }
+
+    /// Reads the live inputs, vector by vector; returns the vectors that are read whole.
+    fn inputs(&mut self, inputs: &[u32]) -> Result<Vec<u32>, fmt::Error> {
+        let mut quads: BTreeMap<u32, Vec<(u32, char)>> = BTreeMap::new();
+        for i in self.recording.live_inputs() {
+            let (quad, part) = place_of_field(inputs[i as usize]);
+            quads.entry(quad).or_default().push((i, part));
+        }
+        let mut whole = Vec::new();
+        for (quad, numbers) in quads {
+            if let [(i, part)] = numbers[..] {
+                line!(self, "let x{i} = fields[{quad}u * worlds + world].{part};")?;
+                continue;
+            }
+            line!(self, "let q{quad} = fields[{quad}u * worlds + world];")?;
+            for (i, part) in numbers {
+                line!(self, "let x{i} = q{quad}.{part};")?;
+            }
+            whole.push(quad);
+        }
+        Ok(whole)
+    }
+
+    /// Writes the outputs, vector by vector; one that is an input in its own field is there already.
+    fn outputs(&mut self, inputs: &[u32], outputs: &[u32], read: &[u32]) -> fmt::Result {
+        let mut quads: BTreeMap<u32, [Option<String>; WIDTH]> = BTreeMap::new();
+        for (x, field) in self.recording.outputs.iter().zip(outputs) {
+            let stays = match *x {
+                Operand::Value(number) => inputs.get(number as usize) == Some(field),
+                _ => false,
+            };
+            if !stays {
+                let place = *field as usize % WIDTH;
+                quads.entry(field / WIDTH as u32).or_default()[place] = Some(self.operand(*x));
+            }
+        }
+        for (quad, mut numbers) in quads {
+            let place = format!("fields[{quad}u * worlds + world]");
+            let count = numbers.iter().flatten().count();
+            let mut is_read = read.contains(&quad);
+            if count + 1 == WIDTH && !is_read {
+                line!(self, "let q{quad} = {place};")?;
+                is_read = true;
+            }
+            if count > 1 && is_read {
+                for (number, part) in numbers.iter_mut().zip(COMPONENTS) {
+                    number.get_or_insert_with(|| format!("q{quad}.{part}"));
+                }
+            }
+            self.write(&place, &numbers)?;
+        }
+        Ok(())
+    }
+
+    /// Writes those numbers of a vector that are given.
+    fn write(&mut self, place: &str, numbers: &[Option<String>; WIDTH]) -> fmt::Result {
+        if let [Some(x), Some(y), Some(z), Some(w)] = numbers {
+            return line!(self, "{place} = vec4<f32>({x}, {y}, {z}, {w});");
+        }
+        for (number, part) in numbers.iter().zip(COMPONENTS) {
+            if let Some(x) = number {
+                line!(self, "{place}.{part} = {x};")?;
+            }
+        }
+        Ok(())
     }
 
     fn block(&mut self, body: &[Statement]) -> fmt::Result {
@@ -170,6 +240,10 @@ impl Printer<'_> {
                 if op.is_inline() {
                     return Ok(());
                 }
+                if let (Op::Quad(quad), Some(part)) = (op, self.single.get(number)) {
+                    let part = COMPONENTS[*part];
+                    return line!(self, "let t{number} = {}.{part};", vector(&quad));
+                }
                 line!(self, "let t{number} = {};", self.op(op))
             }
             Statement::Var { name, value } => {
@@ -180,6 +254,10 @@ impl Printer<'_> {
             }
             Statement::Store { cell, value } => {
                 line!(self, "{} = {};", scratch(cell), self.operand(*value))
+            }
+            Statement::StoreQuad { quad, numbers } => {
+                let numbers = numbers.map(|x| x.map(|x| self.operand(x)));
+                self.write(&vector(quad), &numbers)
             }
             Statement::List { name } => line!(self, "var n{name} = 0u;"),
             Statement::When { mask, body } => {
@@ -231,6 +309,9 @@ impl Printer<'_> {
             Op::Input(i) => format!("x{i}"),
             Op::Get(name) => format!("v{name}"),
             Op::Load(cell) => scratch(&cell),
+            Op::Quad(quad) => vector(&quad),
+            Op::Part(four, _) if self.single.contains_key(&four) => format!("t{four}"),
+            Op::Part(four, k) => format!("t{four}.{}", COMPONENTS[k]),
             Op::Count(list) => format!("f32(n{list})"),
             Op::Unary(unary, a) => match unary {
                 Unary::Neg => format!("(-{})", x(a)),
@@ -300,43 +381,25 @@ fn place(first: usize, stride: usize, row: Row) -> String {
     }
 }
 
-/// A component of four numbers.
-fn component(i: usize) -> &'static str {
-    ["x", "y", "z", "w"][i % 4]
-}
-
-fn field(i: u32) -> String {
-    format!(
-        "fields[{}u * worlds + world].{}",
-        i / 4,
-        component(i as usize)
-    )
-}
-
+/// A number whose place in its vector is found at run time.
 fn scratch(cell: &Cell) -> String {
     let Cell { table, row, number } = cell;
-    let first = table.base + number;
-    match row {
-        Row::At(i) => {
-            let place = first + i * table.stride;
-            format!(
-                "scratch[{}u * worlds + world].{}",
-                place / 4,
-                component(place)
-            )
-        }
-        _ if table.stride.is_multiple_of(4) => format!(
-            "scratch[({} * {}u + {}u) * worlds + world].{}",
-            index(*row),
-            table.stride / 4,
-            first / 4,
-            component(first)
-        ),
-        _ => {
-            let place = place(first, table.stride, *row);
-            format!("scratch[(({place}) / 4u) * worlds + world][({place}) % 4u]")
-        }
+    let place = place(table.base + number, table.stride, *row);
+    format!("scratch[({place}) / 4u * worlds + world][({place}) % 4u]")
+}
+
+fn vector(quad: &Quad) -> String {
+    let place = place(quad.first, quad.stride, quad.row);
+    match quad.row {
+        Row::At(_) => format!("scratch[{place} * worlds + world]"),
+        _ => format!("scratch[({place}) * worlds + world]"),
     }
+}
+
+/// The vector that a field lies in, and its component.
+fn place_of_field(field: u32) -> (u32, char) {
+    let width = WIDTH as u32;
+    (field / width, COMPONENTS[(field % width) as usize])
 }
 
 /// The shortest decimal that reads back as the same `f32`; infinities as the largest number.

@@ -15,35 +15,35 @@ pub const CAPACITY: usize = 3;
 const LISTS: usize = 2;
 const WORK: Table = Table {
     base: 0,
-    stride: 2,
+    stride: 4,
     rows: 5,
 };
 const ROWS: [Table; LISTS] = [
     Table {
-        base: 10,
-        stride: 3,
+        base: 20,
+        stride: 8,
         rows: CAPACITY,
     },
     Table {
-        base: 19,
+        base: 44,
         stride: 2,
         rows: CAPACITY,
     },
 ];
 /// Lengths of the kept lists.
 const COUNTS: Table = Table {
-    base: 25,
+    base: 50,
     stride: 1,
     rows: 2,
 };
 /// Rows of the kept lists.
 const KEPT: Table = Table {
-    base: 27,
-    stride: 2,
+    base: 54,
+    stride: 4,
     rows: 6,
 };
 /// Scratch memory of a program, in numbers per world.
-pub const SCRATCH: usize = 39;
+pub const SCRATCH: usize = 78;
 
 /// Numbers of the model.
 const NUMBERS: Fixed = Fixed {

@@ -2,6 +2,7 @@
 
 mod algebra;
 mod kept;
+mod packed;
 mod programs;
 mod refusals;
 mod refused_blocks;

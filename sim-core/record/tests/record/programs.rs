@@ -83,9 +83,9 @@ fn fields_and_names_of_a_program_are_the_callers() {
     for line in [
         "override workgroup: u32 = 64u;",
         "if (world >= worlds) { return; }",
-        "let x1 = fields[7u * worlds + world];",
-        "scratch[3u * worlds + world] = x1;",
-        "fields[12u * worlds + world] = t2;",
+        "let x1 = fields[1u * worlds + world].w;",
+        "scratch[0u * worlds + world].w = x1;",
+        "fields[3u * worlds + world].x = t2;",
     ] {
         assert!(program.contains(line), "{line} is not in\n{program}");
     }
