@@ -9,7 +9,7 @@ use sim_protocol::{AttachOptions, Client, keep_waiting};
 
 use crate::config::MeshOptions;
 use crate::error::DaemonError;
-use crate::{inspect, recording, session};
+use crate::{devices, inspect, recording, session};
 
 /// Batched robot simulation, served over shared memory.
 #[derive(Debug, Parser)]
@@ -48,6 +48,10 @@ enum Command {
     ///
     /// Example: tightloop replay run.tlrec
     Replay(Replay),
+    /// List the GPUs of this machine, those that software plays last, and what fits on each.
+    ///
+    /// Example: tightloop devices
+    Devices,
     /// List the daemons that run, one name a line.
     ///
     /// Example: tightloop list
@@ -71,9 +75,13 @@ pub(crate) struct Serve {
     #[arg(long, default_value_t = 1)]
     pub(crate) worlds: u64,
 
-    /// Where the physics runs: cpu, or auto for the best there is.
+    /// Where the physics runs: cpu, gpu, or auto for a GPU if there is one and the worlds are many, else the CPU.
     #[arg(long, default_value = "auto")]
     pub(crate) device: String,
+
+    /// Which GPU: its number or part of its name, as `devices` lists them; the first if left out.
+    #[arg(long)]
+    pub(crate) adapter: Option<String>,
 
     /// Name under which clients find the daemon.
     #[arg(long, default_value = "tightloop")]
@@ -244,6 +252,7 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
         Command::Inspect(args) => inspect::run(args),
         Command::Record(args) => recording::record(args),
         Command::Replay(args) => recording::replay(args),
+        Command::Devices => devices::run(),
         Command::List => list(),
         Command::Stop { name } => stop(name),
     };

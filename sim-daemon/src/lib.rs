@@ -5,6 +5,7 @@
 
 mod cli;
 pub mod config;
+mod devices;
 mod error;
 mod export;
 mod faults;

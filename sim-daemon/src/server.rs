@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use sim_engine::simulation::Simulation;
-use sim_protocol::Op;
 use sim_protocol::host::{Host, Next};
+use sim_protocol::{Op, RefusalKind};
 
 use crate::error::DaemonError;
 use crate::export::{self, Advance};
@@ -31,6 +31,7 @@ fn serve(
 ) -> Result<(), DaemonError> {
     let mut mask = Vec::with_capacity(simulation.worlds());
     let mut scratch = Vec::new();
+    let mut lease = 0;
     loop {
         match host.wait()? {
             Next::Command => {
@@ -40,9 +41,25 @@ fn serve(
                 if host.is_recorded() && applied.is_ok() && host.inbox().op() == Op::Restore {
                     host.record_state(&simulation.snapshot(), true);
                 }
+                // the frames of another lease may lie where those of the last one lay
+                if host.lease() != lease {
+                    simulation.forget();
+                    lease = host.lease();
+                }
+                let lost = simulation.lost().map(ToString::to_string);
                 match applied {
-                    Ok(Advance::Step) => host.answer(started, |arena| simulation.step(arena)),
-                    Ok(Advance::Forward) => host.answer(started, |arena| simulation.forward(arena)),
+                    Ok(_) if lost.is_some() => {
+                        host.refuse(RefusalKind::Backend, &lost.unwrap_or_default());
+                    }
+                    Ok(advance) => host.answer(started, |arena| {
+                        // SAFETY: the frames of a lease stay where they are as long as it lasts, and their heads are written
+                        // before and after.
+                        unsafe { simulation.import(arena) };
+                        match advance {
+                            Advance::Step => simulation.step(arena),
+                            Advance::Forward => simulation.forward(arena),
+                        }
+                    }),
                     Err(refusal) => host.refuse(refusal.kind, &refusal.reason),
                 }
                 // the client has its frame, and need not wait for it

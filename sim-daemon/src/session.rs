@@ -7,7 +7,8 @@ use std::sync::atomic::AtomicBool;
 
 use serde_json::json;
 use sim_core::batch::Field;
-use sim_engine::simulation::{Draws, Faults, Lanes, Options, Precision, Simulation};
+use sim_engine::options::{self, Adapter};
+use sim_engine::simulation::{Device, Draws, Faults, Lanes, Options, Precision, Simulation};
 use sim_protocol::host::{Host, check_memory};
 use sim_protocol::place::Place;
 use sim_protocol::tenancy::Tenancy;
@@ -111,6 +112,9 @@ fn open(serve: &Serve, stop: &Arc<AtomicBool>) -> Result<(Simulation, Host), Dae
     let simulation = Simulation::new(model, &options)?;
     (told.device, told.threads) = (simulation.device().to_owned(), simulation.threads());
     told.state_bytes = simulation.snapshot_bytes() as u64;
+    if let (Some(why), true) = (simulation.device_note(), serve.device == "auto") {
+        told.notes.push(format!("device auto is {why}"));
+    }
     let host = Host::open(tenancy, told, table, Arc::clone(stop))?;
     Ok((simulation, host))
 }
@@ -128,12 +132,13 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
     if !(1..=COUNT_MAX).contains(&serve.worlds) {
         return wrong("worlds", &serve.worlds, format!("ask for 1 to {COUNT_MAX}"));
     }
-    if !matches!(serve.device.as_str(), "auto" | "cpu") {
-        let problem = match serve.device.as_str() {
-            "gpu" => "there is no GPU backend yet; use auto or cpu",
-            _ => "unknown; use auto or cpu",
-        };
-        return wrong("device", &serve.device, problem.to_owned());
+    let Some(device) = device(serve) else {
+        let problem = "unknown; use auto, cpu or gpu".to_owned();
+        return wrong("device", &serve.device, problem);
+    };
+    if let (Some(adapter), false) = (&serve.adapter, serve.device == "gpu") {
+        let problem = "goes with device gpu only".to_owned();
+        return wrong("adapter", adapter, problem);
     }
     let precision = match serve.precision.as_str() {
         "f32" => Precision::F32,
@@ -210,6 +215,7 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
     }
     let (worlds, threads) = (serve.worlds as usize, serve.threads);
     Ok(Options {
+        device,
         worlds,
         precision,
         threads,
@@ -223,6 +229,24 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
         },
         draws,
     })
+}
+
+/// What is to keep the worlds; none if the word is unknown.
+fn device(serve: &Serve) -> Option<Device> {
+    let adapter = match &serve.adapter {
+        None => Adapter::First,
+        Some(text) => match text.parse() {
+            Ok(index) => Adapter::Index(index),
+            Err(_) => Adapter::Name(text.clone()),
+        },
+    };
+    let cache = options::cache_folder();
+    match serve.device.as_str() {
+        "cpu" => Some(Device::Cpu),
+        "gpu" => Some(Device::Gpu { adapter, cache }),
+        "auto" => Some(Device::Auto { cache }),
+        _ => None,
+    }
 }
 
 /// The scene, and the folder that its paths are relative to.

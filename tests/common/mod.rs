@@ -154,6 +154,7 @@ impl Run {
                 Dtype::F64 => f64::from_ne_bytes(x.try_into().unwrap()),
                 Dtype::I32 => f64::from(i32::from_ne_bytes(x.try_into().unwrap())),
                 Dtype::U32 => f64::from(u32::from_ne_bytes(x.try_into().unwrap())),
+                Dtype::U64 => u64::from_ne_bytes(x.try_into().unwrap()) as f64,
                 other => unreachable!("{other:?}"),
             })
             .collect()

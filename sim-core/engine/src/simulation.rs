@@ -1,48 +1,17 @@
 //! Many worlds of one model: reset, write, step, read.
 
 pub use crate::backend::{Faults, FirstFrozen, Frozen, Lanes, Precision};
+pub use crate::options::{AUTO_WORLDS, Device, Options};
 pub use crate::random::Draws;
 
-use crate::backend::{Backend, BackendError, Values, cpu};
+use crate::backend::{Backend, BackendError, Values};
+use crate::options::{backend, check_memory, memory_of};
 use crate::snapshot::{self, Head, SnapshotError};
 use sim_core::batch::{Dtype, Field, Group, Layout};
 use sim_core::model::Model;
 use sim_core::model::constants::Motion;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// How to run a model.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Options {
-    /// Number of worlds.
-    pub worlds: usize,
-    /// Precision of state, commands and fields.
-    pub precision: Precision,
-    /// Threads of a step; none = one a core.
-    pub threads: Option<usize>,
-    /// Worlds a block.
-    pub lanes: Lanes,
-    /// Fields of a frame; counters come with every frame.
-    pub fields: Vec<Field>,
-    /// When a world is frozen, and what becomes of it.
-    pub faults: Faults,
-    /// What the draws of a world depend on.
-    pub draws: Draws,
-}
-
-impl Default for Options {
-    fn default() -> Options {
-        Options {
-            worlds: 1,
-            precision: Precision::F32,
-            threads: None,
-            lanes: Lanes::Auto,
-            fields: vec![Field::JointQ, Field::JointQd, Field::BodyQ],
-            faults: Faults::default(),
-            draws: Draws::default(),
-        }
-    }
-}
 
 /// Shortest quaternion that says a rotation.
 const QUATERNION_MIN: f64 = 1e-6;
@@ -55,6 +24,7 @@ pub struct Simulation {
     layout: Layout,
     freezes_nan: bool,
     backend: Box<dyn Backend>,
+    device_note: Option<String>,
 }
 
 impl Simulation {
@@ -82,18 +52,16 @@ impl Simulation {
         }
         check_memory(&model, options)?;
         let layout = Simulation::layout_of(&model, options);
-        let threads = threads_of(options);
-        let (worlds, precision) = (options.worlds, options.precision);
-        let (lanes, draws) = (options.lanes, options.draws);
-        let mut backend = cpu::create(&model, worlds, precision, lanes, &layout, threads, draws)?;
+        let (mut backend, device_note) = backend(&model, options, &layout)?;
         backend.set_faults(options.faults);
         Ok(Simulation {
             model,
-            worlds,
-            precision,
+            worlds: options.worlds,
+            precision: options.precision,
             layout,
             freezes_nan: options.faults.freezes_nan,
             backend,
+            device_note,
         })
     }
 
@@ -122,6 +90,31 @@ impl Simulation {
     pub fn device(&self) -> &str {
         self.backend.device()
     }
+    /// Why [`Device::Auto`] chose what it runs on, for people.
+    pub fn device_note(&self) -> Option<&str> {
+        self.device_note.as_deref()
+    }
+    /// What made it useless: a device that is gone. Frames stay as they are from then on.
+    pub fn lost(&self) -> Option<&BackendError> {
+        self.backend.lost()
+    }
+    /// Bytes of frames that the processor has copied: 0 where the device writes into the arenas itself.
+    pub fn copied(&self) -> u64 {
+        self.backend.copied()
+    }
+    /// Lets a GPU write into this arena whenever it is stepped into; false where it cannot, and on the CPU, which always does.
+    ///
+    /// # Safety
+    /// Its memory stays mapped where it is, to the same pages, until [`Simulation::forget`] or the end of the simulation, and
+    /// nothing else that lies in its pages is written during a step.
+    pub unsafe fn import(&mut self, arena: &mut [u64]) -> bool {
+        // SAFETY: by contract.
+        unsafe { self.backend.import(arena) }
+    }
+    /// Forgets all arenas that were imported: their memory may go.
+    pub fn forget(&mut self) {
+        self.backend.forget();
+    }
     /// Threads that a step uses.
     pub fn threads(&self) -> usize {
         self.backend.threads()
@@ -142,26 +135,7 @@ impl Simulation {
 
     /// Memory that the worlds take in this process, an arena not included [bytes].
     pub fn memory_of(model: &Model, options: &Options) -> u64 {
-        let (real, width) = match options.precision {
-            Precision::F32 => (4, 16),
-            Precision::F64 => (8, 1),
-        };
-        let worlds = (options.worlds as u64).saturating_add(width);
-        // scratch of each chunk, its matrices included; see backend/cpu/mod.rs
-        let m = model.constants();
-        let matrices = 3 * m.pattern.len() + 2 * m.coupled.pattern.len();
-        let chunks = threads_of(options).saturating_mul(cpu::CHUNKS_PER_THREAD) as u64;
-        let scratch = ((m.contacts.memory.len + matrices) as u64 * real * width)
-            .saturating_mul(chunks.min(worlds));
-        // state and commands of a world, its counters; see backend/cpu/chunk.rs
-        worlds
-            .saturating_mul(
-                ((5 + 3 * m.delay.frames) * model.dofs() + 2 * model.coords() + m.varying.len())
-                    as u64
-                    * real
-                    + 28,
-            )
-            .saturating_add(scratch)
+        memory_of(model, options)
     }
 
     /// Sets columns of the state in the worlds of the mask (none = all), and clears their warm start.
@@ -436,38 +410,4 @@ impl Simulation {
             _ => Ok(()),
         }
     }
-}
-
-/// Threads that are asked for: as many as there are cores if none are.
-fn threads_of(options: &Options) -> usize {
-    let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
-    options.threads.unwrap_or_else(cores)
-}
-
-/// Refuses what would not fit, before anything is taken.
-fn check_memory(model: &Model, options: &Options) -> Result<(), BackendError> {
-    const MB: u64 = 1 << 20;
-    // a system that does not say how much is free is not asked twice: the allocation itself will tell
-    let Some(available) = available_memory() else {
-        return Ok(());
-    };
-    let needed = Simulation::memory_of(model, options);
-    if needed > available {
-        return Err(BackendError::Memory {
-            worlds: options.worlds,
-            needed_mb: needed / MB,
-            available_mb: available / MB,
-        });
-    }
-    Ok(())
-}
-
-/// Memory that can be taken without swapping [bytes].
-fn available_memory() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text
-        .lines()
-        .find(|line| line.starts_with("MemAvailable:"))?;
-    let kb: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kb * 1024)
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 use sim_core::batch::Field;
-use sim_engine::simulation::{Draws, Faults, Lanes, Options, Precision, Simulation};
+use sim_engine::simulation::{Device, Draws, Faults, Lanes, Options, Precision, Simulation};
 use sim_protocol::digest::{digest, digests_of};
 use sim_protocol::host::{Inbox, free_memory};
 use sim_protocol::{CommandHeader, Description, Op, Row, Table};
@@ -260,6 +260,7 @@ impl Run {
                 .ok_or_else(|| failed(format!("has a field `{}`, unknown here", field.name)))
         });
         let options = Options {
+            device: Device::Cpu,
             worlds: told.worlds,
             precision: match told.precision.as_str() {
                 "f64" => Precision::F64,

@@ -195,4 +195,27 @@ pub enum BackendError {
         /// The bound.
         value: f64,
     },
+    /// What an accelerator, or its driver, refused.
+    #[error("{reason}")]
+    Device {
+        /// Its words.
+        reason: String,
+    },
+    /// A model whose stages cannot be recorded.
+    #[error("this model cannot be written as a program of a GPU: {reason}; use device = cpu")]
+    Program {
+        /// Why.
+        reason: String,
+    },
+    /// Double precision on a GPU.
+    #[error("a GPU computes in single precision; use precision = f32, or device = cpu")]
+    DoubleOnGpu,
+}
+
+impl From<sim_device::DeviceError> for BackendError {
+    fn from(error: sim_device::DeviceError) -> BackendError {
+        BackendError::Device {
+            reason: error.to_string(),
+        }
+    }
 }

@@ -4,6 +4,7 @@ pub mod cpu;
 mod error;
 mod frozen;
 mod gather;
+pub mod gpu;
 mod noise;
 mod shown;
 mod state;
@@ -153,6 +154,24 @@ pub trait Backend: Send {
     /// The worlds that were frozen since this was asked last.
     fn take_frozen(&mut self) -> Frozen;
     /// Runs `substeps` substeps (none = evaluates only), then writes every field of the layout
-    /// into the arena, 8-byte words. No allocation, no error.
+    /// into the arena, 8-byte words. No allocation, no error: see [`Backend::lost`].
     fn run(&mut self, substeps: usize, arena: &mut [u64]);
+    /// What made this backend useless: a device that is gone. Nothing is computed after it.
+    fn lost(&self) -> Option<&BackendError> {
+        None
+    }
+    /// Bytes of frames that the processor has copied.
+    fn copied(&self) -> u64 {
+        0
+    }
+    /// Lets a device write into this arena whenever it is given to [`Backend::run`]; false where it cannot.
+    ///
+    /// # Safety
+    /// Its memory stays mapped where it is, to the same pages, until [`Backend::forget`] or the end of the backend, and nothing
+    /// else that lies in its pages is written while it runs.
+    unsafe fn import(&mut self, _arena: &mut [u64]) -> bool {
+        false
+    }
+    /// Forgets all arenas that were imported.
+    fn forget(&mut self) {}
 }

@@ -190,6 +190,11 @@ impl Host {
         self.state.answer(started, fill);
     }
 
+    /// The number of the present lease: its frames lie in memory of its own. 0 if there is none.
+    pub fn lease(&self) -> u64 {
+        self.state.lane.as_ref().map_or(0, |lane| lane.epoch)
+    }
+
     /// Whether somebody records what is done.
     pub fn is_recorded(&self) -> bool {
         self.state.journals.are_read()

@@ -1,0 +1,157 @@
+//! A control frame: commands go in, the recorded batches run, and what the host keeps of a frame is taken from it.
+
+use super::tile::{Rows, Tile};
+use super::{Gpu, host};
+use crate::backend::noise::sample;
+use crate::backend::{BackendError, FirstFrozen};
+use crate::random::{Draw, Stream};
+use sim_core::batch::{Dtype, Field, WorkSlot, status};
+
+impl Gpu {
+    /// Draws what is added to the commands of the frame.
+    fn send_command_noise(&mut self) -> Result<(), BackendError> {
+        if self.noise.commands.iter().all(|(_, first)| first.is_none()) {
+            return Ok(());
+        }
+        let dofs = self.shape().dofs;
+        let worlds = self.meant(None);
+        let rows: Vec<Vec<u32>> = (worlds.iter())
+            .map(|&world| {
+                let mut row = vec![0; 3 * dofs];
+                for (k, &(stream, first)) in self.noise.commands.iter().enumerate() {
+                    let Some(first) = first else { continue };
+                    let draw = self.draw_of(world, stream);
+                    for dof in 0..dofs {
+                        let std = f64::from(self.host.params(world)[first + dof]);
+                        row[k * dofs + dof] = (sample(&draw, dof, std) as f32).to_bits();
+                    }
+                }
+                row
+            })
+            .collect();
+        let place = self.places.of(WorkSlot::CommandNoise);
+        self.send(
+            &worlds,
+            Rows::Fields,
+            place.start,
+            3 * dofs as u32,
+            |k, to| {
+                to.copy_from_slice(&rows[k]);
+            },
+        )
+    }
+
+    fn draw_of(&self, world: usize, stream: Stream) -> Draw {
+        let number = self.draws.number(world);
+        let (seed, episode) = (self.host.seeds[world], self.host.episodes[world]);
+        Draw::at_step(seed, number, episode, self.host.steps[world], stream)
+    }
+
+    /// Adds noise to fields that have some: it is drawn on the host.
+    fn add_noise(&self, arena: &mut [u64]) {
+        for slot in &self.layout.slots {
+            let Some(noise) = self.noise.of(slot.field) else {
+                continue;
+            };
+            let columns: usize = slot.shape[1..].iter().product();
+            if columns == 0 || slot.dtype != Dtype::F32 {
+                continue;
+            }
+            let rows: &mut [f32] = host::array(arena, slot.offset, slot.bytes);
+            for (world, row) in rows.chunks_exact_mut(columns).enumerate() {
+                let draw = self.draw_of(world, noise.1);
+                let deviation = |number: usize| f64::from(self.host.params(world)[number]);
+                self.noise.add_to(noise, row, &draw, deviation);
+            }
+        }
+    }
+
+    /// A frame of a device that is gone: every world shows that it is no longer finite.
+    pub(super) fn show_lost(&self, arena: &mut [u64]) {
+        let worlds = self.host.seeds.len();
+        let found: &mut [u32] = host::array(arena, self.offset(Field::Status), 4 * worlds);
+        found.fill(status::NOT_FINITE);
+    }
+
+    fn offset(&self, field: Field) -> usize {
+        let slot = self.layout.slots.iter().find(|slot| slot.field == field);
+        slot.expect("counters are part of every frame").offset
+    }
+
+    /// Reads the counters of a frame: which worlds were frozen in it.
+    fn look(&mut self, arena: &mut [u64], counts: bool) {
+        let worlds = self.host.seeds.len();
+        let (at_status, at_step) = (self.offset(Field::Status), self.offset(Field::Step));
+        self.host
+            .steps
+            .copy_from_slice(host::array::<u64>(arena, at_step, 8 * worlds));
+        let found: &mut [u32] = host::array(arena, at_status, 4 * worlds);
+        for (world, &now) in found.iter().enumerate() {
+            let before = self.host.status[world];
+            if counts && now & status::FROZEN != 0 && before & status::FROZEN == 0 {
+                self.host.frozen.count(FirstFrozen {
+                    frame: self.host.frames,
+                    world,
+                    steps: self.host.steps[world],
+                    is_finite: now & status::NOT_FINITE == 0,
+                });
+            }
+            self.host.status[world] = now;
+        }
+    }
+
+    pub(super) fn run_frame(&mut self, steps: bool, arena: &mut [u64]) -> Result<(), BackendError> {
+        if steps {
+            self.host.frames += 1;
+            self.send_command_noise()?;
+        }
+        let place = arena.as_ptr() as usize;
+        let imported = self.imported.iter().find(|(known, _)| *known == place);
+        let shown = imported.map(|(_, imported)| &imported.shown[..]);
+        let mut batches = Vec::with_capacity(3 * self.tiles.len());
+        for (k, tile) in self.tiles.iter().enumerate() {
+            batches.extend(tile.pending());
+            batches.push(tile.computes(steps));
+            batches.push(shown.map_or_else(|| tile.shows(), |shown| &shown[k]));
+        }
+        if shown.is_none() {
+            batches.extend(self.tiles.iter().filter_map(Tile::copies_out));
+        }
+        self.device.run(&batches)?;
+        let is_staged = shown.is_none();
+        for tile in &mut self.tiles {
+            tile.sent();
+        }
+        if is_staged {
+            let bytes = self.layout.bytes;
+            host::bytes(arena)[..bytes].copy_from_slice(&self.frame.read()[..bytes]);
+            self.copied += bytes as u64;
+        }
+        self.look(arena, steps);
+        self.add_noise(arena);
+        if steps && self.faults.resets {
+            let frozen = |world: &usize| self.host.status[*world] & status::FROZEN != 0;
+            let again: Vec<usize> = (0..self.host.seeds.len()).filter(frozen).collect();
+            if !again.is_empty() {
+                for &world in &again {
+                    self.host.episodes[world] = self.host.episodes[world].wrapping_add(1);
+                    self.host.steps[world] = 0;
+                }
+                self.begin(&again)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends the commands that wait for a frame.
+    pub(super) fn flush(&mut self) -> Result<(), BackendError> {
+        let batches: Vec<_> = self.tiles.iter().flat_map(Tile::pending).collect();
+        if !batches.is_empty() {
+            self.device.run(&batches)?;
+        }
+        for tile in &mut self.tiles {
+            tile.sent();
+        }
+        Ok(())
+    }
+}

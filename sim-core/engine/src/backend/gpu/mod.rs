@@ -1,0 +1,367 @@
+//! A GPU: worlds live in its memory, a control frame is one recorded batch. Sole user of sim-device.
+//!
+//! The programs are the one text of physics, recorded for the model (`programs`), and a few that keep books (`upkeep`, `show`). Randomness
+//! stays on the host, and so do seeds, episodes and the parameters' last values.
+
+mod compiled;
+mod frame;
+mod host;
+mod imported;
+mod places;
+mod programs;
+mod show;
+mod tile;
+mod upkeep;
+mod worlds;
+
+use super::shown::stages_for;
+use super::state::{Shape, StateField, start};
+use super::{Backend, BackendError, Faults, FirstFrozen, Frozen, Values};
+use crate::backend::noise::Noise;
+use crate::random::Draws;
+use crate::start::StartDraw;
+use compiled::{Books, Compiled};
+use host::Host;
+use imported::Imported;
+use places::Places;
+use programs::Programs;
+use sim_core::batch::{Field, Layout, status};
+use sim_core::model::Model;
+use sim_core::model::constants::Constants;
+use sim_device::{AdapterKind, Buffer, Choice, Device, Staging};
+use std::ops::Range;
+use std::path::Path;
+use std::time::Duration;
+use tile::{Rows, Tile};
+
+/// A driver that takes longer over the programs of a model is given up.
+const COMPILE_LIMIT: Duration = Duration::from_secs(180);
+
+/// How frames reach the memory of their readers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Delivery {
+    /// The device writes into the reader's memory.
+    Imported,
+    /// The host copies them there.
+    Staged,
+}
+
+pub(super) struct Gpu {
+    // batches go before the buffers and programs that they name, and those before the device
+    tiles: Vec<Tile>,
+    compiled: Compiled,
+    /// The frame, in memory that the host sees.
+    frame: Staging,
+    /// The frame, in memory of the device, where that is another.
+    drawn: Option<Buffer>,
+    /// Memory of readers that the device writes to, by its address.
+    imported: Vec<(usize, Imported)>,
+    device: Device,
+    constants: Constants<f32>,
+    layout: Layout,
+    places: Places,
+    /// Where each number of a world's record lies.
+    record: Vec<u32>,
+    start: Vec<f32>,
+    draw: StartDraw,
+    draws: Draws,
+    noise: Noise,
+    faults: Faults,
+    host: Host,
+    name: String,
+    lost: Option<BackendError>,
+    copied: u64,
+}
+
+/// Worlds on the adapter that is meant.
+///
+/// # Errors
+/// No such adapter, out of memory, a driver that cannot compile the programs.
+pub fn create(
+    model: &Model,
+    worlds: usize,
+    layout: &Layout,
+    choice: &Choice,
+    cache: Option<&Path>,
+    draws: Draws,
+) -> Result<Box<dyn Backend>, BackendError> {
+    Ok(Box::new(Gpu::new(
+        model, worlds, layout, choice, cache, draws,
+    )?))
+}
+
+impl Gpu {
+    fn new(
+        model: &Model,
+        worlds: usize,
+        layout: &Layout,
+        choice: &Choice,
+        cache: Option<&Path>,
+        draws: Draws,
+    ) -> Result<Gpu, BackendError> {
+        let device = Device::open(choice, cache)?;
+        let constants: Constants<f32> = model.constants().cast();
+        let m = &constants;
+        let computed: Vec<(Field, usize)> = (layout.slots.iter())
+            .filter(|slot| show::is_computed(slot.field) && slot.bytes > 0)
+            .map(|slot| (slot.field, slot.shape[1..].iter().product()))
+            .collect();
+        let places = Places::new(m, &computed);
+        let shown = stages_for(layout);
+        let wanted: Vec<_> = (layout.slots.iter())
+            .flat_map(|slot| show::slots_of(slot.field))
+            .copied()
+            .collect();
+        let programs = Programs::new(m, &places, model.substeps(), &shown, &computed, &wanted)
+            .map_err(|e| BackendError::Program {
+                reason: e.to_string(),
+            })?;
+        let sensors = model.contact_sensors();
+        let shapes = sensors.first().map_or(0, |sensor| sensor.of.len());
+        let frame_s = model.substeps() as f64 * model.dt();
+        let books = Books {
+            counters: show::counters(layout, frame_s),
+            contacts: show::contacts(m, &places, layout, shapes),
+        };
+        let widest = tile::widest(&device, m, &places, worlds);
+        let compiled = Compiled::new(&device, m, &places, &programs, books, widest, COMPILE_LIMIT)?;
+        let frame = device.staging("frame", layout.bytes.max(64) as u64)?;
+        let drawn = match device.info().kind {
+            AdapterKind::Discrete => Some(device.buffer("frame", layout.bytes.max(64) as u64)?),
+            _ => None,
+        };
+        let pairs = tile::pairs(m, sensors);
+        let runs = show::runs(m, &places, layout);
+        let finds_contacts = shown.contains(&sim_core::step::Stage::ContactRows);
+        let target = drawn.as_ref().unwrap_or(&frame);
+        let mut tiles = Vec::new();
+        for first in (0..worlds).step_by(widest as usize) {
+            let part = first..(first + widest as usize).min(worlds);
+            let tile = Tile::new(&device, m, &places, &compiled, part, widest, &runs, &pairs)?;
+            tiles.push(tile);
+        }
+        for tile in &mut tiles {
+            tile.record(&device, &compiled, finds_contacts, target)?;
+        }
+        if let Some(last) = tiles.last_mut()
+            && let Some(drawn) = &drawn
+        {
+            last.copy_out(&device, drawn, &frame, layout.bytes as u64)?;
+        }
+        let shape = Shape::of(m);
+        let mut gpu = Gpu {
+            tiles,
+            compiled,
+            frame,
+            drawn,
+            imported: Vec::new(),
+            name: format!("gpu ({}, {})", device.info().name, device.info().driver),
+            device,
+            record: places.record(shape),
+            start: start(model),
+            draw: StartDraw::new(model),
+            draws,
+            noise: Noise::new(model),
+            faults: Faults::default(),
+            host: Host::new(worlds, m.varying.len()),
+            layout: layout.clone(),
+            places,
+            constants,
+            lost: None,
+            copied: 0,
+        };
+        // those past the last world run along from the scene's start
+        let all: Vec<usize> = (0..worlds).collect();
+        gpu.host
+            .fill_params(&gpu.start[shape.start(StateField::Params)..]);
+        let padding = gpu.start.clone();
+        gpu.pad(&padding)?;
+        gpu.begin(&all)?;
+        Ok(gpu)
+    }
+
+    /// Keeps the first thing that went wrong: nothing is computed after it.
+    fn check(&mut self, result: Result<(), BackendError>) {
+        if let Err(error) = result {
+            self.lost.get_or_insert(error);
+        }
+    }
+}
+
+impl Backend for Gpu {
+    fn device(&self) -> &str {
+        &self.name
+    }
+
+    fn threads(&self) -> usize {
+        1
+    }
+
+    fn set_faults(&mut self, faults: Faults) {
+        self.faults = faults;
+        let bounds = [faults.joint_q_max, faults.joint_qd_max].map(|x| (x as f32).to_bits());
+        for tile in &self.tiles {
+            tile.set_bounds(bounds);
+        }
+    }
+
+    fn freeze_others(&mut self, good: &[bool]) {
+        let is_well = |world: &usize| self.host.status[*world] & status::FROZEN == 0;
+        let bad: Vec<usize> = (0..good.len())
+            .filter(|&w| !good[w])
+            .filter(is_well)
+            .collect();
+        for &world in &bad {
+            self.host.frozen.count(FirstFrozen {
+                frame: self.host.frames,
+                world,
+                steps: self.host.steps[world],
+                is_finite: false,
+            });
+            self.host.status[world] = status::NOT_FINITE;
+        }
+        let sent = self.send(&bad, Rows::Counters, 2, 1, |_, to| {
+            to[0] = status::NOT_FINITE
+        });
+        self.check(sent);
+    }
+
+    fn write(
+        &mut self,
+        field: Field,
+        columns: Range<usize>,
+        values: Values<'_>,
+        mask: Option<&[bool]>,
+    ) {
+        let target = StateField::of(field);
+        if let (None, Some(command), Values::F32(values)) = (mask, tile::command(field), values)
+            && columns.len() == self.shape().dofs
+        {
+            // what a frame brings: it goes with the frame
+            for tile in &mut self.tiles {
+                tile.stage(command, values, columns.len());
+            }
+            return;
+        }
+        // numbers that wait must not come after these
+        let sent = self.flush();
+        self.check(sent);
+        let written = self.write_columns(target, &columns, values, mask);
+        self.check(written);
+    }
+
+    fn write_params(&mut self, columns: Range<usize>, values: Values<'_>, mask: Option<&[bool]>) {
+        let written = self.write_columns(StateField::Params, &columns, values, mask);
+        self.check(written);
+    }
+
+    fn params(&self, columns: Range<usize>, to: &mut [f64]) {
+        let n = columns.len();
+        for (world, row) in to.chunks_exact_mut(n.max(1)).enumerate() {
+            for (x, from) in row
+                .iter_mut()
+                .zip(&self.host.params(world)[columns.clone()])
+            {
+                *x = f64::from(*from);
+            }
+        }
+    }
+
+    fn numbers(&self) -> usize {
+        self.shape().total()
+    }
+
+    fn save(&self, records: &mut [u8]) {
+        self.save_records(records);
+    }
+
+    fn restore(&mut self, records: &[u8], mask: Option<&[bool]>, from_world: Option<usize>) {
+        let restored = self.restore_records(records, mask, from_world);
+        self.check(restored);
+    }
+
+    fn reset(&mut self, mask: Option<&[bool]>, seeds: Option<&[u64]>) {
+        let sent = self.flush();
+        self.check(sent);
+        let worlds = self.meant(mask);
+        for &world in &worlds {
+            self.host.steps[world] = 0;
+            match seeds {
+                Some(seeds) => {
+                    self.host.seeds[world] = if let [seed] = seeds {
+                        *seed
+                    } else {
+                        seeds[world]
+                    };
+                    self.host.episodes[world] = 0;
+                }
+                None => self.host.episodes[world] = self.host.episodes[world].wrapping_add(1),
+            }
+        }
+        let begun = self.begin(&worlds);
+        self.check(begun);
+    }
+
+    fn take_frozen(&mut self) -> Frozen {
+        let mut all = std::mem::take(&mut self.host.frozen);
+        if all.first.is_some() {
+            let frozen = |status: &&u32| **status & status::FROZEN != 0;
+            all.now = self.host.status.iter().filter(frozen).count();
+        }
+        all
+    }
+
+    fn run(&mut self, substeps: usize, arena: &mut [u64]) {
+        assert!(
+            arena.len() * 8 >= self.layout.bytes,
+            "the arena is smaller than the layout"
+        );
+        if self.lost.is_none() {
+            let run = self.run_frame(substeps > 0, arena);
+            self.check(run);
+        }
+        if self.lost.is_some() {
+            self.show_lost(arena);
+        }
+    }
+
+    fn lost(&self) -> Option<&BackendError> {
+        self.lost.as_ref()
+    }
+
+    fn copied(&self) -> u64 {
+        self.copied
+    }
+
+    fn forget(&mut self) {
+        self.imported.clear();
+    }
+
+    unsafe fn import(&mut self, arena: &mut [u64]) -> bool {
+        let place = arena.as_mut_ptr() as usize;
+        if self.imported.iter().any(|(known, _)| *known == place) {
+            return true;
+        }
+        if !self.device.info().imports {
+            return false;
+        }
+        // SAFETY: by contract.
+        let imported = unsafe {
+            Imported::new(
+                &self.device,
+                &self.compiled,
+                &self.tiles,
+                arena,
+                self.layout.bytes,
+                self.drawn.as_ref(),
+            )
+        };
+        match imported {
+            Ok(imported) => {
+                self.imported.push((place, imported));
+                true
+            }
+            Err(_) => false,
+        }
+    }
+}

@@ -1,0 +1,387 @@
+//! Programs that write a frame: arrays of all worlds, world-major, out of a structure of arrays.
+
+use super::places::Places;
+use sim_core::batch::{Field, Layout, Slot as Array, WorkSlot as Slot};
+use sim_core::model::constants::Constants;
+use sim_core::model::contact::row;
+use std::fmt::Write;
+
+/// Neighbouring numbers of a world that go to neighbouring places of its row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Run {
+    /// First number; [`ZERO`] where 0 is shown.
+    pub from: u32,
+    /// Word of the frame at which it begins in the row of the first world.
+    pub to: u32,
+    /// How many.
+    pub len: u32,
+    /// Words from a world's row to the next.
+    pub stride: u32,
+}
+
+/// Nothing is read: the number shown is 0.
+pub(super) const ZERO: u32 = u32::MAX;
+
+/// Fields that are made of others by a program of their own.
+pub(super) fn is_computed(field: Field) -> bool {
+    matches!(field, Field::BodyJacobian | Field::EfcJ)
+}
+
+/// The slots that a field of numbers shows, for what is evaluated.
+pub(super) fn slots_of(field: Field) -> &'static [Slot] {
+    match field {
+        Field::JointQdd => &[Slot::JointQdd],
+        Field::BodyQ => &[Slot::BodyQ],
+        Field::BodyQd => &[Slot::BodyQd],
+        Field::JointTorque => &[Slot::JointTorque],
+        Field::SiteQ => &[Slot::SiteQ],
+        Field::SiteQd => &[Slot::SiteQd],
+        Field::Gyro => &[Slot::Gyro],
+        Field::Accelerometer => &[Slot::Accelerometer],
+        Field::SiteInverseJacobian => &[Slot::SiteInverse],
+        Field::BiasForce => &[Slot::BiasForce],
+        Field::SmoothForce => &[Slot::SmoothForce],
+        Field::ConstraintForce => &[Slot::ConstraintForce],
+        Field::EfcD => &[Slot::EfcWeight],
+        Field::EfcAref => &[Slot::EfcAref],
+        Field::EfcForce => &[Slot::EfcForce],
+        Field::MassMatrix => &[Slot::MassMatrix],
+        Field::ContactPos => &[Slot::Reference],
+        _ => &[],
+    }
+}
+
+/// Where the elements of a field's row come from; none for counters and contacts.
+fn sources(m: &Constants<f32>, places: &Places, field: Field) -> Option<Vec<u32>> {
+    let slot = |slot: Slot| places.of(slot).collect::<Vec<u32>>();
+    Some(match field {
+        Field::JointQ | Field::JointQMeasured => slot(Slot::JointQ),
+        Field::JointQd | Field::JointQdMeasured => slot(Slot::JointQd),
+        Field::JointF => slot(Slot::JointF),
+        Field::JointTargetQ => slot(Slot::JointTargetQ),
+        Field::JointTargetQd => slot(Slot::JointTargetQd),
+        Field::JointQdd => (places.shown_qdd..places.shown_qdd + m.dofs.len() as u32).collect(),
+        Field::BodyJacobian => {
+            let first = places.computed(field);
+            (first..first + (m.frames.len() * 6 * m.dofs.len()) as u32).collect()
+        }
+        Field::EfcJ => {
+            let first = places.computed(field);
+            (first..first + (m.rows() * m.dofs.len()) as u32).collect()
+        }
+        Field::MassMatrix => {
+            let (n, first) = (m.dofs.len(), places.of(Slot::MassMatrix).start);
+            let all = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+            all.map(|(i, j)| {
+                m.pattern
+                    .find(i, j)
+                    .map_or(ZERO, |place| first + place as u32)
+            })
+            .collect()
+        }
+        Field::SiteInverseJacobian => {
+            let (n, first) = (m.dofs.len(), places.of(Slot::SiteInverse).start);
+            let mut all = vec![ZERO; m.sites.len() * n * 6];
+            let columns = m.sites.iter().enumerate();
+            let columns =
+                columns.flat_map(|(k, site)| site.columns.iter().map(move |c| (k, c.dof)));
+            for (row, (k, dof)) in columns.enumerate() {
+                for i in 0..6 {
+                    all[6 * (k * n + dof) + i] = first + (6 * row + i) as u32;
+                }
+            }
+            all
+        }
+        _ => match slots_of(field) {
+            [one] if !is_of_contacts(field) => slot(*one),
+            _ => return None,
+        },
+    })
+}
+
+/// What is copied of every world.
+pub(super) fn runs(m: &Constants<f32>, places: &Places, layout: &Layout) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    for array in &layout.slots {
+        let Some(sources) = sources(m, places, array.field) else {
+            continue;
+        };
+        let (word, stride) = (array.offset as u32 / 4, sources.len() as u32);
+        let first = runs.len();
+        for (k, &from) in sources.iter().enumerate() {
+            let follows = |run: &Run| match run.from {
+                ZERO => from == ZERO,
+                start => from != ZERO && start + run.len == from,
+            };
+            match runs[first..].last_mut().filter(|run| follows(run)) {
+                Some(run) => run.len += 1,
+                None => runs.push(Run {
+                    from,
+                    to: word + k as u32,
+                    len: 1,
+                    stride,
+                }),
+            }
+        }
+    }
+    runs
+}
+
+/// Copies runs of numbers into the frame.
+pub(super) const SHOW: &str = "
+override worlds: u32;
+override workgroup: u32 = 64u;
+@group(0) @binding(0) var<storage, read> fields: array<vec4<u32>>;
+// first world of the tile, its worlds, runs, 0; then a run each: from, to, len, stride
+@group(0) @binding(1) var<storage, read> what: array<vec4<u32>>;
+@group(0) @binding(2) var<storage, read_write> frame: array<u32>;
+@compute @workgroup_size(workgroup)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let w = id.x;
+    if (w >= what[0].y) { return; }
+    let world = what[0].x + w;
+    let runs = what[0].z;
+    for (var r = 1u; r <= runs; r++) {
+        let run = what[r];
+        for (var k = 0u; k < run.z; k++) {
+            var x = 0u;
+            let i = run.x + k;
+            if (run.x != 0xffffffffu) { x = fields[(i / 4u) * worlds + w][i % 4u]; }
+            frame[run.y + world * run.w + k] = x;
+        }
+    }
+}
+";
+
+/// Writes the counters: `time` is `step` times the duration of a frame, rounded as a processor rounds it.
+pub(super) fn counters(layout: &Layout, frame_s: f64) -> String {
+    let word = |field: Field| {
+        let array = layout.slots.iter().find(|array| array.field == field);
+        array.expect("counters are part of every frame").offset / 4
+    };
+    // frame_s = mantissa * 2^exponent
+    let bits = frame_s.to_bits();
+    let mantissa = (bits & ((1 << 52) - 1)) | (1 << 52);
+    let exponent = (bits >> 52) as i64 - 1075;
+    COUNTERS
+        .replace("LOW", &format!("{}u", mantissa as u32))
+        .replace("HIGH", &format!("{}u", (mantissa >> 32) as u32))
+        .replace("EXPONENT", &format!("{}", exponent + 1023))
+        .replace("AT_TIME", &format!("{}u", word(Field::Time)))
+        .replace("AT_STEP", &format!("{}u", word(Field::Step)))
+        .replace("AT_STATUS", &format!("{}u", word(Field::Status)))
+        .replace("AT_LEFT_OUT", &format!("{}u", word(Field::ContactsLeftOut)))
+}
+
+const COUNTERS: &str = "
+override worlds: u32;
+override workgroup: u32 = 64u;
+@group(0) @binding(0) var<storage, read> counters: array<vec4<u32>>;
+@group(0) @binding(1) var<storage, read> what: array<vec4<u32>>;
+@group(0) @binding(2) var<storage, read_write> frame: array<u32>;
+// a * b + c, low and high word
+fn wide(a: u32, b: u32, c: u32) -> vec2<u32> {
+    let al = a & 0xffffu; let ah = a >> 16u; let bl = b & 0xffffu; let bh = b >> 16u;
+    let ll = al * bl;
+    let m = ah * bl + (ll >> 16u);
+    let n = al * bh + (m & 0xffffu);
+    var low = (n << 16u) | (ll & 0xffffu);
+    var high = ah * bh + (m >> 16u) + (n >> 16u);
+    low = low + c;
+    if (low < c) { high = high + 1u; }
+    return vec2<u32>(low, high);
+}
+fn bit(p: vec4<u32>, i: u32) -> u32 { return (p[i / 32u] >> (i % 32u)) & 1u; }
+// a whole number times the duration of a frame, as the bits of a double
+fn time_of(low: u32, high: u32) -> vec2<u32> {
+    if (low == 0u && high == 0u) { return vec2<u32>(); }
+    var p = vec4<u32>();
+    let a = wide(low, LOW, 0u);
+    let b = wide(low, HIGH, a.y);
+    let c = wide(high, LOW, b.x);
+    var d = wide(high, HIGH, c.y);
+    d.x = d.x + b.y;
+    if (d.x < b.y) { d.y = d.y + 1u; }
+    p = vec4<u32>(a.x, c.x, d.x, d.y);
+    var top = 127u;
+    loop {
+        if (bit(p, top) == 1u) { break; }
+        top = top - 1u;
+    }
+    // 53 bits from the top one on, to the nearest, ties to even
+    let r = top - 52u;
+    var m = vec2<u32>();
+    for (var i = 0u; i < 53u; i++) {
+        m[i / 32u] = m[i / 32u] | (bit(p, r + i) << (i % 32u));
+    }
+    var rest = 0u;
+    for (var i = 0u; i + 1u < r; i++) { rest = rest | bit(p, i); }
+    if (r > 0u && bit(p, r - 1u) == 1u && (rest == 1u || (m.x & 1u) == 1u)) {
+        m.x = m.x + 1u;
+        if (m.x == 0u) { m.y = m.y + 1u; }
+        if (m.y == 0x200000u) { m = vec2<u32>(0u, 0x100000u); top = top + 1u; }
+    }
+    let exponent = u32(i32(top) + (EXPONENT));
+    return vec2<u32>(m.x, (m.y & 0xfffffu) | (exponent << 20u));
+}
+@compute @workgroup_size(workgroup)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let w = id.x;
+    if (w >= what[0].y) { return; }
+    let world = what[0].x + w;
+    let count = counters[w];
+    let time = time_of(count.x, count.y);
+    frame[AT_TIME + 2u * world] = time.x;
+    frame[AT_TIME + 2u * world + 1u] = time.y;
+    frame[AT_STEP + 2u * world] = count.x;
+    frame[AT_STEP + 2u * world + 1u] = count.y;
+    frame[AT_STATUS + world] = count.z;
+    frame[AT_LEFT_OUT + world] = count.w;
+}
+";
+
+/// Is it a field of contacts?
+pub(super) fn is_of_contacts(field: Field) -> bool {
+    matches!(
+        field,
+        Field::ContactCount
+            | Field::ContactPos
+            | Field::ContactNormal
+            | Field::ContactDistance
+            | Field::ContactForce
+            | Field::ContactPair
+            | Field::BodyContactForce
+            | Field::ContactSensor
+    )
+}
+
+/// Writes the fields of contacts: lists of each world by itself, one class after the other.
+pub(super) fn contacts(
+    m: &Constants<f32>,
+    places: &Places,
+    layout: &Layout,
+    shapes: usize,
+) -> Option<String> {
+    let arrays: Vec<&Array> = (layout.slots.iter())
+        .filter(|array| is_of_contacts(array.field) && array.bytes > 0)
+        .collect();
+    if arrays.is_empty() {
+        return None;
+    }
+    let (rows, counts) = (m.contacts.memory.rows, m.contacts.memory.counts);
+    let mut text = format!(
+        "
+override worlds: u32;
+override workgroup: u32 = 64u;
+@group(0) @binding(0) var<storage, read> fields: array<vec4<f32>>;
+@group(0) @binding(1) var<storage, read> scratch: array<vec4<f32>>;
+@group(0) @binding(2) var<storage, read> what: array<vec4<u32>>;
+@group(0) @binding(3) var<storage, read_write> frame: array<u32>;
+// of each pair: two shapes, two links; then of each sensor and shape: 1 where it is of the sensor, 2 where against
+@group(0) @binding(4) var<storage, read> pairs: array<vec4<i32>>;
+fn kept(i: u32, w: u32) -> f32 {{ return scratch[(i / 4u) * worlds + w][i % 4u]; }}
+fn at(row: u32, k: u32, w: u32) -> f32 {{ return kept({base}u + row * {stride}u + k, w); }}
+fn three(row: u32, k: u32, w: u32) -> vec3<f32> {{ return vec3<f32>(at(row, k, w), at(row, k + 1u, w), at(row, k + 2u, w)); }}
+fn put(i: u32, x: f32) {{ frame[i] = bitcast<u32>(x); }}
+fn put3(i: u32, x: vec3<f32>) {{ put(i, x.x); put(i + 1u, x.y); put(i + 2u, x.z); }}
+fn add3(i: u32, x: vec3<f32>) {{
+    put3(i, x + vec3<f32>(bitcast<f32>(frame[i]), bitcast<f32>(frame[i + 1u]), bitcast<f32>(frame[i + 2u])));
+}}
+@compute @workgroup_size(workgroup)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
+    let w = id.x;
+    if (w >= what[0].y) {{ return; }}
+    let world = what[0].x + w;
+    var n = 0u;
+",
+        base = rows.base,
+        stride = rows.stride,
+    );
+    for array in &arrays {
+        let width: usize = array.shape[1..].iter().product();
+        let empty = match array.field {
+            Field::ContactPair => "0xffffffffu",
+            _ => "0u",
+        };
+        let _ = writeln!(
+            text,
+            "    for (var k = 0u; k < {width}u; k++) {{ frame[{}u + world * {width}u + k] = {empty}; }}",
+            array.offset / 4
+        );
+    }
+    for (k, class) in m.contacts.classes.iter().enumerate() {
+        let reference = places.of(Slot::Reference).start + 3 * class.trees.1 as u32;
+        let _ = write!(
+            text,
+            "    let end{k} = min(u32(kept({}u, w)), {}u);
+    for (var i = 0u; i < end{k}; i++) {{
+        let row = {}u + i;
+        let pair = pairs[u32(at(row, {}u, w))];
+        let normal = three(row, {normal}u, w);
+        let force = at(row, {force}u, w) * normal + at(row, {force}u + 1u, w) * three(row, {tangents}u, w)
+            + at(row, {force}u + 2u, w) * three(row, {tangents}u + 3u, w);
+",
+            counts.base + k * counts.stride,
+            class.capacity,
+            class.first,
+            row::PAIR,
+            normal = row::NORMAL,
+            force = row::FORCE,
+            tangents = row::TANGENTS,
+        );
+        for array in &arrays {
+            let (base, width) = (array.offset / 4, array.shape[1..].iter().product::<usize>());
+            let first = format!("{base}u + world * {width}u");
+            let _ = match array.field {
+                Field::ContactCount => Ok(()),
+                Field::ContactPos => writeln!(
+                    text,
+                    "        put3({first} + 3u * n, three(row, {}u, w) + vec3<f32>({}, {}, {}));",
+                    row::POINT,
+                    component(reference),
+                    component(reference + 1),
+                    component(reference + 2),
+                ),
+                Field::ContactNormal => writeln!(text, "        put3({first} + 3u * n, normal);"),
+                Field::ContactForce => writeln!(text, "        put3({first} + 3u * n, force);"),
+                Field::ContactDistance => {
+                    writeln!(
+                        text,
+                        "        put({first} + n, at(row, {}u, w));",
+                        row::DISTANCE
+                    )
+                }
+                Field::ContactPair => writeln!(
+                    text,
+                    "        frame[{first} + 2u * n] = u32(pair.x); frame[{first} + 2u * n + 1u] = u32(pair.y);"
+                ),
+                Field::BodyContactForce => writeln!(
+                    text,
+                    "        if (pair.z >= 0) {{ add3({first} + 3u * u32(pair.z), -force); }}
+        if (pair.w >= 0) {{ add3({first} + 3u * u32(pair.w), force); }}"
+                ),
+                _ => writeln!(
+                    text,
+                    "        for (var s = 0u; s < {sensors}u; s++) {{
+            let a = pairs[{pairs}u + s * {shapes}u + u32(pair.x)].x;
+            let b = pairs[{pairs}u + s * {shapes}u + u32(pair.y)].x;
+            if ((b & 1) != 0 && (a & 2) != 0) {{ add3({first} + 3u * s, force); }}
+            if ((a & 1) != 0 && (b & 2) != 0) {{ add3({first} + 3u * s, -force); }}
+        }}",
+                    sensors = width / 3,
+                    pairs = m.contacts.pairs.len(),
+                ),
+            };
+        }
+        text += "        n = n + 1u;\n    }\n";
+    }
+    if let Some(array) = arrays.iter().find(|a| a.field == Field::ContactCount) {
+        let _ = writeln!(text, "    frame[{}u + world] = n;", array.offset / 4);
+    }
+    Some(text + "}\n")
+}
+
+fn component(i: u32) -> String {
+    let part = ["x", "y", "z", "w"][(i % 4) as usize];
+    format!("fields[{}u * worlds + w].{part}", i / 4)
+}

@@ -1,0 +1,234 @@
+//! Numbers of worlds between host and device: starts, records, and columns that are written.
+
+use super::tile::Rows;
+use super::{Gpu, host};
+use crate::backend::state::{Shape, StateField};
+use crate::backend::{BackendError, COUNTERS, Values};
+use std::ops::Range;
+
+impl Gpu {
+    pub(super) fn shape(&self) -> Shape {
+        Shape::of(&self.constants)
+    }
+
+    /// Every lane at the scene's start, those past the last world included.
+    pub(super) fn pad(&mut self, start: &[f32]) -> Result<(), BackendError> {
+        let row = self.placed(start);
+        for tile in &mut self.tiles {
+            tile.fill(&self.device, &row)?;
+        }
+        Ok(())
+    }
+
+    /// A world's record as it lies in device memory.
+    fn placed(&self, record: &[f32]) -> Vec<u32> {
+        let mut row = vec![0; self.places.state as usize];
+        for (place, x) in self.record.iter().zip(record) {
+            row[*place as usize] = x.to_bits();
+        }
+        row
+    }
+
+    /// Begins the episodes of these worlds, which the host has counted already.
+    pub(super) fn begin(&mut self, worlds: &[usize]) -> Result<(), BackendError> {
+        let params = self.shape().start(StateField::Params);
+        let starts = self.constants.varying.starts().to_vec();
+        let mut records = Vec::with_capacity(worlds.len());
+        for &world in worlds {
+            let mut record = self.start.clone();
+            let (seed, episode) = (self.host.seeds[world], self.host.episodes[world]);
+            let number = self.draws.number(world);
+            let shape = self.shape();
+            // parameters stay as they are, but for loads and what is drawn
+            for (k, x) in self.host.params_mut(world).iter_mut().enumerate() {
+                match starts[k].0.is_load() {
+                    true => *x = record[params + k],
+                    false => record[params + k] = *x,
+                }
+            }
+            self.draw
+                .draw(seed, number, episode, |field, column, value| {
+                    record[shape.start(StateField::of(field)) + column] = value as f32;
+                });
+            let own = self.host.params_mut(world);
+            self.draw.draw_params(seed, number, episode, |k, value| {
+                record[params + k] = value as f32;
+                own[k] = value as f32;
+            });
+            records.push(record);
+        }
+        self.set_records(worlds, &records, |_| [0; 4])
+    }
+
+    /// Sets state, commands and counters of some worlds.
+    fn set_records(
+        &mut self,
+        worlds: &[usize],
+        records: &[Vec<f32>],
+        counters: impl Fn(usize) -> [u32; 4],
+    ) -> Result<(), BackendError> {
+        let rows: Vec<Vec<u32>> = records.iter().map(|record| self.placed(record)).collect();
+        let columns = self.places.state;
+        self.send(worlds, Rows::Fields, 0, columns, |k, to| {
+            to.copy_from_slice(&rows[k])
+        })?;
+        for (k, &world) in worlds.iter().enumerate() {
+            self.host.status[world] = counters(k)[2];
+        }
+        self.send(worlds, Rows::Counters, 0, 4, |k, to| {
+            to.copy_from_slice(&counters(k))
+        })
+    }
+
+    /// Writes neighbouring numbers of some worlds, in rising order.
+    pub(super) fn send(
+        &mut self,
+        worlds: &[usize],
+        target: Rows,
+        first: u32,
+        columns: u32,
+        row: impl Fn(usize, &mut [u32]),
+    ) -> Result<(), BackendError> {
+        let mut from = 0;
+        for tile in &mut self.tiles {
+            let end = worlds.partition_point(|&world| world < tile.worlds.end);
+            if from < end && columns > 0 {
+                tile.send(
+                    &self.device,
+                    target,
+                    first,
+                    columns,
+                    &worlds[from..end],
+                    |j, to| {
+                        row(from + j, to);
+                    },
+                )?;
+            }
+            from = end;
+        }
+        Ok(())
+    }
+
+    /// The worlds of a mask; none = all.
+    pub(super) fn meant(&self, mask: Option<&[bool]>) -> Vec<usize> {
+        let worlds = 0..self.host.seeds.len();
+        worlds
+            .filter(|&world| mask.is_none_or(|mask| mask[world]))
+            .collect()
+    }
+
+    pub(super) fn write_columns(
+        &mut self,
+        target: StateField,
+        columns: &Range<usize>,
+        values: Values<'_>,
+        mask: Option<&[bool]>,
+    ) -> Result<(), BackendError> {
+        let n = columns.len();
+        if n == 0 {
+            return Ok(());
+        }
+        let worlds = self.meant(mask);
+        let quaternions: Vec<usize> = match target {
+            StateField::Q => self
+                .constants
+                .quaternions()
+                .filter(|q| columns.contains(q))
+                .collect(),
+            _ => Vec::new(),
+        };
+        let value = |world: usize, k: usize| match values {
+            Values::F32(v) => v[world * n + k],
+            Values::F64(v) => v[world * n + k] as f32,
+        };
+        let first = self.places.group(target) + columns.start as u32;
+        self.send(&worlds, Rows::Fields, first, n as u32, |j, to| {
+            let mut row: Vec<f32> = (0..n).map(|k| value(worlds[j], k)).collect();
+            for quaternion in &quaternions {
+                host::normalize(&mut row[quaternion - columns.start..][..4]);
+            }
+            for (to, x) in to.iter_mut().zip(row) {
+                *to = x.to_bits();
+            }
+        })?;
+        match target {
+            StateField::Params => {
+                for &world in &worlds {
+                    for k in 0..n {
+                        self.host.params_mut(world)[columns.start + k] = value(world, k);
+                    }
+                }
+            }
+            StateField::Q | StateField::Qd => {
+                let qdd = self.places.group(StateField::Qdd);
+                let dofs = self.shape().dofs as u32;
+                self.send(&worlds, Rows::Fields, qdd, dofs, |_, to| to.fill(0))?;
+                if target == StateField::Q {
+                    let rest = self.places.group(StateField::QRest) + columns.start as u32;
+                    self.send(&worlds, Rows::Fields, rest, n as u32, |_, to| to.fill(0))?;
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Writes a record a world.
+    pub(super) fn save_records(&self, records: &mut [u8]) {
+        let size = COUNTERS + 4 * self.shape().total();
+        for tile in &self.tiles {
+            // what cannot be read is told by the next frame; the host's counters are there in any case
+            let Ok(kept) = tile.fetch(&self.device) else {
+                continue;
+            };
+            let read = kept.read();
+            let words: &[u32] = host::words(&read);
+            let at = |i: usize, w: usize| words[((i / 4) * tile.width as usize + w) * 4 + i % 4];
+            let counters = self.places.state as usize;
+            for (w, world) in tile.worlds.clone().enumerate() {
+                let (head, numbers) =
+                    records[world * size..(world + 1) * size].split_at_mut(COUNTERS);
+                for k in 0..4 {
+                    head[4 * k..4 * k + 4].copy_from_slice(&at(counters + k, w).to_le_bytes());
+                }
+                head[16..24].copy_from_slice(&self.host.seeds[world].to_le_bytes());
+                head[24..].copy_from_slice(&self.host.episodes[world].to_le_bytes());
+                for (to, place) in numbers.chunks_exact_mut(4).zip(&self.record) {
+                    to.copy_from_slice(&at(*place as usize, w).to_le_bytes());
+                }
+            }
+        }
+    }
+
+    /// Sets worlds to their records, or to that of one world.
+    pub(super) fn restore_records(
+        &mut self,
+        records: &[u8],
+        mask: Option<&[bool]>,
+        from_world: Option<usize>,
+    ) -> Result<(), BackendError> {
+        self.flush()?;
+        let size = COUNTERS + 4 * self.shape().total();
+        let params = self.shape().start(StateField::Params);
+        let worlds = self.meant(mask);
+        let mut states = Vec::with_capacity(worlds.len());
+        let mut counts = Vec::with_capacity(worlds.len());
+        for &world in &worlds {
+            let first = from_world.unwrap_or(world) * size;
+            let (head, numbers) = records[first..first + size].split_at(COUNTERS);
+            let word = |k: usize| u32::from_le_bytes(std::array::from_fn(|i| head[4 * k + i]));
+            counts.push([word(0), word(1), word(2), word(3)]);
+            self.host.steps[world] = u64::from(word(0)) | u64::from(word(1)) << 32;
+            self.host.seeds[world] = u64::from(word(4)) | u64::from(word(5)) << 32;
+            self.host.episodes[world] = word(6);
+            let record: Vec<f32> = (numbers.chunks_exact(4))
+                .map(|x| f32::from_le_bytes(std::array::from_fn(|i| x[i])))
+                .collect();
+            self.host
+                .params_mut(world)
+                .copy_from_slice(&record[params..]);
+            states.push(record);
+        }
+        self.set_records(&worlds, &states, |k| counts[k])
+    }
+}

@@ -1,0 +1,180 @@
+//! How a model is run, and what keeps its worlds.
+
+use crate::backend::{Backend, BackendError, Faults, Lanes, Precision, cpu, gpu};
+use crate::random::Draws;
+use sim_core::batch::{Field, Layout};
+use sim_core::model::Model;
+use sim_device::AdapterKind;
+use std::path::PathBuf;
+
+pub use sim_device::{AdapterInfo, Choice as Adapter, adapters};
+
+/// What keeps the worlds.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Device {
+    /// The processor.
+    #[default]
+    Cpu,
+    /// An adapter of this machine; `cache` is a folder that keeps its programs from run to run.
+    Gpu {
+        /// Which one.
+        adapter: Adapter,
+        /// Where programs are kept, if anywhere.
+        cache: Option<PathBuf>,
+    },
+    /// A GPU if there is one that is no software, for single precision and at least [`AUTO_WORLDS`] worlds; else the processor.
+    Auto {
+        /// Where programs are kept, if anywhere.
+        cache: Option<PathBuf>,
+    },
+}
+
+/// Worlds from which on [`Device::Auto`] looks for a GPU: fewer leave most of it idle.
+pub const AUTO_WORLDS: usize = 1024;
+
+/// How to run a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Number of worlds.
+    pub worlds: usize,
+    /// What keeps them.
+    pub device: Device,
+    /// Precision of state, commands and fields.
+    pub precision: Precision,
+    /// Threads of a step; none = one a core.
+    pub threads: Option<usize>,
+    /// Worlds a block.
+    pub lanes: Lanes,
+    /// Fields of a frame; counters come with every frame.
+    pub fields: Vec<Field>,
+    /// When a world is frozen, and what becomes of it.
+    pub faults: Faults,
+    /// What the draws of a world depend on.
+    pub draws: Draws,
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options {
+            worlds: 1,
+            device: Device::Cpu,
+            precision: Precision::F32,
+            threads: None,
+            lanes: Lanes::Auto,
+            fields: vec![Field::JointQ, Field::JointQd, Field::BodyQ],
+            faults: Faults::default(),
+            draws: Draws::default(),
+        }
+    }
+}
+
+/// Where programs of GPUs are kept from run to run, if this user has such a place.
+pub fn cache_folder() -> Option<PathBuf> {
+    let absolute = |name: &str| {
+        let path = PathBuf::from(std::env::var_os(name)?);
+        path.is_absolute().then_some(path)
+    };
+    let caches = absolute("XDG_CACHE_HOME").or_else(|| Some(absolute("HOME")?.join(".cache")));
+    Some(caches?.join("tightloop"))
+}
+
+/// What keeps the worlds, and why where that was left open.
+pub(crate) fn backend(
+    model: &Model,
+    options: &Options,
+    layout: &Layout,
+) -> Result<(Box<dyn Backend>, Option<String>), BackendError> {
+    let (worlds, precision, draws) = (options.worlds, options.precision, options.draws);
+    let on_gpu = |adapter: &Adapter, cache: &Option<PathBuf>| {
+        gpu::create(model, worlds, layout, adapter, cache.as_deref(), draws)
+    };
+    let note = match &options.device {
+        Device::Gpu { .. } if precision == Precision::F64 => return Err(BackendError::DoubleOnGpu),
+        Device::Gpu { adapter, cache } => return Ok((on_gpu(adapter, cache)?, None)),
+        Device::Cpu => None,
+        Device::Auto { .. } if precision == Precision::F64 => {
+            Some("the processor: a GPU computes in single precision".to_owned())
+        }
+        Device::Auto { .. } if worlds < AUTO_WORLDS => {
+            Some(format!("the processor: fewer than {AUTO_WORLDS} worlds"))
+        }
+        Device::Auto { cache } => {
+            let found = adapters();
+            match found.iter().find(|info| info.kind != AdapterKind::Software) {
+                None => Some("the processor: no GPU was found".to_owned()),
+                Some(info) => match on_gpu(&Adapter::Index(info.index), cache) {
+                    Ok(backend) => return Ok((backend, Some(format!("the GPU `{}`", info.name)))),
+                    Err(e) => Some(format!("the processor: `{}` failed: {e}", info.name)),
+                },
+            }
+        }
+    };
+    let threads = threads_of(options);
+    let backend = cpu::create(
+        model,
+        worlds,
+        precision,
+        options.lanes,
+        layout,
+        threads,
+        draws,
+    )?;
+    Ok((backend, note))
+}
+
+/// Threads that are asked for: as many as there are cores if none are.
+fn threads_of(options: &Options) -> usize {
+    let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
+    options.threads.unwrap_or_else(cores)
+}
+
+/// Memory that the worlds take in this process, an arena not included [bytes].
+pub(crate) fn memory_of(model: &Model, options: &Options) -> u64 {
+    let (real, width) = match options.precision {
+        Precision::F32 => (4, 16),
+        Precision::F64 => (8, 1),
+    };
+    let worlds = (options.worlds as u64).saturating_add(width);
+    // scratch of each chunk, its matrices included; see backend/cpu/mod.rs
+    let m = model.constants();
+    let matrices = 3 * m.pattern.len() + 2 * m.coupled.pattern.len();
+    let chunks = threads_of(options).saturating_mul(cpu::CHUNKS_PER_THREAD) as u64;
+    let scratch = ((m.contacts.memory.len + matrices) as u64 * real * width)
+        .saturating_mul(chunks.min(worlds));
+    // state and commands of a world, its counters; see backend/cpu/chunk.rs
+    worlds
+        .saturating_mul(
+            ((5 + 3 * m.delay.frames) * model.dofs() + 2 * model.coords() + m.varying.len()) as u64
+                * real
+                + 28,
+        )
+        .saturating_add(scratch)
+}
+
+/// Refuses what would not fit, before anything is taken.
+pub(crate) fn check_memory(model: &Model, options: &Options) -> Result<(), BackendError> {
+    const MB: u64 = 1 << 20;
+    // a system that does not say how much is free is not asked twice: the allocation itself will tell
+    let Some(available) = available_memory() else {
+        return Ok(());
+    };
+    let needed = memory_of(model, options);
+    if needed > available {
+        return Err(BackendError::Memory {
+            worlds: options.worlds,
+            needed_mb: needed / MB,
+            available_mb: available / MB,
+        });
+    }
+    Ok(())
+}
+
+/// Memory that can be taken without swapping [bytes].
+fn available_memory() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text
+        .lines()
+        .find(|line| line.starts_with("MemAvailable:"))?;
+    let kb: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kb * 1024)
+}
