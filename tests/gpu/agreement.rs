@@ -1,0 +1,192 @@
+//! The lesson on a GPU: as near to the recorded runs of MuJoCo C as the CPU's f32 (tests/reference.rs), and all fields as the CPU has them.
+
+use crate::common::shapes::shapes;
+use crate::common::{
+    Demo, FRAMES, Run, command, csv, distance, lesson, lesson_with_table, noise, repo,
+};
+use crate::{assert_alive, gpu, run};
+use sim_core::batch::{Field, FieldDtype, Group};
+use sim_core::model::{Cone, Description, Model, UrdfOptions};
+use sim_engine::backend::Values;
+use sim_engine::simulation::Device;
+use std::sync::Arc;
+
+fn start(scene: &Description) -> Run {
+    let mut run = run(
+        &scene.compile().unwrap(),
+        gpu(),
+        1,
+        &[Field::JointQ, Field::JointQd],
+    );
+    run.forward();
+    run
+}
+
+/// Distance in joint positions from the recorded run, a frame.
+fn deviations(scene: &Description, demo: Demo, file: &str, frames: usize) -> Vec<f64> {
+    let mut run = start(scene);
+    let recorded = csv(repo(file));
+    let mut found = vec![distance(&run.get(Field::JointQ, 0), &recorded[0][1..10])];
+    for frame in 0..frames {
+        let (field, row) = command(demo, frame);
+        run.command(field, &row);
+        run.step();
+        found.push(distance(
+            &run.get(Field::JointQ, 0),
+            &recorded[frame + 1][1..10],
+        ));
+    }
+    assert_alive(&run);
+    found
+}
+
+fn worst(deviations: &[f64], to_frame: usize) -> f64 {
+    deviations[..=to_frame].iter().copied().fold(0.0, f64::max)
+}
+
+#[test]
+fn target_demo_stays_within_2e_6_of_mujoco() {
+    let scene = lesson(Demo::Target);
+    let d = deviations(&scene, Demo::Target, "tests/data/mujoco_target.csv", FRAMES);
+    assert!(worst(&d, FRAMES) < 2e-6, "{:e}", worst(&d, FRAMES));
+}
+
+#[test]
+fn free_torque_demo_stays_near_mujoco() {
+    let scene = lesson(Demo::Torque);
+    let d = deviations(
+        &scene,
+        Demo::Torque,
+        "tests/data/mujoco_torque_free.csv",
+        120,
+    );
+    assert!(worst(&d, 30) < 5e-6, "{:e}", worst(&d, 30));
+    assert!(worst(&d, 60) < 5e-5, "{:e}", worst(&d, 60));
+    assert!(worst(&d, 120) < 1e-2, "{:e}", worst(&d, 120));
+}
+
+#[test]
+fn torque_demo_over_the_table_is_mujocos_until_it_touches() {
+    let scene = lesson_with_table(Demo::Torque, false);
+    let d = deviations(&scene, Demo::Torque, "tests/data/mujoco_torque.csv", 13);
+    assert!(worst(&d, 13) < 2e-6, "{:e}", worst(&d, 13));
+}
+
+#[test]
+fn grasp_demo_stays_within_1e_4_of_mujoco_to_the_end() {
+    let mut run = start(&lesson_with_table(Demo::Target, true));
+    let recorded = csv(repo("tests/data/mujoco_grasp.csv"));
+    let (mut joints, mut cube) = (vec![], vec![]);
+    for (targets, row) in csv(repo("tests/data/grasp_targets.csv"))
+        .iter()
+        .zip(&recorded[1..])
+    {
+        let targets: Vec<f64> = targets.iter().map(|&x| f64::from(x as f32)).collect();
+        run.command(Field::JointTargetQ, &targets);
+        run.step();
+        let q = run.get(Field::JointQ, 0);
+        joints.push(distance(&q[..9], &row[1..10]));
+        cube.push(distance(&q[9..12], &row[10..13]));
+    }
+    assert_alive(&run);
+    println!(
+        "{:e} {:e} {:e}",
+        worst(&joints, 89),
+        worst(&joints, FRAMES - 1),
+        worst(&cube, FRAMES - 1)
+    );
+    assert!(worst(&joints, 89) < 5e-6, "{:e}", worst(&joints, 89));
+    assert!(
+        worst(&joints, FRAMES - 1) < 1e-4,
+        "{:e}",
+        worst(&joints, FRAMES - 1)
+    );
+    assert!(
+        worst(&cube, FRAMES - 1) < 2e-4,
+        "{:e}",
+        worst(&cube, FRAMES - 1)
+    );
+}
+
+/// Every field of some states, evaluated there and on the CPU: relative to the largest number of the field.
+fn compare_fields(model: &Arc<Model>, name: &str) {
+    const WORLDS: usize = 70;
+    let mut here = run(model, gpu(), WORLDS, Field::ALL);
+    let mut there = run(model, Device::Cpu, WORLDS, Field::ALL);
+    let (coords, dofs) = (model.coords(), model.dofs());
+    for run in [&mut here, &mut there] {
+        // so little that what stands stays free or touches lightly, and quaternions stay rotations
+        let start = &model.start().joint_q;
+        let q: Vec<f64> = (0..WORLDS * coords)
+            .map(|k| start[k % coords] + 0.02 * noise(k / coords, k % coords))
+            .collect();
+        let qd: Vec<f64> = (0..WORLDS * dofs)
+            .map(|k| noise(k / dofs, 1000 + k % dofs))
+            .collect();
+        run.sim
+            .write(Field::JointQ, 0..coords, Values::F64(&q), None)
+            .unwrap();
+        run.sim
+            .write(Field::JointQd, 0..dofs, Values::F64(&qd), None)
+            .unwrap();
+        let f: Vec<f64> = (0..WORLDS * dofs)
+            .map(|k| noise(k / dofs, 2000 + k % dofs))
+            .collect();
+        run.sim
+            .command(Field::JointF, 0..dofs, Values::F64(&f))
+            .unwrap();
+        run.forward();
+    }
+    assert_alive(&here);
+    for field in Field::ALL {
+        let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
+        for world in 0..WORLDS {
+            let (a, b) = (here.get(*field, world), there.get(*field, world));
+            assert_eq!(a.len(), b.len());
+            for (a, b) in a.iter().zip(&b) {
+                assert!(
+                    a.is_finite(),
+                    "{name}: {field:?} is {a} in world {world}, not {b}"
+                );
+                worst = worst.max((a - b).abs());
+                largest = largest.max(b.abs());
+            }
+        }
+        let row = field.row();
+        let tolerance = match (row.group, row.dtype) {
+            (Group::Counter | Group::State | Group::Command, _) | (_, FieldDtype::Fixed(_)) => 0.0,
+            _ => 2e-4 * largest,
+        };
+        println!("{name}: {}: {worst:e} of {largest:e}", row.name);
+        assert!(
+            worst <= tolerance,
+            "{name}: {}: {worst:e} of {largest:e}",
+            row.name
+        );
+    }
+}
+
+#[test]
+fn all_fields_of_the_grasp_are_those_of_the_cpu() {
+    let mut scene = lesson_with_table(Demo::Target, true);
+    scene.robots[0].joints[0].q[0] += 0.1;
+    compare_fields(&scene.compile().unwrap(), "grasp");
+}
+
+#[test]
+fn all_fields_of_every_joint_are_those_of_the_cpu() {
+    let mut scene = Description::new(1.0 / 480.0, 8);
+    let options = UrdfOptions {
+        floating: true,
+        ..UrdfOptions::named("r")
+    };
+    scene
+        .add_urdf(repo("tests/record_stages/every_joint.urdf"), options)
+        .unwrap();
+    compare_fields(&scene.compile().unwrap(), "every joint");
+}
+
+#[test]
+fn all_fields_of_every_shape_are_those_of_the_cpu() {
+    compare_fields(&shapes(Cone::Elliptic).compile().unwrap(), "shapes");
+}

@@ -1,0 +1,43 @@
+//! Worlds on a GPU. The software Vulkan of Debian's mesa-vulkan-drivers will do, and some adapter is required.
+
+mod agreement;
+mod books;
+#[path = "../common/mod.rs"]
+mod common;
+mod delivery;
+mod programs;
+mod same_bits;
+
+use sim_core::batch::Field;
+use sim_core::model::Model;
+use sim_engine::options::Adapter;
+use sim_engine::simulation::{Device, Options};
+use std::sync::Arc;
+
+/// The first adapter; nothing is kept on disk.
+fn gpu() -> Device {
+    Device::Gpu {
+        adapter: Adapter::First,
+        cache: None,
+    }
+}
+
+/// Worlds of a model with these fields.
+fn options(device: Device, worlds: usize, fields: &[Field]) -> Options {
+    Options {
+        worlds,
+        device,
+        fields: fields.to_vec(),
+        ..Options::default()
+    }
+}
+
+fn run(model: &Arc<Model>, device: Device, worlds: usize, fields: &[Field]) -> common::Run {
+    common::Run::new(model, options(device, worlds, fields))
+}
+
+/// Nothing went wrong on the device.
+#[track_caller]
+fn assert_alive(run: &common::Run) {
+    assert!(run.sim.lost().is_none(), "{:?}", run.sim.lost());
+}
