@@ -108,6 +108,17 @@ fn grasp_demo_stays_within_1e_4_of_mujoco_to_the_end() {
     );
 }
 
+/// What the solver finds: it ends where f32 sees no more progress, a last bit earlier or later.
+const SOLVED: [Field; 7] = [
+    Field::JointQdd,
+    Field::ConstraintForce,
+    Field::EfcForce,
+    Field::ContactForce,
+    Field::BodyContactForce,
+    Field::ContactSensor,
+    Field::Accelerometer,
+];
+
 /// Every field of some states, evaluated there and on the CPU: relative to the largest number of the field.
 fn compare_fields(model: &Arc<Model>, name: &str) {
     const WORLDS: usize = 70;
@@ -153,9 +164,13 @@ fn compare_fields(model: &Arc<Model>, name: &str) {
             }
         }
         let row = field.row();
-        let tolerance = match (row.group, row.dtype) {
-            (Group::Counter | Group::State | Group::Command, _) | (_, FieldDtype::Fixed(_)) => 0.0,
-            _ => 2e-4 * largest,
+        let is_exact = row.group != Group::Derived || matches!(row.dtype, FieldDtype::Fixed(_));
+        let tolerance = match field {
+            _ if is_exact => 0.0,
+            _ if SOLVED.contains(field) => 2e-3 * largest,
+            // faces that lie on each other touch anywhere within them
+            Field::ContactPos | Field::ContactNormal | Field::ContactDistance => 1e-3 * largest,
+            _ => 2e-5 * largest,
         };
         println!("{name}: {}: {worst:e} of {largest:e}", row.name);
         assert!(
@@ -168,8 +183,7 @@ fn compare_fields(model: &Arc<Model>, name: &str) {
 
 #[test]
 fn all_fields_of_the_grasp_are_those_of_the_cpu() {
-    let mut scene = lesson_with_table(Demo::Target, true);
-    scene.robots[0].joints[0].q[0] += 0.1;
+    let scene = lesson_with_table(Demo::Target, true);
     compare_fields(&scene.compile().unwrap(), "grasp");
 }
 

@@ -102,7 +102,7 @@ fn sources(m: &Constants<f32>, places: &Places, field: Field) -> Option<Vec<u32>
 /// What is copied of every world.
 pub(super) fn runs(m: &Constants<f32>, places: &Places, layout: &Layout) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
-    for array in &layout.slots {
+    for array in layout.slots.iter().filter(|array| array.bytes > 0) {
         let Some(sources) = sources(m, places, array.field) else {
             continue;
         };
