@@ -22,6 +22,12 @@ fn main() {
     let device = Device::open(&Choice::First, None).expect("an adapter");
     let info = device.info();
     println!("{} · {} {}", info.name, info.backend, info.driver);
+    let gigabytes = info.memory.unwrap_or(0) as f64 / 1e9;
+    println!(
+        "{gigabytes:.1} GB, bindings up to {} MiB, imports: {}",
+        info.binding_max >> 20,
+        info.imports
+    );
     println!(
         "medians of {RUNS} runs; CPU time of the submitting thread, then time until done [µs]\n"
     );
