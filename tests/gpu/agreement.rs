@@ -119,6 +119,14 @@ const SOLVED: [Field; 7] = [
     Field::Accelerometer,
 ];
 
+/// Where shapes touch: faces that lie flat on each other may do so anywhere within them, and of shapes that are deep in each
+/// other another axis may be the shortest by a last bit.
+const FOUND: [Field; 3] = [
+    Field::ContactPos,
+    Field::ContactNormal,
+    Field::ContactDistance,
+];
+
 /// Every field of some states, evaluated there and on the CPU: relative to the largest number of the field.
 fn compare_fields(model: &Arc<Model>, name: &str) {
     const WORLDS: usize = 70;
@@ -150,7 +158,7 @@ fn compare_fields(model: &Arc<Model>, name: &str) {
     }
     assert_alive(&here);
     for field in Field::ALL {
-        let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
+        let (mut worst, mut largest) = (vec![0.0_f64; WORLDS], 0.0_f64);
         for world in 0..WORLDS {
             let (a, b) = (here.get(*field, world), there.get(*field, world));
             assert_eq!(a.len(), b.len());
@@ -159,25 +167,32 @@ fn compare_fields(model: &Arc<Model>, name: &str) {
                     a.is_finite(),
                     "{name}: {field:?} is {a} in world {world}, not {b}"
                 );
-                worst = worst.max((a - b).abs());
+                worst[world] = worst[world].max((a - b).abs());
                 largest = largest.max(b.abs());
             }
         }
+        worst.sort_by(f64::total_cmp);
         let row = field.row();
         let is_exact = row.group != Group::Derived || matches!(row.dtype, FieldDtype::Fixed(_));
-        let tolerance = match field {
-            _ if is_exact => 0.0,
-            _ if SOLVED.contains(field) => 2e-3 * largest,
-            // faces that lie on each other touch anywhere within them
-            Field::ContactPos | Field::ContactNormal | Field::ContactDistance => 1e-3 * largest,
-            _ => 2e-5 * largest,
+        // of nine worlds in ten, and of all
+        let tolerances = match field {
+            _ if is_exact => [0.0, 0.0],
+            _ if SOLVED.contains(field) => [1e-3, 1e-2],
+            _ if FOUND.contains(field) => [2e-5, 1e-2],
+            _ => [2e-5, 2e-5],
         };
-        println!("{name}: {}: {worst:e} of {largest:e}", row.name);
-        assert!(
-            worst <= tolerance,
-            "{name}: {}: {worst:e} of {largest:e}",
-            row.name
+        let found = [worst[WORLDS * 9 / 10], worst[WORLDS - 1]];
+        println!(
+            "{name}: {}: {:.1e}, {:.1e} of {largest:.1e}",
+            row.name, found[0], found[1]
         );
+        for (found, tolerance) in found.iter().zip(tolerances) {
+            assert!(
+                *found <= tolerance * largest,
+                "{name}: {}: {found:e} of {largest:e}",
+                row.name
+            );
+        }
     }
 }
 
