@@ -45,6 +45,7 @@ impl Case {
             freezes_nan: false,
         };
         let options = Options {
+            device: sim_engine::simulation::Device::Cpu,
             worlds: dice.pick(&[2, 5, 8, 9, 16, 17, 33, 40]),
             precision,
             threads: Some(1 + dice.below(2)),

@@ -51,7 +51,7 @@ const DOORS: [(&str, &str); 18] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-const UNSAFE: [&str; 17] = [
+const UNSAFE: [&str; 22] = [
     "py-client/src/frame.rs",                      // NumPy views
     "sim-core/device/src/device.rs",               // imports pages of the host
     "sim-core/device/src/portable.rs",             // programs without checks at run time
@@ -65,10 +65,15 @@ const UNSAFE: [&str; 17] = [
     "sim-core/engine/src/backend/cpu/dispatch.rs", // instruction sets
     "sim-core/engine/src/backend/cpu/mod.rs",      // calls what dispatch chose
     "sim-core/engine/src/backend/cpu/transfer.rs", // rows of a frame, written by several threads
+    "sim-core/engine/src/backend/gpu/imported.rs", // memory of readers that a device writes to
+    "sim-core/engine/src/backend/gpu/mod.rs",      // as imported.rs
+    "sim-core/engine/src/backend/mod.rs",          // as imported.rs
+    "sim-core/engine/src/simulation.rs",           // as imported.rs
     "sim-core/src/compiled.rs", // what only a processor with the instructions may run
     "sim-core/src/lane/simd.rs", // intrinsics
     "sim-daemon/protocol/src/frame.rs", // views of a sample
     "sim-daemon/protocol/src/loan.rs", // loaned samples
+    "sim-daemon/src/server.rs", // samples that a device writes to
 ];
 
 fn root() -> PathBuf {

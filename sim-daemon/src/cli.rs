@@ -26,7 +26,7 @@ enum Command {
     /// Prints one line of JSON when clients may attach: {"ready": {…}}, or {"error": {"kind": …, "message": …}}.
     ///
     /// Example: tightloop serve scene.toml --worlds 4096 --name franka
-    Serve(Serve),
+    Serve(Box<Serve>),
     /// Show what a URDF file means: its tree, dofs, masses, limits, what was ignored or mended, and a picture.
     ///
     /// The picture shows the collision shapes; it is written as ROBOT.png into the working folder.

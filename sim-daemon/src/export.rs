@@ -73,6 +73,8 @@ pub(crate) fn description(
         pid: 0,
         worlds: options.worlds,
         device: facts.device,
+        adapter: String::new(),
+        delivery: "direct".to_owned(),
         precision: precision_name(options.precision).to_owned(),
         threads: facts.threads,
         dt: model.dt(),

@@ -126,7 +126,7 @@ fn bad_arguments_name_the_culprit_and_the_cure_and_leave_nothing() {
         (
             &["--device", "tpu"],
             "ArgumentError",
-            "device \"tpu\": unknown; use auto or cpu",
+            "device \"tpu\": unknown; use auto, cpu or gpu",
         ),
         (
             &["--precision", "f16"],

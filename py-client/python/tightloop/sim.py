@@ -42,7 +42,7 @@ class Sim:
     Attributes:
         name: Name of the daemon.
         pid: Its process.
-        device: Where the physics runs, such as ``"cpu (AVX-512, 16 worlds a block, 2 threads)"``.
+        device: Where the physics runs, such as ``"cpu (AVX-512, 16 worlds a block, 2 threads)"`` or ``"gpu (…)"``.
         precision: ``"f32"`` or ``"f64"``, the type of every real array.
         worlds: Number of worlds.
         threads: Threads that a step may use.
@@ -59,7 +59,9 @@ class Sim:
         dofs: Slice of each robot's dofs, by robot name.
         coords: Slice of each robot's coordinates.
         bodies: Slice of each robot's bodies.
-        info: Everything the daemon tells about itself, notes on the scene included.
+        info: Everything the daemon tells about itself, notes on the scene included. ``delivery`` says how frames reach
+            shared memory: ``"direct"`` from the CPU, ``"imported"`` where a GPU writes them there, ``"copied"`` where the
+            processor copies them from it.
     """
 
     def __init__(self, client: _core.Client, daemon: Daemon | None) -> None:
@@ -321,7 +323,9 @@ def launch(
     Args:
         scene: What to simulate; later changes to it have no effect.
         worlds: How many copies of it, at least 1.
-        device: ``"cpu"``, or ``"auto"`` for the best there is.
+        device: ``"cpu"``, ``"gpu"`` for the first GPU, ``"gpu:1"`` or ``"gpu:nvidia"`` for another, by its number or part of its
+            name, as ``tightloop devices`` lists them, or ``"auto"`` for a GPU if there is one that is no software and
+            there are at least 1024 worlds in single precision, else the CPU: `Sim.device` tells.
         precision: ``"f32"``, or ``"f64"`` for the same physics in double precision.
         threads: Most threads a step may use; all cores if left out.
         fields: What frames carry besides ``time``, ``step``, ``status`` and ``contacts_left_out``: names of `Frame`
@@ -369,6 +373,8 @@ def launch(
         else checks.text("launch: name", name, error=ArgumentError),
         "frames-held": checks.integer("launch: frames_held", frames_held, error=ArgumentError),
     }
+    if arguments["device"].startswith("gpu:"):
+        arguments["device"], arguments["adapter"] = arguments["device"].split(":", 1)
     arguments["on-fault"] = checks.text("launch: on_fault", on_fault, error=ArgumentError)
     arguments["on-nan"] = checks.text("launch: on_nan", on_nan, error=ArgumentError)
     arguments["draws"] = checks.text("launch: draws", draws, error=ArgumentError)

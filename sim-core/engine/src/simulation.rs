@@ -98,6 +98,15 @@ impl Simulation {
     pub fn lost(&self) -> Option<&BackendError> {
         self.backend.lost()
     }
+    /// Name of the GPU, empty on the CPU.
+    pub fn adapter(&self) -> &str {
+        self.backend.adapter()
+    }
+    /// How frames reach arenas: `direct` on the CPU; of a GPU `imported` where it can write into those of [`Simulation::import`],
+    /// else `copied`.
+    pub fn delivery(&self) -> &'static str {
+        self.backend.delivery()
+    }
     /// Bytes of frames that the processor has copied: 0 where the device writes into the arenas itself.
     pub fn copied(&self) -> u64 {
         self.backend.copied()

@@ -21,6 +21,10 @@ pub struct Description {
     pub worlds: usize,
     /// Where the physics runs, such as "cpu".
     pub device: String,
+    /// Name of the GPU, empty on the CPU.
+    pub adapter: String,
+    /// How frames reach shared memory: `direct` (the processor writes them there), `imported` (a GPU does), `copied` (from a GPU).
+    pub delivery: String,
     /// Precision of the run and of every real array of it: "f32" or "f64".
     pub precision: String,
     /// Threads that a step uses.

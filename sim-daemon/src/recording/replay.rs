@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 use sim_core::batch::Field;
+use sim_engine::options::{Adapter, cache_folder};
 use sim_engine::simulation::{Device, Draws, Faults, Lanes, Options, Precision, Simulation};
 use sim_protocol::digest::{digest, digests_of};
 use sim_protocol::host::{Inbox, free_memory};
@@ -260,7 +261,14 @@ impl Run {
                 .ok_or_else(|| failed(format!("has a field `{}`, unknown here", field.name)))
         });
         let options = Options {
-            device: Device::Cpu,
+            // the bits of a GPU are its own
+            device: match told.adapter.as_str() {
+                "" => Device::Cpu,
+                name => Device::Gpu {
+                    adapter: Adapter::Name(name.to_owned()),
+                    cache: cache_folder(),
+                },
+            },
             worlds: told.worlds,
             precision: match told.precision.as_str() {
                 "f64" => Precision::F64,

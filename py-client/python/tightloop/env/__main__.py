@@ -45,7 +45,7 @@ def main() -> int:
     serve.add_argument(
         "--option", action="append", default=[], metavar="NAME=VALUE", help="of the task: control=torque"
     )
-    serve.add_argument("--device", default="auto", help="cpu, or auto for the best there is (default auto)")
+    serve.add_argument("--device", default="auto", help="as launch has it, such as gpu (default auto)")
     serve.add_argument("--precision", default="f32", help="f32 or f64 (default f32)")
     serve.add_argument("--threads", type=int, help="threads of a step; one a core if left out")
     args = parser.parse_args()

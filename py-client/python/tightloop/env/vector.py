@@ -76,7 +76,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             copy: Whether each step returns new arrays. Otherwise they are views of a ring, overwritten by the step or
                 reset that comes ``slots`` of these later: for loops that have read them by then.
             slots: Slots of that ring, at least 2.
-            device: ``"cpu"``, or ``"auto"`` for the best there is.
+            device: As `launch` has it, such as ``"gpu"``.
             precision: ``"f32"``, or ``"f64"`` for the physics in double precision; that of a daemon that is joined.
             threads: Most threads a step may use; all cores if left out.
             max_episode_steps: Steps after which an episode is truncated, ``math.inf`` for never; the task's if left

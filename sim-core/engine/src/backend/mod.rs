@@ -160,6 +160,14 @@ pub trait Backend: Send {
     fn lost(&self) -> Option<&BackendError> {
         None
     }
+    /// Name of the GPU, empty on the CPU.
+    fn adapter(&self) -> &str {
+        ""
+    }
+    /// How frames reach the memory of their readers: `direct`, or of a GPU `imported` or `copied`.
+    fn delivery(&self) -> &'static str {
+        "direct"
+    }
     /// Bytes of frames that the processor has copied.
     fn copied(&self) -> u64 {
         0

@@ -41,6 +41,8 @@ fn description() -> Description {
         pid: 0,
         worlds: 2,
         device: "none".to_owned(),
+        adapter: String::new(),
+        delivery: "direct".to_owned(),
         precision: "f32".to_owned(),
         threads: 1,
         dt: 0.01,

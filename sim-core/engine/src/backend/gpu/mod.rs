@@ -37,15 +37,6 @@ use tile::{Rows, Tile};
 /// A driver that takes longer over the programs of a model is given up.
 const COMPILE_LIMIT: Duration = Duration::from_secs(180);
 
-/// How frames reach the memory of their readers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Delivery {
-    /// The device writes into the reader's memory.
-    Imported,
-    /// The host copies them there.
-    Staged,
-}
-
 pub(super) struct Gpu {
     // batches go before the buffers and programs that they name, and those before the device
     tiles: Vec<Tile>,
@@ -327,6 +318,18 @@ impl Backend for Gpu {
 
     fn lost(&self) -> Option<&BackendError> {
         self.lost.as_ref()
+    }
+
+    fn adapter(&self) -> &str {
+        &self.device.info().name
+    }
+
+    fn delivery(&self) -> &'static str {
+        if self.device.info().imports {
+            "imported"
+        } else {
+            "copied"
+        }
     }
 
     fn copied(&self) -> u64 {
