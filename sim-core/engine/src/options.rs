@@ -146,7 +146,7 @@ pub(crate) fn memory_of(model: &Model, options: &Options) -> u64 {
         .saturating_mul(
             ((5 + 3 * m.delay.frames) * model.dofs() + 2 * model.coords() + m.varying.len()) as u64
                 * real
-                + 28,
+                + 45,
         )
         .saturating_add(scratch)
 }

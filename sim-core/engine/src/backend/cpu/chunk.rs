@@ -1,6 +1,7 @@
 //! A run of blocks that one thread works on: their state in lane order, and one workspace.
 
 use super::contacts;
+use super::seats::Seats;
 use super::transfer::{self, Arena};
 use crate::backend::noise::Noise;
 use crate::backend::shown::stages_for;
@@ -8,7 +9,7 @@ use crate::backend::state::{self, Shape, StateField};
 use crate::backend::{Faults, Frozen, Values};
 use crate::random::Draws;
 use crate::start::StartDraw;
-use sim_core::batch::{Block, Field, Layout};
+use sim_core::batch::{Block, Field, Layout, Slot};
 use sim_core::compiled::Stages;
 use sim_core::lane::{Lane, Real};
 use sim_core::model::constants::Constants;
@@ -70,10 +71,20 @@ impl<F: Lane> Job<F> {
     }
 }
 
+/// Is it a number that a chunk keeps of each world, and not of its state?
+fn is_counter(field: Field) -> bool {
+    matches!(
+        field,
+        Field::Time | Field::Step | Field::Status | Field::ContactsLeftOut
+    )
+}
+
 pub(super) struct Chunk<F: Lane> {
     pub(super) worlds: Range<usize>,
     /// `(blocks, numbers of a world, WIDTH)`
     pub(super) state: Vec<F::Real>,
+    /// Where the worlds are in it.
+    pub(super) seats: Seats,
     /// Control frames since the reset of each world; those of a frozen one are as many as it was well.
     pub(super) steps: Vec<u64>,
     pub(super) status: Vec<u32>,
@@ -94,6 +105,8 @@ pub(super) struct Chunk<F: Lane> {
     pub staging: Vec<F>,
     /// The same, number by number.
     pub lanes: Vec<F::Real>,
+    /// The same, world by world.
+    pub rows: Vec<F::Real>,
 }
 
 impl<F: Lane> Chunk<F> {
@@ -118,6 +131,8 @@ impl<F: Lane> Chunk<F> {
             memory: vec![F::default(); job.constants.contacts.memory.len],
             staging: vec![F::default(); elements],
             lanes: vec![F::Real::default(); elements * F::WIDTH],
+            rows: vec![F::Real::default(); elements * F::WIDTH],
+            seats: Seats::new(worlds.len(), blocks * F::WIDTH),
             worlds,
         };
         chunk.start(job);
@@ -126,7 +141,8 @@ impl<F: Lane> Chunk<F> {
 
     /// Place of a number of a world (counted from the chunk's first) in `state`.
     pub(super) fn place(&self, shape: Shape, world: usize, field: StateField, k: usize) -> usize {
-        let (block, lane) = (world / F::WIDTH, world % F::WIDTH);
+        let seat = self.seats.of(world);
+        let (block, lane) = (seat / F::WIDTH, seat % F::WIDTH);
         (block * shape.total() + shape.start(field) + k) * F::WIDTH + lane
     }
 
@@ -251,38 +267,67 @@ impl<F: Lane> Chunk<F> {
             if substeps > 0 || job.finds_contacts {
                 self.count_left_out(block);
             }
-            let worlds = self.worlds_of(block);
-            for slot in &job.layout.slots {
-                let rows = self.worlds.start + worlds.start..self.worlds.start + worlds.end;
+            if substeps > 0 {
+                self.note_touches(&job.constants, block);
+            }
+            for slot in job
+                .layout
+                .slots
+                .iter()
+                .filter(|slot| !is_counter(slot.field))
+            {
                 // SAFETY: the arena holds the layout, and these worlds are this chunk's alone.
                 unsafe {
-                    match slot.field {
-                        Field::Time => arena.put(slot, rows.clone(), |w| {
-                            self.steps[w - self.worlds.start] as f64 * job.frame_s
-                        }),
-                        Field::Step => {
-                            arena.put(slot, rows.clone(), |w| self.steps[w - self.worlds.start])
-                        }
-                        Field::Status => {
-                            arena.put(slot, rows.clone(), |w| self.status[w - self.worlds.start])
-                        }
-                        Field::ContactsLeftOut => {
-                            arena.put(slot, rows.clone(), |w| self.left_out[w - self.worlds.start])
-                        }
-                        field if contacts::is_of_contacts(field) => {
-                            contacts::export(self, job, slot, rows.clone(), arena)
-                        }
-                        _ => transfer::export(self, &job.constants, slot, rows.clone(), arena),
+                    if contacts::is_of_contacts(slot.field) {
+                        contacts::export(self, job, slot, block, arena);
+                    } else {
+                        transfer::export(self, &job.constants, slot, block, arena);
                     }
                     if let Some(noise) = job.noise.of(slot.field) {
-                        let numbers = arena.rows(slot, &rows);
-                        self.add_noise(job, noise, rows, numbers);
+                        for seat in self.seats_of(block) {
+                            let world = self.seats.world(seat);
+                            self.add_noise(
+                                job,
+                                noise,
+                                world,
+                                arena.row(slot, self.worlds.start + world),
+                            );
+                        }
                     }
                 }
             }
+        }
+        for slot in job
+            .layout
+            .slots
+            .iter()
+            .filter(|slot| is_counter(slot.field))
+        {
+            // SAFETY: as above.
+            unsafe { self.put_counter(job, slot, arena) };
+        }
+        if substeps > 0 {
             // now that its trouble was shown, and before the commands of its first step come
-            if job.faults.resets && substeps > 0 {
-                self.reset_frozen(job, block);
+            if job.faults.resets {
+                self.reset_frozen(job);
+            }
+            self.group_worlds(job);
+        }
+    }
+
+    /// Writes a counter of every world.
+    ///
+    /// # Safety
+    /// The arena holds the slot.
+    unsafe fn put_counter(&self, job: &Job<F>, slot: &Slot, arena: Arena) {
+        let (first, all) = (self.worlds.start, self.worlds.clone());
+        // SAFETY: these worlds are this chunk's alone; the rest by contract.
+        unsafe {
+            match slot.field {
+                Field::Time => arena.put(slot, all, |w| self.steps[w - first] as f64 * job.frame_s),
+                Field::Step => arena.put(slot, all, |w| self.steps[w - first]),
+                Field::Status => arena.put(slot, all, |w| self.status[w - first]),
+                _ => arena.put(slot, all, |w| self.left_out[w - first]),
             }
         }
     }

@@ -7,7 +7,6 @@ use sim_core::lane::{Lane, Real};
 use sim_core::model::SensedShapes;
 use sim_core::model::constants::Constants;
 use sim_core::model::contact::{Class, Memory, row};
-use std::ops::Range;
 
 /// A contact of one world: its row, and the class that it is of.
 struct Contact<'a, R> {
@@ -23,19 +22,23 @@ struct World<'a, F: Lane> {
 }
 
 impl<F: Lane> World<'_, F> {
+    #[inline(always)]
     fn number(&self, row: usize, k: usize) -> F::Real {
         let rows = self.memory.rows;
         self.cells[rows.base + row * rows.stride + k].lane(self.lane)
     }
 
+    #[inline(always)]
     fn three(&self, row: usize, k: usize) -> [F::Real; 3] {
         [0, 1, 2].map(|i| self.number(row, k + i))
     }
 
+    #[inline(always)]
     fn pair(&self, row: usize) -> usize {
         self.number(row, row::PAIR).to_usize()
     }
 
+    #[inline(always)]
     fn contacts<'c, R>(&self, classes: &'c [Class<R>]) -> impl Iterator<Item = Contact<'c, R>> {
         let counts = self.memory.counts;
         classes.iter().enumerate().flat_map(move |(k, class)| {
@@ -49,6 +52,7 @@ impl<F: Lane> World<'_, F> {
     }
 
     /// Force on the second body, in world axes [N].
+    #[inline(always)]
     fn force(&self, row: usize) -> [f64; 3] {
         let along = self.three(row, row::FORCE).map(Real::to_f64);
         let axes = [row::NORMAL, row::TANGENTS, row::TANGENTS + 3]
@@ -72,84 +76,98 @@ pub(super) fn is_of_contacts(field: Field) -> bool {
     )
 }
 
-/// Writes a field of contacts of a block, for the worlds of `worlds` (one a lane, from lane 0).
+/// Writes a field of contacts of the worlds of a block.
 ///
 /// # Safety
 /// As [`Arena::rows`].
+#[inline(always)]
 pub(super) unsafe fn export<F: Lane>(
     chunk: &Chunk<F>,
     job: &Job<F>,
     slot: &Slot,
-    worlds: Range<usize>,
+    block: usize,
     arena: Arena,
 ) {
     let m = &job.constants;
-    let n: usize = slot.shape[1..].iter().product();
-    if slot.dtype == Dtype::I32 {
-        // SAFETY: by contract.
-        let rows = unsafe { arena.rows::<i32>(slot, &worlds) };
-        for (lane, to) in rows.chunks_exact_mut(n.max(1)).enumerate() {
-            let world = world(chunk, m, lane);
-            let contacts = world.contacts(&m.contacts.classes);
-            if slot.field == Field::ContactCount {
-                to[0] = contacts.count() as i32;
-                continue;
-            }
-            to.fill(-1);
-            for (contact, to) in contacts.zip(to.chunks_exact_mut(2)) {
-                let pair = &m.contacts.pairs[world.pair(contact.row)];
-                to.copy_from_slice(&pair.shapes.map(|shape| shape as i32));
-            }
+    for (lane, seat) in chunk.seats_of(block).enumerate() {
+        let world = World {
+            memory: &m.contacts.memory,
+            cells: &chunk.memory,
+            lane,
+        };
+        let outside = chunk.worlds.start + chunk.seats.world(seat);
+        if slot.dtype == Dtype::I32 {
+            // SAFETY: by contract.
+            let to = unsafe { arena.row::<i32>(slot, outside) };
+            put_whole(&world, m, slot.field, to);
+        } else {
+            // SAFETY: by contract.
+            let to = unsafe { arena.row::<F::Real>(slot, outside) };
+            put_real(&world, chunk, job, slot.field, to);
         }
+    }
+}
+
+/// A field of whole numbers of a world.
+#[inline(always)]
+fn put_whole<F: Lane>(world: &World<'_, F>, m: &Constants<F::Real>, field: Field, to: &mut [i32]) {
+    let contacts = world.contacts(&m.contacts.classes);
+    if field == Field::ContactCount {
+        to[0] = contacts.count() as i32;
         return;
     }
-    // SAFETY: by contract.
-    let rows = unsafe { arena.rows::<F::Real>(slot, &worlds) };
-    for (lane, to) in rows.chunks_exact_mut(n.max(1)).enumerate() {
-        to.fill(F::Real::default());
-        let world = world(chunk, m, lane);
-        let contacts = world.contacts(&m.contacts.classes);
-        if slot.field == Field::BodyContactForce {
-            add_forces(&world, m, contacts, to);
-            continue;
-        }
-        if slot.field == Field::ContactSensor {
-            add_sensed(&world, m, &job.contact_sensors, contacts, to);
-            continue;
-        }
-        let size = if slot.field == Field::ContactDistance {
-            1
-        } else {
-            3
-        };
-        for (contact, to) in contacts.zip(to.chunks_exact_mut(size)) {
-            let row = contact.row;
-            match slot.field {
-                Field::ContactDistance => to[0] = world.number(row, row::DISTANCE),
-                Field::ContactNormal => to.copy_from_slice(&world.three(row, row::NORMAL)),
-                Field::ContactForce => to.copy_from_slice(&world.force(row).map(Real::of)),
-                _ => {
-                    let origin = &chunk.block.work.reference[contact.class.trees.1];
-                    let point = world.three(row, row::POINT);
-                    for i in 0..3 {
-                        let x = origin[i].lane(lane).to_f64() + point[i].to_f64();
-                        to[i] = Real::of(x);
-                    }
+    to.fill(-1);
+    for (contact, to) in contacts.zip(to.chunks_exact_mut(2)) {
+        let pair = &m.contacts.pairs[world.pair(contact.row)];
+        to.copy_from_slice(&pair.shapes.map(|shape| shape as i32));
+    }
+}
+
+/// A field of numbers of a world.
+#[inline(always)]
+fn put_real<F: Lane>(
+    world: &World<'_, F>,
+    chunk: &Chunk<F>,
+    job: &Job<F>,
+    field: Field,
+    to: &mut [F::Real],
+) {
+    let m = &job.constants;
+    to.fill(F::Real::default());
+    let contacts = world.contacts(&m.contacts.classes);
+    if field == Field::BodyContactForce {
+        add_forces(world, m, contacts, to);
+        return;
+    }
+    if field == Field::ContactSensor {
+        add_sensed(world, m, &job.contact_sensors, contacts, to);
+        return;
+    }
+    let size = if field == Field::ContactDistance {
+        1
+    } else {
+        3
+    };
+    for (contact, to) in contacts.zip(to.chunks_exact_mut(size)) {
+        let row = contact.row;
+        match field {
+            Field::ContactDistance => to[0] = world.number(row, row::DISTANCE),
+            Field::ContactNormal => to.copy_from_slice(&world.three(row, row::NORMAL)),
+            Field::ContactForce => to.copy_from_slice(&world.force(row).map(Real::of)),
+            _ => {
+                let origin = &chunk.block.work.reference[contact.class.trees.1];
+                let point = world.three(row, row::POINT);
+                for i in 0..3 {
+                    let x = origin[i].lane(world.lane).to_f64() + point[i].to_f64();
+                    to[i] = Real::of(x);
                 }
             }
         }
     }
 }
 
-fn world<'a, F: Lane>(chunk: &'a Chunk<F>, m: &'a Constants<F::Real>, lane: usize) -> World<'a, F> {
-    World {
-        memory: &m.contacts.memory,
-        cells: &chunk.memory,
-        lane,
-    }
-}
-
 /// What the contact sensors add up, `(contact_sensors, 3)` [N].
+#[inline(always)]
 fn add_sensed<'c, F: Lane>(
     world: &World<'_, F>,
     m: &Constants<F::Real>,
@@ -158,11 +176,12 @@ fn add_sensed<'c, F: Lane>(
     to: &mut [F::Real],
 ) {
     for contact in contacts {
-        let force = world.force(contact.row);
         let [a, b] = m.contacts.pairs[world.pair(contact.row)].shapes;
         for (sensor, to) in sensors.iter().zip(to.chunks_exact_mut(3)) {
             for (on, from, sign) in [(b, a, 1.0), (a, b, -1.0)] {
                 if sensor.of[on] && sensor.against[from] {
+                    // of few contacts, and so not before
+                    let force = world.force(contact.row);
                     for i in 0..3 {
                         to[i] = Real::of(to[i].to_f64() + sign * force[i]);
                     }
@@ -173,6 +192,7 @@ fn add_sensed<'c, F: Lane>(
 }
 
 /// Net contact force on every link, `(bodies, 3)` [N].
+#[inline(always)]
 fn add_forces<'c, F: Lane>(
     world: &World<'_, F>,
     m: &Constants<F::Real>,

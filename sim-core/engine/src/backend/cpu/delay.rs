@@ -22,10 +22,10 @@ impl<F: Lane> Chunk<F> {
         let frame = 3 * shape.dofs * F::WIDTH;
         let end = first + shape.history * F::WIDTH;
         let status = &self.status;
+        let seats = &self.seats;
         let stays = |lane: usize| {
-            let world = block * F::WIDTH + lane;
             status
-                .get(world)
+                .get(seats.world(block * F::WIDTH + lane))
                 .is_some_and(|&status| status & FROZEN != 0)
         };
         if (0..F::WIDTH).any(stays) {

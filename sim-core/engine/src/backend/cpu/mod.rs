@@ -9,6 +9,7 @@ mod dispatch;
 mod noise;
 mod records;
 mod reset;
+mod seats;
 mod transfer;
 mod trouble;
 

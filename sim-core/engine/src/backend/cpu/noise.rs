@@ -5,7 +5,6 @@ use crate::backend::noise::{FieldNoise, sample};
 use crate::backend::state::{Shape, StateField};
 use crate::random::{Draw, Stream};
 use sim_core::lane::{Lane, Real};
-use std::ops::Range;
 
 impl<F: Lane> Chunk<F> {
     /// Draws what is added to the commands of the frame.
@@ -15,7 +14,8 @@ impl<F: Lane> Chunk<F> {
             let Some(first) = first else { continue };
             for dof in 0..shape.dofs {
                 self.lanes[..F::WIDTH].fill(F::Real::default());
-                for (lane, world) in self.worlds_of(block).enumerate() {
+                for (lane, seat) in self.seats_of(block).enumerate() {
+                    let world = self.seats.world(seat);
                     let std = self.deviation(shape, world, first + dof);
                     if std > 0.0 {
                         let noise = sample(&self.draw(job, world, stream), dof, std);
@@ -27,25 +27,18 @@ impl<F: Lane> Chunk<F> {
         }
     }
 
-    /// Adds noise to a field, as the table has it: `numbers` are those of the worlds of `rows`.
+    /// Adds noise to a field of a world, as the table has it.
     pub(super) fn add_noise(
         &self,
         job: &Job<F>,
         noise: &FieldNoise,
-        rows: Range<usize>,
-        numbers: &mut [F::Real],
+        world: usize,
+        row: &mut [F::Real],
     ) {
-        let columns = numbers.len() / rows.len().max(1);
-        if columns == 0 {
-            return;
-        }
         let shape = Shape::of(&job.constants);
-        for (outside, row) in rows.zip(numbers.chunks_exact_mut(columns)) {
-            let world = outside - self.worlds.start;
-            let draw = self.draw(job, world, noise.1);
-            let deviation = |number| self.deviation(shape, world, number);
-            job.noise.add_to(noise, row, &draw, deviation);
-        }
+        let draw = self.draw(job, world, noise.1);
+        let deviation = |number| self.deviation(shape, world, number);
+        job.noise.add_to(noise, row, &draw, deviation);
     }
 
     fn draw(&self, job: &Job<F>, world: usize, stream: Stream) -> Draw {

@@ -49,6 +49,16 @@ impl Arena {
         }
     }
 
+    /// The elements of a slot that belong to a world.
+    ///
+    /// # Safety
+    /// As [`Arena::rows`].
+    #[inline(always)]
+    pub(super) unsafe fn row<'a, T: Copy>(self, slot: &Slot, world: usize) -> &'a mut [T] {
+        // SAFETY: by contract.
+        unsafe { self.rows(slot, &(world..world + 1)) }
+    }
+
     /// Writes one number a world.
     ///
     /// # Safety
@@ -68,7 +78,7 @@ impl Arena {
     }
 }
 
-/// Writes a field of a block, for the worlds of `worlds` (one a lane, from lane 0).
+/// Writes a field of the worlds of a block.
 ///
 /// # Safety
 /// As [`Arena::rows`].
@@ -77,24 +87,43 @@ pub(super) unsafe fn export<F: Lane>(
     chunk: &mut Chunk<F>,
     m: &Constants<F::Real>,
     slot: &Slot,
-    worlds: Range<usize>,
+    block: usize,
     arena: Arena,
 ) {
     let n: usize = slot.shape[1..].iter().product();
     let cx = &mut Cpu::new(&mut chunk.memory, &m.contacts.tables);
     gather(cx, m, &chunk.block, slot.field, &mut chunk.staging[..n]);
-    // SAFETY: by contract.
-    let rows = unsafe { arena.rows::<F::Real>(slot, &worlds) };
+    let (seats, first) = (chunk.seats_of(block), chunk.worlds.start);
+    if let Some(worlds) = chunk.seats.side_by_side(seats.clone()) {
+        let worlds = first + worlds.start..first + worlds.end;
+        // SAFETY: by contract.
+        let rows = unsafe { arena.rows::<F::Real>(slot, &worlds) };
+        unstage(&chunk.staging[..n], &mut chunk.lanes, rows);
+        return;
+    }
+    let numbers = &mut chunk.rows[..n * seats.len()];
+    unstage(&chunk.staging[..n], &mut chunk.lanes, numbers);
+    for (seat, row) in seats.zip(numbers.chunks_exact(n.max(1))) {
+        // SAFETY: by contract.
+        let to = unsafe { arena.row::<F::Real>(slot, first + chunk.seats.world(seat)) };
+        to.copy_from_slice(row);
+    }
+}
+
+/// From one register an element to one row a world, of as many worlds as there are rows; `lanes` is scratch.
+#[inline(always)]
+fn unstage<F: Lane>(staging: &[F], lanes: &mut [F::Real], rows: &mut [F::Real]) {
+    let n = staging.len();
     // four numbers at a time where every lane is a world; number by number this took a twelfth of a step
     let mut first = 0;
-    if worlds.len() == F::WIDTH {
-        for four in chunk.staging[..n].as_chunks().0 {
+    if rows.len() == n * F::WIDTH {
+        for four in staging.as_chunks().0 {
             F::store_rows(*four, &mut rows[first..], n);
             first += 4;
         }
     }
-    let lanes = &mut chunk.lanes[..(n - first) * F::WIDTH];
-    for (x, lanes) in chunk.staging[first..n]
+    let lanes = &mut lanes[..(n - first) * F::WIDTH];
+    for (x, lanes) in staging[first..]
         .iter()
         .zip(lanes.chunks_exact_mut(F::WIDTH))
     {

@@ -41,10 +41,10 @@ impl<F: Lane> Chunk<F> {
             trouble = F::select(F::c(UNIT_LEAST).lt(square), trouble, lost);
         }
         self.flag(block, self.block.unconverged[0], status::NOT_CONVERGED);
-        let worlds = self.worlds_of(block);
         F::select(zero.lt(trouble), trouble, outside).store(&mut self.lanes);
         let mut frozen = false;
-        for (lane, world) in worlds.enumerate() {
+        for (lane, seat) in self.seats_of(block).enumerate() {
+            let world = self.seats.world(seat);
             let found = self.lanes[lane].to_usize() as u32;
             let trouble = if self.is_frozen(world) {
                 self.status[world]
@@ -100,9 +100,9 @@ impl<F: Lane> Chunk<F> {
         worlds.filter(|&world| self.is_frozen(world)).count()
     }
 
-    /// Resets the worlds of a block that are frozen: their next episode begins.
-    pub(super) fn reset_frozen(&mut self, job: &Job<F>, block: usize) {
-        for world in self.worlds_of(block) {
+    /// Resets the worlds that are frozen: their next episode begins.
+    pub(super) fn reset_frozen(&mut self, job: &Job<F>) {
+        for world in 0..self.worlds.len() {
             if self.is_frozen(world) {
                 self.begin_next(job, world);
             }
@@ -135,7 +135,8 @@ impl<F: Lane> Chunk<F> {
         let left_out = self.block.left_out[0];
         self.flag(block, left_out, status::CONTACTS_LEFT_OUT);
         left_out.store(&mut self.lanes);
-        for (lane, world) in self.worlds_of(block).enumerate() {
+        for (lane, seat) in self.seats_of(block).enumerate() {
+            let world = self.seats.world(seat);
             let count = self.lanes[lane].to_usize() as u32;
             self.left_out[world] = if self.is_frozen(world) { 0 } else { count };
         }
@@ -145,7 +146,8 @@ impl<F: Lane> Chunk<F> {
     #[inline(always)]
     fn flag(&mut self, block: usize, number: F, bit: u32) {
         number.store(&mut self.lanes);
-        for (lane, world) in self.worlds_of(block).enumerate() {
+        for (lane, seat) in self.seats_of(block).enumerate() {
+            let world = self.seats.world(seat);
             let is_set = self.lanes[lane] > F::Real::default() && !self.is_frozen(world);
             let status = &mut self.status[world];
             *status = if is_set {
@@ -156,13 +158,8 @@ impl<F: Lane> Chunk<F> {
         }
     }
 
+    #[inline(always)]
     fn is_frozen(&self, world: usize) -> bool {
         self.status[world] & status::FROZEN != 0
-    }
-
-    /// The worlds of a block, counted from the chunk's first.
-    pub(super) fn worlds_of(&self, block: usize) -> Range<usize> {
-        let first = block * F::WIDTH;
-        first..(first + F::WIDTH).min(self.worlds.len())
     }
 }
