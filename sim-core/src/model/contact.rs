@@ -162,6 +162,8 @@ pub struct Class<R> {
     pub entries: Vec<Vec<Run>>,
     /// Does any entry lie outside the pattern of the mass matrix?
     pub couples: bool,
+    /// Parts of the mass matrix that its columns are of, each once, as [`Pattern::parts`](crate::math::factor::Pattern::parts) counts them.
+    pub parts: Vec<usize>,
     /// Numbers of a pair that all its pairs share.
     pub shared: Vec<Option<R>>,
     /// First row of its contacts.
@@ -423,6 +425,7 @@ impl<R: Real> Contacts<R> {
                     runs: c.runs.clone(),
                     entries: c.entries.clone(),
                     couples: c.couples,
+                    parts: c.parts.clone(),
                     shared: c.shared.iter().map(|x| x.map(cast)).collect(),
                     first: c.first,
                     capacity: c.capacity,

@@ -14,7 +14,7 @@ use super::rows::{IMPEDANCE, contact_damping};
 use super::surface::Surface;
 use crate::lane::{Fixed, Table};
 use crate::math::factor::Pattern;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Finds the pairs and sorts them into classes.
 pub(super) fn add_contacts(
@@ -346,6 +346,8 @@ impl Builder<'_> {
                 }
             }
         }
+        let part = |&(dof, _): &(usize, bool)| self.constants.pattern.part_of(dof);
+        let parts: BTreeSet<usize> = columns.iter().map(part).collect();
         Class {
             trees: (
                 first.map(|first| self.clusters[first].tree),
@@ -363,6 +365,7 @@ impl Builder<'_> {
             runs: Run::of(columns.iter().enumerate().map(|(c, &(dof, _))| (c, dof))),
             entries,
             couples,
+            parts: parts.into_iter().collect(),
             shared,
             first: 0,
             capacity: 0,

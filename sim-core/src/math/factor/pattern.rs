@@ -264,6 +264,19 @@ impl Pattern {
         &self.blocks
     }
 
+    /// Rows of each part of the matrix that nothing couples to the rest.
+    #[inline(always)]
+    pub fn parts(&self) -> impl Iterator<Item = std::ops::Range<usize>> + '_ {
+        let rows = |block: &Block| block.first..block.first + block.size;
+        self.blocks.iter().map(rows)
+    }
+
+    /// The part that a row is of.
+    pub fn part_of(&self, row: usize) -> usize {
+        let part = self.parts().position(|rows| rows.contains(&row));
+        part.expect("every row is of a part")
+    }
+
     /// Runs of a row of a block, both counted from the block's first.
     #[inline(always)]
     pub(super) fn runs(&self, block: &Block, row: usize) -> &[Run] {

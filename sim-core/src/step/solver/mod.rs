@@ -14,7 +14,7 @@
 //!
 //! If no row changes its state between `a` and `a⁺` the model was exact and `a⁺` is the answer.
 //! Otherwise an exact line search on the segment finds the next `a` (in `f32` only if three whole steps
-//! did not get there). The start is the last step's
+//! did not get there, or would overshoot). The start is the last step's
 //! result, which mostly makes the first round the only one; in `f64`, the reference, it is chosen as
 //! MuJoCo does (see [`choose_start`]).
 
@@ -91,6 +91,12 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             contacts::residual(cx, t, a, row::JAR);
         }
         solve_system(cx, m, b, MINIMUM, true, corrects);
+        let gain = match corrects {
+            Some(corrects) if !<<C::F as Num>::Real as Real>::DOUBLE => {
+                C::F::select(corrects, touched_gain(cx, m, b), C::F::c(UNKNOWN))
+            }
+            _ => C::F::c(UNKNOWN),
+        };
         let w = &mut b.work;
         let [a, minimum, step, pull] = &mut w.vector;
         if let Some(corrects) = corrects {
@@ -100,8 +106,10 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         }
         let [jar, jar_minimum, weight, aref] = &mut w.row;
         residual(m, &w.limit_side, aref, minimum, jar_minimum);
-        let mut moved = cx.var(changes(m, &b.params, weight, jar, jar_minimum));
-        let mut curved = cx.var(zero);
+        let [sum, turned] = changes(m, &b.params, weight, jar, jar_minimum);
+        let mut moved = cx.var(sum);
+        // a whole step overshoots where a contact slides, and where a dry friction turns, which it may do for ever
+        let mut curved = cx.var(turned);
         if corrects.is_some() {
             contacts::residual(cx, t, minimum, row::AHEAD);
             contacts::changes(cx, t, &mut moved, &mut curved);
@@ -109,12 +117,15 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let changed = half.lt(cx.get(&moved));
         let later = half.lt(cx.get(&round));
         let early = cx.get(&round).lt(C::F::c(trusted_rounds::<C::F>()));
-        // a whole step overshoots where a contact slides, and where a pyramid's edges are too stiff for their factor
         let mut trusted = C::F::and(early, cx.get(&curved).lt(half));
+        // and where a pyramid's edges are too stiff for their factor
         if let (Some(corrects), Cone::Pyramidal) = (corrects, t.cone) {
             trusted = C::F::and(trusted, C::F::not(corrects));
         }
+        // what bodies that touch would gain by another round is less than the tolerance already
+        let quiet = C::F::and(C::F::not(changed), gain.lt(C::F::k(m.solver.tolerance)));
         let searches = C::F::and(C::F::or(changed, later), C::F::not(trusted));
+        let searches = C::F::and(searches, C::F::not(quiet));
         let mut length = cx.var(one);
         let mut settled = cx.var(zero);
         when!(cx, searches, {
@@ -167,7 +178,8 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
                 C::F::select(searches, moved, minimum[j]),
             );
         }
-        let ends = C::F::and(C::F::not(changed), half.lt(cx.get(&calm)));
+        let is_calm = C::F::or(half.lt(cx.get(&calm)), quiet);
+        let ends = C::F::and(C::F::not(changed), is_calm);
         let done = C::F::or(ends, half.lt(cx.get(&settled)));
         if let Some(corrects) = corrects {
             let again = C::F::and(corrects, changed);
@@ -305,6 +317,33 @@ fn solve_system<C: Cx>(
         });
     }
     gather(cx, &b.solution, &mut w.vector[x]);
+}
+
+/// The gain of a whole step, ½ gᵀ H⁻¹ g, of the parts of the mass matrix in which bodies touch; more where contacts
+/// of several classes touch one part. The others are solved to rounding, however far they go.
+///
+/// The step is in scratch vector [`MINIMUM`], the gradient is the right-hand side that it was solved for.
+#[inline(always)]
+fn touched_gain<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) -> C::F {
+    let (zero, half) = (C::F::c(0.0), C::F::c(0.5));
+    let [_, step, gains, _] = &mut b.work.vector;
+    for (gain, rows) in gains.iter_mut().zip(m.pattern.parts()) {
+        let mut sum = zero;
+        for j in rows {
+            sum = cx.get(&b.pull[j]).fma(step[j], sum);
+        }
+        // alone, a part of what contacts couple may lose
+        *gain = half * sum.abs();
+    }
+    let mut sum = zero;
+    for (k, class) in m.contacts.classes.iter().enumerate() {
+        let at = cx.at(k);
+        let touches = half.lt(cx.load(m.contacts.memory.counts, at, 0));
+        for &part in &class.parts {
+            sum = sum + C::F::select(touches, gains[part], zero);
+        }
+    }
+    sum
 }
 
 /// The values of cells.

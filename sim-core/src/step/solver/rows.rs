@@ -144,7 +144,7 @@ pub(super) fn assemble<F: Num>(
     }
 }
 
-/// How many rows are on another piece of their cost.
+/// How many rows are on another piece of their cost; and how many dry frictions slide the other way.
 #[inline(always)]
 pub(super) fn changes<F: Num>(
     m: &Constants<F::Real>,
@@ -152,14 +152,17 @@ pub(super) fn changes<F: Num>(
     weight: &[F],
     jar: &[F],
     other: &[F],
-) -> F {
-    let mut sum = F::c(0.0);
+) -> [F; 2] {
+    let (zero, one) = (F::c(0.0), F::c(1.0));
+    let (mut sum, mut turned) = (zero, zero);
     let mut r = m.equalities.len();
     for f in &m.frictions {
         let [zone, loss] = bounds(m, params, f);
         let before = dry_friction(jar[r], weight[r], zone, loss).state;
         let after = dry_friction(other[r], weight[r], zone, loss).state;
-        sum = sum + (before - after).abs();
+        let moved = (before - after).abs();
+        sum = sum + moved;
+        turned = turned + F::select(one.lt(moved), one, zero);
         r += 1;
     }
     for _ in &m.limits {
@@ -168,7 +171,7 @@ pub(super) fn changes<F: Num>(
         sum = sum + (before - after).abs();
         r += 1;
     }
-    sum
+    [sum, turned]
 }
 
 /// Force of every row, and their sum in joint space.
