@@ -4,7 +4,9 @@
 
 NumPy in and out, all cores. Three environments:
 
-- ``tightloop/FrankaPickCube-v0``, which returns new arrays, and the same over a ring of views (``copy=False``).
+- ``tightloop/FrankaPickCube-v0``, which returns new arrays, and the same over a ring of views (``copy=False``); each
+  also as two groups of worlds (`make_groups`), of which one steps while the other is sent its actions, as envpool's
+  batches do.
 - envpool's nearest task, ``PandaPickCube-v1`` (MuJoCo Playground's: a Panda and a cube, 66 numbers observed, 4 substeps
   of 5 ms). Its scene is smaller: of the arm only fingers and hand touch anything, and its solver stops after 5 rounds.
 - MuJoCo C with our scene, observations and rewards, an environment a process (benches/mujoco_pick_cube.py). `alike`
@@ -41,7 +43,7 @@ from record import print_table, write_results
 from tqdm import tqdm
 
 import tightloop as tl
-from tightloop.env import VectorEnv
+from tightloop.env import VectorEnv, make_groups
 from tightloop.tasks.cube import DT
 from tightloop.tasks.pick_cube import FrankaPickCube
 
@@ -86,12 +88,27 @@ def settings() -> dict[str, list[Setting]]:
     """What is tried of each side. An environment of envpool's takes 48 MB, so that it gets at most 16 a core."""
     whole = [Setting(n, n, CORES) for n in (CORES, 4 * CORES, 16 * CORES)]
     halves = [Setting(n, n // 2, CORES) for n in (4 * CORES, 16 * CORES)]
+    ours = [Setting(worlds, worlds, CORES) for worlds in (1024, 4096, 8192)]
+    ours += [Setting(worlds, worlds // 2, CORES) for worlds in (8192, 16384)]
     return {
-        OURS: [Setting(worlds, worlds, CORES) for worlds in (1024, 4096, 8192)],
-        RING: [Setting(worlds, worlds, CORES) for worlds in (1024, 4096, 8192)],
+        OURS: ours,
+        RING: ours,
         ENVPOOL: [*whole, *halves],
         ASYNC: [Setting(n, n, n) for n in (CORES, 2 * CORES, 4 * CORES)],
     }
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Groups of worlds, each in a daemon of its own."""
+
+    groups: list[VectorEnv]
+
+    def close(self) -> None:
+        """End them."""
+        for group in self.groups:
+            group.recv()
+            group.close()
 
 
 class Side:
@@ -114,11 +131,17 @@ class Side:
             makers = [partial(MujocoPickCube, binary)] * setting.envs
             self.env = AsyncVectorEnv(makers, copy=False, context="spawn")
             self._others = [process.pid for process in self.env.processes]
-        else:
+        elif setting.batch == setting.envs:
             self.env = gymnasium.make_vec(
                 "tightloop/FrankaPickCube-v0", num_envs=setting.envs, threads=setting.workers, copy=side == OURS
             )
             self._others = [self.env.unwrapped.sim.pid]
+        else:
+            groups = setting.envs // setting.batch
+            self.env = Groups(
+                make_groups(FrankaPickCube, setting.envs, groups, threads=setting.workers, copy=side == OURS)
+            )
+            self._others = [group.sim.pid for group in self.env.groups]
         draw = np.random.default_rng(0).uniform
         dtype = np.float64 if side == ENVPOOL else np.float32
         self._actions = [draw(-1.0, 1.0, (setting.batch, 8)).astype(dtype) for _ in range(ACTIONS)]
@@ -127,9 +150,14 @@ class Side:
         if setting.batch == setting.envs:
             self.env.reset(**({} if side == ENVPOOL else {"seed": 0}))
             self.step = self._whole
-        else:
+        elif side == ENVPOOL:
             self.env.async_reset()
             self.step = self._batch
+        else:
+            for group in self.env.groups:
+                group.reset(seed=0)
+                group.send(self._action())
+            self.step = self._group
 
     def _action(self) -> NDArray[Any]:
         self._count += 1
@@ -142,6 +170,12 @@ class Side:
         *_, infos = self.env.recv()
         self.env.send(self._action(), infos["env_id"])
         return len(infos["env_id"])
+
+    def _group(self) -> int:
+        group = self.env.groups[self._count % len(self.env.groups)]
+        reward = group.recv()[1]
+        group.send(self._action())
+        return len(reward)
 
     def rate(self, seconds: float) -> Rate:
         """Steps for so long."""
