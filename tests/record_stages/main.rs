@@ -1,5 +1,6 @@
 //! Every stage of a step, of robots and of shapes that touch: recorded, printed, validated, and run against the CPU.
 
+mod bits;
 mod models;
 #[path = "../common/shapes.rs"]
 mod scene;
@@ -144,47 +145,6 @@ fn every_stage_is_recorded_and_its_program_is_valid() {
                 stage.name()
             );
             assert!(recording.scratch() <= m.contacts.memory.len);
-        }
-    }
-}
-
-#[test]
-fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
-    for case in cases() {
-        let m = &case.m;
-        let mut random = toy::Random(1);
-        let recordings: Vec<Option<Recording>> = Stage::ALL
-            .iter()
-            .map(|&stage| stage.is_needed(m).then(|| recorded_stage(m, stage)))
-            .collect();
-        for _ in 0..STATES {
-            let mut block = case.random_state(&mut random);
-            let mut memory = memory(m);
-            // poses belong to the state before it moves on
-            let last = [
-                Stage::Accelerations,
-                Stage::JointTorque,
-                Stage::Poses,
-                Stage::Velocities,
-                Stage::Sites,
-                Stage::Imu,
-                Stage::SiteInverse,
-                Stage::Integrate,
-            ];
-            for stage in needed(m, before_integrate()).chain(needed(m, &last)) {
-                let recording = recordings[stage.number()].as_ref().expect("it is needed");
-                let what = format!("{}: {}", case.name, stage.name());
-                let inputs = gathered(&mut block, stage.reads());
-                let before = memory.clone();
-                run(stage, m, &mut block, &mut memory);
-                let expected = gathered(&mut block, stage.writes());
-                for recording in [recording, &recording.packed()] {
-                    let mut scratch = before.clone();
-                    let got = recording.evaluate(&inputs, &mut scratch, &m.contacts.tables);
-                    assert_same(&got, &expected, &what);
-                    assert_same(&scratch, &memory, &format!("{what}: memory"));
-                }
-            }
         }
     }
 }

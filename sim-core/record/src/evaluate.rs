@@ -107,7 +107,9 @@ impl Machine<'_> {
                         }
                     }
                 }
-                Statement::List { name } => self.counts[*name as usize] = 0,
+                Statement::List { name, rows } => {
+                    self.counts[*name as usize] = self.operand(*rows).to_usize();
+                }
                 Statement::When { mask, body } => {
                     if self.holds(*mask) {
                         self.run(body);

@@ -40,6 +40,7 @@ mod number;
 mod pack;
 mod recorder;
 mod rounds;
+pub mod split;
 mod state;
 pub(crate) mod tree;
 pub mod wgsl;
@@ -187,6 +188,15 @@ impl Recording {
         end
     }
 
+    /// Is anything written?
+    pub(crate) fn has_effect(&self) -> bool {
+        let mut stores = false;
+        self.each_statement(&mut |statement| {
+            stores |= matches!(statement, Statement::Store { .. });
+        });
+        stores || !self.outputs.is_empty()
+    }
+
     /// Does the text read numbers, and does it read indices, of the tables of the model?
     #[cfg_attr(test, allow(dead_code))] // the tests inside this crate leave the GPU out
     pub(crate) fn reads_tables(&self) -> (bool, bool) {
@@ -262,7 +272,8 @@ impl Recording {
                 numbers.iter().flatten().for_each(|x| mark(*x));
             }
             Statement::When { mask, .. } | Statement::Push { mask, .. } => mark(*mask),
-            Statement::List { .. } | Statement::Loop { .. } => {}
+            Statement::List { rows, .. } => mark(*rows),
+            Statement::Loop { .. } => {}
         });
     }
 

@@ -10,7 +10,10 @@ use sim_core::lane::{Real, Table};
 impl State {
     pub(super) fn list(&mut self, capacity: usize) -> RecordedList {
         let name = self.name();
-        self.emit(Statement::List { name });
+        self.emit(Statement::List {
+            name,
+            rows: Operand::number(0.0),
+        });
         self.assign(name, Operand::number(0.0));
         self.list_of(name, Extent::Own { capacity })
     }

@@ -144,7 +144,7 @@ impl Live<'_> {
                 Statement::Stop(_) => return true,
                 Statement::Var { name, .. }
                 | Statement::Set { name, .. }
-                | Statement::List { name } => self.names.contains(name),
+                | Statement::List { name, .. } => self.names.contains(name),
                 Statement::Store { .. } | Statement::StoreQuad { .. } => true,
                 Statement::When { body, .. } => self.keep(body),
                 Statement::Push { list, body, .. } => self.keep(body) | self.names.contains(list),

@@ -16,19 +16,25 @@ pub(crate) const WIDTH: usize = 4;
 impl Recording {
     /// The same text, with scratch memory in vectors of four numbers. It gives the same bits.
     pub fn packed(&self) -> Recording {
-        let mut packer = Packer {
-            values: self.values.clone(),
-        };
-        let body = packer.block(&self.body, Vec::new());
+        let (body, values) = pack(&self.body, &self.values);
         Recording {
             inputs: self.inputs,
             outputs: self.outputs.clone(),
-            values: packer.values,
+            values,
             names: self.names,
             scratch: self.scratch,
             body,
         }
     }
+}
+
+/// Statements, with what they load and store in vectors, and all values.
+pub(crate) fn pack(body: &[Statement], values: &[Op]) -> (Vec<Statement>, Vec<Op>) {
+    let mut packer = Packer {
+        values: values.to_vec(),
+    };
+    let body = packer.block(body, Vec::new());
+    (body, packer.values)
 }
 
 impl Recording {

@@ -62,7 +62,7 @@ impl Pair<'_> {
                 self.cell(a, b)?;
                 self.operand(*x, *y)
             }
-            (List { name: a }, List { name: b }) => self.name(*a, *b),
+            (List { name: a, .. }, List { name: b, .. }) => self.name(*a, *b),
             (When { mask: a, body: x }, When { mask: b, body: y }) => {
                 self.operand(*a, *b)?;
                 self.compare(x, y)

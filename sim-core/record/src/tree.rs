@@ -197,9 +197,10 @@ pub(crate) enum Statement {
         quad: Quad,
         numbers: [Option<Operand>; 4],
     },
-    /// An empty list.
+    /// A list of so many rows: none, unless it goes on from another program.
     List {
         name: u32,
+        rows: Operand,
     },
     When {
         mask: Operand,

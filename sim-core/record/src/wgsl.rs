@@ -39,6 +39,33 @@ pub struct ProgramOptions {
     /// Field of each output; none: the fields after the inputs'. It may be that of an input: all
     /// inputs are read before any output is written.
     pub outputs: Option<Vec<u32>>,
+    /// Fields of numbers: a world for which one of them is not 0 is left alone.
+    pub unless: Vec<u32>,
+}
+
+impl ProgramOptions {
+    /// The field of each input and of each output.
+    ///
+    /// # Panics
+    /// If `inputs` or `outputs` does not give a field for each of the recording's.
+    pub fn fields(&self, recording: &Recording) -> (Vec<u32>, Vec<u32>) {
+        let n = recording.inputs() as u32;
+        let fields = |given: &Option<Vec<u32>>, first: u32, count: usize| {
+            let fields = given
+                .clone()
+                .unwrap_or_else(|| (first..first + count as u32).collect());
+            assert_eq!(
+                fields.len(),
+                count,
+                "a field for each input and output of the recording"
+            );
+            fields
+        };
+        (
+            fields(&self.inputs, 0, recording.inputs()),
+            fields(&self.outputs, n, recording.outputs()),
+        )
+    }
 }
 
 impl Default for ProgramOptions {
@@ -48,6 +75,7 @@ impl Default for ProgramOptions {
             workgroup: 32,
             inputs: None,
             outputs: None,
+            unless: Vec::new(),
         }
     }
 }
@@ -57,20 +85,7 @@ impl Default for ProgramOptions {
 /// # Panics
 /// If `inputs` or `outputs` does not give a field for each of the recording's.
 pub fn wgsl(recording: &Recording, options: &ProgramOptions) -> String {
-    let n = recording.inputs() as u32;
-    let fields = |given: &Option<Vec<u32>>, first: u32, count: usize| {
-        let fields = given
-            .clone()
-            .unwrap_or_else(|| (first..first + count as u32).collect());
-        assert_eq!(
-            fields.len(),
-            count,
-            "a field for each input and output of the recording"
-        );
-        fields
-    };
-    let inputs = fields(&options.inputs, 0, recording.inputs());
-    let outputs = fields(&options.outputs, n, recording.outputs());
+    let (inputs, outputs) = options.fields(recording);
     let recording = &recording.packed();
     let mut printer = Printer {
         recording,
@@ -146,6 +161,13 @@ impl Printer<'_> {
         )?;
         line!(self, "let world = thread.x;")?;
         line!(self, "if (world >= worlds) {{ return; }}")?;
+        for field in &options.unless {
+            let (quad, part) = place_of_field(*field);
+            line!(
+                self,
+                "if (fields[{quad}u * worlds + world].{part} != 0.0f) {{ return; }}"
+            )?;
+        }
         let read = self.inputs(inputs)?;
         self.block(&self.recording.body)?;
         self.outputs(inputs, outputs, &read)?;
@@ -259,7 +281,10 @@ impl Printer<'_> {
                 let numbers = numbers.map(|x| x.map(|x| self.operand(x)));
                 self.write(&vector(quad), &numbers)
             }
-            Statement::List { name } => line!(self, "var n{name} = 0u;"),
+            Statement::List { name, rows } => match rows.constant() {
+                Some(rows) => line!(self, "var n{name} = {}u;", rows as u32),
+                None => line!(self, "var n{name} = u32({});", self.operand(*rows)),
+            },
             Statement::When { mask, body } => {
                 line!(self, "if ({}) {{", self.operand(*mask))?;
                 self.nested(body)

@@ -6,6 +6,7 @@ mod packed;
 mod programs;
 mod refusals;
 mod refused_blocks;
+mod split;
 #[path = "../../../tests/toy/mod.rs"]
 mod toy;
 

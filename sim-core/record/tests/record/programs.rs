@@ -76,6 +76,7 @@ fn fields_and_names_of_a_program_are_the_callers() {
         workgroup: 64,
         inputs: Some(vec![12, 7]),
         outputs: Some(vec![12]),
+        ..ProgramOptions::default()
     };
     let program = wgsl(&recording, &options);
     let module = toy::validated(&program);

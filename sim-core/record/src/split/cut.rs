@@ -1,0 +1,393 @@
+//! Where a text is cut: into pieces, each of which becomes a kernel.
+
+use super::Part;
+use super::cost;
+use super::uses::{Use, computed, of_op, of_statement};
+use crate::Recording;
+use crate::tree::{Op, Operand, Rounds, Row, Statement, Unary};
+
+/// A loop or a block that is cut inside.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    /// The loop's index and where it starts; none for a block.
+    pub index: Option<(u32, usize)>,
+}
+
+/// What a piece does, in order.
+#[derive(Clone, Debug)]
+pub(super) enum Item {
+    Run(Statement),
+    /// A world enters a frame; where there is a mask, only if it holds.
+    Enter(usize, Option<Operand>),
+    /// A world leaves a frame where the mask holds.
+    Leave(usize, Operand),
+    /// Counts a frame's index.
+    Next(usize),
+}
+
+/// Statements between two cuts.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Piece {
+    pub items: Vec<Item>,
+    /// The frames around it, the outermost first.
+    pub frames: Vec<usize>,
+}
+
+/// A text in pieces.
+pub(super) struct Pieces {
+    pub pieces: Vec<Piece>,
+    pub frames: Vec<Frame>,
+    pub order: Vec<Part>,
+}
+
+pub(super) fn pieces(recording: &Recording, most: usize) -> Pieces {
+    let mut cutter = Cutter {
+        recording,
+        most,
+        frames: Vec::new(),
+        runs: Vec::new(),
+    };
+    let mut order = Vec::new();
+    let mut last = cutter.level(&recording.body, &[], &mut order);
+    if order.is_empty() || !last.items.is_empty() {
+        cutter.end_run(&mut last, &mut order);
+    } else if let Some(Part::Repeat { .. }) = order.last() {
+        // outputs are written outside of all frames
+        cutter.end_run(&mut last, &mut order);
+    }
+    let Cutter { frames, runs, .. } = cutter;
+    let flow = Flow::new(recording, &runs);
+    let mut pieces = Vec::new();
+    let mut pieces_of_run = Vec::new();
+    for (run, first) in runs.iter().zip(&flow.first_item) {
+        let from = pieces.len();
+        for range in flow.cut(run, *first, most) {
+            pieces.push(Piece {
+                items: run.items[range].to_vec(),
+                frames: run.frames.clone(),
+            });
+        }
+        pieces_of_run.push(from..pieces.len());
+    }
+    Pieces {
+        pieces,
+        frames,
+        order: expanded(&order, &pieces_of_run),
+    }
+}
+
+/// The order of pieces from that of runs.
+fn expanded(order: &[Part], pieces: &[std::ops::Range<usize>]) -> Vec<Part> {
+    let part = |part: &Part| match part {
+        Part::Kernel(run) => pieces[*run].clone().map(Part::Kernel).collect(),
+        Part::Repeat { rounds, parts } => vec![Part::Repeat {
+            rounds: *rounds,
+            parts: expanded(parts, pieces),
+        }],
+    };
+    order.iter().flat_map(part).collect()
+}
+
+struct Cutter<'a> {
+    recording: &'a Recording,
+    most: usize,
+    frames: Vec<Frame>,
+    /// Statements between cuts that have to be.
+    runs: Vec<Piece>,
+}
+
+impl Cutter<'_> {
+    /// Cuts the statements of a level where it has to be; returns what the last run holds, which may go on.
+    fn level(&mut self, body: &[Statement], around: &[usize], order: &mut Vec<Part>) -> Piece {
+        let empty = || Piece {
+            items: Vec::new(),
+            frames: around.to_vec(),
+        };
+        let mut run = empty();
+        for statement in body {
+            let (frame, rounds, mask, inside) = match statement {
+                // only the innermost frame can be a loop here: a text stops a loop at the level of its body
+                Statement::Stop(mask) => {
+                    let frame = *around.last().expect("a loop is left inside a loop");
+                    run.items.push(Item::Leave(frame, *mask));
+                    self.end_run(&mut run, order);
+                    continue;
+                }
+                Statement::Loop {
+                    index,
+                    rounds:
+                        Rounds::Span {
+                            first: Row::At(first),
+                            end: Row::At(end),
+                        },
+                    body,
+                } if self.cost(statement) > self.most => {
+                    let index = Some((*index, *first));
+                    (Frame { index }, end.saturating_sub(*first), None, body)
+                }
+                Statement::When { mask, body } if self.cost(statement) > self.most => {
+                    (Frame { index: None }, 1, Some(*mask), body)
+                }
+                _ => {
+                    run.items.push(Item::Run(statement.clone()));
+                    continue;
+                }
+            };
+            let number = self.frames.len();
+            self.frames.push(frame);
+            run.items.push(Item::Enter(number, mask));
+            self.end_run(&mut run, order);
+            let around: Vec<usize> = around.iter().copied().chain([number]).collect();
+            let mut parts = Vec::new();
+            let mut last = self.level(inside, &around, &mut parts);
+            if rounds > 1 {
+                last.items.push(Item::Next(number));
+            }
+            if !last.items.is_empty() {
+                self.end_run(&mut last, &mut parts);
+            }
+            order.push(Part::Repeat { rounds, parts });
+        }
+        run
+    }
+
+    /// Ends a run; the next one starts empty.
+    fn end_run(&mut self, run: &mut Piece, order: &mut Vec<Part>) {
+        let next = Piece {
+            items: Vec::new(),
+            frames: run.frames.clone(),
+        };
+        order.push(Part::Kernel(self.runs.len()));
+        self.runs.push(std::mem::replace(run, next));
+    }
+
+    fn cost(&self, statement: &Statement) -> usize {
+        cost_of(statement, &self.recording.values)
+    }
+}
+
+/// Of a statement with what is inside it.
+fn cost_of(statement: &Statement, values: &[Op]) -> usize {
+    match statement {
+        Statement::When { .. } | Statement::Push { .. } | Statement::Loop { .. } => {
+            let (body, values) = crate::pack::pack(std::slice::from_ref(statement), values);
+            cost::of_packed(&body, &values)
+        }
+        _ => cost::of_simple(statement, values),
+    }
+}
+
+/// Is it cheaper to compute a value again than to keep it?
+pub(super) fn is_computed_again(op: &Op, values: &[Op]) -> bool {
+    let is_given = |x: Operand| match x {
+        Operand::Value(number) => matches!(values[number as usize], Op::Input(_)),
+        _ => true,
+    };
+    match op {
+        Op::Input(_) | Op::Unary(Unary::Neg | Unary::Not, _) => true,
+        Op::Unary(_, x) => is_given(*x),
+        Op::Binary(_, a, b) => {
+            let inputs = [a, b]
+                .iter()
+                .filter(|x| matches!(x, Operand::Value(_)))
+                .count();
+            is_given(*a) && is_given(*b) && inputs == 1
+        }
+        Op::Constant(entry) | Op::Index { entry, .. } => matches!(entry.row, Row::At(_)),
+        _ => false,
+    }
+}
+
+/// Values that a piece has to be given so that it can have a value: those that are not computed again.
+pub(super) fn bases(number: u32, values: &[Op], f: &mut impl FnMut(u32)) {
+    let op = &values[number as usize];
+    if matches!(op, Op::Input(_)) || !is_computed_again(op, values) {
+        return f(number);
+    }
+    let mut operands = Vec::new();
+    of_op(op, &mut |used| {
+        if let Use::Value(x) = used {
+            operands.push(x);
+        }
+    });
+    operands.iter().for_each(|x| bases(*x, values, f));
+}
+
+/// Calls `f` with everything an item names.
+pub(super) fn uses_of(item: &Item, values: &[Op], f: &mut impl FnMut(Use)) {
+    match item {
+        Item::Run(statement) => of_statement(statement, values, f),
+        Item::Enter(_, mask) => {
+            if let Some(Operand::Value(number)) = mask {
+                f(Use::Value(*number));
+            }
+        }
+        Item::Leave(_, mask) => {
+            if let Operand::Value(number) = mask {
+                f(Use::Value(*number));
+            }
+        }
+        Item::Next(_) => {}
+    }
+}
+
+/// What lives how long, in the order of all items.
+struct Flow<'a> {
+    recording: &'a Recording,
+    /// Number of each run's first item.
+    first_item: Vec<usize>,
+    /// The item that computes a value, and the last one that uses it.
+    made: Vec<usize>,
+    last: Vec<usize>,
+    /// The first and the last item that names a variable or a list.
+    named: Vec<(usize, usize)>,
+}
+
+const NEVER: usize = usize::MAX;
+
+impl<'a> Flow<'a> {
+    fn new(recording: &'a Recording, runs: &[Piece]) -> Flow<'a> {
+        let values = &recording.values;
+        let mut flow = Flow {
+            recording,
+            first_item: Vec::new(),
+            made: vec![0; values.len()],
+            last: vec![0; values.len()],
+            named: vec![(NEVER, 0); recording.names],
+        };
+        let mut at = 1;
+        for run in runs {
+            flow.first_item.push(at);
+            for item in &run.items {
+                if let Item::Run(statement) = item {
+                    computed(std::slice::from_ref(statement), &mut |number| {
+                        flow.made[number as usize] = at;
+                    });
+                }
+                let Flow { last, named, .. } = &mut flow;
+                uses_of(item, values, &mut |used| match used {
+                    Use::Value(number) => {
+                        bases(number, values, &mut |base| last[base as usize] = at);
+                    }
+                    Use::Read(name) | Use::Change(name) | Use::Start(name) => {
+                        let (first, last) = &mut named[name as usize];
+                        *first = (*first).min(at);
+                        *last = at;
+                    }
+                    Use::Index(_) => {}
+                });
+                at += 1;
+            }
+        }
+        for x in &recording.outputs {
+            if let Operand::Value(number) = x {
+                bases(*number, values, &mut |base| {
+                    flow.last[base as usize] = NEVER
+                });
+            }
+        }
+        flow
+    }
+
+    /// The cheapest cuts of a run into pieces of at most `most`.
+    fn cut(&self, run: &Piece, first: usize, most: usize) -> Vec<std::ops::Range<usize>> {
+        let values = &self.recording.values;
+        let n = run.items.len();
+        if n == 0 {
+            return std::iter::once(0..0).collect();
+        }
+        struct Facts {
+            cost: usize,
+            uses: Vec<u32>,
+            names: Vec<Use>,
+            lasting: Vec<u32>,
+        }
+        let facts: Vec<Facts> = run
+            .items
+            .iter()
+            .enumerate()
+            .map(|(i, item)| {
+                let mut facts = Facts {
+                    cost: cost::WRITTEN_QUAD,
+                    uses: Vec::new(),
+                    names: Vec::new(),
+                    lasting: Vec::new(),
+                };
+                if let Item::Run(statement) = item {
+                    facts.cost = cost_of(statement, values);
+                    computed(std::slice::from_ref(statement), &mut |x| {
+                        if self.last[x as usize] > first + i {
+                            facts.lasting.push(x);
+                        }
+                    });
+                }
+                uses_of(item, values, &mut |used| match used {
+                    Use::Value(x) => bases(x, values, &mut |base| facts.uses.push(base)),
+                    Use::Index(_) => {}
+                    name => facts.names.push(name),
+                });
+                facts.uses.sort_unstable();
+                facts.uses.dedup();
+                facts
+            })
+            .collect();
+        // cheapest[j]: of the first j items, with where the last of their pieces starts
+        let mut cheapest = vec![(usize::MAX, 0); n + 1];
+        cheapest[0].0 = 0;
+        let mut value_seen = vec![NEVER; values.len()];
+        let mut name_seen = vec![NEVER; self.recording.names];
+        for i in 0..n {
+            let (mut body, mut reads, mut lasting, mut kept) = (0, 0, 0usize, 0);
+            for (j, facts) in facts.iter().enumerate().skip(i) {
+                let at = first + j;
+                body += facts.cost;
+                for x in &facts.uses {
+                    let x = *x as usize;
+                    let inside = self.made[x] >= first + i;
+                    if !inside && value_seen[x] != i {
+                        reads += 1;
+                    }
+                    if inside && self.last[x] == at && self.made[x] < at {
+                        lasting -= 1;
+                    }
+                    if !inside {
+                        value_seen[x] = i;
+                    }
+                }
+                lasting += facts.lasting.len();
+                for name in &facts.names {
+                    let (Use::Read(x) | Use::Change(x) | Use::Start(x)) = *name else {
+                        continue;
+                    };
+                    let (from, to) = self.named[x as usize];
+                    if name_seen[x as usize] != i {
+                        name_seen[x as usize] = i;
+                        reads += usize::from(from < first + i && !matches!(name, Use::Start(_)));
+                        kept += usize::from(to > at && !matches!(name, Use::Read(_)));
+                    }
+                }
+                let size =
+                    body + reads * cost::QUAD / 4 + (lasting + kept) * cost::WRITTEN_QUAD / 4;
+                if size > most && j > i {
+                    break;
+                }
+                // beside its size, which grows faster than linearly, a kernel costs a start
+                let cost = cheapest[i]
+                    .0
+                    .saturating_add(size + size * size / (2 * most) + most / 8);
+                if cost < cheapest[j + 1].0 {
+                    cheapest[j + 1] = (cost, i);
+                }
+            }
+        }
+        let mut ranges = Vec::new();
+        let mut end = n;
+        while end > 0 {
+            let start = cheapest[end].1;
+            ranges.push(start..end);
+            end = start;
+        }
+        ranges.reverse();
+        ranges
+    }
+}
