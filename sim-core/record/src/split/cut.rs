@@ -1,10 +1,13 @@
 //! Where a text is cut: into pieces, each of which becomes a kernel.
 
 use super::Part;
-use super::cost;
+use super::cost::{self, Cost};
 use super::uses::{Use, computed, of_op, of_statement};
 use crate::Recording;
 use crate::tree::{Op, Operand, Rounds, Row, Statement, Unary};
+
+/// Rounds that make a loop worth another kernel's compile time.
+const ROUNDS: usize = 8;
 
 /// A loop or a block that is cut inside.
 #[derive(Clone, Copy, Debug)]
@@ -121,11 +124,11 @@ impl Cutter<'_> {
                             end: Row::At(end),
                         },
                     body,
-                } if self.cost(statement) > self.most => {
+                } if self.is_cut(statement, end.saturating_sub(*first)) => {
                     let index = Some((*index, *first));
                     (Frame { index }, end.saturating_sub(*first), None, body)
                 }
-                Statement::When { mask, body } if self.cost(statement) > self.most => {
+                Statement::When { mask, body } if self.is_cut(statement, 1) => {
                     (Frame { index: None }, 1, Some(*mask), body)
                 }
                 _ => {
@@ -161,13 +164,16 @@ impl Cutter<'_> {
         self.runs.push(std::mem::replace(run, next));
     }
 
-    fn cost(&self, statement: &Statement) -> usize {
-        cost_of(statement, &self.recording.values)
+    /// Is a loop or a block cut inside? Each of its kernels is dispatched in each of its rounds, whether a
+    /// world is left in the loop or not: the more rounds, the longer a loop may be to stay whole.
+    fn is_cut(&self, statement: &Statement, rounds: usize) -> bool {
+        let cost = cost_of(statement, &self.recording.values);
+        cost.total() > self.most + self.most * rounds / ROUNDS
     }
 }
 
 /// Of a statement with what is inside it.
-fn cost_of(statement: &Statement, values: &[Op]) -> usize {
+fn cost_of(statement: &Statement, values: &[Op]) -> Cost {
     match statement {
         Statement::When { .. } | Statement::Push { .. } | Statement::Loop { .. } => {
             let (body, values) = crate::pack::pack(std::slice::from_ref(statement), values);
@@ -297,7 +303,7 @@ impl<'a> Flow<'a> {
             return std::iter::once(0..0).collect();
         }
         struct Facts {
-            cost: usize,
+            cost: Cost,
             uses: Vec<u32>,
             names: Vec<Use>,
             lasting: Vec<u32>,
@@ -337,7 +343,8 @@ impl<'a> Flow<'a> {
         let mut value_seen = vec![NEVER; values.len()];
         let mut name_seen = vec![NEVER; self.recording.names];
         for i in 0..n {
-            let (mut body, mut reads, mut lasting, mut kept) = (0, 0, 0usize, 0);
+            let mut body = Cost::default();
+            let (mut reads, mut lasting, mut kept) = (0, 0, 0);
             for (j, facts) in facts.iter().enumerate().skip(i) {
                 let at = first + j;
                 body += facts.cost;
@@ -366,15 +373,13 @@ impl<'a> Flow<'a> {
                         kept += usize::from(to > at && !matches!(name, Use::Read(_)));
                     }
                 }
-                let size =
-                    body + reads * cost::QUAD / 4 + (lasting + kept) * cost::WRITTEN_QUAD / 4;
+                let crossing =
+                    cost::QUAD.of_numbers(reads) + cost::WRITTEN_QUAD.of_numbers(lasting + kept);
+                let size = cost::KERNEL + (body + crossing).total();
                 if size > most && j > i {
                     break;
                 }
-                // beside its size, which grows faster than linearly, a kernel costs a start
-                let cost = cheapest[i]
-                    .0
-                    .saturating_add(size + size * size / (2 * most) + most / 8);
+                let cost = cheapest[i].0.saturating_add(size);
                 if cost < cheapest[j + 1].0 {
                     cheapest[j + 1] = (cost, i);
                 }

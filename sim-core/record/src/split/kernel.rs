@@ -2,6 +2,7 @@
 
 use super::Kernel;
 use super::cut::{Item, Piece, Pieces, bases, is_computed_again, uses_of};
+use super::lasting::{Names, lasting};
 use super::uses::{Use, computed, of_op};
 use super::write::Writer;
 use crate::Recording;
@@ -24,6 +25,15 @@ pub(super) struct Needs {
     pub assigned: HashSet<u32>,
     pub made: HashSet<u32>,
     counts: bool,
+}
+
+impl Needs {
+    fn names(&self) -> Names<'_> {
+        Names {
+            loaded: &self.loaded,
+            changed: &self.changed,
+        }
+    }
 }
 
 /// The kernels, and how many fields they use from `spare` on.
@@ -100,7 +110,8 @@ impl<'a> Plan<'a> {
             .map(|piece| plan.needs_of(piece))
             .collect();
         plan.place_outputs(outputs);
-        plan.kept = (0..pieces.pieces.len()).map(|p| plan.kept_by(p)).collect();
+        let names: Vec<Names> = plan.needs.iter().map(Needs::names).collect();
+        plan.kept = lasting(pieces, &names);
         plan
     }
 
@@ -214,20 +225,6 @@ impl<'a> Plan<'a> {
             }
             self.outputs[last].push((x, field));
         }
-    }
-
-    /// Names that a piece changes and another, or the same in the next round, goes on with.
-    fn kept_by(&self, p: usize) -> BTreeSet<u32> {
-        let frames = &self.pieces.pieces[p].frames;
-        let follows = |q: usize| {
-            let other = &self.pieces.pieces[q].frames;
-            q > p || !frames.is_empty() && frames.first() == other.first()
-        };
-        let is_loaded = |name: &u32| {
-            (0..self.needs.len()).any(|q| follows(q) && self.needs[q].loaded.contains(name))
-        };
-        let changed = self.needs[p].changed.iter();
-        changed.filter(|name| is_loaded(name)).copied().collect()
     }
 
     /// Gives a field to all that crosses a cut: what the same pieces write lies side by side.

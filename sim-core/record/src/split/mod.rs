@@ -8,6 +8,7 @@
 mod cost;
 mod cut;
 mod kernel;
+mod lasting;
 mod uses;
 mod write;
 
