@@ -2,7 +2,8 @@
 
 use super::Part;
 use super::cost::{self, Cost};
-use super::uses::{Use, computed, of_op, of_statement};
+use super::flow::Flow;
+use super::uses::{Use, of_op, of_statement};
 use crate::Recording;
 use crate::tree::{Op, Operand, Rounds, Row, Statement, Unary};
 
@@ -62,9 +63,9 @@ pub(super) fn pieces(recording: &Recording, most: usize) -> Pieces {
     let flow = Flow::new(recording, &runs);
     let mut pieces = Vec::new();
     let mut pieces_of_run = Vec::new();
-    for (run, first) in runs.iter().zip(&flow.first_item) {
+    for (k, run) in runs.iter().enumerate() {
         let from = pieces.len();
-        for range in flow.cut(run, *first, most) {
+        for range in flow.cut(k, most) {
             pieces.push(Piece {
                 items: run.items[range].to_vec(),
                 frames: run.frames.clone(),
@@ -173,7 +174,7 @@ impl Cutter<'_> {
 }
 
 /// Of a statement with what is inside it.
-fn cost_of(statement: &Statement, values: &[Op]) -> Cost {
+pub(super) fn cost_of(statement: &Statement, values: &[Op]) -> Cost {
     match statement {
         Statement::When { .. } | Statement::Push { .. } | Statement::Loop { .. } => {
             let (body, values) = crate::pack::pack(std::slice::from_ref(statement), values);
@@ -234,165 +235,5 @@ pub(super) fn uses_of(item: &Item, values: &[Op], f: &mut impl FnMut(Use)) {
             }
         }
         Item::Next(_) => {}
-    }
-}
-
-/// What lives how long, in the order of all items.
-struct Flow<'a> {
-    recording: &'a Recording,
-    /// Number of each run's first item.
-    first_item: Vec<usize>,
-    /// The item that computes a value, and the last one that uses it.
-    made: Vec<usize>,
-    last: Vec<usize>,
-    /// The first and the last item that names a variable or a list.
-    named: Vec<(usize, usize)>,
-}
-
-const NEVER: usize = usize::MAX;
-
-impl<'a> Flow<'a> {
-    fn new(recording: &'a Recording, runs: &[Piece]) -> Flow<'a> {
-        let values = &recording.values;
-        let mut flow = Flow {
-            recording,
-            first_item: Vec::new(),
-            made: vec![0; values.len()],
-            last: vec![0; values.len()],
-            named: vec![(NEVER, 0); recording.names],
-        };
-        let mut at = 1;
-        for run in runs {
-            flow.first_item.push(at);
-            for item in &run.items {
-                if let Item::Run(statement) = item {
-                    computed(std::slice::from_ref(statement), &mut |number| {
-                        flow.made[number as usize] = at;
-                    });
-                }
-                let Flow { last, named, .. } = &mut flow;
-                uses_of(item, values, &mut |used| match used {
-                    Use::Value(number) => {
-                        bases(number, values, &mut |base| last[base as usize] = at);
-                    }
-                    Use::Read(name) | Use::Change(name) | Use::Start(name) => {
-                        let (first, last) = &mut named[name as usize];
-                        *first = (*first).min(at);
-                        *last = at;
-                    }
-                    Use::Index(_) => {}
-                });
-                at += 1;
-            }
-        }
-        for x in &recording.outputs {
-            if let Operand::Value(number) = x {
-                bases(*number, values, &mut |base| {
-                    flow.last[base as usize] = NEVER
-                });
-            }
-        }
-        flow
-    }
-
-    /// The cheapest cuts of a run into pieces of at most `most`.
-    fn cut(&self, run: &Piece, first: usize, most: usize) -> Vec<std::ops::Range<usize>> {
-        let values = &self.recording.values;
-        let n = run.items.len();
-        if n == 0 {
-            return std::iter::once(0..0).collect();
-        }
-        struct Facts {
-            cost: Cost,
-            uses: Vec<u32>,
-            names: Vec<Use>,
-            lasting: Vec<u32>,
-        }
-        let facts: Vec<Facts> = run
-            .items
-            .iter()
-            .enumerate()
-            .map(|(i, item)| {
-                let mut facts = Facts {
-                    cost: cost::WRITTEN_QUAD,
-                    uses: Vec::new(),
-                    names: Vec::new(),
-                    lasting: Vec::new(),
-                };
-                if let Item::Run(statement) = item {
-                    facts.cost = cost_of(statement, values);
-                    computed(std::slice::from_ref(statement), &mut |x| {
-                        if self.last[x as usize] > first + i {
-                            facts.lasting.push(x);
-                        }
-                    });
-                }
-                uses_of(item, values, &mut |used| match used {
-                    Use::Value(x) => bases(x, values, &mut |base| facts.uses.push(base)),
-                    Use::Index(_) => {}
-                    name => facts.names.push(name),
-                });
-                facts.uses.sort_unstable();
-                facts.uses.dedup();
-                facts
-            })
-            .collect();
-        // cheapest[j]: of the first j items, with where the last of their pieces starts
-        let mut cheapest = vec![(usize::MAX, 0); n + 1];
-        cheapest[0].0 = 0;
-        let mut value_seen = vec![NEVER; values.len()];
-        let mut name_seen = vec![NEVER; self.recording.names];
-        for i in 0..n {
-            let mut body = Cost::default();
-            let (mut reads, mut lasting, mut kept) = (0, 0, 0);
-            for (j, facts) in facts.iter().enumerate().skip(i) {
-                let at = first + j;
-                body += facts.cost;
-                for x in &facts.uses {
-                    let x = *x as usize;
-                    let inside = self.made[x] >= first + i;
-                    if !inside && value_seen[x] != i {
-                        reads += 1;
-                    }
-                    if inside && self.last[x] == at && self.made[x] < at {
-                        lasting -= 1;
-                    }
-                    if !inside {
-                        value_seen[x] = i;
-                    }
-                }
-                lasting += facts.lasting.len();
-                for name in &facts.names {
-                    let (Use::Read(x) | Use::Change(x) | Use::Start(x)) = *name else {
-                        continue;
-                    };
-                    let (from, to) = self.named[x as usize];
-                    if name_seen[x as usize] != i {
-                        name_seen[x as usize] = i;
-                        reads += usize::from(from < first + i && !matches!(name, Use::Start(_)));
-                        kept += usize::from(to > at && !matches!(name, Use::Read(_)));
-                    }
-                }
-                let crossing =
-                    cost::QUAD.of_numbers(reads) + cost::WRITTEN_QUAD.of_numbers(lasting + kept);
-                let size = cost::KERNEL + (body + crossing).total();
-                if size > most && j > i {
-                    break;
-                }
-                let cost = cheapest[i].0.saturating_add(size);
-                if cost < cheapest[j + 1].0 {
-                    cheapest[j + 1] = (cost, i);
-                }
-            }
-        }
-        let mut ranges = Vec::new();
-        let mut end = n;
-        while end > 0 {
-            let start = cheapest[end].1;
-            ranges.push(start..end);
-            end = start;
-        }
-        ranges.reverse();
-        ranges
     }
 }

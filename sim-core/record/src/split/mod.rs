@@ -7,6 +7,7 @@
 
 mod cost;
 mod cut;
+mod flow;
 mod kernel;
 mod lasting;
 mod uses;
