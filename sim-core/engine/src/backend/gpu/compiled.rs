@@ -1,12 +1,13 @@
 //! The programs of a run, compiled, and the tables of the model.
 
 use super::places::Places;
-use super::programs::{Kernel, Programs};
+use super::programs::{self, Programs};
 use super::show;
 use super::upkeep::{self, WORKGROUP};
 use crate::backend::BackendError;
 use sim_core::model::constants::Constants;
 use sim_device::{Buffer, Device, DeviceError, Program, Replay, Source};
+use sim_record::split::Part;
 use std::time::Duration;
 
 /// Threads of a workgroup of physics: registers are what it needs.
@@ -18,13 +19,18 @@ pub(super) struct Books {
     pub contacts: Option<String>,
 }
 
+/// Kernels of physics, and the order in which they are dispatched.
+pub(super) struct Kernels {
+    pub kernels: Vec<Program>,
+    pub order: Vec<Part>,
+}
+
 /// All programs of a run, and the tables of the model.
 pub(super) struct Compiled {
-    /// Kernels of a step.
-    pub step: Vec<Program>,
-    /// How often they run in a frame.
-    pub rounds: usize,
-    pub evaluate: Vec<Program>,
+    /// All substeps of a frame.
+    pub step: Kernels,
+    /// What is shown.
+    pub evaluate: Kernels,
     pub begin: Program,
     pub begin_evaluation: Program,
     pub note: Program,
@@ -57,7 +63,12 @@ impl Compiled {
                 ("workgroup".to_owned(), f64::from(workgroup)),
             ],
         };
-        let physics = |kernel: &Kernel| source(&kernel.label, kernel.wgsl.clone(), PHYSICS);
+        let physics = |label: &'static str, program: &programs::Program| {
+            let kernels = program.kernels.iter().enumerate();
+            let kernels =
+                kernels.map(|(k, text)| source(&format!("{label} {k}"), text.clone(), PHYSICS));
+            kernels.collect::<Vec<_>>()
+        };
         let mut sources: Vec<Source> = vec![
             source("begin", upkeep::begin(places, true), WORKGROUP),
             source("begin evaluation", upkeep::begin(places, false), WORKGROUP),
@@ -67,8 +78,8 @@ impl Compiled {
             source("show", show::SHOW.to_owned(), WORKGROUP),
             source("counters", books.counters, WORKGROUP),
         ];
-        sources.extend(programs.step.iter().map(physics));
-        sources.extend(programs.evaluate.iter().map(physics));
+        sources.extend(physics("step", &programs.step));
+        sources.extend(physics("evaluate", &programs.evaluate));
         let has_contacts = books.contacts.is_some();
         sources.extend(
             books
@@ -86,14 +97,16 @@ impl Compiled {
             show,
             counters,
         ] = std::array::from_fn(|_| next());
-        let step = programs.step.iter().map(|_| next()).collect();
-        let evaluate = programs.evaluate.iter().map(|_| next()).collect();
+        let mut kernels = |program: &programs::Program| Kernels {
+            kernels: program.kernels.iter().map(|_| next()).collect(),
+            order: program.order.clone(),
+        };
+        let (step, evaluate) = (kernels(&programs.step), kernels(&programs.evaluate));
         let contacts = has_contacts.then(&mut next);
         let tables = &m.contacts.tables;
         let numbers: Vec<u32> = tables.numbers.iter().map(|x| x.to_bits()).collect();
         Ok(Compiled {
             step,
-            rounds: programs.rounds,
             evaluate,
             begin,
             begin_evaluation,

@@ -37,6 +37,12 @@ use tile::{Rows, Tile};
 /// A driver that takes longer over the programs of a model is given up.
 const COMPILE_LIMIT: Duration = Duration::from_secs(180);
 
+/// What a kernel may cost a driver, in simple statements. Where software plays the GPU, every access to memory is a loop, and its
+/// compiler's time grows with their square.
+const SOFTWARE_KERNEL: usize = 4000;
+/// The same of a driver of hardware: few kernels, so that numbers stay in registers.
+const KERNEL: usize = 40_000;
+
 pub(super) struct Gpu {
     // batches go before the buffers and programs that they name, and those before the device
     tiles: Vec<Tile>,
@@ -97,16 +103,22 @@ impl Gpu {
             .filter(|slot| show::is_computed(slot.field) && slot.bytes > 0)
             .map(|slot| (slot.field, slot.shape[1..].iter().product()))
             .collect();
-        let places = Places::new(m, &computed);
+        let mut places = Places::new(m, &computed);
         let shown = stages_for(layout);
         let wanted: Vec<_> = (layout.slots.iter())
             .flat_map(|slot| show::slots_of(slot.field))
             .copied()
             .collect();
-        let programs = Programs::new(m, &places, model.substeps(), &shown, &computed, &wanted)
+        let most = match device.info().kind {
+            AdapterKind::Software => SOFTWARE_KERNEL,
+            _ => KERNEL,
+        };
+        let substeps = model.substeps();
+        let programs = Programs::new(m, &places, substeps, &shown, &computed, &wanted, most)
             .map_err(|e| BackendError::Program {
                 reason: e.to_string(),
             })?;
+        places.len += programs.spare;
         let sensors = model.contact_sensors();
         let shapes = sensors.first().map_or(0, |sensor| sensor.of.len());
         let frame_s = model.substeps() as f64 * model.dt();

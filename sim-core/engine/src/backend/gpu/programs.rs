@@ -1,4 +1,4 @@
-//! Programs of a model: its stages recorded, as few kernels as a driver compiles in good time.
+//! Programs of a model: the text of a step and of an evaluation, recorded, in kernels that a driver compiles in good time.
 
 use super::places::Places;
 use crate::backend::gather::gather;
@@ -7,12 +7,11 @@ use sim_core::lane::Num;
 use sim_core::model::constants::Constants;
 use sim_core::step::{STAGES, Stage};
 use sim_core::times;
-use sim_record::wgsl::{ProgramOptions, wgsl};
+use sim_record::split::{Part, split};
+use sim_record::wgsl::ProgramOptions;
 use sim_record::{RecordError, Recorded, Recording};
 use stages_recorded::{between, run};
 
-/// Statements of a kernel, beyond which stages are not joined: a driver's time grows faster than they do.
-const STATEMENTS_MAX: usize = 5000;
 /// What outlasts a substep.
 const KEPT: [Slot; 7] = [
     Slot::JointQ,
@@ -24,25 +23,26 @@ const KEPT: [Slot; 7] = [
     Slot::Substep,
 ];
 
-/// The text of a kernel.
-pub(super) struct Kernel {
-    /// The stages in it, for people.
-    pub label: String,
-    pub wgsl: String,
+/// Kernels, and the order in which they are dispatched.
+pub(super) struct Program {
+    /// Text of each.
+    pub kernels: Vec<String>,
+    pub order: Vec<Part>,
 }
 
 /// What a frame dispatches.
 pub(super) struct Programs {
-    /// Kernels of a step, in order.
-    pub step: Vec<Kernel>,
-    /// How often they are dispatched in a frame.
-    pub rounds: usize,
-    /// Kernels that evaluate what is shown.
-    pub evaluate: Vec<Kernel>,
+    /// All substeps.
+    pub step: Program,
+    /// What is shown of a state.
+    pub evaluate: Program,
+    /// Numbers of a world that lie behind the places, for what crosses from kernel to kernel.
+    pub spare: u32,
 }
 
 impl Programs {
-    /// Records the programs of a model: `shown` evaluates, `fields` are what it is for.
+    /// Records the programs of a model: `shown` evaluates, for the slots `wanted` and for fields that are computed. No kernel
+    /// costs a driver more than `most`, in simple statements, where the text allows it.
     ///
     /// # Errors
     /// A text that cannot be recorded, which tests of the recorder rule out.
@@ -51,48 +51,45 @@ impl Programs {
         places: &Places,
         substeps: usize,
         shown: &[Stage],
-        fields: &[(Field, usize)],
+        computed: &[(Field, usize)],
         wanted: &[Slot],
+        most: usize,
     ) -> Result<Programs, RecordError> {
-        let needed: Vec<Stage> = (STAGES.into_iter()).filter(|s| s.is_needed(m)).collect();
-        let groups = groups(m, &needed)?;
-        let (step, rounds) = match &groups[..] {
-            // without the searches of hulls, which are loops as deep as a text may have them
-            [all] if m.contacts.groups.is_empty() => (vec![frame(m, places, all, substeps)?], 1),
-            _ => (kernels(m, places, &groups, &KEPT, false)?, substeps),
+        let needed = |stages: &[Stage]| -> Vec<Stage> {
+            let stages = stages.iter().copied();
+            stages.filter(|stage| stage.is_needed(m)).collect()
         };
-        let shown: Vec<Stage> = (shown.iter().copied()).filter(|s| s.is_needed(m)).collect();
-        let computed = fields.iter().flat_map(|(field, _)| reads_of(*field));
-        let wanted: Vec<Slot> = wanted.iter().chain(computed).copied().collect();
-        let mut evaluate = kernels(m, places, &self::groups(m, &shown)?, &wanted, true)?;
-        for &(field, numbers) in fields {
-            evaluate.push(computed_field(m, places, field, numbers)?);
+        // the searches of hulls are loops as deep as a text may have them: no loop of substeps goes around them
+        let (inside, outside) = match m.contacts.groups.is_empty() {
+            true => (substeps, 1),
+            false => (1, substeps),
+        };
+        let (recording, options) = step(m, places, &needed(&STAGES), inside)?;
+        let (mut step, step_spare) = cut(&recording, &options, most, places.len);
+        if outside > 1 {
+            step.order = vec![Part::Repeat {
+                rounds: outside,
+                parts: step.order,
+            }];
         }
+        let (recording, options) = evaluation(m, places, &needed(shown), computed, wanted)?;
+        let (evaluate, evaluate_spare) = cut(&recording, &options, most, places.len);
         Ok(Programs {
             step,
-            rounds,
             evaluate,
+            spare: step_spare.max(evaluate_spare),
         })
     }
 }
 
-/// Neighbouring stages that make a kernel.
-fn groups(m: &Constants<f32>, stages: &[Stage]) -> Result<Vec<Vec<Stage>>, RecordError> {
-    let mut groups: Vec<Vec<Stage>> = Vec::new();
-    let mut total = usize::MAX / 2;
-    for &stage in stages {
-        let alone = recorded(m, &[stage], stage.reads(), stage.writes())?;
-        let statements = alone.statements().total();
-        total += statements;
-        match groups.last_mut() {
-            Some(group) if total <= STATEMENTS_MAX => group.push(stage),
-            _ => {
-                groups.push(vec![stage]);
-                total = statements;
-            }
-        }
-    }
-    Ok(groups)
+fn cut(recording: &Recording, options: &ProgramOptions, most: usize, spare: u32) -> (Program, u32) {
+    let split = split(recording, options, most, spare);
+    let kernels = split.kernels.iter().map(|kernel| kernel.wgsl()).collect();
+    let program = Program {
+        kernels,
+        order: split.order,
+    };
+    (program, split.spare as u32)
 }
 
 /// What a run of stages reads from before it, and what it writes.
@@ -113,128 +110,82 @@ fn effects(stages: &[Stage]) -> (Vec<Slot>, Vec<Slot>) {
     (reads, writes)
 }
 
-fn recorded(
-    m: &Constants<f32>,
-    stages: &[Stage],
-    reads: &[Slot],
-    writes: &[Slot],
-) -> Result<Recording, RecordError> {
-    between(m, reads, writes, |cx, b| {
-        stages.iter().for_each(|stage| run(*stage, cx, m, b));
-        Vec::new()
-    })
-}
-
-/// A kernel for each group; of what it writes it stores what later groups read, and what outlasts them all.
-fn kernels(
-    m: &Constants<f32>,
-    places: &Places,
-    groups: &[Vec<Stage>],
-    outlasts: &[Slot],
-    is_shown: bool,
-) -> Result<Vec<Kernel>, RecordError> {
-    let mut kernels = Vec::new();
-    let mut moved = false;
-    for (k, group) in groups.iter().enumerate() {
-        let (reads, writes) = effects(group);
-        let later: Vec<Slot> = (groups[k + 1..].iter())
-            .flat_map(|group| effects(group).0)
-            .collect();
-        let writes: Vec<Slot> = (writes.into_iter())
-            .filter(|slot| {
-                later.contains(slot) || outlasts.contains(slot) || *slot == Slot::LeftOut
-            })
-            .collect();
-        let recording = recorded(m, group, &reads, &writes)?;
-        // what is shown leaves the solver's next start as it is
-        let place = |slot: &Slot, moved: bool| match slot {
-            Slot::JointQdd if is_shown && moved => {
-                let first = places.shown_qdd;
-                first..first + m.dofs.len() as u32
-            }
-            _ => places.of(*slot),
-        };
-        let inputs = reads.iter().flat_map(|slot| place(slot, moved)).collect();
-        moved |= writes.contains(&Slot::JointQdd);
-        let outputs = writes.iter().flat_map(|slot| place(slot, moved)).collect();
-        kernels.push(printed(label(group), &recording, inputs, outputs));
-    }
-    Ok(kernels)
-}
-
-/// All substeps in one kernel.
-fn frame(
+/// Substeps, one after another.
+fn step(
     m: &Constants<f32>,
     places: &Places,
     stages: &[Stage],
     substeps: usize,
-) -> Result<Kernel, RecordError> {
+) -> Result<(Recording, ProgramOptions), RecordError> {
     let (mut reads, _) = effects(stages);
-    // what a substep leaves to the next is read by the frame
+    // what a substep leaves to the next is read by all of them together
     for slot in KEPT {
         if !reads.contains(&slot) {
             reads.push(slot);
         }
     }
     let recording = between(m, &reads, &KEPT, |cx, b| {
-        times!(cx, substeps, {
-            for stage in stages {
-                run(*stage, cx, m, b);
-            }
-        });
+        if substeps == 1 {
+            stages.iter().for_each(|stage| run(*stage, cx, m, b));
+        } else {
+            times!(cx, substeps, {
+                for stage in stages {
+                    run(*stage, cx, m, b);
+                }
+            });
+        }
         Vec::new()
     })?;
     let inputs = reads.iter().flat_map(|slot| places.of(*slot)).collect();
     let outputs = KEPT.iter().flat_map(|slot| places.of(*slot)).collect();
-    Ok(printed("frame".to_owned(), &recording, inputs, outputs))
+    Ok((recording, options(inputs, outputs)))
 }
 
-/// What a field that is computed for output is made of.
-fn reads_of(field: Field) -> &'static [Slot] {
-    match field {
-        Field::BodyJacobian => &[Slot::Motion, Slot::LinkCenter],
-        Field::EfcJ => &[Slot::EfcWeight, Slot::LimitSide],
-        _ => unreachable!("`{}` is not computed", field.row().name),
-    }
-}
-
-fn computed_field(
+/// What is shown: the slots that are wanted and are written, and fields that are made of them.
+fn evaluation(
     m: &Constants<f32>,
     places: &Places,
-    field: Field,
-    numbers: usize,
-) -> Result<Kernel, RecordError> {
-    let reads = reads_of(field);
-    let recording = between(m, reads, &[], |cx, b| {
-        let mut row = vec![Recorded::c(0.0); numbers];
-        gather(cx, m, b, field, &mut row);
-        row
+    stages: &[Stage],
+    computed: &[(Field, usize)],
+    wanted: &[Slot],
+) -> Result<(Recording, ProgramOptions), RecordError> {
+    let (reads, written) = effects(stages);
+    // contacts that do not fit are counted in what is shown, too
+    let is_kept = |slot: &Slot| wanted.contains(slot) || *slot == Slot::LeftOut;
+    let writes: Vec<Slot> = written.into_iter().filter(is_kept).collect();
+    let recording = between(m, &reads, &writes, |cx, b| {
+        stages.iter().for_each(|stage| run(*stage, cx, m, b));
+        let mut rows = Vec::new();
+        for &(field, numbers) in computed {
+            let mut row = vec![Recorded::c(0.0); numbers];
+            gather(cx, m, b, field, &mut row);
+            rows.extend(row);
+        }
+        rows
     })?;
     let inputs = reads.iter().flat_map(|slot| places.of(*slot)).collect();
-    let first = places.computed(field);
-    let outputs = (first..first + numbers as u32).collect();
-    Ok(printed(
-        field.row().name.to_owned(),
-        &recording,
-        inputs,
-        outputs,
-    ))
-}
-
-fn label(stages: &[Stage]) -> String {
-    match stages {
-        [one] => one.name().to_owned(),
-        [first, .., last] => format!("{} to {}", first.name(), last.name()),
-        [] => String::new(),
+    let mut outputs = Vec::new();
+    for slot in &writes {
+        match slot {
+            // the solver's next start stays as it is
+            Slot::JointQdd => {
+                let first = places.shown_qdd;
+                outputs.extend(first..first + m.dofs.len() as u32);
+            }
+            _ => outputs.extend(places.of(*slot)),
+        }
     }
+    for &(field, numbers) in computed {
+        let first = places.computed(field);
+        outputs.extend(first..first + numbers as u32);
+    }
+    Ok((recording, options(inputs, outputs)))
 }
 
-fn printed(label: String, recording: &Recording, inputs: Vec<u32>, outputs: Vec<u32>) -> Kernel {
-    let options = ProgramOptions {
+fn options(inputs: Vec<u32>, outputs: Vec<u32>) -> ProgramOptions {
+    ProgramOptions {
         inputs: Some(inputs),
         outputs: Some(outputs),
         ..ProgramOptions::default()
-    };
-    let wgsl = wgsl(recording, &options);
-    Kernel { label, wgsl }
+    }
 }

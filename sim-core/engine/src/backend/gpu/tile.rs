@@ -1,6 +1,6 @@
 //! Worlds that lie in one set of buffers, and the batches that move them.
 
-use super::compiled::{Compiled, PHYSICS, constant};
+use super::compiled::{Compiled, Kernels, PHYSICS, constant};
 use super::places::Places;
 use super::show::Run;
 use super::upkeep::WORKGROUP;
@@ -10,6 +10,7 @@ use sim_core::batch::Field;
 use sim_core::model::SensedShapes;
 use sim_core::model::constants::Constants;
 use sim_device::{Batch, BatchBuilder, Buffer, Device, Program, Replay, Staging};
+use sim_record::split::Part;
 use std::ops::Range;
 
 /// Words before the list of what [`upkeep::ROWS`] reads.
@@ -198,12 +199,7 @@ impl Tile {
     ) -> Result<(), BackendError> {
         let mut step = device.batch(Replay::Recorded);
         self.book(&mut step, &compiled.begin);
-        for _ in 0..compiled.rounds {
-            compiled
-                .step
-                .iter()
-                .for_each(|program| self.physics(&mut step, program, compiled));
-        }
+        self.physics(&mut step, &compiled.step, &compiled.step.order, compiled);
         self.book(&mut step, &compiled.note);
         self.evaluate(&mut step, compiled);
         self.book(&mut step, &compiled.left_out);
@@ -222,19 +218,36 @@ impl Tile {
     }
 
     fn evaluate(&self, batch: &mut BatchBuilder, compiled: &Compiled) {
-        for program in &compiled.evaluate {
-            self.physics(batch, program, compiled);
-        }
+        let evaluate = &compiled.evaluate;
+        self.physics(batch, evaluate, &evaluate.order, compiled);
     }
 
-    fn physics(&self, batch: &mut BatchBuilder, program: &Program, compiled: &Compiled) {
+    fn physics(
+        &self,
+        batch: &mut BatchBuilder,
+        program: &Kernels,
+        order: &[Part],
+        compiled: &Compiled,
+    ) {
         let buffers = [
             (0, &self.fields, 0..self.fields.bytes()),
             (1, &self.scratch, 0..self.scratch.bytes()),
             (2, &compiled.numbers, 0..compiled.numbers.bytes()),
             (3, &compiled.indices, 0..compiled.indices.bytes()),
         ];
-        batch.dispatch(program, &buffers, self.width.div_ceil(PHYSICS));
+        for part in order {
+            match part {
+                Part::Kernel(k) => {
+                    let groups = self.width.div_ceil(PHYSICS);
+                    batch.dispatch(&program.kernels[*k], &buffers, groups);
+                }
+                Part::Repeat { rounds, parts } => {
+                    for _ in 0..*rounds {
+                        self.physics(batch, program, parts, compiled);
+                    }
+                }
+            }
+        }
     }
 
     fn book(&self, batch: &mut BatchBuilder, program: &Program) {
