@@ -1,7 +1,7 @@
 //! The third machine: the text is not run but written down, as a tree that becomes a program.
 //!
 //! [`record`] hands a text a [`Recorder`] and its inputs as [`Recorded`] numbers, and returns what
-//! was computed as a [`Recording`]. `backend::gpu::program` prints that as WGSL;
+//! was computed as a [`Recording`]. [`wgsl`] prints that as a program, [`split`] as several;
 //! [`Recording::evaluate`] runs it on the CPU. Native loops are unrolled by it, constants folded in
 //! `f32`, equal values shared within a block and the blocks around it, and what no output or store
 //! depends on is left out.
