@@ -8,7 +8,7 @@ use crate::Recording;
 use crate::tree::{Op, Operand, Rounds, Row, Statement, Unary};
 
 /// Rounds that make a loop worth another kernel's compile time.
-const ROUNDS: usize = 8;
+const ROUNDS: usize = 32;
 
 /// A loop or a block that is cut inside.
 #[derive(Clone, Copy, Debug)]
