@@ -1,7 +1,7 @@
 //! Every recorded stage against its scalar run: as it is, in vectors of four, and cut into kernels.
 
 use super::*;
-use sim_record::split::{Split, split};
+use sim_record::split::{Limits, Split, split};
 
 /// What a kernel may cost: as an engine asks, and so little that every loop is cut.
 const KERNEL_COSTS: [usize; 2] = [2500, 200];
@@ -12,7 +12,15 @@ const CUT_STATES: usize = 5;
 /// The recording as kernels, whose programs are valid.
 fn in_kernels(recording: &Recording, most: usize) -> Split {
     let spare = (recording.inputs() + recording.outputs()) as u32;
-    let kernels = split(recording, &ProgramOptions::default(), most, spare);
+    let kernels = split(
+        recording,
+        &ProgramOptions::default(),
+        Limits {
+            kernel: most,
+            repeated: most,
+        },
+        spare,
+    );
     for kernel in &kernels.kernels {
         toy::validated(&kernel.wgsl());
     }

@@ -1,14 +1,11 @@
 //! Where a text is cut: into pieces, each of which becomes a kernel.
 
-use super::Part;
 use super::cost::{self, Cost};
 use super::flow::Flow;
 use super::uses::{Use, of_op, of_statement};
+use super::{Limits, Part};
 use crate::Recording;
 use crate::tree::{Op, Operand, Rounds, Row, Statement, Unary};
-
-/// Rounds that make a loop worth another kernel's compile time.
-const ROUNDS: usize = 32;
 
 /// A loop or a block that is cut inside.
 #[derive(Clone, Copy, Debug)]
@@ -44,10 +41,10 @@ pub(super) struct Pieces {
     pub order: Vec<Part>,
 }
 
-pub(super) fn pieces(recording: &Recording, most: usize) -> Pieces {
+pub(super) fn pieces(recording: &Recording, limits: Limits) -> Pieces {
     let mut cutter = Cutter {
         recording,
-        most,
+        limits,
         frames: Vec::new(),
         runs: Vec::new(),
     };
@@ -65,7 +62,7 @@ pub(super) fn pieces(recording: &Recording, most: usize) -> Pieces {
     let mut pieces_of_run = Vec::new();
     for (k, run) in runs.iter().enumerate() {
         let from = pieces.len();
-        for range in flow.cut(k, most) {
+        for range in flow.cut(k, limits.kernel) {
             pieces.push(Piece {
                 items: run.items[range].to_vec(),
                 frames: run.frames.clone(),
@@ -94,7 +91,7 @@ fn expanded(order: &[Part], pieces: &[std::ops::Range<usize>]) -> Vec<Part> {
 
 struct Cutter<'a> {
     recording: &'a Recording,
-    most: usize,
+    limits: Limits,
     frames: Vec<Frame>,
     /// Statements between cuts that have to be.
     runs: Vec<Piece>,
@@ -165,11 +162,13 @@ impl Cutter<'_> {
         self.runs.push(std::mem::replace(run, next));
     }
 
-    /// Is a loop or a block cut inside? Each of its kernels is dispatched in each of its rounds, whether a
-    /// world is left in the loop or not: the more rounds, the longer a loop may be to stay whole.
+    /// Is a loop or a block cut inside?
     fn is_cut(&self, statement: &Statement, rounds: usize) -> bool {
-        let cost = cost_of(statement, &self.recording.values);
-        cost.total() > self.most + self.most * rounds / ROUNDS
+        let most = match rounds {
+            1 => self.limits.kernel,
+            _ => self.limits.repeated,
+        };
+        cost_of(statement, &self.recording.values).total() > most
     }
 }
 

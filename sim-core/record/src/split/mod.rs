@@ -30,6 +30,16 @@ pub struct Split {
     outputs: Vec<u32>,
 }
 
+/// What kernels may cost, in units of a simple statement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// A kernel is cut where it costs more, if its statements allow it.
+    pub kernel: usize,
+    /// A loop is cut inside where it costs more: each of its kernels is then dispatched in each of its rounds, whether a world is
+    /// left in the loop or not.
+    pub repeated: usize,
+}
+
 /// One dispatch or several.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Part {
@@ -88,15 +98,14 @@ impl Kernel {
     }
 }
 
-/// Cuts a recording into kernels of at most `most` each, in units of a simple statement, where its
-/// statements allow it. What crosses a cut stands in the fields from `spare` on, which no input or output
+/// Cuts a recording into kernels within limits, where its statements allow it. What crosses a cut stands in the fields from `spare` on, which no input or output
 /// may have; it is rounded up to a whole vector.
 ///
 /// # Panics
 /// As [`wgsl`] does.
-pub fn split(recording: &Recording, options: &ProgramOptions, most: usize, spare: u32) -> Split {
+pub fn split(recording: &Recording, options: &ProgramOptions, limits: Limits, spare: u32) -> Split {
     let (inputs, outputs) = options.fields(recording);
-    let pieces = cut::pieces(recording, most);
+    let pieces = cut::pieces(recording, limits);
     let spare = spare.next_multiple_of(4);
     let (mut kernels, used) = kernel::kernels(recording, options, &pieces, spare);
     // what ends a text need not do anything

@@ -4,7 +4,7 @@ use crate::{accepted, c, toy};
 use sim_core::lane::{Cx, Num, Tables};
 use sim_core::{break_if, times, when};
 use sim_record::Recording;
-use sim_record::split::{Part, Split, split};
+use sim_record::split::{Limits, Part, Split, split};
 use sim_record::wgsl::ProgramOptions;
 
 /// Longer than any text here.
@@ -13,7 +13,15 @@ const WHOLE: usize = 1_000_000;
 /// A split whose kernels are valid programs; what crosses goes after the outputs.
 fn cut(recording: &Recording, most: usize) -> Split {
     let spare = (recording.inputs() + recording.outputs()) as u32;
-    let split = split(recording, &ProgramOptions::default(), most, spare);
+    let split = split(
+        recording,
+        &ProgramOptions::default(),
+        Limits {
+            kernel: most,
+            repeated: most,
+        },
+        spare,
+    );
     for kernel in &split.kernels {
         toy::validated(&kernel.wgsl());
     }
@@ -124,7 +132,15 @@ fn outputs_in_the_fields_of_inputs_are_written_when_those_are_read() {
         ..ProgramOptions::default()
     };
     for most in [1, WHOLE] {
-        let parts = split(&swapped, &options, most, 4);
+        let parts = split(
+            &swapped,
+            &options,
+            Limits {
+                kernel: most,
+                repeated: most,
+            },
+            4,
+        );
         let got = parts.evaluate(&[2.0, 3.0], &mut [], &Tables::default());
         assert_eq!(got, [10.0, 5.0, 2.0], "at most {most}");
     }

@@ -29,6 +29,7 @@ use sim_core::batch::{Field, Layout, status};
 use sim_core::model::Model;
 use sim_core::model::constants::Constants;
 use sim_device::{AdapterKind, Buffer, Choice, Device, Staging};
+use sim_record::split::Limits;
 use std::ops::Range;
 use std::path::Path;
 use std::time::Duration;
@@ -37,11 +38,17 @@ use tile::{Rows, Tile};
 /// A driver that takes longer over the programs of a model is given up.
 const COMPILE_LIMIT: Duration = Duration::from_secs(180);
 
-/// What a kernel may cost a driver, in simple statements. Where software plays the GPU, every access to memory is a loop, and its
-/// compiler's time grows with their square.
-const SOFTWARE_KERNEL: usize = 4000;
-/// The same of a driver of hardware: few kernels, so that numbers stay in registers.
-const KERNEL: usize = 40_000;
+/// What kernels may cost where software plays the GPU: every access to memory is a loop there, and its compiler's time grows with
+/// their square. A dispatch takes as long as a round of a solver, so loops stay whole.
+const SOFTWARE: Limits = Limits {
+    kernel: 16_000,
+    repeated: usize::MAX,
+};
+/// The same of hardware: few kernels, so that numbers stay in registers.
+const HARDWARE: Limits = Limits {
+    kernel: 40_000,
+    repeated: usize::MAX,
+};
 
 pub(super) struct Gpu {
     // batches go before the buffers and programs that they name, and those before the device
@@ -109,12 +116,12 @@ impl Gpu {
             .flat_map(|slot| show::slots_of(slot.field))
             .copied()
             .collect();
-        let most = match device.info().kind {
-            AdapterKind::Software => SOFTWARE_KERNEL,
-            _ => KERNEL,
+        let limits = match device.info().kind {
+            AdapterKind::Software => SOFTWARE,
+            _ => HARDWARE,
         };
         let substeps = model.substeps();
-        let programs = Programs::new(m, &places, substeps, &shown, &computed, &wanted, most)
+        let programs = Programs::new(m, &places, substeps, &shown, &computed, &wanted, limits)
             .map_err(|e| BackendError::Program {
                 reason: e.to_string(),
             })?;

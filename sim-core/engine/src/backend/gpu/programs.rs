@@ -7,7 +7,7 @@ use sim_core::lane::Num;
 use sim_core::model::constants::Constants;
 use sim_core::step::{STAGES, Stage};
 use sim_core::times;
-use sim_record::split::{Part, split};
+use sim_record::split::{Limits, Part, split};
 use sim_record::wgsl::ProgramOptions;
 use sim_record::{RecordError, Recorded, Recording};
 use stages_recorded::{between, run};
@@ -41,8 +41,8 @@ pub(super) struct Programs {
 }
 
 impl Programs {
-    /// Records the programs of a model: `shown` evaluates, for the slots `wanted` and for fields that are computed. No kernel
-    /// costs a driver more than `most`, in simple statements, where the text allows it.
+    /// Records the programs of a model: `shown` evaluates, for the slots `wanted` and for fields that are computed. Kernels are cut
+    /// within limits, where the text allows it.
     ///
     /// # Errors
     /// A text that cannot be recorded, which tests of the recorder rule out.
@@ -53,7 +53,7 @@ impl Programs {
         shown: &[Stage],
         computed: &[(Field, usize)],
         wanted: &[Slot],
-        most: usize,
+        limits: Limits,
     ) -> Result<Programs, RecordError> {
         let needed = |stages: &[Stage]| -> Vec<Stage> {
             let stages = stages.iter().copied();
@@ -65,7 +65,7 @@ impl Programs {
             false => (1, substeps),
         };
         let (recording, options) = step(m, places, &needed(&STAGES), inside)?;
-        let (mut step, step_spare) = cut(&recording, &options, most, places.len);
+        let (mut step, step_spare) = cut(&recording, &options, limits, places.len);
         if outside > 1 {
             step.order = vec![Part::Repeat {
                 rounds: outside,
@@ -73,7 +73,7 @@ impl Programs {
             }];
         }
         let (recording, options) = evaluation(m, places, &needed(shown), computed, wanted)?;
-        let (evaluate, evaluate_spare) = cut(&recording, &options, most, places.len);
+        let (evaluate, evaluate_spare) = cut(&recording, &options, limits, places.len);
         Ok(Programs {
             step,
             evaluate,
@@ -82,8 +82,13 @@ impl Programs {
     }
 }
 
-fn cut(recording: &Recording, options: &ProgramOptions, most: usize, spare: u32) -> (Program, u32) {
-    let split = split(recording, options, most, spare);
+fn cut(
+    recording: &Recording,
+    options: &ProgramOptions,
+    limits: Limits,
+    spare: u32,
+) -> (Program, u32) {
+    let split = split(recording, options, limits, spare);
     let kernels = split.kernels.iter().map(|kernel| kernel.wgsl()).collect();
     let program = Program {
         kernels,
