@@ -60,8 +60,8 @@ class Sim:
         coords: Slice of each robot's coordinates.
         bodies: Slice of each robot's bodies.
         info: Everything the daemon tells about itself, notes on the scene included. ``delivery`` says how frames reach
-            shared memory: ``"direct"`` from the CPU, ``"imported"`` where a GPU writes them there, ``"copied"`` where the
-            processor copies them from it.
+            shared memory: ``"direct"`` from the CPU, ``"imported"`` where a GPU writes them there, ``"copied"`` where
+            the processor copies them from it.
     """
 
     def __init__(self, client: _core.Client, daemon: Daemon | None) -> None:
@@ -323,9 +323,9 @@ def launch(
     Args:
         scene: What to simulate; later changes to it have no effect.
         worlds: How many copies of it, at least 1.
-        device: ``"cpu"``, ``"gpu"`` for the first GPU, ``"gpu:1"`` or ``"gpu:nvidia"`` for another, by its number or part of its
-            name, as ``tightloop devices`` lists them, or ``"auto"`` for a GPU if there is one that is no software and
-            there are at least 1024 worlds in single precision, else the CPU: `Sim.device` tells.
+        device: ``"cpu"``, ``"gpu"`` for the first GPU, ``"gpu:1"`` or ``"gpu:nvidia"`` for another, by its number or
+            part of its name, as ``tightloop devices`` lists them, or ``"auto"`` for a GPU if there is one that is no
+            software and there are at least 1024 worlds in single precision, else the CPU: `Sim.device` tells.
         precision: ``"f32"``, or ``"f64"`` for the same physics in double precision.
         threads: Most threads a step may use; all cores if left out.
         fields: What frames carry besides ``time``, ``step``, ``status`` and ``contacts_left_out``: names of `Frame`
