@@ -20,6 +20,7 @@ const ORDER: [(&str, &[&str]); 2] = [
             "start",
             "backend",
             "snapshot",
+            "options",
             "simulation",
             "params",
             "command",
