@@ -33,18 +33,19 @@ fn serve(
     let mut scratch = Vec::new();
     let mut lease = 0;
     loop {
-        match host.wait()? {
+        let next = host.wait()?;
+        // other memory may lie where the frames of the last lease lay
+        if host.lease() != lease {
+            simulation.forget();
+            lease = host.lease();
+        }
+        match next {
             Next::Command => {
                 let started = Instant::now();
                 let applied = export::apply(simulation, host.inbox(), &mut mask);
                 // its file may be gone when the recording is replayed
                 if host.is_recorded() && applied.is_ok() && host.inbox().op() == Op::Restore {
                     host.record_state(&simulation.snapshot(), true);
-                }
-                // the frames of another lease may lie where those of the last one lay
-                if host.lease() != lease {
-                    simulation.forget();
-                    lease = host.lease();
                 }
                 let lost = simulation.lost().map(ToString::to_string);
                 match applied {

@@ -239,3 +239,70 @@ fn a_cube_on_a_table_stays_there() {
     assert!((run.get(Field::JointQ, 2)[11] - 0.125).abs() < 2e-3);
     assert_eq!(run.get(Field::ContactCount, 2), [4.0]);
 }
+
+#[test]
+fn commands_come_late_and_noisy_as_on_the_cpu() {
+    let mut scene = lesson(Demo::Target);
+    scene.command_delay_max = Some(20);
+    scene.params = [
+        Param::CommandDelay,
+        Param::JointTargetQNoise,
+        Param::JointQNoise,
+    ]
+    .into();
+    let model = scene.compile().unwrap();
+    let fields = [Field::JointQ, Field::JointQd, Field::JointQMeasured];
+    let runs = [gpu(), Device::Cpu].map(|device| {
+        let mut run = run(&model, device, WORLDS, &fields);
+        let delay: Vec<f64> = (0..WORLDS).map(|w| 0.3 * w as f64 % 20.0).collect();
+        let noise = vec![0.01; WORLDS * 9];
+        for (param, n, values) in [
+            (Param::CommandDelay, 1, &delay),
+            (Param::JointTargetQNoise, 9, &noise),
+            (Param::JointQNoise, 9, &noise),
+        ] {
+            run.sim
+                .write_param(param, 0..n, Values::F64(values), None)
+                .unwrap();
+        }
+        let mut seen = Vec::new();
+        for frame in 0..6 {
+            let (field, row) = command(Demo::Target, 20 * frame);
+            run.command(field, &row);
+            run.step();
+            let all = (0..WORLDS).flat_map(|w| fields.map(|field| run.get(field, w)).concat());
+            seen.push(all.collect::<Vec<f64>>());
+        }
+        assert!(run.sim.lost().is_none());
+        seen
+    });
+    for (frame, (here, there)) in runs[0].iter().zip(&runs[1]).enumerate() {
+        for (a, b) in here.iter().zip(there) {
+            assert!((a - b).abs() < 1e-4, "frame {frame}: {a} {b}");
+        }
+    }
+    let measured = &runs[0][5][18..27];
+    assert!(
+        measured
+            .iter()
+            .zip(&runs[0][5][..9])
+            .any(|(a, b)| (a - b).abs() > 1e-3)
+    );
+}
+
+#[test]
+fn a_scene_in_which_nothing_moves_runs() {
+    let mut scene = sim_core::model::Description::new(0.01, 4);
+    scene.add_ground("ground", 0.0);
+    let model = scene.compile().unwrap();
+    let mut run = run(&model, gpu(), 3, Field::ALL);
+    run.sim.reset(None, Some(&[1])).unwrap();
+    run.step();
+    run.step();
+    let kept = run.sim.snapshot();
+    run.sim.restore(&kept, None, None).unwrap();
+    run.forward();
+    assert_alive(&run);
+    assert_eq!(run.get(Field::Step, 2), [2.0]);
+    assert_eq!(run.get(Field::Time, 0), [0.08]);
+}

@@ -63,3 +63,14 @@ fn a_world_of_the_grasp_is_the_same_among_1_7_and_4096_and_in_every_run() {
     let model = lesson_with_table(Demo::Target, true).compile().unwrap();
     check(&model, Demo::Target, 3);
 }
+
+#[test]
+fn worlds_that_do_not_fit_into_one_binding_are_no_different() {
+    let model = lesson(Demo::Target).compile().unwrap();
+    let few = [39_999, 0, 20_000, 19_999];
+    let many: Vec<usize> = (0..40_000).collect();
+    let all = bits(&model, Demo::Target, &many, 2);
+    for (seed, found) in few.iter().zip(bits(&model, Demo::Target, &few, 2)) {
+        assert_eq!(found, all[*seed], "world {seed} of 40000 among four");
+    }
+}

@@ -58,7 +58,9 @@ pub(super) struct Gpu {
     frame: Staging,
     /// The frame, in memory of the device, where that is another.
     drawn: Option<Buffer>,
-    /// Memory of readers that the device writes to, by its address.
+    /// Does the driver take memory of readers?
+    imports: bool,
+    /// That memory, by its address.
     imported: Vec<(usize, Imported)>,
     device: Device,
     constants: Constants<f32>,
@@ -164,6 +166,7 @@ impl Gpu {
             compiled,
             frame,
             drawn,
+            imports: device.info().imports,
             imported: Vec::new(),
             name: format!("gpu ({}, {})", device.info().name, device.info().driver),
             device,
@@ -344,11 +347,7 @@ impl Backend for Gpu {
     }
 
     fn delivery(&self) -> &'static str {
-        if self.device.info().imports {
-            "imported"
-        } else {
-            "copied"
-        }
+        if self.imports { "imported" } else { "copied" }
     }
 
     fn copied(&self) -> u64 {
@@ -364,7 +363,7 @@ impl Backend for Gpu {
         if self.imported.iter().any(|(known, _)| *known == place) {
             return true;
         }
-        if !self.device.info().imports {
+        if !self.imports {
             return false;
         }
         // SAFETY: by contract.
@@ -383,7 +382,10 @@ impl Backend for Gpu {
                 self.imported.push((place, imported));
                 true
             }
-            Err(_) => false,
+            Err(_) => {
+                self.imports = false;
+                false
+            }
         }
     }
 }
