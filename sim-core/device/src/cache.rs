@@ -8,8 +8,8 @@ use crate::program::Source;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
-/// Head of every file. Its number goes up with the layout of files.
-const MAGIC: &[u8; 8] = b"tldev 01";
+/// Head of every file. Its number goes up with the layout of files, and when words are made in another way.
+const MAGIC: &[u8; 8] = b"tldev 02";
 
 /// What turns a source into words; another version may turn it into others.
 const WRITER: &str = "naga 30.0.1";

@@ -112,5 +112,32 @@ fn words(
         shader_stage: naga::ShaderStage::Compute,
         entry_point: entry.to_owned(),
     };
-    spv::write_vec(module, info, &options, Some(&pipeline)).map_err(|e| e.to_string())
+    let words =
+        spv::write_vec(module, info, &options, Some(&pipeline)).map_err(|e| e.to_string())?;
+    Ok(rounded(&words))
+}
+
+/// SPIR-V's numbers of a sum, a difference, a product and a quotient of floats.
+const ARITHMETIC: [u32; 4] = [129, 131, 133, 136];
+
+/// Asks the driver to round every sum, product and quotient as it stands (`NoContraction`). Mesa would else take `a - ((a + b) - b)` for
+/// 0, and a sum would lose the rounding that it keeps for the next one (Kahan 1965).
+fn rounded(words: &[u32]) -> Vec<u32> {
+    const HEAD: usize = 5;
+    const DECORATE: u32 = 3 << 16 | 71;
+    const NO_CONTRACTION: u32 = 42;
+    let (mut decorations, mut first, mut at) = (Vec::new(), None, HEAD);
+    while at < words.len() {
+        let (length, code) = (words[at] as usize >> 16, words[at] & 0xffff);
+        // decorations (71, 72) stand before types
+        if matches!(code, 19..=39 | 71 | 72) {
+            first.get_or_insert(at);
+        }
+        if ARITHMETIC.contains(&code) {
+            decorations.extend([DECORATE, words[at + 2], NO_CONTRACTION]);
+        }
+        at += length;
+    }
+    let (before, after) = words.split_at(first.unwrap_or(words.len()));
+    [before, &decorations, after].concat()
 }

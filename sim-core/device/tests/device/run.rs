@@ -1,7 +1,7 @@
 //! Commands do what they say, in their order, on every route.
 
-use crate::common::{copy, fetch, numbers, program, scale_add, staged, ways};
-use sim_device::{Batch, Device, Replay};
+use crate::common::{copy, device, fetch, numbers, program, scale_add, staged, ways};
+use sim_device::{Batch, Device, Replay, Source};
 
 const COUNT: u32 = 1000;
 
@@ -49,6 +49,37 @@ fn dispatches_and_copies_see_what_those_before_them_wrote() {
         let wanted: Vec<f32> = input.iter().map(|x| 72.0 * x).collect();
         assert_eq!(numbers(&to), wanted, "{replay:?}");
     }
+}
+
+#[test]
+fn what_a_sum_rounds_away_can_be_kept() {
+    // only where words are the driver's own: WGSL lets a compiler take the difference for 0
+    let device = device();
+    let source = Source {
+        label: "rest".to_owned(),
+        wgsl: "
+            @group(0) @binding(0) var<storage, read_write> numbers: array<f32>;
+            @compute @workgroup_size(1) fn main() {
+                let sum = numbers[0] + numbers[1];
+                numbers[2] = numbers[1] - (sum - numbers[0]);
+                numbers[3] = numbers[0] * numbers[1] + numbers[4];
+            }"
+        .to_owned(),
+        entry: "main".to_owned(),
+        constants: Vec::new(),
+    };
+    let program = program(&device, source);
+    let (a, b) = (1.0 + f32::EPSILON, 1e-8);
+    let given = [a, b, 0.0, 0.0, -b];
+    let memory = staged(&device, &given);
+    let mut batch = device.batch(Replay::Recorded);
+    batch.dispatch(&program, &[(0, &memory, 0..20)], 1);
+    device.run(&[&batch.finish().unwrap()]).unwrap();
+    let found = numbers(&memory);
+    assert_eq!(found[2], b - ((a + b) - a));
+    assert_eq!(found[2], b);
+    // a product is rounded before it is added to
+    assert_eq!(found[3], a * b - b);
 }
 
 #[test]
