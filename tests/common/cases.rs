@@ -1,11 +1,17 @@
-//! The robots and shapes of these tests, and states that take every path through the stages.
+//! Robots and shapes for tests of stages, and states that take every path through them.
 
-use crate::{SUBSTEPS, Scalar, scene, toy};
+use super::shapes::shapes as every_shape;
 use sim_core::batch::Block;
 use sim_core::model::constants::{Constants, Motion};
 use sim_core::model::params::Param;
 use sim_core::model::{Body, Collision, Cone, Description, Model, Pose, Shape, Site, UrdfOptions};
 use std::path::Path;
+
+/// Substeps of a frame.
+pub const SUBSTEPS: usize = 8;
+
+/// A world by itself.
+pub type Scalar = Block<f32, f32>;
 
 /// A model, and where its random states are.
 pub struct Case {
@@ -24,6 +30,19 @@ struct Near {
     apart: f64,
     /// Of free bodies: how much they may be turned, as what is added to each part of a quaternion [–].
     turn: f64,
+}
+
+/// All of them.
+pub fn cases() -> [Case; 7] {
+    [
+        fr3(),
+        every_joint(),
+        limits_only(),
+        shapes(Cone::Elliptic, None),
+        shapes(Cone::Pyramidal, Some(5)),
+        arm_and_cube(),
+        every_param(),
+    ]
 }
 
 /// The FR3 with drives and armatures of the usual size.
@@ -72,7 +91,7 @@ pub fn limits_only() -> Case {
 
 /// Shapes of every kind, two bodies among some that stand still.
 pub fn shapes(cone: Cone, contacts_max: Option<usize>) -> Case {
-    let mut scene = scene::shapes(cone);
+    let mut scene = every_shape(cone);
     scene.contacts_max = contacts_max;
     let model = scene.compile().unwrap();
     assert!(model.constants().contacts.couples());
@@ -182,11 +201,11 @@ fn robot(file: &str, armature: f64, floating: bool) -> Description {
 
 impl Case {
     /// A random state: without a place to be near, a tenth beyond the joints' ranges at either end, so that rows become
-    /// active.
-    pub fn random_state(&self, random: &mut toy::Random) -> Scalar {
+    /// active. `unit` is uniform in [-1, 1).
+    pub fn random_state(&self, mut unit: impl FnMut() -> f64) -> Scalar {
         let m = &self.m;
         let mut block = Block::new(m, 0.0);
-        let mut number = |size: f64| (random.unit() * size) as f32;
+        let mut number = |size: f64| (unit() * size) as f32;
         for (j, dof) in m.dofs.iter().enumerate() {
             let (lower, upper) = m
                 .limits

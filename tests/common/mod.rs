@@ -3,6 +3,7 @@
 
 pub mod any_program;
 pub mod any_scene;
+pub mod cases;
 pub mod dice;
 pub mod drawn;
 #[path = "../../examples/lesson/mod.rs"]

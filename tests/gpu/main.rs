@@ -7,6 +7,7 @@ mod common;
 mod delivery;
 mod programs;
 mod same_bits;
+mod stages;
 
 use sim_core::batch::Field;
 use sim_core::model::Model;

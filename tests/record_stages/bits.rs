@@ -42,7 +42,7 @@ fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
             })
             .collect();
         for n in 0..STATES {
-            let mut block = case.random_state(&mut random);
+            let mut block = case.random_state(|| random.unit());
             let mut memory = memory(m);
             // poses belong to the state before it moves on
             let last = [

@@ -1,13 +1,14 @@
 //! Every stage of a step, of robots and of shapes that touch: recorded, printed, validated, and run against the CPU.
 
 mod bits;
-mod models;
+#[path = "../common/cases.rs"]
+mod cases;
 #[path = "../common/shapes.rs"]
-mod scene;
+mod shapes;
 #[path = "../../sim-core/tests/toy/mod.rs"]
 mod toy;
 
-use models::{Case, arm_and_cube, every_joint, every_param, fr3, limits_only, shapes};
+use cases::{Case, SUBSTEPS, Scalar, arm_and_cube, cases, every_joint, every_param, fr3};
 use sim_core::batch::{Block, Numbers, WorkSlot};
 use sim_core::lane::memory::Cpu;
 use sim_core::model::Cone;
@@ -24,24 +25,9 @@ use std::time::Instant;
 const STATEMENTS_MAX: usize = 5000;
 /// The solver unrolls the classes of contacts, seven of the arm at the cube: it is past that.
 const SOLVER_STATEMENTS_MAX: usize = 12_000;
-const SUBSTEPS: usize = 8;
 const STATES: usize = 50;
 /// States in which each pair of kinds is to touch.
 const MANY_STATES: usize = 200;
-
-type Scalar = Block<f32, f32>;
-
-fn cases() -> [Case; 7] {
-    [
-        fr3(),
-        every_joint(),
-        limits_only(),
-        shapes(Cone::Elliptic, None),
-        shapes(Cone::Pyramidal, Some(5)),
-        arm_and_cube(),
-        every_param(),
-    ]
-}
 
 /// A stage on a machine of one world. Here stands the only call, since it is the whole text of physics.
 #[inline(never)]
@@ -158,8 +144,8 @@ fn the_random_states_of_these_tests_take_every_path() {
         let (mut random, mut same) = (toy::Random(1), toy::Random(1));
         let (mut active, mut hard) = (0, 0);
         for _ in 0..STATES {
-            let mut block = case.random_state(&mut random);
-            let mut hurried = case.random_state(&mut same);
+            let mut block = case.random_state(|| random.unit());
+            let mut hurried = case.random_state(|| same.unit());
             let (mut memory, mut other) = (memory(m), memory(m));
             for stage in needed(m, before_integrate()) {
                 run(stage, m, &mut block, &mut memory);
@@ -194,15 +180,15 @@ fn contacts(m: &Constants<f32>, memory: &[f32]) -> Vec<usize> {
 #[test]
 fn the_random_shapes_of_these_tests_touch_in_every_pair_of_kinds() {
     let (free, tight) = (
-        shapes(Cone::Elliptic, None),
-        shapes(Cone::Pyramidal, Some(5)),
+        cases::shapes(Cone::Elliptic, None),
+        cases::shapes(Cone::Pyramidal, Some(5)),
     );
     for case in [&free, &tight] {
         let m = &case.m;
         let mut random = toy::Random(1);
         let (mut touching, mut left_out, mut coupled) = ([0; PAIR_KINDS.len()], 0, 0);
         for _ in 0..MANY_STATES {
-            let mut block = case.random_state(&mut random);
+            let mut block = case.random_state(|| random.unit());
             let mut memory = memory(m);
             for stage in needed(m, before_integrate()) {
                 run(stage, m, &mut block, &mut memory);
@@ -278,7 +264,7 @@ fn a_control_frame_is_recorded_as_a_loop_over_substeps() {
 
         let mut random = toy::Random(2);
         for _ in 0..10 {
-            let mut block = case.random_state(&mut random);
+            let mut block = case.random_state(|| random.unit());
             let inputs = gathered(&mut block, &reads);
             let (mut memory, mut scratch) = (memory(m), memory(m));
             for _ in 0..SUBSTEPS {
@@ -298,11 +284,12 @@ fn what_a_stage_does_not_name_it_neither_reads_nor_writes() {
     for case in [
         fr3(),
         every_joint(),
-        shapes(Cone::Elliptic, None),
+        cases::shapes(Cone::Elliptic, None),
         arm_and_cube(),
     ] {
         let m = &case.m;
-        let mut start = case.random_state(&mut toy::Random(3));
+        let mut random = toy::Random(3);
+        let mut start = case.random_state(|| random.unit());
         let mut memory = memory(m);
         for stage in needed(m, &Stage::ALL) {
             let mut named = stage.reads().iter().chain(stage.writes());

@@ -1,0 +1,152 @@
+//! A stage as a program of a GPU, by itself.
+
+use super::worlds::{Given, Left};
+use sim_core::model::constants::Constants;
+use sim_core::step::Stage;
+use sim_device::{Choice, Device, Program, Replay, Source, Staging};
+use sim_record::Recording;
+use sim_record::wgsl::{ProgramOptions, wgsl};
+use std::time::Duration;
+
+/// Longer than any program here takes on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(300);
+const WORKGROUP: u32 = 32;
+/// Numbers of a vector.
+const WIDTH: usize = 4;
+
+/// A program of a stage.
+struct Kernel {
+    stage: Stage,
+    /// None where the stage has nothing to leave.
+    program: Option<Program>,
+    inputs: usize,
+    outputs: usize,
+}
+
+/// Programs of the stages of a model, and its tables.
+pub struct Gpu {
+    kernels: Vec<Kernel>,
+    numbers: Staging,
+    indices: Staging,
+    worlds: usize,
+    device: Device,
+}
+
+impl Gpu {
+    /// Compiles stages of a model for so many worlds.
+    pub fn new(m: &Constants<f32>, stages: &[Stage], worlds: usize) -> Gpu {
+        let device = Device::open(&Choice::First, None).expect("the tests need an adapter");
+        let recordings: Vec<_> = (stages.iter())
+            .map(|&stage| {
+                stages_recorded::between(m, stage.reads(), stage.writes(), |cx, b| {
+                    stages_recorded::run(stage, cx, m, b);
+                    Vec::new()
+                })
+                .unwrap_or_else(|e| panic!("{}: {e}", stage.name()))
+            })
+            .collect();
+        let leaves = |recording: &Recording| recording.outputs() + recording.scratch() > 0;
+        let sources: Vec<Source> = (stages.iter().zip(&recordings))
+            .filter(|(_, recording)| leaves(recording))
+            .map(|(stage, recording)| Source {
+                label: stage.name().to_owned(),
+                // input i is number i of the fields, and the outputs follow
+                wgsl: wgsl(recording, &ProgramOptions::default()),
+                entry: "main".to_owned(),
+                constants: vec![
+                    ("worlds".to_owned(), worlds as f64),
+                    ("workgroup".to_owned(), f64::from(WORKGROUP)),
+                ],
+            })
+            .collect();
+        let programs = device
+            .programs(&sources, PATIENCE)
+            .unwrap_or_else(|e| panic!("{e}"));
+        let mut programs = programs.into_iter();
+        let kernels = (stages.iter().zip(&recordings))
+            .map(|(&stage, recording)| Kernel {
+                stage,
+                program: leaves(recording).then(|| programs.next().expect("one a source")),
+                inputs: recording.inputs(),
+                outputs: recording.outputs(),
+            })
+            .collect();
+        let tables = &m.contacts.tables;
+        let numbers = staged(&device, "numbers", bytemuck::cast_slice(&tables.numbers));
+        let indices = staged(&device, "indices", bytemuck::cast_slice(&tables.indices));
+        Gpu {
+            kernels,
+            numbers,
+            indices,
+            worlds,
+            device,
+        }
+    }
+
+    /// Runs a stage.
+    pub fn run(&self, stage: Stage, given: &[Given]) -> Vec<Left> {
+        assert_eq!(given.len(), self.worlds);
+        let kernel = self.kernels.iter().find(|kernel| kernel.stage == stage);
+        let kernel = kernel.expect("it was compiled");
+        let mut fields = vec![0.0; self.packed(kernel.inputs + kernel.outputs)];
+        let mut scratch = vec![0.0; self.packed(given[0].memory.len())];
+        for (w, world) in given.iter().enumerate() {
+            assert_eq!(world.numbers.len(), kernel.inputs);
+            for (i, x) in world.numbers.iter().enumerate() {
+                fields[self.place(i, w)] = *x as f32;
+            }
+            for (i, x) in world.memory.iter().enumerate() {
+                scratch[self.place(i, w)] = *x as f32;
+            }
+        }
+        let fields = staged(&self.device, "fields", bytemuck::cast_slice(&fields));
+        let scratch = staged(&self.device, "scratch", bytemuck::cast_slice(&scratch));
+        let buffers = [
+            (0, &*fields, 0..fields.bytes()),
+            (1, &*scratch, 0..scratch.bytes()),
+            (2, &*self.numbers, 0..self.numbers.bytes()),
+            (3, &*self.indices, 0..self.indices.bytes()),
+        ];
+        let mut batch = self.device.batch(Replay::Recorded);
+        if let Some(program) = &kernel.program {
+            let workgroups = (self.worlds as u32).div_ceil(WORKGROUP);
+            batch.dispatch(program, &buffers, workgroups);
+        }
+        let batch = batch.finish().unwrap_or_else(|e| panic!("{e}"));
+        self.device
+            .run(&[&batch])
+            .unwrap_or_else(|e| panic!("{}: {e}", stage.name()));
+        let (fields, scratch) = (fields.read(), scratch.read());
+        let fields: &[f32] = bytemuck::cast_slice(&fields);
+        let scratch: &[f32] = bytemuck::cast_slice(&scratch);
+        (0..self.worlds)
+            .map(|w| Left {
+                numbers: (kernel.inputs..kernel.inputs + kernel.outputs)
+                    .map(|i| f64::from(fields[self.place(i, w)]))
+                    .collect(),
+                memory: (0..given[w].memory.len())
+                    .map(|i| f64::from(scratch[self.place(i, w)]))
+                    .collect(),
+            })
+            .collect()
+    }
+
+    /// Where number i of world w lies.
+    fn place(&self, i: usize, w: usize) -> usize {
+        (i / WIDTH * self.worlds + w) * WIDTH + i % WIDTH
+    }
+
+    /// Room for so many numbers of all worlds.
+    fn packed(&self, numbers: usize) -> usize {
+        numbers.div_ceil(WIDTH) * WIDTH * self.worlds
+    }
+}
+
+/// Memory of the host with these bytes.
+fn staged(device: &Device, label: &str, bytes: &[u8]) -> Staging {
+    let staging = device
+        .staging(label, bytes.len().max(16) as u64)
+        .unwrap_or_else(|e| panic!("{e}"));
+    staging.write()[..bytes.len()].copy_from_slice(bytes);
+    staging
+}

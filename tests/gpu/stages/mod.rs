@@ -1,0 +1,204 @@
+//! Every stage by itself on random states: on a GPU and in registers of the processor, against double precision.
+//!
+//! All machines are given the same numbers, those that the stages before left in `f32`, so that errors do not add up.
+
+mod compare;
+mod cpu;
+mod device;
+mod worlds;
+
+use crate::common::cases::{self, Case};
+use compare::{POSITIONS, errors, list, parts, touches};
+use device::Gpu;
+use sim_core::model::Cone;
+use sim_core::model::constants::Constants;
+use sim_core::model::contact::{Kind, PAIR_KINDS};
+use sim_core::step::{STAGES, Stage};
+use worlds::{Left, Worlds};
+
+/// How far from double precision a stage may be, in each part of what it leaves.
+struct Tolerance {
+    /// Largest difference over the largest number of the part.
+    near: f64,
+    /// Worlds of [`WORLDS`] that may be farther away: where a search takes another way by the last bit.
+    beyond: usize,
+}
+
+const WORLDS: usize = 128;
+/// A GPU may be so many times as far away as the processor, and by this share of the tolerance more.
+const TIMES: f64 = 3.0;
+const MORE: f64 = 0.125;
+
+/// The tolerance of a stage.
+fn tolerance(stage: Stage, part: &str) -> Tolerance {
+    let of = |near, beyond| Tolerance { near, beyond };
+    match stage {
+        // some roundings of the largest number
+        Stage::Command
+        | Stage::Kinematics
+        | Stage::Bias
+        | Stage::MassMatrix
+        | Stage::Actuation
+        | Stage::Constraint
+        | Stage::Place
+        | Stage::ContactRows
+        | Stage::JointTorque
+        | Stage::Poses
+        | Stage::Velocities
+        | Stage::Sites
+        | Stage::Imu => of(1e-6, 0),
+        Stage::Touch(kinds) => match PAIR_KINDS[kinds].0 {
+            // corners cut from faces: the cut divides by how fast an edge leaves the face
+            (Kind::Box, Kind::Box) => of(1e-5, 0),
+            (Kind::Plane, _) => of(1e-6, 0),
+            // walls and rims of cylinders: a search, which ends where `f32` sees no progress; a wall that lies on a face or along
+            // another wall may touch it anywhere
+            (Kind::Sphere, _) => of(1e-6, 0),
+            (Kind::Box, Kind::Cylinder) => of(1e-3, 10),
+            (Kind::Cylinder, Kind::Cylinder) => of(5e-3, 1),
+            (_, Kind::Cylinder) | (Kind::Cylinder, _) => of(5e-3, 0),
+            _ => of(1e-6, 0),
+        },
+        // forces of contacts are stiffness times what is left of accelerations that cancel
+        Stage::Solver => of(2e-3, 4),
+        Stage::Refine | Stage::Accelerations => of(1e-5, 0),
+        // a matrix that is nearly singular where the arm is stretched
+        Stage::SiteInverse => of(1e-4, 0),
+        // a rounding of a position is what its rest keeps
+        Stage::Integrate if part == POSITIONS => of(3e-8, 0),
+        Stage::Integrate => of(1e-5, 0),
+    }
+}
+
+/// The stages that a model needs: those of a step, those that show its state, and at last the one that moves it on.
+fn order(m: &Constants<f32>) -> Vec<Stage> {
+    let (last, before) = STAGES.split_last().expect("a step has stages");
+    let shown = Stage::ALL.iter().filter(|stage| !STAGES.contains(stage));
+    (before.iter().chain(shown).chain([last]))
+        .copied()
+        .filter(|stage| stage.is_needed(m))
+        .collect()
+}
+
+/// Compares every stage of a case; on the GPU those that `wanted` names. Returns in how many worlds the shapes of each stage touched.
+#[track_caller]
+fn compare(case: &Case, wanted: impl Fn(Stage) -> bool) -> Vec<(Stage, usize)> {
+    let m = &case.m;
+    let exact: Constants<f64> = m.cast();
+    let stages = order(m);
+    let here: Vec<Stage> = stages.iter().copied().filter(|s| wanted(*s)).collect();
+    let gpu = Gpu::new(m, &here, WORLDS);
+    let mut worlds = Worlds::random(case, WORLDS);
+    // the same from stage to stage in double precision
+    let mut ideal = Worlds::random(case, WORLDS);
+    let (mut wrong, mut touched) = (Vec::new(), Vec::new());
+    for stage in stages {
+        let given = worlds.given(stage);
+        let scalar = cpu::scalar(m, stage, &given);
+        for registers in cpu::registers(m, stage, &given) {
+            assert_same(m, stage, &registers, &scalar);
+        }
+        let ideally = cpu::double(&exact, stage, &ideal.given(stage));
+        let reference = match stage {
+            // corrects what rounding of the mass matrix did, which is given
+            Stage::Refine | Stage::Accelerations if m.solver.refinements > 0 => &ideally,
+            Stage::Integrate => &cpu::double(&exact, stage, &worlds.given_uncancelled(m)),
+            _ => &cpu::double(&exact, stage, &given),
+        };
+        let passed_over = worlds.passed_over(m, stage);
+        let cpu = errors(m, stage, reference, &scalar, &passed_over);
+        let gpu = wanted(stage)
+            .then(|| errors(m, stage, reference, &gpu.run(stage, &given), &passed_over));
+        for (k, cpu) in cpu.iter().enumerate() {
+            let Tolerance { near, beyond } = tolerance(stage, &cpu.part);
+            let a = cpu.but_for(beyond);
+            let mut is_near = a <= near;
+            let mut told = format!("{}: {}: processor {cpu}", stage.name(), cpu.part);
+            if let Some(gpu) = gpu.as_ref().map(|parts| &parts[k]) {
+                let b = gpu.but_for(beyond);
+                is_near &= b <= near && b <= TIMES * a + MORE * near;
+                told += &format!("; GPU {gpu}");
+            }
+            println!("{}: {told}", case.name);
+            if !is_near {
+                wrong.push(told);
+            }
+        }
+        if let Stage::Touch(kinds) = stage {
+            let touching = scalar.iter().filter(|left| touches(m, kinds, left));
+            touched.push((stage, touching.count()));
+        }
+        worlds.take(stage, &scalar);
+        ideal.take(stage, &ideally);
+    }
+    assert!(wrong.is_empty(), "{}: {wrong:#?}", case.name);
+    touched
+}
+
+/// Registers of any width give the bits of the scalar run, in all that is in use.
+#[track_caller]
+fn assert_same(m: &Constants<f32>, stage: Stage, some: &[Left], others: &[Left]) {
+    for (world, (a, b)) in some.iter().zip(others).enumerate() {
+        assert_eq!(list(m, a), list(m, b), "{} of world {world}", stage.name());
+        for (a, b) in parts(m, stage, a).iter().zip(parts(m, stage, b)) {
+            let what = format!("{}: {} of world {world}", stage.name(), b.name);
+            assert!(a.numbers == b.numbers, "{what}");
+        }
+    }
+}
+
+#[test]
+fn stages_of_an_arm_are_those_of_double_precision() {
+    compare(&cases::fr3(), |_| true);
+}
+
+#[test]
+fn stages_of_every_joint_are_those_of_double_precision() {
+    compare(&cases::every_joint(), |_| true);
+}
+
+#[test]
+fn stages_of_an_arm_with_limits_only_are_those_of_double_precision() {
+    compare(&cases::limits_only(), |_| true);
+}
+
+#[test]
+fn stages_of_every_shape_are_those_of_double_precision() {
+    let touched = compare(&cases::shapes(Cone::Elliptic, None), |_| true);
+    assert_eq!(touched.len(), PAIR_KINDS.len());
+    for (stage, worlds) in touched {
+        println!("{} touch in {worlds} worlds", stage.name());
+        assert!(
+            worlds > tolerance(stage, "").beyond,
+            "{}: {worlds}",
+            stage.name()
+        );
+    }
+}
+
+#[test]
+fn stages_of_too_many_contacts_are_those_of_double_precision() {
+    // the searches of cylinders and hulls are what the test before has compiled for half a minute
+    let is_quick = |stage: Stage| match stage {
+        Stage::Touch(kinds) => {
+            let (a, b) = PAIR_KINDS[kinds].0;
+            a == Kind::Plane
+                || ![Kind::Cylinder, Kind::Hull]
+                    .iter()
+                    .any(|k| [a, b].contains(k))
+        }
+        _ => true,
+    };
+    compare(&cases::shapes(Cone::Pyramidal, Some(5)), is_quick);
+}
+
+#[test]
+fn stages_of_an_arm_at_a_cube_are_those_of_double_precision() {
+    // its solver takes as long to compile as all other stages: it is in the next test, and in the grasp
+    compare(&cases::arm_and_cube(), |stage| stage != Stage::Solver);
+}
+
+#[test]
+fn stages_where_every_parameter_varies_are_those_of_double_precision() {
+    compare(&cases::every_param(), |_| true);
+}

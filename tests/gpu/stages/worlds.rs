@@ -1,0 +1,121 @@
+//! Worlds that stages are run on, one after the other.
+
+use crate::common::cases::Case;
+use crate::common::dice::Dice;
+use sim_core::batch::{Block, Numbers};
+use sim_core::math::factor::multiply;
+use sim_core::model::constants::Constants;
+use sim_core::step::Stage;
+use stages_recorded::SLOTS;
+
+/// What a stage is given in a world: the numbers of what it reads, and the memory of the machine.
+pub struct Given {
+    pub numbers: Vec<f64>,
+    pub memory: Vec<f64>,
+}
+
+/// What it leaves: the numbers of what it writes, and that memory.
+#[derive(Default)]
+pub struct Left {
+    pub numbers: Vec<f64>,
+    pub memory: Vec<f64>,
+}
+
+/// Numbers of some worlds, whatever machine they came from.
+pub struct Worlds {
+    blocks: Vec<Block<f64, f64>>,
+    memory: Vec<Vec<f64>>,
+}
+
+impl Worlds {
+    /// Random states of a case.
+    pub fn random(case: &Case, worlds: usize) -> Worlds {
+        let mut dice = Dice::new(1);
+        let block = |_| {
+            let mut state = case.random_state(|| dice.number());
+            let mut block = Block::new(&case.m, 0.0);
+            for slot in SLOTS {
+                let from = numbers(state.numbers(slot)).iter();
+                for (to, x) in numbers(block.numbers(slot)).iter_mut().zip(from) {
+                    *to = f64::from(*x);
+                }
+            }
+            block
+        };
+        Worlds {
+            blocks: (0..worlds).map(block).collect(),
+            memory: vec![vec![0.0; case.m.contacts.memory.len]; worlds],
+        }
+    }
+
+    /// What a stage reads.
+    pub fn given(&mut self, stage: Stage) -> Vec<Given> {
+        (self.blocks.iter_mut().zip(&self.memory))
+            .map(|(block, memory)| Given {
+                numbers: (stage.reads().iter())
+                    .flat_map(|slot| numbers(block.numbers(*slot)).to_vec())
+                    .collect(),
+                memory: memory.clone(),
+            })
+            .collect()
+    }
+
+    /// What [`Stage::Integrate`] reads, with M q̈ - smooth for the constraint forces of worlds that touch: in `f32` it takes what
+    /// acts from M q̈, since stiff forces cancel and leave their rounding.
+    pub fn given_uncancelled(&mut self, m: &Constants<f32>) -> Vec<Given> {
+        let kept: Vec<Vec<f64>> = (self.blocks.iter_mut().zip(&self.memory))
+            .map(|(block, memory)| {
+                let kept = block.constraint_force.clone();
+                let classes = m.contacts.classes.len();
+                let counts = &memory[m.contacts.memory.counts.base..][..classes];
+                if counts.iter().any(|count| *count > 0.0) {
+                    let work = &block.work;
+                    let force = &mut block.constraint_force;
+                    multiply(&m.pattern, &work.mass_matrix, &block.joint_qdd, force);
+                    for (force, smooth) in force.iter_mut().zip(&work.smooth_force) {
+                        *force -= smooth;
+                    }
+                }
+                kept
+            })
+            .collect();
+        let given = self.given(Stage::Integrate);
+        for (block, kept) in self.blocks.iter_mut().zip(kept) {
+            block.constraint_force = kept;
+        }
+        given
+    }
+
+    /// Goes on with what a stage left.
+    pub fn take(&mut self, stage: Stage, left: &[Left]) {
+        let worlds = self.blocks.iter_mut().zip(&mut self.memory);
+        for ((block, memory), left) in worlds.zip(left) {
+            let mut from = left.numbers.iter();
+            for slot in stage.writes() {
+                for (to, x) in numbers(block.numbers(*slot)).iter_mut().zip(&mut from) {
+                    *to = *x;
+                }
+            }
+            memory.clone_from(&left.memory);
+        }
+    }
+
+    /// Worlds whose accelerations `f32` leaves to [`Stage::Accelerations`]: limits are all that could act, and none does.
+    pub fn passed_over(&mut self, m: &Constants<f32>, stage: Stage) -> Vec<bool> {
+        let may_be = matches!(stage, Stage::Solver | Stage::Refine)
+            && m.equalities.is_empty()
+            && m.frictions.is_empty()
+            && m.contacts.classes.is_empty();
+        let idle = |block: &mut Block<f64, f64>| {
+            may_be && block.efc_weight.iter().all(|weight| *weight == 0.0)
+        };
+        self.blocks.iter_mut().map(idle).collect()
+    }
+}
+
+/// The numbers of a slot.
+pub fn numbers<F>(of: Numbers<'_, F, F>) -> &mut [F] {
+    match of {
+        Numbers::Cells(x) | Numbers::Values(x) => x,
+    }
+}
