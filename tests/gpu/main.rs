@@ -8,6 +8,7 @@ mod delivery;
 mod programs;
 mod same_bits;
 mod stages;
+mod validation;
 
 use sim_core::batch::Field;
 use sim_core::model::Model;

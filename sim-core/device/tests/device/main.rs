@@ -2,6 +2,7 @@
 
 mod common;
 mod compile;
+mod layer;
 mod memory;
 mod refusals;
 mod run;
