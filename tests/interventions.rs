@@ -45,7 +45,6 @@ impl Case {
             freezes_nan: false,
         };
         let options = Options {
-            device: sim_engine::simulation::Device::Cpu,
             worlds: dice.pick(&[2, 5, 8, 9, 16, 17, 33, 40]),
             precision,
             threads: Some(1 + dice.below(2)),
@@ -53,6 +52,7 @@ impl Case {
             fields: Field::ALL.to_vec(),
             faults,
             draws: dice.pick(&[Draws::World, Draws::Seed]),
+            ..Options::default()
         };
         let is_noisy = model.constants().varying.params().any(is_noise);
         Ok(Case {

@@ -1,8 +1,8 @@
 //! Floating robots without contacts, each joint driven to a target that swings about the middle of its
 //! range; benches/legged.py is the same in Python, with a swing of each world's own.
+#![allow(dead_code)] // each bench uses its part
 
 use sim_core::model::{Description, JointKind, Robot, UrdfOptions};
-use std::path::Path;
 
 /// Control frames of a run.
 pub const FRAMES: usize = 100;
@@ -37,19 +37,18 @@ impl Case {
 
     /// The robot in a scene of its own, at 400 steps and 50 control frames a second.
     pub fn scene(self) -> Description {
-        let file = match self {
-            Case::Quadruped => "quadruped.urdf",
-            Case::Humanoid23 | Case::Humanoid29 => "humanoid.urdf",
+        // within the program, so that a bench runs without this repository
+        let text = match self {
+            Case::Quadruped => include_str!("quadruped.urdf"),
+            Case::Humanoid23 | Case::Humanoid29 => include_str!("humanoid.urdf"),
         };
-        let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("benches/robots")
-            .join(file);
         let options = UrdfOptions {
             floating: true,
             ..UrdfOptions::named("robot")
         };
         let mut scene = Description::new(1.0 / 400.0, 8);
-        let robot = scene.add_urdf(path, options).expect("the robot loads");
+        let robot = Robot::from_urdf_text(text, "robot.urdf", options).expect("the robot loads");
+        let robot = scene.add_robot(robot).expect("the only robot");
         for joint in &mut robot.joints {
             let locked = LOCKED.iter().any(|name| joint.name.ends_with(name));
             if self == Case::Humanoid23 && locked {

@@ -2,8 +2,7 @@
 //! what the Rust twin of the lesson, the tests and the benches share.
 
 use sim_core::batch::Field;
-use sim_core::model::{Description, Pose, UrdfOptions};
-use std::path::Path;
+use sim_core::model::{Description, Pose, Robot, UrdfOptions};
 
 /// Start of the lesson, joints 1..7 and fingers [rad, m]; the fingers start outside their range.
 pub const START: [f64; 9] = [
@@ -32,16 +31,16 @@ pub enum Demo {
 /// The lesson's scene (Newton, "Controlling a Robot"), without contacts.
 pub fn lesson(demo: Demo) -> Description {
     let mut scene = Description::new(1.0 / 480.0, 8);
-    let robot =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/assets/fr3/fr3_franka_hand.urdf");
     let options = UrdfOptions {
         name: Some("arm".into()),
         pose: Pose::at([-0.5, -0.5, 0.1]),
         ..UrdfOptions::default()
     };
-    let arm = scene
-        .add_urdf(robot, options)
+    // within the program, so that it runs without this repository; `add_urdf` reads a file
+    let text = include_str!("../assets/fr3/fr3_franka_hand.urdf");
+    let arm = Robot::from_urdf_text(text, "fr3_franka_hand.urdf", options)
         .expect("the project's own robot loads");
+    let arm = scene.add_robot(arm).expect("the only robot");
     // the reference runs start from float32 values
     let start = START.map(|q| f64::from(q as f32));
     arm.set_joint_q(&start).unwrap();

@@ -230,6 +230,7 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
             freezes_nan: serve.on_nan == "freeze",
         },
         draws,
+        ..Options::default()
     })
 }
 

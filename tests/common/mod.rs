@@ -165,6 +165,11 @@ impl Run {
 /// Rows of a CSV file of numbers, comments left out.
 pub fn csv(path: PathBuf) -> Vec<Vec<f64>> {
     let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    numbers(&text)
+}
+
+/// Rows of the text of such a file.
+pub fn numbers(text: &str) -> Vec<Vec<f64>> {
     text.lines()
         .filter(|line| !line.starts_with('#'))
         .map(|line| line.split(',').map(|x| x.trim().parse().unwrap()).collect())

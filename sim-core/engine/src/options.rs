@@ -7,7 +7,7 @@ use sim_core::model::Model;
 use sim_device::AdapterKind;
 use std::path::PathBuf;
 
-pub use sim_device::{AdapterInfo, Choice as Adapter, adapters};
+pub use sim_device::{AdapterInfo, Choice as Adapter, Replay, adapters};
 
 /// What keeps the worlds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -39,6 +39,8 @@ pub struct Options {
     pub worlds: usize,
     /// What keeps them.
     pub device: Device,
+    /// How a GPU gets the batches of a frame: recorded, unless that is what is measured.
+    pub replay: Replay,
     /// Precision of state, commands and fields.
     pub precision: Precision,
     /// Threads of a step; none = one a core.
@@ -58,6 +60,7 @@ impl Default for Options {
         Options {
             worlds: 1,
             device: Device::Cpu,
+            replay: Replay::Recorded,
             precision: Precision::F32,
             threads: None,
             lanes: Lanes::Auto,
@@ -86,7 +89,8 @@ pub(crate) fn backend(
 ) -> Result<(Box<dyn Backend>, Option<String>), BackendError> {
     let (worlds, precision, draws) = (options.worlds, options.precision, options.draws);
     let on_gpu = |adapter: &Adapter, cache: &Option<PathBuf>| {
-        gpu::create(model, worlds, layout, adapter, cache.as_deref(), draws)
+        let (cache, replay) = (cache.as_deref(), options.replay);
+        gpu::create(model, worlds, layout, adapter, cache, draws, replay)
     };
     let note = match &options.device {
         Device::Gpu { .. } if precision == Precision::F64 => return Err(BackendError::DoubleOnGpu),

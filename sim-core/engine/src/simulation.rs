@@ -1,6 +1,6 @@
 //! Many worlds of one model: reset, write, step, read.
 
-pub use crate::backend::{Faults, FirstFrozen, Frozen, Lanes, Precision};
+pub use crate::backend::{Faults, FirstFrozen, Frozen, Lanes, Precision, ProgramFacts};
 pub use crate::options::{AUTO_WORLDS, Device, Options};
 pub use crate::random::Draws;
 
@@ -123,6 +123,10 @@ impl Simulation {
     /// Forgets all arenas that were imported: their memory may go.
     pub fn forget(&mut self) {
         self.backend.forget();
+    }
+    /// The programs of a GPU; none on the CPU.
+    pub fn programs(&self) -> &[ProgramFacts] {
+        self.backend.programs()
     }
     /// Threads that a step uses.
     pub fn threads(&self) -> usize {

@@ -285,6 +285,7 @@ impl Run {
             },
             draws: Draws::named(&told.draws)
                 .ok_or_else(|| failed(format!("draws by `{}`, unknown here", told.draws)))?,
+            ..Options::default()
         };
         let simulation =
             Simulation::new(model, &options).map_err(|error| failed(error.to_string()))?;

@@ -119,10 +119,25 @@ impl Default for Faults {
     }
 }
 
+/// A program of an accelerator, for people.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ProgramFacts {
+    /// What it does.
+    pub label: String,
+    /// Statements of its text.
+    pub statements: usize,
+    /// Of one that steps: how often a frame runs it.
+    pub rounds: Option<usize>,
+}
+
 /// What keeps the worlds. Arguments were checked by [`crate::simulation::Simulation`].
 pub trait Backend: Send {
     /// What it runs on, for people.
     fn device(&self) -> &str;
+    /// The programs that it consists of: none on the CPU.
+    fn programs(&self) -> &[ProgramFacts] {
+        &[]
+    }
     /// Threads that a step may use.
     fn threads(&self) -> usize;
     /// When worlds are frozen from now on, and what becomes of them.

@@ -4,7 +4,7 @@ use super::places::Places;
 use super::programs::{self, Programs};
 use super::show;
 use super::upkeep::{self, WORKGROUP};
-use crate::backend::BackendError;
+use crate::backend::{BackendError, ProgramFacts};
 use sim_core::model::constants::Constants;
 use sim_device::{Buffer, Device, DeviceError, Program, Replay, Source};
 use sim_record::split::Part;
@@ -41,6 +41,10 @@ pub(super) struct Compiled {
     pub contacts: Option<Program>,
     pub numbers: Buffer,
     pub indices: Buffer,
+    /// All of them, for people.
+    pub facts: Vec<ProgramFacts>,
+    /// How the batches of a frame get to the device.
+    pub replay: Replay,
 }
 
 impl Compiled {
@@ -78,6 +82,7 @@ impl Compiled {
             source("show", show::SHOW.to_owned(), WORKGROUP),
             source("counters", books.counters, WORKGROUP),
         ];
+        let steps = sources.len()..sources.len() + programs.step.kernels.len();
         sources.extend(physics("step", &programs.step));
         sources.extend(physics("evaluate", &programs.evaluate));
         let has_contacts = books.contacts.is_some();
@@ -86,6 +91,14 @@ impl Compiled {
                 .contacts
                 .map(|text| source("contacts", text, WORKGROUP)),
         );
+        let facts = (sources.iter().enumerate())
+            .map(|(k, source)| ProgramFacts {
+                label: source.label.clone(),
+                statements: source.wgsl.matches(';').count(),
+                rounds: (steps.contains(&k))
+                    .then(|| rounds_of(k - steps.start, &programs.step.order)),
+            })
+            .collect();
         let mut compiled = device.programs(&sources, limit)?.into_iter();
         let mut next = || compiled.next().expect("a program for every source");
         let [
@@ -118,8 +131,19 @@ impl Compiled {
             contacts,
             numbers: constant(device, "numbers", &numbers)?,
             indices: constant(device, "indices", &tables.indices)?,
+            facts,
+            replay: Replay::Recorded,
         })
     }
+}
+
+/// How often a kernel is dispatched.
+fn rounds_of(kernel: usize, order: &[Part]) -> usize {
+    let rounds = order.iter().map(|part| match part {
+        Part::Kernel(k) => usize::from(*k == kernel),
+        Part::Repeat { rounds, parts } => rounds * rounds_of(kernel, parts),
+    });
+    rounds.sum()
 }
 
 /// A buffer of words that do not change.

@@ -4,7 +4,7 @@ use super::compiled::Compiled;
 use super::host;
 use super::tile::Tile;
 use crate::backend::BackendError;
-use sim_device::{Batch, Buffer, Device, Replay};
+use sim_device::{Batch, Buffer, Device};
 
 /// Memory of a reader that frames are written to.
 pub(super) struct Imported {
@@ -34,7 +34,7 @@ impl Imported {
         let pages = unsafe { device.import(at, (end - first) as u64)? };
         let mut shown = Vec::new();
         for (k, tile) in tiles.iter().enumerate() {
-            let mut batch = device.batch(Replay::Recorded);
+            let mut batch = device.batch(compiled.replay);
             match drawn {
                 Some(drawn) => {
                     tile.show(&mut batch, compiled, drawn, 0..drawn.bytes());

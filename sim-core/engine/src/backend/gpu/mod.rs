@@ -16,7 +16,7 @@ mod worlds;
 
 use super::shown::stages_for;
 use super::state::{Shape, StateField, start};
-use super::{Backend, BackendError, Faults, FirstFrozen, Frozen, Values};
+use super::{Backend, BackendError, Faults, FirstFrozen, Frozen, ProgramFacts, Values};
 use crate::backend::noise::Noise;
 use crate::random::Draws;
 use crate::start::StartDraw;
@@ -28,7 +28,7 @@ use programs::Programs;
 use sim_core::batch::{Field, Layout, status};
 use sim_core::model::Model;
 use sim_core::model::constants::Constants;
-use sim_device::{AdapterKind, Buffer, Choice, Device, Staging};
+use sim_device::{AdapterKind, Buffer, Choice, Device, Replay, Staging};
 use sim_record::split::Limits;
 use std::ops::Range;
 use std::path::Path;
@@ -90,9 +90,10 @@ pub fn create(
     choice: &Choice,
     cache: Option<&Path>,
     draws: Draws,
+    replay: Replay,
 ) -> Result<Box<dyn Backend>, BackendError> {
     Ok(Box::new(Gpu::new(
-        model, worlds, layout, choice, cache, draws,
+        model, worlds, layout, choice, cache, draws, replay,
     )?))
 }
 
@@ -104,6 +105,7 @@ impl Gpu {
         choice: &Choice,
         cache: Option<&Path>,
         draws: Draws,
+        replay: Replay,
     ) -> Result<Gpu, BackendError> {
         let device = Device::open(choice, cache)?;
         let constants: Constants<f32> = model.constants().cast();
@@ -136,7 +138,9 @@ impl Gpu {
             contacts: show::contacts(m, &places, layout, shapes),
         };
         let widest = tile::widest(&device, m, &places, worlds);
-        let compiled = Compiled::new(&device, m, &places, &programs, books, widest, COMPILE_LIMIT)?;
+        let mut compiled =
+            Compiled::new(&device, m, &places, &programs, books, widest, COMPILE_LIMIT)?;
+        compiled.replay = replay;
         let frame = device.staging("frame", layout.bytes.max(64) as u64)?;
         let drawn = match device.info().kind {
             AdapterKind::Discrete => Some(device.buffer("frame", layout.bytes.max(64) as u64)?),
@@ -208,6 +212,10 @@ impl Backend for Gpu {
 
     fn threads(&self) -> usize {
         1
+    }
+
+    fn programs(&self) -> &[ProgramFacts] {
+        &self.compiled.facts
     }
 
     fn set_faults(&mut self, faults: Faults) {

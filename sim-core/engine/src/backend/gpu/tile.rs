@@ -161,7 +161,7 @@ impl Tile {
             let what = device.staging("what commands are", 16)?;
             let head = [worlds.len() as u32, dofs as u32, places.group(group), 0];
             what.write().copy_from_slice(bytemuck::cast_slice(&head));
-            let mut batch = device.batch(Replay::Recorded);
+            let mut batch = device.batch(compiled.replay);
             placed(&mut batch, &compiled.rows, &fields, &rows, &what, width);
             inboxes.push(Inbox {
                 batch: Some(batch.finish()?),
@@ -197,21 +197,21 @@ impl Tile {
         finds_contacts: bool,
         frame: &Buffer,
     ) -> Result<(), BackendError> {
-        let mut step = device.batch(Replay::Recorded);
+        let mut step = device.batch(compiled.replay);
         self.book(&mut step, &compiled.begin);
         self.physics(&mut step, &compiled.step, &compiled.step.order, compiled);
         self.book(&mut step, &compiled.note);
         self.evaluate(&mut step, compiled);
         self.book(&mut step, &compiled.left_out);
         self.step = Some(step.finish()?);
-        let mut forward = device.batch(Replay::Recorded);
+        let mut forward = device.batch(compiled.replay);
         self.book(&mut forward, &compiled.begin_evaluation);
         self.evaluate(&mut forward, compiled);
         if finds_contacts {
             self.book(&mut forward, &compiled.left_out);
         }
         self.forward = Some(forward.finish()?);
-        let mut show = device.batch(Replay::Recorded);
+        let mut show = device.batch(compiled.replay);
         self.show(&mut show, compiled, frame, 0..frame.bytes());
         self.show = Some(show.finish()?);
         Ok(())

@@ -1,0 +1,130 @@
+//! Is it right? Nothing is measured on a device of which it is not.
+
+use crate::common::{distance, numbers};
+use crate::scenes::{Crowd, Plan, Scene};
+use crate::{Place, options};
+use anyhow::{Context, ensure};
+use sim_core::batch::Field;
+use sim_engine::backend::Values;
+use sim_engine::simulation::Simulation;
+
+/// Joint positions of MuJoCo C's runs, as tests/gpu/agreement.rs reads them.
+const TARGET: &str = include_str!("../../tests/data/mujoco_target.csv");
+const GRASP: &str = include_str!("../../tests/data/mujoco_grasp.csv");
+/// Distance from them [rad, m]: tests/gpu/agreement.rs has the same, and why.
+const TARGET_MAX: f64 = 2e-6;
+const GRASP_MAX: f64 = 1e-4;
+const CUBE_MAX: f64 = 2e-4;
+/// Worlds among which others are looked for, and frames of that. Programs are made for a number of worlds: no one measures this
+/// one, which is no whole number of workgroups either, so that the last world has a neighbour that only runs along.
+const MANY: usize = 4031;
+const FRAMES: usize = 12;
+
+/// Runs all checks on an adapter.
+pub fn check(place: &Place, scenes: &[Scene]) -> anyhow::Result<()> {
+    let [target, _] = deviation(place, Scene::Target, TARGET)?;
+    println!("target demo: within {target:.1e} of MuJoCo C (at most {TARGET_MAX:.0e})");
+    ensure!(
+        target < TARGET_MAX,
+        "the target demo is wrong by {target:e}"
+    );
+    let [arm, cube] = deviation(place, Scene::Grasp, GRASP)?;
+    println!(
+        "grasp: arm within {arm:.1e} (at most {GRASP_MAX:.0e}), cube within {cube:.1e} (at most {CUBE_MAX:.0e})"
+    );
+    ensure!(arm < GRASP_MAX, "the arm of the grasp is wrong by {arm:e}");
+    ensure!(
+        cube < CUBE_MAX,
+        "the cube of the grasp is wrong by {cube:e}"
+    );
+    for &scene in scenes {
+        let name = scene.name();
+        let plan = Plan::new(scene);
+        let last = MANY - 1;
+        let all = bits(place, &plan, &Crowd::all(MANY))?;
+        let few = [last, 2, 0, MANY / 2, 1, 5, 3];
+        for (id, found) in few
+            .iter()
+            .zip(bits(place, &plan, &Crowd::some(&few, MANY))?)
+        {
+            ensure!(
+                found == all[*id],
+                "{name}: world {id} of {MANY} has other bits among seven"
+            );
+        }
+        let alone = bits(place, &plan, &Crowd::some(&[last], MANY))?;
+        ensure!(
+            alone[0] == all[last],
+            "{name}: the last of {MANY} worlds has other bits alone"
+        );
+        ensure!(
+            all[0] != all[last],
+            "{name}: worlds that differ show the same"
+        );
+        println!("{name}: same bits among 1, 7 and {MANY} worlds");
+    }
+    Ok(())
+}
+
+/// Largest distance of world 0 from a recorded run: of the arm, and of the cube's position.
+fn deviation(place: &Place, scene: Scene, recorded: &str) -> anyhow::Result<[f64; 2]> {
+    let plan = Plan::new(scene);
+    let rows = numbers(recorded);
+    let mut worst = [0.0_f64; 2];
+    let coords = plan.model.coords();
+    run(place, &plan, &Crowd::all(1), plan.frames(), |frame, q| {
+        let q: Vec<f64> = q[..coords].iter().map(|x| f64::from(*x)).collect();
+        let row = &rows[frame + 1][1..];
+        worst[0] = worst[0].max(distance(&q[..9], &row[..9]));
+        if q.len() > 9 {
+            worst[1] = worst[1].max(distance(&q[9..12], &row[9..12]));
+        }
+    })?;
+    Ok(worst)
+}
+
+/// Positions and velocities of each world after some frames.
+fn bits(place: &Place, plan: &Plan, crowd: &Crowd) -> anyhow::Result<Vec<Vec<u32>>> {
+    let mut found = Vec::new();
+    let (coords, dofs) = (plan.model.coords(), plan.model.dofs());
+    run(place, plan, crowd, FRAMES, |_, shown| {
+        let (q, qd) = shown.split_at(coords * crowd.len());
+        found = (q.chunks_exact(coords).zip(qd.chunks_exact(dofs)))
+            .map(|(q, qd)| q.iter().chain(qd).map(|x| x.to_bits()).collect())
+            .collect();
+    })?;
+    Ok(found)
+}
+
+/// Runs frames and shows `joint_q` of all worlds, then `joint_qd`.
+fn run(
+    place: &Place,
+    plan: &Plan,
+    crowd: &Crowd,
+    frames: usize,
+    mut look: impl FnMut(usize, &[f32]),
+) -> anyhow::Result<()> {
+    let fields = [Field::JointQ, Field::JointQd];
+    let options = options(place, crowd.len(), &fields);
+    let mut sim = Simulation::new(plan.model.clone(), &options)
+        .with_context(|| format!("{} does not build", plan.scene.name()))?;
+    let mut arena = vec![0; sim.layout().bytes / 8];
+    let mut values = Vec::new();
+    plan.start(&mut sim, crowd);
+    for frame in 0..frames {
+        plan.fill(frame, crowd, &mut values);
+        let dofs = 0..plan.model.dofs();
+        sim.command(plan.field, dofs, Values::F32(&values))?;
+        sim.step(&mut arena);
+        if let Some(lost) = sim.lost() {
+            anyhow::bail!("{}: {lost}", plan.scene.name());
+        }
+        let numbers: &[f32] = bytemuck::cast_slice(&arena);
+        let mut shown = Vec::new();
+        for slot in (sim.layout().slots.iter()).filter(|slot| fields.contains(&slot.field)) {
+            shown.extend_from_slice(&numbers[slot.offset / 4..(slot.offset + slot.bytes) / 4]);
+        }
+        look(frame, &shown);
+    }
+    Ok(())
+}

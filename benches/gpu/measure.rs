@@ -1,0 +1,103 @@
+//! How fast: frames of whole runs, each timed from its commands to what it shows.
+
+use crate::scenes::{Crowd, Plan};
+use rustix::time::{ClockId, clock_gettime};
+use sim_engine::backend::Values;
+use sim_engine::simulation::Simulation;
+use std::time::{Duration, Instant};
+
+/// Frames that do not count: caches, clocks and pages are cold.
+const WARM_UP: usize = 5;
+/// Times the wanted duration, after which a run is left before its end.
+const PATIENCE: u32 = 10;
+
+/// What frames took [s]: on the wall, and of the thread that asked for them.
+#[derive(Default)]
+pub struct Frames {
+    wall: Vec<f64>,
+    thread: Vec<f64>,
+    /// The run was too slow to be measured to its end: rates are of its beginning.
+    pub is_cut: bool,
+}
+
+impl Frames {
+    /// Runs a plan from its start, whole runs until `wanted` is over; `words` are the frame.
+    pub fn measure(
+        sim: &mut Simulation,
+        plan: &Plan,
+        crowd: &Crowd,
+        words: &mut [u64],
+        wanted: Duration,
+    ) -> anyhow::Result<Frames> {
+        let mut values = Vec::new();
+        plan.start(sim, crowd);
+        for frame in 0..WARM_UP {
+            plan.fill(frame, crowd, &mut values);
+            sim.command(plan.field, 0..plan.model.dofs(), Values::F32(&values))?;
+            sim.step(words);
+        }
+        let mut found = Frames::default();
+        let mut spent = 0.0;
+        while spent < wanted.as_secs_f64() {
+            plan.start(sim, crowd);
+            for frame in 0..plan.frames() {
+                plan.fill(frame, crowd, &mut values);
+                let (wall, thread) = (Instant::now(), thread_seconds());
+                sim.command(plan.field, 0..plan.model.dofs(), Values::F32(&values))?;
+                sim.step(words);
+                found.thread.push(thread_seconds() - thread);
+                found.wall.push(wall.elapsed().as_secs_f64());
+                spent += found.wall[found.wall.len() - 1];
+                if spent > (wanted * PATIENCE).as_secs_f64() && frame + 1 < plan.frames() {
+                    found.is_cut = true;
+                    break;
+                }
+            }
+        }
+        if let Some(lost) = sim.lost() {
+            anyhow::bail!("{}: {lost}", plan.scene.name());
+        }
+        found.sort();
+        Ok(found)
+    }
+
+    fn sort(&mut self) {
+        self.wall.sort_by(f64::total_cmp);
+        self.thread.sort_by(f64::total_cmp);
+    }
+
+    /// How many were measured.
+    pub fn len(&self) -> usize {
+        self.wall.len()
+    }
+
+    /// Time of a frame that a share of them does not exceed [ms].
+    pub fn wall_ms(&self, share: f64) -> f64 {
+        1e3 * at(&self.wall, share)
+    }
+
+    /// Time of the thread that asks for a frame, likewise [µs].
+    pub fn thread_us(&self, share: f64) -> f64 {
+        1e6 * at(&self.thread, share)
+    }
+
+    /// So much done a frame makes so much a second: in the median frame.
+    pub fn rate(&self, a_frame: usize) -> f64 {
+        a_frame as f64 / at(&self.wall, 0.5)
+    }
+
+    /// The same, of all frames together.
+    pub fn whole_rate(&self, a_frame: usize) -> f64 {
+        (a_frame * self.wall.len()) as f64 / self.wall.iter().sum::<f64>()
+    }
+}
+
+fn at(sorted: &[f64], share: f64) -> f64 {
+    let place = (share * sorted.len() as f64) as usize;
+    sorted[place.min(sorted.len() - 1)]
+}
+
+fn thread_seconds() -> f64 {
+    let time = clock_gettime(ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+}

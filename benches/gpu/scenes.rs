@@ -1,0 +1,191 @@
+//! What moves: four scenes, the commands of their frames, and what each world has of its own.
+
+use crate::common::{Demo, FRAMES, command, lesson, lesson_with_table, noise, numbers};
+use crate::robots::{self, Case};
+use clap::ValueEnum;
+use sim_core::batch::Field;
+use sim_core::model::Model;
+use sim_engine::backend::Values;
+use sim_engine::simulation::Simulation;
+use std::sync::Arc;
+
+/// Half of the square within which a cube is put [m], about its place in the record: what examples/franka_grasp.py draws from.
+const PLACE: f64 = 0.004;
+/// Coordinates of the arm, and of the cube behind them.
+const ARM: usize = 9;
+const CUBE: usize = 7;
+
+/// A scene by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub enum Scene {
+    /// The lesson's arm under a torque, nothing to touch.
+    TorqueFree,
+    /// The same, driven to position targets.
+    Target,
+    /// The recorded grasp of a cube on a table.
+    Grasp,
+    /// Twelve driven joints on a floating base.
+    Quadruped,
+}
+
+impl Scene {
+    /// Its name on the command line and in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Scene::TorqueFree => "torque_free",
+            Scene::Target => "target",
+            Scene::Grasp => "grasp",
+            Scene::Quadruped => "quadruped",
+        }
+    }
+}
+
+/// Worlds of a run: world k of it is number `ids[k]` of `of`, and has that one's start and commands.
+pub struct Crowd {
+    ids: Vec<usize>,
+    of: usize,
+}
+
+impl Crowd {
+    /// All of them.
+    pub fn all(of: usize) -> Crowd {
+        let ids = (0..of).collect();
+        Crowd { ids, of }
+    }
+
+    /// Some of them.
+    pub fn some(ids: &[usize], of: usize) -> Crowd {
+        let ids = ids.to_vec();
+        Crowd { ids, of }
+    }
+
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.ids.len()
+    }
+
+    /// From 1 in the first world to -1 in the last.
+    fn amplitudes(&self) -> Vec<f32> {
+        let share = |id: &usize| 2.0 * *id as f32 / (self.of - 1).max(1) as f32;
+        self.ids.iter().map(|id| 1.0 - share(id)).collect()
+    }
+}
+
+/// A scene, ready to run.
+pub struct Plan {
+    pub scene: Scene,
+    pub model: Arc<Model>,
+    pub field: Field,
+    /// A command a frame; world 0 gets it as it is.
+    rows: Vec<Vec<f32>>,
+    /// About which the worlds' commands differ.
+    rest: Vec<f32>,
+}
+
+impl Plan {
+    /// Compiles the scene.
+    pub fn new(scene: Scene) -> Plan {
+        let lessons = |demo: Demo| -> Vec<Vec<f64>> {
+            let frames = 0..FRAMES;
+            frames.map(|f| command(demo, f).1.to_vec()).collect()
+        };
+        let (description, field, rows, rest) = match scene {
+            Scene::TorqueFree => {
+                let rest = vec![0.0; ARM];
+                (
+                    lesson(Demo::Torque),
+                    Field::JointF,
+                    lessons(Demo::Torque),
+                    rest,
+                )
+            }
+            Scene::Target => {
+                let rest = lessons(Demo::Target).swap_remove(0);
+                (
+                    lesson(Demo::Target),
+                    Field::JointTargetQ,
+                    lessons(Demo::Target),
+                    rest,
+                )
+            }
+            Scene::Grasp => {
+                let mut rows = numbers(include_str!("../../tests/data/grasp_targets.csv"));
+                // the cube has no drive
+                rows.iter_mut().for_each(|row| row.resize(ARM + 6, 0.0));
+                let rest = vec![0.0; ARM + 6];
+                (
+                    lesson_with_table(Demo::Target, true),
+                    Field::JointTargetQ,
+                    rows,
+                    rest,
+                )
+            }
+            Scene::Quadruped => {
+                let description = Case::Quadruped.scene();
+                let robot = &description.robots[0];
+                let rows: Vec<_> = (0..robots::FRAMES)
+                    .map(|f| robots::targets(robot, f))
+                    .collect();
+                let rest = (0..rows[0].len())
+                    .map(|dof| rows.iter().map(|row| row[dof]).sum::<f64>() / rows.len() as f64)
+                    .collect();
+                (description, Field::JointTargetQ, rows, rest)
+            }
+        };
+        let single = |row: &Vec<f64>| row.iter().map(|x| *x as f32).collect();
+        Plan {
+            scene,
+            model: description.compile().expect("the scene compiles"),
+            field,
+            rows: rows.iter().map(single).collect(),
+            rest: single(&rest),
+        }
+    }
+
+    /// Frames of a run.
+    pub fn frames(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Puts the worlds where they begin.
+    pub fn start(&self, sim: &mut Simulation, crowd: &Crowd) {
+        sim.reset(None, None).expect("a reset without a mask fits");
+        if self.scene != Scene::Grasp {
+            return;
+        }
+        let start = &self.model.start().joint_q[ARM..ARM + CUBE];
+        let cubes: Vec<f32> = (crowd.ids.iter())
+            .flat_map(|&id| {
+                let moved = move |k: usize| match (id, k) {
+                    (1.., 0 | 1) => start[k] + PLACE * noise(id, k),
+                    _ => start[k],
+                };
+                (0..CUBE).map(move |k| moved(k) as f32)
+            })
+            .collect();
+        let columns = ARM..ARM + CUBE;
+        sim.write(Field::JointQ, columns, Values::F32(&cubes), None)
+            .expect("the cube's coordinates");
+    }
+
+    /// The commands of a frame, `(worlds, dofs)`: of the grasp the recorded ones, otherwise of an amplitude of each world's own.
+    pub fn fill(&self, frame: usize, crowd: &Crowd, values: &mut Vec<f32>) {
+        values.clear();
+        let row = &self.rows[frame];
+        if self.scene == Scene::Grasp {
+            for _ in 0..crowd.len() {
+                values.extend_from_slice(row);
+            }
+            return;
+        }
+        for amplitude in crowd.amplitudes() {
+            let both = row.iter().zip(&self.rest);
+            // world 0 is as recorded, to the bit
+            values.extend(both.map(|(x, rest)| match amplitude {
+                1.0 => *x,
+                _ => rest + amplitude * (x - rest),
+            }));
+        }
+    }
+}
