@@ -8,6 +8,7 @@
 #   make published   robots from PyPI against MuJoCo; 260 MB of wheels  (make published TIGHTLOOP_URDF=/path/robot.urdf)
 #   make bench    speed, side by side with what it is compared with
 #   make bench-env   environments beside envpool and gymnasium's, on all cores; 0.8 GB of wheels
+#   make bench-gpu   worlds on the first GPU: checked, then measured, with MuJoCo-Warp and MJX where the venv has them
 #   make check    formats, lints and types only
 
 SHELL  := /bin/bash
@@ -30,7 +31,7 @@ PYTHON_TREES   := py-client/python py-client/tests tests examples benches
 VULKAN         := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
 CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
-.PHONY: demo test test-rl train fuzz published bench bench-env check wheel vulkan
+.PHONY: demo test test-rl train fuzz published bench bench-env bench-gpu check wheel vulkan
 .NOTPARALLEL: # pip installs into one venv, cargo and the tests use all cores by themselves
 
 demo: wheel
@@ -81,6 +82,11 @@ bench: wheel $(VENV)/.dev vulkan
 # Kept out of `bench`, which needs none of these wheels.
 bench-env: wheel $(VENV)/.dev $(VENV)/.peers
 	$(PYTHON) benches/env.py
+
+# The adapter decides what the numbers mean: without a GPU they are of Vulkan in software. peers.py ends with 1 where nothing is installed.
+bench-gpu: wheel $(VENV)/.dev vulkan
+	benches/gpu/run.sh $(GPU)
+	-$(PYTHON) benches/gpu/peers.py
 
 check: wheel $(VENV)/.dev
 	cargo fmt --all --check

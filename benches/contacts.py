@@ -86,6 +86,11 @@ def rival_of(demo: str, scene: tl.Scene) -> mujoco.MjModel:
     """MuJoCo's model of a demo: the record's where it is present, otherwise what it makes of our URDF."""
     if is_published():
         return mujoco.MjModel.from_binary_path(str(MODELS / f"{'torque' if demo == 'torque' else 'grasp'}.mjb"))
+    return own_rival_of(demo, scene)
+
+
+def own_rival_of(demo: str, scene: tl.Scene) -> mujoco.MjModel:
+    """What MuJoCo makes of the URDF of a demo's scene."""
     spec, links = arm_of(scene, impratio=1000.0)
     add_box(spec.worldbody, "table", (0.0, -0.5, 0.05), (0.4, 0.4, 0.05))
     names = [geom.name for geom in links]

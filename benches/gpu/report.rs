@@ -14,7 +14,7 @@ pub struct Row {
     pub dofs: usize,
     pub substeps: usize,
     pub programs: Vec<ProgramFacts>,
-    /// Until worlds stand ready, without and with programs kept by a run before [s].
+    /// Until worlds have made their first frame, without and with programs kept by a run before [s].
     pub cold_s: f64,
     pub cached_s: f64,
     /// Frames that the host copies, and that the device writes to their reader.
@@ -181,7 +181,8 @@ impl Report {
     /// What to know of the columns.
     pub fn notes(&self) {
         println!(
-            "\nsteps/s: physics steps of all worlds in the median frame, commands to arrays; `staged ms`: the median frame where the host copies it.\n\
+            "\ncold, cached: until the first frame is there, without and with programs kept in the folder of a run before.\n\
+             steps/s: physics steps of all worlds in the median frame, commands to arrays; `staged ms`: the median frame where the host copies it.\n\
              submit: processor time of the thread that asks for a frame; `replay`: the same for 64 worlds with batches encoded each time, over that with recorded ones.\n\
              CPU: the same worlds, commands and fields on all cores of this machine, f32 as well; ratio: the GPU's steps/s over the CPU's."
         );
