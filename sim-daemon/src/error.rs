@@ -110,9 +110,13 @@ impl DaemonError {
         match self {
             Argument { .. } | Protocol(ProtocolError::BadName { .. }) => "ArgumentError",
             Backend(
-                BackendError::NoWorlds | BackendError::NoThreads | BackendError::Lanes { .. },
+                BackendError::NoWorlds
+                | BackendError::NoThreads
+                | BackendError::Lanes { .. }
+                | BackendError::Adapter { .. }
+                | BackendError::DoubleOnGpu,
             ) => "ArgumentError",
-            Backend(BackendError::Memory { .. })
+            Backend(BackendError::Memory { .. } | BackendError::DeviceMemory { .. })
             | Protocol(ProtocolError::SharedMemory { .. } | ProtocolError::Memory { .. }) => {
                 "ResourceError"
             }

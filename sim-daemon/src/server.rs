@@ -7,9 +7,12 @@ use sim_protocol::host::{Host, Next};
 use sim_protocol::{Op, RefusalKind};
 
 use crate::error::DaemonError;
-use crate::export::{self, Advance};
+use crate::export::{self, Advance, Refusal, refusal};
 use crate::faults::FaultNews;
 use crate::news::News;
+
+#[cfg(test)]
+mod tests;
 
 /// Serves until somebody asks to end.
 pub(crate) fn run(
@@ -32,6 +35,7 @@ fn serve(
     let mut mask = Vec::with_capacity(simulation.worlds());
     let mut scratch = Vec::new();
     let mut lease = 0;
+    let mut is_told = false;
     loop {
         let next = host.wait()?;
         // other memory may lie where the frames of the last lease lay
@@ -42,16 +46,18 @@ fn serve(
         match next {
             Next::Command => {
                 let started = Instant::now();
-                let applied = export::apply(simulation, host.inbox(), &mut mask);
+                let mut applied = match lost(simulation) {
+                    Some(refusal) => Err(refusal),
+                    None => export::apply(simulation, host.inbox(), &mut mask),
+                };
                 // its file may be gone when the recording is replayed
                 if host.is_recorded() && applied.is_ok() && host.inbox().op() == Op::Restore {
                     host.record_state(&simulation.snapshot(), true);
                 }
-                let lost = simulation.lost().map(ToString::to_string);
+                if let (Ok(_), Some(refusal)) = (&applied, lost(simulation)) {
+                    applied = Err(refusal);
+                }
                 match applied {
-                    Ok(_) if lost.is_some() => {
-                        host.refuse(RefusalKind::Backend, &lost.unwrap_or_default());
-                    }
                     Ok(advance) => host.answer(started, |arena| {
                         // SAFETY: the frames of a lease stay where they are as long as it lasts, and their heads are written
                         // before and after.
@@ -64,6 +70,12 @@ fn serve(
                     Err(refusal) => host.refuse(refusal.kind, &refusal.reason),
                 }
                 // the client has its frame, and need not wait for it
+                if !is_told && let Some(lost) = simulation.lost() {
+                    news.tell(&format!(
+                        "all worlds are lost, and commands are refused from now on: {lost}"
+                    ));
+                    is_told = true;
+                }
                 faults.tell(simulation, news, started);
             }
             Next::Watch => {
@@ -77,4 +89,10 @@ fn serve(
             Next::End => return Ok(()),
         }
     }
+}
+
+/// Why every command is refused, if it is.
+fn lost(simulation: &Simulation) -> Option<Refusal> {
+    let reason = simulation.lost()?.to_string();
+    Some(refusal(RefusalKind::Backend, reason))
 }

@@ -27,6 +27,10 @@ pub(crate) fn save(simulation: &Simulation, inbox: &Inbox) -> Result<(), Refusal
     }
     // the bytes, and the file where it lies in memory too
     check_room(2 * simulation.snapshot_bytes() as u64).map_err(refuse)?;
+    let bytes = simulation.snapshot();
+    if let Some(lost) = simulation.lost() {
+        return Err(refusal(RefusalKind::Backend, lost.to_string()));
+    }
     let header = inbox.header();
     // no other command has this name
     let part = folder.join(format!(
@@ -35,7 +39,7 @@ pub(crate) fn save(simulation: &Simulation, inbox: &Inbox) -> Result<(), Refusal
     ));
     let write = || {
         let mut file = File::create_new(&part)?;
-        file.write_all(&simulation.snapshot())?;
+        file.write_all(&bytes)?;
         // or a power cut might leave the name with nothing behind it
         file.sync_all()?;
         fs::rename(&part, path)

@@ -5,6 +5,7 @@ mod books;
 #[path = "../common/mod.rs"]
 mod common;
 mod delivery;
+mod lost;
 mod programs;
 mod same_bits;
 mod stages;

@@ -1,6 +1,6 @@
 //! How a model is run, and what keeps its worlds.
 
-use crate::backend::{Backend, BackendError, Faults, Lanes, Precision, cpu, gpu};
+use crate::backend::{Backend, BackendError, Faults, Lanes, Precision, available_memory, cpu, gpu};
 use crate::random::Draws;
 use sim_core::batch::{Field, Layout};
 use sim_core::model::Model;
@@ -171,14 +171,4 @@ pub(crate) fn check_memory(model: &Model, options: &Options) -> Result<(), Backe
         });
     }
     Ok(())
-}
-
-/// Memory that can be taken without swapping [bytes].
-fn available_memory() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text
-        .lines()
-        .find(|line| line.starts_with("MemAvailable:"))?;
-    let kb: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kb * 1024)
 }

@@ -98,6 +98,11 @@ impl Simulation {
     pub fn lost(&self) -> Option<&BackendError> {
         self.backend.lost()
     }
+    /// Loses the device, as a driver might. For tests of what comes after.
+    #[doc(hidden)]
+    pub fn lose(&mut self) {
+        self.backend.lose();
+    }
     /// Name of the GPU, empty on the CPU.
     pub fn adapter(&self) -> &str {
         self.backend.adapter()
@@ -201,7 +206,8 @@ impl Simulation {
         self.backend.take_frozen()
     }
 
-    /// All worlds as bytes, from which a run resumes bit for bit; [`crate::snapshot`] says how they lie.
+    /// All worlds as bytes, from which a run resumes bit for bit; [`crate::snapshot`] says how they lie. Worthless where
+    /// [`Simulation::lost`] says so after it.
     pub fn snapshot(&self) -> Vec<u8> {
         snapshot::write(&self.head(), |records| self.backend.save(records))
     }

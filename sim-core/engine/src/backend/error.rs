@@ -201,6 +201,18 @@ pub enum BackendError {
         /// Its words.
         reason: String,
     },
+    /// An accelerator that is not there.
+    #[error("{reason}")]
+    Adapter {
+        /// Those that are.
+        reason: String,
+    },
+    /// Memory that an accelerator has not, or not any more.
+    #[error("{reason}")]
+    DeviceMemory {
+        /// Its words.
+        reason: String,
+    },
     /// A model whose stages cannot be recorded.
     #[error("this model cannot be written as a program of a GPU: {reason}; use device = cpu")]
     Program {
@@ -214,8 +226,12 @@ pub enum BackendError {
 
 impl From<sim_device::DeviceError> for BackendError {
     fn from(error: sim_device::DeviceError) -> BackendError {
-        BackendError::Device {
-            reason: error.to_string(),
+        let reason = error.to_string();
+        use sim_device::DeviceError;
+        match error {
+            DeviceError::UnknownAdapter { .. } => BackendError::Adapter { reason },
+            DeviceError::OutOfMemory { .. } => BackendError::DeviceMemory { reason },
+            _ => BackendError::Device { reason },
         }
     }
 }

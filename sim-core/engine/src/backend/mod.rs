@@ -159,7 +159,8 @@ pub trait Backend: Send {
     fn params(&self, columns: Range<usize>, to: &mut [f64]);
     /// Numbers of a world's state and commands: all that a step begins from.
     fn numbers(&self) -> usize;
-    /// Writes a record a world, in order: [`COUNTERS`] bytes, then [`Backend::numbers`] numbers of the run's precision.
+    /// Writes a record a world, in order: [`COUNTERS`] bytes, then [`Backend::numbers`] numbers of the run's precision. They are
+    /// worthless if a device is lost after it.
     fn save(&self, records: &mut [u8]);
     /// Sets the worlds of the mask (none = all) to their records, or all of them to that of `from_world`.
     fn restore(&mut self, records: &[u8], mask: Option<&[bool]>, from_world: Option<usize>);
@@ -175,6 +176,8 @@ pub trait Backend: Send {
     fn lost(&self) -> Option<&BackendError> {
         None
     }
+    /// Loses a device, as a driver might. For tests of what comes after.
+    fn lose(&mut self) {}
     /// Name of the GPU, empty on the CPU.
     fn adapter(&self) -> &str {
         ""
@@ -197,4 +200,14 @@ pub trait Backend: Send {
     }
     /// Forgets all arenas that were imported.
     fn forget(&mut self) {}
+}
+
+/// Memory that can be taken without swapping [bytes].
+pub(crate) fn available_memory() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text
+        .lines()
+        .find(|line| line.starts_with("MemAvailable:"))?;
+    let kb: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kb * 1024)
 }

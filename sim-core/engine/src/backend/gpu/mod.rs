@@ -16,7 +16,9 @@ mod worlds;
 
 use super::shown::stages_for;
 use super::state::{Shape, StateField, start};
-use super::{Backend, BackendError, Faults, FirstFrozen, Frozen, ProgramFacts, Values};
+use super::{
+    Backend, BackendError, Faults, FirstFrozen, Frozen, ProgramFacts, Values, available_memory,
+};
 use crate::backend::noise::Noise;
 use crate::random::Draws;
 use crate::start::StartDraw;
@@ -32,6 +34,7 @@ use sim_device::{AdapterKind, Buffer, Choice, Device, Replay, Staging};
 use sim_record::split::Limits;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::OnceLock;
 use std::time::Duration;
 use tile::{Rows, Tile};
 
@@ -75,7 +78,7 @@ pub(super) struct Gpu {
     faults: Faults,
     host: Host,
     name: String,
-    lost: Option<BackendError>,
+    lost: OnceLock<BackendError>,
     copied: u64,
 }
 
@@ -97,6 +100,45 @@ pub fn create(
     )?))
 }
 
+const MB: u64 = 1 << 20;
+
+/// Refuses a frame that no program can see as a whole.
+fn check_frame(device: &Device, bytes: u64) -> Result<(), BackendError> {
+    let most = device.info().binding_max;
+    if bytes > most {
+        let (bytes, most) = (bytes.div_ceil(MB), most / MB);
+        return Err(BackendError::DeviceMemory {
+            reason: format!(
+                "a frame is {bytes} MB, and this adapter shows a program {most} MB of it; ask for fewer worlds or fields"
+            ),
+        });
+    }
+    Ok(())
+}
+
+/// Refuses worlds that do not fit into the adapter's memory, before any is taken: of memory that is also the processor's, what is
+/// free counts.
+fn check_memory(device: &Device, worlds: usize, needed: u64) -> Result<(), BackendError> {
+    let info = device.info();
+    let available = match info.kind {
+        // what its driver tells of memory is a constant
+        AdapterKind::Software => available_memory(),
+        AdapterKind::Integrated => info.memory.into_iter().chain(available_memory()).min(),
+        _ => info.memory,
+    };
+    let Some(available) = available else {
+        return Ok(());
+    };
+    match needed > available {
+        true => Err(BackendError::Memory {
+            worlds,
+            needed_mb: needed / MB,
+            available_mb: available / MB,
+        }),
+        false => Ok(()),
+    }
+}
+
 impl Gpu {
     fn new(
         model: &Model,
@@ -108,6 +150,7 @@ impl Gpu {
         replay: Replay,
     ) -> Result<Gpu, BackendError> {
         let device = Device::open(choice, cache)?;
+        check_frame(&device, layout.bytes as u64)?;
         let constants: Constants<f32> = model.constants().cast();
         let m = &constants;
         let computed: Vec<(Field, usize)> = (layout.slots.iter())
@@ -138,6 +181,9 @@ impl Gpu {
             contacts: show::contacts(m, &places, layout, shapes),
         };
         let widest = tile::widest(&device, m, &places, worlds);
+        let tiles = (worlds as u64).div_ceil(u64::from(widest));
+        let needed = tiles * tile::memory(m, &places, widest) + 2 * layout.bytes as u64;
+        check_memory(&device, worlds, needed)?;
         let mut compiled =
             Compiled::new(&device, m, &places, &programs, books, widest, COMPILE_LIMIT)?;
         compiled.replay = replay;
@@ -184,7 +230,7 @@ impl Gpu {
             layout: layout.clone(),
             places,
             constants,
-            lost: None,
+            lost: OnceLock::new(),
             copied: 0,
         };
         // those past the last world run along from the scene's start
@@ -198,9 +244,9 @@ impl Gpu {
     }
 
     /// Keeps the first thing that went wrong: nothing is computed after it.
-    fn check(&mut self, result: Result<(), BackendError>) {
+    fn check(&self, result: Result<(), BackendError>) {
         if let Err(error) = result {
-            self.lost.get_or_insert(error);
+            self.lost.get_or_init(|| error);
         }
     }
 }
@@ -293,7 +339,7 @@ impl Backend for Gpu {
     }
 
     fn save(&self, records: &mut [u8]) {
-        self.save_records(records);
+        self.check(self.save_records(records));
     }
 
     fn restore(&mut self, records: &[u8], mask: Option<&[bool]>, from_world: Option<usize>) {
@@ -337,17 +383,21 @@ impl Backend for Gpu {
             arena.len() * 8 >= self.layout.bytes,
             "the arena is smaller than the layout"
         );
-        if self.lost.is_none() {
+        if self.lost.get().is_none() {
             let run = self.run_frame(substeps > 0, arena);
             self.check(run);
         }
-        if self.lost.is_some() {
+        if self.lost.get().is_some() {
             self.show_lost(arena);
         }
     }
 
     fn lost(&self) -> Option<&BackendError> {
-        self.lost.as_ref()
+        self.lost.get()
+    }
+
+    fn lose(&mut self) {
+        self.device.lose();
     }
 
     fn adapter(&self) -> &str {

@@ -27,6 +27,15 @@ pub(super) fn widest(device: &Device, m: &Constants<f32>, places: &Places, world
         .min(u64::from(u32::MAX)) as u32
 }
 
+/// Memory that a tile takes, what the host sees of it included [bytes].
+pub(super) fn memory(m: &Constants<f32>, places: &Places, width: u32) -> u64 {
+    let state = u64::from(places.state);
+    // fields, contacts and counters; state and counters for the host, rows from it with their worlds, commands
+    let numbers = u64::from(places.len) + m.contacts.memory.len as u64 + 4;
+    let host = (state + 4) + (state + 1) + 3 * m.dofs.len() as u64;
+    4 * (numbers + host) * u64::from(width)
+}
+
 /// Of each pair its shapes and links, then of each sensor and shape what [`show::contacts`] reads.
 pub(super) fn pairs(m: &Constants<f32>, sensors: &[SensedShapes]) -> Vec<[i32; 4]> {
     let link = |link: Option<usize>| link.map_or(-1, |link| link as i32);

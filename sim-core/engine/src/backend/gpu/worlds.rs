@@ -174,13 +174,10 @@ impl Gpu {
     }
 
     /// Writes a record a world.
-    pub(super) fn save_records(&self, records: &mut [u8]) {
+    pub(super) fn save_records(&self, records: &mut [u8]) -> Result<(), BackendError> {
         let size = COUNTERS + 4 * self.shape().total();
         for tile in &self.tiles {
-            // what cannot be read is told by the next frame; the host's counters are there in any case
-            let Ok(kept) = tile.fetch(&self.device) else {
-                continue;
-            };
+            let kept = tile.fetch(&self.device)?;
             let read = kept.read();
             let words: &[u32] = host::words(&read);
             let at = |i: usize, w: usize| words[((i / 4) * tile.width as usize + w) * 4 + i % 4];
@@ -198,6 +195,7 @@ impl Gpu {
                 }
             }
         }
+        Ok(())
     }
 
     /// Sets worlds to their records, or to that of one world.

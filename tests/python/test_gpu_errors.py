@@ -1,0 +1,115 @@
+"""A GPU that is not there, or that cannot do what is asked: a message with the cure, the exit codes of other errors, nothing left behind.
+
+A device that is lost in the midst of a run is lost in `sim-daemon/src/server/tests.rs`: no driver here loses one when it is asked to.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+import tightloop as tl
+
+# What the loader of Vulkan calls it now, and did before
+NO_DRIVER = {"VK_DRIVER_FILES": "/nonexistent", "VK_ICD_FILENAMES": "/nonexistent"}
+
+
+@pytest.fixture
+def no_driver(monkeypatch):
+    for name, value in NO_DRIVER.items():
+        monkeypatch.setenv(name, value)
+
+
+@pytest.fixture
+def serve(pendulum, tmp_path, unique):
+    """Runs `tightloop serve` on a GPU until it fails."""
+
+    def run(*arguments):
+        file = tmp_path / "pendulum.toml"
+        pendulum.save(file)
+        command = [sys.executable, "-m", "tightloop", "serve", str(file), "--device=gpu", f"--name={unique()}"]
+        return subprocess.run([*command, *arguments], capture_output=True, text=True, timeout=120, check=False)
+
+    return run
+
+
+def last_line(done):
+    return done.stderr.strip().splitlines()[-1]
+
+
+def test_a_gpu_runs_what_the_others_ask_in_vain(pendulum):
+    with tl.launch(pendulum, worlds=2, device="gpu") as sim:
+        assert sim.device.startswith("gpu (")
+        assert sim.step().step.tolist() == [1, 1]
+
+
+@pytest.mark.parametrize("adapter", ["nonsense", "99"])
+def test_an_unknown_adapter_is_named_with_those_there_are(serve, adapter):
+    done = serve(f"--adapter={adapter}")
+    assert done.returncode == 2
+    assert '"kind":"ArgumentError"' in done.stdout
+    assert adapter in last_line(done)
+    assert "there are: 0 `" in last_line(done)
+
+
+def test_double_precision_on_a_gpu_is_refused_with_both_cures(pendulum, serve):
+    with pytest.raises(tl.ArgumentError, match=r"single precision.*f32.*cpu"):
+        tl.launch(pendulum, worlds=1, device="gpu", precision="f64")
+    done = serve("--precision=f64")
+    assert done.returncode == 2
+    assert "single precision" in last_line(done)
+
+
+@pytest.mark.usefixtures("no_driver")
+def test_without_a_driver_the_message_says_what_to_install(pendulum, serve):
+    with pytest.raises(tl.LaunchError, match=r"no adapter.*mesa-vulkan-drivers"):
+        tl.launch(pendulum, worlds=1, device="gpu")
+    done = serve()
+    assert done.returncode == 1
+    assert '"kind":"LaunchError"' in done.stdout
+    assert "install a Vulkan driver" in last_line(done)
+
+
+@pytest.mark.usefixtures("no_driver")
+def test_without_a_driver_devices_says_so_and_succeeds():
+    command = [sys.executable, "-m", "tightloop", "devices"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout.count("\n")) == (0, 1)
+    assert "no GPU" in done.stdout
+
+
+@pytest.mark.usefixtures("no_driver")
+def test_auto_is_the_processor_where_there_is_no_gpu_and_the_log_says_why(pendulum, tmp_path):
+    log = tmp_path / "news.log"
+    with tl.launch(pendulum, worlds=1024, device="auto", log=log) as sim:
+        assert sim.device.startswith("cpu")
+        sim.step()
+    assert "device auto is the processor: no GPU was found" in log.read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        ({"worlds": 1}, "fewer than 1024 worlds"),
+        ({"worlds": 1024, "precision": "f64"}, "a GPU computes in single precision"),
+    ],
+    ids=["few worlds", "double precision"],
+)
+def test_auto_says_what_keeps_it_from_a_gpu(pendulum, tmp_path, arguments, why):
+    log = tmp_path / "news.log"
+    with tl.launch(pendulum, device="auto", log=log, **arguments) as sim:
+        assert sim.device.startswith("cpu")
+    assert f"device auto is the processor: {why}" in log.read_text()
+
+
+def test_more_worlds_than_a_gpu_holds_are_refused_before_memory_is_taken(pendulum):
+    with pytest.raises(tl.ResourceError, match="fewer worlds"):
+        tl.launch(pendulum, worlds=20_000_000, device="gpu", fields=())
+
+
+def test_a_daemon_goes_on_after_another_failed_on_the_gpu(pendulum, serve):
+    with tl.launch(pendulum, worlds=1, device="gpu") as sim:
+        assert serve("--adapter=nonsense").returncode == 2
+        sim.step()
