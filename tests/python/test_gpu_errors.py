@@ -1,6 +1,6 @@
-"""A GPU that is not there, or that cannot do what is asked: a message with the cure, the exit codes of other errors, nothing left behind.
+"""A GPU that is not there, or cannot do what is asked: a message with the cure, exit codes as of other errors.
 
-A device that is lost in the midst of a run is lost in `sim-daemon/src/server/tests.rs`: no driver here loses one when it is asked to.
+One that is lost in the midst of a run is lost in `sim-daemon/src/server/tests.rs`: no driver loses one when asked to.
 """
 
 from __future__ import annotations
