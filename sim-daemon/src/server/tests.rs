@@ -83,7 +83,9 @@ fn a_daemon_whose_device_is_lost_refuses_commands_with_the_reason_and_goes_on() 
         client.snapshot(kept.to_str().unwrap(), hook),
     ];
     for refusal in refusals {
-        let error = refusal.err().expect("nothing can be computed");
+        let Err(error) = refusal else {
+            panic!("nothing can be computed");
+        };
         assert!(
             matches!(error, ProtocolError::CommandRefused { .. })
                 && error.to_string().contains("device lost"),
