@@ -3,10 +3,10 @@
     python benches/gpu/peers.py --worlds 1024,4096 --scenes grasp --csv FILE
 
 Needs tightloop (for the scenes) and `mujoco`, and measures those of `mujoco_warp` and `mujoco.mjx` that can be
-imported; of the others, and of scenes that one of them refuses, it says so and why. The models are MuJoCo's, made of the URDF
-files that main.rs carries. A frame is what it is there: commands of all worlds to the device, 8 steps as one recorded
-graph or one compiled function, then joint positions, velocities and body poses as arrays of the host. Columns are those
-of run.sh.
+imported; of the others, and of scenes that one of them refuses, it says so and why. The models are MuJoCo's, made of
+the URDF files that main.rs carries. A frame is what it is there: commands of all worlds to the device, 8 steps as one
+recorded graph or one compiled function, then joint positions, velocities and body poses as arrays of the host. Columns
+are those of run.sh.
 
 Like with like: model, time step, substeps, solver, iterations, cone, single precision, and the commands of world 0. Not
 the same: all worlds are alike here, cubes and commands, and contacts are found by each engine's own means.
@@ -21,6 +21,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -62,7 +63,8 @@ class Plan:
         else:
             self.model = Twin(lesson.scene(driven=name == "target")).model
             self.model.opt.iterations, self.model.opt.tolerance = 20, 1e-8
-            self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+            # a twin's own flag, which MuJoCo-Warp does not know, goes
+            self.model.opt.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT
             self.start = np.array(lesson.START)
             values = lesson.targets if name == "target" else lesson.torques
             one = np.ones(1)
@@ -135,7 +137,7 @@ def mjx(plan: Plan, worlds: int) -> tuple[Frame, Callable[[], None]]:
     start = engine.put_data(plan.model, plan.data())
     name = "qfrc_applied" if plan.applies else "ctrl"
 
-    def steps(data: object, command: object) -> object:
+    def steps(data: Any, command: Any) -> Any:
         data = data.replace(**{name: command})
         return jax.lax.fori_loop(0, SUBSTEPS, lambda _, data: engine.step(model, data), data)
 
@@ -169,7 +171,7 @@ def measure(plan: Plan, side: str, worlds: int, seconds: float) -> dict[str, str
     for row in commands[1:WARM_UP]:
         frame(row)
     times: list[float] = []
-    is_cut = False
+    is_cut, shown = False, ()
     while sum(times) < seconds and not is_cut:
         reset()
         for row in commands:
