@@ -291,6 +291,24 @@ fn commands_come_late_and_noisy_as_on_the_cpu() {
 }
 
 #[test]
+fn a_snapshot_has_the_commands_that_no_frame_has_taken_yet() {
+    let model = lesson(Demo::Target).compile().unwrap();
+    let options = options(gpu(), WORLDS, &[Field::JointQ]);
+    let [here, there] = both(&model, &options, |_| {});
+    let kept = [here, there].map(|mut run| {
+        let goal: Vec<f32> = (0..WORLDS * 9).map(|k| 0.01 * k as f32).collect();
+        run.sim
+            .command(Field::JointTargetQ, 0..9, Values::F32(&goal))
+            .unwrap();
+        let kept = run.sim.snapshot();
+        run.step();
+        assert!(run.sim.lost().is_none());
+        kept
+    });
+    assert!(kept[0] == kept[1]);
+}
+
+#[test]
 fn a_scene_in_which_nothing_moves_runs() {
     let mut scene = sim_core::model::Description::new(0.01, 4);
     scene.add_ground("ground", 0.0);

@@ -1,31 +1,13 @@
 //! Every recorded stage against its scalar run: as it is, in vectors of four, and cut into kernels.
 
 use super::*;
-use sim_record::split::{Limits, Split, split};
+use sim_record::split::Split;
 
 /// What a kernel may cost: as an engine asks, and so little that every loop is cut.
 const KERNEL_COSTS: [usize; 2] = [2500, 200];
 
 /// States that the kernels are run from: each of them is a program of its own.
 const CUT_STATES: usize = 5;
-
-/// The recording as kernels, whose programs are valid.
-fn in_kernels(recording: &Recording, most: usize) -> Split {
-    let spare = (recording.inputs() + recording.outputs()) as u32;
-    let kernels = split(
-        recording,
-        &ProgramOptions::default(),
-        Limits {
-            kernel: most,
-            repeated: most,
-        },
-        spare,
-    );
-    for kernel in &kernels.kernels {
-        toy::validated(&kernel.wgsl());
-    }
-    kernels
-}
 
 #[test]
 fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
@@ -37,7 +19,7 @@ fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
             .map(|&stage| {
                 let recording = stage.is_needed(m).then(|| recorded_stage(m, stage))?;
                 let packed = recording.packed();
-                let splits = KERNEL_COSTS.map(|most| in_kernels(&recording, most));
+                let splits = KERNEL_COSTS.map(|most| toy::in_kernels(&recording, most));
                 Some((recording, packed, splits))
             })
             .collect();

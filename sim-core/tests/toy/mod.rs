@@ -8,6 +8,9 @@ pub use program::*;
 
 use sim_core::lane::memory::Cpu;
 use sim_core::lane::{Lane, Real, Tables};
+use sim_record::Recording;
+use sim_record::split::{Limits, Split, split};
+use sim_record::wgsl::ProgramOptions;
 
 /// SplitMix64 (Steele, Lea and Flood 2014): the same numbers from a seed on every machine.
 pub struct Random(pub u64);
@@ -84,4 +87,18 @@ pub fn validated(wgsl: &str) -> naga::Module {
         .validate(&module)
         .unwrap_or_else(|e| panic!("{}\n{wgsl}", e.emit_to_string(wgsl)));
     module
+}
+
+/// A recording as kernels of at most a cost, whose programs are valid; what crosses goes after the outputs.
+pub fn in_kernels(recording: &Recording, most: usize) -> Split {
+    let spare = (recording.inputs() + recording.outputs()) as u32;
+    let limits = Limits {
+        kernel: most,
+        repeated: most,
+    };
+    let split = split(recording, &ProgramOptions::default(), limits, spare);
+    for kernel in &split.kernels {
+        validated(&kernel.wgsl());
+    }
+    split
 }

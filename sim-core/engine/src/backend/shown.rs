@@ -43,3 +43,18 @@ pub(super) fn stages_for(layout: &Layout) -> Vec<Stage> {
     stages.extend(output);
     stages
 }
+
+/// Is it a field of contacts, which a backend writes from its lists?
+pub(super) fn is_of_contacts(field: Field) -> bool {
+    matches!(
+        field,
+        Field::ContactCount
+            | Field::ContactPos
+            | Field::ContactNormal
+            | Field::ContactDistance
+            | Field::ContactForce
+            | Field::ContactPair
+            | Field::BodyContactForce
+            | Field::ContactSensor
+    )
+}

@@ -4,29 +4,11 @@ use crate::{accepted, c, toy};
 use sim_core::lane::{Cx, Num, Tables};
 use sim_core::{break_if, times, when};
 use sim_record::Recording;
-use sim_record::split::{Limits, Part, Split, split};
+use sim_record::split::{Limits, Part, split};
 use sim_record::wgsl::ProgramOptions;
 
 /// Longer than any text here.
 const WHOLE: usize = 1_000_000;
-
-/// A split whose kernels are valid programs; what crosses goes after the outputs.
-fn cut(recording: &Recording, most: usize) -> Split {
-    let spare = (recording.inputs() + recording.outputs()) as u32;
-    let split = split(
-        recording,
-        &ProgramOptions::default(),
-        Limits {
-            kernel: most,
-            repeated: most,
-        },
-        spare,
-    );
-    for kernel in &split.kernels {
-        toy::validated(&kernel.wgsl());
-    }
-    split
-}
 
 fn bits(x: &[f32]) -> Vec<u32> {
     x.iter().map(|x| x.to_bits()).collect()
@@ -41,7 +23,7 @@ fn random_programs_give_the_same_bits_in_kernels_of_any_length() {
         let recording = toy::recorded(&steps);
         let worlds = toy::worlds::<{ toy::INPUTS }>(&mut random, 8);
         for most in [1, 60, 250, WHOLE] {
-            let parts = cut(&recording, most);
+            let parts = toy::in_kernels(&recording, most);
             if most == 1 {
                 kernels += parts.kernels.len();
             }
@@ -63,7 +45,7 @@ fn random_programs_give_the_same_bits_in_kernels_of_any_length() {
 #[test]
 fn a_text_that_is_short_is_one_kernel() {
     let short = accepted(|_, x| vec![x[0] + x[1], x[0]]);
-    let parts = cut(&short, WHOLE);
+    let parts = toy::in_kernels(&short, WHOLE);
     assert_eq!(parts.order, [Part::Kernel(0)]);
     assert_eq!((parts.kernels.len(), parts.spare), (1, 0));
 }
@@ -99,7 +81,7 @@ fn search() -> Recording {
 #[test]
 fn loops_that_are_cut_inside_are_repeated_and_left_by_each_world() {
     let recording = search();
-    let parts = cut(&recording, 1);
+    let parts = toy::in_kernels(&recording, 1);
     fn depth(parts: &[Part]) -> usize {
         let depth_of = |part: &Part| match part {
             Part::Kernel(_) => 0,

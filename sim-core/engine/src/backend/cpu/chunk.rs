@@ -4,7 +4,7 @@ use super::contacts;
 use super::seats::Seats;
 use super::transfer::{self, Arena};
 use crate::backend::noise::Noise;
-use crate::backend::shown::stages_for;
+use crate::backend::shown::{is_of_contacts, stages_for};
 use crate::backend::state::{self, Shape, StateField};
 use crate::backend::{Faults, Frozen, Values};
 use crate::random::Draws;
@@ -278,7 +278,7 @@ impl<F: Lane> Chunk<F> {
             {
                 // SAFETY: the arena holds the layout, and these worlds are this chunk's alone.
                 unsafe {
-                    if contacts::is_of_contacts(slot.field) {
+                    if is_of_contacts(slot.field) {
                         contacts::export(self, job, slot, block, arena);
                     } else {
                         transfer::export(self, &job.constants, slot, block, arena);

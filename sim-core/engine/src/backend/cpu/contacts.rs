@@ -61,21 +61,6 @@ impl<F: Lane> World<'_, F> {
     }
 }
 
-/// Is it one of the fields that this page writes?
-pub(super) fn is_of_contacts(field: Field) -> bool {
-    matches!(
-        field,
-        Field::ContactCount
-            | Field::ContactPos
-            | Field::ContactNormal
-            | Field::ContactDistance
-            | Field::ContactForce
-            | Field::ContactPair
-            | Field::BodyContactForce
-            | Field::ContactSensor
-    )
-}
-
 /// Writes a field of contacts of the worlds of a block.
 ///
 /// # Safety

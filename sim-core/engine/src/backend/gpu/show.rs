@@ -1,6 +1,7 @@
 //! Programs that write a frame: arrays of all worlds, world-major, out of a structure of arrays.
 
 use super::places::Places;
+use crate::backend::shown::is_of_contacts;
 use sim_core::batch::{Field, Layout, Slot as Array, WorkSlot as Slot};
 use sim_core::model::constants::Constants;
 use sim_core::model::contact::row;
@@ -239,21 +240,6 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     frame[AT_LEFT_OUT + world] = count.w;
 }
 ";
-
-/// Is it a field of contacts?
-pub(super) fn is_of_contacts(field: Field) -> bool {
-    matches!(
-        field,
-        Field::ContactCount
-            | Field::ContactPos
-            | Field::ContactNormal
-            | Field::ContactDistance
-            | Field::ContactForce
-            | Field::ContactPair
-            | Field::BodyContactForce
-            | Field::ContactSensor
-    )
-}
 
 /// Writes the fields of contacts: lists of each world by itself, one class after the other.
 pub(super) fn contacts(

@@ -414,9 +414,11 @@ impl Tile {
         )
     }
 
-    /// State and counters, four numbers of every lane after each other.
+    /// State and counters, four numbers of every lane after each other. Commands that wait are among them, and wait on: they are
+    /// sent again with the frame.
     pub fn fetch(&self, device: &Device) -> Result<&Staging, BackendError> {
-        device.run(&[&self.keep])?;
+        let batches: Vec<_> = self.pending().chain([&self.keep]).collect();
+        device.run(&batches)?;
         Ok(&self.kept)
     }
 }

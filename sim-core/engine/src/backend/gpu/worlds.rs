@@ -13,20 +13,12 @@ impl Gpu {
 
     /// Every lane at the scene's start, those past the last world included.
     pub(super) fn pad(&mut self, start: &[f32]) -> Result<(), BackendError> {
-        let row = self.placed(start);
+        let mut row = vec![0; self.places.state as usize];
+        place(&self.record, start, &mut row);
         for tile in &mut self.tiles {
             tile.fill(&self.device, &row)?;
         }
         Ok(())
-    }
-
-    /// A world's record as it lies in device memory.
-    fn placed(&self, record: &[f32]) -> Vec<u32> {
-        let mut row = vec![0; self.places.state as usize];
-        for (place, x) in self.record.iter().zip(record) {
-            row[*place as usize] = x.to_bits();
-        }
-        row
     }
 
     /// Begins the episodes of these worlds, which the host has counted already.
@@ -67,10 +59,9 @@ impl Gpu {
         records: &[Vec<f32>],
         counters: impl Fn(usize) -> [u32; 4],
     ) -> Result<(), BackendError> {
-        let rows: Vec<Vec<u32>> = records.iter().map(|record| self.placed(record)).collect();
-        let columns = self.places.state;
+        let (places, columns) = (self.record.clone(), self.places.state);
         self.send(worlds, Rows::Fields, 0, columns, |k, to| {
-            to.copy_from_slice(&rows[k])
+            place(&places, &records[k], to);
         })?;
         for (k, &world) in worlds.iter().enumerate() {
             self.host.status[world] = counters(k)[2];
@@ -228,5 +219,13 @@ impl Gpu {
             states.push(record);
         }
         self.set_records(&worlds, &states, |k| counts[k])
+    }
+}
+
+/// Puts a world's record where its numbers lie in device memory; what lies between them is 0.
+fn place(places: &[u32], record: &[f32], to: &mut [u32]) {
+    to.fill(0);
+    for (place, x) in places.iter().zip(record) {
+        to[*place as usize] = x.to_bits();
     }
 }
