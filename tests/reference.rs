@@ -2,7 +2,8 @@
 
 mod common;
 
-use common::{Demo, FRAMES, Run, command, csv, distance, lesson, lesson_with_table, repo};
+use common::recorded::{self, worst};
+use common::{Demo, FRAMES, Run, lesson, lesson_with_table};
 use sim_core::batch::Field;
 use sim_core::model::Description;
 use sim_engine::simulation::{Lanes, Options, Precision};
@@ -19,26 +20,12 @@ fn run(scene: &Description, precision: Precision) -> Run {
         fields: vec![Field::JointQ, Field::JointQd],
         ..Options::default()
     };
-    let mut run = Run::new(&scene.compile().unwrap(), options);
-    run.forward();
-    run
+    Run::new(&scene.compile().unwrap(), options)
 }
 
 /// Distance in joint positions from the recorded run, a frame.
 fn deviations_of(scene: &Description, demo: Demo, file: &str, precision: Precision) -> Vec<f64> {
-    let mut run = run(scene, precision);
-    let recorded = csv(repo(file));
-    let mut found = vec![distance(&run.get(Field::JointQ, 0), &recorded[0][1..10])];
-    for frame in 0..FRAMES {
-        let (field, row) = command(demo, frame);
-        run.command(field, &row);
-        run.step();
-        found.push(distance(
-            &run.get(Field::JointQ, 0),
-            &recorded[frame + 1][1..10],
-        ));
-    }
-    found
+    recorded::deviations(&mut run(scene, precision), demo, file, FRAMES)
 }
 
 fn deviations(demo: Demo, file: &str, precision: Precision) -> Vec<f64> {
@@ -47,26 +34,8 @@ fn deviations(demo: Demo, file: &str, precision: Precision) -> Vec<f64> {
 
 /// Distances in joint positions and in the cube's position from the recorded grasp, a frame.
 fn grasp_deviations(precision: Precision) -> [Vec<f64>; 2] {
-    let mut run = run(&lesson_with_table(Demo::Target, true), precision);
-    let recorded = csv(repo("tests/data/mujoco_grasp.csv"));
-    let mut found = [vec![], vec![]];
-    for (targets, row) in csv(repo("tests/data/grasp_targets.csv"))
-        .iter()
-        .zip(&recorded[1..])
-    {
-        let targets: Vec<f64> = targets.iter().map(|&x| f64::from(x as f32)).collect();
-        run.command(Field::JointTargetQ, &targets);
-        run.step();
-        let q = run.get(Field::JointQ, 0);
-        found[0].push(distance(&q[..9], &row[1..10]));
-        found[1].push(distance(&q[9..12], &row[10..13]));
-    }
-    assert_eq!(found[0].len(), FRAMES);
-    found
-}
-
-fn worst(deviations: &[f64], to_frame: usize) -> f64 {
-    deviations[..=to_frame].iter().copied().fold(0.0, f64::max)
+    let scene = lesson_with_table(Demo::Target, true);
+    recorded::grasp_deviations(&mut run(&scene, precision))
 }
 
 #[test]

@@ -10,6 +10,7 @@ pub mod drawn;
 mod lesson_scene;
 pub mod played;
 pub mod program;
+pub mod recorded;
 pub mod shapes;
 
 #[allow(unused_imports)] // as above

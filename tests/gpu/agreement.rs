@@ -1,9 +1,8 @@
 //! The lesson on a GPU: as near to the recorded runs of MuJoCo C as the CPU's f32 (tests/reference.rs), and all fields as the CPU has them.
 
+use crate::common::recorded::{self, worst};
 use crate::common::shapes::shapes;
-use crate::common::{
-    Demo, FRAMES, Run, command, csv, distance, lesson, lesson_with_table, noise, repo,
-};
+use crate::common::{Demo, FRAMES, Run, lesson, lesson_with_table, noise, repo};
 use crate::{assert_alive, gpu, run};
 use sim_core::batch::{Field, FieldDtype, Group};
 use sim_core::model::{Cone, Description, Model, UrdfOptions};
@@ -12,36 +11,20 @@ use sim_engine::simulation::Device;
 use std::sync::Arc;
 
 fn start(scene: &Description) -> Run {
-    let mut run = run(
+    run(
         &scene.compile().unwrap(),
         gpu(),
         1,
         &[Field::JointQ, Field::JointQd],
-    );
-    run.forward();
-    run
+    )
 }
 
 /// Distance in joint positions from the recorded run, a frame.
 fn deviations(scene: &Description, demo: Demo, file: &str, frames: usize) -> Vec<f64> {
     let mut run = start(scene);
-    let recorded = csv(repo(file));
-    let mut found = vec![distance(&run.get(Field::JointQ, 0), &recorded[0][1..10])];
-    for frame in 0..frames {
-        let (field, row) = command(demo, frame);
-        run.command(field, &row);
-        run.step();
-        found.push(distance(
-            &run.get(Field::JointQ, 0),
-            &recorded[frame + 1][1..10],
-        ));
-    }
+    let found = recorded::deviations(&mut run, demo, file, frames);
     assert_alive(&run);
     found
-}
-
-fn worst(deviations: &[f64], to_frame: usize) -> f64 {
-    deviations[..=to_frame].iter().copied().fold(0.0, f64::max)
 }
 
 #[test]
@@ -75,19 +58,7 @@ fn torque_demo_over_the_table_is_mujocos_until_it_touches() {
 #[test]
 fn grasp_demo_stays_within_1e_4_of_mujoco_to_the_end() {
     let mut run = start(&lesson_with_table(Demo::Target, true));
-    let recorded = csv(repo("tests/data/mujoco_grasp.csv"));
-    let (mut joints, mut cube) = (vec![], vec![]);
-    for (targets, row) in csv(repo("tests/data/grasp_targets.csv"))
-        .iter()
-        .zip(&recorded[1..])
-    {
-        let targets: Vec<f64> = targets.iter().map(|&x| f64::from(x as f32)).collect();
-        run.command(Field::JointTargetQ, &targets);
-        run.step();
-        let q = run.get(Field::JointQ, 0);
-        joints.push(distance(&q[..9], &row[1..10]));
-        cube.push(distance(&q[9..12], &row[10..13]));
-    }
+    let [joints, cube] = recorded::grasp_deviations(&mut run);
     assert_alive(&run);
     println!(
         "{:e} {:e} {:e}",
