@@ -1,0 +1,1 @@
+"""Looking at a simulation: in a browser, and as pictures. Its libraries come with ``pip install "tightloop[view]"``."""
