@@ -10,6 +10,7 @@ mod errors;
 mod frame;
 mod input;
 mod look;
+mod looks;
 mod random;
 mod scene;
 
@@ -39,6 +40,7 @@ mod core {
     use super::frame::{Frame, Sample};
     #[pymodule_export]
     use super::look::{Evaluation, Playback};
+    use super::looks::parts;
     #[pymodule_export]
     use super::random::draw;
     #[pymodule_export]
