@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import threading
 import time
@@ -42,7 +44,8 @@ class Server:
         self._worlds = worlds
         self._feed: Feed | None = open_feed(target, worlds)
         self._page: Page | None = None
-        self._viser = viser.ViserServer(host, port, label=f"tightloop · {target}", verbose=False)
+        with contextlib.redirect_stdout(io.StringIO()):  # viser greets
+            self._viser = viser.ViserServer(host, port, label=f"tightloop · {target}", verbose=False)
         self._viser.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         self.port: int = self._viser.get_port()
         self.url = f"http://{'localhost' if host in ('0.0.0.0', '127.0.0.1', '::') else host}:{self.port}"
