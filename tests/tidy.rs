@@ -30,7 +30,7 @@ const ORDER: [(&str, &[&str]); 2] = [
 ];
 
 /// The only door of each heavy package.
-const DOORS: [(&str, &str); 18] = [
+const DOORS: [(&str, &str); 20] = [
     ("ash", "sim-core/device/src/vulkan"),
     ("naga", "sim-core/device/src/module.rs"),
     ("wgpu", "sim-core/device/src"),
@@ -42,7 +42,9 @@ const DOORS: [(&str, &str); 18] = [
     ("rayon", "sim-core/engine/src/backend/cpu"),
     ("crc32fast", "sim-core/engine/src/snapshot.rs"),
     ("iceoryx2", "sim-daemon/protocol/src"),
-    ("clap", "sim-daemon/src/cli.rs"),
+    ("clap", "sim-daemon/src/cli"),
+    ("clap_complete", "sim-daemon/src/cli/pages.rs"),
+    ("clap_mangen", "sim-daemon/src/cli/pages.rs"),
     ("lz4_flex", "sim-daemon/src/recording/blocks.rs"),
     ("xxhash_rust", "sim-daemon/protocol/src/digest.rs"),
     ("noto_sans_mono_bitmap", "sim-daemon/src/inspect/picture"),
