@@ -31,9 +31,11 @@ PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml -name '
 PYTHON_TREES   := py-client/python py-client/tests tests examples benches docs
 # Vulkan in software, and what checks its use: Debian's names.
 VULKAN         := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
+# The browser that the tests look through.
+BROWSER        := chromium
 CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
-.PHONY: demo test docs test-rl train fuzz published packages bench bench-env bench-gpu check wheel vulkan
+.PHONY: demo test docs test-rl train fuzz published packages bench bench-env bench-gpu check wheel vulkan browser
 .NOTPARALLEL: # pip installs into one venv, cargo and the tests use all cores by themselves
 
 demo: wheel
@@ -133,12 +135,19 @@ $(VENV)/.peers: py-client/requirements-peers.txt $(VENV)/.dev
 	$(PIP) install --quiet -r $<
 	@touch $@
 
-# The tests of the device need an adapter. Elsewhere than on Debian it is for you to install one: they say so where there is none.
+# What Debian has for the tests; elsewhere it is for you to install, and the tests say so where it is missing.
+define debian
+@if command -v dpkg >/dev/null && ! dpkg -s $(1) >/dev/null 2>&1; then \
+  if [ "$$(id -u)" = 0 ]; then apt-get update -qq && apt-get install -y -qq $(1); \
+  elif sudo -n true 2>/dev/null; then sudo apt-get update -qq && sudo apt-get install -y -qq $(1); \
+  else echo "the tests need $(2): run 'sudo apt install $(1)', then make again"; exit 1; fi; fi
+endef
+
 vulkan:
-	@if command -v dpkg >/dev/null && ! dpkg -s $(VULKAN) >/dev/null 2>&1; then \
-	  if [ "$$(id -u)" = 0 ]; then apt-get update -qq && apt-get install -y -qq $(VULKAN); \
-	  elif sudo -n true 2>/dev/null; then sudo apt-get update -qq && sudo apt-get install -y -qq $(VULKAN); \
-	  else echo "the tests need Vulkan in software: run 'sudo apt install $(VULKAN)', then make again"; exit 1; fi; fi
+	$(call debian,$(VULKAN),Vulkan in software)
+
+browser:
+	$(call debian,$(BROWSER),a browser)
 
 # Debian splits ensurepip from python3; `python3 -m venv` then leaves half a folder behind.
 $(PYTHON):

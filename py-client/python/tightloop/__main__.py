@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from pathlib import Path
@@ -12,7 +13,10 @@ def main() -> int:
     if sys.argv[1:2] == ["view"]:
         from tightloop.view.command import main as view
 
-        return view(sys.argv[2:])
+        code = view(sys.argv[2:])
+        sys.stdout.flush()
+        # It has let go of everything; to take the interpreter apart takes a busy machine seconds
+        os._exit(code)
     from tightloop import _core
 
     # Rust does the work and never returns to the interpreter in between: Python's own handler would only set a flag.
