@@ -9,7 +9,8 @@ mod dynamics;
 mod errors;
 mod frame;
 mod input;
-mod looks;
+mod look;
+mod parts;
 mod random;
 mod scene;
 
@@ -38,7 +39,9 @@ mod core {
     #[pymodule_export]
     use super::frame::{Frame, Sample};
     #[pymodule_export]
-    use super::looks::parts;
+    use super::look::{Evaluation, Playback};
+    #[pymodule_export]
+    use super::parts::parts;
     #[pymodule_export]
     use super::random::draw;
     #[pymodule_export]

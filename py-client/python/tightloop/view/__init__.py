@@ -1,1 +1,3 @@
-"""Looking at a simulation: in a browser, and as pictures. Its libraries come with ``pip install "tightloop[view]"``."""
+"""Looking at worlds: in a browser, as pictures, as films; from a running daemon or from a recording."""
+
+from __future__ import annotations
