@@ -15,6 +15,10 @@ from tightloop.demo import lesson
 from tightloop.demo.policy import Policy
 
 
+# Where the goal stands in observations of `tightloop.tasks.pick_cube`, in the world's axes [m].
+_GOAL = slice(26, 29)
+
+
 class Stop(ABC):
     """Something to see.
 
@@ -71,6 +75,10 @@ class Stop(ABC):
     def state(self) -> NDArray[np.float64]:
         """Joint positions of the worlds in its picture, shape ``(worlds, coords)``."""
         return np.array(self.frame.joint_q[: self.shown], np.float64)
+
+    def goals(self) -> dict[str, Any]:
+        """What is to be reached, as `tightloop.view.picture.Picture.render` has it."""
+        return {}
 
     @abstractmethod
     def scene(self) -> tl.Scene:
@@ -242,6 +250,9 @@ class Trained(Stop):
 
     def state(self) -> NDArray[np.float64]:
         return np.array(self.sim.forward().joint_q[: self.shown], np.float64)
+
+    def goals(self) -> dict[str, Any]:
+        return {"goal": (self._obs[: self.shown, _GOAL], 0.02, (40, 190, 90))}
 
     def told(self) -> str:
         return f"{self._done.mean():.0%} of the cubes are where they should be"

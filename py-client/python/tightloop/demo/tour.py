@@ -112,7 +112,7 @@ def _draw(stop: Stop, path: Path) -> None:
     body_q = sim.forward_kinematics(stop.state())
     look = parts(sim.info["scene"], sim.info["scene_folder"], sim.body_names)
     picture = Picture(look, *_SIZE)
-    Image.fromarray(picture.render(Shown({"body_q": body_q}), worlds=len(body_q))).save(path)
+    Image.fromarray(picture.render(Shown({"body_q": body_q}), goals=stop.goals())).save(path)
 
 
 class _Page:
