@@ -9,6 +9,7 @@ mod dynamics;
 mod errors;
 mod frame;
 mod input;
+mod picture;
 mod random;
 mod scene;
 
@@ -36,6 +37,8 @@ mod core {
     use super::dynamics::Dynamics;
     #[pymodule_export]
     use super::frame::{Frame, Sample};
+    #[pymodule_export]
+    use super::picture::Renderer;
     #[pymodule_export]
     use super::random::draw;
     #[pymodule_export]
