@@ -9,6 +9,7 @@ mod dynamics;
 mod errors;
 mod frame;
 mod input;
+mod look;
 mod picture;
 mod random;
 mod scene;
@@ -37,6 +38,8 @@ mod core {
     use super::dynamics::Dynamics;
     #[pymodule_export]
     use super::frame::{Frame, Sample};
+    #[pymodule_export]
+    use super::look::{Evaluation, Playback};
     #[pymodule_export]
     use super::picture::Renderer;
     #[pymodule_export]

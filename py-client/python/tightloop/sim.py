@@ -209,6 +209,35 @@ class Sim:
         """Evaluate every field at the present state and commands, without stepping. Raises as `step` does."""
         return self._client.forward()
 
+    def latest(self, timeout: float = 0.0) -> Frame | None:
+        """What observers see: the newest frame of the first ``info["watch_worlds"]`` worlds, whoever steps them.
+
+        It needs no control, and costs whoever has it next to nothing. States after a step are shown at most 60 times a
+        second (half as often where there are more than 256 worlds to see), and so is any at which the simulation rests.
+
+        Args:
+            timeout: How long to wait for one [s].
+
+        Returns:
+            A frame that carries those worlds only, and in ``state`` a snapshot of them as bytes; None if there is none
+            that this client has not seen.
+
+        Raises:
+            ArgumentError: ``timeout`` is no number, or below 0.
+            FramesHeld: As many such frames are alive as ``frames_held`` allows.
+            DaemonLost: The daemon went away.
+        """
+        timeout = checks.number("latest: timeout", timeout, least=0.0, error=ArgumentError)
+        return self._client.wait_newer(timeout) if timeout > 0.0 else self._client.latest()
+
+    def controller(self) -> int | None:
+        """The process that controls the simulation, if any: one that has stepped or reset it and has not let go."""
+        return self._client.controller()
+
+    def release(self) -> None:
+        """Let another client take control; the next command takes it back, or raises `LeaseHeld`."""
+        self._client.release()
+
     def snapshot(self) -> Snapshot:
         """Keep all worlds as they are now: a run that is restored from it goes on with the same bits.
 
@@ -317,6 +346,7 @@ def launch(
     name: str | None = None,
     log: str | os.PathLike[str] | None = None,
     frames_held: int = 4,
+    watch_worlds: int = 256,
 ) -> Sim:
     """Start a daemon that simulates a scene, and join it. The daemon ends with this process, however that ends.
 
@@ -347,6 +377,7 @@ def launch(
         log: File for the daemon's news, such as how many worlds were frozen, at most one line a second; warnings and
             errors go to stderr if left out.
         frames_held: How many frames may be alive at once, at least 1.
+        watch_worlds: How many worlds observers see, such as the viewer: the first ones, or all if there are fewer.
 
     Raises:
         ArgumentError: An argument is not valid; the message lists what is.
@@ -372,6 +403,7 @@ def launch(
         if name is None
         else checks.text("launch: name", name, error=ArgumentError),
         "frames-held": checks.integer("launch: frames_held", frames_held, error=ArgumentError),
+        "watch-worlds": checks.integer("launch: watch_worlds", watch_worlds, error=ArgumentError),
     }
     if arguments["device"].startswith("gpu:"):
         arguments["device"], arguments["adapter"] = arguments["device"].split(":", 1)
