@@ -21,6 +21,7 @@ from tightloop.errors import ArgumentError, CommandRefused, UnknownField
 from tightloop.params import Params
 from tightloop.scene import Scene
 from tightloop.snapshot import Snapshot, passing
+from tightloop.view.process import Viewer
 
 #: An array (worlds, dofs) for the whole scene, one (dofs,) for every world, or such arrays by robot name.
 Command = ArrayLike | Mapping[str, ArrayLike]
@@ -69,7 +70,8 @@ class Sim:
         self.info: dict[str, Any] = json.loads(client.describe())
         self.name: str = self.info["name"]
         # Runs when the last reference goes, and at interpreter exit
-        self._end = weakref.finalize(self, _end, client, daemon, self.name, os.getpid())
+        self._viewers: list[Viewer] = []
+        self._end = weakref.finalize(self, _end, client, daemon, self.name, os.getpid(), self._viewers)
         self.pid: int = self.info["pid"]
         self.device: str = self.info["device"]
         self.precision: str = self.info["precision"]
@@ -315,6 +317,26 @@ class Sim:
         """Joint forces that give accelerations at given states; see `Dynamics.inverse_dynamics`."""
         return self.dynamics.inverse_dynamics(joint_q, joint_qd, joint_qdd, damping=damping)
 
+    def view(self, *, port: int = 8080, worlds: int = 256, open: bool = False) -> Viewer:
+        """Show it in the browser, by a process of its own that takes no time of this one. It ends with the simulation.
+
+        The page shows what happens, and drives the simulation while nobody else is in control.
+
+        Args:
+            port: Port of the page on this machine; the next free one if it is taken.
+            worlds: The most worlds to show, up to 1024; the daemon shows its first ``watch_worlds``.
+            open: Whether to open the page in this machine's browser.
+
+        Returns:
+            The viewer: its ``url``, and ``close()``.
+
+        Raises:
+            LaunchError: The viewer did not start; stderr says why.
+        """
+        viewer = Viewer(self.name, port=port, worlds=worlds, open=open)
+        self._viewers.append(viewer)
+        return viewer
+
     def close(self) -> None:
         """End the simulation: a launched daemon stops, an attached one is released. Frames stay valid."""
         self._end()
@@ -450,10 +472,12 @@ def attach(name: str) -> Sim:
     return Sim(_core.Client(checks.text("attach: name", name, error=ArgumentError), lease=False), None)
 
 
-def _end(client: _core.Client, daemon: Daemon | None, name: str, owner: int) -> None:
+def _end(client: _core.Client, daemon: Daemon | None, name: str, owner: int, viewers: list[Viewer]) -> None:
     # A forked child must not end what belongs to its parent
     if os.getpid() != owner:
         return
+    for viewer in viewers:
+        viewer.close()
     client.close()
     if daemon is None:
         _core.sweep(name)  # does nothing while the daemon lives
