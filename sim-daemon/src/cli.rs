@@ -1,10 +1,13 @@
 //! The command line. Doc comments here are the help.
 
+mod pages;
+mod python;
+
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use sim_protocol::{AttachOptions, Client, keep_waiting};
 
 use crate::config::MeshOptions;
@@ -62,6 +65,22 @@ enum Command {
     Stop {
         /// Name of the daemon.
         name: String,
+    },
+    #[command(flatten)]
+    Python(python::Python),
+    /// Print what a shell needs to complete command lines.
+    ///
+    /// Example: tightloop completions bash > ~/.local/share/bash-completion/completions/tightloop
+    Completions {
+        /// The shell.
+        shell: pages::Shell,
+    },
+    /// Print the manual page, or write the pages of all commands into a folder.
+    ///
+    /// Example: tightloop man ~/.local/share/man/man1 && man tightloop-serve
+    Man {
+        /// The folder; it is made if it is not there.
+        folder: Option<PathBuf>,
     },
 }
 
@@ -255,6 +274,9 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
         Command::Devices => devices::run(),
         Command::List => list(),
         Command::Stop { name } => stop(name),
+        Command::Python(command) => command.run(),
+        Command::Completions { shell } => pages::completions(Cli::command(), *shell),
+        Command::Man { folder } => pages::man(Cli::command(), folder.as_deref()),
     };
     match result {
         Ok(()) => 0,
@@ -286,8 +308,6 @@ fn stop(name: &str) -> Result<(), DaemonError> {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
     #[test]
@@ -297,6 +317,10 @@ mod tests {
 
     #[test]
     fn help_says_what_it_said() {
+        let help = Cli::command().term_width(100).render_help().to_string();
+        let lines: Vec<_> = help.lines().map(str::trim_end).collect();
+        let said: Vec<_> = include_str!("help.txt").lines().collect();
+        assert_eq!(lines, said, "if the change is wanted, change help.txt");
         for (name, file, said) in [
             ("serve", "serve_help.txt", include_str!("serve_help.txt")),
             ("record", "record_help.txt", include_str!("record_help.txt")),

@@ -99,6 +99,20 @@ pub enum DaemonError {
         /// How many entries.
         lost: u64,
     },
+    /// The manual pages cannot be written.
+    #[error("manual pages in {}: {problem}", folder.display())]
+    Pages {
+        /// The folder.
+        folder: std::path::PathBuf,
+        /// What the system says.
+        problem: String,
+    },
+    /// A command of the Python package, where there is none.
+    #[error("`{command}` comes with the Python package: pip install \"tightloop[view]\"")]
+    NeedsPython {
+        /// The command.
+        command: &'static str,
+    },
     /// The system refuses something that every system has.
     #[error("{action}: {problem}")]
     System {
@@ -129,7 +143,13 @@ impl DaemonError {
             Read { .. } | Config(_) | Model(_) => "SceneError",
             Recording { .. } | Replay { .. } | Differs { .. } | Gap { .. } => "RecordingError",
             State { .. } => "SnapshotError",
-            Backend(_) | Protocol(_) | Log { .. } | Picture { .. } | System { .. } => "LaunchError",
+            NeedsPython { .. } => "MissingLibrary",
+            Backend(_)
+            | Protocol(_)
+            | Log { .. }
+            | Picture { .. }
+            | Pages { .. }
+            | System { .. } => "LaunchError",
         }
     }
 

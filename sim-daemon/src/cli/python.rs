@@ -1,0 +1,67 @@
+//! Commands that the Python package carries out, before this command line sees them. They stand here for its help, its
+//! completions and its manual; who calls them here has no Python package.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use crate::error::DaemonError;
+
+/// A command of the Python package.
+#[derive(Debug, Subcommand)]
+pub(super) enum Python {
+    /// Show a daemon's worlds, or a recording, in the browser.
+    ///
+    /// Example: tightloop view franka --worlds 256
+    View(View),
+    /// Make a picture, a film or a web page of a daemon's worlds or of a recording, without a display.
+    ///
+    /// Example: tightloop film run.tlrec run.mp4 --world 3
+    Film(Film),
+    /// Tour what there is: torques, targets, a grasp, many worlds, a trained policy.
+    ///
+    /// Example: tightloop demo --view
+    Demo(Demo),
+}
+
+#[derive(Debug, Args)]
+pub(super) struct View {
+    /// Name of a daemon, or a file that `record` wrote.
+    source: PathBuf,
+
+    /// Port of the page; the next free one if it is taken.
+    #[arg(long, default_value_t = 8080)]
+    port: u16,
+
+    /// Worlds that are shown: the first ones.
+    #[arg(long, default_value_t = 256)]
+    worlds: usize,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Film {
+    /// Name of a daemon, or a file that `record` wrote.
+    source: PathBuf,
+
+    /// What to write: a .png, .gif, .mp4 or .html file.
+    out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Demo {
+    /// Show it in the browser.
+    #[arg(long)]
+    view: bool,
+}
+
+impl Python {
+    /// Says what is missing.
+    pub(super) fn run(&self) -> Result<(), DaemonError> {
+        let command = match self {
+            Python::View(_) => "view",
+            Python::Film(_) => "film",
+            Python::Demo(_) => "demo",
+        };
+        Err(DaemonError::NeedsPython { command })
+    }
+}

@@ -1,0 +1,66 @@
+"""Every program of ``examples/`` runs, with few worlds and for a moment, and leaves what it says."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from conftest import REPOSITORY
+
+EXAMPLES = REPOSITORY / "examples"
+# How each is run here; {out} is an empty folder. What is said must match.
+RUNS = {
+    "franka_lesson.py": ("--worlds 4 --precision f64 --out {out}", r"distance from MuJoCo C +\d\.\de-\d\d"),
+    "franka_grasp.py": ("--worlds 8 --out {out}", r"\d+ of 8 worlds lifted the cube"),
+    "newton_lesson.py": ("--worlds 4", r"target demo: joint 4 from -2\.\d+ to -1\.\d+ rad"),
+    "own_task.py": ("", r"mean reward of random actions: \d"),
+    "randomized_push.py": ("--worlds 32 --out {out}", r"\d+ of 32 within 1 cm"),
+}
+PICTURES = {"franka_lesson.py", "franka_grasp.py", "randomized_push.py"}
+# Those that need torch or onnxruntime, and the test that runs each, by `make test-rl`.
+TRAINING = {
+    "play.py": "tests/rl/test_ppo.py",
+    "ppo.py": "tests/rl/test_ppo.py",
+    "train_rsl_rl.py": "tests/rl/test_train_examples.py",
+    "train_sb3.py": "tests/rl/test_train_examples.py",
+}
+# Modules of the others.
+PARTS = {"evaluation.py", "training.py"}
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_an_example_runs(name, tmp_path):
+    arguments, said = RUNS[name]
+    command = [sys.executable, str(EXAMPLES / name), *arguments.format(out=tmp_path / "out").split()]
+    # its working directory is somewhere else: examples find their files themselves
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    assert re.search(said, done.stdout), done.stdout
+    pictures = sorted((tmp_path / "out").glob("*.png"))
+    assert [path.stem for path in pictures] == ([Path(name).stem] if name in PICTURES else [])
+    assert all(path.stat().st_size > 10_000 for path in pictures)
+
+
+def test_every_example_has_a_test():
+    there = {path.name for path in EXAMPLES.glob("*.py")}
+    assert there == {*RUNS, *TRAINING, *PARTS}
+    for name, test in TRAINING.items():
+        assert name.removesuffix(".py") in (REPOSITORY / test).read_text(), f"{test} does not run {name}"
+    for name in PARTS:
+        users = [path for path in EXAMPLES.glob("*.py") if f"from {Path(name).stem} import" in path.read_text()]
+        assert users, f"nobody imports {name}"
+    assert [path.name for path in EXAMPLES.glob("*.rs")] == ["franka_lesson.rs"]
+
+
+def test_the_twin_in_rust_runs():
+    # the Rust tests have built it; this makes sure that it is of this checkout
+    build = ["cargo", "build", "--release", "--quiet", "--workspace", "--example", "franka_lesson"]
+    subprocess.run(build, cwd=REPOSITORY, check=True)
+    command = [str(REPOSITORY / "target/release/examples/franka_lesson"), "16"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert re.findall(r"^(\w+): 16 worlds", done.stdout, re.MULTILINE) == ["Torque", "Target"]
+    assert "fr3_joint4" in done.stdout

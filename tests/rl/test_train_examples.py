@@ -1,0 +1,26 @@
+"""``examples/train_sb3.py`` and ``examples/train_rsl_rl.py`` learn to balance, and leave a policy."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.mark.parametrize(
+    ("name", "files"),
+    [("train_sb3", ["model.zip", "normalize.pkl"]), ("train_rsl_rl", ["model.pt", "policy.onnx"])],
+)
+def test_it_learns_to_balance_and_leaves_a_policy(name, files, tmp_path):
+    command = [sys.executable, f"{EXAMPLES}/{name}.py", "CartPoleBalance", "--threads", "1", "--out", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    said = re.search(r"return ([\d.]+)", done.stdout)
+    # an untrained policy falls after some 40 steps of 500
+    assert said and float(said.group(1)) > 400, done.stdout
+    assert all((tmp_path / "CartPoleBalance-0" / file).stat().st_size > 10_000 for file in files)
