@@ -11,6 +11,7 @@ mod frame;
 mod input;
 mod look;
 mod parts;
+mod picture;
 mod random;
 mod scene;
 
@@ -42,6 +43,8 @@ mod core {
     use super::look::{Evaluation, Playback};
     #[pymodule_export]
     use super::parts::parts;
+    #[pymodule_export]
+    use super::picture::Renderer;
     #[pymodule_export]
     use super::random::draw;
     #[pymodule_export]
