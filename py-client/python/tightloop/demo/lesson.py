@@ -68,9 +68,14 @@ def targets(frame: int, worlds: int) -> NDArray[np.float32]:
     return goal
 
 
-def wave(frame: int, worlds: int) -> NDArray[np.float32]:
-    """Drive targets [rad or m], shape ``(worlds, 9)``: each arm nods a little later than its neighbours in a square."""
-    side = int(np.ceil(np.sqrt(worlds)))
+def wave(frame: int, worlds: int, side: int) -> NDArray[np.float32]:
+    """Drive targets [rad or m], shape ``(worlds, 9)``: each arm nods a little later than its neighbours.
+
+    Args:
+        frame: Frame of the round, from 0.
+        worlds: How many arms.
+        side: Arms in a row of the square that is seen; those beyond it go on from its first row.
+    """
     row, column = np.divmod(np.arange(worlds), side)
     phase = 2 * np.pi * (frame / 120 - row / 16 - column / 24)
     # it begins at the start

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from abc import ABC, abstractmethod
 from pathlib import Path
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 import tightloop as tl
 from tightloop.demo import lesson
 from tightloop.demo.policy import Policy
-
 
 # Where the goal stands in observations of `tightloop.tasks.pick_cube`, in the world's axes [m].
 _GOAL = slice(26, 29)
@@ -200,6 +200,10 @@ class Many(Stop):
     title = "arms that nod in a wave, one daemon for all"
     shown = 256
 
+    def __init__(self, worlds: int) -> None:
+        super().__init__(worlds)
+        self._side = math.ceil(math.sqrt(min(worlds, self.shown)))
+
     def scene(self) -> tl.Scene:
         return lesson.arm(driven=True)
 
@@ -207,7 +211,7 @@ class Many(Stop):
         self.frame = self.sim.reset()
 
     def step(self, frame: int) -> None:
-        self.frame = self.sim.step(joint_target_q={"arm": lesson.wave(frame, self.worlds)})
+        self.frame = self.sim.step(joint_target_q={"arm": lesson.wave(frame, self.worlds, self._side)})
 
     def told(self) -> str:
         simulated = self.worlds * self.done * self.sim.dt * self.sim.substeps
