@@ -1,6 +1,6 @@
 # demo · test · docs · test-rl · train · fuzz · published · packages · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
 #
-#   make demo     the Franka lesson and a grasp in 4096 worlds, plots in out/  (make demo WORLDS=256)
+#   make demo     a tour with pictures in out/demo; then the Franka lesson and a grasp in 4096 worlds, plots in out/  (make demo WORLDS=256)
 #   make test     every Rust and Python test
 #   make docs     the site, into out/site: guides, references, API of Python and Rust
 #   make test-rl  adapters against their libraries, and short trainings; 6 GB of torch, Ray and others into .venv
@@ -27,7 +27,7 @@ export PYO3_PYTHON := $(CURDIR)/$(PYTHON)
 export PYO3_BUILD_EXTENSION_MODULE := 1
 
 RUST_SOURCES   := $(shell find sim-core sim-daemon py-client/src py-client/Cargo.toml Cargo.toml rust-toolchain.toml -name '*.rs' -o -name '*.toml')
-PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml -name '*.py' -o -name '*.pyi' -o -name '*.toml')
+PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml -name '*.py' -o -name '*.pyi' -o -name '*.toml' -o -name '*.npz' -o -name '*.urdf')
 PYTHON_TREES   := py-client/python py-client/tests tests examples benches docs
 # Vulkan in software, and what checks its use: Debian's names.
 VULKAN         := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
@@ -38,7 +38,9 @@ CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D
 .PHONY: demo test docs test-rl train fuzz published packages bench bench-env bench-gpu check wheel vulkan browser
 .NOTPARALLEL: # pip installs into one venv, cargo and the tests use all cores by themselves
 
+# The tour first: it draws within seconds. Then its lesson at length, with plots.
 demo: wheel
+	$(PYTHON) -m tightloop demo --out out/demo
 	$(PYTHON) examples/franka_lesson.py --worlds $(WORLDS)
 	$(PYTHON) examples/franka_grasp.py --worlds $(WORLDS)
 	$(PYTHON) examples/randomized_push.py --worlds $(WORLDS)

@@ -135,6 +135,7 @@ fn sources() -> Vec<String> {
         "sim-core/stages",
         "sim-daemon/src",
         "sim-daemon/protocol/src",
+        "sim-daemon/picture/src",
         "py-client/src",
     ]
     .iter()
@@ -179,6 +180,16 @@ fn crates_know_only_what_they_may() {
         (
             "sim-daemon/protocol/src",
             &["sim_core", "sim_device", "sim_engine", "sim_daemon"],
+        ),
+        (
+            "sim-daemon/picture/src",
+            &[
+                "sim_core",
+                "sim_device",
+                "sim_engine",
+                "sim_protocol",
+                "sim_daemon",
+            ],
         ),
         ("py-client/src", &["sim_core", "sim_device", "sim_engine"]),
     ] {

@@ -10,7 +10,8 @@ mod errors;
 mod frame;
 mod input;
 mod look;
-mod looks;
+mod parts;
+mod picture;
 mod random;
 mod scene;
 
@@ -40,7 +41,10 @@ mod core {
     use super::frame::{Frame, Sample};
     #[pymodule_export]
     use super::look::{Evaluation, Playback};
-    use super::looks::parts;
+    #[pymodule_export]
+    use super::parts::parts;
+    #[pymodule_export]
+    use super::picture::Renderer;
     #[pymodule_export]
     use super::random::draw;
     #[pymodule_export]

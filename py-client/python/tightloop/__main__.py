@@ -17,6 +17,10 @@ def main() -> int:
         sys.stdout.flush()
         # It has let go of everything; to take the interpreter apart takes a busy machine seconds
         os._exit(code)
+    if sys.argv[1:2] == ["demo"]:
+        from tightloop.demo.command import main as demo
+
+        return demo(sys.argv[2:])
     from tightloop import _core
 
     # Rust does the work and never returns to the interpreter in between: Python's own handler would only set a flag.

@@ -291,3 +291,58 @@ def scene_to_toml(scene: str, /) -> str: ...
 def save_scene(scene: str, path: str, /) -> None: ...
 def load_scene(path: str, /) -> str: ...
 def parts(scene: str, folder: str, /) -> tuple[str, list[tuple[NDArray[np.float32], NDArray[np.uint32]]]]: ...
+
+class Renderer:
+    """Draws meshes on the processor: no display, no graphics driver. `tightloop.view.Picture` draws scenes with it.
+
+    The same calls give the same bytes, on any number of threads.
+
+    Args:
+        width: Of pictures [pixels], at most 8192.
+        height: Likewise.
+        threads: Most threads a picture takes; all cores if left out.
+
+    Raises:
+        ArgumentError: A size is out of range; also from its methods, where a shape or a number is not as they say.
+            A wrong dtype is a TypeError.
+    """
+
+    def __new__(cls, width: int, height: int, threads: int | None = None) -> Renderer: ...
+    def add(self, vertices: NDArray[np.float32], faces: NDArray[np.uint32], colors: NDArray[np.uint8]) -> int:
+        """Keep a mesh; returns its number.
+
+        Args:
+            vertices: Shape ``(n, 3)`` [m].
+            faces: Shape ``(m, 3)``, counter-clockwise from outside.
+            colors: Red, green, blue, opacity of each face, shape ``(m, 4)``.
+        """
+
+    def render(
+        self,
+        camera: Sequence[Sequence[float]],
+        angle: float,
+        around: Sequence[float],
+        floor: Sequence[float] | None,
+        meshes: NDArray[np.uint32],
+        poses: NDArray[np.float64],
+        tints: NDArray[np.uint8],
+        opacities: NDArray[np.float32],
+        lines: NDArray[np.float64],
+        line_colors: NDArray[np.uint8],
+        line_widths: NDArray[np.float32],
+    ) -> NDArray[np.uint8]:
+        """A picture, shape ``(height, width, 3)``. What is not finite is left out.
+
+        Args:
+            camera: Where it is, what it looks at [m], and what is up.
+            angle: Its vertical field of view [rad].
+            around: Middle of what matters and how far it reaches [m]: beyond, floor and shadows fade.
+            floor: Height of the floor and distance of its lines [m]; None for no floor.
+            meshes: Numbers of the meshes that are seen, shape ``(k,)``.
+            poses: Where, position [m] and quaternion (x, y, z, w), shape ``(k, 7)``.
+            tints: A colour laid over each, and how much of it, shape ``(k, 4)``.
+            opacities: From 0 to 1, shape ``(k,)``.
+            lines: Both ends of lines on top [m], shape ``(l, 6)``; ends in one place are a dot.
+            line_colors: Red, green, blue, opacity, shape ``(l, 4)``.
+            line_widths: Shape ``(l,)`` [pixels].
+        """

@@ -49,9 +49,29 @@ pub(super) struct Film {
 
 #[derive(Debug, Args)]
 pub(super) struct Demo {
-    /// Show it in the browser.
+    /// Only this stop: torque, target, grasp, worlds or policy; may be given again.
+    #[arg(long)]
+    stop: Vec<String>,
+
+    /// How long to stay at each stop [s]; one round if left out.
+    #[arg(long)]
+    seconds: Option<f64>,
+
+    /// Worlds of every stop.
+    #[arg(long)]
+    worlds: Option<usize>,
+
+    /// Show it in the browser, in real time.
     #[arg(long)]
     view: bool,
+
+    /// Port of the page; the next free one if it is taken.
+    #[arg(long, default_value_t = 8080)]
+    port: u16,
+
+    /// Folder of the pictures.
+    #[arg(long, default_value = "demo")]
+    out: PathBuf,
 }
 
 impl Python {

@@ -25,6 +25,15 @@ def place(pose: Array, points: Array) -> Array:
     return pose[:3] + rotate(pose[3:], points)
 
 
+def compose(outer: Array, inner: Array) -> Array:
+    """Poses ``inner`` of frames whose own poses are ``outer``, as poses in what those are in; leading axes broadcast."""
+    u, w = outer[..., 3:6], outer[..., 6:]
+    v, s = inner[..., 3:6], inner[..., 6:]
+    position = outer[..., :3] + rotate(outer[..., 3:], inner[..., :3])
+    turned = w * v + s * u + np.cross(u, v)
+    return np.concatenate([position, turned, w * s - np.sum(u * v, axis=-1, keepdims=True)], axis=-1)
+
+
 def wxyz(quat: Array) -> Array:
     """Quaternions (x, y, z, w) as viser has them, w first."""
     return quat[..., [3, 0, 1, 2]]

@@ -3,8 +3,8 @@
 use super::canvas::{PAPER, Rgb, mix};
 use super::raster::cover;
 use super::surface::Surface;
-use super::vector::Vector;
-use super::view::View;
+use sim_picture::View;
+use sim_picture::vector::Vector;
 
 const FLOOR: Rgb = [229, 231, 235];
 const LINE: Rgb = [176, 181, 190];
@@ -67,8 +67,8 @@ fn floor(view: &View, x: f64, y: f64, spacing: f64, shadow: &Shadow) -> Rgb {
 fn paper(view: &View, x: f64, y: f64, spacing: f64, axes: [usize; 2]) -> Rgb {
     let aside = [x - 0.5 * view.width, 0.5 * view.height - y];
     let origin = [
-        super::vector::dot(view.eye, view.right),
-        super::vector::dot(view.eye, view.up),
+        sim_picture::vector::dot(view.eye, view.right),
+        sim_picture::vector::dot(view.eye, view.up),
     ];
     let mut colour = PAPER;
     let mut axis_colour = None;

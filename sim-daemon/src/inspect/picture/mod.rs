@@ -1,7 +1,8 @@
 //! A picture of a robot's collision shapes: three-quarter view, side, front and top on one page.
 //!
 //! A renderer of our own: the page needs no window, no graphics driver and no font file, and the same robot gives the
-//! same bytes. surface (triangles) → view (cameras) → raster (pixels) over backdrop, then marks on a canvas.
+//! same bytes. surface (triangles) → raster (pixels) over backdrop, then marks on a canvas; cameras, normals and which
+//! samples a triangle covers are those of the crate sim-picture.
 
 mod backdrop;
 mod canvas;
@@ -12,8 +13,6 @@ mod raster;
 mod surface;
 #[cfg(test)]
 mod tests;
-mod vector;
-mod view;
 
 use sim_core::model::Pose;
 use sim_core::model::geometry::TriMesh;

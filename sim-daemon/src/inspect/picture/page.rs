@@ -7,9 +7,9 @@ use super::backdrop::{AXES, Backdrop, Shadow, round_spacing};
 use super::canvas::{Canvas, PAPER, Rgb, Size};
 use super::legend::{BONE, Legend, QUIET, RULE, TEXT, clipped, colours};
 use super::raster::render as rasterise;
-use super::surface::{Surface, extent};
-use super::vector::Vector;
-use super::view::View;
+use super::surface::Surface;
+use sim_picture::View;
+use sim_picture::vector::{Vector, extent};
 
 /// Size of the page [pixels].
 const WIDTH: usize = 1600;

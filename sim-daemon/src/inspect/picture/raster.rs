@@ -8,8 +8,8 @@ use std::sync::Mutex;
 use super::backdrop::Backdrop;
 use super::canvas::{Canvas, Rgb};
 use super::surface::{Facet, Surface};
-use super::vector::{Vector, along, dot, unit};
-use super::view::View;
+use sim_picture::View;
+use sim_picture::vector::{Vector, along, dot, unit};
 
 /// Samples a pixel, along each side.
 const FINE: usize = 3;
@@ -189,49 +189,19 @@ fn samples<'a>(
 ///
 /// Corners are in [`SUB`]ths of a sample; sample (i, j) of `columns` × `lines` is at (i + ½, j + ½ + top).
 pub(super) fn cover(
-    [a, b, c]: &[[i64; 2]; 3],
+    corners: &[[i64; 2]; 3],
     columns: usize,
     top: i64,
     lines: usize,
     mut each: impl FnMut(usize, [f32; 3]),
 ) {
-    let sub = SUB as i64;
-    let span = |axis: usize, first: i64, count: usize| {
-        let low = a[axis].min(b[axis]).min(c[axis]).div_euclid(sub) - first;
-        let high = a[axis].max(b[axis]).max(c[axis]).div_euclid(sub) - first;
-        low.max(0)..(high + 1).min(count as i64)
-    };
-    let rows = span(1, top, lines);
-    if rows.is_empty() {
-        return;
-    }
-    // twice the signed area of a triangle
-    let area = |a: &[i64; 2], b: &[i64; 2], c: &[i64; 2]| {
-        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-    };
-    let whole = area(a, b, c);
-    if whole == 0 {
-        return;
-    }
-    let sign = whole.signum();
-    let columns_hit = span(0, 0, columns);
-    let inverse = 1.0 / whole.abs() as f32;
-    for line in rows {
-        let at = |column: i64| [column * sub + sub / 2, (line + top) * sub + sub / 2];
-        let first = at(columns_hit.start);
-        // each changes by the same step from column to column
-        let mut parts = [(b, c), (c, a), (a, b)].map(|(p, q)| sign * area(p, q, &first));
-        let steps = [(b, c), (c, a), (a, b)].map(|(p, q)| -sign * (q[1] - p[1]) * sub);
-        for column in columns_hit.clone() {
-            if parts.iter().all(|&part| part >= 0) {
-                let index = line as usize * columns + column as usize;
-                each(index, parts.map(|part| part as f32 * inverse));
-            }
-            for k in 0..3 {
-                parts[k] += steps[k];
-            }
-        }
-    }
+    let middle = [[SUB as i64 / 2; 2]];
+    let (wide, tall) = (0..columns as i64, top..top + lines as i64);
+    sim_picture::cover(corners, &middle, wide, tall, |x, y, _, parts, whole| {
+        let inverse = 1.0 / whole as f32;
+        let index = (y - top) as usize * columns + x as usize;
+        each(index, std::array::from_fn(|k| parts[k][0] as f32 * inverse));
+    });
 }
 
 /// Colour of a surface under two lights and a sky.

@@ -6,7 +6,7 @@ use sim_core::model::{Pose, Shape};
 use super::backdrop::{Backdrop, Shadow, round_spacing};
 use super::raster::{cover, render_on};
 use super::surface::Surface;
-use super::view::View;
+use sim_picture::View;
 
 /// A grid of points in a box about `middle`.
 fn points(middle: [f64; 3], half: [f64; 3]) -> Vec<[f64; 3]> {

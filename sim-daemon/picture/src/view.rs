@@ -1,28 +1,65 @@
 //! Cameras: a direction to look along, and where a point of the world lies in the picture.
 
-use super::vector::{Vector, along, cross, dot, sub, unit};
+use crate::vector::{Vector, along, cross, dot, extent, middle, sub, unit};
 
 /// Half the angle of view of the perspective, its tangent: 14°, as of a long lens.
 const HALF_ANGLE: f64 = 0.25;
 
 /// A camera for a panel of the page.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct View {
-    /// Unit vectors of the camera in the world: to the right, up, and into the picture.
+pub struct View {
+    /// Unit vectors of the camera in the world: to the right.
     pub right: Vector,
+    /// Up.
     pub up: Vector,
+    /// Into the picture.
     pub into: Vector,
     /// Where the camera is; without perspective, any point on the line of sight of the panel's middle [m].
     pub eye: Vector,
+    /// Whether what is far is small.
     pub perspective: bool,
-    /// Size of the panel [pixels].
+    /// Width of the panel [pixels].
     pub width: f64,
+    /// Height of the panel [pixels].
     pub height: f64,
     /// Pixels a metre; in perspective, at a distance of 1 m.
     pub scale: f64,
 }
 
 impl View {
+    /// A camera at `eye` [m] that looks at `target`, and sees `height` pixels in this angle [rad].
+    ///
+    /// `up` is what should be up; where it is along the line of sight, x is, or y.
+    pub fn looking(
+        eye: Vector,
+        target: Vector,
+        up: Vector,
+        angle: f64,
+        [width, height]: [usize; 2],
+    ) -> View {
+        let into = match unit(sub(target, eye)) {
+            [0.0, 0.0, 0.0] => [0.0, 1.0, 0.0],
+            into => into,
+        };
+        let square = |a: Vector| dot(a, a);
+        let aside = [up, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+            .map(|up| cross(into, unit(up)))
+            .into_iter()
+            .find(|&aside| square(aside) > 1e-9)
+            .unwrap_or([1.0, 0.0, 0.0]);
+        let right = unit(aside);
+        View {
+            right,
+            up: cross(right, into),
+            into,
+            eye,
+            perspective: true,
+            width: width as f64,
+            height: height as f64,
+            scale: 0.5 * height as f64 / (0.5 * angle).tan(),
+        }
+    }
+
     /// A camera that looks along `into` and sees all points, with margins beside and above them [pixels].
     ///
     /// `up` is what should be up; it must not be along `into`. All points in one place are shown as if 1 m wide.
@@ -51,14 +88,14 @@ impl View {
             view.scale = 0.5 * view.width.min(view.height) / HALF_ANGLE;
             view.eye = view.stand_back(half.map(|half| half / view.scale), points);
         } else {
-            let [low, high] = super::surface::extent(points.map(|point| view.place(point)));
+            let [low, high] = extent(points.map(|point| view.place(point)));
             let size = [high[0] - low[0], high[1] - low[1]];
             let scale = |axis: usize| 2.0 * half[axis] / size[axis];
             view.scale = scale(0).min(scale(1));
             if !view.scale.is_finite() {
                 view.scale = 2.0 * half[0].min(half[1]);
             }
-            let centre = super::surface::middle([low, high]);
+            let centre = middle([low, high]);
             view.eye = view.world(centre);
         }
         view

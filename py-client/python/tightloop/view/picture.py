@@ -1,0 +1,284 @@
+"""Pictures of worlds without a display, a browser or a graphics driver."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tightloop import _core, checks
+from tightloop.errors import ArgumentError
+from tightloop.view import grid
+from tightloop.view.balls import ball
+from tightloop.view.cameras import PRESETS, Camera, camera
+from tightloop.view.parts import Mesh, Part
+from tightloop.view.poses import Array, compose
+
+# Bits of `status` of a world that is frozen, and what is laid over its colours.
+_FROZEN = 1 | 8
+_RED = (225, 40, 40, 180)
+_GHOST = (60, 170, 240, 190)
+_GHOST_OPACITY = 0.35
+_PLAIN = (0, 0, 0, 0)
+_POINT = (250, 190, 30, 255)
+_FORCE = (230, 60, 40, 255)
+_POINT_WIDTH, _FORCE_WIDTH = 6.0, 2.5
+# Length of a force [m/N], and the longest one: the first millisecond of an impact would fill the picture.
+_FORCE_SCALE, _FORCE_MAX = 0.01, 1.0
+# The camera stands still, so there is room for what moves.
+_ROOM = 1.1
+# Distances of lines on the floor [m]; about so many of them cross what is looked at.
+_SPACINGS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+_LINES = 12
+
+
+class Picture:
+    """Draws worlds as they are shown by a frame or a `Shown`; the same worlds give the same bytes.
+
+    The camera of a preset is set up by the first picture, so that it stands still in those that follow.
+
+    Attributes:
+        width: Of the pictures [pixels].
+        height: Likewise.
+        offsets: Where each world stands [m], shape ``(worlds, 3)``; known once there was a picture.
+
+    Args:
+        parts: What a world looks like, as `tightloop.view.parts.parts` reads it.
+        width: Of the pictures [pixels], 16 to 8192.
+        height: Likewise.
+        kind: Whether robots are drawn as they look, or as the shapes that touch.
+        threads: Most threads that a picture takes; all cores if left out.
+
+    Raises:
+        ArgumentError: A size is out of range, or there is no such kind.
+    """
+
+    def __init__(
+        self,
+        parts: Iterable[Part],
+        width: int = 640,
+        height: int = 480,
+        *,
+        kind: Literal["visual", "collision"] = "visual",
+        threads: int | None = None,
+    ) -> None:
+        if kind not in ("visual", "collision"):
+            raise ArgumentError(f"picture: kind is {kind!r}; give 'visual' or 'collision'")
+        sizes = (("width", width), ("height", height))
+        self.width, self.height = (
+            checks.integer(f"picture: {name}", size, least=16, error=ArgumentError) for name, size in sizes
+        )
+        self._renderer = _core.Renderer(self.width, self.height, threads)
+        own = [part for part in parts if part.kind == kind]
+        # a floor is drawn as one that has no end; a slope is drawn as it is
+        self._floors = [float(part.pose[2]) for part in own if _is_floor(part)]
+        self._parts = [part for part in own if not _is_floor(part)]
+        numbers: dict[int, int] = {}
+        for part in self._parts:
+            if id(part.mesh) not in numbers:
+                numbers[id(part.mesh)] = self._add(part.mesh)
+        self._meshes = np.array([numbers[id(part.mesh)] for part in self._parts], np.uint32)
+        self._bodies = np.array([part.body for part in self._parts], np.intp)
+        self._poses = np.array([part.pose for part in self._parts], float).reshape(-1, 7)
+        self._balls: dict[tuple[float, tuple[int, ...]], int] = {}
+        self._stands: dict[tuple[Any, ...], tuple[NDArray[np.float64], NDArray[np.float64], float]] = {}
+        self.offsets: NDArray[np.float32] = np.zeros((0, 3), np.float32)
+
+    def render(
+        self,
+        shown: Any,
+        *,
+        worlds: int | Sequence[int] | None = None,
+        camera: str | Camera = "three-quarter",
+        world: int = 0,
+        contacts: bool = True,
+        ghost: ArrayLike | None = None,
+        goals: Mapping[str, tuple[ArrayLike, float, Sequence[int]]] | None = None,
+    ) -> NDArray[np.uint8]:
+        """A picture.
+
+        Args:
+            shown: A frame with ``body_q``; with ``status`` frozen worlds are red, and where it has ``contact_count``,
+                ``contact_pos`` and ``contact_force``, contacts are drawn.
+            worlds: How many worlds are drawn, on a grid, the first ones; or which ones. All if left out.
+            camera: A preset, ``"three-quarter"``, ``"front"``, ``"side"``, ``"top"`` or ``"follow"``, which goes along
+                with ``world``; or a `Camera` of your own.
+            world: The world that the ghost is of, and that ``"follow"`` follows.
+            contacts: Whether contacts are drawn.
+            ghost: Where the bodies of ``world`` are to be, shape ``(bodies, 7)``, drawn as a shade.
+            goals: Translucent balls by name: middles [m], shape ``(worlds, 3)`` or ``(worlds, n, 3)``, in the axes of
+                each world, radius [m], and colour as red, green, blue.
+
+        Returns:
+            Shape ``(height, width, 3)``: red, green, blue.
+
+        Raises:
+            ArgumentError: There is no such world or camera; the message names it.
+            UnknownField: The frame carries no ``body_q``.
+        """
+        body_q = np.asarray(shown.body_q, float)
+        chosen = self._chosen(worlds, len(body_q))
+        if world not in chosen:
+            if world != 0 or camera == "follow" or ghost is not None:
+                raise ArgumentError(f"picture: world is {world!r}; these are drawn: {_listed(chosen)}")
+            world = int(chosen[0])
+        box, offsets, floor = self._stand(chosen, body_q)
+        self.offsets = offsets.astype(np.float32)
+        place = int(np.argmax(chosen == world))
+        meshes, poses = self._instances(body_q[chosen], offsets)
+        frozen = np.asarray(_field(shown, "status", np.zeros(len(body_q), int)))[chosen] & _FROZEN
+        tints = np.where(frozen[:, None, None] > 0, _RED, _PLAIN).astype(np.uint8)
+        tints = np.repeat(tints, len(self._parts), axis=1).reshape(-1, 4)
+        layers = [(meshes, poses, tints, np.ones(len(meshes), np.float32))]
+        if ghost is not None:
+            layers.append(self._ghost(np.asarray(ghost, float), offsets[place]))
+        for name, goal in (goals or {}).items():
+            layers.append(self._goal(name, goal, chosen, offsets))
+        lines = self._contacts(shown, chosen, offsets) if contacts else _no_lines()
+        view, around = self._view(camera, box, body_q[world], offsets[place])
+        reach = around[3]
+        spacing = next((step for step in _SPACINGS if step * _LINES >= reach), _SPACINGS[-1])
+        meshes, poses, tints, opacities = (np.concatenate(column) for column in zip(*layers, strict=True))
+        return self._renderer.render(
+            (view.position, view.target, view.up),
+            view.fov,
+            around,
+            (floor, spacing),
+            meshes,
+            poses,
+            tints,
+            opacities,
+            *lines,
+        )
+
+    def _add(self, mesh: Mesh) -> int:
+        return self._renderer.add(
+            np.ascontiguousarray(mesh.vertices, np.float32),
+            np.ascontiguousarray(mesh.faces, np.uint32),
+            np.ascontiguousarray(mesh.colors, np.uint8),
+        )
+
+    def _chosen(self, worlds: int | Sequence[int] | None, there: int) -> NDArray[np.intp]:
+        if worlds is None:
+            return np.arange(there)
+        if isinstance(worlds, int | np.integer):
+            return np.arange(min(checks.integer("picture: worlds", int(worlds), least=1, error=ArgumentError), there))
+        chosen = np.asarray(worlds)
+        if chosen.ndim != 1 or not len(chosen) or not np.issubdtype(chosen.dtype, np.integer):
+            raise ArgumentError(f"picture: worlds is {worlds!r}; give how many, or a list of which ones")
+        wrong = chosen[(chosen < 0) | (chosen >= there)]
+        if len(wrong):
+            raise ArgumentError(f"picture: there is no world {int(wrong[0])}; there are {there}, from 0 on")
+        return chosen.astype(np.intp)
+
+    def _stand(self, chosen: NDArray[np.intp], body_q: Array) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """The box around one world, where each stands, and how high the floor is: as the first picture had it."""
+        key = (*chosen.tolist(),)
+        if key not in self._stands:
+            box = grid.extent(self._parts, body_q[chosen[0]])
+            offsets = grid.offsets(len(chosen), box).astype(float)
+            # what stands on the floor may have its rim below it by a rounding
+            lowest = float(box[0, 2])
+            own = [floor for floor in self._floors if np.isfinite(floor)]
+            floor = max(own) if own else (lowest if lowest < -1e-3 else 0.0)
+            self._stands[key] = box, offsets, floor
+        return self._stands[key]
+
+    def _instances(self, body_q: Array, offsets: Array) -> tuple[NDArray[np.uint32], Array]:
+        """Meshes and poses of all parts of some worlds."""
+        still = np.broadcast_to(np.array([0, 0, 0, 0, 0, 0, 1.0]), (len(body_q), 1, 7))
+        # the world is the body after the last, as -1 says
+        poses = compose(np.concatenate([body_q, still], axis=1)[:, self._bodies], self._poses)
+        poses[..., :3] += offsets[:, None]
+        return np.tile(self._meshes, len(body_q)), poses.reshape(-1, 7)
+
+    def _ghost(self, body_q: Array, offset: Array) -> tuple[Any, ...]:
+        moving = np.flatnonzero(self._bodies >= 0)
+        poses = compose(body_q[self._bodies[moving]], self._poses[moving])
+        poses[:, :3] += offset
+        count = len(moving)
+        opacities = np.full(count, _GHOST_OPACITY, np.float32)
+        return self._meshes[moving], poses, np.tile(np.array(_GHOST, np.uint8), (count, 1)), opacities
+
+    def _goal(
+        self, name: str, goal: tuple[ArrayLike, float, Sequence[int]], chosen: NDArray[np.intp], offsets: Array
+    ) -> tuple[Any, ...]:
+        middles, radius, color = goal
+        middles = np.asarray(middles, float)
+        if middles.ndim not in (2, 3) or middles.shape[-1] != 3:
+            raise ArgumentError(f"picture: goal {name!r} has shape {middles.shape}; give (worlds, 3) or (worlds, n, 3)")
+        middles = middles.reshape(len(middles), -1, 3)[chosen] + offsets[:, None]
+        key = (float(radius), tuple(color))
+        if key not in self._balls:
+            self._balls[key] = self._add(ball(key[0], (*key[1], 255)))
+        poses = np.zeros((middles.size // 3, 7))
+        poses[:, :3], poses[:, 6] = middles.reshape(-1, 3), 1.0
+        count = len(poses)
+        tints = np.zeros((count, 4), np.uint8)
+        return np.full(count, self._balls[key], np.uint32), poses, tints, np.full(count, 0.45, np.float32)
+
+    def _contacts(self, shown: Any, chosen: NDArray[np.intp], offsets: Array) -> tuple[Array, Array, Array]:
+        fields = [_field(shown, name) for name in ("contact_count", "contact_pos", "contact_force")]
+        if any(field is None for field in fields):
+            return _no_lines()
+        counts, places, forces = (np.asarray(field)[chosen] for field in fields)
+        used = np.arange(places.shape[1]) < counts.reshape(-1, 1)
+        points = (places + offsets[:, None])[used].astype(float)
+        arrows = forces[used].astype(float) * _FORCE_SCALE
+        length = np.linalg.norm(arrows, axis=-1, keepdims=True)
+        arrows = arrows * np.minimum(1.0, _FORCE_MAX / np.maximum(length, _FORCE_MAX))
+        count = len(points)
+        ends = np.concatenate([np.hstack([points, points + arrows]), np.hstack([points, points])])
+        colors = np.repeat(np.array([_FORCE, _POINT], np.uint8), count, axis=0)
+        widths = np.repeat(np.array([_FORCE_WIDTH, _POINT_WIDTH], np.float32), count)
+        return np.ascontiguousarray(ends), colors, widths
+
+    def _view(
+        self, given: str | Camera, box: Array, body_q: Array, offset: Array
+    ) -> tuple[Camera, tuple[float, float, float, float]]:
+        """The camera, and the middle and the reach of what matters."""
+        places = self.offsets.astype(float)
+        whole = np.stack([box[0] + places.min(axis=0), box[1] + places.max(axis=0)])
+        middle = whole.mean(axis=0)
+        if given == "follow":
+            # the bodies may be far from where the world began
+            bodies = body_q[np.isfinite(body_q).all(axis=-1)]
+            centre = (
+                (0.5 * (bodies[:, :3].min(axis=0) + bodies[:, :3].max(axis=0))) if len(bodies) else box.mean(axis=0)
+            )
+            whole = box - box.mean(axis=0) + centre + offset
+            middle = whole.mean(axis=0)
+        size = float(np.linalg.norm(whole[1] - whole[0])) / 2
+        around = (float(middle[0]), float(middle[1]), float(middle[2]), max(1.6 * size, 1e-3))
+        if isinstance(given, Camera):
+            return given, around
+        if given not in PRESETS:
+            known = ", ".join(PRESETS)
+            raise ArgumentError(f"picture: camera is {given!r}; give a tightloop.view.Camera or one of: {known}")
+        roomy = middle + (whole - middle) * _ROOM
+        return dataclasses.replace(camera(given, roomy, aspect=self.width / self.height, fov=0.6)), around
+
+
+def _is_floor(part: Part) -> bool:
+    """Whether it is a plane that lies level, upside up."""
+    turned = np.abs(part.pose[3:5]).max()
+    return part.body < 0 and part.shape == "plane" and bool(turned < 1e-6)
+
+
+def _field(shown: Any, name: str, default: Any = None) -> Any:
+    try:
+        return getattr(shown, name)
+    except AttributeError:  # UnknownField is one
+        return default
+
+
+def _no_lines() -> tuple[Array, Array, Array]:
+    return np.zeros((0, 6)), np.zeros((0, 4), np.uint8), np.zeros(0, np.float32)
+
+
+def _listed(chosen: NDArray[np.intp]) -> str:
+    few = ", ".join(str(int(world)) for world in chosen[:8])
+    return f"{few}, …" if len(chosen) > 8 else few

@@ -1,0 +1,34 @@
+//! Pictures of worlds: triangles to pixels on the processor, without a window, a display or a graphics driver.
+//!
+//! A renderer of our own, because libraries that draw ask for a driver, and a machine that trains often has none that
+//! draws. The same scene gives the same bytes, on any number of threads: corners are whole numbers, sums have an order.
+//!
+//! mesh (what is drawn) → project (where its triangles fall, tile by tile) → tile (who is seen) → shade (in what light),
+//! with shadows from a second, smaller picture as the light sees it, and marks (lines and dots) on top.
+//! `tightloop inspect` draws its page with the same view, normals and cover.
+
+mod clip;
+mod cover;
+mod marks;
+mod mesh;
+mod normals;
+mod project;
+mod renderer;
+mod shade;
+mod shadow;
+#[cfg(test)]
+mod tests;
+mod threads;
+mod tile;
+pub mod vector;
+mod view;
+
+pub use cover::cover;
+pub use marks::Line;
+pub use mesh::{Mesh, MeshError};
+pub use normals::corner_normals;
+pub use renderer::{Instance, Renderer, Shot};
+pub use view::View;
+
+/// Red, green, blue.
+pub type Rgb = [u8; 3];

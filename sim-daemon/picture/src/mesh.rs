@@ -1,0 +1,231 @@
+//! What is drawn: triangles with normals and colours, and coarser copies of them for where they are small.
+
+use std::collections::HashMap;
+
+use crate::normals::corner_normals;
+
+/// Cells along the longest side of a mesh in its coarser copies.
+const COARSER: [f32; 4] = [128.0, 64.0, 32.0, 16.0];
+/// A copy is worth its memory where it saves this share of the triangles.
+const WORTH: f64 = 0.7;
+
+/// Why triangles are no mesh.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum MeshError {
+    /// A vertex is not finite.
+    Vertex(usize),
+    /// A triangle names a vertex that is not there.
+    Triangle(usize),
+    /// There is not one colour a triangle.
+    Colours,
+}
+
+impl std::fmt::Display for MeshError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            MeshError::Vertex(vertex) => write!(f, "vertex {vertex} is not finite"),
+            MeshError::Triangle(face) => write!(f, "face {face} names a vertex that is not there"),
+            MeshError::Colours => write!(f, "there must be one colour a face"),
+        }
+    }
+}
+
+impl std::error::Error for MeshError {}
+
+/// A corner, edge or face of it may be seen from both sides, unless it is closed.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    /// From fine to coarse.
+    pub(crate) levels: Vec<Level>,
+    /// Whether it has an inside, so that no triangle is seen from behind.
+    pub(crate) closed: bool,
+    /// A ball around it, its frame.
+    pub(crate) centre: [f32; 3],
+    pub(crate) radius: f32,
+    /// Whether some face is translucent.
+    pub(crate) translucent: bool,
+}
+
+/// The triangles of a mesh, or of a coarser copy.
+#[derive(Clone, Debug)]
+pub(crate) struct Level {
+    /// How far a vertex may be from where it belongs, in the mesh's frame [m].
+    pub error: f32,
+    pub vertices: Vec<[f32; 3]>,
+    pub faces: Vec<Face>,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Face {
+    pub corners: [u32; 3],
+    /// Normal at each corner, parts in 32767ths.
+    pub normals: [[i16; 3]; 3],
+    /// Red, green, blue, opacity.
+    pub colour: [u8; 4],
+}
+
+impl Mesh {
+    /// Of vertices [m], triangles counter-clockwise as seen from outside, and a colour (red, green, blue, opacity) a
+    /// triangle.
+    ///
+    /// # Errors
+    /// A vertex is not finite, a triangle names one that is not there, or colours do not count up.
+    pub fn new(
+        vertices: &[[f32; 3]],
+        triangles: &[[u32; 3]],
+        colours: &[[u8; 4]],
+    ) -> Result<Mesh, MeshError> {
+        if let Some(vertex) = vertices
+            .iter()
+            .position(|v| !v.iter().all(|part| part.is_finite()))
+        {
+            return Err(MeshError::Vertex(vertex));
+        }
+        if let Some(face) = triangles
+            .iter()
+            .position(|corners| corners.iter().any(|&v| v as usize >= vertices.len()))
+        {
+            return Err(MeshError::Triangle(face));
+        }
+        if colours.len() != triangles.len() {
+            return Err(MeshError::Colours);
+        }
+        let [low, high] = extent(vertices);
+        let centre: [f32; 3] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
+        let distance = |v: &[f32; 3]| (0..3).map(|k| (v[k] - centre[k]).powi(2)).sum::<f32>();
+        let radius = vertices.iter().map(distance).fold(0.0, f32::max).sqrt();
+        // vertices that lie in one place are one vertex: files often repeat them for each triangle
+        let (welded, corners) = merged(vertices, triangles, |v| {
+            v.map(|part| (part + 0.0).to_bits())
+        });
+        let closed = is_closed(&corners);
+        let finest = Level::new(0.0, welded, &corners, colours);
+        let side = (0..3)
+            .map(|axis| high[axis] - low[axis])
+            .fold(0.0, f32::max);
+        let mut levels = vec![finest];
+        for cells in COARSER {
+            let cell = side / cells;
+            let last = &levels[levels.len() - 1];
+            if cell <= 0.0 || last.faces.len() < 200 {
+                break;
+            }
+            let places = |v: &[f32; 3]| -> [u32; 3] {
+                std::array::from_fn(|axis| ((v[axis] - low[axis]) / cell) as u32)
+            };
+            let (vertices, corners) = merged(vertices, triangles, places);
+            let count = corners.iter().filter(|corners| is_proper(corners)).count();
+            if (count as f64) < WORTH * last.faces.len() as f64 {
+                levels.push(Level::new(cell, vertices, &corners, colours));
+            }
+        }
+        Ok(Mesh {
+            levels,
+            closed,
+            centre,
+            radius,
+            translucent: colours.iter().any(|colour| colour[3] < 255),
+        })
+    }
+
+    /// The coarsest level whose error is below this [m].
+    pub(crate) fn level(&self, error: f32) -> usize {
+        let fine = self.levels[1..]
+            .iter()
+            .take_while(|level| level.error < error);
+        fine.count()
+    }
+}
+
+impl Level {
+    fn new(
+        error: f32,
+        vertices: Vec<[f32; 3]>,
+        corners: &[[u32; 3]],
+        colours: &[[u8; 4]],
+    ) -> Level {
+        let (corners, colours): (Vec<_>, Vec<_>) = corners
+            .iter()
+            .zip(colours)
+            .filter(|(corners, _)| is_proper(corners))
+            .unzip();
+        let corners: Vec<[u32; 3]> = corners;
+        let wide: Vec<[f64; 3]> = vertices.iter().map(|v| v.map(f64::from)).collect();
+        let normals = corner_normals(&wide, &corners);
+        let faces = corners.into_iter().zip(normals).zip(colours);
+        let faces = faces.map(|((corners, normals), colour)| Face {
+            corners,
+            normals,
+            colour,
+        });
+        Level {
+            error,
+            faces: faces.collect(),
+            vertices,
+        }
+    }
+}
+
+/// Whether its corners are three.
+fn is_proper([a, b, c]: &[u32; 3]) -> bool {
+    a != b && b != c && c != a
+}
+
+fn extent(vertices: &[[f32; 3]]) -> [[f32; 3]; 2] {
+    let Some(&first) = vertices.first() else {
+        return [[0.0; 3]; 2];
+    };
+    vertices.iter().fold([first; 2], |[low, high], v| {
+        [
+            std::array::from_fn(|axis| low[axis].min(v[axis])),
+            std::array::from_fn(|axis| high[axis].max(v[axis])),
+        ]
+    })
+}
+
+/// Vertices of one place become one, at their mean; triangles with the numbers of these.
+fn merged(
+    vertices: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    place: impl Fn(&[f32; 3]) -> [u32; 3],
+) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    let mut numbers: HashMap<[u32; 3], u32> = HashMap::with_capacity(vertices.len());
+    let mut sums: Vec<([f64; 3], f64)> = Vec::new();
+    let number: Vec<u32> = vertices
+        .iter()
+        .map(|vertex| {
+            let number = *numbers.entry(place(vertex)).or_insert_with(|| {
+                sums.push(([0.0; 3], 0.0));
+                sums.len() as u32 - 1
+            });
+            let (sum, count) = &mut sums[number as usize];
+            for axis in 0..3 {
+                sum[axis] += f64::from(vertex[axis]);
+            }
+            *count += 1.0;
+            number
+        })
+        .collect();
+    let means = sums
+        .into_iter()
+        .map(|(sum, count)| sum.map(|part| (part / count) as f32))
+        .collect();
+    let corners = triangles
+        .iter()
+        .map(|corners| corners.map(|vertex| number[vertex as usize]))
+        .collect();
+    (means, corners)
+}
+
+/// Whether each edge belongs to two triangles, which run along it in opposite directions.
+fn is_closed(corners: &[[u32; 3]]) -> bool {
+    let mut balance: HashMap<(u32, u32), (i32, u32)> = HashMap::new();
+    for [a, b, c] in corners.iter().filter(|corners| is_proper(corners)) {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            let entry = balance.entry((*from.min(to), *from.max(to))).or_default();
+            entry.0 += if from < to { 1 } else { -1 };
+            entry.1 += 1;
+        }
+    }
+    !balance.is_empty() && balance.values().all(|&(sum, count)| sum == 0 && count == 2)
+}
