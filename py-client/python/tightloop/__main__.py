@@ -13,6 +13,10 @@ def main() -> int:
         from tightloop.view.command import main as view
 
         return view(sys.argv[2:])
+    if sys.argv[1:2] == ["film"]:
+        from tightloop.view.film_command import main as film
+
+        return film(sys.argv[2:])
     from tightloop import _core
 
     # Rust does the work and never returns to the interpreter in between: Python's own handler would only set a flag.
