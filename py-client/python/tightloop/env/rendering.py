@@ -32,6 +32,11 @@ def check(mode: str | None) -> str | None:
     return mode
 
 
+def marks(task: Task, goal: NDArray[Any]) -> dict[str, Any] | None:
+    """Goals as `Picture.render` marks them; None of a task whose goals have no place."""
+    return None if task.goal_radius is None else {"goal": (goal[:, :3], task.goal_radius, _GOAL)}
+
+
 class Rendering:
     """Shows the worlds of an environment.
 
@@ -74,9 +79,9 @@ class Rendering:
         if frame is None:
             raise CommandRefused("render: no episode has begun; call reset first")
         picture = self._pictures()
-        radius = self._task.goal_radius
-        goals = None if radius is None else {"goal": (goal[:, :3], radius, _GOAL)}
-        return tuple(picture.render(frame, worlds=[world], world=world, goals=goals) for world in range(len(goal)))
+        goals = marks(self._task, goal)
+        worlds = range(self._sim.worlds)
+        return tuple(picture.render(frame, worlds=[world], world=world, goals=goals) for world in worlds)
 
     def _pictures(self) -> Picture:
         if self._picture is None:

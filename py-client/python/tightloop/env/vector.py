@@ -19,7 +19,7 @@ from tightloop.env.episodes import Episodes
 from tightloop.env.evaluation import Evaluation
 from tightloop.env.names import Names
 from tightloop.env.registry import make_task
-from tightloop.env.rendering import FIELDS, MODES, Rendering
+from tightloop.env.rendering import FIELDS, MODES, Rendering, marks
 from tightloop.env.rendering import check as check_mode
 from tightloop.env.slots import Slot, Slots
 from tightloop.env.start import begin
@@ -153,6 +153,16 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
     def elapsed(self, steps: ArrayLike) -> None:
         self._check_idle("elapsed")
         self._episodes.elapsed[:] = steps
+
+    @property
+    def frame(self) -> Any:
+        """The frame that the last reset or step ended with, as `Sim.step` returns it; None before the first."""
+        return self._frame
+
+    @property
+    def marks(self) -> dict[str, Any] | None:
+        """The goals of now, as `tightloop.view` marks them in pictures; None of a task whose goals have no place."""
+        return marks(self.task, self._episodes.goal)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None

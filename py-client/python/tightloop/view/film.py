@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -113,13 +113,14 @@ class Film:
         """Time of the run that was added, up to its last frame [s]."""
         return self._time or 0.0
 
-    def add(self, frame: Any, seconds: float | None = None) -> None:
+    def add(self, frame: Any, seconds: float | None = None, *, goals: Mapping[str, Any] | None = None) -> None:
         """Add the next frame.
 
         Args:
             frame: A `Frame`, a copy of one, or a `Shown`, with ``body_q`` of all worlds that are seen.
             seconds: Time since the frame before [s]; a control frame if left out. Where a picture is due it is drawn;
                 where frames are farther apart, it stands.
+            goals: As `Picture.render` has them; the HTML shows none.
         """
         self._time = 0.0 if self._time is None else self._time + (self._period if seconds is None else seconds)
         more = self._reached(self._time) - self.pictures
@@ -131,7 +132,12 @@ class Film:
         else:
             assert self._roll is not None
             pixels = self._picture.render(
-                frame, worlds=self._worlds, camera=self._camera, world=self._world, contacts=self._contacts
+                frame,
+                worlds=self._worlds,
+                camera=self._camera,
+                world=self._world,
+                contacts=self._contacts,
+                goals=goals,
             )
             for _ in range(more):
                 self._roll.add(pixels)
