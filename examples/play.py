@@ -1,6 +1,8 @@
 """Runs a policy file in the loop, and draws what it did.
 
     python examples/play.py FrankaReach out/train/FrankaReach-0/policy.onnx
+    python examples/play.py FrankaPickCube examples/trained/FrankaPickCube.onnx --num-envs 16 --film out/pick.mp4
+    python examples/play.py FrankaPickCube examples/trained/FrankaPickCube.onnx --num-envs 16 --view
 
 The file is ONNX with the input ``obs`` (worlds, size) and the output ``action`` (worlds, actions), as
 ``examples/ppo.py`` leaves it. Every world plays one episode; the picture has the rewards, the
@@ -10,6 +12,7 @@ actions and the first observations of a few.
 from __future__ import annotations
 
 import argparse
+from contextlib import nullcontext
 from pathlib import Path
 
 import matplotlib
@@ -18,18 +21,24 @@ import onnxruntime
 from numpy.typing import NDArray
 
 from tightloop.env import AutoresetMode, VectorEnv
+from tightloop.view import Film
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 SHOWN = 8  # worlds in the picture
+FILMED = 16  # worlds in the film
 
 
-def play(envs: VectorEnv, policy: onnxruntime.InferenceSession, seed: int) -> dict[str, NDArray[np.float64]]:
+def play(
+    envs: VectorEnv, policy: onnxruntime.InferenceSession, seed: int, film: Film | None
+) -> dict[str, NDArray[np.float64]]:
     """One episode in every world: what was seen, done, and got, ``(steps, worlds, …)``; NaN after an episode's end."""
     obs, _ = envs.reset(seed=seed)
     going, kept = np.ones(envs.num_envs, bool), {"obs": [], "action": [], "reward": [], "success": []}
     while going.any():
+        if film is not None:
+            film.add(envs.frame, goals=envs.marks)
         (action,) = policy.run(["action"], {"obs": obs})
         seen = obs
         obs, reward, terminated, truncated, infos = envs.step(action)
@@ -71,18 +80,26 @@ def main() -> None:
     parser.add_argument("policy", type=Path, help="ONNX file")
     parser.add_argument("--num-envs", type=int, default=256, help="worlds (default 256)")
     parser.add_argument("--seed", type=int, default=0, help="of the episodes (default 0)")
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument("--view", action="store_true", help="show it in the browser, at the pace of the world")
+    shown.add_argument("--film", type=Path, help=f"film of the first {FILMED} worlds: .mp4, .gif, .html or a folder")
     parser.add_argument("--out", type=Path, help="picture (default: beside the policy, play.png)")
     args = parser.parse_args()
     out = args.out or args.policy.with_name("play.png")
 
     policy = onnxruntime.InferenceSession(args.policy, providers=["CPUExecutionProvider"])
-    envs = VectorEnv(args.task, args.num_envs, autoreset_mode=AutoresetMode.SAME_STEP)
+    mode = "human" if args.view else "rgb_array" if args.film else None
+    envs = VectorEnv(args.task, args.num_envs, autoreset_mode=AutoresetMode.SAME_STEP, render_mode=mode)
     try:
         size = envs.single_observation_space.shape[0]
         expected = policy.get_inputs()[0].shape[1]
         if expected != size:
             raise SystemExit(f"{args.policy} takes {expected} numbers, and {args.task} has {size}")
-        kept = play(envs, policy, args.seed)
+        if args.film:
+            args.film.parent.mkdir(parents=True, exist_ok=True)
+        filmed = Film(args.film, envs.sim, worlds=min(FILMED, args.num_envs)) if args.film else nullcontext()
+        with filmed as film:
+            kept = play(envs, policy, args.seed, film)
         returns = np.nansum(kept["reward"], axis=0)
         last = np.isfinite(kept["reward"]).sum(axis=0) - 1
         success = kept["success"][last, np.arange(args.num_envs)].mean()

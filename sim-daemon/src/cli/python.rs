@@ -43,8 +43,48 @@ pub(super) struct Film {
     /// Name of a daemon, or a file that `record` wrote.
     source: PathBuf,
 
-    /// What to write: a .png, .gif, .mp4 or .html file.
+    /// What to write: a .png, .gif, .mp4 or .html file, or a folder of PNG files.
     out: PathBuf,
+
+    /// When to begin, or when a .png is taken [s].
+    #[arg(long, default_value_t = 0.0)]
+    at: f64,
+
+    /// How long: of a daemon as time passes, 5 s if left out; of a recording simulated time, all of it [s].
+    #[arg(long)]
+    seconds: Option<f64>,
+
+    /// Pictures a second.
+    #[arg(long, default_value_t = 30.0)]
+    fps: f64,
+
+    /// Seconds of the run a second of film.
+    #[arg(long, default_value_t = 1.0)]
+    speed: f64,
+
+    /// Size of the pictures [pixels].
+    #[arg(long, value_name = "WxH", default_value = "640x480")]
+    size: String,
+
+    /// How many worlds are seen, on a grid.
+    #[arg(long, default_value_t = 1)]
+    worlds: usize,
+
+    /// The world that is seen alone, or that the camera follows.
+    #[arg(long, default_value_t = 0)]
+    world: usize,
+
+    /// Where the camera is.
+    #[arg(long, default_value = "three-quarter", value_parser = ["three-quarter", "front", "side", "top", "follow"])]
+    camera: String,
+
+    /// Show the shapes that touch, not what robots look like.
+    #[arg(long)]
+    collision: bool,
+
+    /// Leave contact points and forces out.
+    #[arg(long)]
+    no_contacts: bool,
 }
 
 #[derive(Debug, Args)]

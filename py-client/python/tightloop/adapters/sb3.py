@@ -82,9 +82,10 @@ class Sb3VecEnv(vec_env.VecEnv):
         """End the simulation."""
         self.env.close()
 
-    def get_images(self) -> list[None]:
-        """Nothing: environments cannot be rendered yet."""
-        return [None] * self.num_envs
+    def get_images(self) -> list[Any]:
+        """A picture of each world, or None without ``render_mode="rgb_array"``."""
+        pictures = None if self.env.render_mode is None else self.env.render()
+        return [None] * self.num_envs if pictures is None else list(pictures)
 
     def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
         """An attribute of the `VectorEnv`, once for each world asked for."""

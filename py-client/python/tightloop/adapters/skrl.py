@@ -41,5 +41,6 @@ class SkrlEnv(gymnasium_envs.GymnasiumWrapper):
         super().__init__(environment(env, num_envs, AutoresetMode.NEXT_STEP, options))
         self._device = skrl.config.torch.parse_device(torch_device)
 
-    def render(self, *args: Any, **kwargs: Any) -> None:
-        """Nothing: environments cannot be rendered yet, and trainers ask for it unless they are told ``headless``."""
+    def render(self, *args: Any, **kwargs: Any) -> Any:
+        """As of the `VectorEnv`; nothing without a render mode, as trainers ask unless they are told ``headless``."""
+        return None if self._env.render_mode is None else self._env.render()

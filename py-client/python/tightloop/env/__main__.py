@@ -10,15 +10,19 @@ from typing import Any
 
 from tightloop import _core
 from tightloop.env.registry import make_task
+from tightloop.env.rendering import FIELDS
 from tightloop.env.start import DAEMON_OPTIONS, fields_of
 from tightloop.errors import ArgumentError
 from tightloop.registration import TASKS
 
 
-def arguments_of(task: str, options: Mapping[str, Any], extra: Sequence[str]) -> tuple[str, list[str]]:
-    """The scene of a task as TOML, and the arguments of ``tightloop serve`` for it."""
+def arguments_of(
+    task: str, options: Mapping[str, Any], extra: Sequence[str], fields: Sequence[str] = ()
+) -> tuple[str, list[str]]:
+    """The scene of a task as TOML, and the arguments of ``tightloop serve`` for it, with further fields."""
     made = make_task(task, options)
-    arguments = ["--fields", ",".join(fields_of(made, made.controls()))]
+    read = fields_of(made, made.controls())
+    arguments = ["--fields", ",".join(dict.fromkeys([*read, *fields]))]
     own = DAEMON_OPTIONS | made.launch_options
     for bound, value in own.pop("bounds", {}).items():
         arguments += [f"--{bound.replace('_', '-')}-max", f"{value}"]
@@ -48,6 +52,7 @@ def main() -> int:
     serve.add_argument("--device", default="auto", help="as launch has it, such as gpu (default auto)")
     serve.add_argument("--precision", default="f32", help="f32 or f64 (default f32)")
     serve.add_argument("--threads", type=int, help="threads of a step; one a core if left out")
+    serve.add_argument("--render", action="store_true", help="for trainers that draw pictures (render_mode)")
     args = parser.parse_args()
     options = dict(option.partition("=")[::2] for option in args.option)
     extra = [
@@ -62,7 +67,7 @@ def main() -> int:
     ]
     extra += [] if args.threads is None else ["--threads", f"{args.threads}"]
     try:
-        scene, arguments = arguments_of(args.task, options, extra)
+        scene, arguments = arguments_of(args.task, options, extra, FIELDS if args.render else ())
     except ArgumentError as problem:
         parser.exit(2, f"error: {problem}\n")
     # `tightloop serve -` reads the scene from standard input

@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import ArrayLike, NDArray
 
+from tightloop.env.rendering import MODES
 from tightloop.env.task import Task
 from tightloop.env.vector import VectorEnv
 
@@ -22,14 +23,15 @@ class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         vector: The `VectorEnv` of one world that it is made of.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": list(MODES)}  # noqa: RUF012
 
     def __init__(self, task: Task | type[Task] | str, **options: Any) -> None:
         """A task in one world; ``options`` are those of `VectorEnv`, but for ``num_envs`` and ``autoreset_mode``."""
         if options.get("daemon") is None:
             options.setdefault("threads", 1)
         self.vector = VectorEnv(task, 1, autoreset_mode=AutoresetMode.DISABLED, **options)
-        self.render_mode = None
+        self.render_mode = self.vector.render_mode
+        self.metadata = {name: value for name, value in self.vector.metadata.items() if name != "autoreset_mode"}
         self.observation_space = self.vector.single_observation_space
         self.action_space = self.vector.single_action_space
 
@@ -46,6 +48,11 @@ class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         obs, reward, terminated, truncated, infos = self.vector.step(np.asarray(action)[None])
         info = {name: value[0] for name, value in infos.items() if not name.startswith("_") and infos[f"_{name}"][0]}
         return obs[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
+
+    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """A picture as it is now, shape ``(height, width, 3)``, in the mode ``"rgb_array"``. As `VectorEnv.render`."""
+        pictures = self.vector.render()
+        return None if pictures is None else pictures[0]
 
     def close(self) -> None:
         """End the simulation."""

@@ -28,18 +28,19 @@ def begin(
     device: str,
     precision: str | None,
     threads: int | None,
+    fields: Sequence[str] = (),
 ) -> tuple[tl.Scene, tl.Sim]:
-    """The task's scene, and a simulation of it.
+    """The task's scene, and a simulation of it, whose own frames carry these fields besides what the task reads.
 
     Raises:
         ArgumentError: The daemon runs something else, or another number of worlds.
     """
-    scene, fields = task.scene(), fields_of(task, controls)
+    scene, read = task.scene(), fields_of(task, controls)
     if daemon is None:
         return scene, tl.launch(
             scene,
             worlds=1 if worlds is None else worlds,
-            fields=fields,
+            fields=tuple(dict.fromkeys([*read, *fields])),
             device=device,
             precision=precision or "f32",
             threads=threads,
@@ -49,7 +50,7 @@ def begin(
         raise ArgumentError(f"device and threads are those of the daemon `{daemon}`; leave them out")
     sim = tl.attach(daemon)
     try:
-        _check(task, scene, sim, fields)
+        _check(task, scene, sim, read)
         for name, given, own in (("precision", precision, sim.precision), ("num_envs", worlds, sim.worlds)):
             if given is not None and given != own:
                 raise ArgumentError(f"{name} is {given}, and daemon `{daemon}` has {own}; leave it out")

@@ -94,6 +94,8 @@ class Task:
         goal_draws: How many random numbers `goal` takes a world.
         goal_steps: Control steps after which a goal gives way to the next one; None for one an episode.
         launch_options: Further arguments of `tightloop.launch`, such as ``bounds``.
+        goal_radius: Where the first three numbers of a goal are a place, the radius of the ball that marks it in
+            pictures [m]; None for no ball.
     """
 
     fields: ClassVar[Sequence[str]] = ("joint_q", "joint_qd")
@@ -101,6 +103,7 @@ class Task:
     goal_draws: ClassVar[int] = 0
     goal_steps: ClassVar[int | None] = None
     launch_options: ClassVar[dict[str, Any]] = {}
+    goal_radius: ClassVar[float | None] = None
 
     def scene(self) -> Scene:
         """The scene, with what `Scene.randomize` draws at each reset. ``dt * substeps`` is a control step."""

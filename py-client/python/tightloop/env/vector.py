@@ -6,6 +6,7 @@ import copy as copying
 from collections.abc import Sequence
 from typing import Any
 
+import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector import VectorEnv as GymVectorEnv
@@ -18,6 +19,8 @@ from tightloop.env.episodes import Episodes
 from tightloop.env.evaluation import Evaluation
 from tightloop.env.names import Names
 from tightloop.env.registry import make_task
+from tightloop.env.rendering import FIELDS, MODES, Rendering, marks
+from tightloop.env.rendering import check as check_mode
 from tightloop.env.slots import Slot, Slots
 from tightloop.env.start import begin
 from tightloop.env.task import Task, episode_steps
@@ -48,6 +51,8 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         control_dt: Length of a step [s].
         evaluation: Calls the task's functions with what the worlds are now.
     """
+
+    metadata: dict[str, Any] = {"render_modes": list(MODES)}  # noqa: RUF012
 
     def __init__(
         self,
@@ -84,15 +89,15 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             daemon: Name of a running daemon to join, which ``python -m tightloop.env serve`` started for that task. It
                 goes on when this process ends, however it ends. None launches one that ends with this process.
             first_env: Number of the first world among those that ``reset(seed=…)`` counts, for groups of environments.
-            render_mode: None: rendering is not there yet.
+            render_mode: ``"rgb_array"`` for `render`, ``"human"`` for a page in the browser, where each step takes its
+                time; both need ``pip install "tightloop[view]"``.
             **options: What the task's class takes.
 
         Raises:
             ArgumentError: An argument is not valid; the message names it.
             LaunchError: The daemon did not start. Other errors are those of `launch` and `attach`.
         """
-        if render_mode is not None:
-            raise ArgumentError(f"render_mode is {render_mode!r}; environments cannot be rendered yet, leave it out")
+        self.render_mode = check_mode(render_mode)
         slots = checks.integer("slots", slots, least=2, error=ArgumentError)
         first_env = checks.integer("first_env", first_env, least=0, error=ArgumentError)
         if num_envs is not None:
@@ -100,21 +105,32 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         # a task is bound to one environment: another with the same one would write into its arrays
         self.task = copying.deepcopy(make_task(task, options))
         self.autoreset_mode = _mode(autoreset_mode)
-        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
-        self.render_mode = None
         self.max_episode_steps = episode_steps(self.task, max_episode_steps)
         controls = list(self.task.controls())
         scene, self.sim = begin(
-            self.task, controls, num_envs, device=device, precision=precision, threads=threads, daemon=daemon
+            self.task,
+            controls,
+            num_envs,
+            device=device,
+            precision=precision,
+            threads=threads,
+            daemon=daemon,
+            fields=FIELDS if render_mode == "rgb_array" else (),
         )
         self.num_envs = self.sim.worlds
         self.control_dt = self.sim.dt * self.sim.substeps
+        self.metadata = {
+            "render_modes": list(MODES),
+            "render_fps": max(round(1 / self.control_dt), 1),
+            "autoreset_mode": self.autoreset_mode,
+        }
         try:
             names = Names(self.sim.info)
             self.task.bind(names)
             self._actions = Actions(controls, scene, names, self.num_envs)
             self.evaluation = Evaluation(self.task, self.num_envs)
             self._episodes = Episodes(self.task, self.num_envs, first_env)
+            self._rendering = None if render_mode is None else Rendering(self.sim, self.task, render_mode)
         except BaseException:
             self.sim.close()
             raise
@@ -137,6 +153,16 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
     def elapsed(self, steps: ArrayLike) -> None:
         self._check_idle("elapsed")
         self._episodes.elapsed[:] = steps
+
+    @property
+    def frame(self) -> Any:
+        """The frame that the last reset or step ended with, as `Sim.step` returns it; None before the first."""
+        return self._frame
+
+    @property
+    def marks(self) -> dict[str, Any] | None:
+        """The goals of now, as `tightloop.view` marks them in pictures; None of a task whose goals have no place."""
+        return marks(self.task, self._episodes.goal)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -213,6 +239,8 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             self._in_flight = False
             raise
         self._in_flight = False
+        if self._rendering is not None:
+            self._rendering.pace(self.control_dt)
         slot, infos = self._next_slot(), {}
         begun = self._done if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._done.any() else None
         if begun is None:
@@ -231,6 +259,19 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             self._end(slot, infos)
         self._observe(slot.obs)
         return slot.obs, slot.reward, slot.terminated, slot.truncated, infos
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Pictures of all worlds as they are now, each of shape ``(height, width, 3)``, in the mode ``"rgb_array"``.
+
+        None in other modes. A world takes milliseconds: `tightloop.view.Picture` shows many of them in one picture.
+
+        Raises:
+            CommandRefused: No episode has begun.
+        """
+        if self._rendering is None:
+            gymnasium.logger.warn('render: there is no render_mode; make the environment with render_mode="rgb_array"')
+            return None
+        return self._rendering.render(self._frame, self._episodes.goal)
 
     def close_extras(self, **kwargs: Any) -> None:
         """End the simulation, or leave the daemon that was joined."""

@@ -50,6 +50,7 @@ class FrankaLift(CubeTask):
 
     fields = ("joint_q", "joint_qd", "site_q")
     max_episode_steps = 250
+    goal_radius = 0.025
     goal_draws = 3
     substeps = 4
     start = START

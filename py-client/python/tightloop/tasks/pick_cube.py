@@ -54,6 +54,7 @@ class FrankaPickCube(CubeTask):
 
     fields = ("joint_q", "joint_qd", "site_q", "contact_sensor")
     max_episode_steps = 50
+    goal_radius = 0.025
     goal_draws = 3
     substeps = 10
     start = START

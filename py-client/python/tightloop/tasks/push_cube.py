@@ -45,6 +45,7 @@ class FrankaPushCube(CubeTask):
 
     fields = ("joint_q", "joint_qd", "site_q")
     max_episode_steps = 50
+    goal_radius = 0.03
     substeps = 10
     start = START
     base = BASE

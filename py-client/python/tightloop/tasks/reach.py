@@ -43,6 +43,7 @@ class FrankaReach(Task):
 
     fields = ("joint_q", "joint_qd", "site_q")
     max_episode_steps = 360
+    goal_radius = 0.02
     goal_draws = 4
     goal_steps = 120
 

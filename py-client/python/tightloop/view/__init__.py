@@ -1,6 +1,36 @@
 """Looking at worlds: in a browser, as pictures, as films; from a running daemon or from a recording.
 
 Its libraries come with ``pip install "tightloop[view]"``.
+
+>>> from tightloop.view import Film
+>>> with Film("run.mp4", sim) as film:
+...     for _ in range(600):
+...         film.add(sim.step(joint_target_q=targets))
 """
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tightloop.view.cameras import Camera
+    from tightloop.view.film import Film, film
+    from tightloop.view.picture import Picture
+
+_HOMES = {"Camera": "cameras", "Film": "film", "Picture": "picture", "film": "film"}
+
+__all__ = ["Camera", "Film", "Picture", "film"]
+
+
+def __getattr__(name: str) -> Any:
+    # Lazy (PEP 562): a simulation that nobody looks at needs none of the libraries
+    home = _HOMES.get(name)
+    if home is None:
+        raise AttributeError(f"module `tightloop.view` has no attribute `{name}`")
+    from importlib import import_module
+
+    return getattr(import_module(f"tightloop.view.{home}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

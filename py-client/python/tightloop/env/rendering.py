@@ -1,0 +1,93 @@
+"""What ``render`` shows: pictures as arrays, or a page in the browser."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop.env.task import Task
+from tightloop.errors import ArgumentError, CommandRefused
+
+if TYPE_CHECKING:
+    from tightloop.sim import Sim
+    from tightloop.view.picture import Picture
+
+#: As gymnasium names them: a page in the browser, and pictures.
+MODES = ("human", "rgb_array")
+#: What frames must carry for pictures, besides what the task reads.
+FIELDS = ("body_q",)
+# Of pictures [pixels]: what a policy's film needs, and no more.
+_SIZE = (480, 360)
+_GOAL = (40, 190, 90)
+
+
+def check(mode: str | None) -> str | None:
+    """A render mode, or an error that names those there are."""
+    if mode is not None and mode not in MODES:
+        raise ArgumentError(f"render_mode is {mode!r}; give one of {', '.join(map(repr, MODES))}, or None")
+    return mode
+
+
+def marks(task: Task, goal: NDArray[Any]) -> dict[str, Any] | None:
+    """Goals as `Picture.render` marks them; None of a task whose goals have no place."""
+    return None if task.goal_radius is None else {"goal": (goal[:, :3], task.goal_radius, _GOAL)}
+
+
+class Rendering:
+    """Shows the worlds of an environment.
+
+    Args:
+        sim: The simulation.
+        task: What its worlds are about; a goal with a place is marked.
+        mode: One of `MODES`.
+
+    Raises:
+        ArgumentError: The frames of a daemon that was joined carry no ``body_q``.
+        MissingLibrary: ``pip install "tightloop[view]"`` has not been run.
+    """
+
+    def __init__(self, sim: Sim, task: Task, mode: str) -> None:
+        self._sim, self._task, self._mode = sim, task, mode
+        self._picture: Picture | None = None
+        self._due = 0.0
+        if mode == "human":
+            self._viewer = sim.view(worlds=min(sim.worlds, 1024))
+            print(f"tightloop: {sim.name} is shown at {self._viewer.url}", file=sys.stderr, flush=True)
+        elif "body_q" not in sim.fields:
+            cure = "start it with `python -m tightloop.env serve … --render`"
+            raise ArgumentError(f"render_mode is {mode!r}, and frames of daemon `{sim.name}` carry no body_q; {cure}")
+
+    def pace(self, seconds: float) -> None:
+        """In the browser, let a step take as long as it takes in the world [s]."""
+        if self._mode == "human":
+            now = time.monotonic()
+            time.sleep(max(self._due - now, 0.0))
+            self._due = max(self._due, now) + seconds
+
+    def render(self, frame: Any, goal: NDArray[Any]) -> tuple[NDArray[np.uint8], ...] | None:
+        """A picture of each world; nothing in the browser, which shows them by itself.
+
+        Raises:
+            CommandRefused: No episode has begun.
+        """
+        if self._mode == "human":
+            return None
+        if frame is None:
+            raise CommandRefused("render: no episode has begun; call reset first")
+        picture = self._pictures()
+        goals = marks(self._task, goal)
+        worlds = range(self._sim.worlds)
+        return tuple(picture.render(frame, worlds=[world], world=world, goals=goals) for world in worlds)
+
+    def _pictures(self) -> Picture:
+        if self._picture is None:
+            from tightloop.view.parts import parts
+            from tightloop.view.picture import Picture
+
+            info = self._sim.info
+            self._picture = Picture(parts(info["scene"], info["scene_folder"], info["body_names"]), *_SIZE)
+        return self._picture

@@ -1,0 +1,91 @@
+"""The subcommand `tightloop film`: a daemon or a recording as PNG, GIF, MP4 or HTML."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+
+from tightloop.errors import TightloopError
+from tightloop.view.cameras import PRESETS
+
+_EPILOG = """examples:
+  tightloop film franka out.mp4                           five seconds of the daemon `franka`
+  tightloop film run.tlrec run.gif --worlds 16 --fps 15   16 worlds of a recording, all of it
+  tightloop film run.tlrec at3.png --at 3 --camera side   one picture, 3 s after its begin
+  tightloop film run.tlrec run.html --seconds 10          to be turned and zoomed in a browser"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    made = argparse.ArgumentParser(
+        prog="tightloop film",
+        description="Make pictures or a film of a running daemon, or of a recording. No display is needed.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    made.add_argument("source", metavar="NAME|FILE.tlrec", help="a daemon's name, or a recording")
+    made.add_argument("out", metavar="OUT", help="a file .png, .gif, .mp4 or .html, or a folder of PNG files")
+    made.add_argument(
+        "--at", type=float, metavar="SECONDS", help="when to begin; of a .png, when it is taken (default 0)"
+    )
+    made.add_argument(
+        "--seconds", type=float, help="how long: of a daemon as time passes (default 5), of a recording simulated time"
+    )
+    made.add_argument("--fps", type=float, default=30.0, help="pictures a second (default 30)")
+    made.add_argument("--speed", type=float, default=1.0, help="seconds of the run a second of film (default 1)")
+    made.add_argument("--size", type=_size, default=(640, 480), metavar="WxH", help="of the pictures (default 640x480)")
+    made.add_argument("--worlds", type=int, default=1, help="how many worlds, on a grid (default 1)")
+    made.add_argument("--world", type=int, default=0, help="the one that is seen alone, or followed (default 0)")
+    made.add_argument("--camera", choices=list(PRESETS), default="three-quarter", help="default three-quarter")
+    made.add_argument("--collision", action="store_true", help="show the shapes that touch, not what robots look like")
+    made.add_argument("--no-contacts", action="store_true", help="leave contact points and forces out")
+    return made
+
+
+def main(arguments: list[str]) -> int:
+    """Run the subcommand; returns its exit code: 0 done, 1 failed, 2 misused."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    given = parser().parse_args(arguments)
+    shows = sys.stderr.isatty()
+    try:
+        from tightloop.view.film import film
+
+        made = film(
+            given.source,
+            given.out,
+            at=given.at,
+            seconds=given.seconds,
+            fps=given.fps,
+            speed=given.speed,
+            size=given.size,
+            worlds=given.worlds,
+            world=given.world,
+            camera=given.camera,
+            kind="collision" if given.collision else "visual",
+            contacts=not given.no_contacts,
+            progress=_tell if shows else None,
+        )
+    except (TightloopError, OSError) as problem:
+        print(f"tightloop: {problem}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    if shows:
+        print(file=sys.stderr)
+    for note in made.notes:
+        print(f"tightloop: {note}", file=sys.stderr)
+    print(os.fspath(given.out))
+    return 0
+
+
+def _tell(seconds: float) -> None:
+    print(f"\r{seconds:8.2f} s", end="", file=sys.stderr, flush=True)
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        raise argparse.ArgumentTypeError(f"{text!r} is no size; give it as 640x480")
+    return int(width), int(height)
