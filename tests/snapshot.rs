@@ -316,7 +316,7 @@ fn refused(
 fn every_changed_byte_and_every_other_length_is_refused() {
     let mut run = ball(400.0, Precision::F32, 2);
     let snapshot = run.sim.snapshot();
-    assert_eq!(snapshot.len(), run.sim.snapshot_bytes());
+    assert_eq!(snapshot.len(), run.sim.snapshot_bytes(run.sim.worlds()));
     run.step();
     for at in 0..snapshot.len() {
         for change in [1, 0x80, 0xff] {

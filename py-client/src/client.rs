@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -145,6 +146,35 @@ impl Client {
         let mask = Mask::new("worlds", mask, self.description.worlds)?;
         let mask = mask.as_slice()?;
         frame(py, |hook| connection.restore(path, mask, from_world, hook))
+    }
+
+    /// The newest frame that observers see and this client has not, or None.
+    fn latest(&self, py: Python<'_>) -> PyResult<Option<Frame>> {
+        let connection = self.connection(py)?;
+        let latest = py.detach(|| connection.latest());
+        let latest = latest.map_err(|error| protocol(py, &error))?;
+        latest.map(|frame| Frame::new(py, frame)).transpose()
+    }
+
+    /// The same; waits for it as long as ``timeout`` [s].
+    fn wait_newer(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<Frame>> {
+        let connection = self.connection(py)?;
+        let timeout = Duration::try_from_secs_f64(timeout).ok();
+        let newer = waiting(py, |hook| connection.wait_newer(timeout, hook))?;
+        newer.map(|frame| Frame::new(py, frame)).transpose()
+    }
+
+    /// Process in control, if any.
+    fn controller(&self, py: Python<'_>) -> PyResult<Option<u32>> {
+        let connection = self.connection(py)?;
+        waiting(py, |hook| connection.controller(hook))
+    }
+
+    /// Give the lease back; the next command takes one again.
+    fn release(&self, py: Python<'_>) -> PyResult<()> {
+        let connection = self.connection(py)?;
+        py.detach(|| connection.release());
+        Ok(())
     }
 
     /// Give the lease back and end the connection; calls after it raise ``SimClosed``.

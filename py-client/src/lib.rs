@@ -9,6 +9,8 @@ mod dynamics;
 mod errors;
 mod frame;
 mod input;
+mod look;
+mod looks;
 mod random;
 mod scene;
 
@@ -36,6 +38,9 @@ mod core {
     use super::dynamics::Dynamics;
     #[pymodule_export]
     use super::frame::{Frame, Sample};
+    #[pymodule_export]
+    use super::look::{Evaluation, Playback};
+    use super::looks::parts;
     #[pymodule_export]
     use super::random::draw;
     #[pymodule_export]

@@ -147,7 +147,7 @@ pub(crate) struct Serve {
     pub(crate) frames_held: usize,
 
     /// Worlds that observers see: the first ones.
-    #[arg(long, default_value_t = 64)]
+    #[arg(long, default_value_t = 256)]
     pub(crate) watch_worlds: usize,
 
     /// End when this process, our parent, ends.

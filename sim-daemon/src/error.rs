@@ -83,6 +83,12 @@ pub enum DaemonError {
         /// World and field, and both numbers where they are known.
         difference: String,
     },
+    /// A state that was shown is not one of these worlds.
+    #[error("the state that was shown cannot be evaluated: {problem}")]
+    State {
+        /// What is wrong, and the cure.
+        problem: String,
+    },
     /// Something that happened was not recorded.
     #[error("{}: before frame {frames} a gap: {lost} entries were lost; the {frames} frames before it are equal, bit for bit", path.display())]
     Gap {
@@ -136,6 +142,7 @@ impl DaemonError {
             }
             Read { .. } | Config(_) | Model(_) => "SceneError",
             Recording { .. } | Replay { .. } | Differs { .. } | Gap { .. } => "RecordingError",
+            State { .. } => "SnapshotError",
             NeedsPython { .. } => "MissingLibrary",
             Backend(_)
             | Protocol(_)

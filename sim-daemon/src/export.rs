@@ -140,6 +140,7 @@ pub(crate) fn description(
         notes: notes(facts.scene),
         frames_held: facts.frames_held,
         watch_worlds: facts.watch_worlds.min(options.worlds),
+        watch_state_bytes: 0,
         joint_q_max: bound(options.faults.joint_q_max),
         joint_qd_max: bound(options.faults.joint_qd_max),
         on_fault: if options.faults.resets {

@@ -10,6 +10,7 @@ mod error;
 mod export;
 mod faults;
 mod inspect;
+pub mod look;
 mod news;
 mod recording;
 mod server;

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use sim_engine::simulation::Simulation;
-use sim_protocol::host::{Host, Next};
+use sim_protocol::host::{Host, Next, Worlds};
 use sim_protocol::{Op, RefusalKind};
 
 use crate::error::DaemonError;
@@ -36,6 +36,7 @@ fn serve(
     let mut scratch = Vec::new();
     let mut lease = 0;
     let mut is_told = false;
+    let watched = host.description().watch_worlds;
     loop {
         let next = host.wait()?;
         // other memory may lie where the frames of the last lease lay
@@ -58,15 +59,15 @@ fn serve(
                     applied = Err(refusal);
                 }
                 match applied {
-                    Ok(advance) => host.answer(started, |arena| {
-                        // SAFETY: the frames of a lease stay where they are as long as it lasts, and their heads are written
-                        // before and after.
-                        unsafe { simulation.import(arena) };
-                        match advance {
-                            Advance::Step => simulation.step(arena),
-                            Advance::Forward => simulation.forward(arena),
-                        }
-                    }),
+                    Ok(advance) => {
+                        let mut shown = Shown {
+                            simulation,
+                            advance,
+                            is_leased: true,
+                            watched,
+                        };
+                        host.answer(started, &mut shown);
+                    }
                     Err(refusal) => host.refuse(refusal.kind, &refusal.reason),
                 }
                 // the client has its frame, and need not wait for it
@@ -81,13 +82,46 @@ fn serve(
             Next::Watch => {
                 // nobody steps now, so there is time to evaluate what observers have not seen
                 scratch.resize(simulation.layout().bytes.div_ceil(8), 0);
-                simulation.forward(&mut scratch);
-                host.show(&scratch);
+                let mut shown = Shown {
+                    simulation,
+                    advance: Advance::Forward,
+                    is_leased: false,
+                    watched,
+                };
+                host.show(&mut scratch, &mut shown);
                 faults.tell(simulation, news, Instant::now());
             }
             Next::Record => host.record_state(&simulation.snapshot(), false),
             Next::End => return Ok(()),
         }
+    }
+}
+
+/// The worlds, for a frame.
+struct Shown<'a> {
+    simulation: &'a mut Simulation,
+    advance: Advance,
+    /// The arena is of a lease, not of our own.
+    is_leased: bool,
+    /// Worlds that observers see.
+    watched: usize,
+}
+
+impl Worlds for Shown<'_> {
+    fn frame(&mut self, arena: &mut [u64]) {
+        if self.is_leased {
+            // SAFETY: the frames of a lease stay where they are as long as it lasts, and their heads are written before and
+            // after.
+            unsafe { self.simulation.import(arena) };
+        }
+        match self.advance {
+            Advance::Step => self.simulation.step(arena),
+            Advance::Forward => self.simulation.forward(arena),
+        }
+    }
+
+    fn state(&mut self, to: &mut [u8]) {
+        self.simulation.snapshot_first(self.watched, to);
     }
 }
 

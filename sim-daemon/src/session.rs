@@ -113,7 +113,8 @@ fn open(serve: &Serve, stop: &Arc<AtomicBool>) -> Result<(Simulation, Host), Dae
     (told.device, told.threads) = (simulation.device().to_owned(), simulation.threads());
     told.adapter = simulation.adapter().to_owned();
     told.delivery = simulation.delivery().to_owned();
-    told.state_bytes = simulation.snapshot_bytes() as u64;
+    told.state_bytes = simulation.snapshot_bytes(told.worlds) as u64;
+    told.watch_state_bytes = simulation.snapshot_bytes(told.watch_worlds) as u64;
     if let (Some(why), true) = (simulation.device_note(), serve.device == "auto") {
         told.notes.push(format!("device auto is {why}"));
     }

@@ -26,7 +26,7 @@ pub(crate) fn save(simulation: &Simulation, inbox: &Inbox) -> Result<(), Refusal
         ));
     }
     // the bytes, and the file where it lies in memory too
-    check_room(2 * simulation.snapshot_bytes() as u64).map_err(refuse)?;
+    check_room(2 * simulation.snapshot_bytes(simulation.worlds()) as u64).map_err(refuse)?;
     let bytes = simulation.snapshot();
     if let Some(lost) = simulation.lost() {
         return Err(refusal(RefusalKind::Backend, lost.to_string()));

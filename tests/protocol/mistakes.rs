@@ -1,7 +1,9 @@
 //! Mistakes of users: each gets a sentence with the culprit and the cure, and the daemon goes on.
 
 use sim_core::batch::Field;
-use sim_protocol::{Command, Frame, ProtocolError, RefusalKind, Values, keep_waiting};
+use sim_protocol::{
+    Command, Frame, PROTOCOL_VERSION, ProtocolError, RefusalKind, Values, keep_waiting,
+};
 
 use crate::daemon::{Daemon, attach, scene, unique};
 use crate::{command, floats, reset, step, twin, twin_field};
@@ -199,7 +201,7 @@ fn another_protocol_version_is_refused_with_both_named() {
             error,
             ProtocolError::ProtocolVersion {
                 daemon: 99,
-                client: 1,
+                client: PROTOCOL_VERSION,
                 ..
             }
         ),

@@ -9,6 +9,10 @@ from pathlib import Path
 
 def main() -> int:
     """Run the command line of this process; returns its exit code."""
+    if sys.argv[1:2] == ["view"]:
+        from tightloop.view.command import main as view
+
+        return view(sys.argv[2:])
     from tightloop import _core
 
     # Rust does the work and never returns to the interpreter in between: Python's own handler would only set a flag.

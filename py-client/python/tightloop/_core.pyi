@@ -1,5 +1,6 @@
 """Types of the Rust module."""
 
+import os
 from collections.abc import Sequence
 from typing import Any, TypeVar, overload
 
@@ -121,6 +122,9 @@ class Frame:
     contacts_left_out: NDArray[np.uint32]
     """Contacts that did not fit: the most of any physics step of the last frame [–], ``(worlds,)``."""
 
+    state: NDArray[np.uint8]
+    """A snapshot of the worlds of this frame, as bytes; in frames of `Sim.latest` only."""
+
     @property
     def fields(self) -> list[str]:
         """Names of the fields that this frame carries."""
@@ -142,7 +146,56 @@ class Client:
     def forward(self) -> Frame: ...
     def snapshot(self, path: str, /) -> Frame: ...
     def restore(self, path: str, mask: Any, from_world: int | None, /) -> Frame: ...
+    def latest(self) -> Frame | None: ...
+    def wait_newer(self, timeout: float, /) -> Frame | None: ...
+    def controller(self) -> int | None: ...
+    def release(self) -> None: ...
     def close(self) -> None: ...
+
+class Evaluation:
+    """Worlds of a scene at states that a daemon shows; `tightloop.view` uses it.
+
+    Args:
+        scene: The scene as TOML, with paths relative to ``folder``.
+        worlds: How many: the first ones of each state.
+        precision: Of the run.
+        fields: What is evaluated, besides what every frame has.
+
+    Raises:
+        SceneError: The scene is not valid, or its files cannot be read.
+        UnknownField: There is no such field.
+    """
+
+    def __init__(self, scene: str, folder: str, worlds: int, precision: str, fields: Sequence[str]) -> None: ...
+    @property
+    def model_hash(self) -> int: ...
+    def evaluate(self, state: NDArray[np.uint8], /) -> dict[str, NDArray[Any]]:
+        """The fields by name, worlds first, at the ``state`` of a frame of `Client.latest`.
+
+        Raises:
+            SnapshotError: It is no state of such worlds.
+        """
+
+class Playback:
+    """A recording, run again without a daemon, frame after frame; `tightloop.view` uses it.
+
+    Args:
+        path: The file.
+        worlds: How many worlds its frames show: the first ones.
+        fields: What they carry, besides what every frame has.
+
+    Raises:
+        RecordingError: It cannot be read, or is no recording, or its scene's files are not where they were.
+        UnknownField: There is no such field.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], worlds: int, fields: Sequence[str]) -> None: ...
+    def describe(self) -> str: ...
+    @property
+    def note(self) -> str | None: ...
+    @property
+    def end(self) -> str | None: ...
+    def next(self) -> dict[str, NDArray[Any]] | None: ...
 
 class Dynamics:
     """A scene's model at given states; `tightloop.Dynamics` wraps it, and documents its methods."""
@@ -237,3 +290,4 @@ def read_mesh(
 def scene_to_toml(scene: str, /) -> str: ...
 def save_scene(scene: str, path: str, /) -> None: ...
 def load_scene(path: str, /) -> str: ...
+def parts(scene: str, folder: str, /) -> tuple[str, list[tuple[NDArray[np.float32], NDArray[np.uint32]]]]: ...

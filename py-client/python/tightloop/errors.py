@@ -79,6 +79,10 @@ class SnapshotError(TightloopError, ValueError):
     """A snapshot is damaged, of something else, or cannot be written; the message says which. No world was changed."""
 
 
+class RecordingError(TightloopError, ValueError):
+    """A recording cannot be read, or not further, or the files of its scene are not what they were."""
+
+
 class UnknownField(TightloopError, AttributeError):
     """Frames of this run do not carry that field; ask for it in ``fields`` at launch."""
 

@@ -8,6 +8,7 @@ import re
 import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal, SupportsFloat, SupportsIndex
 
 import numpy as np
@@ -344,21 +345,26 @@ class Scene(Randomized):
             UrdfError: A robot in it cannot be read.
         """
         file = checks.path("load: path", path)
+        return cls._read(file, file.parent)
+
+    @classmethod
+    def _read(cls, file: Path, folder: Path) -> Scene:
+        """Read a scene file whose relative paths are those of a folder, which need not be its own."""
         data = json.loads(_core.load_scene(str(file)))
         options = ("dt", "substeps", "gravity", "contacts_max", "rows_max", "params", "command_delay_max")
         scene = cls(**{option: data[option] for option in options if option in data})
         scene.solver(**data["solver"])
         for table in data.get("robot", ()):
             joints = {name: table.pop(name) for name in PER_DOF if name in table}
-            packages = [file.parent / folder for folder in table.pop("package_dirs", ())]
-            robot = scene.add_urdf(file.parent / table.pop("urdf"), package_dirs=packages, **table)
+            packages = [folder / package for package in table.pop("package_dirs", ())]
+            robot = scene.add_urdf(folder / table.pop("urdf"), package_dirs=packages, **table)
             for name, values in joints.items():
                 setattr(robot, name, values if name == "joint_target_mode" else np.array(values, dtype=float))
         for table in data.get("body", ()):
             scene.add_body(**table)
         for shape in data.get("shape", ()):
             if "path" in shape:
-                shape["path"] = file.parent / shape["path"]
+                shape["path"] = folder / shape["path"]
             getattr(scene, f"add_{shape.pop('type')}")(**shape)
         for pair in data.get("contact_filters", ()):
             scene.filter_contacts(*pair)

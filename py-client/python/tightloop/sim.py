@@ -21,6 +21,7 @@ from tightloop.errors import ArgumentError, CommandRefused, UnknownField
 from tightloop.params import Params
 from tightloop.scene import Scene
 from tightloop.snapshot import Snapshot, passing
+from tightloop.view.process import Viewer
 
 #: An array (worlds, dofs) for the whole scene, one (dofs,) for every world, or such arrays by robot name.
 Command = ArrayLike | Mapping[str, ArrayLike]
@@ -69,7 +70,8 @@ class Sim:
         self.info: dict[str, Any] = json.loads(client.describe())
         self.name: str = self.info["name"]
         # Runs when the last reference goes, and at interpreter exit
-        self._end = weakref.finalize(self, _end, client, daemon, self.name, os.getpid())
+        self._viewers: list[Viewer] = []
+        self._end = weakref.finalize(self, _end, client, daemon, self.name, os.getpid(), self._viewers)
         self.pid: int = self.info["pid"]
         self.device: str = self.info["device"]
         self.precision: str = self.info["precision"]
@@ -209,6 +211,35 @@ class Sim:
         """Evaluate every field at the present state and commands, without stepping. Raises as `step` does."""
         return self._client.forward()
 
+    def latest(self, timeout: float = 0.0) -> Frame | None:
+        """What observers see: the newest frame of the first ``info["watch_worlds"]`` worlds, whoever steps them.
+
+        It needs no control, and costs whoever has it next to nothing. States after a step are shown at most 60 times a
+        second (half as often where there are more than 256 worlds to see), and so is any at which the simulation rests.
+
+        Args:
+            timeout: How long to wait for one [s].
+
+        Returns:
+            A frame that carries those worlds only, and in ``state`` a snapshot of them as bytes; None if there is none
+            that this client has not seen.
+
+        Raises:
+            ArgumentError: ``timeout`` is no number, or below 0.
+            FramesHeld: As many such frames are alive as ``frames_held`` allows.
+            DaemonLost: The daemon went away.
+        """
+        timeout = checks.number("latest: timeout", timeout, least=0.0, error=ArgumentError)
+        return self._client.wait_newer(timeout) if timeout > 0.0 else self._client.latest()
+
+    def controller(self) -> int | None:
+        """The process that controls the simulation, if any: one that has stepped or reset it and has not let go."""
+        return self._client.controller()
+
+    def release(self) -> None:
+        """Let another client take control; the next command takes it back, or raises `LeaseHeld`."""
+        self._client.release()
+
     def snapshot(self) -> Snapshot:
         """Keep all worlds as they are now: a run that is restored from it goes on with the same bits.
 
@@ -286,6 +317,26 @@ class Sim:
         """Joint forces that give accelerations at given states; see `Dynamics.inverse_dynamics`."""
         return self.dynamics.inverse_dynamics(joint_q, joint_qd, joint_qdd, damping=damping)
 
+    def view(self, *, port: int = 8080, worlds: int = 256, open: bool = False) -> Viewer:
+        """Show it in the browser, by a process of its own that takes no time of this one. It ends with the simulation.
+
+        The page shows what happens, and drives the simulation while nobody else is in control.
+
+        Args:
+            port: Port of the page on this machine; the next free one if it is taken.
+            worlds: The most worlds to show, up to 1024; the daemon shows its first ``watch_worlds``.
+            open: Whether to open the page in this machine's browser.
+
+        Returns:
+            The viewer: its ``url``, and ``close()``.
+
+        Raises:
+            LaunchError: The viewer did not start; stderr says why.
+        """
+        viewer = Viewer(self.name, port=port, worlds=worlds, open=open)
+        self._viewers.append(viewer)
+        return viewer
+
     def close(self) -> None:
         """End the simulation: a launched daemon stops, an attached one is released. Frames stay valid."""
         self._end()
@@ -317,6 +368,7 @@ def launch(
     name: str | None = None,
     log: str | os.PathLike[str] | None = None,
     frames_held: int = 4,
+    watch_worlds: int = 256,
 ) -> Sim:
     """Start a daemon that simulates a scene, and join it. The daemon ends with this process, however that ends.
 
@@ -347,6 +399,7 @@ def launch(
         log: File for the daemon's news, such as how many worlds were frozen, at most one line a second; warnings and
             errors go to stderr if left out.
         frames_held: How many frames may be alive at once, at least 1.
+        watch_worlds: How many worlds observers see, such as the viewer: the first ones, or all if there are fewer.
 
     Raises:
         ArgumentError: An argument is not valid; the message lists what is.
@@ -372,6 +425,7 @@ def launch(
         if name is None
         else checks.text("launch: name", name, error=ArgumentError),
         "frames-held": checks.integer("launch: frames_held", frames_held, error=ArgumentError),
+        "watch-worlds": checks.integer("launch: watch_worlds", watch_worlds, error=ArgumentError),
     }
     if arguments["device"].startswith("gpu:"):
         arguments["device"], arguments["adapter"] = arguments["device"].split(":", 1)
@@ -418,10 +472,12 @@ def attach(name: str) -> Sim:
     return Sim(_core.Client(checks.text("attach: name", name, error=ArgumentError), lease=False), None)
 
 
-def _end(client: _core.Client, daemon: Daemon | None, name: str, owner: int) -> None:
+def _end(client: _core.Client, daemon: Daemon | None, name: str, owner: int, viewers: list[Viewer]) -> None:
     # A forked child must not end what belongs to its parent
     if os.getpid() != owner:
         return
+    for viewer in viewers:
+        viewer.close()
     client.close()
     if daemon is None:
         _core.sweep(name)  # does nothing while the daemon lives

@@ -209,12 +209,29 @@ impl Simulation {
     /// All worlds as bytes, from which a run resumes bit for bit; [`crate::snapshot`] says how they lie. Worthless where
     /// [`Simulation::lost`] says so after it.
     pub fn snapshot(&self) -> Vec<u8> {
-        snapshot::write(&self.head(), |records| self.backend.save(records))
+        let mut bytes = vec![0; self.snapshot_bytes(self.worlds)];
+        self.snapshot_first(self.worlds, &mut bytes);
+        bytes
     }
 
-    /// Bytes that [`Simulation::snapshot`] gives.
-    pub fn snapshot_bytes(&self) -> usize {
-        self.head().bytes()
+    /// A snapshot of the first worlds alone, for those who look on.
+    ///
+    /// # Panics
+    /// If `to` is not of [`Simulation::snapshot_bytes`], or there are fewer worlds.
+    pub fn snapshot_first(&self, worlds: usize, to: &mut [u8]) {
+        assert!(worlds <= self.worlds, "there are fewer worlds");
+        let head = Head {
+            worlds,
+            ..self.head()
+        };
+        assert_eq!(to.len(), head.bytes(), "another size than a snapshot's");
+        snapshot::write(&head, to, |records| self.backend.save(records));
+    }
+
+    /// Bytes of a snapshot of so many worlds.
+    pub fn snapshot_bytes(&self, worlds: usize) -> usize {
+        let head = self.head();
+        Head { worlds, ..head }.bytes()
     }
 
     /// Sets the worlds of the mask (none = all) to what a snapshot has of them, counters and commands included;
@@ -231,6 +248,17 @@ impl Simulation {
     ) -> Result<(), SnapshotError> {
         let records = snapshot::check(bytes, &self.head(), mask, from_world)?;
         self.backend.restore(records, mask, from_world);
+        Ok(())
+    }
+
+    /// Sets all worlds to the first ones of a snapshot, which may have more, for those who look on: a world that is not finite
+    /// there stays as it is, and a checksum is not asked for.
+    ///
+    /// # Errors
+    /// Bytes that are no snapshot, or not of this model and precision, or of fewer worlds; nothing is changed then.
+    pub fn restore_first(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
+        let (records, are_finite) = snapshot::first(bytes, &self.head())?;
+        self.backend.restore(records, Some(&are_finite), None);
         Ok(())
     }
 

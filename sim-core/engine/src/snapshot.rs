@@ -139,9 +139,8 @@ impl Head {
     }
 }
 
-/// The snapshot whose records `fill` writes.
-pub(crate) fn write(head: &Head, fill: impl FnOnce(&mut [u8])) -> Vec<u8> {
-    let mut bytes = vec![0; head.bytes()];
+/// A snapshot, as long as its head says, whose records `fill` writes.
+pub(crate) fn write(head: &Head, bytes: &mut [u8], fill: impl FnOnce(&mut [u8])) {
     fill(&mut bytes[HEAD..]);
     bytes[..8].copy_from_slice(&MAGIC);
     bytes[8..12].copy_from_slice(&VERSION.to_le_bytes());
@@ -151,7 +150,6 @@ pub(crate) fn write(head: &Head, fill: impl FnOnce(&mut [u8])) -> Vec<u8> {
     bytes[36..40].copy_from_slice(&(head.real() as u32).to_le_bytes());
     let checksum = crc32fast::hash(&bytes[COVERED..]);
     bytes[12..16].copy_from_slice(&checksum.to_le_bytes());
-    bytes
 }
 
 /// Records of a snapshot that fits a simulation, which `here` describes, and may be restored in the worlds of the mask
@@ -165,25 +163,7 @@ pub(crate) fn check<'a>(
     mask: Option<&[bool]>,
     from_world: Option<usize>,
 ) -> Result<&'a [u8], SnapshotError> {
-    let (model, worlds, numbers, real) = read_head(bytes)?;
-    if crc32fast::hash(&bytes[COVERED..]) != word(bytes, 12) {
-        return Err(SnapshotError::Damaged);
-    }
-    if model != here.model {
-        let expected = here.model;
-        return Err(SnapshotError::Model {
-            got: model,
-            expected,
-        });
-    }
-    if real != here.real() {
-        let (got, expected) = (8 * real as u64, 8 * here.real() as u64);
-        return Err(SnapshotError::Precision { got, expected });
-    }
-    if numbers != here.numbers {
-        let (got, expected) = (numbers, here.numbers);
-        return Err(SnapshotError::Numbers { got, expected });
-    }
+    let worlds = fit(bytes, here, true)?;
     match from_world {
         None if worlds != here.worlds => {
             let (got, expected) = (worlds, here.worlds);
@@ -215,6 +195,49 @@ pub(crate) fn check<'a>(
         Some(world) => Err(SnapshotError::NotFinite { world }),
         None => Ok(records),
     }
+}
+
+/// Records of a snapshot of as many worlds as a simulation, or more, and which of the simulation's worlds are finite there. For
+/// those who look on: it comes out of memory, so that its checksum is passed over.
+///
+/// # Errors
+/// The first thing that is wrong.
+pub(crate) fn first<'a>(
+    bytes: &'a [u8],
+    here: &Head,
+) -> Result<(&'a [u8], Vec<bool>), SnapshotError> {
+    let (got, expected) = (fit(bytes, here, false)?, here.worlds);
+    if got < expected {
+        return Err(SnapshotError::Worlds { got, expected });
+    }
+    let records = &bytes[HEAD..];
+    let own = records.chunks_exact(here.record()).take(expected);
+    let are_finite = own.map(|record| is_finite(&record[COUNTERS..], here.precision));
+    Ok((records, are_finite.collect()))
+}
+
+/// Worlds of a snapshot of the model that `here` describes; its checksum is compared if asked for.
+fn fit(bytes: &[u8], here: &Head, is_summed: bool) -> Result<usize, SnapshotError> {
+    let (model, worlds, numbers, real) = read_head(bytes)?;
+    if is_summed && crc32fast::hash(&bytes[COVERED..]) != word(bytes, 12) {
+        return Err(SnapshotError::Damaged);
+    }
+    if model != here.model {
+        let expected = here.model;
+        return Err(SnapshotError::Model {
+            got: model,
+            expected,
+        });
+    }
+    if real != here.real() {
+        let (got, expected) = (8 * real as u64, 8 * here.real() as u64);
+        return Err(SnapshotError::Precision { got, expected });
+    }
+    if numbers != here.numbers {
+        let (got, expected) = (numbers, here.numbers);
+        return Err(SnapshotError::Numbers { got, expected });
+    }
+    Ok(worlds)
 }
 
 /// Model, worlds, numbers of a world and bytes of a number, of a snapshot that is as long as these say.

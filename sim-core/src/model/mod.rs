@@ -44,4 +44,4 @@ pub use inertia::principal_moments;
 pub use pose::Pose;
 pub use ranges::{ParamDraw, ParamRanges};
 pub use surface::Surface;
-pub use urdf::UrdfOptions;
+pub use urdf::{Look, UrdfOptions, Visual, Visuals};

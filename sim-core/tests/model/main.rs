@@ -12,3 +12,4 @@ mod refused;
 mod shapes;
 mod urdf;
 mod validate;
+mod visuals;

@@ -71,6 +71,8 @@ pub struct Description {
     pub frames_held: usize,
     /// Worlds that observers see: the first ones.
     pub watch_worlds: usize,
+    /// Size of their state, as observers get it: a snapshot of these worlds [bytes].
+    pub watch_state_bytes: u64,
     /// Largest |joint_q| of a world before it is frozen [rad or m], if there is one.
     pub joint_q_max: Option<f64>,
     /// Largest |joint_qd| of a world before it is frozen [rad/s or m/s], if there is one.
@@ -147,6 +149,7 @@ impl Description {
         hash.text(&self.precision);
         hash.number(self.frames_held as u64);
         hash.number(self.watch_worlds as u64);
+        hash.number(self.watch_state_bytes);
         self.dof_names.iter().for_each(|name| hash.text(name));
         self.coord_names.iter().for_each(|name| hash.text(name));
         self.body_names.iter().for_each(|name| hash.text(name));

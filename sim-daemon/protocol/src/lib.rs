@@ -5,7 +5,7 @@
 //!            control (request-response, JSON) ◄── describe · acquire · heartbeat · release · journal · shutdown
 //!  daemon    act/<epoch>   (pub-sub, 1 : 1)   ◄── command: header, field table, arrays ──   controller
 //!            obs/<epoch>   (pub-sub, 1 : 1)   ──► frame:   header, field table, arrays ──►
-//!            watch         (pub-sub, 1 : n)   ──► frames of the first worlds, at a limited rate ──► observers
+//!            watch         (pub-sub, 1 : n)   ──► frames of the first worlds and their state, at a limited rate ──► observers
 //!            journal/<n>   (pub-sub, 1 : 1)   ──► each command carried out, and digests of its frame ──► recorder
 //! ```
 //!

@@ -3,6 +3,7 @@
 //! Paths in a file are relative to it; relative paths in a text are relative to the folder given with it.
 
 mod bodies;
+mod looks;
 mod number;
 pub(crate) mod paths;
 mod randomize;
@@ -19,6 +20,8 @@ use sim_core::model::params::Param;
 use sim_core::model::{Cone, Description, ModelError, Pose, Solver};
 
 pub use bodies::BodyTable;
+pub use looks::Looks;
+pub(crate) use looks::hull_sides;
 pub use number::{Number, PerDof};
 pub use randomize::{DistributionTable, ParamTable, RandomizeTable};
 pub use robots::{ModeName, RobotTable};

@@ -10,11 +10,12 @@ mod tree;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use sim_core::model::geometry::{Hull, MeshOptions, TriMesh, triangles};
+use sim_core::model::geometry::{MeshOptions, triangles};
 use sim_core::model::{Description, ModelError, Pose, Robot, Shape, UrdfOptions};
 use sim_engine::dynamics::Dynamics;
 
 use crate::cli::Inspect;
+use crate::config::hull_sides;
 use crate::error::DaemonError;
 use facts::Facts;
 use picture::Drawing;
@@ -91,18 +92,6 @@ fn failed(path: &Path, problem: String) -> DaemonError {
     }
 }
 
-/// The sides of a hull.
-fn sides(hull: &Hull) -> TriMesh {
-    let sides = hull.faces.iter().flat_map(|face| {
-        let fan = face.corners.windows(2).skip(1);
-        fan.map(|edge| [face.corners[0], edge[0], edge[1]])
-    });
-    TriMesh {
-        vertices: hull.vertices.clone(),
-        triangles: sides.collect(),
-    }
-}
-
 /// Where the picture goes, if anywhere.
 fn destination(args: &Inspect, robot: &Robot) -> Option<PathBuf> {
     match &args.png {
@@ -137,7 +126,7 @@ fn drawing(facts: &Facts, frames: &[f64], args: &Inspect) -> Drawing {
             let frame = pose.mul(&collision.pose);
             let mut draw = |surface| shapes.push((place as u32, frame, surface));
             match &collision.shape {
-                Shape::Mesh(mesh) if args.hulls => mesh.hulls.iter().map(sides).for_each(draw),
+                Shape::Mesh(mesh) if args.hulls => mesh.hulls.iter().map(hull_sides).for_each(draw),
                 shape => draw(triangles(shape)),
             }
         }

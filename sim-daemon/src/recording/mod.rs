@@ -13,15 +13,19 @@
 
 mod blocks;
 mod compare;
+mod entries;
+mod playback;
 mod record;
 mod records;
 mod replay;
+mod run;
 #[cfg(test)]
 mod tests;
 mod writer;
 
 use std::path::Path;
 
+pub use playback::Playback;
 pub(crate) use record::run as record;
 pub(crate) use replay::run as replay;
 

@@ -159,7 +159,7 @@ pub trait Backend: Send {
     fn params(&self, columns: Range<usize>, to: &mut [f64]);
     /// Numbers of a world's state and commands: all that a step begins from.
     fn numbers(&self) -> usize;
-    /// Writes a record a world, in order: [`COUNTERS`] bytes, then [`Backend::numbers`] numbers of the run's precision. They are
+    /// Writes the records of the first worlds, as many as there is room for, in order: [`COUNTERS`] bytes, then [`Backend::numbers`] numbers of the run's precision. They are
     /// worthless if a device is lost after it.
     fn save(&self, records: &mut [u8]);
     /// Sets the worlds of the mask (none = all) to their records, or all of them to that of `from_world`.

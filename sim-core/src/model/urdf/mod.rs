@@ -11,6 +11,7 @@ mod scan;
 mod source;
 mod table;
 mod value;
+mod visual;
 mod xml;
 
 use std::collections::HashMap;
@@ -23,6 +24,7 @@ use super::pose::Pose;
 use super::validate::{Culprit, Fault};
 use reader::Reader;
 use scan::Scan;
+pub use visual::{Look, Visual, Visuals};
 
 /// How a URDF file joins a scene.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -421,6 +421,11 @@ impl<'a, 'input> Scan<'a, 'input> {
         }
     }
 
+    /// Whether `quat_xyzw` counts.
+    pub fn has_quaternions(&self) -> bool {
+        self.has_quaternions
+    }
+
     /// The outermost element.
     pub fn root(&self) -> Node<'a, 'input> {
         self.document.root_element()

@@ -7,7 +7,7 @@ use rustix::fs::{FallocateFlags, fallocate, statvfs};
 use crate::command::command_bytes;
 use crate::place::SHARED_MEMORY;
 use crate::transport::{COMMAND_SLOTS, frame_slots, watch_slots};
-use crate::{Description, ProtocolError, Table};
+use crate::{Description, Dtype, ProtocolError, Table};
 
 /// What the transport puts before a payload [bytes]: its header, ours, alignment.
 const SLOT_HEAD: usize = 256;
@@ -33,13 +33,15 @@ pub(crate) fn journal_bytes(slot: usize, slots: usize) -> usize {
     slots * (slot + SLOT_HEAD)
 }
 
-/// What observers see of a frame: the first worlds.
+/// What observers see of a frame: the first worlds, and last their state.
 pub(crate) fn watch_table(description: &Description, frame: &Table) -> Table {
-    Table::lay_out(frame.rows().iter().map(|row| {
+    let seen = frame.rows().iter().map(|row| {
         let mut shape = row.shape.clone();
         shape[0] = shape[0].min(description.watch_worlds);
         (row.name.clone(), row.dtype, shape, 0)
-    }))
+    });
+    let state = vec![description.watch_state_bytes as usize];
+    Table::lay_out(seen.chain([("state".to_owned(), Dtype::U8, state, 0)]))
 }
 
 /// Bytes of everything.

@@ -9,6 +9,7 @@ pub(crate) mod memory;
 mod state;
 #[cfg(test)]
 mod tests;
+mod watch;
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -22,7 +23,8 @@ pub use janitor::Janitor;
 
 use self::journal::Journals;
 use self::lane::Lane;
-use self::state::State;
+use self::state::{State, header};
+use self::watch::Watch;
 use crate::apart::Apart;
 use crate::control::Response;
 use crate::pace::{Pace, cores};
@@ -36,6 +38,14 @@ type S = ipc::Service;
 const AROUND_PERIOD: Duration = Duration::from_millis(20);
 /// Room for answers other than the description [bytes].
 const RESPONSE_MIN: usize = 1024;
+
+/// What a host asks for: frames, and for those who look on the state behind them.
+pub trait Worlds {
+    /// Writes the arena of a frame.
+    fn frame(&mut self, arena: &mut [u64]);
+    /// Writes the state of the worlds that observers see, [`Description::watch_state_bytes`] of it.
+    fn state(&mut self, to: &mut [u8]);
+}
 
 /// The wire of one daemon.
 pub struct Host {
@@ -81,7 +91,6 @@ impl Host {
         description.session = session;
         description.pid = std::process::id();
         description.schema = description.schema_hash();
-        let watch_table = memory::watch_table(&description, &frame);
         check_memory(&description, &frame, 0)?;
 
         let node = transport::node::<S>(&tenancy.place().transport_config(session), "daemon")?;
@@ -96,11 +105,7 @@ impl Host {
             serde_json::to_vec(&Response::Description(Box::new(description.clone())))
                 .expect("descriptions are plain data");
         let responder = transport::responder(&node, description_json.len().max(RESPONSE_MIN))?;
-        let watch_service = transport::create_watch(&node, description.frames_held)?;
-        let watch = transport::frame_publisher(&watch_service, watch_table.total_bytes())?;
-        let prefix = node.config().global.prefix.to_string();
-        memory::reserve(&prefix, watch.id().value(), "the frames of observers")?;
-        let watch_notifier = transport::notifier(&transport::create_event(&node, "watch", &[])?)?;
+        let watch = Watch::open(&node, &description, &frame)?;
         let lane = Lane::open(&node, 1, &frame, description.frames_held)?;
         // last: from here on clients may come
         tenancy.announce(session)?;
@@ -111,17 +116,11 @@ impl Host {
             description,
             description_json,
             frame,
-            watch_table,
             lane: Some(lane),
             journals: Journals::default(),
             epochs: 1,
             responder,
             watch,
-            watch_service,
-            watch_notifier,
-            watchers: 0,
-            unseen: true,
-            shown: Instant::now(),
             looked: Instant::now(),
             frames: 0,
             inbox,
@@ -183,11 +182,11 @@ impl Host {
         &self.state.inbox
     }
 
-    /// Answers the command: `fill` writes the arena of the frame, straight into shared memory.
+    /// Answers the command with a frame, which the worlds write straight into shared memory.
     ///
     /// `started` is when work on the command began.
-    pub fn answer(&mut self, started: Instant, fill: impl FnOnce(&mut [u64])) {
-        self.state.answer(started, fill);
+    pub fn answer(&mut self, started: Instant, worlds: &mut impl Worlds) {
+        self.state.answer(started, worlds);
     }
 
     /// The number of the present lease: its frames lie in memory of its own. 0 if there is none.
@@ -212,10 +211,13 @@ impl Host {
         self.state.refuse(kind, reason);
     }
 
-    /// Shows observers a frame; `arena` as [`Host::answer`]'s `fill` would write it.
-    pub fn show(&mut self, arena: &[u64]) {
-        self.state.frames += 1;
-        self.state.show(arena);
+    /// Shows observers the present state; `arena` has room for a frame.
+    pub fn show(&mut self, arena: &mut [u64], worlds: &mut impl Worlds) {
+        let state = &mut self.state;
+        state.frames += 1;
+        worlds.frame(arena);
+        let head = header(&state.description, &state.frame, state.frames);
+        state.watch.show(head, &state.frame, arena, worlds);
     }
 }
 

@@ -4,22 +4,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use iceoryx2::port::notifier::Notifier;
-use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::prelude::{Node, PortFactory};
+use iceoryx2::prelude::Node;
 
 use super::journal::{Journals, Occasion, RECORDERS_MAX};
 use super::lane::Lane;
-use super::{Inbox, Janitor, Next, S, memory};
+use super::watch::Watch;
+use super::{Inbox, Janitor, Next, S, Worlds, memory};
 use crate::apart::Apart;
 use crate::control::{Request, Response};
 use crate::loan;
 use crate::pace::Waiting;
-use crate::transport::{FramePublisher, FrameService, Responder};
+use crate::transport::Responder;
 use crate::{ALIGNMENT, Description, Dtype, FrameHeader, ProtocolError, RefusalKind, Table};
 
-/// Observers see at most this many frames a second.
-const WATCH_PERIOD: Duration = Duration::from_micros(16_667);
 /// A look around that comes later than this was held up by ourselves, and heartbeats with it.
 const HELD_UP: Duration = Duration::from_millis(200);
 /// Everything of a host but the waiting.
@@ -28,18 +25,11 @@ pub(super) struct State {
     pub(super) description: Description,
     pub(super) description_json: Vec<u8>,
     pub(super) frame: Table,
-    pub(super) watch_table: Table,
     pub(super) lane: Option<Lane>,
     pub(super) journals: Journals,
     pub(super) epochs: u64,
     pub(super) responder: Responder<S>,
-    pub(super) watch: FramePublisher<S>,
-    pub(super) watch_service: FrameService<S>,
-    pub(super) watch_notifier: Notifier<S>,
-    pub(super) watchers: usize,
-    /// The state has changed since observers were shown one.
-    pub(super) unseen: bool,
-    pub(super) shown: Instant,
+    pub(super) watch: Watch,
     pub(super) looked: Instant,
     pub(super) frames: u64,
     pub(super) inbox: Inbox,
@@ -186,7 +176,7 @@ impl State {
         end.then_some(Next::End)
     }
 
-    pub(super) fn answer(&mut self, started: Instant, fill: impl FnOnce(&mut [u64])) {
+    pub(super) fn answer(&mut self, started: Instant, worlds: &mut impl Worlds) {
         let Some(lane) = &mut self.lane else {
             return self.record_inputs();
         };
@@ -201,24 +191,18 @@ impl State {
         let words = loan::words(loan.payload_mut());
         let (head, arena) = words.split_at_mut(Table::head_bytes(self.frame.rows().len()) / 8);
         head[..self.frame.words().len()].copy_from_slice(self.frame.words());
-        fill(arena);
+        worlds.frame(arena);
         self.frames += 1;
-        self.unseen = true;
+        self.watch.changed();
         let now = Instant::now();
-        let due = self.watchers > 0 && now.duration_since(self.shown) > WATCH_PERIOD;
-        if due {
-            self.show(arena);
-        }
-        let Some(lane) = &mut self.lane else {
-            return;
-        };
+        let common = header(&self.description, &self.frame, self.frames);
         let busy_ns = now.duration_since(started).as_nanos() as u64;
         *loan.user_header_mut() = FrameHeader {
             epoch: lane.epoch,
             ack_seq: self.inbox.header().seq,
             busy_ns,
             core: self.apart.core(),
-            ..header(&self.description, &self.frame, self.frames)
+            ..common
         };
         if let Some(holder) = &mut lane.holder {
             holder.beat = now;
@@ -230,13 +214,16 @@ impl State {
         // a holder that cannot be notified looks by itself after 50 ms
         let _ = lane.notifier.notify();
         // last: nobody waits for it
+        let head = Table::head_bytes(self.frame.rows().len()) / 8;
+        if self.watch.is_due() {
+            self.watch.show(common, &self.frame, &sent[head..], worlds);
+        }
         if self.journals.are_read() {
             let occasion = Occasion {
                 description: &self.description,
                 inbox: &self.inbox,
                 table: &self.frame,
             };
-            let head = Table::head_bytes(self.frame.rows().len()) / 8;
             self.journals.entry(&occasion, Some(&sent[head..]));
         }
     }
@@ -249,33 +236,6 @@ impl State {
             table: &self.frame,
         };
         self.journals.entry(&occasion, None);
-    }
-
-    /// Shows observers the first worlds of an arena.
-    pub(super) fn show(&mut self, arena: &[u64]) {
-        (self.shown, self.unseen) = (Instant::now(), false);
-        let Ok(mut loan) = self
-            .watch
-            .loan_slice_uninit(self.watch_table.total_bytes() / ALIGNMENT)
-        else {
-            return; // observers keep every slot: they miss a frame
-        };
-        let words = loan::words(loan.payload_mut());
-        words[..self.watch_table.words().len()].copy_from_slice(self.watch_table.words());
-        let (from, head): (&[u8], _) = (
-            bytemuck::cast_slice(arena),
-            Table::head_bytes(self.frame.rows().len()),
-        );
-        let to: &mut [u8] = bytemuck::cast_slice_mut(words);
-        for (source, target) in self.frame.rows().iter().zip(self.watch_table.rows()) {
-            // worlds come first in every array, so the first worlds are its first bytes
-            to[target.offset..target.offset + target.bytes]
-                .copy_from_slice(&from[source.offset - head..][..target.bytes]);
-        }
-        *loan.user_header_mut() = header(&self.description, &self.watch_table, self.frames);
-        // an observer that cannot be reached misses a frame; one that cannot be notified looks by itself after 50 ms
-        let _ = loan::send(loan);
-        let _ = self.watch_notifier.notify();
     }
 
     pub(super) fn refuse(&mut self, kind: RefusalKind, reason: &str) {
@@ -331,8 +291,7 @@ impl State {
         }
         self.lane.iter().for_each(Lane::refresh);
         // new observers get the frame shown last, dead ones give their slots back
-        let _ = self.watch.update_connections();
-        self.watchers = self.watch_service.dynamic_config().number_of_subscribers();
+        self.watch.refresh();
         let waits = self.journals.refresh();
         next.or(waits.then_some(Next::Record))
     }
@@ -382,13 +341,12 @@ impl Waiting<Next> for State {
 
     fn around(&mut self) -> Result<Option<Next>, ProtocolError> {
         let next = self.look_around();
-        let due = self.unseen && self.watchers > 0 && self.shown.elapsed() > WATCH_PERIOD;
-        Ok(next.or(due.then_some(Next::Watch)))
+        Ok(next.or(self.watch.is_due().then_some(Next::Watch)))
     }
 }
 
 /// What every frame's head has in common.
-fn header(description: &Description, table: &Table, frame: u64) -> FrameHeader {
+pub(super) fn header(description: &Description, table: &Table, frame: u64) -> FrameHeader {
     let (session, schema) = (description.session, description.schema);
     FrameHeader {
         session,

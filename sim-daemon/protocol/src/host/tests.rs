@@ -7,6 +7,7 @@ use std::thread::JoinHandle;
 use std::sync::atomic::Ordering;
 
 use super::*;
+use crate::PROTOCOL_VERSION;
 use crate::place::Place;
 use crate::transport::CommandPublisher;
 use crate::{
@@ -66,6 +67,7 @@ fn description() -> Description {
         notes: Vec::new(),
         frames_held: 2,
         watch_worlds: 1,
+        watch_state_bytes: STATE as u64,
         joint_q_max: None,
         joint_qd_max: None,
         on_fault: "freeze".to_owned(),
@@ -73,6 +75,19 @@ fn description() -> Description {
         draws: "world".to_owned(),
         state_bytes: 0,
         schema: 0,
+    }
+}
+
+/// Worlds whose frames and state are a number.
+struct Counted(u64);
+
+impl Worlds for Counted {
+    fn frame(&mut self, arena: &mut [u64]) {
+        arena[..2].fill(self.0);
+    }
+
+    fn state(&mut self, to: &mut [u8]) {
+        to.fill(self.0 as u8);
     }
 }
 
@@ -88,9 +103,9 @@ fn serve(place: &Place, stop: Arc<AtomicBool>, ready: Sender<()>) {
         match host.wait().unwrap() {
             Next::Command => {
                 count += 1;
-                host.answer(Instant::now(), |arena| arena[..2].fill(count));
+                host.answer(Instant::now(), &mut Counted(count));
             }
-            Next::Watch => host.show(&[count; 8]),
+            Next::Watch => host.show(&mut [0; 8], &mut Counted(count)),
             Next::Record => host.record_state(&[count as u8; STATE], false),
             Next::End => break,
         }
@@ -394,7 +409,9 @@ fn facts_that_differ_are_refused_with_both_named() {
         .unwrap_err()
         .to_string();
     assert!(
-        error.contains("protocol version is 7 in the handshake and 1"),
+        error.contains(&format!(
+            "protocol version is 7 in the handshake and {PROTOCOL_VERSION}"
+        )),
         "{error}"
     );
     drop((wake, node, tenancy));

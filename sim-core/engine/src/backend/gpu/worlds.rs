@@ -164,16 +164,17 @@ impl Gpu {
         Ok(())
     }
 
-    /// Writes a record a world.
+    /// Writes the records of the first worlds.
     pub(super) fn save_records(&self, records: &mut [u8]) -> Result<(), BackendError> {
         let size = COUNTERS + 4 * self.shape().total();
-        for tile in &self.tiles {
+        let asked = records.len() / size;
+        for tile in self.tiles.iter().filter(|tile| tile.worlds.start < asked) {
             let kept = tile.fetch(&self.device)?;
             let read = kept.read();
             let words: &[u32] = host::words(&read);
             let at = |i: usize, w: usize| words[((i / 4) * tile.width as usize + w) * 4 + i % 4];
             let counters = self.places.state as usize;
-            for (w, world) in tile.worlds.clone().enumerate() {
+            for (w, world) in (tile.worlds.start..tile.worlds.end.min(asked)).enumerate() {
                 let (head, numbers) =
                     records[world * size..(world + 1) * size].split_at_mut(COUNTERS);
                 for k in 0..4 {

@@ -1,0 +1,81 @@
+"""The subcommand `tightloop view`: a daemon or a recording in the browser."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+import threading
+import webbrowser
+
+from tightloop.errors import TightloopError
+from tightloop.view import needs
+
+_WORLDS_MAX = 1024
+_EPILOG = """examples:
+  tightloop view franka                    look at the daemon `franka`, and drive it while nobody trains
+  tightloop view run.tlrec --worlds 16     play a recording"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    made = argparse.ArgumentParser(
+        prog="tightloop view",
+        description="Show a running daemon, or a recording, in the browser. Ends with Ctrl-C.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    made.add_argument("target", metavar="NAME|FILE.tlrec", help="a daemon's name, or a recording")
+    made.add_argument("--port", type=_port, default=8080, help="port of the page; the next free one if it is taken")
+    made.add_argument("--host", default="127.0.0.1", help="address to listen on; 0.0.0.0 lets other machines drive, too")
+    made.add_argument("--worlds", type=_worlds, default=256, help=f"most worlds to show, up to {_WORLDS_MAX}")
+    made.add_argument("--open", action="store_true", help="open the page in this machine's browser")
+    made.add_argument("--parent", type=int, help=argparse.SUPPRESS)
+    return made
+
+
+def main(arguments: list[str]) -> int:
+    """Run the subcommand; returns its exit code: 0 done, 1 failed, 2 misused."""
+    given = parser().parse_args(arguments)
+    stopped = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stopped.set())
+    try:
+        needs.check("viser", "trimesh")
+        from tightloop.view.server import Server
+
+        _give_way()
+        server = Server(given.target, host=given.host, port=given.port, worlds=given.worlds)
+    except (TightloopError, OSError) as problem:
+        print(f"tightloop: {problem}", file=sys.stderr)
+        return 1
+    try:
+        if server.port != given.port:
+            print(f"tightloop: port {given.port} is taken; the page is at {server.port}", file=sys.stderr, flush=True)
+        print(server.url, flush=True)
+        if given.open:
+            webbrowser.open(server.url)
+        server.run(stopped, given.parent)
+    finally:
+        server.close()
+    return 0
+
+
+def _give_way() -> None:
+    """Let the simulation go first where there are not enough cores for both."""
+    os.nice(10)
+
+
+def _port(text: str) -> int:
+    port = int(text)
+    if not 0 < port < 65536:
+        raise argparse.ArgumentTypeError(f"{port} is no port; give 1 to 65535")
+    return port
+
+
+def _worlds(text: str) -> int:
+    worlds = int(text)
+    if not 0 < worlds <= _WORLDS_MAX:
+        raise argparse.ArgumentTypeError(f"{worlds} worlds cannot be shown; give 1 to {_WORLDS_MAX}")
+    return worlds

@@ -1,0 +1,113 @@
+"""What a page is fed from: a daemon that runs, or a recording of one, each with who drives it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from tightloop.sim import attach
+from tightloop.view.pilot import Pilot
+from tightloop.view.player import Player
+from tightloop.view.source import Live, Recorded
+
+#: What is always asked for; contacts and plots ask for more.
+FIELDS = ("body_q", "body_qd", "joint_q", "joint_target_q")
+CONTACTS = ("contact_count", "contact_pos", "contact_force")
+
+
+def is_recording(target: str) -> bool:
+    """Whether a file is meant, and not the name of a daemon."""
+    return target.endswith(".tlrec") or "/" in target
+
+
+class LiveFeed:
+    """Frames of a daemon as observers see them.
+
+    Args:
+        name: Of the daemon.
+        worlds: The most worlds to show.
+
+    Raises:
+        UnknownDaemon: No daemon of that name is running; the message lists those that are.
+    """
+
+    def __init__(self, name: str, worlds: int) -> None:
+        self._name = name
+        self._most = worlds
+        self._fields = frozenset(FIELDS)
+        self._newest: Any = None
+        self._source = Live(name, worlds, FIELDS)
+        self.info: dict[str, Any] = self._source.info
+        self.worlds: int = self._source.worlds
+        self.driver = Pilot(attach(name), lambda: self._newest)
+
+    def poll(self, timeout: float) -> Any:
+        """The newest frame, None if none came in that time [s].
+
+        Raises:
+            DaemonLost: The daemon went away.
+        """
+        shown = self._source.poll(timeout)
+        if shown is not None:
+            self._newest = shown
+        return shown
+
+    def want(self, fields: Iterable[str]) -> None:
+        """Have frames carry these fields, too, from now on."""
+        wanted = self._fields | set(fields)
+        if wanted != self._fields:
+            self._source.close()
+            self._source = Live(self._name, self._most, tuple(sorted(wanted)))
+            self._fields = wanted
+
+    def close(self) -> None:
+        """Detach; the daemon goes on."""
+        self.driver.close()
+        self._source.close()
+
+
+class RecordedFeed:
+    """Frames of a recording.
+
+    Args:
+        path: The file.
+        worlds: The most worlds to show.
+    """
+
+    def __init__(self, path: str, worlds: int) -> None:
+        self._path = str(Path(path).expanduser().absolute())
+        self._most = worlds
+        # a recording is opened once: what any choice may need is evaluated at once
+        self._fields = frozenset((*FIELDS, *CONTACTS))
+        first = self._open()
+        self.info: dict[str, Any] = first.info
+        self.worlds: int = first.worlds
+        first.close()
+        self.driver = Player(self._open)
+
+    def _open(self) -> Recorded:
+        return Recorded(self._path, self._most, tuple(sorted(self._fields)))
+
+    def poll(self, timeout: float) -> Any:
+        """The frame that is due, None if none is in that time [s]."""
+        return self.driver.poll(timeout)
+
+    def want(self, fields: Iterable[str]) -> None:
+        """Have frames carry these fields, too; the recording then begins anew."""
+        wanted = self._fields | set(fields)
+        if wanted != self._fields:
+            self._fields = wanted
+            self.driver.reset(None)
+
+    def close(self) -> None:
+        """Close the file."""
+        self.driver.close()
+
+
+Feed = LiveFeed | RecordedFeed
+
+
+def open_feed(target: str, worlds: int) -> Feed:
+    """The feed of a daemon's name or a recording's path, with at most so many worlds."""
+    return RecordedFeed(target, worlds) if is_recording(target) else LiveFeed(target, worlds)

@@ -1,0 +1,91 @@
+"""The joints of a scene that have drives: their limits, and where a robot is when it has reached its targets."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop.scene import Scene
+from tightloop.view.poses import Array
+
+# How far a slider goes where a joint has no limit [rad or m].
+_UNLIMITED = np.pi
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A dof with a drive.
+
+    Attributes:
+        dof: Its place in ``dof_names``.
+        name: ``robot/joint``, or ``robot/joint.part`` where a joint has several.
+        lower: Least target that a slider sets [rad or m].
+        upper: Largest one.
+        follows: The name of the joint that it follows (a mimic joint), or none.
+    """
+
+    dof: int
+    name: str
+    lower: float
+    upper: float
+    follows: str | None = None
+
+
+def joints(info: dict[str, Any]) -> list[Joint]:
+    """Dofs whose targets have an effect, from what a daemon tells about itself.
+
+    Raises:
+        SceneError: A robot's file cannot be read here.
+    """
+    found = []
+    for name, robot in _scene(info).robots.items():
+        first = next(entry["dofs"][0] for entry in info["robots"] if entry["name"] == name)
+        leaders = robot.joint_leaders
+        for index, (own, (lower, upper)) in enumerate(zip(robot.dof_names, robot.joint_range, strict=True)):
+            if robot.joint_target_ke[index] <= 0:
+                continue
+            low = max(float(lower), -_UNLIMITED) if np.isfinite(lower) else -_UNLIMITED
+            high = float(upper) if np.isfinite(upper) else _UNLIMITED
+            found.append(Joint(first + index, f"{name}/{own}", low, high, leaders.get(own)))
+    return found
+
+
+def at_targets(info: dict[str, Any], driven: Sequence[Joint], joint_q: Array, targets: Array) -> NDArray[np.float64]:
+    """Positions of a world whose driven joints are at their targets, and whose others are where they are.
+
+    Args:
+        info: What a daemon tells about itself.
+        driven: The joints that have drives.
+        joint_q: Positions now, shape ``(coords,)``.
+        targets: Its ``joint_target_q``, shape ``(dofs,)``.
+    """
+    place = {name: index for index, name in enumerate(info["coord_names"])}
+    reached = np.array(joint_q, np.float64)
+    balls: dict[str, list[int]] = {}
+    for joint in driven:
+        if joint.name in place:
+            reached[place[joint.name]] = targets[joint.dof]
+        else:
+            balls.setdefault(joint.name.rpartition(".")[0], []).append(joint.dof)
+    # the target of a ball is a rotation vector, its coordinates are a quaternion
+    for ball, dofs in balls.items():
+        first = place.get(f"{ball}.qx")
+        if first is not None and len(dofs) == 3:
+            vector = np.asarray(targets[dofs], np.float64)
+            angle = np.linalg.norm(vector)
+            reached[first : first + 3] = vector * np.sinc(angle / (2 * np.pi)) / 2
+            reached[first + 3] = np.cos(angle / 2)
+    return reached
+
+
+def _scene(info: dict[str, Any]) -> Scene:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "scene.toml"
+        file.write_text(info["scene"])
+        return Scene._read(file, Path(info["scene_folder"]))

@@ -1,0 +1,82 @@
+"""Colours: red, green, blue and opacity of faces, 0 to 255, as a screen shows them."""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Colors = NDArray[np.uint8]
+
+#: What has no colour of its own: robots, what stands still, and the fields of a plane's checkers.
+PLAIN = (214, 216, 220, 255)
+STILL = (178, 170, 158, 255)
+CHECKERS = ((196, 202, 210, 255), (172, 180, 190, 255))
+# Where a face looks a texture up: its middle, and near its corners.
+_PLACES = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
+# Hues that follow one another by the golden angle are well apart.
+_GOLDEN = 137.507764 / 360
+
+
+def palette(number: int) -> tuple[int, int, int, int]:
+    """The colour of the body with this number where nothing gives it one."""
+    red, green, blue = colorsys.hls_to_rgb((0.58 + _GOLDEN * number) % 1, 0.6 if number % 2 == 0 else 0.7, 0.5)
+    return round(255 * red), round(255 * green), round(255 * blue), 255
+
+
+def of_floats(color: Sequence[float]) -> tuple[int, int, int, int]:
+    """Three or four numbers from 0 to 1 as a colour."""
+    red, green, blue, alpha = (round(255 * min(max(float(part), 0.0), 1.0)) for part in (*color, 1.0)[:4])
+    return red, green, blue, alpha
+
+
+def to_screen(colors: NDArray[Any]) -> Colors:
+    """Colours whose red, green and blue are proportional to light, 0 to 255, as a screen wants them (sRGB)."""
+    light = np.asarray(colors, np.float64) / 255
+    shown = np.where(light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055)
+    shown[..., 3] = light[..., 3]
+    return np.round(255 * np.clip(shown, 0, 1)).astype(np.uint8)
+
+
+def image_mean(image: Any) -> tuple[int, int, int, int]:
+    """Mean colour of an image of pillow's."""
+    red, green, blue, alpha = np.asarray(image.convert("RGBA"), np.float64).mean(axis=(0, 1)).round()
+    return int(red), int(green), int(blue), int(alpha)
+
+
+def file_mean(path: str | Path) -> tuple[int, int, int, int]:
+    """Mean colour of an image file.
+
+    Raises:
+        OSError: It cannot be read.
+    """
+    from PIL import Image
+
+    with Image.open(path) as image:
+        return image_mean(image)
+
+
+def from_texture(image: Any, uv: NDArray[Any], faces: NDArray[Any]) -> Colors:
+    """What a texture has where each face lies.
+
+    Args:
+        image: An image of pillow's, row 0 on top.
+        uv: Place of each vertex in it, (0, 0) bottom left, (1, 1) top right; it repeats beyond. ``(vertices, 2)``
+        faces: Corners of each face, ``(faces, 3)``.
+
+    Returns:
+        Shape ``(faces, 4)``.
+    """
+    texels = np.asarray(image.convert("RGBA"))
+    height, width = texels.shape[:2]
+    total = np.zeros((len(faces), 4))
+    for place in _PLACES:
+        across, up = np.einsum("c,fcd->df", place, np.asarray(uv, np.float64)[faces])
+        columns = np.minimum((np.mod(across, 1) * width).astype(int), width - 1)
+        rows = np.minimum((np.mod(1 - up, 1) * height).astype(int), height - 1)
+        total += texels[rows, columns]
+    return np.round(total / len(_PLACES)).astype(np.uint8)

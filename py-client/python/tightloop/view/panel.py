@@ -1,0 +1,216 @@
+"""The page's controls: who drives and how fast, what is shown, from where. They change `Looks` and ask the driver."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import viser
+
+from tightloop.view.cameras import PRESETS
+from tightloop.view.joints import Joint
+from tightloop.view.looks import Looks
+from tightloop.view.pilot import Pilot
+from tightloop.view.player import Player
+from tightloop.view.plots import PLOTS_MAX, Plot, choices
+from tightloop.view.sliders import Sliders
+
+SPEEDS = {"0.1×": 0.1, "0.25×": 0.25, "0.5×": 0.5, "1×": 1.0, "2×": 2.0, "5×": 5.0, "max": float("inf")}
+_STATUS = {1: "not finite, frozen", 2: "solver out of iterations", 4: "contacts left out", 8: "out of bounds, frozen"}
+# How often text and plots are sent [s].
+_PERIOD = 0.1
+_RATE_SECONDS = 2.0
+
+
+class Panel:
+    """The controls of a page.
+
+    Args:
+        server: Whose page.
+        info: What the daemon tells about itself.
+        worlds: How many worlds can be seen.
+        looks: What the controls write.
+        driver: Whom they ask to play.
+        driven: Joints that get sliders.
+        aim: Called with a preset's name when one is chosen.
+        notes: What is to be told about the scene's looks.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        info: dict[str, Any],
+        worlds: int,
+        looks: Looks,
+        driver: Pilot | Player,
+        driven: list[Joint],
+        aim: Callable[[str], None],
+        notes: list[str],
+    ) -> None:
+        self._gui = server.gui
+        self._info = info
+        self._worlds = worlds
+        self._looks = looks
+        self._driver = driver
+        self._plots: list[Plot] = []
+        self._shown_at: deque[float] = deque(maxlen=400)
+        self._told_at = 0.0
+        self.strength = 1.0
+        self._gui.set_panel_label(f"tightloop · {info['name']}")
+        self._text = self._gui.add_markdown("")
+        with self._gui.add_folder("Time"):
+            self._add_time()
+        with self._gui.add_folder("Look"):
+            self._add_looks(aim)
+        self._sliders = None
+        if isinstance(driver, Pilot):
+            with self._gui.add_folder("Joint targets", expand_by_default=0 < len(driven) <= 12):  # noqa: PLR2004
+                self._sliders = Sliders(self._gui, driven, driver, looks, worlds)
+            with self._gui.add_folder("Push", expand_by_default=False):
+                self._add_push(driver)
+        with self._gui.add_folder("Plots", expand_by_default=False):
+            self._add_plots()
+        if notes:
+            with self._gui.add_folder("Notes", expand_by_default=False):
+                self._gui.add_markdown("\n".join(f"- {note}" for note in notes))
+
+    @property
+    def fields(self) -> set[str]:
+        """Fields that plots show."""
+        return {plot.field for plot in self._plots}
+
+    def tell(self, shown: Any, *, new: bool) -> None:
+        """Keep text, sliders and plots up to date.
+
+        Args:
+            shown: The frame that is shown.
+            new: Whether it was not shown before.
+        """
+        now = time.monotonic()
+        world = self._looks.world
+        if new:
+            self._shown_at.append(now)
+            for plot in self._plots:
+                plot.add(float(shown.time[world]), np.asarray(getattr(shown, plot.field)[world]))
+        if now - self._told_at < _PERIOD:
+            return
+        self._told_at = now
+        taken = self._driver.controller
+        self._text.content = self._text_of(shown, taken, now)
+        self._play.label = "Pause" if self._driver.playing else "Play"
+        for control in self._of_driver:
+            control.disabled = taken is not None
+        if self._sliders is not None:
+            self._sliders.tell(np.asarray(shown.joint_target_q)[world], disabled=taken is not None)
+        for plot in self._plots:
+            plot.draw()
+
+    def follow(self, world: int) -> None:
+        """Follow another world, as when it was clicked."""
+        self._world.value = world
+
+    def _text_of(self, shown: Any, taken: int | None, now: float) -> str:
+        world, driver = self._looks.world, self._driver
+        rate = sum(now - at < _RATE_SECONDS for at in self._shown_at) / _RATE_SECONDS
+        bits = int(shown.status[world])
+        trouble = ", ".join(text for bit, text in _STATUS.items() if bits & bit)
+        frozen = int(np.count_nonzero(np.asarray(shown.status) & 9))
+        if taken is not None:
+            who = f"process **{taken}** is in control; you watch"
+        elif not driver.live:
+            who = "recording, playing" if driver.playing else "recording, paused"
+        else:
+            who = f"you drive, {driver.pace:.2g}× real time" if driver.playing else "paused; nobody drives"
+        lines = [
+            f"**world {world}** of {self._info['worlds']} · {shown.time[world]:.3f} s · step {int(shown.step[world])}",
+            f"{who} · {rate:.0f} frames/s shown",
+            f"{self._info['device']}",
+        ]
+        if trouble:
+            lines.append(f"world {world}: **{trouble}**")
+        if frozen:
+            lines.append(f"{frozen} of the worlds shown are frozen (red); reset frees them")
+        if driver.problem:
+            lines.append(f"⚠ {driver.problem}")
+        return "  \n".join(lines)
+
+    def _add_time(self) -> None:
+        driver = self._driver
+        self._play = self._gui.add_button("Play", color="green", icon="player-play")
+        step = self._gui.add_button("Step", icon="player-skip-forward")
+        reset = self._gui.add_button("Reset all" if driver.live else "Restart", icon="player-skip-back")
+        speed = self._gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1×")
+        self._of_driver: list[Any] = [self._play, step, reset]
+        self._play.on_click(lambda _: driver.pause() if driver.playing else driver.play())
+        step.on_click(lambda _: driver.step())
+        reset.on_click(lambda _: driver.reset(None))
+        speed.on_update(lambda _: setattr(driver, "speed", SPEEDS[speed.value]))
+        if isinstance(driver, Player):
+            skip = self._gui.add_button_group("Skip", ("+1 s", "+10 s"))
+            skip.on_click(lambda _: driver.skip(float(skip.value[1:].split()[0])))
+        elif self._worlds > 1:
+            one = self._gui.add_button("Reset this world")
+            self._of_driver.append(one)
+            one.on_click(lambda _: driver.reset(self._looks.world))
+
+    def _add_looks(self, aim: Callable[[str], None]) -> None:
+        gui, looks = self._gui, self._looks
+        camera = gui.add_dropdown("Camera", tuple(PRESETS), initial_value="three-quarter")
+        camera.on_update(lambda _: (looks.choose(follow=camera.value == "follow"), aim(camera.value)))
+        world = self._world = gui.add_slider(
+            "World", 0, max(self._worlds - 1, 1), 1, looks.world, visible=self._worlds > 1
+        )
+        alone = gui.add_checkbox("This world alone", looks.alone, visible=self._worlds > 1)
+        shapes = gui.add_checkbox("Collision shapes", looks.kind == "collision")
+        ghosts = gui.add_checkbox("Targets as ghosts", looks.ghosts)
+        frames = gui.add_checkbox("Body frames", looks.frames)
+        where = ("off", "followed world") + (("all worlds",) if self._worlds > 1 else ())
+        contacts = gui.add_dropdown("Contacts", where, initial_value=looks.contacts)
+        scale = gui.add_number("Arrow length [m/N]", looks.force_scale, min=1e-4, max=1.0, step=1e-3)
+
+        def choose_world(_: Any) -> None:
+            looks.choose(world=min(world.value, self._worlds - 1))
+            for plot in self._plots:
+                plot.clear()
+
+        world.on_update(choose_world)
+        alone.on_update(lambda _: looks.choose(alone=alone.value))
+        shapes.on_update(lambda _: looks.choose(kind="collision" if shapes.value else "visual"))
+        ghosts.on_update(lambda _: looks.choose(ghosts=ghosts.value))
+        frames.on_update(lambda _: looks.choose(frames=frames.value))
+        contacts.on_update(lambda _: looks.choose(contacts=contacts.value))
+        scale.on_update(lambda _: looks.choose(force_scale=scale.value))
+
+    def _add_push(self, driver: Pilot) -> None:
+        if not driver.can_push:
+            self._gui.add_markdown('To push bodies, launch with `params=("body_f",)`.')
+            return
+        self._gui.add_markdown("Hold **Shift** and drag a body: a spring pulls it to the pointer.")
+        strength = self._gui.add_slider("Strength", 0.5, 20.0, 0.5, self.strength)
+        strength.on_update(lambda _: setattr(self, "strength", strength.value))
+
+    def _add_plots(self) -> None:
+        known = choices(self._info)
+        field = self._gui.add_dropdown("Field", tuple(known), initial_value=next(iter(known)))
+        column = self._gui.add_dropdown("Of", tuple(known[field.value]))
+        add, clear = self._gui.add_button("Add plot"), self._gui.add_button("Remove plots")
+        drawn = self._gui.add_folder("Last 10 s of the followed world")
+
+        @field.on_update
+        def _(_: Any) -> None:
+            column.options = tuple(known[field.value])
+
+        @add.on_click
+        def _(_: Any) -> None:
+            if len(self._plots) < PLOTS_MAX:
+                with drawn:
+                    self._plots.append(Plot(self._gui, self._info, field.value, column.value))
+
+        @clear.on_click
+        def _(_: Any) -> None:
+            plots, self._plots = self._plots, []
+            for plot in plots:
+                plot.remove()

@@ -1,0 +1,242 @@
+"""What a scene looks like: the visuals of its robots' files, and the shapes that touch.
+
+A robot is seen as its file's visuals. Where a visual cannot be read, the collision shapes of that link stand in for
+all of its visuals, and a note says why; a robot whose file has no visuals at all, and what the scene adds, are seen as
+what touches. Collision meshes touch as convex hulls, and are then seen as their files have them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop import _core
+from tightloop.errors import SceneError
+from tightloop.view import mesh_files, paint
+from tightloop.view.surface import FACES_MAX, Surface, Unreadable, joined
+
+Kind = Literal["visual", "collision"]
+Color = tuple[int, int, int, int]
+
+# The sheet that is shown of a plane, and one of its fields [m].
+_SHEET = 10.0
+_FIELD = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles, counter-clockwise from outside.
+
+    Attributes:
+        vertices: Shape ``(vertices, 3)`` [m].
+        faces: Corners of each face, shape ``(faces, 3)``.
+        colors: Red, green, blue and opacity of each face, 0 to 255, shape ``(faces, 4)``.
+    """
+
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.uint32]
+    colors: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A mesh that a body carries.
+
+    Attributes:
+        body: The body, as a place in ``body_names``; -1 is the world.
+        kind: ``"visual"``, what it looks like, or ``"collision"``, how it touches.
+        name: ``robot/link/visual``, or the shape's name.
+        pose: Its frame in the body's: position [m], then quaternion (x, y, z, w), shape ``(7,)``.
+        mesh: Its surface; parts that look alike share one.
+        shape: What it is: ``"plane"`` (a sheet around its frame's origin stands for it), ``"box"``, ``"sphere"``,
+            ``"cylinder"``, ``"capsule"`` or ``"mesh"``.
+    """
+
+    body: int
+    kind: Kind
+    name: str
+    pose: NDArray[np.float64]
+    mesh: Mesh
+    shape: str
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """What a scene looks like.
+
+    Attributes:
+        parts: All parts, the world's first.
+        notes: What could not be shown as its file has it, a sentence each.
+    """
+
+    parts: list[Part]
+    notes: list[str]
+
+    def __iter__(self) -> Iterator[Part]:
+        return iter(self.parts)
+
+    def __len__(self) -> int:
+        return len(self.parts)
+
+    def of(self, kind: Kind) -> list[Part]:
+        """The parts of one kind: what is seen at a time."""
+        return [part for part in self.parts if part.kind == kind]
+
+
+def parts(scene_toml: str, folder: str | PathLike[str], body_names: Sequence[str]) -> Parts:
+    """Read what a scene looks like; reading its meshes may take seconds.
+
+    Args:
+        scene_toml: The scene, such as ``sim.info["scene"]``.
+        folder: What its paths are relative to, such as ``sim.info["scene_folder"]``.
+        body_names: The bodies in the order of ``body_q``, such as ``sim.body_names``.
+
+    Raises:
+        SceneError: The scene is not valid, or has other bodies.
+        MissingLibrary: What reads a visual's file is not installed.
+    """
+    text, surfaces = _core.parts(scene_toml, fspath(folder))
+    told = json.loads(text)
+    return _Assembly(surfaces, body_names).whole(told["parts"], told["notes"])
+
+
+class _Assembly:
+    """Turns what Rust tells of parts into parts; keeps what is read, so that it is read once."""
+
+    def __init__(self, surfaces: Sequence[tuple[Any, Any]], body_names: Sequence[str]) -> None:
+        self._surfaces = surfaces
+        self._places = {name: place for place, name in enumerate(body_names)}
+        self._files: dict[str, Surface | Unreadable] = {}
+        self._images: dict[str, Color | None] = {}
+        self._meshes: dict[Any, Mesh] = {}
+        self._notes: list[str] = []
+
+    def whole(self, told: Sequence[dict[str, Any]], notes: Sequence[str]) -> Parts:
+        collisions = [entry for entry in told if entry["kind"] == "collision"]
+        visuals = [entry for entry in told if entry["kind"] == "visual"]
+        self._notes.extend(notes)
+        seen: dict[str, list[Part]] = {}
+        lost: set[str] = set()
+        for entry in visuals:
+            try:
+                part = self._visual(entry)
+            except Unreadable as error:
+                self._note(f"visual {entry['name']}: {error}; the link's collision shapes are shown")
+                lost.add(entry["body"])
+            else:
+                seen.setdefault(entry["body"], []).append(part)
+        dressed = {entry["body"].split("/")[0] for entry in visuals}
+        made = []
+        for entry in collisions:
+            made.append(self._stand_in(entry, "collision"))
+            body = entry["body"]
+            if entry["added"] or body in lost or body.split("/")[0] not in dressed:
+                made.append(self._stand_in(entry, "visual"))
+        for body, own in seen.items():
+            if body not in lost:
+                made.extend(own)
+        made.sort(key=lambda part: part.body)
+        return Parts(made, self._notes)
+
+    def _visual(self, entry: dict[str, Any]) -> Part:
+        if "problem" in entry:
+            raise Unreadable(entry["problem"])
+        own = self._material(entry)
+        if "file" in entry:
+            mesh = self._of_file(entry["file"], tuple(entry["scale"]), own or paint.PLAIN)
+        else:
+            mesh = self._of_surface(entry["mesh"], own or paint.PLAIN)
+        return self._part(entry, "visual", mesh)
+
+    def _material(self, entry: dict[str, Any]) -> Color | None:
+        """The colour that a robot's file gives a visual: its texture's mean, else its own."""
+        image = entry["texture"]
+        if image is not None:
+            if image not in self._images:
+                try:
+                    self._images[image] = paint.file_mean(image)
+                except Exception as error:  # pillow's, of whatever is broken in it
+                    self._note(f"texture {image} cannot be read: {error}")
+                    self._images[image] = None
+            if self._images[image] is not None:
+                return self._images[image]
+        return None if entry["color"] is None else paint.of_floats(entry["color"])
+
+    def _of_file(self, file: str, scale: tuple[float, ...], color: Color) -> Mesh:
+        found = self._files.get(file)
+        if found is None:
+            try:
+                found = mesh_files.read(file)
+                for note in found.notes:
+                    self._note(f"visual mesh {Path(file).name} {note}")
+            except Unreadable as error:
+                found = Unreadable(f"{file}: {error}")
+            self._files[file] = found
+        if isinstance(found, Unreadable):
+            raise found
+        key = file, scale, None if found.painted.all() else color
+        if key not in self._meshes:
+            scaled = found.scaled(scale)
+            self._meshes[key] = Mesh(scaled.vertices, scaled.faces, scaled.filled(color))
+        return self._meshes[key]
+
+    def _of_surface(self, place: int, color: Color) -> Mesh:
+        key = place, color
+        if key not in self._meshes:
+            vertices, faces = self._surfaces[place]
+            colors = np.tile(np.array(color, np.uint8), (len(faces), 1))
+            if len(faces) > FACES_MAX:
+                thin = joined([Surface(vertices, faces, colors, np.ones(len(faces), bool))])
+                self._notes.extend(f"a collision mesh {note}" for note in thin.notes)
+                vertices, faces, colors = thin.vertices, thin.faces, thin.colors
+            self._meshes[key] = Mesh(vertices, faces, colors)
+        return self._meshes[key]
+
+    def _stand_in(self, entry: dict[str, Any], kind: Kind) -> Part:
+        """A collision shape, as what it is or as what is seen."""
+        if entry["shape"] == "plane":
+            if "plane" not in self._meshes:
+                self._meshes["plane"] = _checkers()
+            return self._part(entry, kind, self._meshes["plane"])
+        body = self._body(entry)
+        color = paint.STILL if body < 0 else paint.palette(body)
+        if kind == "visual" and not entry["added"]:
+            color = paint.PLAIN
+        return self._part(entry, kind, self._of_surface(entry["mesh" if kind == "collision" else "whole"], color))
+
+    def _part(self, entry: dict[str, Any], kind: Kind, mesh: Mesh) -> Part:
+        pose = np.array([*entry["pos"], *entry["quat"]])
+        return Part(self._body(entry), kind, entry["name"], pose, mesh, entry["shape"])
+
+    def _body(self, entry: dict[str, Any]) -> int:
+        name = entry["body"]
+        if name is None:
+            return -1
+        if name not in self._places:
+            raise SceneError(f"body `{name}` of the scene is not among the bodies given; give body_names of this scene")
+        return self._places[name]
+
+    def _note(self, note: str) -> None:
+        if note not in self._notes:
+            self._notes.append(note)
+
+
+def _checkers() -> Mesh:
+    """A sheet of square fields around the origin, seen from above and from below."""
+    count = round(_SHEET / _FIELD)
+    edge = np.linspace(-_SHEET / 2, _SHEET / 2, count + 1)
+    x, y = np.meshgrid(edge, edge, indexing="ij")
+    vertices = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3).astype(np.float32)
+    row, column = (index.ravel() for index in np.meshgrid(np.arange(count), np.arange(count), indexing="ij"))
+    corner = row * (count + 1) + column
+    beyond = corner + count + 1
+    faces = np.stack([corner, beyond, beyond + 1, corner, beyond + 1, corner + 1], axis=-1).reshape(-1, 3)
+    colors = np.array(paint.CHECKERS, np.uint8)[np.repeat((row + column) % 2, 2)]
+    return Mesh(vertices, faces.astype(np.uint32), colors)

@@ -1,0 +1,115 @@
+"""A recording that is looked at: played at its own pace or a multiple of it, by single frames, or skipped over."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, Protocol
+
+_LATE_MAX = 0.1
+
+
+class Frames(Protocol):
+    """What a recording gives: its frames, one after the other."""
+
+    dt_frame: float
+
+    def poll(self, timeout: float) -> Any: ...
+    def close(self) -> None: ...
+
+
+class Player:
+    """Plays a recording; it goes forwards only, and begins anew.
+
+    Attributes:
+        playing: Whether it plays.
+        speed: Recorded seconds a second; infinite for as fast as it goes.
+        problem: Nothing, or that it is at its end.
+
+    Args:
+        open_frames: Opens the recording at its begin.
+    """
+
+    live = False
+    can_push = False
+    controller = None
+
+    def __init__(self, open_frames: Callable[[], Frames]) -> None:
+        self.playing = True
+        self.speed = 1.0
+        self.problem = ""
+        self._open = open_frames
+        self._frames = open_frames()
+        self._wanted = 1  # frames to be shown at once: the first one
+        self._due = time.monotonic()
+        self._restart = False
+        self._changed = threading.Condition()
+
+    @property
+    def pace(self) -> float:
+        """Recorded seconds a second."""
+        return self.speed if self.playing else 0.0
+
+    def play(self) -> None:
+        """Play on."""
+        self._set(playing=True)
+
+    def pause(self) -> None:
+        """Stand still."""
+        self._set(playing=False)
+
+    def step(self) -> None:
+        """Show the next frame, and stand still."""
+        self._set(playing=False, more=1)
+
+    def skip(self, seconds: float) -> None:
+        """Go on to what is that much later [s]."""
+        self._set(playing=self.playing, more=max(round(seconds / self._frames.dt_frame), 1))
+
+    def reset(self, world: int | None) -> None:
+        """Begin anew; ``world`` makes no difference."""
+        with self._changed:
+            self._restart, self._wanted, self.problem = True, 1, ""
+            self._changed.notify_all()
+
+    def poll(self, timeout: float) -> Any:
+        """The frame to be shown next, None if there is none in that time [s]."""
+        with self._changed:
+            now = time.monotonic()
+            wait = min(max(self._due - now, 0.0), timeout) if self.playing else timeout
+            self._changed.wait_for(lambda: self._wanted or self._restart, timeout=wait)
+            if self._restart:
+                self._frames.close()
+                self._frames, self._restart = self._open(), False
+            wanted, self._wanted = self._wanted, 0
+            now = time.monotonic()
+            if not wanted and self.playing and now >= self._due:
+                # frames that the page has no time for are passed over
+                late = now - self._due
+                wanted = 1 + int(late / self._spacing) if 0 < self._spacing and late < _LATE_MAX else 1
+                self._due = (self._due if late < _LATE_MAX else now) + wanted * self._spacing
+        shown = None
+        for _ in range(wanted):
+            following = self._frames.poll(0.0)
+            if following is None:
+                self.playing, self.problem = False, "the recording ends here"
+                break
+            shown = following
+        return shown
+
+    @property
+    def _spacing(self) -> float:
+        return self._frames.dt_frame / self.speed
+
+    def close(self) -> None:
+        """Close the file."""
+        self._frames.close()
+
+    def _set(self, *, playing: bool, more: int = 0) -> None:
+        with self._changed:
+            self.playing = playing
+            self.problem = ""
+            self._wanted += more
+            self._due = time.monotonic()
+            self._changed.notify_all()

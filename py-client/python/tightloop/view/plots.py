@@ -1,0 +1,107 @@
+"""Plots of chosen fields of the followed world: their last seconds."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+import viser
+import viser.uplot
+from numpy.typing import NDArray
+
+SECONDS = 10.0
+#: Each plot is data to send, ten times a second.
+PLOTS_MAX = 4
+# Rows that are kept of each plot: the frames of these seconds at 60 Hz.
+_ROWS_MAX = 600
+_COLORS = ("#2f7ed8", "#e4572e", "#3aa655", "#a05cc8", "#e0a020", "#1fa5a5", "#c2477f", "#6b7280", "#8a6d3b")
+# What each axis of a field is of, as keys of a daemon's description.
+_AXES = {
+    "dofs": "dof_names",
+    "coords": "coord_names",
+    "bodies": "body_names",
+    "sites": "site_names",
+    "contact_sensors": "contact_sensor_names",
+}
+_PARTS = {"3": "x y z", "4": "x y z w", "6": "x y z rx ry rz", "7": "x y z qx qy qz qw"}
+_ALL = "all"
+
+
+def choices(info: dict[str, Any]) -> dict[str, list[str]]:
+    """Fields that can be plotted, and what of each: one number a world, a column by name, or all columns."""
+    found = {}
+    for field in info["known_fields"]:
+        axes = field["axes"].strip("()").replace(" ", "").split(",")[1:]
+        axes = [axis for axis in axes if axis]
+        if not axes:
+            found[field["name"]] = [_ALL]
+        elif axes[0] in _AXES and (len(axes) == 1 or (len(axes) == 2 and axes[1] in _PARTS)):
+            names = list(info[_AXES[axes[0]]])
+            if names:
+                found[field["name"]] = names if len(axes) == 2 else [_ALL, *names]
+    return found
+
+
+class Plot:
+    """One field, or one column of it, of the followed world.
+
+    Args:
+        gui: Where it is drawn.
+        info: What the daemon tells about itself.
+        field: Name of the field.
+        column: One of its `choices`.
+    """
+
+    def __init__(self, gui: viser.GuiApi, info: dict[str, Any], field: str, column: str) -> None:
+        self.field = field
+        (entry,) = (entry for entry in info["known_fields"] if entry["name"] == field)
+        axes = [axis for axis in entry["axes"].strip("()").replace(" ", "").split(",")[1:] if axis]
+        names = list(info[_AXES[axes[0]]]) if axes else [field]
+        self._row = slice(None) if column == _ALL else names.index(column)
+        series = names if column == _ALL else [column]
+        if len(axes) == 2:
+            series = _PARTS[axes[1]].split()
+        self._series = [name.rpartition("/")[2] for name in series][: len(_COLORS)]
+        self._rows: deque[tuple[float, NDArray[Any]]] = deque(maxlen=_ROWS_MAX)
+        title = field if column in (_ALL, field) else f"{field} of {column}"
+        # Markdown in front of the plot: uPlot's own title cannot wrap
+        self._title = gui.add_markdown(f"**{title}** [{entry['unit']}]")
+        self._handle = gui.add_uplot(
+            tuple(np.zeros(1) for _ in range(1 + len(self._series))),
+            (
+                viser.uplot.Series(label="s"),
+                *(
+                    viser.uplot.Series(label=name, stroke=color, width=1.5)
+                    for name, color in zip(self._series, _COLORS, strict=False)
+                ),
+            ),
+            scales={"x": viser.uplot.Scale(time=False)},
+            height=180,
+        )
+
+    def add(self, time: float, values: NDArray[Any]) -> None:
+        """Take a world's values of the field, at a simulated time [s]."""
+        row = np.atleast_1d(values[self._row] if values.ndim else values).astype(np.float64)[: len(self._series)]
+        if self._rows and time < self._rows[-1][0]:
+            # it was reset
+            self._rows.clear()
+        if not self._rows or time > self._rows[-1][0]:
+            self._rows.append((time, row))
+
+    def clear(self) -> None:
+        """Forget what was, as for another world."""
+        self._rows.clear()
+
+    def draw(self) -> None:
+        """Send what there is."""
+        if not self._rows:
+            return
+        times = np.array([time for time, _ in self._rows])
+        rows = np.array([row for _, row in self._rows])
+        kept = times >= times[-1] - SECONDS
+        self._handle.data = (times[kept], *np.ascontiguousarray(rows[kept].T))
+
+    def remove(self) -> None:
+        self._title.remove()
+        self._handle.remove()

@@ -1,0 +1,114 @@
+"""The process that shows a simulation: a viser server, fed until it is told to end."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import threading
+import time
+
+import viser
+
+from tightloop.errors import DaemonLost, TightloopError, UnknownDaemon
+from tightloop.view.feed import Feed, open_feed
+from tightloop.view.page import Page
+
+# Frames a second that are shown: of few worlds, and of many.
+_RATE_HZ, _RATE_MANY_HZ, _FEW_WORLDS = 60.0, 30.0, 16
+# Frames are shown to nobody at this rate: text and state stay fresh for who comes next.
+_RATE_UNSEEN_HZ = 5.0
+_WAIT_SECONDS = 0.5
+_PARENT_SECONDS = 0.5
+
+
+class Server:
+    """Shows a daemon or a recording in browsers.
+
+    Attributes:
+        url: Where the page is.
+        port: Its port: the one asked for, or the next one that is free.
+
+    Args:
+        target: Name of a daemon, or path of a recording.
+        host: Address that browsers connect to.
+        port: Port that is tried first.
+        worlds: The most worlds to show.
+
+    Raises:
+        UnknownDaemon: No daemon of that name is running; the message lists those that are.
+    """
+
+    def __init__(self, target: str, *, host: str, port: int, worlds: int) -> None:
+        self._target = target
+        self._worlds = worlds
+        self._feed: Feed | None = open_feed(target, worlds)
+        self._page: Page | None = None
+        with contextlib.redirect_stdout(io.StringIO()):  # viser greets
+            self._viser = viser.ViserServer(host, port, label=f"tightloop · {target}", verbose=False)
+        self._viser.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
+        self.port: int = self._viser.get_port()
+        self.url = f"http://{'localhost' if host in ('0.0.0.0', '127.0.0.1', '::') else host}:{self.port}"
+
+    def run(self, stopped: threading.Event, parent: int | None = None) -> None:
+        """Show frames until an event is set, or the process has ended that started this one."""
+        looked_at = time.monotonic()
+        while not stopped.is_set():
+            began = time.monotonic()
+            if parent is not None and began - looked_at > _PARENT_SECONDS:
+                looked_at = began
+                if os.getppid() != parent:
+                    return
+            try:
+                if self._turn():
+                    time.sleep(max(1 / self._rate() - (time.monotonic() - began), 0.0))
+            except DaemonLost as lost:
+                self._lose(lost)
+
+    def close(self) -> None:
+        """Detach, and close the page."""
+        if self._feed is not None:
+            self._feed.close()
+        self._viser.stop()
+
+    def _turn(self) -> bool:
+        """One look at the feed; whether anything was new."""
+        if self._feed is None:
+            self._await_restart()
+            return False
+        if self._page is None:
+            first = self._feed.poll(_WAIT_SECONDS)
+            if first is not None:
+                self._page = Page(self._viser, self._feed, first)
+            return False
+        return self._page.update(0.05)
+
+    def _rate(self) -> float:
+        if not self._viser.get_clients():
+            return _RATE_UNSEEN_HZ
+        assert self._feed is not None
+        return _RATE_HZ if self._feed.worlds <= _FEW_WORLDS else _RATE_MANY_HZ
+
+    def _lose(self, lost: DaemonLost) -> None:
+        """Tell in the page that the daemon is gone, and wait for another of its name."""
+        if self._feed is not None:
+            self._feed.close()
+        self._feed = self._page = None
+        self._viser.gui.reset()
+        self._viser.gui.set_panel_label(f"tightloop · {self._target}")
+        self._viser.gui.add_markdown(
+            f"## Daemon lost\n{lost}\n\nThis page goes on when a daemon of the name `{self._target}` is started."
+        )
+
+    def _await_restart(self) -> None:
+        try:
+            self._feed = open_feed(self._target, self._worlds)
+        except (UnknownDaemon, DaemonLost):
+            time.sleep(_WAIT_SECONDS)
+            return
+        except TightloopError as problem:
+            self._viser.gui.add_markdown(f"It cannot be shown: {problem}")
+            time.sleep(_WAIT_SECONDS)
+            return
+        self._viser.gui.reset()
+        self._viser.scene.reset()

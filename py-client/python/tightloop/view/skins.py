@@ -1,0 +1,84 @@
+"""What is drawn at once: all parts of a body that have one colour, as one mesh; bodies that look alike share it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from tightloop.view.parts import Part
+from tightloop.view.poses import place
+
+# A mesh with more colours than that gets its colours rounded: each is something to send in every frame.
+_COLORS_MAX = 6
+# Edges sharper than this stay sharp under the light.
+_CREASE = np.radians(35)
+# Beyond that many faces, finding the sharp edges takes seconds, and facets are smaller than what one sees.
+_FACES_MAX = 100_000
+
+
+@dataclass(frozen=True)
+class Skin:
+    """A mesh of one colour, in the frame of the bodies that have it.
+
+    Attributes:
+        vertices: Shape ``(vertices, 3)`` [m].
+        faces: Shape ``(faces, 3)``.
+        color: Red, green, blue and opacity, 0 to 255.
+        bodies: Which bodies, as places in ``body_names``; (-1,) is the world.
+    """
+
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.uint32]
+    color: tuple[int, int, int, int]
+    bodies: tuple[int, ...]
+
+
+def skins(parts: Sequence[Part]) -> list[Skin]:
+    """The fewest meshes that show these parts, all of one kind."""
+    of_body: dict[int, list[Part]] = {}
+    for part in parts:
+        of_body.setdefault(part.body, []).append(part)
+    # bodies with the same meshes at the same places, such as two fingers, look alike; the world is not a body
+    alike: dict[tuple[Any, ...], list[int]] = {}
+    for body, own in of_body.items():
+        key = (body < 0, *((id(part.mesh), np.asarray(part.pose).tobytes()) for part in own))
+        alike.setdefault(key, []).append(body)
+    return [skin for bodies in alike.values() for skin in _skins_of(of_body[bodies[0]], tuple(bodies))]
+
+
+def _skins_of(parts: list[Part], bodies: tuple[int, ...]) -> list[Skin]:
+    counts = np.cumsum([0, *(len(part.mesh.vertices) for part in parts)])
+    vertices = np.concatenate([place(np.asarray(part.pose), part.mesh.vertices) for part in parts])
+    faces = np.concatenate([part.mesh.faces + first for part, first in zip(parts, counts, strict=False)])
+    colors, which = _few(np.concatenate([part.mesh.colors for part in parts]))
+    return [
+        Skin(*_creased(vertices, faces[which == color]), tuple(int(value) for value in rgba), bodies)
+        for color, rgba in enumerate(colors)
+    ]
+
+
+def _few(colors: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.intp]]:
+    """The distinct colours, and which one each face has; near ones are one where there are too many."""
+    for bits in range(8):
+        step = 1 << bits
+        # the middle of a step stands for it
+        rounded = np.minimum(colors // step * step + (step >> 1), 255).astype(np.uint8) if bits else colors
+        distinct, which = np.unique(rounded, axis=0, return_inverse=True)
+        if len(distinct) <= _COLORS_MAX:
+            break
+    means = np.stack([colors[which.ravel() == color].mean(axis=0) for color in range(len(distinct))])
+    return means.astype(np.uint8), which.ravel()
+
+
+def _creased(vertices: NDArray[Any], faces: NDArray[Any]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """The same surface with vertices of their own on both sides of a sharp edge, as the browser averages normals."""
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    mesh.merge_vertices()
+    if len(faces) <= _FACES_MAX:
+        mesh = trimesh.graph.smooth_shade(mesh, angle=_CREASE)
+    return np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.uint32)

@@ -1,0 +1,145 @@
+"""Where what is shown comes from: a running daemon, which pays nothing for it, or a recording."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
+
+from tightloop import _core, checks
+from tightloop.errors import ArgumentError, SceneError, UnknownField
+
+#: What viewers need of every frame; time, step, status and contacts_left_out come with it.
+FIELDS = ("body_q", "joint_q", "joint_qd", "joint_target_q")
+#: What they need besides to show contacts.
+CONTACT_FIELDS = ("contact_count", "contact_pos", "contact_normal", "contact_force")
+
+
+class Shown:
+    """The worlds at one instant. Attributes are arrays by field, worlds first, as in `Frame`; they are the caller's."""
+
+    def __init__(self, arrays: dict[str, NDArray[Any]]) -> None:
+        self.__dict__.update(arrays)
+
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        raise UnknownField(f"{name!r} is not shown; there are: {', '.join(self.__dict__)}")
+
+
+class Source(Protocol):
+    """Something that can be looked at.
+
+    Attributes:
+        info: What the daemon tells about itself, as `Sim.info`.
+        worlds: Worlds that are shown: the first ones.
+        period: Simulated time between two control frames [s].
+    """
+
+    info: dict[str, Any]
+    worlds: int
+    period: float
+
+    def poll(self, timeout: float = 0.0) -> Shown | None:
+        """The next thing to show, or None if there is nothing new within ``timeout`` [s]."""
+        ...
+
+    def close(self) -> None:
+        """Let go of it."""
+        ...
+
+
+class Live:
+    """The worlds of a running daemon, as its observers see them: at most 60 times a second, half as often where they
+    see more than 256 worlds.
+
+    The daemon shows the state of its first ``watch_worlds`` worlds; fields are evaluated here, in this process, so that
+    any may be asked for, whatever the frames of the daemon carry.
+
+    Args:
+        name: Name of the daemon.
+        worlds: How many worlds to show; the ``watch_worlds`` of the daemon if there are fewer.
+        fields: What to evaluate.
+
+    Raises:
+        UnknownDaemon: No daemon of that name is running; the message lists those that are.
+        SceneError: A file of its scene cannot be read here, or has changed.
+        UnknownField: There is no such field.
+    """
+
+    def __init__(self, name: str, worlds: int = 256, fields: Sequence[str] = (*FIELDS, *CONTACT_FIELDS)) -> None:
+        asked = checks.integer("view: worlds", worlds, least=1, error=ArgumentError)
+        self.client = _core.Client(checks.text("view: name", name, error=ArgumentError), lease=False)
+        try:
+            self.info: dict[str, Any] = json.loads(self.client.describe())
+            self.worlds = min(asked, self.info["watch_worlds"])
+            self.period: float = self.info["dt"] * self.info["substeps"]
+            self._evaluation = _core.Evaluation(
+                self.info["scene"], self.info["scene_folder"], self.worlds, self.info["precision"], list(fields)
+            )
+            if self._evaluation.model_hash != self.info["model_hash"]:
+                raise SceneError(f"the files of simulation `{name}` have changed since it started; launch it again")
+        except BaseException:
+            self.client.close()
+            raise
+
+    def poll(self, timeout: float = 0.0) -> Shown | None:
+        """The newest state, or None if there is none that was not shown, within ``timeout`` [s].
+
+        Raises:
+            DaemonLost: The daemon went away.
+        """
+        frame = self.client.wait_newer(timeout) if timeout > 0.0 else self.client.latest()
+        return None if frame is None else Shown(self._evaluation.evaluate(frame.state))
+
+    def close(self) -> None:
+        """Let go of the daemon, which goes on."""
+        self.client.close()
+
+
+class Recorded:
+    """The frames of a recording (``tightloop record``), run again one after the other.
+
+    Args:
+        path: The file.
+        worlds: How many worlds to show; those it has if they are fewer.
+        fields: What to evaluate.
+
+    Attributes:
+        note: What is to be known about it, if anything.
+
+    Raises:
+        RecordingError: It cannot be read, is no recording, or its scene's files are not where they were.
+        UnknownField: There is no such field.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        worlds: int = 256,
+        fields: Sequence[str] = (*FIELDS, *CONTACT_FIELDS),
+    ) -> None:
+        asked = checks.integer("view: worlds", worlds, least=1, error=ArgumentError)
+        self._playback = _core.Playback(checks.path("view: path", path, error=ArgumentError), asked, list(fields))
+        self.info: dict[str, Any] = json.loads(self._playback.describe())
+        self.worlds = min(asked, self.info["worlds"])
+        self.period: float = self.info["dt"] * self.info["substeps"]
+        self.note = self._playback.note
+
+    @property
+    def end(self) -> str | None:
+        """Why there are no more frames, once there are none."""
+        return self._playback.end
+
+    def poll(self, timeout: float = 0.0) -> Shown | None:
+        """The next frame, or None at the end; it does not wait.
+
+        Raises:
+            RecordingError: The file cannot be read further.
+        """
+        arrays = self._playback.next()
+        return None if arrays is None else Shown(arrays)
+
+    def close(self) -> None:
+        """Nothing is held that would have to be let go."""

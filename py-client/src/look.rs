@@ -1,0 +1,163 @@
+//! What viewers need: fields of worlds at a state that a daemon shows, and frames of recordings.
+
+use std::path::PathBuf;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use numpy::{Element, PyArray1, PyArrayMethods, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
+use pyo3::types::PyDict;
+use sim_daemon::look::{self, Array, Arrays, DaemonError, Dtype, Field, Precision};
+
+use crate::errors::raise;
+
+/// Worlds of a scene, in this process, at states that a daemon shows.
+#[pyclass(frozen, module = "tightloop._core")]
+pub(crate) struct Evaluation(Mutex<look::Evaluation>);
+
+#[pymethods]
+impl Evaluation {
+    /// The first ``worlds`` of a scene as TOML, with paths relative to a folder.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        scene: &str,
+        folder: PathBuf,
+        worlds: usize,
+        precision: &str,
+        fields: Vec<String>,
+    ) -> PyResult<Evaluation> {
+        let fields = named(py, &fields)?;
+        let precision = match precision {
+            "f64" => Precision::F64,
+            _ => Precision::F32,
+        };
+        let made = py.detach(|| look::Evaluation::new(scene, &folder, worlds, precision, &fields));
+        let made = made.map_err(|error| raised(py, &error))?;
+        Ok(Evaluation(Mutex::new(made)))
+    }
+
+    /// Hash of the model, as a daemon tells its own.
+    #[getter]
+    fn model_hash(&self, py: Python<'_>) -> u64 {
+        lock(py, &self.0).model_hash()
+    }
+
+    /// The fields at the state of the first worlds.
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        state: PyReadonlyArray1<'py, u8>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let state = state.as_slice()?;
+        let mut guard = lock(py, &self.0);
+        let inner = &mut *guard;
+        let arrays = py.detach(move || inner.evaluate(state));
+        dict(py, arrays.map_err(|error| raised(py, &error))?, usize::MAX)
+    }
+}
+
+/// A recording, frame after frame.
+#[pyclass(frozen, module = "tightloop._core")]
+pub(crate) struct Playback {
+    inner: Mutex<look::Playback>,
+    worlds: usize,
+}
+
+#[pymethods]
+impl Playback {
+    /// Frames of the first ``worlds`` of a recording.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        path: PathBuf,
+        worlds: usize,
+        fields: Vec<String>,
+    ) -> PyResult<Playback> {
+        let fields = named(py, &fields)?;
+        let opened = py.detach(|| look::Playback::open(&path, &fields, None));
+        Ok(Playback {
+            inner: Mutex::new(opened.map_err(|error| raised(py, &error))?),
+            worlds,
+        })
+    }
+
+    /// What the daemon told about itself, as JSON.
+    fn describe(&self, py: Python<'_>) -> String {
+        serde_json::to_string(lock(py, &self.inner).description())
+            .expect("a description is plain data")
+    }
+
+    /// What a viewer should know, if anything.
+    #[getter]
+    fn note(&self, py: Python<'_>) -> Option<String> {
+        lock(py, &self.inner).note().map(str::to_owned)
+    }
+
+    /// Why there are no more frames, once there are none.
+    #[getter]
+    fn end(&self, py: Python<'_>) -> Option<String> {
+        lock(py, &self.inner).end().map(str::to_owned)
+    }
+
+    /// The next frame; None at the end.
+    fn next<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let mut guard = lock(py, &self.inner);
+        let inner = &mut *guard;
+        let arrays = py.detach(move || inner.advance());
+        let arrays = arrays.map_err(|error| raised(py, &error))?;
+        arrays
+            .map(|arrays| dict(py, arrays, self.worlds))
+            .transpose()
+    }
+}
+
+/// Without the interpreter lock while it waits, which the holder will want again.
+fn lock<'a, T>(py: Python<'_>, mutex: &'a Mutex<T>) -> MutexGuard<'a, T> {
+    let locked = mutex.lock_py_attached(py);
+    locked.unwrap_or_else(PoisonError::into_inner)
+}
+
+fn raised(py: Python<'_>, error: &DaemonError) -> PyErr {
+    raise(py, error.kind(), error.to_string())
+}
+
+fn named(py: Python<'_>, names: &[String]) -> PyResult<Vec<Field>> {
+    let field = |name: &String| {
+        let unknown = || raise(py, "UnknownField", format!("there is no field `{name}`"));
+        Field::named(name).ok_or_else(unknown)
+    };
+    names.iter().map(field).collect()
+}
+
+/// Copies of the first worlds of arrays, by name.
+fn dict<'py>(py: Python<'py>, arrays: &Arrays, worlds: usize) -> PyResult<Bound<'py, PyDict>> {
+    let to = PyDict::new(py);
+    for array in arrays.iter() {
+        to.set_item(array.name, copied(py, &array, worlds)?)?;
+    }
+    Ok(to)
+}
+
+fn copied<'py>(py: Python<'py>, array: &Array<'_>, worlds: usize) -> PyResult<Bound<'py, PyAny>> {
+    match array.dtype {
+        Dtype::F32 => of::<f32>(py, array, worlds),
+        Dtype::F64 => of::<f64>(py, array, worlds),
+        Dtype::I32 => of::<i32>(py, array, worlds),
+        Dtype::U32 => of::<u32>(py, array, worlds),
+        Dtype::U64 => of::<u64>(py, array, worlds),
+        Dtype::U8 => of::<u8>(py, array, worlds),
+    }
+}
+
+fn of<'py, T: Element + bytemuck::AnyBitPattern>(
+    py: Python<'py>,
+    array: &Array<'_>,
+    worlds: usize,
+) -> PyResult<Bound<'py, PyAny>> {
+    let entries: &[T] = bytemuck::cast_slice(array.bytes);
+    let mut shape = array.shape.to_vec();
+    shape[0] = shape[0].min(worlds);
+    let first = &entries[..shape.iter().product()];
+    Ok(PyArray1::from_slice(py, first).reshape(shape)?.into_any())
+}

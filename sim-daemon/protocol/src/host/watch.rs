@@ -1,0 +1,110 @@
+//! Observers: now and then they are shown the first worlds of a frame, with the state from which these could go on.
+
+use std::time::{Duration, Instant};
+
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::prelude::{Node, PortFactory};
+
+use super::{S, Worlds, memory};
+use crate::transport::{self, FramePublisher, FrameService};
+use crate::{ALIGNMENT, Description, FrameHeader, ProtocolError, Table, loan};
+
+/// Observers see at most this many frames a second ...
+const PERIOD: Duration = Duration::from_micros(16_667);
+/// ... and half of them where they see more worlds than this.
+const MANY: usize = 256;
+
+/// The observers' service.
+pub(super) struct Watch {
+    table: Table,
+    publisher: FramePublisher<S>,
+    service: FrameService<S>,
+    notifier: Notifier<S>,
+    period: Duration,
+    observers: usize,
+    /// The state has changed since they were shown one.
+    unseen: bool,
+    shown: Instant,
+}
+
+impl Watch {
+    /// Opens the service and takes its memory.
+    pub fn open(
+        node: &Node<S>,
+        description: &Description,
+        frame: &Table,
+    ) -> Result<Watch, ProtocolError> {
+        let table = memory::watch_table(description, frame);
+        let service = transport::create_watch(node, description.frames_held)?;
+        let publisher = transport::frame_publisher(&service, table.total_bytes())?;
+        let prefix = node.config().global.prefix.to_string();
+        memory::reserve(&prefix, publisher.id().value(), "the frames of observers")?;
+        let notifier = transport::notifier(&transport::create_event(node, "watch", &[])?)?;
+        Ok(Watch {
+            table,
+            publisher,
+            service,
+            notifier,
+            period: match description.watch_worlds {
+                ..=MANY => PERIOD,
+                _ => 2 * PERIOD,
+            },
+            observers: 0,
+            unseen: true,
+            shown: Instant::now(),
+        })
+    }
+
+    /// There is something new to see.
+    pub fn changed(&mut self) {
+        self.unseen = true;
+    }
+
+    /// Somebody looks on, and has not seen the present state, nor any within the last period?
+    pub fn is_due(&self) -> bool {
+        self.unseen && self.observers > 0 && self.shown.elapsed() > self.period
+    }
+
+    /// Sees who is there; a new observer gets the last sample.
+    pub fn refresh(&mut self) {
+        // an observer that cannot be connected looks again by itself
+        let _ = self.publisher.update_connections();
+        self.observers = self.service.dynamic_config().number_of_subscribers();
+    }
+
+    /// Shows the first worlds of an arena, which `frame` describes, and their state.
+    pub fn show(
+        &mut self,
+        head: FrameHeader,
+        frame: &Table,
+        arena: &[u64],
+        worlds: &mut impl Worlds,
+    ) {
+        (self.shown, self.unseen) = (Instant::now(), false);
+        let lines = self.table.total_bytes() / ALIGNMENT;
+        let Ok(mut loan) = self.publisher.loan_slice_uninit(lines) else {
+            return; // observers keep every slot: they miss a frame
+        };
+        let words = loan::words(loan.payload_mut());
+        words[..self.table.words().len()].copy_from_slice(self.table.words());
+        let from: &[u8] = bytemuck::cast_slice(arena);
+        let before = Table::head_bytes(frame.rows().len());
+        let to: &mut [u8] = bytemuck::cast_slice_mut(words);
+        for (source, target) in frame.rows().iter().zip(self.table.rows()) {
+            // worlds come first in every array, so the first worlds are its first bytes
+            to[target.offset..target.offset + target.bytes]
+                .copy_from_slice(&from[source.offset - before..][..target.bytes]);
+        }
+        if let [.., state] = self.table.rows() {
+            worlds.state(&mut to[state.offset..state.offset + state.bytes]);
+        }
+        *loan.user_header_mut() = FrameHeader {
+            rows: self.table.rows().len() as u32,
+            ..head
+        };
+        // an observer that cannot be reached misses a frame; one that cannot be notified looks by itself after 50 ms
+        let _ = loan::send(loan);
+        let _ = self.notifier.notify();
+    }
+}

@@ -1,0 +1,94 @@
+//! The records of a recording, one after the other, across its blocks.
+
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use super::blocks::{Blocks, Next};
+use super::records::{self, Record};
+use super::unreadable;
+use crate::error::DaemonError;
+
+/// What comes next in a recording.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Entry<'a> {
+    /// A record.
+    Record(Record<'a>),
+    /// Nothing: the last block was whole.
+    End,
+    /// Part of a block.
+    Cut,
+    /// A block that is not as it was written.
+    Damaged,
+}
+
+/// A file that is read.
+#[derive(Debug)]
+pub(super) struct Entries<R> {
+    pub(super) path: PathBuf,
+    blocks: Blocks<R>,
+    block: Vec<u64>,
+    /// Words of the block that were read.
+    read: usize,
+}
+
+impl Entries<BufReader<File>> {
+    /// Opens a file and checks its head.
+    pub(super) fn open(path: &Path) -> Result<Self, DaemonError> {
+        let failed = |error: std::io::Error| unreadable(path, format!("cannot be read: {error}"));
+        let file = File::open(path).map_err(failed)?;
+        if file.metadata().map_err(failed)?.is_dir() {
+            return Err(unreadable(
+                path,
+                "is a folder; give the file of a recording",
+            ));
+        }
+        let blocks =
+            Blocks::open(BufReader::new(file)).map_err(|problem| unreadable(path, problem))?;
+        Ok(Entries {
+            path: path.to_owned(),
+            blocks,
+            block: Vec::new(),
+            read: 0,
+        })
+    }
+}
+
+impl<R: Read> Entries<R> {
+    /// The next one.
+    ///
+    /// # Errors
+    /// The system's; a block whose records make no sense.
+    pub(super) fn next(&mut self) -> Result<Entry<'_>, DaemonError> {
+        while self.read == self.block.len() {
+            self.read = 0;
+            let next = self.blocks.next(&mut self.block);
+            let next =
+                next.map_err(|error| unreadable(&self.path, format!("cannot be read: {error}")))?;
+            let end = match next {
+                Next::Block => continue,
+                Next::End => Entry::End,
+                Next::Cut => Entry::Cut,
+                Next::Damaged => Entry::Damaged,
+            };
+            self.block.clear();
+            return Ok(end);
+        }
+        let mut rest = &self.block[self.read..];
+        let Some(record) = records::read(&mut rest) else {
+            return Err(self.damaged("a record makes no sense"));
+        };
+        self.read = self.block.len() - rest.len();
+        Ok(Entry::Record(record))
+    }
+
+    /// Bytes of the file up to the end of the last good block.
+    pub(super) fn good(&self) -> u64 {
+        self.blocks.good
+    }
+
+    /// What to say of records that no recorder writes.
+    pub(super) fn damaged(&self, what: &str) -> DaemonError {
+        unreadable(&self.path, format!("is damaged: {what}; copy it again"))
+    }
+}

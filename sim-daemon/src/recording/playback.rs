@@ -1,0 +1,132 @@
+//! A recording as those who look on want it: frames of whatever fields they ask for, one after the other.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use sim_core::batch::Field;
+use sim_engine::options::{Adapter, cache_folder};
+use sim_engine::simulation::Device;
+use sim_protocol::Description;
+
+use super::entries::{Entries, Entry};
+use super::records::Record;
+use super::run::{Head, Run};
+use super::unreadable;
+use crate::error::DaemonError;
+use crate::look::Arrays;
+
+/// A recording that is run again, frame after frame, without comparing them.
+pub struct Playback {
+    entries: Entries<BufReader<File>>,
+    description: Description,
+    run: Run,
+    arrays: Arrays,
+    frames: u64,
+    note: Option<String>,
+    end: Option<String>,
+}
+
+impl Playback {
+    /// Opens a file, with frames of `fields` on so many threads (all cores without a number).
+    ///
+    /// # Errors
+    /// A file that cannot be read or is no recording; a scene whose robots and meshes are not where they were.
+    pub fn open(
+        path: &Path,
+        fields: &[Field],
+        threads: Option<usize>,
+    ) -> Result<Playback, DaemonError> {
+        let mut entries = Entries::open(path)?;
+        let head = match entries.next()? {
+            Entry::Record(Record::Head(json)) => Head::read(path, json)?,
+            _ => return Err(unreadable(path, "ends before its head; copy it again")),
+        };
+        let open = |device| Run::open(path, &head, fields.to_vec(), device, threads);
+        let (run, note) = match head.daemon.adapter.as_str() {
+            "" => (open(Device::Cpu)?, None),
+            name => {
+                let device = Device::Gpu {
+                    adapter: Adapter::Name(name.to_owned()),
+                    cache: cache_folder(),
+                };
+                match open(device) {
+                    Ok(run) => (run, None),
+                    Err(error) => {
+                        let note = format!(
+                            "played on the CPU, whose bits are others than those of the GPU it was recorded on: {error}"
+                        );
+                        (open(Device::Cpu)?, Some(note))
+                    }
+                }
+            }
+        };
+        Ok(Playback {
+            entries,
+            arrays: Arrays::new(&run.simulation),
+            description: head.daemon,
+            run,
+            frames: 0,
+            note,
+            end: None,
+        })
+    }
+
+    /// What the daemon told about itself.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// What a viewer should know, if anything.
+    pub fn note(&self) -> Option<&str> {
+        self.note.as_deref()
+    }
+
+    /// Why there are no more frames, once there are none.
+    pub fn end(&self) -> Option<&str> {
+        self.end.as_deref()
+    }
+
+    /// The next frame; none at the end of the recording, or where it has a gap or is damaged.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or whose records no recorder writes.
+    pub fn advance(&mut self) -> Result<Option<&Arrays>, DaemonError> {
+        if self.end.is_some() {
+            return Ok(None);
+        }
+        let path = self.entries.path.clone();
+        loop {
+            let record = match self.entries.next()? {
+                Entry::Record(record) => record,
+                Entry::End | Entry::Cut => return Ok(self.ended("it ends here".to_owned())),
+                Entry::Damaged => return Ok(self.ended("it is damaged from here on".to_owned())),
+            };
+            match record {
+                Record::End(why) => {
+                    let why = why.to_owned();
+                    return Ok(self.ended(why));
+                }
+                Record::Gap(lost) => {
+                    return Ok(self.ended(format!("{lost} frames are missing from here on")));
+                }
+                Record::State(state) => self.run.restore(&path, state)?,
+                Record::Command(command) if self.run.has_state => {
+                    if let Some(advance) = self.run.command(&path, &command, self.frames)? {
+                        self.frames += 1;
+                        self.run.advance(advance, self.arrays.arena());
+                        return Ok(Some(&self.arrays));
+                    }
+                }
+                Record::Head(_) | Record::Command(_) => {
+                    return Err(self.entries.damaged("its records are out of order"));
+                }
+            }
+        }
+    }
+
+    fn ended(&mut self, why: String) -> Option<&Arrays> {
+        self.end = Some(why);
+        None
+    }
+}

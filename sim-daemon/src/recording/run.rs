@@ -1,0 +1,186 @@
+//! A simulation that does again what a recording says.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use sim_core::batch::Field;
+use sim_engine::simulation::{Device, Draws, Faults, Lanes, Options, Precision, Simulation};
+use sim_protocol::host::{Inbox, free_memory};
+use sim_protocol::{CommandHeader, Description, Op};
+
+use super::records::Command;
+use super::unreadable;
+use crate::config;
+use crate::error::DaemonError;
+use crate::export::{self, Advance};
+
+/// Counts above this are damage; below it, sizes in bytes do not overflow.
+const WORLDS_MAX: usize = u32::MAX as usize;
+
+/// The head of a recording.
+#[derive(Debug, Deserialize)]
+pub(super) struct Head {
+    pub(super) daemon: Description,
+    pub(super) observed: Vec<String>,
+}
+
+impl Head {
+    /// Reads it.
+    pub(super) fn read(path: &Path, json: &[u8]) -> Result<Head, DaemonError> {
+        let head: Head = serde_json::from_slice(json).map_err(|error| {
+            let problem = format!(
+                "its head cannot be read: {error}; replay it with the release that recorded it"
+            );
+            unreadable(path, problem)
+        })?;
+        let worlds = head.daemon.worlds;
+        if !(1..=WORLDS_MAX).contains(&worlds) {
+            return Err(unreadable(path, format!("has {worlds} worlds in its head")));
+        }
+        Ok(head)
+    }
+
+    /// The fields of the frames that were recorded.
+    pub(super) fn fields(&self, path: &Path) -> Result<Vec<Field>, DaemonError> {
+        let named = self.daemon.fields.iter().map(|field| {
+            let unknown =
+                || unreadable(path, format!("has a field `{}`, unknown here", field.name));
+            Field::named(&field.name).ok_or_else(unknown)
+        });
+        named.collect()
+    }
+}
+
+/// The worlds of a recording.
+pub(super) struct Run {
+    pub(super) simulation: Simulation,
+    inbox: Inbox,
+    mask: Vec<bool>,
+    /// They are where the recording begins.
+    pub(super) has_state: bool,
+}
+
+impl Run {
+    /// Builds the simulation that the head describes, with frames of `fields`.
+    pub(super) fn open(
+        path: &Path,
+        head: &Head,
+        fields: Vec<Field>,
+        device: Device,
+        threads: Option<usize>,
+    ) -> Result<Run, DaemonError> {
+        let failed = |problem: String| unreadable(path, problem);
+        let told = &head.daemon;
+        let scene = config::parse(&told.scene, "of the recording");
+        let scene = scene.map_err(|error| failed(error.to_string()))?;
+        let description = scene.describe(Path::new(&told.scene_folder));
+        let model = description
+            .map_err(|error| {
+                failed(format!(
+                    "needs the scene's robots and meshes where they were: {error}"
+                ))
+            })?
+            .compile()
+            .map_err(|error| failed(error.to_string()))?;
+        if model.hash() != told.model_hash {
+            let (then, now) = (told.model_hash, model.hash());
+            let ours = env!("CARGO_PKG_VERSION");
+            let cause = match told.release == ours {
+                true => {
+                    "a robot file or a mesh of its scene has changed since; put back what it was"
+                        .to_owned()
+                }
+                false => format!(
+                    "a robot file or a mesh of its scene has changed since, or release {} makes another of it than \
+                     ours, {ours}; replay it with that one",
+                    told.release
+                ),
+            };
+            return Err(failed(format!(
+                "is of another model ({then:016x}, here {now:016x}): {cause}"
+            )));
+        }
+        let options = Options {
+            device,
+            worlds: told.worlds,
+            precision: match told.precision.as_str() {
+                "f64" => Precision::F64,
+                _ => Precision::F32,
+            },
+            threads,
+            lanes: Lanes::Auto,
+            fields,
+            faults: Faults {
+                joint_q_max: told.joint_q_max.unwrap_or(f64::INFINITY),
+                joint_qd_max: told.joint_qd_max.unwrap_or(f64::INFINITY),
+                resets: told.on_fault == "reset",
+                freezes_nan: told.on_nan == "freeze",
+            },
+            draws: Draws::named(&told.draws)
+                .ok_or_else(|| failed(format!("draws by `{}`, unknown here", told.draws)))?,
+            ..Options::default()
+        };
+        let simulation =
+            Simulation::new(model, &options).map_err(|error| failed(error.to_string()))?;
+        let (needed, free) = (simulation.layout().bytes as u64, free_memory());
+        if needed > free {
+            return Err(failed(format!(
+                "has frames of {needed} bytes and {free} bytes of memory are free; end other programs"
+            )));
+        }
+        Ok(Run {
+            inbox: Inbox::for_commands_of(told),
+            mask: Vec::with_capacity(told.worlds),
+            simulation,
+            has_state: false,
+        })
+    }
+
+    /// A state of all worlds.
+    pub(super) fn restore(&mut self, path: &Path, state: &[u8]) -> Result<(), DaemonError> {
+        let restored = self.simulation.restore(state, None, None);
+        restored.map_err(|error| unreadable(path, error.to_string()))?;
+        self.has_state = true;
+        Ok(())
+    }
+
+    /// Sets the inputs of command number `frame` and tells how to go on; nothing if it made no frame.
+    pub(super) fn command(
+        &mut self,
+        path: &Path,
+        command: &Command<'_>,
+        frame: u64,
+    ) -> Result<Option<Advance>, DaemonError> {
+        let refused = |problem: String| {
+            let problem =
+                format!("frame {frame}: a command that was carried out is refused: {problem}");
+            unreadable(path, problem)
+        };
+        let header = CommandHeader {
+            op: command.op,
+            rows: command.rows,
+            ..CommandHeader::default()
+        };
+        self.inbox.take(header, command.words).map_err(refused)?;
+        let advance = match self.op() {
+            // the state that came before is what the restore has left; a snapshot changes nothing
+            Op::Restore | Op::Snapshot => Advance::Forward,
+            _ => export::apply(&mut self.simulation, &self.inbox, &mut self.mask)
+                .map_err(|refusal| refused(refusal.reason))?,
+        };
+        Ok((!command.digests.is_empty()).then_some(advance))
+    }
+
+    /// What the last command was.
+    pub(super) fn op(&self) -> Op {
+        self.inbox.op()
+    }
+
+    /// Goes on, and writes a frame.
+    pub(super) fn advance(&mut self, advance: Advance, arena: &mut [u64]) {
+        match advance {
+            Advance::Step => self.simulation.step(arena),
+            Advance::Forward => self.simulation.forward(arena),
+        }
+    }
+}
