@@ -29,7 +29,7 @@ def demo(checkout: Path, environment: dict[str, str]) -> tuple[float, float]:
     process = subprocess.Popen(["make", "demo"], cwd=checkout, env=environment)
     first = None
     while process.poll() is None:
-        pictures = (checkout / "out").glob("*.png")
+        pictures = (checkout / "out").rglob("*.png")
         # a picture that was there before is not it, and one of no size is still being written
         if first is None and any(path.stat().st_mtime > clock and path.stat().st_size for path in pictures):
             first = time.perf_counter() - begun
