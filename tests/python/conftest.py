@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 import tightloop as tl
 from tightloop.env import VectorEnv
+from vulkan_layer import Layer
 
 REPOSITORY = Path(__file__).parents[2]
 URDF = REPOSITORY / "examples/assets/fr3/fr3_franka_hand.urdf"
@@ -50,6 +51,24 @@ def root() -> Iterator[Path]:
     left = sorted(path.name for path in folder.iterdir())
     shutil.rmtree(folder)
     assert not left, f"the tests left {left} behind"
+
+
+@pytest.fixture(scope="session")
+def layer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Layer]:
+    """Vulkan's validation layer, over all daemons of this run."""
+    layer = Layer(tmp_path_factory.mktemp("layer"))
+    yield layer
+    said = layer.words()
+    layer.close()
+    assert not said, said
+
+
+@pytest.fixture(autouse=True)
+def validated(layer: Layer) -> Iterator[None]:
+    """Vulkan's validation layer has nothing to say about the test."""
+    yield
+    said = layer.words()
+    assert not said, said
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -37,6 +38,20 @@ def serve(pendulum, tmp_path, unique):
 
 def last_line(done):
     return done.stderr.strip().splitlines()[-1]
+
+
+def test_the_validation_layer_watches_daemons_and_its_words_are_heard(pendulum, layer):
+    with tl.launch(pendulum, worlds=1, device="gpu") as sim:
+        assert "khronos_validation" in Path(f"/proc/{sim.pid}/maps").read_text()
+    assert layer.words() == ""
+    # a structure that says to be another one
+    code = (
+        "import ctypes\n"
+        "vulkan = ctypes.CDLL('libvulkan.so.1')\n"
+        "vulkan.vkCreateInstance((ctypes.c_uint32 * 16)(999), None, ctypes.byref(ctypes.c_void_p()))\n"
+    )
+    subprocess.run([sys.executable, "-c", code], timeout=60, check=True)
+    assert "VUID-VkInstanceCreateInfo-sType-sType" in layer.words()
 
 
 def test_a_gpu_runs_what_the_others_ask_in_vain(pendulum):

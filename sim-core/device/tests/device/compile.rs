@@ -32,7 +32,7 @@ fn altered(change: impl Fn(&mut Source)) -> Source {
     source
 }
 
-/// A path of its own, where nothing is: these tests run in several processes at once, one of them under the validation layer.
+/// A path of its own, where nothing is: these tests run in several processes at once.
 fn folder(name: &str) -> PathBuf {
     let name = format!("{name}-{}", std::process::id());
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
