@@ -20,6 +20,7 @@ use super::{
     Backend, BackendError, Faults, FirstFrozen, Frozen, ProgramFacts, Values, available_memory,
 };
 use crate::backend::noise::Noise;
+use crate::options::Options;
 use crate::random::Draws;
 use crate::start::StartDraw;
 use compiled::{Books, Compiled};
@@ -30,16 +31,12 @@ use programs::Programs;
 use sim_core::batch::{Field, Layout, status};
 use sim_core::model::Model;
 use sim_core::model::constants::Constants;
-use sim_device::{AdapterKind, Buffer, Choice, Device, Replay, Staging};
+use sim_device::{AdapterKind, Buffer, Choice, Device, Staging};
 use sim_record::split::Limits;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::OnceLock;
-use std::time::Duration;
 use tile::{Rows, Tile};
-
-/// A driver that takes longer over the programs of a model is given up.
-const COMPILE_LIMIT: Duration = Duration::from_secs(180);
 
 /// What kernels may cost where software plays the GPU: every access to memory is a loop there, and its compiler's time grows with
 /// their square. A dispatch takes as long as a round of a solver, so loops stay whole.
@@ -88,16 +85,12 @@ pub(super) struct Gpu {
 /// No such adapter, out of memory, a driver that cannot compile the programs.
 pub fn create(
     model: &Model,
-    worlds: usize,
     layout: &Layout,
+    options: &Options,
     choice: &Choice,
     cache: Option<&Path>,
-    draws: Draws,
-    replay: Replay,
 ) -> Result<Box<dyn Backend>, BackendError> {
-    Ok(Box::new(Gpu::new(
-        model, worlds, layout, choice, cache, draws, replay,
-    )?))
+    Ok(Box::new(Gpu::new(model, layout, options, choice, cache)?))
 }
 
 const MB: u64 = 1 << 20;
@@ -142,13 +135,12 @@ fn check_memory(device: &Device, worlds: usize, needed: u64) -> Result<(), Backe
 impl Gpu {
     fn new(
         model: &Model,
-        worlds: usize,
         layout: &Layout,
+        options: &Options,
         choice: &Choice,
         cache: Option<&Path>,
-        draws: Draws,
-        replay: Replay,
     ) -> Result<Gpu, BackendError> {
+        let (worlds, limit) = (options.worlds, options.compile_limit);
         let device = Device::open(choice, cache)?;
         check_frame(&device, layout.bytes as u64)?;
         let constants: Constants<f32> = model.constants().cast();
@@ -184,9 +176,8 @@ impl Gpu {
         let tiles = (worlds as u64).div_ceil(u64::from(widest));
         let needed = tiles * tile::memory(m, &places, widest) + 2 * layout.bytes as u64;
         check_memory(&device, worlds, needed)?;
-        let mut compiled =
-            Compiled::new(&device, m, &places, &programs, books, widest, COMPILE_LIMIT)?;
-        compiled.replay = replay;
+        let mut compiled = Compiled::new(&device, m, &places, &programs, books, widest, limit)?;
+        compiled.replay = options.replay;
         let frame = device.staging("frame", layout.bytes.max(64) as u64)?;
         let drawn = match device.info().kind {
             AdapterKind::Discrete => Some(device.buffer("frame", layout.bytes.max(64) as u64)?),
@@ -223,7 +214,7 @@ impl Gpu {
             record: places.record(shape),
             start: start(model),
             draw: StartDraw::new(model),
-            draws,
+            draws: options.draws,
             noise: Noise::new(model),
             faults: Faults::default(),
             host: Host::new(worlds, m.varying.len()),
