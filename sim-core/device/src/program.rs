@@ -2,6 +2,7 @@
 
 use crate::device::{Device, Inner};
 use crate::error::DeviceError;
+use crate::leave::COMPILING;
 use crate::module::{self, Binding, Module};
 use crate::{portable, vulkan};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -76,7 +77,7 @@ impl Device {
     /// Compiles programs on all cores, and runs each once over nothing (`warm`); the order is kept.
     ///
     /// A driver that takes longer than `limit` over one of them cannot be stopped: its thread is left to itself, and keeps the
-    /// device open until it ends (`compiling` counts such threads). A process that exits before may crash in the driver.
+    /// device open until it ends (`compiling` counts such threads). A process that ends before may crash in the driver: see `leave`.
     ///
     /// Errors: the first program that does not compile, takes too long or asks for more than the adapter has; those begun
     /// beside it are finished and dropped.
@@ -191,6 +192,7 @@ pub(crate) fn within<T: Send + 'static>(
         let (work, next, stop, tell) = (work.clone(), next.clone(), stop.clone(), tell.clone());
         let device = device.clone();
         device.compiling.fetch_add(1, Ordering::Relaxed);
+        COMPILING.fetch_add(1, Ordering::Relaxed);
         let thread = std::thread::Builder::new().name("compile".to_owned());
         let spawned = thread.stack_size(STACK).spawn(move || {
             loop {
@@ -203,6 +205,9 @@ pub(crate) fn within<T: Send + 'static>(
             }
             drop((work, tell));
             device.compiling.fetch_sub(1, Ordering::Relaxed);
+            // that may have closed the device, in the driver
+            drop(device);
+            COMPILING.fetch_sub(1, Ordering::Relaxed);
         });
         spawned.expect("the system has threads");
     }

@@ -7,7 +7,7 @@ use sim_core::model::Model;
 use std::path::PathBuf;
 use std::time::Duration;
 
-pub use sim_device::{AdapterInfo, AdapterKind, Choice as Adapter, Replay, adapters};
+pub use sim_device::{AdapterInfo, AdapterKind, Choice as Adapter, Replay, adapters, leave};
 #[doc(hidden)]
 pub use sim_device::lose_after;
 
