@@ -52,7 +52,7 @@ fn serve(
                 };
                 // its file may be gone when the recording is replayed
                 if host.is_recorded() && applied.is_ok() && host.inbox().op() == Op::Restore {
-                    host.record_state(&simulation.snapshot(), true);
+                    record_state(simulation, host, true);
                 }
                 if let (Ok(_), Some(refusal)) = (&applied, lost(simulation)) {
                     applied = Err(refusal);
@@ -66,15 +66,9 @@ fn serve(
                             Advance::Step => simulation.step(arena),
                             Advance::Forward => simulation.forward(arena),
                         }
+                        simulation.lost().is_none()
                     }),
                     Err(refusal) => host.refuse(refusal.kind, &refusal.reason),
-                }
-                // the client has its frame, and need not wait for it
-                if !is_told && let Some(lost) = simulation.lost() {
-                    news.tell(&format!(
-                        "all worlds are lost, and commands are refused from now on: {lost}"
-                    ));
-                    is_told = true;
                 }
                 faults.tell(simulation, news, started);
             }
@@ -85,9 +79,25 @@ fn serve(
                 host.show(&scratch);
                 faults.tell(simulation, news, Instant::now());
             }
-            Next::Record => host.record_state(&simulation.snapshot(), false),
+            Next::Record => record_state(simulation, host, false),
             Next::End => return Ok(()),
         }
+        // whoever waited has a frame, and need not wait for this
+        if !is_told && let Some(lost) = simulation.lost() {
+            news.tell(&format!(
+                "all worlds are lost, and commands are refused from now on: {lost}"
+            ));
+            host.end_records(&format!("all worlds are lost: {lost}"));
+            is_told = true;
+        }
+    }
+}
+
+/// Gives recorders the state of all worlds, as long as there is one: `all` of them, or those who wait for it.
+fn record_state(simulation: &Simulation, host: &mut Host, all: bool) {
+    let state = simulation.snapshot();
+    if simulation.lost().is_none() {
+        host.record_state(&state, all);
     }
 }
 

@@ -22,6 +22,8 @@ mod writer;
 
 use std::path::Path;
 
+#[cfg(test)]
+pub(crate) use record::follow;
 pub(crate) use record::run as record;
 pub(crate) use replay::run as replay;
 

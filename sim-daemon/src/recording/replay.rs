@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 use sim_core::batch::Field;
-use sim_engine::options::{Adapter, cache_folder};
+use sim_engine::options::{Adapter, cache_folder, compile_limit};
 use sim_engine::simulation::{Device, Draws, Faults, Lanes, Options, Precision, Simulation};
 use sim_protocol::digest::{digest, digests_of};
 use sim_protocol::host::{Inbox, free_memory};
@@ -269,6 +269,7 @@ impl Run {
                     cache: cache_folder(),
                 },
             },
+            compile_limit: compile_limit()?,
             worlds: told.worlds,
             precision: match told.precision.as_str() {
                 "f64" => Precision::F64,

@@ -185,8 +185,8 @@ impl Host {
 
     /// Answers the command: `fill` writes the arena of the frame, straight into shared memory.
     ///
-    /// `started` is when work on the command began.
-    pub fn answer(&mut self, started: Instant, fill: impl FnOnce(&mut [u64])) {
+    /// `started` is when work on the command began; `fill` says whether recorders are to be told.
+    pub fn answer(&mut self, started: Instant, fill: impl FnOnce(&mut [u64]) -> bool) {
         self.state.answer(started, fill);
     }
 
@@ -205,6 +205,12 @@ impl Host {
     pub fn record_state(&mut self, state: &[u8], all: bool) {
         let session = self.state.description.session;
         self.state.journals.state(session, state, all);
+    }
+
+    /// Ends all recordings, and refuses those to come.
+    pub fn end_records(&mut self, reason: &str) {
+        let session = self.state.description.session;
+        self.state.journals.end(session, reason);
     }
 
     /// Answers the command with a refusal.

@@ -110,8 +110,11 @@ impl State {
     /// Opens a journal, if there is room for it.
     fn journal(&mut self, observed: u64) -> Response {
         let refused = |reason| Response::Refused { reason };
+        if let Some(reason) = self.journals.ended() {
+            return refused(format!("nothing can be recorded any more: {reason}"));
+        }
         // those that ended since somebody looked
-        self.journals.refresh();
+        self.journals.refresh(self.description.session);
         if self.journals.are_full() {
             return refused(format!(
                 "{RECORDERS_MAX} recorders are at work, which is the limit; end one of them"
@@ -186,7 +189,7 @@ impl State {
         end.then_some(Next::End)
     }
 
-    pub(super) fn answer(&mut self, started: Instant, fill: impl FnOnce(&mut [u64])) {
+    pub(super) fn answer(&mut self, started: Instant, fill: impl FnOnce(&mut [u64]) -> bool) {
         let Some(lane) = &mut self.lane else {
             return self.record_inputs();
         };
@@ -201,7 +204,7 @@ impl State {
         let words = loan::words(loan.payload_mut());
         let (head, arena) = words.split_at_mut(Table::head_bytes(self.frame.rows().len()) / 8);
         head[..self.frame.words().len()].copy_from_slice(self.frame.words());
-        fill(arena);
+        let is_told = fill(arena);
         self.frames += 1;
         self.unseen = true;
         let now = Instant::now();
@@ -230,7 +233,7 @@ impl State {
         // a holder that cannot be notified looks by itself after 50 ms
         let _ = lane.notifier.notify();
         // last: nobody waits for it
-        if self.journals.are_read() {
+        if is_told && self.journals.are_read() {
             let occasion = Occasion {
                 description: &self.description,
                 inbox: &self.inbox,
@@ -333,7 +336,7 @@ impl State {
         // new observers get the frame shown last, dead ones give their slots back
         let _ = self.watch.update_connections();
         self.watchers = self.watch_service.dynamic_config().number_of_subscribers();
-        let waits = self.journals.refresh();
+        let waits = self.journals.refresh(self.description.session);
         next.or(waits.then_some(Next::Record))
     }
 }

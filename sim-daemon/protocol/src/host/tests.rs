@@ -88,7 +88,10 @@ fn serve(place: &Place, stop: Arc<AtomicBool>, ready: Sender<()>) {
         match host.wait().unwrap() {
             Next::Command => {
                 count += 1;
-                host.answer(Instant::now(), |arena| arena[..2].fill(count));
+                host.answer(Instant::now(), |arena| {
+                    arena[..2].fill(count);
+                    true
+                });
             }
             Next::Watch => host.show(&[count; 8]),
             Next::Record => host.record_state(&[count as u8; STATE], false),
