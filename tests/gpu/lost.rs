@@ -112,7 +112,11 @@ fn a_driver_that_takes_too_long_is_named_with_the_cures() {
         ..options(gpu(), 1, &[Field::JointQ])
     };
     let failure = Simulation::new(model, &wanted).err().unwrap().to_string();
-    for word in ["did not compile within 1µs", "cpu", "TIGHTLOOP_COMPILE_LIMIT"] {
+    for word in [
+        "did not compile within 1µs",
+        "cpu",
+        "TIGHTLOOP_COMPILE_LIMIT",
+    ] {
         assert!(failure.contains(word), "{word}: {failure}");
     }
 }

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from vulkan_layer import Layer
 
 import tightloop as tl
 from tightloop.env import VectorEnv
-from vulkan_layer import Layer
 
 REPOSITORY = Path(__file__).parents[2]
 URDF = REPOSITORY / "examples/assets/fr3/fr3_franka_hand.urdf"

@@ -7,9 +7,9 @@ use sim_core::model::Model;
 use std::path::PathBuf;
 use std::time::Duration;
 
-pub use sim_device::{AdapterInfo, AdapterKind, Choice as Adapter, Replay, adapters, leave};
 #[doc(hidden)]
 pub use sim_device::lose_after;
+pub use sim_device::{AdapterInfo, AdapterKind, Choice as Adapter, Replay, adapters, leave};
 
 /// What keeps the worlds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -36,7 +36,7 @@ pub enum Device {
 /// Worlds from which on [`Device::Auto`] looks for a GPU: fewer leave most of it idle.
 pub const AUTO_WORLDS: usize = 1024;
 
-/// Ten times what lavapipe takes over the slowest program of a grasp on a busy machine.
+/// For each: lavapipe takes 12 s over all programs of a grasp together on four idle cores, and three times that on busy ones.
 const COMPILE_LIMIT: Duration = Duration::from_secs(180);
 /// Where another limit is said.
 const COMPILE_LIMIT_NAME: &str = "TIGHTLOOP_COMPILE_LIMIT";

@@ -151,7 +151,11 @@ fn a_daemon_whose_device_is_lost_refuses_commands_with_the_reason_and_goes_on() 
     }
     assert!(!kept.exists());
     let out = served.root.join("late.tlrec");
-    let refused = follow(&attach(&served.root), &recorded(&out), &AtomicBool::new(false));
+    let refused = follow(
+        &attach(&served.root),
+        &recorded(&out),
+        &AtomicBool::new(false),
+    );
     let refused = refused.unwrap_err().to_string();
     assert!(
         refused.contains("nothing can be recorded any more") && refused.contains("device lost"),

@@ -37,7 +37,7 @@ extern "C" fn begin() {
     let settings = memfd_create("layer", MemfdFlags::CLOEXEC).expect("memory for settings");
     let mut settings = File::from(settings);
     let to = path(room.as_raw_fd());
-    let written = write!(settings, "{SETTINGS}khronos_validation.log_filename = {to}\n");
+    let written = writeln!(settings, "{SETTINGS}khronos_validation.log_filename = {to}");
     written.expect("settings are few");
     let place = path(settings.as_raw_fd());
     // SAFETY: before `main` there is one thread.

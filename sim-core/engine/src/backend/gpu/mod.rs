@@ -44,7 +44,7 @@ const SOFTWARE: Limits = Limits {
     kernel: 16_000,
     repeated: usize::MAX,
 };
-/// The same of hardware: few kernels, so that numbers stay in registers.
+/// The same of hardware: few kernels, so that numbers stay in registers. A guess, with others that ARCHITECTURE.md lists.
 const HARDWARE: Limits = Limits {
     kernel: 40_000,
     repeated: usize::MAX,
