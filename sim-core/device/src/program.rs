@@ -188,13 +188,14 @@ pub(crate) fn within<T: Send + 'static>(
     let (work, next) = (Arc::new(work), Arc::new(AtomicUsize::new(0)));
     let stop = Arc::new(AtomicBool::new(false));
     let (tell, news) = mpsc::channel();
+    let mut spawned = Vec::new();
     for _ in 0..threads.min(count) {
         let (work, next, stop, tell) = (work.clone(), next.clone(), stop.clone(), tell.clone());
         let device = device.clone();
         device.compiling.fetch_add(1, Ordering::Relaxed);
         COMPILING.fetch_add(1, Ordering::Relaxed);
         let thread = std::thread::Builder::new().name("compile".to_owned());
-        let spawned = thread.stack_size(STACK).spawn(move || {
+        let begun = thread.stack_size(STACK).spawn(move || {
             loop {
                 let place = next.fetch_add(1, Ordering::Relaxed);
                 if place >= count || stop.load(Ordering::Relaxed) {
@@ -209,7 +210,7 @@ pub(crate) fn within<T: Send + 'static>(
             drop(device);
             COMPILING.fetch_sub(1, Ordering::Relaxed);
         });
-        spawned.expect("the system has threads");
+        spawned.push(begun.expect("the system has threads"));
     }
     drop((tell, work));
 
@@ -245,6 +246,12 @@ pub(crate) fn within<T: Send + 'static>(
     stop.store(true, Ordering::Relaxed);
     match failure {
         Some(failure) => Err(failure),
-        None => Ok(done.into_iter().flatten().collect()),
+        None => {
+            // else the last of them may close the device while the process ends
+            for thread in spawned {
+                let _ = thread.join();
+            }
+            Ok(done.into_iter().flatten().collect())
+        }
     }
 }

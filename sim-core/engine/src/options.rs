@@ -119,7 +119,15 @@ pub(crate) fn backend(
 ) -> Result<(Box<dyn Backend>, Option<String>), BackendError> {
     let (worlds, precision, draws) = (options.worlds, options.precision, options.draws);
     let on_gpu = |adapter: &Adapter, cache: &Option<PathBuf>| {
-        gpu::create(model, layout, options, adapter, cache.as_deref())
+        let wanted = gpu::Wanted {
+            worlds,
+            adapter,
+            cache: cache.as_deref(),
+            draws,
+            replay: options.replay,
+            compile_limit: options.compile_limit,
+        };
+        gpu::create(model, layout, &wanted)
     };
     let note = match &options.device {
         Device::Gpu { .. } if precision == Precision::F64 => return Err(BackendError::DoubleOnGpu),

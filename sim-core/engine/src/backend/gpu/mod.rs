@@ -20,7 +20,6 @@ use super::{
     Backend, BackendError, Faults, FirstFrozen, Frozen, ProgramFacts, Values, available_memory,
 };
 use crate::backend::noise::Noise;
-use crate::options::Options;
 use crate::random::Draws;
 use crate::start::StartDraw;
 use compiled::{Books, Compiled};
@@ -31,11 +30,12 @@ use programs::Programs;
 use sim_core::batch::{Field, Layout, status};
 use sim_core::model::Model;
 use sim_core::model::constants::Constants;
-use sim_device::{AdapterKind, Buffer, Choice, Device, Staging};
+use sim_device::{AdapterKind, Buffer, Choice, Device, Replay, Staging};
 use sim_record::split::Limits;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::OnceLock;
+use std::time::Duration;
 use tile::{Rows, Tile};
 
 /// What kernels may cost where software plays the GPU: every access to memory is a loop there, and its compiler's time grows with
@@ -79,6 +79,22 @@ pub(super) struct Gpu {
     copied: u64,
 }
 
+/// What is asked of a GPU, besides a model.
+pub struct Wanted<'a> {
+    /// Number of worlds.
+    pub worlds: usize,
+    /// Which one it is.
+    pub adapter: &'a Choice,
+    /// Where programs are kept, if anywhere.
+    pub cache: Option<&'a Path>,
+    /// What the draws of a world depend on.
+    pub draws: Draws,
+    /// How it gets the batches of a frame.
+    pub replay: Replay,
+    /// How long its driver may take over a program.
+    pub compile_limit: Duration,
+}
+
 /// Worlds on the adapter that is meant.
 ///
 /// # Errors
@@ -86,11 +102,9 @@ pub(super) struct Gpu {
 pub fn create(
     model: &Model,
     layout: &Layout,
-    options: &Options,
-    choice: &Choice,
-    cache: Option<&Path>,
+    wanted: &Wanted<'_>,
 ) -> Result<Box<dyn Backend>, BackendError> {
-    Ok(Box::new(Gpu::new(model, layout, options, choice, cache)?))
+    Ok(Box::new(Gpu::new(model, layout, wanted)?))
 }
 
 const MB: u64 = 1 << 20;
@@ -133,15 +147,9 @@ fn check_memory(device: &Device, worlds: usize, needed: u64) -> Result<(), Backe
 }
 
 impl Gpu {
-    fn new(
-        model: &Model,
-        layout: &Layout,
-        options: &Options,
-        choice: &Choice,
-        cache: Option<&Path>,
-    ) -> Result<Gpu, BackendError> {
-        let (worlds, limit) = (options.worlds, options.compile_limit);
-        let device = Device::open(choice, cache)?;
+    fn new(model: &Model, layout: &Layout, asked: &Wanted<'_>) -> Result<Gpu, BackendError> {
+        let (worlds, limit) = (asked.worlds, asked.compile_limit);
+        let device = Device::open(asked.adapter, asked.cache)?;
         check_frame(&device, layout.bytes as u64)?;
         let constants: Constants<f32> = model.constants().cast();
         let m = &constants;
@@ -177,7 +185,7 @@ impl Gpu {
         let needed = tiles * tile::memory(m, &places, widest) + 2 * layout.bytes as u64;
         check_memory(&device, worlds, needed)?;
         let mut compiled = Compiled::new(&device, m, &places, &programs, books, widest, limit)?;
-        compiled.replay = options.replay;
+        compiled.replay = asked.replay;
         let frame = device.staging("frame", layout.bytes.max(64) as u64)?;
         let drawn = match device.info().kind {
             AdapterKind::Discrete => Some(device.buffer("frame", layout.bytes.max(64) as u64)?),
@@ -214,7 +222,7 @@ impl Gpu {
             record: places.record(shape),
             start: start(model),
             draw: StartDraw::new(model),
-            draws: options.draws,
+            draws: asked.draws,
             noise: Noise::new(model),
             faults: Faults::default(),
             host: Host::new(worlds, m.varying.len()),
