@@ -75,6 +75,10 @@ pub(crate) struct Serve {
     #[arg(long, default_value_t = 1)]
     pub(crate) worlds: u64,
 
+    /// Groups that the worlds are split into, which step independently; clients attach to NAME.0, NAME.1, ….
+    #[arg(long, default_value_t = 1)]
+    pub(crate) groups: u64,
+
     /// Where the physics runs: cpu, gpu, or auto for a GPU if there is one and the worlds are many, else the CPU.
     #[arg(long, default_value = "auto")]
     pub(crate) device: String,
@@ -87,7 +91,7 @@ pub(crate) struct Serve {
     #[arg(long, default_value = "tightloop")]
     pub(crate) name: String,
 
-    /// Threads of a step; one a core if left out.
+    /// Threads of a step, shared by all groups; one a core if left out.
     #[arg(long)]
     pub(crate) threads: Option<usize>,
 
@@ -279,7 +283,13 @@ fn list() -> Result<(), DaemonError> {
 }
 
 fn stop(name: &str) -> Result<(), DaemonError> {
-    let client = Client::attach(name, &AttachOptions::default(), &mut keep_waiting())?;
+    let options = AttachOptions::default();
+    // any of its groups ends a daemon
+    let name = match sim_protocol::find(name, &options, &mut keep_waiting())?.groups {
+        1 => name.to_owned(),
+        _ => format!("{name}.0"),
+    };
+    let client = Client::attach(&name, &options, &mut keep_waiting())?;
     client.shutdown(&mut keep_waiting())?;
     Ok(())
 }

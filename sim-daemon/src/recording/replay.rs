@@ -270,6 +270,7 @@ impl Run {
                 },
             },
             worlds: told.worlds,
+            first_world: told.first_world,
             precision: match told.precision.as_str() {
                 "f64" => Precision::F64,
                 _ => Precision::F32,

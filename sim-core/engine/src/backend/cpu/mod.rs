@@ -16,15 +16,14 @@ mod trouble;
 pub use dispatch::{available, create};
 
 use super::state::StateField;
-use super::{Backend, BackendError, Faults, Frozen, Lanes, Precision, Values};
-use crate::random::Draws;
+use super::{Backend, BackendError, Faults, Frozen, Groups, Lanes, Precision, Values};
 use chunk::{Chunk, Job};
 use dispatch::{Program, RunChunk};
 use rayon::prelude::*;
 use sim_core::batch::{Field, Layout};
 use sim_core::lane::Lane;
-use sim_core::model::Model;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Chunks a thread: enough that a slow block does not leave the others idle.
 pub(crate) const CHUNKS_PER_THREAD: usize = 4;
@@ -32,30 +31,42 @@ pub(crate) const CHUNKS_PER_THREAD: usize = 4;
 struct Cpu<F: Lane> {
     chunks: Vec<Chunk<F>>,
     job: Job<F>,
-    pool: Option<rayon::ThreadPool>,
+    pool: Option<Arc<rayon::ThreadPool>>,
     threads: usize,
     device: String,
     arena_words: usize,
     run: RunChunk<F>,
 }
 
+/// Threads for the steps of all groups: what one group leaves idle works for another. None where the caller's own is enough.
+fn pool(threads: usize, groups: usize) -> Result<Option<Arc<rayon::ThreadPool>>, BackendError> {
+    if threads == 1 && groups == 1 {
+        return Ok(None);
+    }
+    let builder = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|i| format!("step-{i}"));
+    let failed = |e: rayon::ThreadPoolBuildError| BackendError::Threads {
+        threads,
+        reason: e.to_string(),
+    };
+    Ok(Some(Arc::new(builder.build().map_err(failed)?)))
+}
+
 impl<F: Lane> Cpu<F> {
     fn new(
-        model: &Model,
+        job: Job<F>,
         worlds: usize,
-        layout: &Layout,
         threads: usize,
-        draws: Draws,
-        program: Program<F>,
-    ) -> Result<Self, BackendError> {
+        pool: Option<Arc<rayon::ThreadPool>>,
+        program: &Program<F>,
+    ) -> Self {
         let blocks = worlds.div_ceil(F::WIDTH);
-        let threads = threads.min(blocks);
         let parts = if threads == 1 {
             1
         } else {
             (threads * CHUNKS_PER_THREAD).min(blocks)
         };
-        let job = Job::new(model, layout.clone(), program.stages, draws);
         let chunks = (0..parts)
             .map(|part| {
                 let first = part * blocks / parts * F::WIDTH;
@@ -63,20 +74,9 @@ impl<F: Lane> Cpu<F> {
                 Chunk::new(&job, first..end)
             })
             .collect();
-        let pool = if threads == 1 {
-            None
-        } else {
-            let builder = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .thread_name(|i| format!("step-{i}"));
-            let failed = |e: rayon::ThreadPoolBuildError| BackendError::Threads {
-                threads,
-                reason: e.to_string(),
-            };
-            Some(builder.build().map_err(failed)?)
-        };
         let plural = if threads == 1 { "" } else { "s" };
-        Ok(Cpu {
+        Cpu {
+            arena_words: job.layout.bytes / 8,
             chunks,
             job,
             pool,
@@ -87,9 +87,8 @@ impl<F: Lane> Cpu<F> {
                 F::WIDTH,
                 if F::WIDTH == 1 { "" } else { "s" },
             ),
-            arena_words: layout.bytes / 8,
             run: program.chunk,
-        })
+        }
     }
 }
 

@@ -20,7 +20,7 @@ use super::{
     Backend, BackendError, Faults, FirstFrozen, Frozen, ProgramFacts, Values, available_memory,
 };
 use crate::backend::noise::Noise;
-use crate::random::Draws;
+use crate::random::Numbering;
 use crate::start::StartDraw;
 use compiled::{Books, Compiled};
 use host::Host;
@@ -73,7 +73,7 @@ pub(super) struct Gpu {
     record: Vec<u32>,
     start: Vec<f32>,
     draw: StartDraw,
-    draws: Draws,
+    numbering: Numbering,
     noise: Noise,
     faults: Faults,
     host: Host,
@@ -92,11 +92,11 @@ pub fn create(
     layout: &Layout,
     choice: &Choice,
     cache: Option<&Path>,
-    draws: Draws,
+    numbering: Numbering,
     replay: Replay,
 ) -> Result<Box<dyn Backend>, BackendError> {
     Ok(Box::new(Gpu::new(
-        model, worlds, layout, choice, cache, draws, replay,
+        model, worlds, layout, choice, cache, numbering, replay,
     )?))
 }
 
@@ -146,7 +146,7 @@ impl Gpu {
         layout: &Layout,
         choice: &Choice,
         cache: Option<&Path>,
-        draws: Draws,
+        numbering: Numbering,
         replay: Replay,
     ) -> Result<Gpu, BackendError> {
         let device = Device::open(choice, cache)?;
@@ -223,7 +223,7 @@ impl Gpu {
             record: places.record(shape),
             start: start(model),
             draw: StartDraw::new(model),
-            draws,
+            numbering,
             noise: Noise::new(model),
             faults: Faults::default(),
             host: Host::new(worlds, m.varying.len()),
