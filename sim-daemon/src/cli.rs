@@ -56,7 +56,7 @@ enum Command {
     ///
     /// Example: tightloop list
     List,
-    /// Stop a daemon and wait until it is gone.
+    /// Stop a daemon, with all of its groups, and wait until it is gone.
     ///
     /// Example: tightloop stop franka
     Stop {
@@ -147,7 +147,7 @@ pub(crate) struct Serve {
 /// Arguments of `record` as given; `recording` checks them.
 #[derive(Debug, Args)]
 pub(crate) struct Record {
-    /// Name of the daemon.
+    /// Name of the daemon, or of one of its groups, such as franka.0.
     pub(crate) name: String,
 
     /// File to write, such as run.tlrec.

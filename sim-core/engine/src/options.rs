@@ -1,7 +1,7 @@
 //! How a model is run, and what keeps its worlds.
 
 use crate::backend::{
-    Backend, BackendError, Faults, Groups, Lanes, Precision, available_memory, cpu, gpu,
+    BackendError, Backends, Faults, Groups, Lanes, Precision, available_memory, cpu, gpu,
 };
 use crate::random::{Draws, Numbering};
 use sim_core::batch::{Field, Layout};
@@ -92,7 +92,7 @@ pub(crate) fn backends(
     options: &Options,
     count: usize,
     layout: &Layout,
-) -> Result<(Vec<Box<dyn Backend>>, Option<String>), BackendError> {
+) -> Result<(Backends, Option<String>), BackendError> {
     let (worlds, precision) = (options.worlds, options.precision);
     let numbering = Numbering {
         draws: options.draws,
@@ -103,13 +103,9 @@ pub(crate) fn backends(
         worlds,
         numbering,
     };
-    // a device each, so that none waits for another's batch
     let on_gpu = |adapter: &Adapter, cache: &Option<PathBuf>| {
         let (cache, replay) = (cache.as_deref(), options.replay);
-        let made = groups
-            .numberings()
-            .map(|numbering| gpu::create(model, worlds, layout, adapter, cache, numbering, replay));
-        made.collect::<Result<Vec<_>, _>>()
+        gpu::create(model, groups, layout, adapter, cache, replay)
     };
     let note = match &options.device {
         Device::Gpu { .. } if precision == Precision::F64 => return Err(BackendError::DoubleOnGpu),

@@ -154,6 +154,9 @@ pub struct ProgramFacts {
     pub rounds: Option<usize>,
 }
 
+/// One for each group.
+pub type Backends = Vec<Box<dyn Backend>>;
+
 /// What keeps the worlds. Arguments were checked by [`crate::simulation::Simulation`].
 pub trait Backend: Send {
     /// What it runs on, for people.

@@ -2,7 +2,7 @@
 
 use super::chunk::{Chunk, Job};
 use super::transfer::Arena;
-use super::{Backend, BackendError, Cpu, Groups, Lanes, Layout, Precision, pool};
+use super::{Backend, BackendError, Backends, Cpu, Groups, Lanes, Layout, Precision, Workers};
 use sim_core::compiled::Stages;
 use sim_core::lane::Lane;
 use sim_core::model::Model;
@@ -78,7 +78,7 @@ pub fn create(
     lanes: Lanes,
     layout: &Layout,
     threads: usize,
-) -> Result<Vec<Box<dyn Backend>>, BackendError> {
+) -> Result<Backends, BackendError> {
     let lanes = match lanes {
         // a register that holds one world takes longer than a scalar, for the same bits
         Lanes::Auto if groups.worlds == 1 => Lanes::Scalar,
@@ -143,13 +143,13 @@ fn boxed<F: Lane>(
     layout: &Layout,
     threads: usize,
     program: Program<F>,
-) -> Result<Vec<Box<dyn Backend>>, BackendError> {
+) -> Result<Backends, BackendError> {
     // a thread for each block is enough
     let threads = threads.min(groups.count * groups.worlds.div_ceil(F::WIDTH));
-    let pool = pool(threads, groups.count)?;
+    let workers = Workers::new(threads, groups.count)?;
     let made = groups.numberings().map(|numbering| {
         let job = Job::new(model, layout.clone(), program.stages, numbering);
-        let cpu = Cpu::new(job, groups.worlds, threads, pool.clone(), &program);
+        let cpu = Cpu::new(job, groups.worlds, threads, workers.clone(), &program);
         Box::new(cpu) as Box<dyn Backend>
     });
     Ok(made.collect())

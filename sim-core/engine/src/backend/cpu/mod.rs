@@ -1,6 +1,7 @@
 //! The CPU: blocks of worlds, one world a SIMD lane, spread over threads. Sole user of rayon.
 //!
-//! A control frame is one pass per block with all substeps in cache; nothing is allocated in it.
+//! A control frame is one pass per block with all substeps in cache; nothing is allocated in it, but where groups share their threads a
+//! few words for each chunk.
 
 mod chunk;
 mod contacts;
@@ -16,7 +17,7 @@ mod trouble;
 pub use dispatch::{available, create};
 
 use super::state::StateField;
-use super::{Backend, BackendError, Faults, Frozen, Groups, Lanes, Precision, Values};
+use super::{Backend, BackendError, Backends, Faults, Frozen, Groups, Lanes, Precision, Values};
 use chunk::{Chunk, Job};
 use dispatch::{Program, RunChunk};
 use rayon::prelude::*;
@@ -31,26 +32,42 @@ pub(crate) const CHUNKS_PER_THREAD: usize = 4;
 struct Cpu<F: Lane> {
     chunks: Vec<Chunk<F>>,
     job: Job<F>,
-    pool: Option<Arc<rayon::ThreadPool>>,
+    workers: Workers,
     threads: usize,
     device: String,
     arena_words: usize,
     run: RunChunk<F>,
 }
 
-/// Threads for the steps of all groups: what one group leaves idle works for another. None where the caller's own is enough.
-fn pool(threads: usize, groups: usize) -> Result<Option<Arc<rayon::ThreadPool>>, BackendError> {
-    if threads == 1 && groups == 1 {
-        return Ok(None);
+/// Who steps the chunks.
+#[derive(Clone)]
+enum Workers {
+    /// The thread of the caller.
+    Caller,
+    /// A pool for one group.
+    Own(Arc<rayon::ThreadPool>),
+    /// A pool for all groups: what one leaves idle works for another.
+    Shared(Arc<rayon::ThreadPool>),
+}
+
+impl Workers {
+    fn new(threads: usize, groups: usize) -> Result<Workers, BackendError> {
+        if threads == 1 && groups == 1 {
+            return Ok(Workers::Caller);
+        }
+        let builder = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(|i| format!("step-{i}"));
+        let failed = |e: rayon::ThreadPoolBuildError| BackendError::Threads {
+            threads,
+            reason: e.to_string(),
+        };
+        let pool = Arc::new(builder.build().map_err(failed)?);
+        Ok(match groups {
+            1 => Workers::Own(pool),
+            _ => Workers::Shared(pool),
+        })
     }
-    let builder = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .thread_name(|i| format!("step-{i}"));
-    let failed = |e: rayon::ThreadPoolBuildError| BackendError::Threads {
-        threads,
-        reason: e.to_string(),
-    };
-    Ok(Some(Arc::new(builder.build().map_err(failed)?)))
 }
 
 impl<F: Lane> Cpu<F> {
@@ -58,7 +75,7 @@ impl<F: Lane> Cpu<F> {
         job: Job<F>,
         worlds: usize,
         threads: usize,
-        pool: Option<Arc<rayon::ThreadPool>>,
+        workers: Workers,
         program: &Program<F>,
     ) -> Self {
         let blocks = worlds.div_ceil(F::WIDTH);
@@ -79,7 +96,7 @@ impl<F: Lane> Cpu<F> {
             arena_words: job.layout.bytes / 8,
             chunks,
             job,
-            pool,
+            workers,
             threads,
             device: format!(
                 "cpu ({}, {} world{} a block, {threads} thread{plural})",
@@ -97,9 +114,17 @@ impl<F: Lane> Cpu<F> {
     fn for_each(&mut self, work: impl Fn(&mut Chunk<F>, &Job<F>) + Send + Sync) {
         let job = &self.job;
         let work = |chunk: &mut Chunk<F>| work(chunk, job);
-        match &self.pool {
-            None => self.chunks.iter_mut().for_each(work),
-            Some(pool) => pool.install(|| self.chunks.par_iter_mut().for_each(work)),
+        match &self.workers {
+            Workers::Caller => self.chunks.iter_mut().for_each(work),
+            Workers::Own(pool) => pool.install(|| self.chunks.par_iter_mut().for_each(work)),
+            // a job a chunk, in order of arrival: a thread that waits within a job, as those of an iterator do, would take up
+            // another group's meanwhile, and hold up its own
+            Workers::Shared(pool) => pool.in_place_scope(|scope| {
+                let work = &work;
+                for chunk in &mut self.chunks {
+                    scope.spawn(move |_| work(chunk));
+                }
+            }),
         }
     }
 }

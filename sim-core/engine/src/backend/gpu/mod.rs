@@ -17,7 +17,8 @@ mod worlds;
 use super::shown::stages_for;
 use super::state::{Shape, StateField, start};
 use super::{
-    Backend, BackendError, Faults, FirstFrozen, Frozen, ProgramFacts, Values, available_memory,
+    Backend, BackendError, Backends, Faults, FirstFrozen, Frozen, Groups, ProgramFacts, Values,
+    available_memory,
 };
 use crate::backend::noise::Noise;
 use crate::random::Numbering;
@@ -82,22 +83,41 @@ pub(super) struct Gpu {
     copied: u64,
 }
 
-/// Worlds on the adapter that is meant.
+/// Worlds of a group.
+#[derive(Clone, Copy)]
+struct Part {
+    worlds: usize,
+    numbering: Numbering,
+    /// Groups of as many worlds that are not there yet, this one included: there must be memory for all.
+    coming: usize,
+}
+
+/// A backend for each group on the adapter that is meant, with a device of its own, so that none waits for another's batch.
 ///
 /// # Errors
 /// No such adapter, out of memory, a driver that cannot compile the programs.
 pub fn create(
     model: &Model,
-    worlds: usize,
+    groups: Groups,
     layout: &Layout,
     choice: &Choice,
     cache: Option<&Path>,
-    numbering: Numbering,
     replay: Replay,
-) -> Result<Box<dyn Backend>, BackendError> {
-    Ok(Box::new(Gpu::new(
-        model, worlds, layout, choice, cache, numbering, replay,
-    )?))
+) -> Result<Backends, BackendError> {
+    let parts = groups.numberings().zip((1..=groups.count).rev());
+    let made = parts.map(
+        |(numbering, coming)| -> Result<Box<dyn Backend>, BackendError> {
+            let part = Part {
+                worlds: groups.worlds,
+                numbering,
+                coming,
+            };
+            Ok(Box::new(Gpu::new(
+                model, part, layout, choice, cache, replay,
+            )?))
+        },
+    );
+    made.collect()
 }
 
 const MB: u64 = 1 << 20;
@@ -142,13 +162,17 @@ fn check_memory(device: &Device, worlds: usize, needed: u64) -> Result<(), Backe
 impl Gpu {
     fn new(
         model: &Model,
-        worlds: usize,
+        part: Part,
         layout: &Layout,
         choice: &Choice,
         cache: Option<&Path>,
-        numbering: Numbering,
         replay: Replay,
     ) -> Result<Gpu, BackendError> {
+        let Part {
+            worlds,
+            numbering,
+            coming,
+        } = part;
         let device = Device::open(choice, cache)?;
         check_frame(&device, layout.bytes as u64)?;
         let constants: Constants<f32> = model.constants().cast();
@@ -183,7 +207,7 @@ impl Gpu {
         let widest = tile::widest(&device, m, &places, worlds);
         let tiles = (worlds as u64).div_ceil(u64::from(widest));
         let needed = tiles * tile::memory(m, &places, widest) + 2 * layout.bytes as u64;
-        check_memory(&device, worlds, needed)?;
+        check_memory(&device, coming * worlds, coming as u64 * needed)?;
         let mut compiled =
             Compiled::new(&device, m, &places, &programs, books, widest, COMPILE_LIMIT)?;
         compiled.replay = replay;
