@@ -18,10 +18,10 @@ CHROMIUM = "/usr/bin/chromium"
 # Screenshots are kept: test output for whoever wants to see.
 SHOTS = Path(__file__).parents[2] / "out" / "viewer"
 # Its software renderer needs seconds for a picture where other programs have the cores.
-PATIENCE_SECONDS = 90.0
+PATIENCE_SECONDS = 240.0
 _FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 # The panel covers the right of a page; the scene is seen in the rest.
-WIDTH, HEIGHT, SCENE_WIDTH = 1000, 640, 640
+WIDTH, HEIGHT, SCENE_WIDTH = 840, 520, 480
 
 
 @contextmanager
