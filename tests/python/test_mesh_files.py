@@ -66,6 +66,16 @@ def test_collada_lies_where_physics_has_it(tmp_path, asset, transform):
     assert any("turned" in note for note in found.notes) == ("Z_UP" not in asset)
 
 
+def test_a_skin_lies_where_physics_has_it(tmp_path):
+    turned = "0 -1 0 5  1 0 0 6  0 0 2 7  0 0 0 1"
+    path = looks.collada(tmp_path / "box.dae", skin=turned, transform="<translate>1 2 3</translate>")
+    told = json.loads(_core.read_mesh(str(path), (1.0, 1.0, 1.0), 64, False))
+    found = mesh_files.read(path)
+    np.testing.assert_allclose(extent(found), told["extent"], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(extent(found), [[4, 8, 10], [6, 9, 16]], atol=1e-6)
+    assert (found.colors == RED).all()
+
+
 def test_gltf_lies_where_physics_has_it(tmp_path):
     nodes = [
         {"mesh": 0, "translation": [1, 2, 3], "scale": [1, 1, -1]},

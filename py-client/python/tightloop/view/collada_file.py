@@ -87,11 +87,9 @@ def _bound(file: Any) -> Iterator[Any]:
         return
     yield from file.scene.objects("geometry")
     for controller in file.scene.objects("controller"):
-        # as it lies in the file, with its bind shape
-        skin = controller.skin if hasattr(controller, "skin") else None
-        if skin is not None:
-            matrix = np.dot(controller.matrix, np.asarray(skin.bind_shape_matrix).reshape(4, 4))
-            yield skin.geometry.bind(matrix, controller.materialnodebysymbol)
+        # a skin as it lies in the file; a morph has no geometry of its own
+        if hasattr(controller, "geometry"):
+            yield controller.geometry
 
 
 def _pieces(bound: Any, frame: Any) -> Iterator[Surface]:
