@@ -48,7 +48,9 @@ def drawn(arm: Arm, shown: Any, **options: Any) -> NDArray[np.int16]:
 
 def empty(camera: Camera) -> NDArray[np.int16]:
     """The same picture without anything in it."""
-    return Picture([], WIDTH, HEIGHT).render(SimpleNamespace(body_q=np.zeros((1, 0, 7))), camera=camera).astype(np.int16)
+    return (
+        Picture([], WIDTH, HEIGHT).render(SimpleNamespace(body_q=np.zeros((1, 0, 7))), camera=camera).astype(np.int16)
+    )
 
 
 def redness(picture: NDArray[Any]) -> NDArray[Any]:
