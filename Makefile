@@ -1,6 +1,6 @@
-# demo · test · docs · test-rl · train · fuzz · published · packages · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
+# demo · test · docs · test-rl · train · fuzz · published · packages · newcomer · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
 #
-#   make demo     the Franka lesson and a grasp in 4096 worlds, plots in out/  (make demo WORLDS=256)
+#   make demo     a tour with pictures in out/demo; then the Franka lesson and a grasp in 4096 worlds, plots in out/  (make demo WORLDS=256)
 #   make test     every Rust and Python test
 #   make docs     the site, into out/site: guides, references, API of Python and Rust
 #   make test-rl  adapters against their libraries, and short trainings; 6 GB of torch, Ray and others into .venv
@@ -8,6 +8,7 @@
 #   make fuzz     random programs on random scenes, many more of them  (make fuzz CASES=1000 SEED=5000)
 #   make published   robots from PyPI against MuJoCo; 260 MB of wheels  (make published TIGHTLOOP_URDF=/path/robot.urdf)
 #   make packages    the wheel on every Python found, the abi it needs, and the daemon by cargo install
+#   make newcomer    how long `make demo` takes on a clean checkout with empty caches, and again
 #   make bench    speed, side by side with what it is compared with
 #   make bench-env   environments beside envpool and gymnasium's, on all cores; 0.8 GB of wheels
 #   make bench-gpu   worlds on the first GPU: checked, then measured, with MuJoCo-Warp and MJX where the venv has them
@@ -27,16 +28,20 @@ export PYO3_PYTHON := $(CURDIR)/$(PYTHON)
 export PYO3_BUILD_EXTENSION_MODULE := 1
 
 RUST_SOURCES   := $(shell find sim-core sim-daemon py-client/src py-client/Cargo.toml Cargo.toml rust-toolchain.toml -name '*.rs' -o -name '*.toml')
-PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml -name '*.py' -o -name '*.pyi' -o -name '*.toml')
+PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml -name '*.py' -o -name '*.pyi' -o -name '*.toml' -o -name '*.npz' -o -name '*.urdf')
 PYTHON_TREES   := py-client/python py-client/tests tests examples benches docs
 # Vulkan in software, and what checks its use: Debian's names.
 VULKAN         := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
+# The browser that the tests look through.
+BROWSER        := chromium
 CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
-.PHONY: demo test docs test-rl train fuzz published packages bench bench-env bench-gpu check wheel vulkan
+.PHONY: demo test docs test-rl train fuzz published packages newcomer bench bench-env bench-gpu check wheel vulkan browser
 .NOTPARALLEL: # pip installs into one venv, cargo and the tests use all cores by themselves
 
+# The tour first: it draws within seconds. Then its lesson at length, with plots.
 demo: wheel
+	$(PYTHON) -m tightloop demo --out out/demo
 	$(PYTHON) examples/franka_lesson.py --worlds $(WORLDS)
 	$(PYTHON) examples/franka_grasp.py --worlds $(WORLDS)
 	$(PYTHON) examples/randomized_push.py --worlds $(WORLDS)
@@ -51,10 +56,10 @@ test: wheel $(VENV)/.dev $(VENV)/.docs vulkan
 	else set -x; cargo test --release --workspace --lib --bins --tests; fi
 	$(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . py-client/tests tests/python
 
-# The crates' own pages stay out of `test`: they are checked once more, with all that they need, and take minutes the first time.
+# The crates' own pages stay out of `test`: all that they need is checked once more. rustdoc takes units, [m], for links and equations for code.
 docs: wheel $(VENV)/.docs
 	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict --quiet -f docs/mkdocs.yml
-	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --quiet
+	RUSTDOCFLAGS="-A warnings" cargo doc --release --workspace --no-deps --quiet
 	@rm -rf out/site/rust && cp -r target/doc out/site/rust
 	@echo "site: out/site/index.html"
 
@@ -75,6 +80,16 @@ published: wheel $(VENV)/.dev
 	$(if $(TIGHTLOOP_URDF),,$(PYTHON) tests/python/published/fetch.py)
 	PYTHONPATH=tests/python/published:tests/python/mujoco $(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . \
 	  -p options tests/python/published/agree.py
+
+# Kept out of `test`: environments of each Python, and a build of the daemon alone, which shares nothing with the workspace's.
+packages: wheel $(VENV)/.dev
+	$(VENV)/bin/abi3audit --strict $(VENV)/wheels/*.whl
+	$(PYTHON) tests/packaging/wheel.py $(VENV)/wheels
+	cargo install --path sim-daemon --locked --quiet --root out/packages
+	out/packages/bin/tightloop --version
+
+newcomer:
+	python3 benches/newcomer.py
 
 bench: wheel $(VENV)/.dev vulkan
 	cargo bench --package tightloop --bench step
@@ -133,12 +148,19 @@ $(VENV)/.peers: py-client/requirements-peers.txt $(VENV)/.dev
 	$(PIP) install --quiet -r $<
 	@touch $@
 
-# The tests of the device need an adapter. Elsewhere than on Debian it is for you to install one: they say so where there is none.
+# What Debian has for the tests; elsewhere it is for you to install, and the tests say so where it is missing.
+define debian
+@if command -v dpkg >/dev/null && ! dpkg -s $(1) >/dev/null 2>&1; then \
+  if [ "$$(id -u)" = 0 ]; then apt-get update -qq && apt-get install -y -qq $(1); \
+  elif sudo -n true 2>/dev/null; then sudo apt-get update -qq && sudo apt-get install -y -qq $(1); \
+  else echo "the tests need $(2): run 'sudo apt install $(1)', then make again"; exit 1; fi; fi
+endef
+
 vulkan:
-	@if command -v dpkg >/dev/null && ! dpkg -s $(VULKAN) >/dev/null 2>&1; then \
-	  if [ "$$(id -u)" = 0 ]; then apt-get update -qq && apt-get install -y -qq $(VULKAN); \
-	  elif sudo -n true 2>/dev/null; then sudo apt-get update -qq && sudo apt-get install -y -qq $(VULKAN); \
-	  else echo "the tests need Vulkan in software: run 'sudo apt install $(VULKAN)', then make again"; exit 1; fi; fi
+	$(call debian,$(VULKAN),Vulkan in software)
+
+browser:
+	$(call debian,$(BROWSER),a browser)
 
 # Debian splits ensurepip from python3; `python3 -m venv` then leaves half a folder behind.
 $(PYTHON):

@@ -31,6 +31,7 @@ TITLES = {
     "libraries": "Training with libraries of reinforcement learning",
     "gpu": "Worlds on a GPU",
     "viewer": "With a viewer attached",
+    "newcomer": "From a clean checkout to the first picture",
     "snapshot": "Snapshots",
     "recording": "With a recorder",
 }

@@ -10,7 +10,7 @@ mod errors;
 mod frame;
 mod input;
 mod look;
-mod looks;
+mod parts;
 mod picture;
 mod random;
 mod scene;
@@ -42,7 +42,7 @@ mod core {
     #[pymodule_export]
     use super::look::{Evaluation, Playback};
     #[pymodule_export]
-    use super::looks::parts;
+    use super::parts::parts;
     #[pymodule_export]
     use super::picture::Renderer;
     #[pymodule_export]

@@ -316,6 +316,23 @@ mod tests {
     }
 
     #[test]
+    fn without_python_its_commands_say_what_is_missing() {
+        let line = ["tightloop", "film", "run.tlrec", "run.mp4"];
+        let Ok(Cli {
+            command: Command::Python(python),
+        }) = Cli::try_parse_from(line)
+        else {
+            panic!("film is a command of Python");
+        };
+        let said = python.run().unwrap_err().to_string();
+        assert!(
+            said.contains("`film`") && said.contains("pip install"),
+            "{said}"
+        );
+        assert_eq!(run(line.map(OsString::from)), 1);
+    }
+
+    #[test]
     fn help_says_what_it_said() {
         let help = Cli::command().term_width(100).render_help().to_string();
         let lines: Vec<_> = help.lines().map(str::trim_end).collect();

@@ -58,3 +58,13 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     done = subprocess.run([*PROGRAM, "man", str(tmp_path / "file")], capture_output=True, text=True, check=False)
     assert done.returncode == 1 and str(tmp_path / "file") in done.stderr
+
+
+@pytest.mark.parametrize("command", ["view", "film", "demo"])
+def test_commands_of_python_have_the_flags_that_shells_complete(command):
+    """``tightloop view --help`` is Python's, ``tightloop help view`` what completions and manual are made of."""
+    flags = re.compile(r"^ +(?:-\w, )?(--[\w-]+)", re.MULTILINE)
+    of_python, of_shells = said(command, "--help"), said("help", command)
+    assert of_python != of_shells, f"`{command}` is not carried out by Python"
+    # --version is the whole program's
+    assert set(flags.findall(of_python)) == set(flags.findall(of_shells)) - {"--version"}

@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+import importlib
+import os
 import signal
 import sys
 from pathlib import Path
 
+# Commands that are carried out here; all others are Rust's.
+_IN_PYTHON = {
+    "demo": "tightloop.demo.command",
+    "film": "tightloop.view.film_command",
+    "view": "tightloop.view.command",
+}
+
 
 def main() -> int:
     """Run the command line of this process; returns its exit code."""
-    if sys.argv[1:2] == ["view"]:
-        from tightloop.view.command import main as view
-
-        return view(sys.argv[2:])
-    if sys.argv[1:2] == ["film"]:
-        from tightloop.view.film_command import main as film
-
-        return film(sys.argv[2:])
+    home = _IN_PYTHON.get(sys.argv[1]) if len(sys.argv) > 1 else None
+    if home is not None:
+        code = importlib.import_module(home).main(sys.argv[2:])
+        if sys.argv[1] == "view":
+            # It has let go of everything; to take the interpreter apart takes a busy machine seconds
+            sys.stdout.flush()
+            os._exit(code)
+        return code
     from tightloop import _core
 
     # Rust does the work and never returns to the interpreter in between: Python's own handler would only set a flag.

@@ -1,6 +1,7 @@
 //! Commands that the Python package carries out, before this command line sees them. They stand here for its help, its
-//! completions and its manual; who calls them here has no Python package.
+//! completions and its manual; who calls them here has no Python package. tests/python/test_shells.py compares both.
 
+use std::net::IpAddr;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
@@ -12,7 +13,7 @@ use crate::error::DaemonError;
 pub(super) enum Python {
     /// Show a daemon's worlds, or a recording, in the browser.
     ///
-    /// Example: tightloop view franka --worlds 256
+    /// Example: tightloop view franka --worlds 64
     View(View),
     /// Make a picture, a film or a web page of a daemon's worlds or of a recording, without a display.
     ///
@@ -27,20 +28,30 @@ pub(super) enum Python {
 #[derive(Debug, Args)]
 pub(super) struct View {
     /// Name of a daemon, or a file that `record` wrote.
-    source: PathBuf,
+    #[arg(value_name = "NAME|FILE.tlrec")]
+    target: PathBuf,
 
     /// Port of the page; the next free one if it is taken.
     #[arg(long, default_value_t = 8080)]
     port: u16,
 
-    /// Worlds that are shown: the first ones.
+    /// Address to listen on; 0.0.0.0 lets other machines drive, too.
+    #[arg(long, default_value = "127.0.0.1")]
+    host: IpAddr,
+
+    /// Most worlds to show, up to 1024.
     #[arg(long, default_value_t = 256)]
     worlds: usize,
+
+    /// Open the page in this machine's browser.
+    #[arg(long)]
+    open: bool,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct Film {
     /// Name of a daemon, or a file that `record` wrote.
+    #[arg(value_name = "NAME|FILE.tlrec")]
     source: PathBuf,
 
     /// What to write: a .png, .gif, .mp4 or .html file, or a folder of PNG files.
@@ -89,9 +100,37 @@ pub(super) struct Film {
 
 #[derive(Debug, Args)]
 pub(super) struct Demo {
-    /// Show it in the browser.
+    /// Only this stop, such as grasp; may be given several times.
+    #[arg(long = "stop", value_name = "NAME")]
+    stops: Vec<String>,
+
+    /// How long to stay at each stop; one round if left out.
+    #[arg(long)]
+    seconds: Option<f64>,
+
+    /// Worlds of every stop.
+    #[arg(long)]
+    worlds: Option<usize>,
+
+    /// Show it in the browser, in real time.
     #[arg(long)]
     view: bool,
+
+    /// Port of the page; the next free one if it is taken.
+    #[arg(long, default_value_t = 8080)]
+    port: u16,
+
+    /// Folder of the pictures.
+    #[arg(long, default_value = "demo")]
+    out: PathBuf,
+
+    /// Where the physics runs: cpu, gpu, or auto.
+    #[arg(long, default_value = "auto")]
+    device: String,
+
+    /// Most threads a step may use; all cores if left out.
+    #[arg(long)]
+    threads: Option<usize>,
 }
 
 impl Python {

@@ -3,8 +3,8 @@
 //! Paths in a file are relative to it; relative paths in a text are relative to the folder given with it.
 
 mod bodies;
-mod looks;
 mod number;
+mod parts;
 pub(crate) mod paths;
 mod randomize;
 mod robots;
@@ -20,9 +20,9 @@ use sim_core::model::params::Param;
 use sim_core::model::{Cone, Description, ModelError, Pose, Solver};
 
 pub use bodies::BodyTable;
-pub use looks::Looks;
-pub(crate) use looks::hull_sides;
 pub use number::{Number, PerDof};
+pub use parts::Parts;
+pub(crate) use parts::hull_sides;
 pub use randomize::{DistributionTable, ParamTable, RandomizeTable};
 pub use robots::{ModeName, RobotTable};
 pub use sensors::{ContactSensorTable, SiteTable};

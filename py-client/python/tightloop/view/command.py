@@ -42,7 +42,7 @@ def main(arguments: list[str]) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.set())
     try:
-        needs.check("viser", "trimesh")
+        needs.check("viser")
         from tightloop.view.server import Server
 
         _give_way()

@@ -9,11 +9,10 @@ from typing import Any
 from tightloop.sim import attach
 from tightloop.view.pilot import Pilot
 from tightloop.view.player import Player
-from tightloop.view.source import Live, Recorded
+from tightloop.view.source import CONTACT_FIELDS, Live, Recorded
 
 #: What is always asked for; contacts and plots ask for more.
 FIELDS = ("body_q", "body_qd", "joint_q", "joint_target_q")
-CONTACTS = ("contact_count", "contact_pos", "contact_force")
 
 
 def is_recording(target: str) -> bool:
@@ -79,7 +78,7 @@ class RecordedFeed:
         self._path = str(Path(path).expanduser().absolute())
         self._most = worlds
         # a recording is opened once: what any choice may need is evaluated at once
-        self._fields = frozenset((*FIELDS, *CONTACTS))
+        self._fields = frozenset((*FIELDS, *CONTACT_FIELDS))
         first = self._open()
         self.info: dict[str, Any] = first.info
         self.worlds: int = first.worlds

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tightloop.dynamics import Dynamics
 from tightloop.errors import TightloopError
 from tightloop.view.cameras import camera
-from tightloop.view.feed import CONTACTS, Feed
+from tightloop.view.feed import Feed
 from tightloop.view.grip import Grip, grip
 from tightloop.view.joints import Joint, at_targets, joints
 from tightloop.view.looks import Looks
@@ -21,6 +21,7 @@ from tightloop.view.panel import Panel
 from tightloop.view.parts import parts
 from tightloop.view.pilot import Pilot
 from tightloop.view.poses import Array
+from tightloop.view.source import CONTACT_FIELDS
 from tightloop.view.stage import Stage
 
 # A camera that goes along closes a tenth of its distance to where it should be in a frame: no jerks.
@@ -76,7 +77,7 @@ class Page:
         """
         shown = self._feed.poll(timeout)
         changed = self.looks.take_changes()
-        wanted = self._panel.fields | (set(CONTACTS) if self.looks.contacts != "off" else set())
+        wanted = self._panel.fields | (set(CONTACT_FIELDS) if self.looks.contacts != "off" else set())
         self._feed.want(wanted)
         if shown is not None:
             self._shown = shown
@@ -93,7 +94,7 @@ class Page:
             self._stage.show(body_q, np.asarray(shown.status))
             self._overlay.show_axes(body_q)
             self._overlay.show_ghost(self._ghost(shown, world))
-            if all(hasattr(shown, field) for field in CONTACTS):
+            if all(hasattr(shown, field) for field in CONTACT_FIELDS):
                 self._overlay.show_contacts(shown, self._stage.shown(len(body_q)))
             held = self._grip
             self._overlay.show_pull(None if held is None else held.ends, world if held is None else held.world)

@@ -61,7 +61,7 @@ class Pilot:
         """Process of another client that is in control, if there is one."""
         pid = None
         with contextlib.suppress(TightloopError):  # a daemon that is gone is told elsewhere
-            pid = self._sim._client.controller()
+            pid = self._sim.controller()
         return None if pid == os.getpid() else pid
 
     @property

@@ -13,7 +13,7 @@ _LATE_MAX = 0.1
 class Frames(Protocol):
     """What a recording gives: its frames, one after the other."""
 
-    dt_frame: float
+    period: float
 
     def poll(self, timeout: float) -> Any: ...
     def close(self) -> None: ...
@@ -65,7 +65,7 @@ class Player:
 
     def skip(self, seconds: float) -> None:
         """Go on to what is that much later [s]."""
-        self._set(playing=self.playing, more=max(round(seconds / self._frames.dt_frame), 1))
+        self._set(playing=self.playing, more=max(round(seconds / self._frames.period), 1))
 
     def reset(self, world: int | None) -> None:
         """Begin anew; ``world`` makes no difference."""
@@ -100,7 +100,7 @@ class Player:
 
     @property
     def _spacing(self) -> float:
-        return self._frames.dt_frame / self.speed
+        return self._frames.period / self.speed
 
     def close(self) -> None:
         """Close the file."""

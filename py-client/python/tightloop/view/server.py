@@ -69,7 +69,8 @@ class Server:
         """Detach, and close the page."""
         if self._feed is not None:
             self._feed.close()
-        self._viser.stop()
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._viser.stop()
 
     def _turn(self) -> bool:
         """One look at the feed; whether anything was new."""

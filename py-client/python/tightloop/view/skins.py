@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from tightloop.view.parts import Part
@@ -17,8 +16,6 @@ from tightloop.view.poses import place
 _COLORS_MAX = 6
 # Edges sharper than this stay sharp under the light.
 _CREASE = np.radians(35)
-# Beyond that many faces, finding the sharp edges takes seconds, and facets are smaller than what one sees.
-_FACES_MAX = 100_000
 
 
 @dataclass(frozen=True)
@@ -76,9 +73,32 @@ def _few(colors: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.intp]
 
 
 def _creased(vertices: NDArray[Any], faces: NDArray[Any]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
-    """The same surface with vertices of their own on both sides of a sharp edge, as the browser averages normals."""
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
-    mesh.merge_vertices()
-    if len(faces) <= _FACES_MAX:
-        mesh = trimesh.graph.smooth_shade(mesh, angle=_CREASE)
-    return np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.uint32)
+    """The same surface, where faces share a corner if a smooth edge joins them: browsers average normals over those."""
+    places, same = np.unique(vertices.astype(np.float32), axis=0, return_inverse=True)
+    faces = same.ravel()[faces]
+    sides = places[faces]
+    normals = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0]).astype(np.float64)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    # each side of a face, with its corners in the order of their vertices, beside the other face's
+    corners = np.arange(faces.size).reshape(-1, 3)
+    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
+    at = faces.ravel()[ends]
+    ends = np.take_along_axis(ends, at.argsort(axis=1), axis=1)
+    at = np.sort(at, axis=1)
+    order = np.lexsort(at.T)
+    at, ends = at[order], ends[order]
+    bent = np.sum(normals[ends[:-1, 0] // 3] * normals[ends[1:, 0] // 3], axis=1) < np.cos(_CREASE)
+    joined = np.all(at[:-1] == at[1:], axis=1) & ~bent
+    first, second = ends[:-1][joined].ravel(), ends[1:][joined].ravel()
+    # a corner belongs to the least one that smooth edges lead to; as many rounds as faces meet in a corner
+    label = np.arange(faces.size)
+    while True:
+        least = np.minimum(label[first], label[second])
+        following = label.copy()
+        np.minimum.at(following, first, least)
+        np.minimum.at(following, second, least)
+        if np.array_equal(following, label):
+            break
+        label = following
+    kept, renumbered = np.unique(label, return_inverse=True)
+    return places[faces.ravel()[kept]], renumbered.reshape(-1, 3).astype(np.uint32)

@@ -11,7 +11,7 @@ use crate::errors::raise;
 /// Corners `(n, 3)` [m] and triangles `(m, 3)`.
 type Surface<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>);
 
-/// Parts and notes of a scene as JSON (`SceneFile::looks` says what they have), and the surfaces that the parts name; the scene
+/// Parts and notes of a scene as JSON (`SceneFile::parts` says what they have), and the surfaces that the parts name; the scene
 /// is TOML with paths relative to a folder.
 #[pyfunction]
 pub(crate) fn parts<'py>(
@@ -19,9 +19,9 @@ pub(crate) fn parts<'py>(
     scene: &str,
     folder: PathBuf,
 ) -> PyResult<(String, Vec<Surface<'py>>)> {
-    let looks = py.detach(|| config::parse(scene, "scene")?.looks(&folder));
-    let looks = looks.map_err(|error| raise(py, "SceneError", error.to_string()))?;
-    let surfaces = looks.meshes.iter().map(|mesh| {
+    let found = py.detach(|| config::parse(scene, "scene")?.parts(&folder));
+    let found = found.map_err(|error| raise(py, "SceneError", error.to_string()))?;
+    let surfaces = found.meshes.iter().map(|mesh| {
         let corners = mesh.vertices.as_flattened();
         let corners = PyArray1::from_iter(py, corners.iter().map(|&part| part as f32));
         let triangles = PyArray1::from_slice(py, mesh.triangles.as_flattened());
@@ -30,5 +30,5 @@ pub(crate) fn parts<'py>(
             triangles.reshape([mesh.triangles.len(), 3])?,
         ))
     });
-    Ok((looks.parts.to_string(), surfaces.collect::<PyResult<_>>()?))
+    Ok((found.told.to_string(), surfaces.collect::<PyResult<_>>()?))
 }

@@ -10,9 +10,9 @@ use sim_core::model::{Description, Link, Look, Pose, Robot, Shape, Visual};
 use super::{ConfigError, SceneFile};
 
 /// What there is to draw.
-pub struct Looks {
-    /// An object with lists `parts` and `notes`; see [`SceneFile::looks`].
-    pub parts: Value,
+pub struct Parts {
+    /// An object with lists `parts` and `notes`; see [`SceneFile::parts`].
+    pub told: Value,
     /// Surfaces that the parts name by their places, each in the part's frame.
     pub meshes: Vec<TriMesh>,
 }
@@ -29,7 +29,7 @@ impl SceneFile {
     ///
     /// # Errors
     /// As [`SceneFile::describe`].
-    pub fn looks(&self, base_dir: &Path) -> Result<Looks, ConfigError> {
+    pub fn parts(&self, base_dir: &Path) -> Result<Parts, ConfigError> {
         let description = self.describe(base_dir)?;
         let mut drawing = Drawing::default();
         let mut names = description.shape_names().into_iter();
@@ -53,8 +53,8 @@ impl SceneFile {
             }
         }
         self.visuals(&description, base_dir, &mut drawing);
-        Ok(Looks {
-            parts: json!({ "parts": drawing.parts, "notes": drawing.notes }),
+        Ok(Parts {
+            told: json!({ "parts": drawing.parts, "notes": drawing.notes }),
             meshes: drawing.meshes,
         })
     }

@@ -1,0 +1,72 @@
+"""The subcommand `tightloop demo`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from tightloop.demo.stops import STOPS
+from tightloop.demo.tour import Plan, tour
+from tightloop.errors import TightloopError
+
+_EPILOG = """stops:
+  {stops}
+
+examples:
+  tightloop demo                           all stops, a line and a picture each
+  tightloop demo --view                    the same in the browser, in real time
+  tightloop demo --stop grasp --seconds 60 --view"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    width = max(len(stop.name) for stop, _ in STOPS) + 2
+    stops = "\n  ".join(f"{stop.name:<{width}}{worlds} {stop.title}" for stop, worlds in STOPS)
+    made = argparse.ArgumentParser(
+        prog="tightloop demo",
+        description="Show what tightloop does, stop by stop: a line of numbers and a picture each.",
+        epilog=_EPILOG.format(stops=stops),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    names = [stop.name for stop, _ in STOPS]
+    made.add_argument(
+        "--stop", action="append", choices=names, metavar="NAME", help="only this one; may be given again"
+    )
+    made.add_argument("--seconds", type=_positive, help="how long to stay at each stop; one round if left out")
+    made.add_argument("--worlds", type=_count, help="worlds of every stop; those below if left out")
+    made.add_argument("--view", action="store_true", help="show it in the browser, in real time")
+    made.add_argument("--port", type=_count, default=8080, help="port of the page; the next free one if it is taken")
+    made.add_argument("--out", type=Path, default=Path("demo"), help="folder of the pictures (default demo)")
+    made.add_argument("--device", default="auto", help="cpu, gpu, or auto")
+    made.add_argument("--threads", type=_count, help="most threads a step may use; all cores if left out")
+    return made
+
+
+def main(arguments: list[str]) -> int:
+    """Run the subcommand; returns its exit code: 0 done, 1 failed, 2 misused."""
+    given = parser().parse_args(arguments)
+    chosen = [stop(given.worlds or worlds) for stop, worlds in STOPS if not given.stop or stop.name in given.stop]
+    plan = Plan(given.out, given.seconds, given.view, given.port, given.device, given.threads)
+    try:
+        tour(chosen, plan)
+    except (TightloopError, OSError) as problem:
+        print(f"tightloop: {problem}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 1
+    return 0
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not at least 1")
+    return value

@@ -1,0 +1,34 @@
+"""A policy as NumPy evaluates it: what `examples/ppo.py` trains, without any library of learning."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+_CLIP = 10.0  # of normalised observations, as in training
+
+
+class Policy:
+    """Two hidden layers with ELU after a normaliser of observations; the most likely action.
+
+    Args:
+        path: An ``.npz`` file with ``mean`` and ``scale`` of the observations, and ``weight`` and ``bias`` of each
+            layer, numbered from 0.
+    """
+
+    def __init__(self, path: Path) -> None:
+        with np.load(path) as arrays:
+            self._mean, self._scale = arrays["mean"], arrays["scale"]
+            layers = sum(name.startswith("weight") for name in arrays)
+            self._layers = [(arrays[f"weight{layer}"], arrays[f"bias{layer}"]) for layer in range(layers)]
+
+    def __call__(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Actions, shape ``(worlds, actions)``, for observations of shape ``(worlds, size)``."""
+        x = np.clip((obs - self._mean) / self._scale, -_CLIP, _CLIP)
+        for place, (weight, bias) in enumerate(self._layers):
+            if place:
+                x = np.where(x > 0, x, np.expm1(np.minimum(x, 0)))
+            x = x @ weight.T + bias
+        return x

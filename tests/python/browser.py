@@ -1,0 +1,118 @@
+"""A page of the viewer in headless Chromium: its pixels, its controls, and what its console says."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from playwright.sync_api import Browser, Page, sync_playwright
+
+CHROMIUM = "/usr/bin/chromium"
+# Screenshots are kept: test output for whoever wants to see.
+SHOTS = Path(__file__).parents[2] / "out" / "viewer"
+# Its software renderer needs seconds for a picture where other programs have the cores.
+PATIENCE_SECONDS = 90.0
+_FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+# The panel covers the right of a page; the scene is seen in the rest.
+WIDTH, HEIGHT, SCENE_WIDTH = 1000, 640, 640
+
+
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """A browser without a display."""
+    assert Path(CHROMIUM).exists(), "the viewer's tests need Chromium: apt install chromium"
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=_FLAGS)
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+class View:
+    """The viewer's page, open."""
+
+    def __init__(self, browser: Browser, url: str) -> None:
+        self.page: Page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
+        self.page.set_default_timeout(PATIENCE_SECONDS * 1000)
+        self.errors: list[str] = []
+        self.page.on("console", lambda said: self.errors.append(said.text) if said.type == "error" else None)
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        # viser would lower its resolution while it is slow, and pictures could not be compared
+        self.page.goto(f"{url}/?fixedDpr=1")
+        self.wait(lambda: "world" in self.text, "the panel shows text")
+
+    @property
+    def text(self) -> str:
+        return self.page.inner_text("body")
+
+    def shot(self, name: str | None = None) -> NDArray[np.int16]:
+        """The pixels of the scene, the panel left out; kept as a file if it has a name."""
+        clip: Any = {"x": 0, "y": 0, "width": SCENE_WIDTH, "height": HEIGHT}
+        data = self.page.screenshot(clip=clip)
+        if name is not None:
+            SHOTS.mkdir(parents=True, exist_ok=True)
+            self.page.screenshot(path=SHOTS / f"{name}.png")
+        return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"), np.int16)
+
+    def still(self, name: str | None = None) -> NDArray[np.int16]:
+        """The pixels once they do not change any more."""
+        before = self.shot()
+        deadline = time.monotonic() + PATIENCE_SECONDS
+        while True:
+            self.page.wait_for_timeout(500)
+            now = self.shot()
+            if differing(before, now) == 0 and len(np.unique(now.reshape(-1, 3), axis=0)) > 100:
+                return self.shot(name)
+            assert time.monotonic() < deadline, "the page does not come to rest"
+            before = now
+
+    def wait(self, condition: Callable[[], Any], what: str) -> Any:
+        """Wait for something to be true in the page."""
+        deadline = time.monotonic() + PATIENCE_SECONDS
+        while not (found := condition()):
+            assert time.monotonic() < deadline, f"waited in vain until {what}; the page says: {self.text[:600]}"
+            self.page.wait_for_timeout(100)
+        return found
+
+    def close_notices(self) -> None:
+        """Close what lies over the scene: Chromium renders in software, and viser says so."""
+        for button in self.page.get_by_role("alert").get_by_role("button").all():
+            button.click()
+
+    def press(self, button: str) -> None:
+        self.page.get_by_role("button", name=button, exact=True).click()
+
+    def choose(self, dropdown: str, option: str) -> None:
+        self.page.get_by_role("combobox", name=dropdown, exact=True).click()
+        self.page.get_by_role("option", name=option, exact=True).click()
+
+
+def differing(a: NDArray[np.int16], b: NDArray[np.int16]) -> int:
+    """How many pixels differ by more than a shade."""
+    return int(np.count_nonzero(np.abs(a - b).max(axis=-1) > 12))
+
+
+def spots(mask: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
+    """The connected parts of a mask: rows and columns of each, shape ``(pixels, 2)``."""
+    left = {(int(row), int(column)) for row, column in np.argwhere(mask)}
+    found = []
+    while left:
+        edge = [left.pop()]
+        spot = list(edge)
+        while edge:
+            row, column = edge.pop()
+            for near in ((row + 1, column), (row - 1, column), (row, column + 1), (row, column - 1)):
+                if near in left:
+                    left.remove(near)
+                    edge.append(near)
+                    spot.append(near)
+        found.append(np.array(spot))
+    return found

@@ -1,0 +1,331 @@
+"""The viewer without a browser: where worlds stand, what cameras see, who drives, and how its process begins and ends."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import urllib.request
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import tightloop as tl
+from leftovers import alive, wait_until
+from tightloop.view import cameras, grid, needs
+from tightloop.view.command import main
+from tightloop.view.feed import FIELDS
+from tightloop.view.grip import grip
+from tightloop.view.joints import at_targets, joints
+from tightloop.view.parts import Mesh, Part
+from tightloop.view.pilot import Pilot
+from tightloop.view.player import Player
+from tightloop.view.plots import choices
+from tightloop.view.poses import IDENTITY
+from tightloop.view.skins import skins
+from tightloop.view.source import Live
+
+CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float32)
+CUBE_FACES = np.array(
+    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4]]
+    + [[1, 5, 7], [1, 7, 3]],
+    np.uint32,
+)
+
+
+def cube(color: tuple[int, int, int, int] = (200, 100, 50, 255)) -> Mesh:
+    return Mesh(CUBE, CUBE_FACES, np.tile(np.array(color, np.uint8), (12, 1)))
+
+
+def part(body: int, mesh: Mesh, x: float = 0.0, shape: str = "box") -> Part:
+    return Part(body, "visual", "part", np.array([x, 0, 0, 0, 0, 0, 1.0]), mesh, shape)
+
+
+def test_worlds_stand_apart_and_the_first_where_it_is():
+    box = grid.extent([part(0, cube()), part(-1, cube(), x=2.0)], np.array([IDENTITY]))
+    assert np.allclose(box, [[0, 0, 0], [3, 1, 1]])
+    places = grid.offsets(10, box)
+    assert np.array_equal(places[0], [0, 0, 0])
+    gaps = np.abs(places[:, None] - places[None])
+    apart = (gaps[..., 0] >= 3) | (gaps[..., 1] >= 1)
+    assert np.all(apart | np.eye(10, dtype=bool))
+
+
+def test_a_floor_does_not_push_worlds_apart():
+    floor = Mesh(CUBE * [100, 100, 0], CUBE_FACES, cube().colors)
+    assert np.allclose(grid.extent([part(0, cube()), part(-1, floor, shape="plane")], np.array([IDENTITY]))[1], 1)
+
+
+@pytest.mark.parametrize("preset", cameras.PRESETS)
+@pytest.mark.parametrize("aspect", [0.5, 1.0, 2.0])
+def test_every_preset_sees_the_whole_box_and_not_much_else(preset, aspect):
+    box = np.array([[-1.0, 2.0, 0.0], [3.0, 3.0, 1.5]])
+    seen = cameras.camera(preset, box, aspect=aspect)
+    position, target = np.array(seen.position), np.array(seen.target)
+    forward = (target - position) / np.linalg.norm(target - position)
+    right = np.cross(forward, seen.up)
+    right /= np.linalg.norm(right)
+    corners = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3) - position
+    depth = corners @ forward
+    x = corners @ right / depth / np.tan(seen.fov / 2) / aspect
+    y = corners @ np.cross(right, forward) / depth / np.tan(seen.fov / 2)
+    assert depth.min() > 0
+    extreme = max(np.abs(x).max(), np.abs(y).max())
+    assert 0.8 < extreme < 1.0
+
+
+def test_bodies_that_look_alike_share_a_skin_and_each_colour_is_one():
+    shared, other = cube(), cube((0, 0, 255, 255))
+    found = skins([part(0, shared), part(1, shared), part(2, shared), part(2, other, x=2.0)])
+    assert sorted((skin.bodies, skin.color) for skin in found) == [
+        ((0, 1), (200, 100, 50, 255)),
+        ((2,), (0, 0, 255, 255)),
+        ((2,), (200, 100, 50, 255)),
+    ]
+    # a corner of a cube is sharp: each of its three faces has one of its own
+    assert all(len(skin.vertices) == 24 and len(skin.faces) == 12 for skin in found)
+
+
+def test_a_mesh_of_many_colours_becomes_few_skins_of_near_ones():
+    rng = np.random.default_rng(0)
+    mesh = Mesh(CUBE, CUBE_FACES, np.concatenate([rng.integers(0, 256, (12, 3)), np.full((12, 1), 255)], 1).astype("u1"))
+    found = skins([part(0, mesh)])
+    assert 1 < len(found) <= 6
+    assert sum(len(skin.faces) for skin in found) == 12
+
+
+def test_sliders_are_of_joints_with_drives_and_go_to_their_limits(lesson):
+    with tl.launch(lesson(driven=True), worlds=1) as sim:
+        found = joints(sim.info)
+        assert [joint.name for joint in found] == sim.dof_names
+        assert (found[0].lower, found[0].upper) == (-2.7437, 2.7437)
+    with tl.launch(lesson(driven=False), worlds=1) as sim:
+        assert joints(sim.info) == []
+
+
+def test_a_robot_at_its_targets_is_where_its_drives_take_it(lesson):
+    scene = lesson(driven=True)
+    scene.gravity = (0, 0, 0)
+    with tl.launch(scene, worlds=1, fields=("joint_q", "joint_target_q", "body_q")) as sim:
+        goal = sim.reset().joint_q[0] + np.array([0.02] * 7 + [-0.02] * 2, np.float32)
+        for _ in range(240):
+            frame = sim.step(joint_target_q=goal)
+        ghost = sim.forward_kinematics(at_targets(sim.info, joints(sim.info), sim.reset().joint_q[0], goal))
+        # drives without gravity end at their targets, but for dry friction over stiffness: 1e-3 rad
+        assert np.allclose(ghost, frame.body_q[0], atol=2e-3)
+
+
+def test_fields_are_plotted_by_the_names_of_their_columns(lesson):
+    with tl.launch(lesson(driven=True), worlds=1) as sim:
+        known = choices(sim.info)
+    assert known["joint_q"] == ["all", *sim.coord_names]
+    assert known["body_q"] == sim.body_names
+    assert known["contact_count"] == ["all"]
+    assert "mass_matrix" not in known and "contact_pos" not in known
+
+
+class Newest:
+    """The newest frame, as a page has it."""
+
+    def __init__(self, name: str) -> None:
+        self.live = Live(name, 64, FIELDS)
+        self.shown: Any = self.live.poll(5.0)
+
+    def __call__(self) -> Any:
+        self.shown = self.live.poll() or self.shown
+        return self.shown
+
+
+@pytest.fixture
+def piloted(lesson, unique):
+    """A simulation of three worlds, a pilot of it, and what it shows."""
+    with tl.launch(lesson(driven=True), worlds=3, name=unique(), params=("body_f",)) as sim:
+        sim.reset()
+        sim.release()
+        newest = Newest(sim.name)
+        pilot = Pilot(tl.attach(sim.name), newest)
+        yield sim, pilot, newest
+        pilot.close()
+        newest.live.close()
+
+
+def test_a_pilot_plays_in_real_time_and_gives_control_back(piloted):
+    sim, pilot, newest = piloted
+    pilot.play()
+    assert wait_until(lambda: newest().step[0] > 60, 20)
+    # never faster than asked; how much slower is for the machine to say
+    assert pilot.pace <= 1.1
+    assert pilot.controller is None, "it is this process"
+    pilot.pause()
+    assert wait_until(lambda: sim.controller() is None, 5)
+    stood = sim.forward().step[0]
+    assert sim.step().step[0] == stood + 1
+    pilot.play()
+    assert wait_until(lambda: "control" in pilot.problem, 5), "the message names who is in control"
+    assert not pilot.playing
+
+
+def test_targets_are_set_in_one_world_or_in_all(piloted):
+    _, pilot, newest = piloted
+    before = np.array(newest().joint_target_q)
+    pilot.set_target(0, 0.5, 1, everywhere=False)
+    assert wait_until(lambda: newest().joint_target_q[1, 0] == np.float32(0.5), 5)
+    expected = before.copy()
+    expected[1, 0] = 0.5
+    assert np.array_equal(newest().joint_target_q, expected)
+    pilot.set_target(1, -0.25, 1, everywhere=True)
+    assert wait_until(lambda: np.all(newest().joint_target_q[:, 1] == np.float32(-0.25)), 5)
+    expected = np.tile(expected[1], (3, 1))
+    expected[:, 1] = -0.25
+    assert np.array_equal(newest().joint_target_q, expected)
+    pilot.reset(1)
+    assert wait_until(lambda: np.array_equal(newest().joint_target_q[1], before[1]), 5)
+    assert np.array_equal(newest().joint_target_q[0], expected[0]), "the others keep theirs"
+
+
+def test_a_grip_pulls_a_free_body_as_its_mass_asks_and_no_fixed_one(lesson):
+    scene = lesson(driven=True)
+    cube = scene.add_cube(pos=(0, 0, 1))
+    dynamics = tl.Dynamics(scene)
+    with tl.launch(scene, worlds=1) as sim:
+        joint_q = sim.reset().joint_q[0]
+    ends = np.array([[0, 0, 1], [0.1, 0, 1.0]])
+    body = dynamics.body_names.index("cube/body")
+    held = grip(dynamics, 0, body, ends, joint_q, strength=1.0)
+    # 400 kg/m³ of 5 cm a side are 50 g; the spring's frequency is 1.5 Hz
+    assert held.stiffness == pytest.approx(0.05 * (3 * np.pi) ** 2)
+    still = SimpleNamespace(body_qd=np.zeros((1, len(dynamics.body_names), 6)))
+    assert held.force(still) == pytest.approx([held.stiffness * 0.1, 0, 0])
+    with pytest.raises(tl.CommandRefused, match="arm/base.*fixed"):
+        grip(dynamics, 0, 0, ends, joint_q, strength=1.0)
+    assert cube.name == "cube"
+
+
+class Numbers:
+    """A recording whose frames are numbers."""
+
+    period = 0.01
+
+    def __init__(self) -> None:
+        self.frames = iter(range(1, 501))
+
+    def poll(self, timeout: float = 0.0) -> Any:
+        return next(self.frames, None)
+
+    def close(self) -> None:
+        self.frames = iter(())
+
+
+def test_a_recording_is_played_stepped_skipped_and_begun_anew():
+    player = Player(Numbers)
+    player.pause()
+    assert player.poll(0.0) == 1, "the first frame is shown at once"
+    assert player.poll(0.0) is None
+    player.step()
+    assert player.poll(0.0) == 2
+    player.skip(1.0)
+    assert player.poll(0.0) == 102
+    player.speed = float("inf")
+    player.play()
+    shown = [player.poll(0.1) for _ in range(399)]
+    assert shown == [*range(103, 501), None]
+    assert not player.playing and "ends here" in player.problem
+    player.reset(None)
+    assert player.poll(0.0) == 1
+
+
+def test_a_recording_that_is_looked_at_seldom_passes_frames_over():
+    player = Player(Numbers)
+    assert player.poll(0.0) == 1
+    time.sleep(0.06)
+    assert player.poll(0.0) >= 5
+
+
+def test_an_unknown_daemon_is_named_with_those_that_run(pendulum, unique, capsys, restore_signals):
+    with tl.launch(pendulum, worlds=1, name=unique()) as sim:
+        assert main(["nobody-of-that-name"]) == 1
+        assert sim.name in capsys.readouterr().err
+
+
+def test_a_missing_library_is_named_with_its_cure(monkeypatch, capsys, restore_signals):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    with pytest.raises(tl.MissingLibrary, match=r"viser.*pip install .tightloop\[view\]"):
+        needs.check("viser")
+    assert main(["nobody"]) == 1
+    assert "tightloop[view]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("wrong", [["a", "--port=0"], ["a", "--worlds=1025"], [], ["a", "--port=x"]])
+def test_misuse_ends_with_2(wrong, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(wrong)
+    assert end.value.code == 2
+    assert "usage: tightloop view" in capsys.readouterr().err
+
+
+@pytest.fixture
+def restore_signals():
+    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in kept.items():
+        signal.signal(number, handler)
+
+
+def served(url: str) -> bool:
+    with urllib.request.urlopen(url, timeout=20) as answer:
+        return b"<html" in answer.read().lower()
+
+
+def test_viewers_of_a_simulation_have_ports_of_their_own_and_end_with_it(pendulum):
+    with tl.launch(pendulum, worlds=1) as sim:
+        first, second = sim.view(port=8350), sim.view(port=8350)
+        assert first.url != second.url
+        assert all(re.fullmatch(r"http://localhost:\d+", viewer.url) and served(viewer.url) for viewer in (first, second))
+        first.close()
+        assert not alive(first.pid) and alive(second.pid)
+        sim.step()
+    assert not alive(second.pid)
+
+
+def test_a_viewer_ends_when_the_process_that_started_it_is_killed(pendulum_urdf):
+    code = f"""
+import tightloop as tl, time
+scene = tl.Scene(dt=1 / 480, substeps=4)
+scene.add_urdf({str(pendulum_urdf)!r}, name="arm")
+sim = tl.launch(scene, worlds=1)
+print(sim.view(port=8360).pid, flush=True)
+time.sleep(60)
+"""
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        pid = int(process.stdout.readline())
+        process.kill()
+    assert wait_until(lambda: not alive(pid), 10)
+
+
+def test_ctrl_c_ends_a_viewer_with_0_and_the_daemon_goes_on(pendulum, unique):
+    with tl.launch(pendulum, worlds=1, name=unique()) as sim:
+        command = [sys.executable, "-m", "tightloop", "view", sim.name, "--port=8370"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as viewer:
+            assert viewer.stdout is not None and viewer.stdout.readline().startswith("http://localhost:")
+            os.kill(viewer.pid, signal.SIGINT)
+            assert viewer.communicate(timeout=20) == ("", "")
+            assert viewer.returncode == 0
+        sim.step()
+
+
+def test_a_simulation_that_is_looked_at_steps_to_the_same_bits(lesson, torques):
+    runs = []
+    for viewed in (False, True):
+        with tl.launch(lesson(driven=False), worlds=64) as sim:
+            if viewed:
+                sim.view(port=8380)
+            for frame in range(30):
+                last = sim.step(joint_f=torques(frame))
+            runs.append(last.copy().joint_q)
+    assert np.array_equal(*runs)

@@ -1,0 +1,251 @@
+"""The viewer's page in headless Chromium: what is seen, and what its controls do. Screenshots go to out/viewer."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import tightloop as tl
+from browser import View, chromium, differing, spots
+from leftovers import wait_until
+from tightloop import Frame
+
+START = [0.0, 0.0, 0.0, -2.4, 0.0, 2.4, 0.8, 0.04, 0.04]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as opened:
+        yield opened
+
+
+@pytest.fixture
+def look(browser) -> Iterator[Callable[[str], View]]:
+    """Opens the page of a viewer; at the end, no error may have been in its console."""
+    views: list[View] = []
+
+    def at(url: str) -> View:
+        views.append(View(browser, url))
+        return views[-1]
+
+    yield at
+    for view in views:
+        view.page.close()
+    assert [error for view in views for error in view.errors] == []
+
+
+@pytest.fixture
+def arm(lesson) -> tl.Scene:
+    """The lesson's Franka with drives, its table and cube."""
+    scene = lesson(driven=True)
+    scene.robots["arm"].joint_q = START
+    scene.add_table(mu=0.8)
+    scene.add_cube()
+    return scene
+
+
+@pytest.fixture
+def box() -> tl.Scene:
+    """A box that floats, and nothing else."""
+    scene = tl.Scene(dt=1 / 480, substeps=8, gravity=(0, 0, 0))
+    scene.add_box(half_extents=(0.1, 0.1, 0.1), body=scene.add_body(name="box", pos=(0, 0, 0.5)))
+    return scene
+
+
+def is_red(pixels: NDArray[np.int16]) -> NDArray[np.bool_]:
+    """Where something is red: nothing of the page is, but frozen worlds."""
+    red, green, blue = (pixels[..., channel] for channel in range(3))
+    return (red > 100) & (red > green + 50) & (red > blue + 50)
+
+
+class Observer:
+    """A client that only looks."""
+
+    def __init__(self, name: str) -> None:
+        self.sim = tl.attach(name)
+        self.frame = self.sim.latest(5.0)
+
+    def see(self) -> Frame:
+        """The newest frame."""
+        self.frame = self.sim.latest() or self.frame
+        assert self.frame is not None
+        return self.frame
+
+
+def test_two_poses_of_an_arm_are_two_pictures_and_the_first_comes_back(arm, look, unique):
+    with tl.launch(arm, worlds=1, name=unique()) as sim:
+        sim.reset()
+        view = look(sim.view(port=8300).url)
+        view.close_notices()
+        first = view.still("pose_first")
+        sim.write(joint_q={"arm": [1.2, 0.4, *START[2:]]})
+        view.wait(lambda: differing(view.shot(), first) > 0, "the arm moves")
+        second = view.still("pose_second")
+        # an arm covers some per cent of the picture
+        assert differing(first, second) > 0.02 * first[..., 0].size
+        sim.reset()
+        view.wait(lambda: differing(view.shot(), second) > 0, "the arm moves back")
+        assert differing(view.still(), first) == 0
+
+
+def test_a_slider_moves_the_arm_and_pause_gives_control_back(arm, look, unique):
+    with tl.launch(arm, worlds=1, name=unique()) as sim:
+        sim.reset()
+        sim.release()
+        viewer = sim.view(port=8300)
+        view = look(viewer.url)
+        view.close_notices()
+        before, observer = view.still(), Observer(sim.name)
+        view.page.get_by_role("slider").first.focus()
+        for _ in range(60):
+            view.page.keyboard.press("ArrowRight")
+        view.wait(lambda: observer.see().joint_q[0, 0] > 0.2, "the first joint turns")
+        assert sim.controller() == viewer.pid
+        view.wait(lambda: "you drive" in view.text, "the panel says who drives")
+        with pytest.raises(tl.LeaseHeld, match=str(viewer.pid)):
+            sim.step()
+        view.wait(lambda: differing(view.shot(), before) > 0.005 * before[..., 0].size, "the page shows it")
+        view.shot("slider_moved")
+        view.press("Pause")
+        assert wait_until(lambda: sim.controller() is None, 30)
+        stood = int(sim.forward().step[0])
+        assert sim.step().step[0] == stood + 1
+
+
+def test_play_step_and_reset_drive_the_worlds(box, look, unique):
+    with tl.launch(box, worlds=4, name=unique()) as sim:
+        sim.reset()
+        sim.release()
+        view, observer = look(sim.view(port=8300).url), Observer(sim.name)
+        for steps in (1, 2):
+            view.press("Step")
+            view.wait(lambda steps=steps: observer.see().step[0] == steps, f"{steps} steps are done")
+        view.wait(lambda: sim.controller() is None, "a single step gives control back")
+        view.press("Play")
+        view.wait(lambda: observer.see().step[0] > 20, "it plays")
+        view.press("Pause")
+        view.wait(lambda: sim.controller() is None, "it stands still")
+        view.press("Reset all")
+        view.wait(lambda: observer.see().step.max() == 0, "it is reset")
+
+
+def test_256_worlds_are_seen_and_a_frozen_one_is_red(box, look, unique):
+    with tl.launch(box, worlds=256, name=unique(), on_nan="freeze", params=("body_f",)) as sim:
+        sim.reset()
+        view = look(sim.view(port=8300).url)
+        view.close_notices()
+        view.choose("Camera", "top")
+        assert not is_red(view.still("worlds_256")).any()
+        sim.step(body_f=np.full((256, len(sim.body_names), 6), np.nan))
+        view.wait(lambda: is_red(view.shot()).any(), "frozen worlds are red")
+        # each world is a box that stands apart from the others
+        assert len(spots(is_red(view.still("worlds_256_frozen")))) == 256
+        sim.reset(mask=np.arange(256) != 7)
+        view.wait(lambda: len(spots(is_red(view.shot()))) == 1, "one is left")
+
+
+def test_contacts_ghosts_frames_shapes_and_plots_are_shown_when_they_are_chosen(arm, look, unique):
+    with tl.launch(arm, worlds=1, name=unique()) as sim:
+        for _ in range(30):
+            sim.step()
+        view = look(sim.view(port=8300).url)
+        view.close_notices()
+        before = view.still()
+        for choice in ("Targets as ghosts", "Body frames", "Collision shapes"):
+            view.page.get_by_label(choice, exact=True).check()
+            view.wait(lambda before=before: differing(view.shot(), before) > 20, f"{choice} are shown")
+            before = view.still(choice.lower().replace(" ", "_"))
+        view.choose("Contacts", "followed world")
+        view.wait(lambda: differing(view.shot(), before) > 3, "contacts are shown")
+        view.still("contacts")
+        view.page.get_by_text("Plots", exact=True).click()
+        view.press("Add plot")
+        view.wait(lambda: view.page.locator(".uplot").count() == 1, "a plot is drawn")
+        for _ in range(30):
+            sim.step()
+        view.page.locator(".uplot").scroll_into_view_if_needed()
+        view.shot("plot")
+
+
+def test_a_body_is_pulled_with_shift_and_the_mouse(box, look, unique):
+    with tl.launch(box, worlds=1, name=unique(), params=("body_f",)) as sim:
+        sim.reset()
+        sim.release()
+        view, observer = look(sim.view(port=8300).url), Observer(sim.name)
+        view.close_notices()
+        view.choose("Camera", "front")
+        view.still()
+        page, start = view.page, observer.see().body_q[0, 0, :3].copy()
+        size = page.viewport_size
+        assert size is not None
+        x, y = size["width"] / 2, size["height"] / 2
+        page.keyboard.down("Shift")
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x, y - 100, steps=10)
+        view.wait(lambda: observer.see().body_q[0, 0, 2] > start[2] + 0.02, "the box follows the pointer upwards")
+        view.shot("pulled")
+        page.mouse.up()
+        page.keyboard.up("Shift")
+
+
+def test_while_another_is_in_control_the_page_says_who_and_can_only_look(arm, look, unique):
+    with tl.launch(arm, worlds=1, name=unique()) as sim:
+        sim.step()
+        view = look(sim.view(port=8300).url)
+        view.wait(lambda: f"process {os.getpid()} is in control" in view.text, "it says who")
+        play = view.page.get_by_role("button", name="Play", exact=True)
+        view.wait(play.is_disabled, "Play is disabled")
+        slider = view.page.get_by_role("slider").first
+        assert slider.get_attribute("tabindex") == "-1" or slider.is_disabled() or slider.get_attribute("data-disabled")
+        sim.release()
+        view.wait(play.is_enabled, "Play is enabled")
+
+
+def test_a_page_outlives_its_daemon_and_goes_on_with_the_next_of_that_name(box, look, unique):
+    name = unique()
+    with tl.launch(box, worlds=1, name=name) as sim:
+        sim.reset()
+        command = [sys.executable, "-m", "tightloop", "view", name, "--port=8300"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as viewer:
+            assert viewer.stdout is not None
+            view = look(viewer.stdout.readline().strip())
+            os.kill(sim.pid, signal.SIGKILL)
+            view.wait(lambda: "Daemon lost" in view.text, "it says that the daemon is gone")
+            with tl.launch(box, worlds=2, name=name) as other:
+                other.step()
+                view.wait(lambda: "step 1" in view.text and "of 2" in view.text, "it shows the next one")
+                viewer.send_signal(signal.SIGINT)
+                assert viewer.wait(30) == 0
+
+
+def test_a_recording_plays_to_its_end_and_again(box, look, unique, tmp_path):
+    file = tmp_path / "run.tlrec"
+    with tl.launch(box, worlds=2, name=unique()) as sim:
+        sim.reset()
+        record = [sys.executable, "-m", "tightloop", "record", sim.name, str(file)]
+        with subprocess.Popen(record, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as recorder:
+            assert recorder.stderr is not None and "recording" in recorder.stderr.readline()
+            for _ in range(90):
+                sim.step()
+            recorder.send_signal(signal.SIGINT)
+            recorder.communicate()
+    command = [sys.executable, "-m", "tightloop", "view", str(file), "--port=8300"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as viewer:
+        assert viewer.stdout is not None
+        view = look(viewer.stdout.readline().strip())
+        view.wait(lambda: "the recording ends here" in view.text and "step 90" in view.text, "it is at its end")
+        view.press("Restart")
+        view.wait(lambda: "step 90" not in view.text, "it is at its begin")
+        view.press("Step")
+        view.press("+1 s")
+        view.wait(lambda: "step 90" not in view.text and "step 6" in view.text, "a second is skipped")
+        viewer.send_signal(signal.SIGTERM)
+        assert viewer.wait(30) == 0
