@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import subprocess
 import sys
 from collections.abc import Callable
@@ -52,7 +53,7 @@ def moves(pictures: list[NDArray[np.uint8]]) -> bool:
     """Whether each picture differs from the one before."""
     return all(
         np.abs(before.astype(int) - after).sum(axis=-1).max() > 30
-        for before, after in zip(pictures, pictures[1:], strict=False)
+        for before, after in itertools.pairwise(pictures)
     )
 
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import URDF
 from numpy.typing import NDArray
 
 import tightloop as tl
+from conftest import URDF
 from tightloop import _core
 from tightloop.view import Camera, Picture
 from tightloop.view.parts import Parts, parts

@@ -13,7 +13,6 @@ import numpy as np
 import viser
 
 from tightloop.view.cameras import Camera, camera
-from tightloop.view.feed import CONTACTS
 from tightloop.view.looks import Kind, Looks
 from tightloop.view.overlay import Overlay
 from tightloop.view.parts import Parts
@@ -21,6 +20,8 @@ from tightloop.view.stage import Stage
 
 # Of the browser's window, which is not known yet.
 _ASPECT = 1.6
+# What contacts are drawn from.
+_CONTACTS = ("contact_count", "contact_pos", "contact_force")
 
 
 class Html:
@@ -58,13 +59,13 @@ class Html:
 
     def add(self, shown: Any, chosen: Sequence[int]) -> None:
         """Add a frame, of these worlds."""
-        there = [name for name in ("body_q", "status", *CONTACTS) if hasattr(shown, name)]
+        there = [name for name in ("body_q", "status", *_CONTACTS) if hasattr(shown, name)]
         own = SimpleNamespace(**{name: np.asarray(getattr(shown, name))[list(chosen)] for name in there})
         if self._stage is None:
             self._begin(own.body_q)
         assert self._stage is not None and self._overlay is not None
         self._stage.show(own.body_q, getattr(own, "status", np.zeros(len(own.body_q), int)))
-        if all(hasattr(own, name) for name in CONTACTS):
+        if all(hasattr(own, name) for name in _CONTACTS):
             self._overlay.show_contacts(own, range(len(own.body_q)))
         if self._serializer is None:
             self._serializer = self._server.get_scene_serializer()
