@@ -62,7 +62,6 @@ def test_blocks_that_do_not_run_say_why():
         "needs a browser": 1,
         "needs a compiler": 2,
         "needs a network": 2,
-        "needs a running daemon": 1,
         "needs docker": 1,
         "needs onnxruntime": 1,
         "needs stable-baselines3": 2,
