@@ -85,8 +85,8 @@ pub(super) struct Film {
     #[arg(long, default_value_t = 0)]
     world: usize,
 
-    /// Where it is seen from: three-quarter, front, side, top, or follow, which goes with it.
-    #[arg(long, default_value = "three-quarter")]
+    /// Where it is seen from; follow goes with the world.
+    #[arg(long, default_value = "three-quarter", value_parser = ["three-quarter", "front", "side", "top", "follow"])]
     camera: String,
 
     /// Show the shapes that touch, not what robots look like.
