@@ -134,6 +134,7 @@ impl DaemonError {
                 | BackendError::NoThreads
                 | BackendError::Lanes { .. }
                 | BackendError::Adapter { .. }
+                | BackendError::CompileLimit { .. }
                 | BackendError::DoubleOnGpu,
             ) => "ArgumentError",
             Backend(BackendError::Memory { .. } | BackendError::DeviceMemory { .. })

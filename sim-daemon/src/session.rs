@@ -219,6 +219,7 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
     let (worlds, threads) = (serve.worlds as usize, serve.threads);
     Ok(Options {
         device,
+        compile_limit: options::compile_limit()?,
         worlds,
         precision,
         threads,
@@ -248,7 +249,10 @@ fn device(serve: &Serve) -> Option<Device> {
     match serve.device.as_str() {
         "cpu" => Some(Device::Cpu),
         "gpu" => Some(Device::Gpu { adapter, cache }),
-        "auto" => Some(Device::Auto { cache }),
+        "auto" => Some(Device::Auto {
+            cache,
+            software: options::auto_takes_software(),
+        }),
         _ => None,
     }
 }

@@ -4,10 +4,12 @@ use crate::backend::{Backend, BackendError, Faults, Lanes, Precision, available_
 use crate::random::Draws;
 use sim_core::batch::{Field, Layout};
 use sim_core::model::Model;
-use sim_device::AdapterKind;
 use std::path::PathBuf;
+use std::time::Duration;
 
-pub use sim_device::{AdapterInfo, Choice as Adapter, Replay, adapters};
+#[doc(hidden)]
+pub use sim_device::lose_after;
+pub use sim_device::{AdapterInfo, AdapterKind, Choice as Adapter, Replay, adapters, leave};
 
 /// What keeps the worlds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -26,11 +28,18 @@ pub enum Device {
     Auto {
         /// Where programs are kept, if anywhere.
         cache: Option<PathBuf>,
+        /// A GPU that software plays will do, too: for tests of what comes after.
+        software: bool,
     },
 }
 
 /// Worlds from which on [`Device::Auto`] looks for a GPU: fewer leave most of it idle.
 pub const AUTO_WORLDS: usize = 1024;
+
+/// For each: lavapipe takes 12 s over all programs of a grasp together on four idle cores, and three times that on busy ones.
+const COMPILE_LIMIT: Duration = Duration::from_secs(180);
+/// Where another limit is said.
+const COMPILE_LIMIT_NAME: &str = "TIGHTLOOP_COMPILE_LIMIT";
 
 /// How to run a model.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +50,8 @@ pub struct Options {
     pub device: Device,
     /// How a GPU gets the batches of a frame: recorded, unless that is what is measured.
     pub replay: Replay,
+    /// A driver that takes longer over a program of a GPU is given up.
+    pub compile_limit: Duration,
     /// Precision of state, commands and fields.
     pub precision: Precision,
     /// Threads of a step; none = one a core.
@@ -61,6 +72,7 @@ impl Default for Options {
             worlds: 1,
             device: Device::Cpu,
             replay: Replay::Recorded,
+            compile_limit: COMPILE_LIMIT,
             precision: Precision::F32,
             threads: None,
             lanes: Lanes::Auto,
@@ -81,6 +93,24 @@ pub fn cache_folder() -> Option<PathBuf> {
     Some(caches?.join("tightloop"))
 }
 
+/// How long a driver may take over a program: seconds in `TIGHTLOOP_COMPILE_LIMIT`, or what [`Options::default`] has.
+///
+/// # Errors
+/// What stands there is no time.
+pub fn compile_limit() -> Result<Duration, BackendError> {
+    let Ok(value) = std::env::var(COMPILE_LIMIT_NAME) else {
+        return Ok(COMPILE_LIMIT);
+    };
+    let seconds = value.parse().unwrap_or(f64::NAN);
+    let limit = Duration::try_from_secs_f64(seconds);
+    limit.map_err(|_| BackendError::CompileLimit { value })
+}
+
+/// Whether [`Device::Auto`] takes a GPU that software plays: `TIGHTLOOP_AUTO_SOFTWARE=1`, for tests of daemons.
+pub fn auto_takes_software() -> bool {
+    std::env::var_os("TIGHTLOOP_AUTO_SOFTWARE").is_some_and(|value| value == "1")
+}
+
 /// What keeps the worlds, and why where that was left open.
 pub(crate) fn backend(
     model: &Model,
@@ -89,8 +119,15 @@ pub(crate) fn backend(
 ) -> Result<(Box<dyn Backend>, Option<String>), BackendError> {
     let (worlds, precision, draws) = (options.worlds, options.precision, options.draws);
     let on_gpu = |adapter: &Adapter, cache: &Option<PathBuf>| {
-        let (cache, replay) = (cache.as_deref(), options.replay);
-        gpu::create(model, worlds, layout, adapter, cache, draws, replay)
+        let wanted = gpu::Wanted {
+            worlds,
+            adapter,
+            cache: cache.as_deref(),
+            draws,
+            replay: options.replay,
+            compile_limit: options.compile_limit,
+        };
+        gpu::create(model, layout, &wanted)
     };
     let note = match &options.device {
         Device::Gpu { .. } if precision == Precision::F64 => return Err(BackendError::DoubleOnGpu),
@@ -102,9 +139,10 @@ pub(crate) fn backend(
         Device::Auto { .. } if worlds < AUTO_WORLDS => {
             Some(format!("the processor: fewer than {AUTO_WORLDS} worlds"))
         }
-        Device::Auto { cache } => {
+        Device::Auto { cache, software } => {
             let found = adapters();
-            match found.iter().find(|info| info.kind != AdapterKind::Software) {
+            let will_do = |info: &&AdapterInfo| *software || info.kind != AdapterKind::Software;
+            match found.iter().find(will_do) {
                 None => Some("the processor: no GPU was found".to_owned()),
                 Some(info) => match on_gpu(&Adapter::Index(info.index), cache) {
                     Ok(backend) => return Ok((backend, Some(format!("the GPU `{}`", info.name)))),

@@ -41,8 +41,8 @@ const RESPONSE_MIN: usize = 1024;
 
 /// What a host asks for: frames, and for those who look on the state behind them.
 pub trait Worlds {
-    /// Writes the arena of a frame.
-    fn frame(&mut self, arena: &mut [u64]);
+    /// Writes the arena of a frame; returns whether there is something to be seen and recorded in it.
+    fn frame(&mut self, arena: &mut [u64]) -> bool;
     /// Writes the state of the worlds that observers see, [`Description::watch_state_bytes`] of it.
     fn state(&mut self, to: &mut [u8]);
 }
@@ -206,6 +206,12 @@ impl Host {
         self.state.journals.state(session, state, all);
     }
 
+    /// Ends all recordings, and refuses those to come.
+    pub fn end_records(&mut self, reason: &str) {
+        let session = self.state.description.session;
+        self.state.journals.end(session, reason);
+    }
+
     /// Answers the command with a refusal.
     pub fn refuse(&mut self, kind: RefusalKind, reason: &str) {
         self.state.refuse(kind, reason);
@@ -215,9 +221,12 @@ impl Host {
     pub fn show(&mut self, arena: &mut [u64], worlds: &mut impl Worlds) {
         let state = &mut self.state;
         state.frames += 1;
-        worlds.frame(arena);
-        let head = header(&state.description, &state.frame, state.frames);
-        state.watch.show(head, &state.frame, arena, worlds);
+        if worlds.frame(arena) {
+            let head = header(&state.description, &state.frame, state.frames);
+            state.watch.show(head, &state.frame, arena, worlds);
+        } else {
+            state.watch.unchanged();
+        }
     }
 }
 

@@ -82,8 +82,9 @@ fn description() -> Description {
 struct Counted(u64);
 
 impl Worlds for Counted {
-    fn frame(&mut self, arena: &mut [u64]) {
+    fn frame(&mut self, arena: &mut [u64]) -> bool {
         arena[..2].fill(self.0);
+        true
     }
 
     fn state(&mut self, to: &mut [u8]) {

@@ -38,16 +38,13 @@ use std::sync::OnceLock;
 use std::time::Duration;
 use tile::{Rows, Tile};
 
-/// A driver that takes longer over the programs of a model is given up.
-const COMPILE_LIMIT: Duration = Duration::from_secs(180);
-
 /// What kernels may cost where software plays the GPU: every access to memory is a loop there, and its compiler's time grows with
 /// their square. A dispatch takes as long as a round of a solver, so loops stay whole.
 const SOFTWARE: Limits = Limits {
     kernel: 16_000,
     repeated: usize::MAX,
 };
-/// The same of hardware: few kernels, so that numbers stay in registers.
+/// The same of hardware: few kernels, so that numbers stay in registers. A guess, with others that ARCHITECTURE.md lists.
 const HARDWARE: Limits = Limits {
     kernel: 40_000,
     repeated: usize::MAX,
@@ -82,22 +79,32 @@ pub(super) struct Gpu {
     copied: u64,
 }
 
+/// What is asked of a GPU, besides a model.
+pub struct Wanted<'a> {
+    /// Number of worlds.
+    pub worlds: usize,
+    /// Which one it is.
+    pub adapter: &'a Choice,
+    /// Where programs are kept, if anywhere.
+    pub cache: Option<&'a Path>,
+    /// What the draws of a world depend on.
+    pub draws: Draws,
+    /// How it gets the batches of a frame.
+    pub replay: Replay,
+    /// How long its driver may take over a program.
+    pub compile_limit: Duration,
+}
+
 /// Worlds on the adapter that is meant.
 ///
 /// # Errors
 /// No such adapter, out of memory, a driver that cannot compile the programs.
 pub fn create(
     model: &Model,
-    worlds: usize,
     layout: &Layout,
-    choice: &Choice,
-    cache: Option<&Path>,
-    draws: Draws,
-    replay: Replay,
+    wanted: &Wanted<'_>,
 ) -> Result<Box<dyn Backend>, BackendError> {
-    Ok(Box::new(Gpu::new(
-        model, worlds, layout, choice, cache, draws, replay,
-    )?))
+    Ok(Box::new(Gpu::new(model, layout, wanted)?))
 }
 
 const MB: u64 = 1 << 20;
@@ -140,16 +147,9 @@ fn check_memory(device: &Device, worlds: usize, needed: u64) -> Result<(), Backe
 }
 
 impl Gpu {
-    fn new(
-        model: &Model,
-        worlds: usize,
-        layout: &Layout,
-        choice: &Choice,
-        cache: Option<&Path>,
-        draws: Draws,
-        replay: Replay,
-    ) -> Result<Gpu, BackendError> {
-        let device = Device::open(choice, cache)?;
+    fn new(model: &Model, layout: &Layout, asked: &Wanted<'_>) -> Result<Gpu, BackendError> {
+        let (worlds, limit) = (asked.worlds, asked.compile_limit);
+        let device = Device::open(asked.adapter, asked.cache)?;
         check_frame(&device, layout.bytes as u64)?;
         let constants: Constants<f32> = model.constants().cast();
         let m = &constants;
@@ -184,9 +184,8 @@ impl Gpu {
         let tiles = (worlds as u64).div_ceil(u64::from(widest));
         let needed = tiles * tile::memory(m, &places, widest) + 2 * layout.bytes as u64;
         check_memory(&device, worlds, needed)?;
-        let mut compiled =
-            Compiled::new(&device, m, &places, &programs, books, widest, COMPILE_LIMIT)?;
-        compiled.replay = replay;
+        let mut compiled = Compiled::new(&device, m, &places, &programs, books, widest, limit)?;
+        compiled.replay = asked.replay;
         let frame = device.staging("frame", layout.bytes.max(64) as u64)?;
         let drawn = match device.info().kind {
             AdapterKind::Discrete => Some(device.buffer("frame", layout.bytes.max(64) as u64)?),
@@ -223,7 +222,7 @@ impl Gpu {
             record: places.record(shape),
             start: start(model),
             draw: StartDraw::new(model),
-            draws,
+            draws: asked.draws,
             noise: Noise::new(model),
             faults: Faults::default(),
             host: Host::new(worlds, m.varying.len()),
