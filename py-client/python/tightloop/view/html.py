@@ -21,8 +21,6 @@ from tightloop.view.stage import Stage
 
 # Of the browser's window, which is not known yet.
 _ASPECT = 1.6
-# What contacts are drawn from.
-_CONTACTS = ("contact_count", "contact_pos", "contact_force")
 
 
 class Html:
