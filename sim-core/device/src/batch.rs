@@ -108,6 +108,15 @@ impl BatchBuilder {
         }
     }
 
+    /// Runs no workgroup of a program.
+    pub(crate) fn empty(&mut self, program: &Program, slots: Vec<Slot>) {
+        self.commands.push(Command::Dispatch {
+            program: program.0.clone(),
+            slots,
+            workgroups: 0,
+        });
+    }
+
     /// Copies bytes; places and size are multiples of 4.
     pub fn copy(&mut self, from: &Buffer, from_at: u64, to: &Buffer, to_at: u64, bytes: u64) {
         match self.copied(from, from_at, to, to_at, bytes) {

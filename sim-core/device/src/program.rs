@@ -1,5 +1,6 @@
 //! Programs: WGSL in, compiled on all cores, with a limit on a driver's patience.
 
+use crate::ahead;
 use crate::device::{Device, Inner};
 use crate::error::DeviceError;
 use crate::module::{self, Binding, Module};
@@ -86,6 +87,7 @@ impl Device {
         limit: Duration,
     ) -> Result<Vec<Program>, DeviceError> {
         self.inner.alive()?;
+        ahead::compile(self, sources, limit)?;
         let labels = sources.iter().map(|source| source.label.clone()).collect();
         let sources = sources.to_vec();
         let inner = self.inner.clone();
@@ -101,7 +103,23 @@ impl Device {
 }
 
 fn compile(device: &Arc<Inner>, source: &Source, limit: Duration) -> Result<Program, String> {
-    let module = read(device, source)?;
+    let program = build(device, source, read(device, source)?, limit)?;
+    if ahead::is_late(device) {
+        let device = Device {
+            inner: device.clone(),
+        };
+        ahead::run_empty(&device, &program).map_err(|e| e.to_string())?;
+    }
+    Ok(program)
+}
+
+/// What a driver makes of a program before it runs.
+pub(crate) fn build(
+    device: &Arc<Inner>,
+    source: &Source,
+    module: Module,
+    limit: Duration,
+) -> Result<Program, String> {
     let info = &device.info;
     if module.bindings.is_empty() {
         return Err("it uses no storage buffer".to_owned());
@@ -149,7 +167,7 @@ fn compile(device: &Arc<Inner>, source: &Source, limit: Duration) -> Result<Prog
 }
 
 /// The program's words, from the cache if they are there.
-fn read(device: &Inner, source: &Source) -> Result<Module, String> {
+pub(crate) fn read(device: &Inner, source: &Source) -> Result<Module, String> {
     let Some(cache) = &device.cache else {
         return module::read(source, device.vulkan.is_some());
     };
@@ -172,7 +190,7 @@ enum News<T> {
 }
 
 /// Does one piece of work a label, on all cores, and gives up where one takes longer than `limit`.
-fn within<T: Send + 'static>(
+pub(crate) fn within<T: Send + 'static>(
     device: &Arc<Inner>,
     labels: Vec<String>,
     limit: Duration,

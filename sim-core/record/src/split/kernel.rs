@@ -290,7 +290,8 @@ impl<'a> Plan<'a> {
     fn kernel(&self, p: usize, options: &ProgramOptions) -> Kernel {
         let (piece, needs) = (&self.pieces.pieces[p], &self.needs[p]);
         let mut inputs = Vec::new();
-        let mut given: HashMap<u32, u32> = HashMap::new();
+        // in order: equal recordings have equal texts, by which they are kept
+        let mut given: BTreeMap<u32, u32> = BTreeMap::new();
         for x in &needs.values {
             given.insert(*x, inputs.len() as u32);
             inputs.push(match self.inputs.get(*x as usize) {
