@@ -6,6 +6,7 @@ use crate::batch::{Replay, Slot};
 use crate::device::{Device, Inner};
 use crate::error::DeviceError;
 use crate::memory::Buffer;
+use crate::module::Module;
 use crate::program::{self, Program, Source};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -25,23 +26,25 @@ fn keeps() -> bool {
     })
 }
 
-/// Lets the driver compile programs that the folder of the device does not know, each on one of several devices. What is wrong with a program is
-/// found again, and told, when it is compiled for the device that is meant.
+/// Lets the driver compile programs that the folder of the device does not know, each on one of several devices; returns their words, by the
+/// places of the sources. What is wrong with a program is found again, and told, when it is compiled for the device that is meant.
 ///
 /// Errors: the driver takes longer than `limit` over one of them.
 pub(crate) fn compile(
     device: &Device,
     sources: &[Source],
     limit: Duration,
-) -> Result<(), DeviceError> {
+) -> Result<Vec<Option<Module>>, DeviceError> {
+    let mut made = vec![None; sources.len()];
     let cache = device.inner.cache.as_ref();
-    let is_new = |source: &&Source| cache.is_none_or(|cache| !cache.knows(source));
-    let mut new: Vec<Source> = sources.iter().filter(is_new).cloned().collect();
-    if new.len() < 2 || !is_late(&device.inner) || !keeps() {
-        return Ok(());
+    let is_new = |place: &usize| cache.is_none_or(|cache| !cache.knows(&sources[*place]));
+    let mut places: Vec<usize> = (0..sources.len()).filter(is_new).collect();
+    if places.len() < 2 || !is_late(&device.inner) || !keeps() {
+        return Ok(made);
     }
     // the longest first, so that none is left alone at the end
-    new.sort_by_key(|source| std::cmp::Reverse(source.wgsl.len()));
+    places.sort_by_key(|place| std::cmp::Reverse(sources[*place].wgsl.len()));
+    let new: Vec<Source> = places.iter().map(|place| sources[*place].clone()).collect();
     let labels = new.iter().map(|source| source.label.clone()).collect();
     let idle = Arc::new(Mutex::new(Vec::new()));
     let (shared, main) = (idle.clone(), device.inner.clone());
@@ -52,21 +55,27 @@ pub(crate) fn compile(
             Some(other) => other,
             None => match Device::open(&Choice::Index(main.info.index), None) {
                 Ok(other) => other,
-                Err(_) => return Ok(()),
+                Err(_) => return Ok(None),
             },
         };
         let source = &new[place];
-        let _ = program::read(&main, source)
-            .and_then(|module| program::build(&other.inner, source, module, limit))
-            .map(|program| run_empty(&other, &program));
+        let module = program::read(&main, source).ok();
+        if let Some(module) = &module
+            && let Ok(program) = program::build(&other.inner, source, module.clone(), limit)
+        {
+            let _ = run_empty(&other, &program);
+        }
         lock().push(other);
-        Ok(())
+        Ok(module)
     };
-    program::within(&device.inner, labels, limit, work)?;
+    let modules = program::within(&device.inner, labels, limit, work)?;
+    for (place, module) in places.into_iter().zip(modules) {
+        made[place] = module;
+    }
     // a driver has written its folder when its devices are closed
     let closed: Vec<Device> = std::mem::take(&mut *idle.lock().unwrap_or_else(|e| e.into_inner()));
     drop(closed);
-    Ok(())
+    Ok(made)
 }
 
 /// Runs no workgroup of a program: the driver compiles it, or reads what it kept.

@@ -87,11 +87,18 @@ impl Device {
         limit: Duration,
     ) -> Result<Vec<Program>, DeviceError> {
         self.inner.alive()?;
-        ahead::compile(self, sources, limit)?;
+        let made = ahead::compile(self, sources, limit)?;
         let labels = sources.iter().map(|source| source.label.clone()).collect();
         let sources = sources.to_vec();
         let inner = self.inner.clone();
-        let compile = move |place: usize| compile(&inner, &sources[place], limit);
+        let compile = move |place: usize| {
+            let source = &sources[place];
+            let module = match &made[place] {
+                Some(module) => module.clone(),
+                None => read(&inner, source)?,
+            };
+            compile(&inner, source, module, limit)
+        };
         let made = within(&self.inner, labels, limit, compile);
         self.inner.alive()?;
         let made = made?;
@@ -102,8 +109,13 @@ impl Device {
     }
 }
 
-fn compile(device: &Arc<Inner>, source: &Source, limit: Duration) -> Result<Program, String> {
-    let program = build(device, source, read(device, source)?, limit)?;
+fn compile(
+    device: &Arc<Inner>,
+    source: &Source,
+    module: Module,
+    limit: Duration,
+) -> Result<Program, String> {
+    let program = build(device, source, module, limit)?;
     if ahead::is_late(device) {
         let device = Device {
             inner: device.clone(),
