@@ -143,10 +143,13 @@ pub(super) fn sources(device: &Device, loops: &[Loop], width: u32) -> Vec<Source
     sources
 }
 
+/// Of a loop the programs of its first list and of the others.
+type Listing = (Loop, [Program; 2]);
+
 /// Programs of the lists.
 pub(super) struct Enlisting {
-    /// The one that clears, and of each loop those of its first list and of the others.
-    programs: Option<(Program, Vec<(Loop, [Program; 2])>)>,
+    /// The one that clears, and those of the loops.
+    programs: Option<(Program, Vec<Listing>)>,
     places: u64,
 }
 
