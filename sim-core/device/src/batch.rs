@@ -48,7 +48,7 @@ pub(crate) enum Command {
     Dispatch {
         program: Arc<Compiled>,
         slots: Vec<Slot>,
-        workgroups: u32,
+        groups: Groups,
     },
     Copy {
         from: Arc<Memory>,
@@ -56,6 +56,16 @@ pub(crate) enum Command {
         to: Arc<Memory>,
         to_at: u64,
         bytes: u64,
+    },
+}
+
+/// How many workgroups run.
+pub(crate) enum Groups {
+    Given(u32),
+    /// Three numbers, of which the last two are 1, at a byte of a buffer when the command runs.
+    Found {
+        buffer: Arc<Memory>,
+        at: u64,
     },
 }
 
@@ -102,10 +112,68 @@ impl BatchBuilder {
         buffers: &[(u32, &Buffer, Range<u64>)],
         workgroups: u32,
     ) {
-        match self.dispatched(program, buffers, workgroups) {
-            Ok(command) => self.commands.push(command),
+        let max = self.device.info.workgroups_max;
+        if workgroups == 0 || workgroups > max {
+            let reason = format!("{workgroups} workgroups; from 1 to {max} may be");
+            return self.fail(program.label(), reason);
+        }
+        match self.slots(program, buffers) {
+            Ok(slots) => self.push(program, slots, Groups::Given(workgroups)),
             Err(reason) => self.fail(program.label(), reason),
         }
+    }
+
+    /// As `dispatch`, with as many workgroups as an earlier command wrote: three `u32` at a byte of `found`, the last two of them 1, the first no
+    /// more than the adapter has. It may be 0.
+    pub fn dispatch_found(
+        &mut self,
+        program: &Program,
+        buffers: &[(u32, &Buffer, Range<u64>)],
+        found: &Buffer,
+        at: u64,
+    ) {
+        if !Arc::ptr_eq(&found.0.device, &self.device) {
+            let reason = format!("`{}` is another device's", found.label());
+            return self.fail(program.label(), reason);
+        }
+        if !at.is_multiple_of(4) || at.checked_add(12).is_none_or(|end| end > found.bytes()) {
+            let bytes = found.bytes();
+            let reason = format!("numbers of workgroups at {at} of {bytes} bytes");
+            return self.fail(program.label(), reason);
+        }
+        let groups = Groups::Found {
+            buffer: found.0.clone(),
+            at,
+        };
+        match self.slots(program, buffers) {
+            // wgpu refuses it, as below
+            Ok(slots)
+                if slots
+                    .iter()
+                    .any(|slot| !slot.read_only && Arc::ptr_eq(&slot.buffer, &found.0)) =>
+            {
+                let reason = format!(
+                    "it writes `{}`, which says how many workgroups run",
+                    found.label()
+                );
+                self.fail(program.label(), reason);
+            }
+            Ok(slots) => self.push(program, slots, groups),
+            Err(reason) => self.fail(program.label(), reason),
+        }
+    }
+
+    fn push(&mut self, program: &Program, slots: Vec<Slot>, groups: Groups) {
+        self.commands.push(Command::Dispatch {
+            program: program.0.clone(),
+            slots,
+            groups,
+        });
+    }
+
+    /// Runs no workgroup of a program.
+    pub(crate) fn empty(&mut self, program: &Program, slots: Vec<Slot>) {
+        self.push(program, slots, Groups::Given(0));
     }
 
     /// Copies bytes; places and size are multiples of 4.
@@ -147,19 +215,14 @@ impl BatchBuilder {
             .get_or_insert(DeviceError::Command { label, reason });
     }
 
-    fn dispatched(
+    /// What a program sees.
+    fn slots(
         &self,
         program: &Program,
         buffers: &[(u32, &Buffer, Range<u64>)],
-        workgroups: u32,
-    ) -> Result<Command, String> {
-        let info = &self.device.info;
+    ) -> Result<Vec<Slot>, String> {
         if !Arc::ptr_eq(&program.0.device, &self.device) {
             return Err("the program is another device's".to_owned());
-        }
-        if workgroups == 0 || workgroups > info.workgroups_max {
-            let max = info.workgroups_max;
-            return Err(format!("{workgroups} workgroups; from 1 to {max} may be"));
         }
         let mut slots: Vec<Slot> = Vec::new();
         for wanted in &program.0.bindings {
@@ -191,11 +254,7 @@ impl BatchBuilder {
             }
             slots.push(slot);
         }
-        Ok(Command::Dispatch {
-            program: program.0.clone(),
-            slots,
-            workgroups,
-        })
+        Ok(slots)
     }
 
     fn check(&self, slot: &Slot) -> Result<(), String> {
@@ -278,9 +337,12 @@ fn staging(commands: &[Command]) -> Vec<Staged> {
     };
     for command in commands {
         match command {
-            Command::Dispatch { slots, .. } => {
+            Command::Dispatch { slots, groups, .. } => {
                 for slot in slots {
                     note(&slot.buffer, !slot.read_only);
+                }
+                if let Groups::Found { buffer, .. } = groups {
+                    note(buffer, false);
                 }
             }
             Command::Copy { from, to, .. } => {

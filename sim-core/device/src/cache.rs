@@ -46,6 +46,11 @@ impl Cache {
         Some(module)
     }
 
+    /// Are the words of a program there?
+    pub fn knows(&self, source: &Source) -> bool {
+        self.file(&key(source)).exists()
+    }
+
     /// Keeps a program.
     pub fn keep_module(&self, source: &Source, module: &Module) {
         let key = key(source);

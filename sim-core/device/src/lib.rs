@@ -16,6 +16,7 @@
 )]
 
 mod adapter;
+mod ahead;
 mod batch;
 mod cache;
 mod device;

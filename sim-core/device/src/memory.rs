@@ -27,6 +27,7 @@ pub(crate) const GRAIN: u64 = 16;
 
 /// What every buffer may be used for.
 pub(crate) const USAGES: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE
+    .union(wgpu::BufferUsages::INDIRECT)
     .union(wgpu::BufferUsages::COPY_SRC)
     .union(wgpu::BufferUsages::COPY_DST);
 

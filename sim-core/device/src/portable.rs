@@ -1,7 +1,7 @@
 //! What goes through wgpu alone: pipelines and encoded batches of every route, staging where host memory cannot be mapped for ever.
 
 use crate::adapter::ready;
-use crate::batch::Command;
+use crate::batch::{Command, Groups};
 use crate::error::DeviceError;
 use crate::memory::{HostBytes, Memory};
 use crate::program::Source;
@@ -109,13 +109,18 @@ pub(crate) fn encode(
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         while let Some(Command::Dispatch {
             program,
-            workgroups,
+            groups: workgroups,
             ..
         }) = rest.first()
         {
             pass.set_pipeline(program.encoded()?);
             pass.set_bind_group(0, groups.next().expect("a group a dispatch"), &[]);
-            pass.dispatch_workgroups(*workgroups, 1, 1);
+            match workgroups {
+                Groups::Given(groups) => pass.dispatch_workgroups(*groups, 1, 1),
+                Groups::Found { buffer, at } => {
+                    pass.dispatch_workgroups_indirect(&buffer.wgpu, *at);
+                }
+            }
             rest = &rest[1..];
         }
     }

@@ -1,5 +1,6 @@
 //! Programs: WGSL in, compiled on all cores, with a limit on a driver's patience.
 
+use crate::ahead;
 use crate::device::{Device, Inner};
 use crate::error::DeviceError;
 use crate::leave::COMPILING;
@@ -87,10 +88,18 @@ impl Device {
         limit: Duration,
     ) -> Result<Vec<Program>, DeviceError> {
         self.inner.alive()?;
+        let made = ahead::compile(self, sources, limit)?;
         let labels = sources.iter().map(|source| source.label.clone()).collect();
         let sources = sources.to_vec();
         let inner = self.inner.clone();
-        let compile = move |place: usize| compile(&inner, &sources[place], limit);
+        let compile = move |place: usize| {
+            let source = &sources[place];
+            let module = match &made[place] {
+                Some(module) => module.clone(),
+                None => read(&inner, source)?,
+            };
+            build(&inner, source, module, limit)
+        };
         let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
         let made = within(&self.inner, labels, cores, limit, compile);
         self.inner.alive()?;
@@ -105,8 +114,13 @@ impl Device {
     }
 }
 
-fn compile(device: &Arc<Inner>, source: &Source, limit: Duration) -> Result<Program, String> {
-    let module = read(device, source)?;
+/// What a driver makes of a program before it runs.
+pub(crate) fn build(
+    device: &Arc<Inner>,
+    source: &Source,
+    module: Module,
+    limit: Duration,
+) -> Result<Program, String> {
     let info = &device.info;
     if module.bindings.is_empty() {
         return Err("it uses no storage buffer".to_owned());
@@ -154,7 +168,7 @@ fn compile(device: &Arc<Inner>, source: &Source, limit: Duration) -> Result<Prog
 }
 
 /// The program's words, from the cache if they are there.
-fn read(device: &Inner, source: &Source) -> Result<Module, String> {
+pub(crate) fn read(device: &Inner, source: &Source) -> Result<Module, String> {
     let Some(cache) = &device.cache else {
         return module::read(source, device.vulkan.is_some());
     };

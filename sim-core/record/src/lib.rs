@@ -33,6 +33,7 @@ mod evaluate;
 mod facts;
 mod fold;
 mod handles;
+mod join;
 mod lists;
 mod live;
 mod loops;
@@ -139,11 +140,14 @@ pub fn record(
         return Err(error);
     }
     live::prune(&state.values, &mut body, &outputs, place)?;
+    let mut values = state.values.iter().map(|v| v.op).collect();
+    let mut names = state.counters().names as usize;
+    join::join(&mut body, &mut values, &mut names);
     let mut recording = Recording {
         inputs,
         outputs,
-        names: state.counters().names as usize,
-        values: state.values.iter().map(|v| v.op).collect(),
+        names,
+        values,
         scratch: 0,
         body,
     };

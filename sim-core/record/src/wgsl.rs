@@ -41,6 +41,8 @@ pub struct ProgramOptions {
     pub outputs: Option<Vec<u32>>,
     /// Fields of numbers: a world for which one of them is not 0 is left alone.
     pub unless: Vec<u32>,
+    /// Is the world of a thread found in a list? At binding 4 stand workgroups, 1, 1 and the worlds of the list, at binding 5 the list.
+    pub is_listed: bool,
 }
 
 impl ProgramOptions {
@@ -76,6 +78,7 @@ impl Default for ProgramOptions {
             inputs: None,
             outputs: None,
             unless: Vec::new(),
+            is_listed: false,
         }
     }
 }
@@ -153,14 +156,26 @@ impl Printer<'_> {
                 "@group(0) @binding(3) var<storage, read> indices: array<u32>;"
             )?;
         }
+        if options.is_listed {
+            writeln!(
+                self.text,
+                "@group(0) @binding(4) var<storage, read> left: array<u32>;\n\
+                 @group(0) @binding(5) var<storage, read> list: array<u32>;"
+            )?;
+        }
         writeln!(self.text, "\n@compute @workgroup_size(workgroup)")?;
         writeln!(
             self.text,
             "fn {}(@builtin(global_invocation_id) thread: vec3<u32>) {{",
             options.entry
         )?;
-        line!(self, "let world = thread.x;")?;
-        line!(self, "if (world >= worlds) {{ return; }}")?;
+        if options.is_listed {
+            line!(self, "if (thread.x >= left[3]) {{ return; }}")?;
+            line!(self, "let world = list[thread.x];")?;
+        } else {
+            line!(self, "let world = thread.x;")?;
+            line!(self, "if (world >= worlds) {{ return; }}")?;
+        }
         for field in &options.unless {
             let (quad, part) = place_of_field(*field);
             line!(

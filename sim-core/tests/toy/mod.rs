@@ -95,6 +95,7 @@ pub fn in_kernels(recording: &Recording, most: usize) -> Split {
     let limits = Limits {
         kernel: most,
         repeated: most,
+        dispatch: 0,
     };
     let split = split(recording, &ProgramOptions::default(), limits, spare);
     for kernel in &split.kernels {

@@ -242,6 +242,7 @@ impl Vulkan {
 fn describe(bytes: u64) -> vk::BufferCreateInfo<'static> {
     vk::BufferCreateInfo::default().size(bytes).usage(
         vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::INDIRECT_BUFFER
             | vk::BufferUsageFlags::TRANSFER_SRC
             | vk::BufferUsageFlags::TRANSFER_DST,
     )

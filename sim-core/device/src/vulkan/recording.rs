@@ -1,7 +1,7 @@
 //! Commands recorded once, as a secondary command buffer that runs as often as one likes.
 
 use super::{Api, Failure, Vulkan};
-use crate::batch::Command;
+use crate::batch::{Command, Groups};
 use ash::vk;
 
 /// A recorded batch.
@@ -48,9 +48,7 @@ impl Vulkan {
                 barrier(device, made.commands, false);
                 match command {
                     Command::Dispatch {
-                        program,
-                        workgroups,
-                        ..
+                        program, groups, ..
                     } => {
                         let pipeline = program.pipeline();
                         let compute = vk::PipelineBindPoint::COMPUTE;
@@ -64,7 +62,15 @@ impl Vulkan {
                             &set,
                             &[],
                         );
-                        device.cmd_dispatch(made.commands, *workgroups, 1, 1);
+                        match groups {
+                            Groups::Given(groups) => {
+                                device.cmd_dispatch(made.commands, *groups, 1, 1);
+                            }
+                            Groups::Found { buffer, at } => {
+                                let buffer = buffer.raw().0;
+                                device.cmd_dispatch_indirect(made.commands, buffer, *at);
+                            }
+                        }
                     }
                     Command::Copy {
                         from,
@@ -179,7 +185,11 @@ unsafe fn barrier(device: &ash::Device, commands: vk::CommandBuffer, host: bool)
     let (to, reads) = if host {
         (work | Stage::HOST, used | Access::HOST_READ)
     } else {
-        (work, used)
+        // numbers of workgroups, too, may have been written by a program
+        (
+            work | Stage::DRAW_INDIRECT,
+            used | Access::INDIRECT_COMMAND_READ,
+        )
     };
     let memory = [vk::MemoryBarrier::default()
         .src_access_mask(written)

@@ -41,7 +41,7 @@ fn an_adapter_that_is_not_there_is_refused_with_those_that_are() {
 fn commands_that_cannot_be_are_refused_by_name() {
     type Ask =
         fn(&mut BatchBuilder, &sim_device::Program, &sim_device::Buffer, &sim_device::Buffer);
-    let cases: [(Ask, &str); 13] = [
+    let cases: [(Ask, &str); 16] = [
         (|c, p, a, _| c.dispatch(p, &[(0, a, 0..64)], 1), "binding 3"),
         (
             |c, p, a, b| c.dispatch(p, &[(0, a, 0..64), (3, b, 0..64), (3, b, 0..64)], 1),
@@ -74,6 +74,18 @@ fn commands_that_cannot_be_are_refused_by_name() {
         (
             |c, p, a, _| c.dispatch(p, &[(0, a, 0..64), (3, a, 0..64)], 1),
             "read-only",
+        ),
+        (
+            |c, p, a, b| c.dispatch_found(p, &[(0, a, 0..64), (3, b, 0..64)], a, 56),
+            "at 56 of 64",
+        ),
+        (
+            |c, p, a, b| c.dispatch_found(p, &[(0, a, 0..64), (3, b, 0..64)], a, 2),
+            "at 2 of 64",
+        ),
+        (
+            |c, p, a, b| c.dispatch_found(p, &[(0, a, 0..64), (3, b, 0..64)], b, 0),
+            "it writes `b`",
         ),
         (|c, _, a, b| c.copy(a, 0, b, 32, 36), "36 bytes at 32"),
         (|c, _, a, b| c.copy(a, u64::MAX - 3, b, 0, 8), "`a`"),

@@ -190,3 +190,43 @@ fn threads_run_batches_of_one_device_at_the_same_time() {
         });
     }
 }
+
+#[test]
+fn as_many_workgroups_run_as_a_program_has_found() {
+    let find = Source {
+        label: "find".to_owned(),
+        wgsl: "
+            @group(0) @binding(0) var<storage, read_write> groups: array<u32>;
+            @compute @workgroup_size(1) fn main() {
+                groups[1] = groups[4];
+                groups[2] = 1u;
+                groups[3] = 1u;
+            }"
+        .to_owned(),
+        entry: "main".to_owned(),
+        constants: Vec::new(),
+    };
+    for (device, replay) in ways() {
+        let (find, add) = (
+            program(&device, find.clone()),
+            program(&device, scale_add(1.0, 96)),
+        );
+        let wish = device.staging("groups", 20).unwrap();
+        let (one, sum) = (staged(&device, &[1.0; 96]), staged(&device, &[0.0; 96]));
+        let groups = device.buffer("found", 20).unwrap();
+        let mut batch = device.batch(replay);
+        batch.copy(&wish, 0, &groups, 0, 20);
+        batch.dispatch(&find, &[(0, &groups, 0..20)], 1);
+        batch.dispatch_found(&add, &[(0, &one, 0..384), (3, &sum, 0..384)], &groups, 4);
+        let batch = batch.finish().unwrap();
+        let mut wanted = [0.0; 96];
+        for count in [2u32, 0, 1, 3] {
+            wish.write()[16..20].copy_from_slice(&count.to_le_bytes());
+            device.run(&[&batch]).unwrap();
+            wanted[..32 * count as usize]
+                .iter_mut()
+                .for_each(|x| *x += 1.0);
+            assert_eq!(numbers(&sum), wanted, "{replay:?}");
+        }
+    }
+}

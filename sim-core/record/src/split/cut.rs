@@ -12,7 +12,12 @@ use crate::tree::{Op, Operand, Rounds, Row, Statement, Unary};
 pub(super) struct Frame {
     /// The loop's index and where it starts; none for a block.
     pub index: Option<(u32, usize)>,
+    /// How often it runs, at most.
+    pub rounds: usize,
 }
+
+/// Fields of a frame: is a world out of it, and in which round. Those of the first frame come first.
+pub(super) const FRAME: u32 = 4;
 
 /// What a piece does, in order.
 #[derive(Clone, Debug)]
@@ -41,10 +46,11 @@ pub(super) struct Pieces {
     pub order: Vec<Part>,
 }
 
-pub(super) fn pieces(recording: &Recording, limits: Limits) -> Pieces {
+pub(super) fn pieces(recording: &Recording, limits: Limits, spare: u32) -> Pieces {
     let mut cutter = Cutter {
         recording,
         limits,
+        spare,
         frames: Vec::new(),
         runs: Vec::new(),
     };
@@ -62,7 +68,9 @@ pub(super) fn pieces(recording: &Recording, limits: Limits) -> Pieces {
     let mut pieces_of_run = Vec::new();
     for (k, run) in runs.iter().enumerate() {
         let from = pieces.len();
-        for range in flow.cut(k, limits.kernel) {
+        let repeats = run.frames.iter().any(|frame| frames[*frame].rounds > 1);
+        let price = if repeats { limits.dispatch } else { 0 };
+        for range in flow.cut(k, limits.kernel, price) {
             pieces.push(Piece {
                 items: run.items[range].to_vec(),
                 frames: run.frames.clone(),
@@ -81,9 +89,10 @@ pub(super) fn pieces(recording: &Recording, limits: Limits) -> Pieces {
 fn expanded(order: &[Part], pieces: &[std::ops::Range<usize>]) -> Vec<Part> {
     let part = |part: &Part| match part {
         Part::Kernel(run) => pieces[*run].clone().map(Part::Kernel).collect(),
-        Part::Repeat { rounds, parts } => vec![Part::Repeat {
+        Part::Repeat { rounds, parts, out } => vec![Part::Repeat {
             rounds: *rounds,
             parts: expanded(parts, pieces),
+            out: *out,
         }],
     };
     order.iter().flat_map(part).collect()
@@ -92,6 +101,7 @@ fn expanded(order: &[Part], pieces: &[std::ops::Range<usize>]) -> Vec<Part> {
 struct Cutter<'a> {
     recording: &'a Recording,
     limits: Limits,
+    spare: u32,
     frames: Vec<Frame>,
     /// Statements between cuts that have to be.
     runs: Vec<Piece>,
@@ -105,13 +115,16 @@ impl Cutter<'_> {
             frames: around.to_vec(),
         };
         let mut run = empty();
-        for statement in body {
-            let (frame, rounds, mask, inside) = match statement {
+        for (k, statement) in body.iter().enumerate() {
+            let (index, rounds, mask, inside) = match statement {
                 // only the innermost frame can be a loop here: a text stops a loop at the level of its body
                 Statement::Stop(mask) => {
                     let frame = *around.last().expect("a loop is left inside a loop");
                     run.items.push(Item::Leave(frame, *mask));
-                    self.end_run(&mut run, order);
+                    // behind it a world is out, but for the count of its rounds
+                    if k + 1 < body.len() {
+                        self.end_run(&mut run, order);
+                    }
                     continue;
                 }
                 Statement::Loop {
@@ -124,10 +137,10 @@ impl Cutter<'_> {
                     body,
                 } if self.is_cut(statement, end.saturating_sub(*first)) => {
                     let index = Some((*index, *first));
-                    (Frame { index }, end.saturating_sub(*first), None, body)
+                    (index, end.saturating_sub(*first), None, body)
                 }
                 Statement::When { mask, body } if self.is_cut(statement, 1) => {
-                    (Frame { index: None }, 1, Some(*mask), body)
+                    (None, 1, Some(*mask), body)
                 }
                 _ => {
                     run.items.push(Item::Run(statement.clone()));
@@ -135,7 +148,7 @@ impl Cutter<'_> {
                 }
             };
             let number = self.frames.len();
-            self.frames.push(frame);
+            self.frames.push(Frame { index, rounds });
             run.items.push(Item::Enter(number, mask));
             self.end_run(&mut run, order);
             let around: Vec<usize> = around.iter().copied().chain([number]).collect();
@@ -147,7 +160,8 @@ impl Cutter<'_> {
             if !last.items.is_empty() {
                 self.end_run(&mut last, &mut parts);
             }
-            order.push(Part::Repeat { rounds, parts });
+            let out = Some(self.spare + number as u32 * FRAME);
+            order.push(Part::Repeat { rounds, parts, out });
         }
         run
     }

@@ -145,8 +145,8 @@ impl<'a> Flow<'a> {
         }
     }
 
-    /// The cheapest cuts of a run into pieces of at most `most`.
-    pub(super) fn cut(&self, run: usize, most: usize) -> Vec<Range<usize>> {
+    /// The cheapest cuts of a run into pieces of at most `most`, each of which costs `price` beside its statements.
+    pub(super) fn cut(&self, run: usize, most: usize, price: usize) -> Vec<Range<usize>> {
         let (first, run) = (self.first[run], &self.runs[run]);
         let n = run.items.len();
         if n == 0 {
@@ -193,7 +193,7 @@ impl<'a> Flow<'a> {
                     break;
                 }
                 let size = cost::KERNEL + (given + left).total();
-                let cost = cheapest[i].0.saturating_add(size);
+                let cost = cheapest[i].0.saturating_add(size + price);
                 if (size <= most || j == i) && cost < cheapest[j + 1].0 {
                     cheapest[j + 1] = (cost, i);
                 }

@@ -1,17 +1,15 @@
 //! Kernels from pieces: what each is given, what it keeps for others, and in which fields.
 
 use super::Kernel;
-use super::cut::{Item, Piece, Pieces, bases, is_computed_again, uses_of};
+use super::cut::{FRAME, Item, Piece, Pieces, bases, is_computed_again, uses_of};
 use super::lasting::{Names, lasting};
+use super::private::private;
 use super::uses::{Use, computed, of_op};
 use super::write::Writer;
 use crate::Recording;
 use crate::tree::{Op, Operand, Statement};
 use crate::wgsl::ProgramOptions;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
-
-/// Fields of a frame: is a world out of it, and in which round.
-const FRAME: u32 = 4;
 
 /// What a piece is given and what it changes.
 #[derive(Default)]
@@ -25,6 +23,8 @@ pub(super) struct Needs {
     pub assigned: HashSet<u32>,
     pub made: HashSet<u32>,
     counts: bool,
+    /// Variables that start anew, whatever they held.
+    private: BTreeSet<u32>,
 }
 
 impl Needs {
@@ -107,7 +107,8 @@ impl<'a> Plan<'a> {
         plan.needs = pieces
             .pieces
             .iter()
-            .map(|piece| plan.needs_of(piece))
+            .zip(private(&pieces.pieces, &recording.values))
+            .map(|(piece, private)| plan.needs_of(piece, private))
             .collect();
         plan.place_outputs(outputs);
         let names: Vec<Names> = plan.needs.iter().map(Needs::names).collect();
@@ -115,7 +116,7 @@ impl<'a> Plan<'a> {
         plan
     }
 
-    fn needs_of(&self, piece: &Piece) -> Needs {
+    fn needs_of(&self, piece: &Piece, private: BTreeSet<u32>) -> Needs {
         let values = &self.recording.values;
         let mut needs = Needs::default();
         let mut met: HashSet<u32> = HashSet::new();
@@ -152,6 +153,9 @@ impl<'a> Plan<'a> {
                 Use::Index(name) => needs.counts |= self.indices.contains_key(&name),
             });
         }
+        needs.loaded = &needs.loaded - &private;
+        needs.changed = &needs.changed - &private;
+        needs.private = private;
         needs
     }
 
@@ -290,7 +294,8 @@ impl<'a> Plan<'a> {
     fn kernel(&self, p: usize, options: &ProgramOptions) -> Kernel {
         let (piece, needs) = (&self.pieces.pieces[p], &self.needs[p]);
         let mut inputs = Vec::new();
-        let mut given: HashMap<u32, u32> = HashMap::new();
+        // in order: equal recordings have equal texts, by which they are kept
+        let mut given: BTreeMap<u32, u32> = BTreeMap::new();
         for x in &needs.values {
             given.insert(*x, inputs.len() as u32);
             inputs.push(match self.inputs.get(*x as usize) {
@@ -329,6 +334,10 @@ impl<'a> Plan<'a> {
                 false => Statement::Var { name, value },
             });
         }
+        for name in &needs.private {
+            let value = Operand::number(0.0);
+            writer.body.push(Statement::Var { name: *name, value });
+        }
         let (results, fields): (Vec<Operand>, Vec<u32>) = writer.run(p).into_iter().unzip();
         let recording = Recording {
             inputs: inputs.len(),
@@ -347,6 +356,10 @@ impl<'a> Plan<'a> {
             inputs: Some(inputs),
             outputs: Some(fields),
             unless: options.unless.iter().copied().chain(unless).collect(),
+            is_listed: piece
+                .frames
+                .iter()
+                .any(|frame| self.pieces.frames[*frame].rounds > 1),
             ..options.clone()
         };
         Kernel { recording, options }

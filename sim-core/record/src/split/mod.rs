@@ -10,8 +10,12 @@ mod cut;
 mod flow;
 mod kernel;
 mod lasting;
+mod private;
+mod tail;
 mod uses;
 mod write;
+
+pub(crate) use uses::Rename;
 
 use crate::Recording;
 use crate::wgsl::{ProgramOptions, wgsl};
@@ -35,9 +39,11 @@ pub struct Split {
 pub struct Limits {
     /// A kernel is cut where it costs more, if its statements allow it.
     pub kernel: usize,
-    /// A loop is cut inside where it costs more: each of its kernels is then dispatched in each of its rounds, whether a world is
-    /// left in the loop or not.
+    /// A loop is cut inside where it costs more: each of its kernels is then dispatched in each of its rounds, for a list of
+    /// the worlds that are left in the loop.
     pub repeated: usize,
+    /// What a kernel more is worth inside such a loop, where it is dispatched so often.
+    pub dispatch: usize,
 }
 
 /// One dispatch or several.
@@ -51,6 +57,8 @@ pub enum Part {
         rounds: usize,
         /// What is dispatched in a round.
         parts: Vec<Part>,
+        /// A field that is 0 in the worlds that are in the loop.
+        out: Option<u32>,
     },
 }
 
@@ -105,8 +113,9 @@ impl Kernel {
 /// As [`wgsl`] does.
 pub fn split(recording: &Recording, options: &ProgramOptions, limits: Limits, spare: u32) -> Split {
     let (inputs, outputs) = options.fields(recording);
-    let pieces = cut::pieces(recording, limits);
     let spare = spare.next_multiple_of(4);
+    let recording = &tail::with_stops_last(recording);
+    let pieces = cut::pieces(recording, limits, spare);
     let (mut kernels, used) = kernel::kernels(recording, options, &pieces, spare);
     // what ends a text need not do anything
     let mut numbers = Vec::new();
@@ -129,9 +138,10 @@ pub fn split(recording: &Recording, options: &ProgramOptions, limits: Limits, sp
 fn renumbered(order: &[Part], numbers: &[Option<usize>]) -> Vec<Part> {
     let part = |part: &Part| match part {
         Part::Kernel(k) => numbers[*k].map(Part::Kernel),
-        Part::Repeat { rounds, parts } => Some(Part::Repeat {
+        Part::Repeat { rounds, parts, out } => Some(Part::Repeat {
             rounds: *rounds,
             parts: renumbered(parts, numbers),
+            out: *out,
         }),
     };
     order.iter().filter_map(part).collect()
@@ -162,7 +172,7 @@ impl Split {
         for part in parts {
             match part {
                 Part::Kernel(k) => self.kernels[*k].run(fields, scratch, tables),
-                Part::Repeat { rounds, parts } => {
+                Part::Repeat { rounds, parts, .. } => {
                     for _ in 0..*rounds {
                         self.run(parts, fields, scratch, tables);
                     }

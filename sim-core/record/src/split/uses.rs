@@ -107,7 +107,7 @@ pub(super) fn computed(body: &[Statement], f: &mut impl FnMut(u32)) {
 }
 
 /// Writes statements again with other values and indices.
-pub(super) trait Rename {
+pub(crate) trait Rename {
     fn value(&mut self, number: u32) -> Operand;
     /// The value that stands for an index, if one does.
     fn index(&mut self, name: u32) -> Option<u32>;

@@ -1,6 +1,7 @@
 //! The recorder: what it refuses, what it folds, and that its programs are right.
 
 mod algebra;
+mod joined;
 mod kept;
 mod packed;
 mod programs;

@@ -1,5 +1,6 @@
 //! The programs of a run, compiled, and the tables of the model.
 
+use super::left::{self, Enlisting};
 use super::places::Places;
 use super::programs::{self, Programs};
 use super::show;
@@ -39,6 +40,8 @@ pub(super) struct Compiled {
     pub show: Program,
     pub counters: Program,
     pub contacts: Option<Program>,
+    /// What lists worlds that are left in a loop.
+    pub enlisting: Enlisting,
     pub numbers: Buffer,
     pub indices: Buffer,
     /// All of them, for people.
@@ -85,6 +88,8 @@ impl Compiled {
         let steps = sources.len()..sources.len() + programs.step.kernels.len();
         sources.extend(physics("step", &programs.step));
         sources.extend(physics("evaluate", &programs.evaluate));
+        let loops = left::loops([&programs.step.order, &programs.evaluate.order]);
+        sources.extend(left::sources(device, &loops, width));
         let has_contacts = books.contacts.is_some();
         sources.extend(
             books
@@ -115,6 +120,7 @@ impl Compiled {
             order: program.order.clone(),
         };
         let (step, evaluate) = (kernels(&programs.step), kernels(&programs.evaluate));
+        let enlisting = Enlisting::new(loops, &mut next);
         let contacts = has_contacts.then(&mut next);
         let tables = &m.contacts.tables;
         let numbers: Vec<u32> = tables.numbers.iter().map(|x| x.to_bits()).collect();
@@ -129,6 +135,7 @@ impl Compiled {
             show,
             counters,
             contacts,
+            enlisting,
             numbers: constant(device, "numbers", &numbers)?,
             indices: constant(device, "indices", &tables.indices)?,
             facts,
@@ -141,7 +148,7 @@ impl Compiled {
 fn rounds_of(kernel: usize, order: &[Part]) -> usize {
     let rounds = order.iter().map(|part| match part {
         Part::Kernel(k) => usize::from(*k == kernel),
-        Part::Repeat { rounds, parts } => rounds * rounds_of(kernel, parts),
+        Part::Repeat { rounds, parts, .. } => rounds * rounds_of(kernel, parts),
     });
     rounds.sum()
 }

@@ -7,6 +7,7 @@ mod compiled;
 mod frame;
 mod host;
 mod imported;
+mod left;
 mod places;
 mod programs;
 mod show;
@@ -40,15 +41,18 @@ use std::time::Duration;
 use tile::{Rows, Tile};
 
 /// What kernels may cost where software plays the GPU: every access to memory is a loop there, and its compiler's time grows with
-/// their square. A dispatch takes as long as a round of a solver, so loops stay whole.
+/// their square. The grasp's Newton loop takes one thread longer than all other kernels four; in three kernels it is compiled like
+/// these. What goes from one to the next costs about a tenth of a step, so they are few.
 const SOFTWARE: Limits = Limits {
     kernel: 16_000,
-    repeated: usize::MAX,
+    repeated: 20_000,
+    dispatch: 4_000,
 };
 /// The same of hardware: few kernels, so that numbers stay in registers. A guess, with others that ARCHITECTURE.md lists.
 const HARDWARE: Limits = Limits {
     kernel: 40_000,
     repeated: usize::MAX,
+    dispatch: 0,
 };
 
 pub(super) struct Gpu {

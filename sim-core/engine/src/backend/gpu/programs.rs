@@ -70,6 +70,7 @@ impl Programs {
             step.order = vec![Part::Repeat {
                 rounds: outside,
                 parts: step.order,
+                out: None,
             }];
         }
         let (recording, options) = evaluation(m, places, &needed(shown), computed, wanted)?;

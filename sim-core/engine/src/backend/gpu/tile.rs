@@ -1,6 +1,7 @@
 //! Worlds that lie in one set of buffers, and the batches that move them.
 
 use super::compiled::{Compiled, Kernels, PHYSICS, constant};
+use super::left::Left;
 use super::places::Places;
 use super::show::Run;
 use super::upkeep::WORKGROUP;
@@ -105,6 +106,8 @@ pub(super) struct Tile {
     bounds: Staging,
     runs: Buffer,
     pairs: Buffer,
+    /// Worlds that are left in a loop.
+    left: Option<Left>,
     /// State and counters, for the host.
     kept: Staging,
 }
@@ -194,6 +197,7 @@ impl Tile {
             bounds: device.staging("bounds", 16)?,
             runs,
             pairs,
+            left: compiled.enlisting.room(device, width)?,
             kept,
         })
     }
@@ -208,7 +212,13 @@ impl Tile {
     ) -> Result<(), BackendError> {
         let mut step = device.batch(compiled.replay);
         self.book(&mut step, &compiled.begin);
-        self.physics(&mut step, &compiled.step, &compiled.step.order, compiled);
+        self.physics(
+            &mut step,
+            &compiled.step,
+            &compiled.step.order,
+            compiled,
+            None,
+        );
         self.book(&mut step, &compiled.note);
         self.evaluate(&mut step, compiled);
         self.book(&mut step, &compiled.left_out);
@@ -228,7 +238,7 @@ impl Tile {
 
     fn evaluate(&self, batch: &mut BatchBuilder, compiled: &Compiled) {
         let evaluate = &compiled.evaluate;
-        self.physics(batch, evaluate, &evaluate.order, compiled);
+        self.physics(batch, evaluate, &evaluate.order, compiled, None);
     }
 
     fn physics(
@@ -237,22 +247,47 @@ impl Tile {
         program: &Kernels,
         order: &[Part],
         compiled: &Compiled,
+        round: Option<usize>,
     ) {
-        let buffers = [
+        let mut buffers = vec![
             (0, &self.fields, 0..self.fields.bytes()),
             (1, &self.scratch, 0..self.scratch.bytes()),
             (2, &compiled.numbers, 0..compiled.numbers.bytes()),
             (3, &compiled.indices, 0..compiled.indices.bytes()),
         ];
+        let left = self.left.as_ref();
+        let groups = self.width.div_ceil(PHYSICS);
         for part in order {
-            match part {
-                Part::Kernel(k) => {
-                    let groups = self.width.div_ceil(PHYSICS);
+            match (part, round.zip(left)) {
+                (Part::Kernel(k), None) => {
                     batch.dispatch(&program.kernels[*k], &buffers, groups);
                 }
-                Part::Repeat { rounds, parts } => {
+                (Part::Kernel(k), Some((round, left))) => {
+                    buffers.truncate(4);
+                    buffers.extend(left.seen(round));
+                    let (found, at) = left.groups(round);
+                    batch.dispatch_found(&program.kernels[*k], &buffers, found, at);
+                }
+                (
+                    Part::Repeat {
+                        rounds: rounds @ 2..,
+                        parts,
+                        out: Some(out),
+                    },
+                    None,
+                ) => {
+                    let left = left.expect("a list for every loop");
+                    left.begin(batch, &compiled.enlisting, *out, &self.fields, groups);
+                    for round in 0..*rounds {
+                        self.physics(batch, program, parts, compiled, Some(round));
+                        if round + 1 < *rounds {
+                            left.go_on(batch, &compiled.enlisting, *out, &self.fields, round);
+                        }
+                    }
+                }
+                (Part::Repeat { rounds, parts, .. }, _) => {
                     for _ in 0..*rounds {
-                        self.physics(batch, program, parts, compiled);
+                        self.physics(batch, program, parts, compiled, round);
                     }
                 }
             }
