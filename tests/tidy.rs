@@ -54,9 +54,10 @@ const DOORS: [(&str, &str); 20] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-const UNSAFE: [&str; 22] = [
+const UNSAFE: [&str; 23] = [
     "py-client/src/frame.rs",                      // NumPy views
     "sim-core/device/src/device.rs",               // imports pages of the host
+    "sim-core/device/src/leave.rs",                // an end of the process beside the driver's
     "sim-core/device/src/portable.rs",             // programs without checks at run time
     "sim-core/device/src/vulkan/memory.rs",        // the driver's memory, and the host's
     "sim-core/device/src/vulkan/mod.rs",           // the driver's handles

@@ -4,6 +4,7 @@
 //! Where it finds MuJoCo's runs not met, bits that depend on the number of worlds, or a device that is lost, it shows no
 //! numbers and ends with 1.
 
+mod apart;
 mod checks;
 #[path = "../../tests/common/mod.rs"]
 mod common;
@@ -63,6 +64,9 @@ struct Arguments {
     /// What else the head of the file says, as `name: value`.
     #[arg(long)]
     fact: Vec<String>,
+    /// Only builds the first scene, with its programs in this folder, and tells how long it took [s]: what `apart` runs.
+    #[arg(long, hide = true)]
+    build_in: Option<PathBuf>,
 }
 
 /// Where worlds are kept: an adapter, with a folder for its programs.
@@ -89,6 +93,9 @@ pub fn options(place: &Place, worlds: usize, fields: &[Field]) -> Options {
 fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
     let info = chosen(arguments.adapter.as_deref())?;
+    if let Some(folder) = &arguments.build_in {
+        return apart::tell(&arguments, &info, folder);
+    }
     let cache = std::env::temp_dir().join(format!("gpu-bench-{}", std::process::id()));
     let place = Place {
         adapter: Adapter::Index(info.index),
@@ -103,14 +110,12 @@ fn main() -> anyhow::Result<()> {
 fn run(arguments: &Arguments, info: &AdapterInfo, place: Place) -> anyhow::Result<()> {
     let mut report = Report::new(info, &arguments.fact);
     checks::check(&place, &arguments.scenes)?;
-    // programs that the checks have kept are not cold
-    std::fs::remove_dir_all(&place.cache).context("the folder of programs")?;
     report.head();
     for &scene in &arguments.scenes {
         let plan = Plan::new(scene);
         let mut replay = Some(replay(&place, &plan, arguments)?);
         for &worlds in &arguments.worlds {
-            let row = measure(arguments, &place, &plan, worlds)?;
+            let row = measure(arguments, info, &place, &plan, worlds)?;
             // it is the scene's, and stands in its first row
             report.add(Row {
                 replay: replay.take(),
@@ -169,10 +174,12 @@ fn replay(place: &Place, plan: &Plan, arguments: &Arguments) -> anyhow::Result<[
 /// All about a scene with so many worlds, but for its replay.
 fn measure(
     arguments: &Arguments,
+    info: &AdapterInfo,
     place: &Place,
     plan: &Plan,
     worlds: usize,
 ) -> anyhow::Result<Row> {
+    let [cold_s, cached_s] = apart::build_twice(info, plan.scene, worlds)?;
     let wanted = Duration::from_secs_f64(arguments.seconds);
     let crowd = Crowd::all(worlds);
     let options = options(place, worlds, &FIELDS);
@@ -180,7 +187,7 @@ fn measure(
     // before the worlds, so that the pages are there until those are gone
     let mut pages = Pages::new(words)?;
     let mut heap = vec![0; words];
-    let (mut sim, cold_s) = build(plan, &options)?;
+    let (mut sim, _) = build(plan, &options)?;
     let staged = Frames::measure(&mut sim, plan, &crowd, &mut heap, wanted)?;
     // SAFETY: the pages go after the worlds, and no one else has them.
     let imports = !arguments.no_import && unsafe { sim.import(pages.words()) };
@@ -188,8 +195,6 @@ fn measure(
         .then(|| Frames::measure(&mut sim, plan, &crowd, pages.words(), wanted))
         .transpose()?;
     let programs = sim.programs().to_vec();
-    drop(sim);
-    let (sim, cached_s) = build(plan, &options)?;
     drop(sim);
     let cpu = match arguments.no_cpu {
         true => None,

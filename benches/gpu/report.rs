@@ -14,7 +14,7 @@ pub struct Row {
     pub dofs: usize,
     pub substeps: usize,
     pub programs: Vec<ProgramFacts>,
-    /// Until worlds have made their first frame, without and with programs kept by a run before [s].
+    /// Until worlds have made their first frame, in a process that finds nothing kept, and in one after it [s].
     pub cold_s: f64,
     pub cached_s: f64,
     /// Frames that the host copies, and that the device writes to their reader.
@@ -181,7 +181,8 @@ impl Report {
     /// What to know of the columns.
     pub fn notes(&self) {
         println!(
-            "\ncold, cached: until the first frame is there, without and with programs kept in the folder of a run before.\n\
+            "\ncold: until the first frame is there, in a process of its own for which neither we nor the driver have kept anything;\n\
+             cached: in a process after it. Drivers that keep what they compile elsewhere than Mesa's and NVIDIA's are not cold.\n\
              steps/s: physics steps of all worlds in the median frame, commands to arrays; `staged ms`: the median frame where the host copies it.\n\
              submit: processor time of the thread that asks for a frame; `replay`: the same for 64 worlds with batches encoded each time, over that with recorded ones.\n\
              CPU: the same worlds, commands and fields on all cores of this machine, f32 as well; ratio: the GPU's steps/s over the CPU's."

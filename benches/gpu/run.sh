@@ -4,8 +4,8 @@
 #   benches/gpu/run.sh [--adapter NAME] [--worlds 1024,4096] [--scenes grasp] [--seconds 2] [--csv FILE] [--no-import]
 #
 # In a checkout it builds the bench. Elsewhere it takes the binary `gpu_bench` that lies beside it, so these two files are all
-# that another machine needs, besides a Vulkan driver. Drivers keep what they have compiled: here in a folder that is empty at
-# first and goes at the end, so that what is called cold is cold.
+# that another machine needs, besides a Vulkan driver. Drivers keep what they have compiled: here in a folder that goes at the end.
+# What is called cold is built in processes with empty folders of their own (apart.rs).
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 if [ -x "$here/gpu_bench" ]; then

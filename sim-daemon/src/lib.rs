@@ -9,6 +9,7 @@ mod devices;
 mod error;
 mod export;
 mod faults;
+mod groups;
 mod inspect;
 pub mod look;
 mod news;
@@ -23,6 +24,10 @@ use std::ffi::OsString;
 pub use error::DaemonError;
 
 /// Runs the command line `args` (the program's name first) and returns its exit code: 0 done, 1 failed, 2 misused.
+///
+/// Where a driver was given up and compiles yet, it ends the process with that code itself.
 pub fn serve(args: impl IntoIterator<Item = OsString>) -> i32 {
-    cli::run(args)
+    let code = cli::run(args);
+    sim_engine::options::leave(code);
+    code
 }

@@ -53,7 +53,7 @@ fn serve(
                 };
                 // its file may be gone when the recording is replayed
                 if host.is_recorded() && applied.is_ok() && host.inbox().op() == Op::Restore {
-                    host.record_state(&simulation.snapshot(), true);
+                    record_state(simulation, host, true);
                 }
                 if let (Ok(_), Some(refusal)) = (&applied, lost(simulation)) {
                     applied = Err(refusal);
@@ -70,13 +70,6 @@ fn serve(
                     }
                     Err(refusal) => host.refuse(refusal.kind, &refusal.reason),
                 }
-                // the client has its frame, and need not wait for it
-                if !is_told && let Some(lost) = simulation.lost() {
-                    news.tell(&format!(
-                        "all worlds are lost, and commands are refused from now on: {lost}"
-                    ));
-                    is_told = true;
-                }
                 faults.tell(simulation, news, started);
             }
             Next::Watch => {
@@ -91,9 +84,25 @@ fn serve(
                 host.show(&mut scratch, &mut shown);
                 faults.tell(simulation, news, Instant::now());
             }
-            Next::Record => host.record_state(&simulation.snapshot(), false),
+            Next::Record => record_state(simulation, host, false),
             Next::End => return Ok(()),
         }
+        // whoever waited has a frame, and need not wait for this
+        if !is_told && let Some(lost) = simulation.lost() {
+            news.tell(&format!(
+                "all worlds are lost, and commands are refused from now on: {lost}"
+            ));
+            host.end_records(&format!("all worlds are lost: {lost}"));
+            is_told = true;
+        }
+    }
+}
+
+/// Gives recorders the state of all worlds, as long as there is one: `all` of them, or those who wait for it.
+fn record_state(simulation: &Simulation, host: &mut Host, all: bool) {
+    let state = simulation.snapshot();
+    if simulation.lost().is_none() {
+        host.record_state(&state, all);
     }
 }
 
@@ -108,7 +117,7 @@ struct Shown<'a> {
 }
 
 impl Worlds for Shown<'_> {
-    fn frame(&mut self, arena: &mut [u64]) {
+    fn frame(&mut self, arena: &mut [u64]) -> bool {
         if self.is_leased {
             // SAFETY: the frames of a lease stay where they are as long as it lasts, and their heads are written before and
             // after.
@@ -118,6 +127,7 @@ impl Worlds for Shown<'_> {
             Advance::Step => self.simulation.step(arena),
             Advance::Forward => self.simulation.forward(arena),
         }
+        self.simulation.lost().is_none()
     }
 
     fn state(&mut self, to: &mut [u8]) {

@@ -1,11 +1,12 @@
-//! A device that is lost, and one whose memory does not hold the worlds.
+//! A device that is lost, one whose memory does not hold the worlds, one that does not start; and what `auto` does then.
 
-use crate::common::{Demo, command, lesson, lesson_with_table};
-use crate::{gpu, options, run};
+use crate::common::{Demo, Run, command, lesson, lesson_with_table};
+use crate::{assert_alive, gpu, options, run};
 use sim_core::batch::{Field, status};
 use sim_engine::backend::BackendError;
-use sim_engine::options::adapters;
-use sim_engine::simulation::{Options, Precision, Simulation};
+use sim_engine::options::{AUTO_WORLDS, AdapterKind, adapters, lose_after};
+use sim_engine::simulation::{Device, Options, Precision, Simulation};
+use std::time::Duration;
 
 #[test]
 fn after_a_device_is_lost_every_frame_says_so_and_nothing_panics() {
@@ -83,4 +84,108 @@ fn double_precision_is_refused() {
         Simulation::new(model, &wanted).err(),
         Some(BackendError::DoubleOnGpu)
     );
+}
+
+#[test]
+fn a_device_that_is_lost_at_any_point_of_the_start_is_an_error() {
+    let model = lesson(Demo::Target).compile().unwrap();
+    let mut lost = 0;
+    loop {
+        lose_after(lost);
+        match Simulation::new(model.clone(), &options(gpu(), 3, &[Field::JointQ])).err() {
+            Some(BackendError::Device { reason }) => {
+                assert!(reason.contains("device lost"), "{reason}")
+            }
+            Some(other) => panic!("after {lost} runs: {other}"),
+            None => break,
+        }
+        lost += 1;
+    }
+    assert!(lost >= 5, "a start has more than {lost} runs");
+}
+
+#[test]
+fn a_driver_that_takes_too_long_is_named_with_the_cures() {
+    let model = lesson(Demo::Target).compile().unwrap();
+    let wanted = Options {
+        compile_limit: Duration::from_micros(1),
+        ..options(gpu(), 1, &[Field::JointQ])
+    };
+    let failure = Simulation::new(model, &wanted).err().unwrap().to_string();
+    for word in [
+        "did not compile within 1µs",
+        "cpu",
+        "TIGHTLOOP_COMPILE_LIMIT",
+    ] {
+        assert!(failure.contains(word), "{word}: {failure}");
+    }
+}
+
+/// What is wanted of a device that is left open, if software may play it.
+fn auto(software: bool, fields: &[Field]) -> Options {
+    let device = Device::Auto {
+        cache: None,
+        software,
+    };
+    options(device, AUTO_WORLDS, fields)
+}
+
+#[test]
+fn auto_falls_back_to_the_processor_where_the_gpu_does_not_start_and_says_why() {
+    let model = lesson(Demo::Target).compile().unwrap();
+    let few = [Field::JointQ];
+    let too_slow = Options {
+        compile_limit: Duration::from_micros(1),
+        ..auto(true, &few)
+    };
+    let one = Simulation::layout_of(&model, &options(gpu(), 64, Field::ALL)).bytes / 64;
+    let too_large = Options {
+        worlds: adapters()[0].binding_max as usize / one + 64,
+        ..auto(true, Field::ALL)
+    };
+    let cases = [
+        (too_slow, u64::MAX, "did not compile within"),
+        (too_large, u64::MAX, "fewer worlds or fields"),
+        (auto(true, &few), 0, "device lost"),
+        (auto(true, &few), 3, "device lost"),
+    ];
+    for (wanted, runs, why) in cases {
+        lose_after(runs);
+        let mut here = Run::new(&model, wanted.clone());
+        lose_after(u64::MAX);
+        let note = here.sim.device_note().expect("auto tells").to_owned();
+        let name = &adapters()[0].name;
+        let begin = format!("the processor: `{name}` failed: ");
+        assert!(note.starts_with(&begin) && note.contains(why), "{note}");
+        assert!(here.sim.device().starts_with("cpu"));
+        let mut there = Run::new(
+            &model,
+            Options {
+                device: Device::Cpu,
+                ..wanted
+            },
+        );
+        for run in [&mut here, &mut there] {
+            run.step();
+        }
+        assert!(here.arena == there.arena, "{why}");
+    }
+}
+
+#[test]
+fn auto_takes_a_gpu_that_starts_and_software_only_where_it_may() {
+    let model = lesson(Demo::Target).compile().unwrap();
+    let mut run = Run::new(&model, auto(true, &[Field::JointQ]));
+    assert!(run.sim.device().starts_with("gpu"));
+    let note = run.sim.device_note().expect("auto tells").to_owned();
+    assert!(note.starts_with("the GPU `"), "{note}");
+    run.step();
+    assert_alive(&run);
+    let is_software = |info: &sim_engine::options::AdapterInfo| info.kind == AdapterKind::Software;
+    if adapters().iter().all(is_software) {
+        let run = Run::new(&model, auto(false, &[Field::JointQ]));
+        assert!(run.sim.device().starts_with("cpu"));
+        let note = run.sim.device_note().expect("auto tells");
+        assert!(note.contains("no GPU was found"), "{note}");
+    }
 }

@@ -5,11 +5,12 @@ mod books;
 #[path = "../common/mod.rs"]
 mod common;
 mod delivery;
+#[path = "../../sim-core/device/tests/device/layer.rs"]
+mod layer;
 mod lost;
 mod programs;
 mod same_bits;
 mod stages;
-mod validation;
 
 use sim_core::batch::Field;
 use sim_core::model::Model;
@@ -39,8 +40,11 @@ fn run(model: &Arc<Model>, device: Device, worlds: usize, fields: &[Field]) -> c
     common::Run::new(model, options(device, worlds, fields))
 }
 
-/// Nothing went wrong on the device.
+/// Nothing went wrong on the device, and on a GPU Vulkan's validation layer would have told.
 #[track_caller]
 fn assert_alive(run: &common::Run) {
+    if run.sim.device().starts_with("gpu") {
+        layer::assert_watched();
+    }
     assert!(run.sim.lost().is_none(), "{:?}", run.sim.lost());
 }

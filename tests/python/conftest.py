@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from vulkan_layer import Layer
 
 import tightloop as tl
 from tightloop.env import VectorEnv
@@ -50,6 +51,24 @@ def root() -> Iterator[Path]:
     left = sorted(path.name for path in folder.iterdir())
     shutil.rmtree(folder)
     assert not left, f"the tests left {left} behind"
+
+
+@pytest.fixture(scope="session")
+def layer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Layer]:
+    """Vulkan's validation layer, over all daemons of this run."""
+    layer = Layer(tmp_path_factory.mktemp("layer"))
+    yield layer
+    said = layer.words()
+    layer.close()
+    assert not said, said
+
+
+@pytest.fixture(autouse=True)
+def validated(layer: Layer) -> Iterator[None]:
+    """Vulkan's validation layer has nothing to say about the test."""
+    yield
+    said = layer.words()
+    assert not said, said
 
 
 @pytest.fixture

@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 import tightloop as tl
 
+URDF = Path(__file__).parents[2] / "examples/assets/fr3/fr3_franka_hand.urdf"
 # What the loader of Vulkan calls it now, and did before
 NO_DRIVER = {"VK_DRIVER_FILES": "/nonexistent", "VK_ICD_FILENAMES": "/nonexistent"}
 
@@ -26,17 +29,47 @@ def no_driver(monkeypatch):
 def serve(pendulum, tmp_path, unique):
     """Runs `tightloop serve` on a GPU until it fails."""
 
-    def run(*arguments):
-        file = tmp_path / "pendulum.toml"
-        pendulum.save(file)
+    def run(*arguments, scene=pendulum):
+        file = tmp_path / "scene.toml"
+        scene.save(file)
         command = [sys.executable, "-m", "tightloop", "serve", str(file), "--device=gpu", f"--name={unique()}"]
         return subprocess.run([*command, *arguments], capture_output=True, text=True, timeout=120, check=False)
 
     return run
 
 
+@pytest.fixture
+def grasp():
+    """An arm at a cube on a table, whose programs take a driver seconds."""
+    scene = tl.Scene(dt=1 / 480, substeps=8)
+    scene.add_urdf(URDF, name="arm").joint_q = [0.0, 0.0, 0.0, -2.4, 0.0, 2.4, 0.8, 0.04, 0.04]
+    scene.add_table(mu=0.8)
+    scene.add_cube()
+    return scene
+
+
+@pytest.fixture
+def cold(monkeypatch, tmp_path):
+    """Nothing is kept of earlier runs, by us or by the driver."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
 def last_line(done):
     return done.stderr.strip().splitlines()[-1]
+
+
+def test_the_validation_layer_watches_daemons_and_its_words_are_heard(pendulum, layer):
+    with tl.launch(pendulum, worlds=1, device="gpu") as sim:
+        assert "khronos_validation" in Path(f"/proc/{sim.pid}/maps").read_text()
+    assert layer.words() == ""
+    # a structure that says to be another one
+    code = (
+        "import ctypes\n"
+        "vulkan = ctypes.CDLL('libvulkan.so.1')\n"
+        "vulkan.vkCreateInstance((ctypes.c_uint32 * 16)(999), None, ctypes.byref(ctypes.c_void_p()))\n"
+    )
+    subprocess.run([sys.executable, "-c", code], timeout=60, check=True)
+    assert "VUID-VkInstanceCreateInfo-sType-sType" in layer.words()
 
 
 def test_a_gpu_runs_what_the_others_ask_in_vain(pendulum):
@@ -113,3 +146,45 @@ def test_a_daemon_goes_on_after_another_failed_on_the_gpu(pendulum, serve):
     with tl.launch(pendulum, worlds=1, device="gpu") as sim:
         assert serve("--adapter=nonsense").returncode == 2
         sim.step()
+
+
+# The last two find the driver at work when the process ends, on one program or many
+@pytest.mark.parametrize("limit", ["0.000001", "0.05", "0.2"])
+@pytest.mark.usefixtures("cold")
+def test_a_driver_that_takes_too_long_is_given_up_with_the_cures(grasp, serve, monkeypatch, limit):
+    monkeypatch.setenv("TIGHTLOOP_COMPILE_LIMIT", limit)
+    done = serve(scene=grasp)
+    assert done.returncode == 1
+    assert '"kind":"LaunchError"' in done.stdout
+    assert "did not compile within" in last_line(done)
+    assert "device = cpu" in last_line(done) and "TIGHTLOOP_COMPILE_LIMIT" in last_line(done)
+    monkeypatch.setenv("TIGHTLOOP_COMPILE_LIMIT", "1e-6")
+    with pytest.raises(tl.LaunchError, match="did not compile within"):
+        tl.launch(grasp, worlds=1, device="gpu")
+
+
+@pytest.mark.parametrize("limit", ["soon", "-1", "nan", ""])
+def test_a_limit_that_is_no_time_is_refused(serve, monkeypatch, limit):
+    monkeypatch.setenv("TIGHTLOOP_COMPILE_LIMIT", limit)
+    done = serve()
+    assert done.returncode == 2
+    assert "give seconds" in last_line(done)
+
+
+def test_auto_falls_back_to_the_processor_where_the_gpu_does_not_start(pendulum, monkeypatch, tmp_path):
+    # the one GPU that every test has is software, which `auto` refuses else
+    monkeypatch.setenv("TIGHTLOOP_AUTO_SOFTWARE", "1")
+    log = tmp_path / "news.log"
+    with tl.launch(pendulum, worlds=1024, device="auto", log=log) as sim:
+        assert sim.device.startswith("gpu (")
+        assert any(note.startswith("device auto is the GPU `") for note in sim.info["notes"])
+        with monkeypatch.context() as impatient:
+            impatient.setenv("TIGHTLOOP_COMPILE_LIMIT", "1e-6")
+            with tl.launch(pendulum, worlds=1024, device="auto", log=log) as other:
+                assert other.device.startswith("cpu")
+                (note,) = (note for note in other.info["notes"] if "device auto" in note)
+                assert note.startswith("device auto is the processor: `") and "did not compile within" in note
+                assert note in log.read_text()
+                frame = other.step()
+        # a daemon whose driver was in time goes on beside it
+        np.testing.assert_allclose(sim.step().joint_q, frame.joint_q, atol=1e-6)

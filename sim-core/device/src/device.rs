@@ -7,10 +7,22 @@ use crate::error::DeviceError;
 use crate::memory::{Buffer, GRAIN, Host, HostBytes, Memory, Staging, USAGES};
 use crate::portable;
 use crate::vulkan::{self, Vulkan};
+use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, RwLock, TryLockError};
+
+thread_local! {
+    /// Runs that this thread may ask for before a device is lost.
+    static RUNS_LEFT: Cell<u64> = const { Cell::new(u64::MAX) };
+}
+
+/// Loses the device of this thread's next run but so many, as a driver might. For tests of what comes after.
+#[doc(hidden)]
+pub fn lose_after(runs: u64) {
+    RUNS_LEFT.set(runs);
+}
 
 /// An open device. Clones name the same one; it closes when its last clone, buffer, program and batch are gone.
 #[derive(Clone)]
@@ -238,6 +250,11 @@ impl Device {
     pub fn run(&self, batches: &[&Batch]) -> Result<(), DeviceError> {
         let inner = &self.inner;
         inner.alive()?;
+        match RUNS_LEFT.get() {
+            u64::MAX => {}
+            0 => self.lose(),
+            left => RUNS_LEFT.set(left - 1),
+        }
         for batch in batches {
             assert!(Arc::ptr_eq(&batch.device, inner), "a batch of this device");
         }

@@ -20,16 +20,19 @@ mod batch;
 mod cache;
 mod device;
 mod error;
+mod leave;
 mod memory;
 mod module;
 mod portable;
 mod program;
 #[cfg_attr(not(target_os = "linux"), path = "vulkan_absent.rs")]
 mod vulkan;
+mod warm;
 
 pub use adapter::{AdapterInfo, AdapterKind, Choice, adapters};
 pub use batch::{Batch, BatchBuilder, Replay};
-pub use device::Device;
+pub use device::{Device, lose_after};
 pub use error::DeviceError;
+pub use leave::leave;
 pub use memory::{Buffer, Read, Staging, Write};
 pub use program::{Program, Source};

@@ -2,6 +2,7 @@
 
 use crate::device::{Device, Inner};
 use crate::error::DeviceError;
+use crate::leave::COMPILING;
 use crate::module::{self, Binding, Module};
 use crate::{portable, vulkan};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -64,7 +65,7 @@ impl Compiled {
                 let program = self.clone();
                 let label = self.source.label.clone();
                 let work = move |_| portable::pipeline(&program.device.wgpu, &program.source);
-                let mut done = within(&self.device, vec![label], self.limit, work)?;
+                let mut done = within(&self.device, vec![label], 1, self.limit, work)?;
                 Ok(done.remove(0))
             })
             .as_ref()
@@ -73,10 +74,10 @@ impl Compiled {
 }
 
 impl Device {
-    /// Compiles programs on all cores; the order is kept.
+    /// Compiles programs on all cores, and runs each once over nothing (`warm`); the order is kept.
     ///
     /// A driver that takes longer than `limit` over one of them cannot be stopped: its thread is left to itself, and keeps the
-    /// device open until it ends (`compiling` counts such threads). A process that exits before may crash in the driver.
+    /// device open until it ends (`compiling` counts such threads). A process that ends before may crash in the driver: see `leave`.
     ///
     /// Errors: the first program that does not compile, takes too long or asks for more than the adapter has; those begun
     /// beside it are finished and dropped.
@@ -90,9 +91,13 @@ impl Device {
         let sources = sources.to_vec();
         let inner = self.inner.clone();
         let compile = move |place: usize| compile(&inner, &sources[place], limit);
-        let made = within(&self.inner, labels, limit, compile);
+        let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+        let made = within(&self.inner, labels, cores, limit, compile);
         self.inner.alive()?;
         let made = made?;
+        let warmed = self.warm(&made, limit);
+        self.inner.alive()?;
+        warmed?;
         if let (Some(vulkan), Some(cache)) = (&self.inner.vulkan, &self.inner.cache) {
             cache.keep_pipelines(&vulkan.remembered());
         }
@@ -171,10 +176,11 @@ enum News<T> {
     Done(usize, Result<T, String>),
 }
 
-/// Does one piece of work a label, on all cores, and gives up where one takes longer than `limit`.
-fn within<T: Send + 'static>(
+/// Does one piece of work a label, in so many threads, and gives up where one takes longer than `limit`.
+pub(crate) fn within<T: Send + 'static>(
     device: &Arc<Inner>,
     labels: Vec<String>,
+    threads: usize,
     limit: Duration,
     work: impl Fn(usize) -> Result<T, String> + Send + Sync + 'static,
 ) -> Result<Vec<T>, DeviceError> {
@@ -182,13 +188,14 @@ fn within<T: Send + 'static>(
     let (work, next) = (Arc::new(work), Arc::new(AtomicUsize::new(0)));
     let stop = Arc::new(AtomicBool::new(false));
     let (tell, news) = mpsc::channel();
-    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-    for _ in 0..cores.min(count) {
+    let mut spawned = Vec::new();
+    for _ in 0..threads.min(count) {
         let (work, next, stop, tell) = (work.clone(), next.clone(), stop.clone(), tell.clone());
         let device = device.clone();
         device.compiling.fetch_add(1, Ordering::Relaxed);
+        COMPILING.fetch_add(1, Ordering::Relaxed);
         let thread = std::thread::Builder::new().name("compile".to_owned());
-        let spawned = thread.stack_size(STACK).spawn(move || {
+        let begun = thread.stack_size(STACK).spawn(move || {
             loop {
                 let place = next.fetch_add(1, Ordering::Relaxed);
                 if place >= count || stop.load(Ordering::Relaxed) {
@@ -199,8 +206,11 @@ fn within<T: Send + 'static>(
             }
             drop((work, tell));
             device.compiling.fetch_sub(1, Ordering::Relaxed);
+            // that may have closed the device, in the driver
+            drop(device);
+            COMPILING.fetch_sub(1, Ordering::Relaxed);
         });
-        spawned.expect("the system has threads");
+        spawned.push(begun.expect("the system has threads"));
     }
     drop((tell, work));
 
@@ -236,6 +246,12 @@ fn within<T: Send + 'static>(
     stop.store(true, Ordering::Relaxed);
     match failure {
         Some(failure) => Err(failure),
-        None => Ok(done.into_iter().flatten().collect()),
+        None => {
+            // else the last of them may close the device while the process ends
+            for thread in spawned {
+                let _ = thread.join();
+            }
+            Ok(done.into_iter().flatten().collect())
+        }
     }
 }

@@ -1,13 +1,17 @@
 //! How a model is run, and what keeps its worlds.
 
-use crate::backend::{Backend, BackendError, Faults, Lanes, Precision, available_memory, cpu, gpu};
-use crate::random::Draws;
+use crate::backend::{
+    BackendError, Backends, Faults, Groups, Lanes, Precision, available_memory, cpu, gpu,
+};
+use crate::random::{Draws, Numbering};
 use sim_core::batch::{Field, Layout};
 use sim_core::model::Model;
-use sim_device::AdapterKind;
 use std::path::PathBuf;
+use std::time::Duration;
 
-pub use sim_device::{AdapterInfo, Choice as Adapter, Replay, adapters};
+#[doc(hidden)]
+pub use sim_device::lose_after;
+pub use sim_device::{AdapterInfo, AdapterKind, Choice as Adapter, Replay, adapters, leave};
 
 /// What keeps the worlds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -26,11 +30,18 @@ pub enum Device {
     Auto {
         /// Where programs are kept, if anywhere.
         cache: Option<PathBuf>,
+        /// A GPU that software plays will do, too: for tests of what comes after.
+        software: bool,
     },
 }
 
 /// Worlds from which on [`Device::Auto`] looks for a GPU: fewer leave most of it idle.
 pub const AUTO_WORLDS: usize = 1024;
+
+/// For each: lavapipe takes 12 s over all programs of a grasp together on four idle cores, and three times that on busy ones.
+const COMPILE_LIMIT: Duration = Duration::from_secs(180);
+/// Where another limit is said.
+const COMPILE_LIMIT_NAME: &str = "TIGHTLOOP_COMPILE_LIMIT";
 
 /// How to run a model.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +52,8 @@ pub struct Options {
     pub device: Device,
     /// How a GPU gets the batches of a frame: recorded, unless that is what is measured.
     pub replay: Replay,
+    /// A driver that takes longer over a program of a GPU is given up.
+    pub compile_limit: Duration,
     /// Precision of state, commands and fields.
     pub precision: Precision,
     /// Threads of a step; none = one a core.
@@ -53,6 +66,8 @@ pub struct Options {
     pub faults: Faults,
     /// What the draws of a world depend on.
     pub draws: Draws,
+    /// The number of the first world in draws: that of a group of worlds which others come before.
+    pub first_world: usize,
 }
 
 impl Default for Options {
@@ -61,12 +76,14 @@ impl Default for Options {
             worlds: 1,
             device: Device::Cpu,
             replay: Replay::Recorded,
+            compile_limit: COMPILE_LIMIT,
             precision: Precision::F32,
             threads: None,
             lanes: Lanes::Auto,
             fields: vec![Field::JointQ, Field::JointQd, Field::BodyQ],
             faults: Faults::default(),
             draws: Draws::default(),
+            first_world: 0,
         }
     }
 }
@@ -81,16 +98,49 @@ pub fn cache_folder() -> Option<PathBuf> {
     Some(caches?.join("tightloop"))
 }
 
-/// What keeps the worlds, and why where that was left open.
-pub(crate) fn backend(
+/// How long a driver may take over a program: seconds in `TIGHTLOOP_COMPILE_LIMIT`, or what [`Options::default`] has.
+///
+/// # Errors
+/// What stands there is no time.
+pub fn compile_limit() -> Result<Duration, BackendError> {
+    let Ok(value) = std::env::var(COMPILE_LIMIT_NAME) else {
+        return Ok(COMPILE_LIMIT);
+    };
+    let seconds = value.parse().unwrap_or(f64::NAN);
+    let limit = Duration::try_from_secs_f64(seconds);
+    limit.map_err(|_| BackendError::CompileLimit { value })
+}
+
+/// Whether [`Device::Auto`] takes a GPU that software plays: `TIGHTLOOP_AUTO_SOFTWARE=1`, for tests of daemons.
+pub fn auto_takes_software() -> bool {
+    std::env::var_os("TIGHTLOOP_AUTO_SOFTWARE").is_some_and(|value| value == "1")
+}
+
+/// What keeps the worlds of each of so many groups, and why where that was left open.
+pub(crate) fn backends(
     model: &Model,
     options: &Options,
+    count: usize,
     layout: &Layout,
-) -> Result<(Box<dyn Backend>, Option<String>), BackendError> {
-    let (worlds, precision, draws) = (options.worlds, options.precision, options.draws);
+) -> Result<(Backends, Option<String>), BackendError> {
+    let (worlds, precision) = (options.worlds, options.precision);
+    let numbering = Numbering {
+        draws: options.draws,
+        first_world: options.first_world,
+    };
+    let groups = Groups {
+        count,
+        worlds,
+        numbering,
+    };
     let on_gpu = |adapter: &Adapter, cache: &Option<PathBuf>| {
-        let (cache, replay) = (cache.as_deref(), options.replay);
-        gpu::create(model, worlds, layout, adapter, cache, draws, replay)
+        let wanted = gpu::Wanted {
+            adapter,
+            cache: cache.as_deref(),
+            replay: options.replay,
+            compile_limit: options.compile_limit,
+        };
+        gpu::create(model, groups, layout, &wanted)
     };
     let note = match &options.device {
         Device::Gpu { .. } if precision == Precision::F64 => return Err(BackendError::DoubleOnGpu),
@@ -99,31 +149,24 @@ pub(crate) fn backend(
         Device::Auto { .. } if precision == Precision::F64 => {
             Some("the processor: a GPU computes in single precision".to_owned())
         }
-        Device::Auto { .. } if worlds < AUTO_WORLDS => {
+        Device::Auto { .. } if groups.all() < AUTO_WORLDS => {
             Some(format!("the processor: fewer than {AUTO_WORLDS} worlds"))
         }
-        Device::Auto { cache } => {
+        Device::Auto { cache, software } => {
             let found = adapters();
-            match found.iter().find(|info| info.kind != AdapterKind::Software) {
+            let will_do = |info: &&AdapterInfo| *software || info.kind != AdapterKind::Software;
+            match found.iter().find(will_do) {
                 None => Some("the processor: no GPU was found".to_owned()),
                 Some(info) => match on_gpu(&Adapter::Index(info.index), cache) {
-                    Ok(backend) => return Ok((backend, Some(format!("the GPU `{}`", info.name)))),
+                    Ok(made) => return Ok((made, Some(format!("the GPU `{}`", info.name)))),
                     Err(e) => Some(format!("the processor: `{}` failed: {e}", info.name)),
                 },
             }
         }
     };
     let threads = threads_of(options);
-    let backend = cpu::create(
-        model,
-        worlds,
-        precision,
-        options.lanes,
-        layout,
-        threads,
-        draws,
-    )?;
-    Ok((backend, note))
+    let made = cpu::create(model, groups, precision, options.lanes, layout, threads)?;
+    Ok((made, note))
 }
 
 /// Threads that are asked for: as many as there are cores if none are.
@@ -155,17 +198,21 @@ pub(crate) fn memory_of(model: &Model, options: &Options) -> u64 {
         .saturating_add(scratch)
 }
 
-/// Refuses what would not fit, before anything is taken.
-pub(crate) fn check_memory(model: &Model, options: &Options) -> Result<(), BackendError> {
+/// Refuses what would not fit in so many groups, before anything is taken.
+pub(crate) fn check_memory(
+    model: &Model,
+    options: &Options,
+    groups: usize,
+) -> Result<(), BackendError> {
     const MB: u64 = 1 << 20;
     // a system that does not say how much is free is not asked twice: the allocation itself will tell
     let Some(available) = available_memory() else {
         return Ok(());
     };
-    let needed = memory_of(model, options);
+    let needed = memory_of(model, options).saturating_mul(groups as u64);
     if needed > available {
         return Err(BackendError::Memory {
-            worlds: options.worlds,
+            worlds: options.worlds * groups,
             needed_mb: needed / MB,
             available_mb: available / MB,
         });

@@ -18,6 +18,9 @@ use crate::{ALIGNMENT, Description, Line, ProtocolError, RefusalKind};
 /// a core from its step.
 const NAP: Duration = Duration::from_millis(5);
 
+/// In place of an [`crate::Op`]: nothing comes any more, for the reason that is the command's bytes.
+pub(crate) const ENDED: u32 = u32::MAX;
+
 /// Head of an entry of a journal.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq, ZeroCopySend)]
 #[repr(C)]
@@ -33,7 +36,7 @@ pub struct JournalHeader {
     pub first: u64,
     /// Bytes of the arrays observed, each padded to [`ALIGNMENT`].
     pub observed: u64,
-    /// The [`crate::Op`] that was carried out; 0: this is a piece of the state of all worlds at this place.
+    /// The [`crate::Op`] that was carried out; 0: this is a piece of the state of all worlds at this place; [`ENDED`].
     pub op: u32,
     /// Rows in the field table of the command.
     pub rows: u32,
@@ -48,6 +51,11 @@ impl JournalHeader {
     /// Whether this is a piece of the state of all worlds.
     pub fn is_state(&self) -> bool {
         self.op == 0
+    }
+
+    /// Whether this says why nothing comes any more.
+    pub fn is_end(&self) -> bool {
+        self.op == ENDED
     }
 
     /// Bytes of command or piece, of digests and of arrays as they lie in a payload of `payload` bytes, each from the next
@@ -68,7 +76,8 @@ impl JournalHeader {
         let needed = padded(body)?
             .checked_add(padded(digests)?)?
             .checked_add(observed)?;
-        let fits = needed <= payload && (self.is_state() || body % 8 == 0) && observed % 8 == 0;
+        let is_words = !self.is_state() && !self.is_end();
+        let fits = needed <= payload && (!is_words || body % 8 == 0) && observed % 8 == 0;
         fits.then_some([body, digests, observed])
     }
 }
@@ -98,6 +107,11 @@ impl Entry {
         self.part(0)
     }
 
+    /// Why nothing comes any more.
+    pub fn reason(&self) -> String {
+        String::from_utf8_lossy(self.part(0)).into_owned()
+    }
+
     /// Digests of the frame; see [`crate::digest`].
     pub fn digests(&self) -> &[u32] {
         bytemuck::cast_slice(self.part(1))
@@ -121,7 +135,7 @@ impl Entry {
 /// A subscription to what a daemon does, which ends when this is dropped.
 ///
 /// It begins with the state of all worlds, in pieces; then comes every command that is carried out, after a restore the state
-/// again. The daemon never waits: who does not take its entries in time loses the oldest.
+/// again. Worlds that are lost end it, with the reason. The daemon never waits: who does not take its entries in time loses the oldest.
 #[derive(Debug)]
 pub struct Journal {
     link: Arc<Link>,

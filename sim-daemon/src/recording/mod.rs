@@ -26,6 +26,8 @@ mod writer;
 use std::path::Path;
 
 pub use playback::Playback;
+#[cfg(test)]
+pub(crate) use record::follow;
 pub(crate) use record::run as record;
 pub(crate) use replay::run as replay;
 

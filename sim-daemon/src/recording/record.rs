@@ -65,6 +65,19 @@ pub(crate) fn run(args: &cli::Record) -> Result<(), DaemonError> {
         false => ControlFlow::Continue(()),
     };
     let client = Client::attach(&args.name, &AttachOptions::default(), &mut hook)?;
+    follow(&client, args, &stop)
+}
+
+/// Records what the daemon of a client does, until something ends it.
+pub(crate) fn follow(
+    client: &Client,
+    args: &cli::Record,
+    stop: &AtomicBool,
+) -> Result<(), DaemonError> {
+    let mut hook = || match stop.load(Ordering::Relaxed) {
+        true => ControlFlow::Break(()),
+        false => ControlFlow::Continue(()),
+    };
     let fields: Vec<String> = args
         .fields
         .iter()
@@ -83,7 +96,7 @@ pub(crate) fn run(args: &cli::Record) -> Result<(), DaemonError> {
     })?;
     let mut recorder = Recorder {
         args,
-        stop: &stop,
+        stop,
         journal,
         writer,
         state: Vec::new(),
@@ -240,6 +253,13 @@ impl Recorder<'_> {
         }
         if header.is_state() {
             return self.take_state(entry);
+        }
+        if header.is_end() {
+            let reason = entry.reason();
+            return Err(match self.has_begun {
+                true => End::Done(reason),
+                false => End::Failed(failed(&self.args.out, reason)),
+            });
         }
         self.writer.put(&Record::Command(Command {
             op: header.op,

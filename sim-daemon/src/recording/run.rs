@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 use sim_core::batch::Field;
+use sim_engine::options::compile_limit;
 use sim_engine::simulation::{Device, Draws, Faults, Lanes, Options, Precision, Simulation};
 use sim_protocol::host::{Inbox, free_memory};
 use sim_protocol::{CommandHeader, Description, Op};
@@ -102,7 +103,9 @@ impl Run {
         }
         let options = Options {
             device,
+            compile_limit: compile_limit()?,
             worlds: told.worlds,
+            first_world: told.first_world,
             precision: match told.precision.as_str() {
                 "f64" => Precision::F64,
                 _ => Precision::F32,

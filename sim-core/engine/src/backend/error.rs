@@ -201,6 +201,20 @@ pub enum BackendError {
         /// Its words.
         reason: String,
     },
+    /// A driver that takes too long over a program.
+    #[error(
+        "{reason}, or use device = cpu, or give the driver longer: TIGHTLOOP_COMPILE_LIMIT=600 [s]"
+    )]
+    CompileTimeout {
+        /// Which program, and the limit.
+        reason: String,
+    },
+    /// A limit on a driver that is no time.
+    #[error("TIGHTLOOP_COMPILE_LIMIT is {value:?}; give seconds, such as 600, or leave it out")]
+    CompileLimit {
+        /// What stands there.
+        value: String,
+    },
     /// An accelerator that is not there.
     #[error("{reason}")]
     Adapter {
@@ -231,6 +245,7 @@ impl From<sim_device::DeviceError> for BackendError {
         match error {
             DeviceError::UnknownAdapter { .. } => BackendError::Adapter { reason },
             DeviceError::OutOfMemory { .. } => BackendError::DeviceMemory { reason },
+            DeviceError::CompileTimeout { .. } => BackendError::CompileTimeout { reason },
             _ => BackendError::Device { reason },
         }
     }

@@ -7,7 +7,7 @@ use iceoryx2::prelude::{Node, PortFactory};
 
 use super::{Inbox, S, memory};
 use crate::digest::{digest, digests_of};
-use crate::journal::JournalHeader;
+use crate::journal::{ENDED, JournalHeader};
 use crate::loan;
 use crate::transport::{self, JournalPublisher, JournalService, journal_slots};
 use crate::{ALIGNMENT, Description, ProtocolError, Row, Table};
@@ -28,6 +28,8 @@ const BESIDE_STATE: usize = 8;
 pub(super) struct Journals {
     open: Vec<Journal>,
     opened: u64,
+    /// Why there is nothing to record any more.
+    ended: Option<String>,
 }
 
 /// One recorder's.
@@ -42,6 +44,8 @@ struct Journal {
     joined: bool,
     /// It has the state from which it goes on.
     begun: bool,
+    /// It was told that nothing comes any more.
+    ended: bool,
     entries: u64,
 }
 
@@ -96,13 +100,14 @@ impl Journals {
             since: Instant::now(),
             joined: false,
             begun: false,
+            ended: false,
             entries: 0,
         });
         Ok((self.opened, port))
     }
 
     /// Meets new recorders and forgets those that went. Returns whether one waits for the state to begin with.
-    pub(super) fn refresh(&mut self) -> bool {
+    pub(super) fn refresh(&mut self, session: u64) -> bool {
         self.open.retain_mut(|journal| {
             let recorders = journal.service.dynamic_config().number_of_subscribers();
             journal.joined |= recorders > 0;
@@ -110,14 +115,36 @@ impl Journals {
             let _ = journal.publisher.update_connections();
             recorders > 0 || (!journal.joined && journal.since.elapsed() < JOIN_MAX)
         });
-        self.open
-            .iter()
-            .any(|journal| journal.joined && !journal.begun)
+        self.tell_end(session);
+        let waits = |journal: &Journal| journal.joined && !journal.begun;
+        self.ended.is_none() && self.open.iter().any(waits)
     }
 
     /// Whether somebody records.
     pub(super) fn are_read(&self) -> bool {
-        self.open.iter().any(|journal| journal.begun)
+        self.ended.is_none() && self.open.iter().any(|journal| journal.begun)
+    }
+
+    /// Why there is nothing to record any more.
+    pub(super) fn ended(&self) -> Option<&str> {
+        self.ended.as_deref()
+    }
+
+    /// Ends all journals, those included that are still to be joined.
+    pub(super) fn end(&mut self, session: u64, reason: &str) {
+        self.ended = Some(reason.to_owned());
+        self.tell_end(session);
+    }
+
+    fn tell_end(&mut self, session: u64) {
+        let Some(reason) = &self.ended else {
+            return;
+        };
+        let told = |journal: &&mut Journal| journal.joined && !journal.ended;
+        for journal in self.open.iter_mut().filter(told) {
+            journal.ended = true;
+            journal.end(session, reason);
+        }
     }
 
     /// Sends the state of all worlds to those who wait for one, or to `all`.
@@ -145,6 +172,21 @@ impl Journals {
 }
 
 impl Journal {
+    fn end(&mut self, session: u64, reason: &str) {
+        let room = reason.floor_char_boundary(self.slot_bytes);
+        let reason = &reason.as_bytes()[..room];
+        let header = JournalHeader {
+            session,
+            bytes: reason.len() as u64,
+            op: ENDED,
+            ..JournalHeader::default()
+        };
+        let padded = reason.len().next_multiple_of(ALIGNMENT);
+        self.send(header, padded, |bytes| {
+            bytes[..reason.len()].copy_from_slice(reason);
+        });
+    }
+
     fn state(&mut self, session: u64, state: &[u8]) {
         for (index, piece) in state.chunks(self.slot_bytes).enumerate() {
             let header = JournalHeader {

@@ -41,8 +41,8 @@ const RESPONSE_MIN: usize = 1024;
 
 /// What a host asks for: frames, and for those who look on the state behind them.
 pub trait Worlds {
-    /// Writes the arena of a frame.
-    fn frame(&mut self, arena: &mut [u64]);
+    /// Writes the arena of a frame; returns whether there is something to be seen and recorded in it.
+    fn frame(&mut self, arena: &mut [u64]) -> bool;
     /// Writes the state of the worlds that observers see, [`Description::watch_state_bytes`] of it.
     fn state(&mut self, to: &mut [u8]);
 }
@@ -91,7 +91,7 @@ impl Host {
         description.session = session;
         description.pid = std::process::id();
         description.schema = description.schema_hash();
-        check_memory(&description, &frame, 0)?;
+        check(&description, &frame, 0, 1)?;
 
         let node = transport::node::<S>(&tenancy.place().transport_config(session), "daemon")?;
         let attributes = [
@@ -108,8 +108,13 @@ impl Host {
         let watch = Watch::open(&node, &description, &frame)?;
         let lane = Lane::open(&node, 1, &frame, description.frames_held)?;
         // last: from here on clients may come
-        tenancy.announce(session)?;
+        tenancy.announce(session, 1)?;
 
+        // the daemon only waits while nobody steps: its own threads are idle then, the client needs one core. Other groups may step
+        let others = match description.groups {
+            1 => 0,
+            _ => description.busy_threads(),
+        };
         let inbox = Inbox::for_commands_of(&description);
         let state = State {
             node,
@@ -127,10 +132,9 @@ impl Host {
             stop,
             apart: Apart::new(),
         };
-        // the daemon only waits while nobody steps: its own threads are idle then, the client needs one core
         Ok(Host {
             state,
-            pace: Pace::new(cores() > 1),
+            pace: Pace::new(cores() > 1 + others),
             listener,
             tenancy,
         })
@@ -206,6 +210,12 @@ impl Host {
         self.state.journals.state(session, state, all);
     }
 
+    /// Ends all recordings, and refuses those to come.
+    pub fn end_records(&mut self, reason: &str) {
+        let session = self.state.description.session;
+        self.state.journals.end(session, reason);
+    }
+
     /// Answers the command with a refusal.
     pub fn refuse(&mut self, kind: RefusalKind, reason: &str) {
         self.state.refuse(kind, reason);
@@ -215,14 +225,17 @@ impl Host {
     pub fn show(&mut self, arena: &mut [u64], worlds: &mut impl Worlds) {
         let state = &mut self.state;
         state.frames += 1;
-        worlds.frame(arena);
-        let head = header(&state.description, &state.frame, state.frames);
-        state.watch.show(head, &state.frame, arena, worlds);
+        if worlds.frame(arena) {
+            let head = header(&state.description, &state.frame, state.frames);
+            state.watch.show(head, &state.frame, arena, worlds);
+        } else {
+            state.watch.unchanged();
+        }
     }
 }
 
 /// Refuses a run whose shared memory would not fit, or not beside the `physics_bytes` of its worlds, before anything is
-/// taken.
+/// taken. Of several groups, each as described, all are counted.
 ///
 /// # Errors
 /// [`ProtocolError::SharedMemory`] or [`ProtocolError::Memory`] with the bytes free and needed.
@@ -231,15 +244,30 @@ pub fn check_memory(
     frame: &Table,
     physics_bytes: u64,
 ) -> Result<(), ProtocolError> {
+    check(description, frame, physics_bytes, description.groups)
+}
+
+/// The same for so many groups.
+fn check(
+    description: &Description,
+    frame: &Table,
+    physics_bytes: u64,
+    groups: usize,
+) -> Result<(), ProtocolError> {
+    let among = match groups {
+        1 => String::new(),
+        _ => format!(" in {groups} groups"),
+    };
     let what = format!(
-        "{} worlds, {} frames held",
-        description.worlds, description.frames_held
+        "{} worlds{among}, {} frames held",
+        description.worlds * groups,
+        description.frames_held
     );
     let own = physics_bytes.saturating_add(memory::own_bytes(description) as u64);
     memory::check(
         memory::free(),
-        memory::all_bytes(description, frame),
-        own,
+        memory::all_bytes(description, frame).saturating_mul(groups),
+        own.saturating_mul(groups as u64),
         &what,
     )
 }

@@ -100,8 +100,11 @@ impl State {
     /// Opens a journal, if there is room for it.
     fn journal(&mut self, observed: u64) -> Response {
         let refused = |reason| Response::Refused { reason };
+        if let Some(reason) = self.journals.ended() {
+            return refused(format!("nothing can be recorded any more: {reason}"));
+        }
         // those that ended since somebody looked
-        self.journals.refresh();
+        self.journals.refresh(self.description.session);
         if self.journals.are_full() {
             return refused(format!(
                 "{RECORDERS_MAX} recorders are at work, which is the limit; end one of them"
@@ -191,7 +194,7 @@ impl State {
         let words = loan::words(loan.payload_mut());
         let (head, arena) = words.split_at_mut(Table::head_bytes(self.frame.rows().len()) / 8);
         head[..self.frame.words().len()].copy_from_slice(self.frame.words());
-        worlds.frame(arena);
+        let is_good = worlds.frame(arena);
         self.frames += 1;
         self.watch.changed();
         let now = Instant::now();
@@ -215,10 +218,10 @@ impl State {
         let _ = lane.notifier.notify();
         // last: nobody waits for it
         let head = Table::head_bytes(self.frame.rows().len()) / 8;
-        if self.watch.is_due() {
+        if is_good && self.watch.is_due() {
             self.watch.show(common, &self.frame, &sent[head..], worlds);
         }
-        if self.journals.are_read() {
+        if is_good && self.journals.are_read() {
             let occasion = Occasion {
                 description: &self.description,
                 inbox: &self.inbox,
@@ -292,7 +295,7 @@ impl State {
         self.lane.iter().for_each(Lane::refresh);
         // new observers get the frame shown last, dead ones give their slots back
         self.watch.refresh();
-        let waits = self.journals.refresh();
+        let waits = self.journals.refresh(self.description.session);
         next.or(waits.then_some(Next::Record))
     }
 }

@@ -61,6 +61,11 @@ impl Watch {
         self.unseen = true;
     }
 
+    /// There is nothing new to see, after all.
+    pub fn unchanged(&mut self) {
+        self.unseen = false;
+    }
+
     /// Somebody looks on, and has not seen the present state, nor any within the last period?
     pub fn is_due(&self) -> bool {
         self.unseen && self.observers > 0 && self.shown.elapsed() > self.period

@@ -17,10 +17,11 @@ mod worlds;
 use super::shown::stages_for;
 use super::state::{Shape, StateField, start};
 use super::{
-    Backend, BackendError, Faults, FirstFrozen, Frozen, ProgramFacts, Values, available_memory,
+    Backend, BackendError, Backends, Faults, FirstFrozen, Frozen, Groups, ProgramFacts, Values,
+    available_memory,
 };
 use crate::backend::noise::Noise;
-use crate::random::Draws;
+use crate::random::Numbering;
 use crate::start::StartDraw;
 use compiled::{Books, Compiled};
 use host::Host;
@@ -38,16 +39,13 @@ use std::sync::OnceLock;
 use std::time::Duration;
 use tile::{Rows, Tile};
 
-/// A driver that takes longer over the programs of a model is given up.
-const COMPILE_LIMIT: Duration = Duration::from_secs(180);
-
 /// What kernels may cost where software plays the GPU: every access to memory is a loop there, and its compiler's time grows with
 /// their square. A dispatch takes as long as a round of a solver, so loops stay whole.
 const SOFTWARE: Limits = Limits {
     kernel: 16_000,
     repeated: usize::MAX,
 };
-/// The same of hardware: few kernels, so that numbers stay in registers.
+/// The same of hardware: few kernels, so that numbers stay in registers. A guess, with others that ARCHITECTURE.md lists.
 const HARDWARE: Limits = Limits {
     kernel: 40_000,
     repeated: usize::MAX,
@@ -73,7 +71,7 @@ pub(super) struct Gpu {
     record: Vec<u32>,
     start: Vec<f32>,
     draw: StartDraw,
-    draws: Draws,
+    numbering: Numbering,
     noise: Noise,
     faults: Faults,
     host: Host,
@@ -82,22 +80,49 @@ pub(super) struct Gpu {
     copied: u64,
 }
 
-/// Worlds on the adapter that is meant.
+/// What is asked of a GPU, besides a model and its worlds.
+pub struct Wanted<'a> {
+    /// Which one it is.
+    pub adapter: &'a Choice,
+    /// Where programs are kept, if anywhere.
+    pub cache: Option<&'a Path>,
+    /// How it gets the batches of a frame.
+    pub replay: Replay,
+    /// How long its driver may take over a program.
+    pub compile_limit: Duration,
+}
+
+/// Worlds of a group.
+#[derive(Clone, Copy)]
+struct Part {
+    worlds: usize,
+    numbering: Numbering,
+    /// Groups of as many worlds that are not there yet, this one included: there must be memory for all.
+    coming: usize,
+}
+
+/// A backend for each group on the adapter that is meant, with a device of its own, so that none waits for another's batch.
 ///
 /// # Errors
 /// No such adapter, out of memory, a driver that cannot compile the programs.
 pub fn create(
     model: &Model,
-    worlds: usize,
+    groups: Groups,
     layout: &Layout,
-    choice: &Choice,
-    cache: Option<&Path>,
-    draws: Draws,
-    replay: Replay,
-) -> Result<Box<dyn Backend>, BackendError> {
-    Ok(Box::new(Gpu::new(
-        model, worlds, layout, choice, cache, draws, replay,
-    )?))
+    wanted: &Wanted<'_>,
+) -> Result<Backends, BackendError> {
+    let parts = groups.numberings().zip((1..=groups.count).rev());
+    let made = parts.map(
+        |(numbering, coming)| -> Result<Box<dyn Backend>, BackendError> {
+            let part = Part {
+                worlds: groups.worlds,
+                numbering,
+                coming,
+            };
+            Ok(Box::new(Gpu::new(model, part, layout, wanted)?))
+        },
+    );
+    made.collect()
 }
 
 const MB: u64 = 1 << 20;
@@ -142,14 +167,17 @@ fn check_memory(device: &Device, worlds: usize, needed: u64) -> Result<(), Backe
 impl Gpu {
     fn new(
         model: &Model,
-        worlds: usize,
+        part: Part,
         layout: &Layout,
-        choice: &Choice,
-        cache: Option<&Path>,
-        draws: Draws,
-        replay: Replay,
+        asked: &Wanted<'_>,
     ) -> Result<Gpu, BackendError> {
-        let device = Device::open(choice, cache)?;
+        let Part {
+            worlds,
+            numbering,
+            coming,
+        } = part;
+        let limit = asked.compile_limit;
+        let device = Device::open(asked.adapter, asked.cache)?;
         check_frame(&device, layout.bytes as u64)?;
         let constants: Constants<f32> = model.constants().cast();
         let m = &constants;
@@ -183,10 +211,9 @@ impl Gpu {
         let widest = tile::widest(&device, m, &places, worlds);
         let tiles = (worlds as u64).div_ceil(u64::from(widest));
         let needed = tiles * tile::memory(m, &places, widest) + 2 * layout.bytes as u64;
-        check_memory(&device, worlds, needed)?;
-        let mut compiled =
-            Compiled::new(&device, m, &places, &programs, books, widest, COMPILE_LIMIT)?;
-        compiled.replay = replay;
+        check_memory(&device, coming * worlds, coming as u64 * needed)?;
+        let mut compiled = Compiled::new(&device, m, &places, &programs, books, widest, limit)?;
+        compiled.replay = asked.replay;
         let frame = device.staging("frame", layout.bytes.max(64) as u64)?;
         let drawn = match device.info().kind {
             AdapterKind::Discrete => Some(device.buffer("frame", layout.bytes.max(64) as u64)?),
@@ -223,7 +250,7 @@ impl Gpu {
             record: places.record(shape),
             start: start(model),
             draw: StartDraw::new(model),
-            draws,
+            numbering,
             noise: Noise::new(model),
             faults: Faults::default(),
             host: Host::new(worlds, m.varying.len()),
