@@ -17,7 +17,8 @@ run's `precision` says.
 ## Fields
 
 `launch(fields=(…))` and `tightloop serve --fields …` choose them; all belong to the state in their frame. `time`,
-`step`, `status` and `contacts_left_out` come with every frame.
+`step`, `status` and `contacts_left_out` come with every frame. Frames of `sim.latest` have a snapshot of the worlds
+that observers see besides, as bytes: `state`.
 """
 COMMANDS = """
 ## Commands

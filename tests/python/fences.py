@@ -76,7 +76,8 @@ class Reader:
             assert block.language in SHOWN, f"{block}: {block.language} is neither run nor shown"
 
     def _shell(self, block: Block) -> None:
-        if " replay " in block.text:
+        # a recording is read when it is whole
+        if ".tlrec" in block.text and " record " not in block.text:
             self._await_end_of_background()
         said = self.folder / f"said-{block.line}.txt"
         with said.open("wb") as out:

@@ -17,7 +17,7 @@ pub(super) enum Python {
     View(View),
     /// Make a picture, a film or a web page of a daemon's worlds or of a recording, without a display.
     ///
-    /// Example: tightloop film run.tlrec run.mp4 --world 3
+    /// Example: tightloop film run.tlrec run.mp4 --worlds 16
     Film(Film),
     /// Tour what there is: torques, targets, a grasp, many worlds, a trained policy.
     ///
@@ -54,14 +54,14 @@ pub(super) struct Film {
     #[arg(value_name = "NAME|FILE.tlrec")]
     source: PathBuf,
 
-    /// What to write: a .png, .gif, .mp4 or .html file, or a folder of PNG files.
+    /// What to write: a .png, .gif, .mp4 or .html file, or a folder of .png files.
     out: PathBuf,
 
-    /// When to begin, or when a .png is taken [s].
-    #[arg(long, default_value_t = 0.0)]
+    /// When to begin; of a .png, when it is taken [s].
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     at: f64,
 
-    /// How long: of a daemon as time passes, 5 s if left out; of a recording simulated time, all of it [s].
+    /// How long: of a daemon as time passes, 5 if left out; of a recording simulated time, all if left out.
     #[arg(long)]
     seconds: Option<f64>,
 
@@ -73,19 +73,19 @@ pub(super) struct Film {
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
 
-    /// Size of the pictures [pixels].
+    /// Size of the pictures.
     #[arg(long, value_name = "WxH", default_value = "640x480")]
     size: String,
 
-    /// How many worlds are seen, on a grid.
+    /// How many worlds, on a grid.
     #[arg(long, default_value_t = 1)]
     worlds: usize,
 
-    /// The world that is seen alone, or that the camera follows.
+    /// The one that is seen alone, or followed.
     #[arg(long, default_value_t = 0)]
     world: usize,
 
-    /// Where the camera is.
+    /// Where it is seen from; follow goes with the world.
     #[arg(long, default_value = "three-quarter", value_parser = ["three-quarter", "front", "side", "top", "follow"])]
     camera: String,
 
