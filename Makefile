@@ -79,7 +79,7 @@ fuzz:
 published: wheel $(VENV)/.dev
 	$(if $(TIGHTLOOP_URDF),,$(PYTHON) tests/python/published/fetch.py)
 	PYTHONPATH=tests/python/published:tests/python/mujoco $(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . \
-	  -p options tests/python/published/agree.py
+	  -p options tests/python/published/agree.py tests/python/published/seen.py
 
 # Kept out of `test`: environments of each Python, and a build of the daemon alone, which shares nothing with the workspace's.
 packages: wheel $(VENV)/.dev

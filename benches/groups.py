@@ -1,9 +1,10 @@
-"""Steps per second of FrankaReach with a policy in NumPy: one environment, and two groups of which one steps meanwhile.
+"""Steps per second with a policy in NumPy: all worlds at once, and two groups of which one steps meanwhile.
 
     python benches/groups.py
 
-Both sides have as many worlds, the same policy on one thread, and all cores but one for the physics; they take turns in
-one run. Writes benches/results/MACHINE/groups.csv.
+Of FrankaReach as environments, and of its arm alone, driven by targets, through `launch`. Both sides have as many
+worlds, the same policy on one thread, and all cores but one for the physics; they take turns in one run. Writes
+benches/results/MACHINE/groups.csv.
 """
 
 from __future__ import annotations
@@ -11,15 +12,18 @@ from __future__ import annotations
 import argparse
 import os
 import time
+from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # the policy is on one thread
 
 import numpy as np
 from record import print_table, write_results
 
+import tightloop as tl
 from tightloop.env import VectorEnv, make_groups
+from tightloop.tasks.reach import FrankaReach
 
 WORLDS, HIDDEN = 4096, 128
 CORES = len(os.sched_getaffinity(0))
@@ -40,44 +44,109 @@ class Policy:
         return obs
 
 
-def run(envs: list[VectorEnv], policy: Policy, seconds: float) -> float:
-    """Env steps a second of all groups, each sent its actions as soon as it was received."""
-    for env in envs:
-        env.send(policy(env.reset(seed=0)[0]))
+class Side(Protocol):
+    """Worlds that are stepped in two halves."""
+
+    worlds: int
+
+    def reset(self) -> Any: ...
+
+    def send(self, actions: Any) -> None: ...
+
+    def recv(self) -> Any: ...
+
+    def close(self) -> None: ...
+
+
+class Environments:
+    """Worlds of a task, whose observations the policy sees."""
+
+    def __init__(self, env: VectorEnv) -> None:
+        self._env, self.worlds = env, env.num_envs
+        self.send, self.close = env.send, env.close
+
+    def reset(self) -> Any:
+        """Observations ``(worlds, inputs)``."""
+        return self._env.reset(seed=0)[0]
+
+    def recv(self) -> Any:
+        """Likewise."""
+        return self._env.recv()[0]
+
+
+class Arms:
+    """Worlds of an arm, of which the policy sees positions and velocities."""
+
+    def __init__(self, sim: tl.Sim) -> None:
+        self._sim, self.worlds, self.close = sim, sim.worlds, sim.close
+        self._start = np.copy(sim.reset().joint_q)
+        self._seen = np.zeros((sim.worlds, len(sim.coord_names) + len(sim.dof_names)), np.float32)
+
+    def _see(self, frame: tl.Frame) -> Any:
+        """Positions and velocities ``(worlds, coords + dofs)``."""
+        return np.concatenate((frame.joint_q, frame.joint_qd), axis=1, out=self._seen)
+
+    def reset(self) -> Any:
+        """What the policy sees at the start."""
+        return self._see(self._sim.reset())
+
+    def send(self, actions: Any) -> None:
+        """Targets within 0.2 rad of the start."""
+        self._sim.send(joint_target_q=self._start + np.float32(0.2) * actions)
+
+    def recv(self) -> Any:
+        """What the policy sees next."""
+        return self._see(self._sim.recv())
+
+
+def run(sides: Sequence[Side], policy: Callable[[Any], Any], seconds: float) -> float:
+    """World steps a second of all groups, each sent its actions as soon as it was received."""
+    for side in sides:
+        side.send(policy(side.reset()))
     steps, begin = 0, time.perf_counter()
     while time.perf_counter() - begin < seconds:
-        for env in envs:
-            env.send(policy(env.recv()[0]))
-            steps += env.num_envs
+        for side in sides:
+            side.send(policy(side.recv()))
+            steps += side.worlds
     taken = time.perf_counter() - begin
-    for env in envs:
-        env.recv()
+    for side in sides:
+        side.recv()
     return steps / taken
+
+
+def measure(what: str, one: Sequence[Side], two: Sequence[Side], policy: Policy, args: Any) -> dict[str, Any]:
+    """A row of the results."""
+    rates = np.array([[run(sides, policy, args.seconds) for sides in (one, two)] for _ in range(args.rounds)])
+    seen = one[0].reset()
+    begin = time.perf_counter()
+    for _ in range(20):
+        policy(seen)
+    policy_ms = (time.perf_counter() - begin) / 20 * 1e3
+    for side in (*one, *two):
+        side.close()
+    median = np.median(rates, axis=0)
+    ratio = float(np.median(rates[:, 1] / rates[:, 0]))
+    row = {"what": what, "worlds": WORLDS, "threads": max(1, CORES - 1), "policy_ms": f"{policy_ms:.2f}"}
+    return row | {"one": f"{median[0]:.0f}", "two_groups": f"{median[1]:.0f}", "ratio": f"{ratio:.2f}"}
 
 
 def main() -> None:
     """Measure both in turns, print and write the results."""
-    parser = argparse.ArgumentParser(description="One environment, or two groups of worlds.")
+    parser = argparse.ArgumentParser(description="One simulation, or two groups of worlds.")
     parser.add_argument("--rounds", type=int, default=9, help="turns of each side (default 9)")
     parser.add_argument("--seconds", type=float, default=2.0, help="of a turn (default 2)")
     args = parser.parse_args()
     threads = max(1, CORES - 1)
-    one = [VectorEnv("FrankaReach", WORLDS, copy=False, threads=threads)]
-    two = make_groups("FrankaReach", WORLDS, 2, copy=False, threads=threads)
-    (inputs,), (actions,) = one[0].single_observation_space.shape, one[0].single_action_space.shape  # pyright: ignore
-    policy = Policy(inputs, actions)
-    rates = np.array([[run(envs, policy, args.seconds) for envs in (one, two)] for _ in range(args.rounds)])
-    obs = one[0].reset(seed=0)[0]
-    begin = time.perf_counter()
-    for _ in range(20):
-        policy(obs)
-    policy_ms = (time.perf_counter() - begin) / 20 * 1e3
-    for env in (*one, *two):
-        env.close()
-    median = np.median(rates, axis=0)
-    ratio = float(np.median(rates[:, 1] / rates[:, 0]))
-    row = {"worlds": WORLDS, "threads": threads, "policy_ms": f"{policy_ms:.2f}", "one": f"{median[0]:.0f}"}
-    rows = [row | {"two_groups": f"{median[1]:.0f}", "ratio": f"{ratio:.2f}"}]
+    env = VectorEnv("FrankaReach", WORLDS, copy=False, threads=threads)
+    (inputs,), (actions,) = env.single_observation_space.shape, env.single_action_space.shape  # pyright: ignore
+    groups = make_groups("FrankaReach", WORLDS, 2, copy=False, threads=threads)
+    two = [Environments(group) for group in groups]
+    rows = [measure("environments of FrankaReach", [Environments(env)], two, Policy(inputs, actions), args)]
+    scene = FrankaReach().scene()
+    sim = tl.launch(scene, worlds=WORLDS, threads=threads)
+    sims = tl.launch(scene, worlds=WORLDS, threads=threads, groups=2)
+    policy = Policy(len(sim.coord_names) + len(sim.dof_names), len(sim.dof_names))
+    rows.append(measure("its arm through launch", [Arms(sim)], [Arms(group) for group in sims], policy, args))
     print_table(rows)
     write_results("groups", rows, {"command": f"python benches/groups.py --rounds {args.rounds}", "cores": CORES})
 

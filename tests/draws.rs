@@ -1,54 +1,19 @@
-//! Draws by seeds alone: worlds of one seed are alike wherever they are, and those that draw by their number are not.
+//! What draws depend on. By seeds alone, worlds of one seed are alike wherever they are; by their number they are not, and have it in
+//! whatever group they are.
 
 mod common;
 
-use common::{Run, drawn};
+use common::Run;
+use common::grouped::{FIELDS, assert_groups_are_the_whole, scene};
 use sim_core::batch::Field;
-use sim_core::model::params::Param;
-use sim_core::model::{Description, Distribution, Pose, Site};
 use sim_engine::backend::{Values, cpu};
 use sim_engine::simulation::{Draws, Lanes, Options, Precision};
 
-const FIELDS: [Field; 7] = [
-    Field::JointQ,
-    Field::JointQd,
-    Field::JointQMeasured,
-    Field::JointQdMeasured,
-    Field::JointTorque,
-    Field::SiteQ,
-    Field::Accelerometer,
-];
 /// Seeds of 21 worlds, three of which have that of world 5: in its block of eight, of sixteen, and in none of them.
 const SEEDS: [u64; 21] = [
     10, 11, 12, 13, 14, 1234, 16, 1234, 18, 19, 20, 21, 22, 1234, 24, 25, 26, 27, 28, 29, 1234,
 ];
 const ALIKE: [usize; 4] = [5, 7, 13, 20];
-
-/// Joints of every kind and a body: start, mass, delay and the deviations of all noise are drawn.
-fn scene() -> Description {
-    let mut scene = drawn::scene(1.0);
-    scene.sites.push(Site {
-        name: "imu".to_owned(),
-        body: Some("ball".to_owned()),
-        pose: Pose::at([0.1, 0.0, 0.0]),
-        relative_to: None,
-        damping: Site::DAMPING,
-    });
-    for (param, name, low, high) in [
-        (Param::BodyMassScale, "r", 0.8, 1.2),
-        (Param::CommandDelay, "", 0.0, 9.0),
-        (Param::JointFNoise, "r", 0.01, 0.1),
-        (Param::JointQNoise, "r", 0.01, 0.1),
-        (Param::JointQdNoise, "r", 0.01, 0.1),
-        (Param::JointTorqueNoise, "r", 0.01, 0.1),
-        (Param::SiteQNoise, "imu", 0.01, 0.1),
-        (Param::AccelerometerNoise, "imu", 0.01, 0.1),
-    ] {
-        let ranges = scene.param_ranges.entry(param).or_default();
-        ranges.insert(name.to_owned(), Distribution::Uniform { low, high });
-    }
-    scene
-}
 
 fn options(worlds: usize, precision: Precision, lanes: Lanes, draws: Draws) -> Options {
     Options {
@@ -178,4 +143,22 @@ fn a_snapshot_goes_on_with_the_draws_of_its_seeds() {
     // one world in all places goes on as it does in its own
     assert!(on(Some(13)).iter().all(|q| *q == kept[13]));
     assert!(kept[12] != kept[13]);
+}
+
+#[test]
+fn groups_have_the_bits_of_all_worlds_together() {
+    for (precision, draws, worlds) in [
+        (Precision::F64, Draws::World, 3),
+        // neither a whole register nor a whole block
+        (Precision::F32, Draws::World, 21),
+        (Precision::F32, Draws::Seed, 7),
+    ] {
+        for (groups, threads) in [(2, 3), (3, 1)] {
+            let options = Options {
+                threads: Some(threads),
+                ..options(worlds, precision, Lanes::Auto, draws)
+            };
+            assert_groups_are_the_whole(options, groups);
+        }
+    }
 }

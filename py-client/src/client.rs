@@ -259,6 +259,15 @@ where
     }
 }
 
+/// Into how many groups the daemon of that name has split its worlds; 1 if it has not.
+#[pyfunction]
+pub(crate) fn groups(py: Python<'_>, name: &str) -> PyResult<usize> {
+    waiting(py, |hook| {
+        let beacon = sim_protocol::find(name, &AttachOptions::default(), hook)?;
+        Ok(beacon.groups)
+    })
+}
+
 /// Remove what a dead daemon of that name left behind; whether nothing is left, that is, false while one runs.
 #[pyfunction]
 pub(crate) fn sweep(py: Python<'_>, name: &str) -> PyResult<bool> {

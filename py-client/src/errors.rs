@@ -20,7 +20,7 @@ pub(crate) fn raise(py: Python<'_>, class: &str, message: impl Into<String>) -> 
 pub(crate) fn protocol(py: Python<'_>, error: &ProtocolError) -> PyErr {
     use ProtocolError::*;
     let class = match error {
-        BadName { .. } => "ArgumentError",
+        BadName { .. } | Grouped { .. } => "ArgumentError",
         NoDaemon { .. } => "UnknownDaemon",
         ProtocolVersion { .. } | Handshake { .. } | Malformed { .. } => "ProtocolMismatch",
         DaemonLost { .. } => "DaemonLost",

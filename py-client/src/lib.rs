@@ -32,7 +32,7 @@ mod core {
     #[pymodule_export]
     use super::arrays::{drive, pack};
     #[pymodule_export]
-    use super::client::{Client, sweep};
+    use super::client::{Client, groups, sweep};
     #[pymodule_export]
     use super::command_line;
     #[pymodule_export]

@@ -59,7 +59,7 @@ enum Command {
     ///
     /// Example: tightloop list
     List,
-    /// Stop a daemon and wait until it is gone.
+    /// Stop a daemon, with all of its groups, and wait until it is gone.
     ///
     /// Example: tightloop stop franka
     Stop {
@@ -94,6 +94,10 @@ pub(crate) struct Serve {
     #[arg(long, default_value_t = 1)]
     pub(crate) worlds: u64,
 
+    /// Groups that the worlds are split into, which step independently; clients attach to NAME.0, NAME.1, ….
+    #[arg(long, default_value_t = 1)]
+    pub(crate) groups: u64,
+
     /// Where the physics runs: cpu, gpu, or auto for a GPU if there is one and the worlds are many, else the CPU.
     #[arg(long, default_value = "auto")]
     pub(crate) device: String,
@@ -106,7 +110,7 @@ pub(crate) struct Serve {
     #[arg(long, default_value = "tightloop")]
     pub(crate) name: String,
 
-    /// Threads of a step; one a core if left out.
+    /// Threads of a step, shared by all groups; one a core if left out.
     #[arg(long)]
     pub(crate) threads: Option<usize>,
 
@@ -162,7 +166,7 @@ pub(crate) struct Serve {
 /// Arguments of `record` as given; `recording` checks them.
 #[derive(Debug, Args)]
 pub(crate) struct Record {
-    /// Name of the daemon.
+    /// Name of the daemon, or of one of its groups, such as franka.0.
     pub(crate) name: String,
 
     /// File to write, such as run.tlrec.
@@ -301,7 +305,13 @@ fn list() -> Result<(), DaemonError> {
 }
 
 fn stop(name: &str) -> Result<(), DaemonError> {
-    let client = Client::attach(name, &AttachOptions::default(), &mut keep_waiting())?;
+    let options = AttachOptions::default();
+    // any of its groups ends a daemon
+    let name = match sim_protocol::find(name, &options, &mut keep_waiting())?.groups {
+        1 => name.to_owned(),
+        _ => format!("{name}.0"),
+    };
+    let client = Client::attach(&name, &options, &mut keep_waiting())?;
     client.shutdown(&mut keep_waiting())?;
     Ok(())
 }

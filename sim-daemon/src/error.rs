@@ -89,6 +89,14 @@ pub enum DaemonError {
         /// What is wrong, and the cure.
         problem: String,
     },
+    /// A group of worlds fails, and with it the daemon.
+    #[error("group {group}: {problem}")]
+    Group {
+        /// Which one.
+        group: usize,
+        /// What is wrong with it.
+        problem: Box<DaemonError>,
+    },
     /// Something that happened was not recorded.
     #[error("{}: before frame {frames} a gap: {lost} entries were lost; the {frames} frames before it are equal, bit for bit", path.display())]
     Gap {
@@ -128,6 +136,7 @@ impl DaemonError {
     pub fn kind(&self) -> &'static str {
         use DaemonError::*;
         match self {
+            Group { problem, .. } => problem.kind(),
             Argument { .. } | Protocol(ProtocolError::BadName { .. }) => "ArgumentError",
             Backend(
                 BackendError::NoWorlds

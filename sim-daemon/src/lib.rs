@@ -9,6 +9,7 @@ mod devices;
 mod error;
 mod export;
 mod faults;
+mod groups;
 mod inspect;
 pub mod look;
 mod news;

@@ -2,8 +2,8 @@
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
 use sim_core::batch::Field;
@@ -12,17 +12,21 @@ use sim_engine::simulation::{Device, Draws, Faults, Lanes, Options, Precision, S
 use sim_protocol::host::{Host, check_memory};
 use sim_protocol::place::Place;
 use sim_protocol::tenancy::Tenancy;
+use sim_protocol::{Description, ProtocolError, Table};
 
 use crate::cli::Serve;
 use crate::config::{self, SceneFile};
 use crate::error::DaemonError;
 use crate::export::{self, Facts};
+use crate::groups;
 use crate::news::News;
 use crate::server;
 use crate::watchdog::Watchdog;
 
 /// Counts above this are mistakes; below it, sizes in bytes do not overflow.
 const COUNT_MAX: u64 = u32::MAX as u64;
+/// Each has a thread and services of its own.
+const GROUPS_MAX: u64 = 64;
 
 /// Runs `tightloop serve`: from the arguments to the last cleaning. Prints one line to stdout when ready or failed.
 pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
@@ -42,52 +46,147 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
             })
             .inspect_err(announce_error)?;
     }
-    let (simulation, mut host) = open(serve, &stop).inspect_err(announce_error)?;
-    let description = host.description();
-    news.tell(&format!(
-        "{}: {} worlds on {}, {} threads, {:.0} MB of shared memory; pid {}",
-        description.name,
-        description.worlds,
-        description.device,
-        description.threads,
-        host.shared_bytes() as f64 / 1e6,
-        description.pid,
-    ));
-    description.notes.iter().for_each(|note| news.tell(note));
-    let ready = json!({ "ready": {
-        "name": description.name,
-        "pid": description.pid,
-        "session": format!("{:016x}", description.session),
-        "protocol": description.protocol,
-        "worlds": description.worlds,
-        "device": description.device,
-        "precision": description.precision,
-        "threads": description.threads,
-        "root": host.tenancy().place().root(),
-    }});
-    let watchdog = Watchdog::start(Arc::clone(&stop), serve.parent, host.janitor())?;
-    announce(&ready);
-    let result = server::run(simulation, &mut host, &mut news);
-    // its janitor must not look at the shared folder while the host takes that away
-    drop(watchdog);
-    drop(host);
+    let Opened { daemon, groups } = open(serve).inspect_err(announce_error)?;
+    let door = Mutex::new(Door {
+        daemon,
+        closed: groups.len(),
+        bytes: 0,
+        session: 0,
+        news: news.clone(),
+    });
+    let result = groups::serve_all(groups, &stop, |number, group: Group| {
+        let mut news = match group.told.groups {
+            1 => news.clone(),
+            _ => news.of_group(number),
+        };
+        let mut host = Host::open(group.tenancy, group.told, group.table, Arc::clone(&stop))?;
+        let watchdog = Watchdog::start(Arc::clone(&stop), serve.parent, host.janitor())?;
+        door.lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .open(&host)?;
+        let result = server::run(group.simulation, &mut host, &mut news);
+        // its janitor must not look at the shared folder while the host takes that away
+        drop(watchdog);
+        result
+    });
+    let door = door.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let was_ready = door.closed == 0;
+    // the daemon's name goes after those of its groups
+    drop(door);
     match &result {
         Ok(()) => news.tell("ended"),
         Err(error) => news.tell(&format!("failed: {error}")),
     }
-    if let (Err(error), Some(_)) = (&result, serve.parent) {
-        // the one line is said; this is for the terminal of whoever launched us
-        let _ = writeln!(std::io::stderr(), "tightloop: {error}");
+    if let Err(error) = &result {
+        if !was_ready {
+            announce_error(error);
+        } else if serve.parent.is_some() {
+            // the one line is said; this is for the terminal of whoever launched us
+            let _ = writeln!(std::io::stderr(), "tightloop: {error}");
+        }
     }
     result
 }
 
-/// Everything before the first client may come.
-fn open(serve: &Serve, stop: &Arc<AtomicBool>) -> Result<(Simulation, Host), DaemonError> {
+/// A daemon before its first client may come.
+struct Opened {
+    /// Of the daemon's name, where its groups have names of their own.
+    daemon: Option<Tenancy>,
+    groups: Vec<Group>,
+}
+
+/// A group of worlds before it is served.
+struct Group {
+    tenancy: Tenancy,
+    simulation: Simulation,
+    told: Description,
+    table: Table,
+}
+
+/// What is said when the last group is open.
+struct Door {
+    daemon: Option<Tenancy>,
+    /// Groups that are not open yet.
+    closed: usize,
+    /// Shared memory of those that are.
+    bytes: u64,
+    /// Of the first group's run.
+    session: u64,
+    news: News,
+}
+
+impl Door {
+    /// A group is open. After the last one, all who wait for the daemon are told.
+    fn open(&mut self, host: &Host) -> Result<(), DaemonError> {
+        let description = host.description();
+        self.closed -= 1;
+        self.bytes += host.shared_bytes();
+        if description.group == 0 {
+            self.session = description.session;
+        }
+        if self.closed > 0 {
+            return Ok(());
+        }
+        let groups = description.groups;
+        let name = match &mut self.daemon {
+            None => &description.name,
+            Some(daemon) => {
+                daemon.announce(self.session, groups)?;
+                daemon.place().name()
+            }
+        };
+        let worlds = description.worlds * groups;
+        let among = match groups {
+            1 => String::new(),
+            _ => format!(" in {groups} groups"),
+        };
+        self.news.tell(&format!(
+            "{name}: {worlds} worlds{among} on {}, {} threads, {:.0} MB of shared memory; pid {}",
+            description.device,
+            description.threads,
+            self.bytes as f64 / 1e6,
+            description.pid,
+        ));
+        description
+            .notes
+            .iter()
+            .for_each(|note| self.news.tell(note));
+        announce(&json!({ "ready": {
+            "name": name,
+            "pid": description.pid,
+            "session": format!("{:016x}", self.session),
+            "protocol": description.protocol,
+            "worlds": worlds,
+            "groups": groups,
+            "device": description.device,
+            "precision": description.precision,
+            "threads": description.threads,
+            "root": host.tenancy().place().root(),
+        }}));
+        Ok(())
+    }
+}
+
+/// Everything before the first client may come, but for the wire.
+fn open(serve: &Serve) -> Result<Opened, DaemonError> {
+    // of each group
     let options = check(serve)?;
+    let count = serve.groups as usize;
     let place = Place::new(None, &serve.name)?;
+    if place.is_group() {
+        let name = serve.name.clone();
+        let problem = "a name with a number after a dot is that of a group";
+        return Err(ProtocolError::BadName { name, problem }.into());
+    }
     sim_protocol::sweep(None)?;
     let tenancy = Tenancy::take(&place)?;
+    let (daemon, tenancies) = match count {
+        1 => (None, vec![tenancy]),
+        _ => {
+            let taken = (0..count).map(|group| Tenancy::take(&place.group(group)?));
+            (Some(tenancy), taken.collect::<Result<Vec<_>, _>>()?)
+        }
+    };
 
     let (mut scene, folder) = read_scene(&serve.scene)?;
     let named = serve.params.iter().map(|name| name.trim().to_owned());
@@ -107,22 +206,36 @@ fn open(serve: &Serve, stop: &Arc<AtomicBool>) -> Result<(Simulation, Host), Dae
         watch_worlds: serve.watch_worlds,
     };
     let mut told = export::description(&model, &options, &layout, facts);
+    told.groups = count;
     // before anything large is taken: memory that is missing kills instead of failing
     check_memory(&told, &table, Simulation::memory_of(&model, &options))?;
-    let simulation = Simulation::new(model, &options)?;
-    (told.device, told.threads) = (simulation.device().to_owned(), simulation.threads());
-    told.adapter = simulation.adapter().to_owned();
-    told.delivery = simulation.delivery().to_owned();
-    told.state_bytes = simulation.snapshot_bytes(told.worlds) as u64;
-    told.watch_state_bytes = simulation.snapshot_bytes(told.watch_worlds) as u64;
-    if let (Some(why), true) = (simulation.device_note(), serve.device == "auto") {
-        told.notes.push(format!("device auto is {why}"));
-    }
-    let host = Host::open(tenancy, told, table, Arc::clone(stop))?;
-    Ok((simulation, host))
+    let simulations = Simulation::groups(model, &options, count)?;
+    let group = |(number, (tenancy, simulation)): (usize, (Tenancy, Simulation))| {
+        let mut told = told.clone();
+        (told.group, told.first_world) = (number, number * options.worlds);
+        (told.device, told.threads) = (simulation.device().to_owned(), simulation.threads());
+        told.adapter = simulation.adapter().to_owned();
+        told.delivery = simulation.delivery().to_owned();
+        told.state_bytes = simulation.snapshot_bytes(told.worlds) as u64;
+        told.watch_state_bytes = simulation.snapshot_bytes(told.watch_worlds) as u64;
+        if let (Some(why), true) = (simulation.device_note(), serve.device == "auto") {
+            told.notes.push(format!("device auto is {why}"));
+        }
+        Group {
+            tenancy,
+            simulation,
+            told,
+            table: table.clone(),
+        }
+    };
+    let groups = tenancies.into_iter().zip(simulations);
+    Ok(Opened {
+        daemon,
+        groups: groups.enumerate().map(group).collect(),
+    })
 }
 
-/// The arguments, checked.
+/// The arguments, checked; the worlds are those of each group.
 fn check(serve: &Serve) -> Result<Options, DaemonError> {
     let wrong = |argument, value: &dyn ToString, problem: String| {
         let value = value.to_string();
@@ -134,6 +247,20 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
     };
     if !(1..=COUNT_MAX).contains(&serve.worlds) {
         return wrong("worlds", &serve.worlds, format!("ask for 1 to {COUNT_MAX}"));
+    }
+    if !(1..=GROUPS_MAX).contains(&serve.groups) {
+        let problem = format!("ask for 1 to {GROUPS_MAX}");
+        return wrong("groups", &serve.groups, problem);
+    }
+    if !serve.worlds.is_multiple_of(serve.groups) {
+        let problem = match serve.groups > serve.worlds {
+            true => format!(
+                "each has at least one world, and there are {}",
+                serve.worlds
+            ),
+            false => format!("{} worlds cannot be shared out evenly", serve.worlds),
+        };
+        return wrong("groups", &serve.groups, problem);
     }
     let Some(device) = device(serve) else {
         let problem = "unknown; use auto, cpu or gpu".to_owned();
@@ -216,7 +343,7 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
             return wrong(argument, &value, problem);
         }
     }
-    let (worlds, threads) = (serve.worlds as usize, serve.threads);
+    let (worlds, threads) = ((serve.worlds / serve.groups) as usize, serve.threads);
     Ok(Options {
         device,
         compile_limit: options::compile_limit()?,

@@ -6,6 +6,7 @@ pub mod any_scene;
 pub mod cases;
 pub mod dice;
 pub mod drawn;
+pub mod grouped;
 #[path = "../../examples/lesson/mod.rs"]
 mod lesson_scene;
 pub mod played;

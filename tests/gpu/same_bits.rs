@@ -1,7 +1,8 @@
 //! A world's bits on a GPU: whatever their number, its place, and the run.
 
+use crate::common::grouped::assert_groups_are_the_whole;
 use crate::common::{Demo, Run, command, lesson, lesson_with_table, noise};
-use crate::{assert_alive, gpu, run};
+use crate::{assert_alive, gpu, options, run};
 use sim_core::batch::Field;
 use sim_core::model::Model;
 use sim_engine::backend::Values;
@@ -73,4 +74,9 @@ fn worlds_that_do_not_fit_into_one_binding_are_no_different() {
     for (seed, found) in few.iter().zip(bits(&model, Demo::Target, &few, 2)) {
         assert_eq!(found, all[*seed], "world {seed} of 40000 among four");
     }
+}
+
+#[test]
+fn groups_have_the_bits_of_all_worlds_together() {
+    assert_groups_are_the_whole(options(gpu(), 5, &[]), 2);
 }

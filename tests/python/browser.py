@@ -18,10 +18,10 @@ CHROMIUM = "/usr/bin/chromium"
 # Screenshots are kept: test output for whoever wants to see.
 SHOTS = Path(__file__).parents[2] / "out" / "viewer"
 # Its software renderer needs seconds for a picture where other programs have the cores.
-PATIENCE_SECONDS = 90.0
+PATIENCE_SECONDS = 120.0
 _FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 # The panel covers the right of a page; the scene is seen in the rest.
-WIDTH, HEIGHT, SCENE_WIDTH = 1000, 640, 640
+WIDTH, WIDE, HEIGHT, PANEL_WIDTH = 840, 1200, 520, 360
 
 
 @contextmanager
@@ -39,8 +39,9 @@ def chromium() -> Iterator[Browser]:
 class View:
     """The viewer's page, open."""
 
-    def __init__(self, browser: Browser, url: str) -> None:
-        self.page: Page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
+    def __init__(self, browser: Browser, url: str, width: int) -> None:
+        self.page: Page = browser.new_page(viewport={"width": width, "height": HEIGHT})
+        self.scene_width = width - PANEL_WIDTH
         self.page.set_default_timeout(PATIENCE_SECONDS * 1000)
         self.errors: list[str] = []
         self.page.on("console", lambda said: self.errors.append(said.text) if said.type == "error" else None)
@@ -55,7 +56,7 @@ class View:
 
     def shot(self, name: str | None = None) -> NDArray[np.int16]:
         """The pixels of the scene, the panel left out; kept as a file if it has a name."""
-        clip: Any = {"x": 0, "y": 0, "width": SCENE_WIDTH, "height": HEIGHT}
+        clip: Any = {"x": 0, "y": 0, "width": self.scene_width, "height": HEIGHT}
         data = self.page.screenshot(clip=clip)
         if name is not None:
             SHOTS.mkdir(parents=True, exist_ok=True)

@@ -54,8 +54,12 @@ def collada(
     more: str = "",
     images: str = "",
     bind: bool = True,
+    skin: str = "",
 ) -> Path:
-    """One box of one material in a node with this transformation; ``more`` goes into the effect."""
+    """One box of one material in a node with this transformation; ``more`` goes into the effect.
+
+    With ``skin``, the matrix of its bind shape, it is the skin of a joint.
+    """
     positions = " ".join(str(part) for part in CORNERS.ravel())
     corners = " ".join(f"{corner} 0" for corner in FACES.ravel())
     bound = (
@@ -64,6 +68,9 @@ def collada(
         if bind
         else ""
     )
+    shown = f'<instance_geometry url="#g">{bound}</instance_geometry>'
+    if skin:
+        shown = f'<instance_controller url="#c"><skeleton>#n</skeleton>{bound}</instance_controller>'
     path.write_text(f"""<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
   <asset><created>2026-01-01T00:00:00</created><modified>2026-01-01T00:00:00</modified>{asset}</asset>
@@ -82,11 +89,29 @@ def collada(
     <triangles count="{len(FACES)}" material="skin"><input semantic="VERTEX" source="#v" offset="0"/>
       <input semantic="TEXCOORD" source="#t" offset="1" set="0"/><p>{corners}</p></triangles>
   </mesh></geometry></library_geometries>
+  {_controller(skin) if skin else ""}
   <library_visual_scenes><visual_scene id="s"><node id="n">{transform}
-    <instance_geometry url="#g">{bound}</instance_geometry></node></visual_scene></library_visual_scenes>
+    {shown}</node></visual_scene></library_visual_scenes>
   <scene><instance_visual_scene url="#s"/></scene>
 </COLLADA>""")
     return path
+
+
+def _controller(matrix: str) -> str:
+    """A skin that hangs on one joint."""
+    source = '<technique_common><accessor source="#{}" count="1" stride="{}"><param name="{}" type="{}"/></accessor>'
+    source += "</technique_common></source>"
+    unit = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
+    return f"""<library_controllers><controller id="c"><skin source="#g">
+    <bind_shape_matrix>{matrix}</bind_shape_matrix>
+    <source id="j"><Name_array id="ja" count="1">n</Name_array>{source.format("ja", 1, "JOINT", "name")}
+    <source id="b"><float_array id="ba" count="16">{unit}</float_array>
+      {source.format("ba", 16, "TRANSFORM", "float4x4")}
+    <source id="w"><float_array id="wa" count="1">1</float_array>{source.format("wa", 1, "WEIGHT", "float")}
+    <joints><input semantic="JOINT" source="#j"/><input semantic="INV_BIND_MATRIX" source="#b"/></joints>
+    <vertex_weights count="8"><input semantic="JOINT" source="#j" offset="0"/>
+      <input semantic="WEIGHT" source="#w" offset="1"/><vcount>{"1 " * 8}</vcount><v>{"0 0 " * 8}</v></vertex_weights>
+  </skin></controller></library_controllers>"""
 
 
 def _params(images: str) -> str:

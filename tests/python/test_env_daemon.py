@@ -150,3 +150,12 @@ def test_the_daemon_that_is_killed_is_told() -> None:
         for _ in range(100):
             env.step(np.zeros((2, 7)))
     env.close()
+
+
+def test_a_trainer_that_draws_needs_a_daemon_that_shows_bodies(serve: Any) -> None:
+    with pytest.raises(tl.ArgumentError, match="--render"):
+        VectorEnv("CartPoleBalance", daemon=serve("CartPoleBalance"), render_mode="rgb_array")
+    envs = VectorEnv("CartPoleBalance", daemon=serve("CartPoleBalance", "--render"), render_mode="rgb_array")
+    envs.reset(seed=0)
+    assert len(envs.render() or ()) == envs.num_envs == 1
+    envs.close()

@@ -66,6 +66,16 @@ def test_collada_lies_where_physics_has_it(tmp_path, asset, transform):
     assert any("turned" in note for note in found.notes) == ("Z_UP" not in asset)
 
 
+def test_a_skin_lies_where_physics_has_it(tmp_path):
+    turned = "0 -1 0 5  1 0 0 6  0 0 2 7  0 0 0 1"
+    path = looks.collada(tmp_path / "box.dae", skin=turned, transform="<translate>1 2 3</translate>")
+    told = json.loads(_core.read_mesh(str(path), (1.0, 1.0, 1.0), 64, False))
+    found = mesh_files.read(path)
+    np.testing.assert_allclose(extent(found), told["extent"], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(extent(found), [[4, 8, 10], [6, 9, 16]], atol=1e-6)
+    assert (found.colors == RED).all()
+
+
 def test_gltf_lies_where_physics_has_it(tmp_path):
     nodes = [
         {"mesh": 0, "translation": [1, 2, 3], "scale": [1, 1, -1]},
@@ -152,6 +162,31 @@ def test_what_has_no_material_is_left_unpainted(tmp_path):
     assert half.painted.sum() == 4
     filled = half.filled((1, 2, 3, 4))
     assert (filled[half.painted] == RED).all() and (filled[~half.painted] == [1, 2, 3, 4]).all()
+
+
+def test_broken_materials_leave_the_shape(tmp_path):
+    # an effect whose image is not in the file: pycollada drops the effect, its material, and all that has it
+    found = mesh_files.read(
+        looks.collada(
+            tmp_path / "box.dae", diffuse='<texture texture="sampler" texcoord="UV"/>', images="<library_images/>"
+        )
+    )
+    assert len(found.faces) == 12 and not found.painted.any()
+    assert any("materials that are broken" in note for note in found.notes)
+    # an image whose file is not there
+    images = '<library_images><image id="i"><init_from>skin.png</init_from></image></library_images>'
+    found = mesh_files.read(
+        looks.collada(tmp_path / "box.dae", diffuse='<texture texture="sampler" texcoord="UV"/>', images=images)
+    )
+    assert len(found.faces) == 12 and not found.painted.any()
+
+
+def test_vertices_that_no_face_has_take_no_room(tmp_path):
+    path = looks.obj(tmp_path / "box.obj", mtl=None)
+    path.write_text("v 100 100 100\n" + path.read_text().replace("f ", "g ") + "f 2 3 4\nf 3 5 4\n")
+    found = mesh_files.read(path)
+    assert len(found.vertices) == 4 and found.faces.max() == 3
+    np.testing.assert_allclose(extent(found), [[0, 0, 0], [1, 2, 0]])
 
 
 def test_a_mirror_keeps_the_outside_outside(tmp_path):

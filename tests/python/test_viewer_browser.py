@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 import tightloop as tl
-from browser import View, chromium, differing, spots
+from browser import WIDE, WIDTH, View, chromium, differing, spots
 from leftovers import wait_until
 from tightloop import Frame
 
@@ -27,12 +27,12 @@ def browser():
 
 
 @pytest.fixture
-def look(browser) -> Iterator[Callable[[str], View]]:
+def look(browser) -> Iterator[Callable[..., View]]:
     """Opens the page of a viewer; at the end, no error may have been in its console."""
     views: list[View] = []
 
-    def at(url: str) -> View:
-        views.append(View(browser, url))
+    def at(url: str, width: int = WIDTH) -> View:
+        views.append(View(browser, url, width))
         return views[-1]
 
     yield at
@@ -139,7 +139,7 @@ def test_play_step_and_reset_drive_the_worlds(box, look, unique):
 def test_256_worlds_are_seen_and_a_frozen_one_is_red(box, look, unique):
     with tl.launch(box, worlds=256, name=unique(), on_nan="freeze", params=("body_f",)) as sim:
         sim.reset()
-        view = look(sim.view(port=8300).url)
+        view = look(sim.view(port=8300).url, WIDE)
         view.close_notices()
         view.choose("Camera", "top")
         assert not is_red(view.still("worlds_256")).any()

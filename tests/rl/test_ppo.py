@@ -47,6 +47,11 @@ def test_it_learns_to_balance_and_its_policy_plays(tmp_path: Path) -> None:
     mean = float(played.stdout.split("return ")[1].split(" ±")[0])
     assert mean > 400, played.stdout
     assert (folder / "play.png").stat().st_size > 10_000
+    film = folder / "film.gif"
+    filmed = run(
+        f"{EXAMPLES}/play.py", "CartPoleBalance", str(folder / "policy.onnx"), "--num-envs", "2", "--film", str(film)
+    )
+    assert filmed.returncode == 0 and film.stat().st_size > 10_000, filmed.stderr
     wrong = run(f"{EXAMPLES}/play.py", "FrankaReach", str(folder / "policy.onnx"))
     assert wrong.returncode == 1 and "takes 5 numbers, and FrankaReach has 32" in wrong.stderr
 

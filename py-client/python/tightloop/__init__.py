@@ -43,11 +43,13 @@ if TYPE_CHECKING:
         UrdfError,
         WaitTimeout,
     )
+    from tightloop.groups import Groups
+    from tightloop.launching import attach, launch
     from tightloop.robot import Link, Robot
     from tightloop.scene import Scene
     from tightloop.sensed import ContactSensor, Site
     from tightloop.shapes import Shape, Surface
-    from tightloop.sim import FrameCopy, Sim, attach, launch
+    from tightloop.sim import FrameCopy, Sim
     from tightloop.snapshot import Snapshot
 
 _HOMES = {
@@ -79,11 +81,13 @@ _HOMES = {
         "UrdfError",
         "WaitTimeout",
     ),
+    "tightloop.groups": ("Groups",),
+    "tightloop.launching": ("attach", "launch"),
     "tightloop.robot": ("Link", "Robot"),
     "tightloop.scene": ("Scene",),
     "tightloop.sensed": ("ContactSensor", "Site"),
     "tightloop.shapes": ("Shape", "Surface"),
-    "tightloop.sim": ("FrameCopy", "Sim", "attach", "launch"),
+    "tightloop.sim": ("FrameCopy", "Sim"),
     "tightloop.snapshot": ("Snapshot",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
@@ -100,6 +104,7 @@ __all__ = [
     "Frame",
     "FrameCopy",
     "FramesHeld",
+    "Groups",
     "LaunchError",
     "LeaseHeld",
     "LeaseLost",

@@ -20,17 +20,19 @@ _STOP_SECONDS = 3.0
 class Daemon:
     """A daemon process of our own, and its name."""
 
-    def __init__(self, process: subprocess.Popen[bytes], name: str) -> None:
+    def __init__(self, process: subprocess.Popen[bytes], name: str, users: int) -> None:
         self.process = process
         self.name = name
+        self._users = users
 
     @classmethod
-    def start(cls, scene: str, arguments: dict[str, Any]) -> Daemon:
+    def start(cls, scene: str, arguments: dict[str, Any], users: int = 1) -> Daemon:
         """Start a daemon and wait until it is ready.
 
         Args:
             scene: The scene as TOML; paths inside are absolute.
             arguments: Values of the long flags of ``tightloop serve``.
+            users: How many will `leave`.
 
         Raises:
             TightloopError: What the daemon said, as the exception of its kind.
@@ -46,7 +48,7 @@ class Daemon:
             # Ctrl-C in a terminal goes to the caller, who decides what becomes of the daemon
             start_new_session=True,
         )
-        daemon = cls(process, arguments["name"])
+        daemon = cls(process, arguments["name"], users)
         try:
             daemon._await_ready(scene)
         except BaseException:
@@ -76,6 +78,12 @@ class Daemon:
         except subprocess.TimeoutExpired:
             return "was not understood"
         return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
+
+    def leave(self) -> None:
+        """One user less; `stop` after the last."""
+        self._users -= 1
+        if self._users == 0:
+            self.stop()
 
     def stop(self) -> None:
         """Wait for the daemon to end, make it end if it does not, and remove what a killed one leaves."""

@@ -1,13 +1,12 @@
-"""A running simulation: `launch` starts a daemon of its own, `attach` joins one, and `Sim` steps it."""
+"""A running simulation, which `launch` and `attach` make."""
 
 from __future__ import annotations
 
 import functools
 import json
 import os
-import secrets
 import weakref
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,6 @@ from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
 from tightloop.errors import ArgumentError, CommandRefused, UnknownField
 from tightloop.params import Params
-from tightloop.scene import Scene
 from tightloop.snapshot import Snapshot, passing
 from tightloop.view.process import Viewer
 
@@ -41,12 +39,12 @@ class Sim:
     """A simulation that a daemon runs; made by `launch` and `attach`, closed by ``close`` or the end of a ``with``.
 
     Attributes:
-        name: Name of the daemon.
+        name: Name of the daemon, or of the group of worlds that this is, such as ``"franka.0"``.
         pid: Its process.
         device: Where the physics runs, such as ``"cpu (AVX-512, 16 worlds a block, 2 threads)"`` or ``"gpu (…)"``.
         precision: ``"f32"`` or ``"f64"``, the type of every real array.
         worlds: Number of worlds.
-        threads: Threads that a step may use.
+        threads: Threads that a step may use; all groups of a daemon share them.
         dt: Physics step [s].
         substeps: Physics steps a control frame.
         fields: What every frame carries.
@@ -62,7 +60,8 @@ class Sim:
         bodies: Slice of each robot's bodies.
         info: Everything the daemon tells about itself, notes on the scene included. ``delivery`` says how frames reach
             shared memory: ``"direct"`` from the CPU, ``"imported"`` where a GPU writes them there, ``"copied"`` where
-            the processor copies them from it.
+            the processor copies them from it. ``groups`` and ``group`` say how many the daemon has and which one this
+            is, and ``first_world`` the number of its first world among those of all.
     """
 
     def __init__(self, client: _core.Client, daemon: Daemon | None) -> None:
@@ -338,7 +337,10 @@ class Sim:
         return viewer
 
     def close(self) -> None:
-        """End the simulation: a launched daemon stops, an attached one is released. Frames stay valid."""
+        """End the simulation: a launched daemon stops (with the last of its groups), an attached one is released.
+
+        Frames stay valid.
+        """
         self._end()
 
     def __enter__(self) -> Sim:
@@ -352,126 +354,6 @@ class Sim:
         return f"Sim({self.name!r}, worlds={self.worlds}, device={self.device!r}, pid={self.pid}{state})"
 
 
-def launch(
-    scene: Scene,
-    *,
-    worlds: int,
-    device: str = "auto",
-    precision: str = "f32",
-    threads: int | None = None,
-    fields: Sequence[str] = ("joint_q", "joint_qd", "body_q"),
-    params: Sequence[str] = (),
-    bounds: Mapping[str, float] | None = None,
-    on_fault: str = "freeze",
-    on_nan: str = "refuse",
-    draws: str = "world",
-    name: str | None = None,
-    log: str | os.PathLike[str] | None = None,
-    frames_held: int = 4,
-    watch_worlds: int = 256,
-) -> Sim:
-    """Start a daemon that simulates a scene, and join it. The daemon ends with this process, however that ends.
-
-    Args:
-        scene: What to simulate; later changes to it have no effect.
-        worlds: How many copies of it, at least 1.
-        device: ``"cpu"``, ``"gpu"`` for the first GPU, ``"gpu:1"`` or ``"gpu:nvidia"`` for another, by its number or
-            part of its name, as ``tightloop devices`` lists them, or ``"auto"`` for a GPU if there is one that is no
-            software and there are at least 1024 worlds in single precision, else the CPU: `Sim.device` tells.
-        precision: ``"f32"``, or ``"f64"`` for the same physics in double precision.
-        threads: Most threads a step may use; all cores if left out.
-        fields: What frames carry besides ``time``, ``step``, ``status`` and ``contacts_left_out``: names of `Frame`
-            attributes.
-        params: Numbers of the model that vary from world to world and may be written while it runs, besides those that
-            the scene names, such as ``"shape_mu"``, ``"joint_friction"``, ``"command_delay"``, ``"gyro_noise"``;
-            `Sim.params` lists them all. Those that `Scene.randomize` draws vary too.
-        bounds: Largest ``"joint_q"`` [rad or m] and ``"joint_qd"`` [rad/s or m/s], in size; a world beyond one is
-            frozen at its state before that frame, with bit 8 of ``status``. None if left out.
-        on_fault: What becomes of a frozen world: ``"freeze"`` keeps it until it is reset, ``"reset"`` resets it
-            before its next step, so that its ``status`` is seen once.
-        on_nan: What becomes of a command that is NaN or infinite in some world: ``"refuse"`` refuses it for all worlds,
-            ``"freeze"`` freezes that world as one that is no longer finite, and the others go on.
-        draws: What start states, parameters and noise that are drawn depend on, besides a world's episode and ``step``:
-            ``"world"`` its number and its seed, ``"seed"`` its seed alone, so that an environment has the same numbers
-            wherever it stands. Worlds of one seed are then alike, and so they begin, with seed 0: give
-            ``reset(seed=...)`` a sequence with one seed a world.
-        name: Name of the daemon, for `attach`; a unique one if left out.
-        log: File for the daemon's news, such as how many worlds were frozen, at most one line a second; warnings and
-            errors go to stderr if left out.
-        frames_held: How many frames may be alive at once, at least 1.
-        watch_worlds: How many worlds observers see, such as the viewer: the first ones, or all if there are fewer.
-
-    Raises:
-        ArgumentError: An argument is not valid; the message lists what is.
-        SceneError: The scene is not valid.
-        ResourceError: Memory or shared memory does not hold that many worlds.
-        LaunchError: The daemon did not start; the message holds its reason.
-    """
-    if not isinstance(scene, Scene):
-        raise ArgumentError(f"launch: scene is {type(scene).__name__}; give a tightloop.Scene")
-    for argument, names in (("fields", fields), ("params", params)):
-        if isinstance(names, str):
-            raise ArgumentError(f"launch: {argument} is {names!r}; give a list of names, such as ({names!r},)")
-        if not isinstance(names, Iterable):
-            raise ArgumentError(f"launch: {argument} is {names!r}; give a list of names, or () for none")
-    # Types are checked here, values by the daemon, before it takes anything
-    arguments: dict[str, Any] = {
-        "worlds": checks.integer("launch: worlds", worlds, error=ArgumentError),
-        "device": checks.text("launch: device", device, error=ArgumentError),
-        "precision": checks.text("launch: precision", precision, error=ArgumentError),
-        "fields": _joined("fields", fields),
-        "params": _joined("params", params),
-        "name": f"sim-{os.getpid()}-{secrets.token_hex(4)}"
-        if name is None
-        else checks.text("launch: name", name, error=ArgumentError),
-        "frames-held": checks.integer("launch: frames_held", frames_held, error=ArgumentError),
-        "watch-worlds": checks.integer("launch: watch_worlds", watch_worlds, error=ArgumentError),
-    }
-    if arguments["device"].startswith("gpu:"):
-        arguments["device"], arguments["adapter"] = arguments["device"].split(":", 1)
-    arguments["on-fault"] = checks.text("launch: on_fault", on_fault, error=ArgumentError)
-    arguments["on-nan"] = checks.text("launch: on_nan", on_nan, error=ArgumentError)
-    arguments["draws"] = checks.text("launch: draws", draws, error=ArgumentError)
-    if bounds is not None and not isinstance(bounds, Mapping):
-        raise ArgumentError(f'launch: bounds is {bounds!r}; give a dict, such as {{"joint_qd": 50.0}}')
-    for bound, value in (bounds or {}).items():
-        if bound not in ("joint_q", "joint_qd"):
-            raise ArgumentError(f"launch: bounds has {bound!r}; give joint_q and joint_qd, or one of them")
-        name_of = f"launch: bounds of {bound}"
-        arguments[f"{bound.replace('_', '-')}-max"] = checks.number(name_of, value, above=0.0, error=ArgumentError)
-    if threads is not None:
-        arguments["threads"] = checks.integer("launch: threads", threads, error=ArgumentError)
-    if log is not None:
-        arguments["log"] = checks.path("launch: log", log, error=ArgumentError)
-    daemon = Daemon.start(scene.to_toml(), arguments)
-    try:
-        return Sim(_core.Client(arguments["name"], lease=True), daemon)
-    except BaseException:
-        daemon.stop()
-        raise
-
-
-def _joined(argument: str, names: Iterable[str]) -> str:
-    checked = [checks.text(f"launch: an entry of {argument}", name, error=ArgumentError) for name in names]
-    for name in checked:
-        if "," in name:
-            raise ArgumentError(f"launch: an entry of {argument} is {name!r}; give each name as an entry of its own")
-    return ",".join(checked)
-
-
-def attach(name: str) -> Sim:
-    """Join a daemon that is already running. It goes on when this client ends.
-
-    The first command makes this client its controller; until it ends, others that try get `LeaseHeld`.
-
-    Raises:
-        ArgumentError: No daemon can have that name.
-        UnknownDaemon: No daemon of that name is running; the message lists those that are.
-        ProtocolMismatch: The daemon is of another release.
-    """
-    return Sim(_core.Client(checks.text("attach: name", name, error=ArgumentError), lease=False), None)
-
-
 def _end(client: _core.Client, daemon: Daemon | None, name: str, owner: int, viewers: list[Viewer]) -> None:
     # A forked child must not end what belongs to its parent
     if os.getpid() != owner:
@@ -482,4 +364,4 @@ def _end(client: _core.Client, daemon: Daemon | None, name: str, owner: int, vie
     if daemon is None:
         _core.sweep(name)  # does nothing while the daemon lives
     else:
-        daemon.stop()
+        daemon.leave()

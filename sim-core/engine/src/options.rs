@@ -1,7 +1,9 @@
 //! How a model is run, and what keeps its worlds.
 
-use crate::backend::{Backend, BackendError, Faults, Lanes, Precision, available_memory, cpu, gpu};
-use crate::random::Draws;
+use crate::backend::{
+    BackendError, Backends, Faults, Groups, Lanes, Precision, available_memory, cpu, gpu,
+};
+use crate::random::{Draws, Numbering};
 use sim_core::batch::{Field, Layout};
 use sim_core::model::Model;
 use std::path::PathBuf;
@@ -64,6 +66,8 @@ pub struct Options {
     pub faults: Faults,
     /// What the draws of a world depend on.
     pub draws: Draws,
+    /// The number of the first world in draws: that of a group of worlds which others come before.
+    pub first_world: usize,
 }
 
 impl Default for Options {
@@ -79,6 +83,7 @@ impl Default for Options {
             fields: vec![Field::JointQ, Field::JointQd, Field::BodyQ],
             faults: Faults::default(),
             draws: Draws::default(),
+            first_world: 0,
         }
     }
 }
@@ -111,23 +116,31 @@ pub fn auto_takes_software() -> bool {
     std::env::var_os("TIGHTLOOP_AUTO_SOFTWARE").is_some_and(|value| value == "1")
 }
 
-/// What keeps the worlds, and why where that was left open.
-pub(crate) fn backend(
+/// What keeps the worlds of each of so many groups, and why where that was left open.
+pub(crate) fn backends(
     model: &Model,
     options: &Options,
+    count: usize,
     layout: &Layout,
-) -> Result<(Box<dyn Backend>, Option<String>), BackendError> {
-    let (worlds, precision, draws) = (options.worlds, options.precision, options.draws);
+) -> Result<(Backends, Option<String>), BackendError> {
+    let (worlds, precision) = (options.worlds, options.precision);
+    let numbering = Numbering {
+        draws: options.draws,
+        first_world: options.first_world,
+    };
+    let groups = Groups {
+        count,
+        worlds,
+        numbering,
+    };
     let on_gpu = |adapter: &Adapter, cache: &Option<PathBuf>| {
         let wanted = gpu::Wanted {
-            worlds,
             adapter,
             cache: cache.as_deref(),
-            draws,
             replay: options.replay,
             compile_limit: options.compile_limit,
         };
-        gpu::create(model, layout, &wanted)
+        gpu::create(model, groups, layout, &wanted)
     };
     let note = match &options.device {
         Device::Gpu { .. } if precision == Precision::F64 => return Err(BackendError::DoubleOnGpu),
@@ -136,7 +149,7 @@ pub(crate) fn backend(
         Device::Auto { .. } if precision == Precision::F64 => {
             Some("the processor: a GPU computes in single precision".to_owned())
         }
-        Device::Auto { .. } if worlds < AUTO_WORLDS => {
+        Device::Auto { .. } if groups.all() < AUTO_WORLDS => {
             Some(format!("the processor: fewer than {AUTO_WORLDS} worlds"))
         }
         Device::Auto { cache, software } => {
@@ -145,23 +158,15 @@ pub(crate) fn backend(
             match found.iter().find(will_do) {
                 None => Some("the processor: no GPU was found".to_owned()),
                 Some(info) => match on_gpu(&Adapter::Index(info.index), cache) {
-                    Ok(backend) => return Ok((backend, Some(format!("the GPU `{}`", info.name)))),
+                    Ok(made) => return Ok((made, Some(format!("the GPU `{}`", info.name)))),
                     Err(e) => Some(format!("the processor: `{}` failed: {e}", info.name)),
                 },
             }
         }
     };
     let threads = threads_of(options);
-    let backend = cpu::create(
-        model,
-        worlds,
-        precision,
-        options.lanes,
-        layout,
-        threads,
-        draws,
-    )?;
-    Ok((backend, note))
+    let made = cpu::create(model, groups, precision, options.lanes, layout, threads)?;
+    Ok((made, note))
 }
 
 /// Threads that are asked for: as many as there are cores if none are.
@@ -193,17 +198,21 @@ pub(crate) fn memory_of(model: &Model, options: &Options) -> u64 {
         .saturating_add(scratch)
 }
 
-/// Refuses what would not fit, before anything is taken.
-pub(crate) fn check_memory(model: &Model, options: &Options) -> Result<(), BackendError> {
+/// Refuses what would not fit in so many groups, before anything is taken.
+pub(crate) fn check_memory(
+    model: &Model,
+    options: &Options,
+    groups: usize,
+) -> Result<(), BackendError> {
     const MB: u64 = 1 << 20;
     // a system that does not say how much is free is not asked twice: the allocation itself will tell
     let Some(available) = available_memory() else {
         return Ok(());
     };
-    let needed = memory_of(model, options);
+    let needed = memory_of(model, options).saturating_mul(groups as u64);
     if needed > available {
         return Err(BackendError::Memory {
-            worlds: options.worlds,
+            worlds: options.worlds * groups,
             needed_mb: needed / MB,
             available_mb: available / MB,
         });

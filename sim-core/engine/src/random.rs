@@ -104,12 +104,31 @@ impl Draws {
             Draws::Seed => "seed",
         }
     }
+}
 
-    /// What stands for a world in its draws.
+/// What stands for each world in its draws.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Numbering {
+    /// Whether its number does.
+    pub draws: Draws,
+    /// The number of the first world: that of a group which others come before.
+    pub first_world: usize,
+}
+
+impl Numbering {
+    /// What stands for the world that comes so many places after the first.
     pub fn number(self, world: usize) -> u32 {
-        match self {
-            Draws::World => world as u32,
+        match self.draws {
+            Draws::World => (self.first_world + world) as u32,
             Draws::Seed => 0,
+        }
+    }
+
+    /// That of worlds which begin so many places later.
+    pub fn after(self, worlds: usize) -> Numbering {
+        Numbering {
+            first_world: self.first_world + worlds,
+            ..self
         }
     }
 }

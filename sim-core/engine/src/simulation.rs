@@ -5,7 +5,7 @@ pub use crate::options::{AUTO_WORLDS, Device, Options};
 pub use crate::random::Draws;
 
 use crate::backend::{Backend, BackendError, Values};
-use crate::options::{backend, check_memory, memory_of};
+use crate::options::{backends, check_memory, memory_of};
 use crate::snapshot::{self, Head, SnapshotError};
 use sim_core::batch::{Dtype, Field, Group, Layout};
 use sim_core::model::Model;
@@ -34,6 +34,20 @@ impl Simulation {
     /// Options that make no sense or that this machine cannot meet, memory included (checked before
     /// it is taken).
     pub fn new(model: Arc<Model>, options: &Options) -> Result<Simulation, BackendError> {
+        let mut made = Simulation::groups(model, options, 1)?;
+        Ok(made.pop().expect("one group was asked for"))
+    }
+
+    /// Groups of worlds, `options.worlds` in each, that share threads and step independently: group `g` has the worlds from number
+    /// `options.first_world + g * options.worlds` on, and the bits that these have where all are together.
+    ///
+    /// # Errors
+    /// As of [`Simulation::new`].
+    pub fn groups(
+        model: Arc<Model>,
+        options: &Options,
+        groups: usize,
+    ) -> Result<Vec<Simulation>, BackendError> {
         if options.worlds == 0 {
             return Err(BackendError::NoWorlds);
         }
@@ -50,19 +64,22 @@ impl Simulation {
                 return Err(BackendError::Bound { bound, value });
             }
         }
-        check_memory(&model, options)?;
+        check_memory(&model, options, groups)?;
         let layout = Simulation::layout_of(&model, options);
-        let (mut backend, device_note) = backend(&model, options, &layout)?;
-        backend.set_faults(options.faults);
-        Ok(Simulation {
-            model,
-            worlds: options.worlds,
-            precision: options.precision,
-            layout,
-            freezes_nan: options.faults.freezes_nan,
-            backend,
-            device_note,
-        })
+        let (made, device_note) = backends(&model, options, groups, &layout)?;
+        let with = |mut backend: Box<dyn Backend>| {
+            backend.set_faults(options.faults);
+            Simulation {
+                model: Arc::clone(&model),
+                worlds: options.worlds,
+                precision: options.precision,
+                layout: layout.clone(),
+                freezes_nan: options.faults.freezes_nan,
+                backend,
+                device_note: device_note.clone(),
+            }
+        };
+        Ok(made.into_iter().map(with).collect())
     }
 
     pub(crate) fn backend(&self) -> &dyn Backend {

@@ -8,12 +8,13 @@ use std::time::{Duration, Instant};
 use crate::command::{Call, Command};
 use crate::control::{Request, Response};
 use crate::controller::Controller;
+use crate::find::find;
 use crate::frame::Alive;
 use crate::journal::Journal;
 use crate::link::{ANSWER_MAX, Link, S, lock, malformed};
 use crate::liveness::Peer;
 use crate::observer::Observer;
-use crate::place::{Place, Presence, running};
+use crate::place::{Place, Presence};
 use crate::transport::{self, facts};
 use crate::{Description, Frame, Op, PROTOCOL_VERSION, ProtocolError};
 
@@ -46,49 +47,22 @@ pub struct Client {
 }
 
 impl Client {
-    /// Attaches to the daemon `name`, as an observer at first.
+    /// Attaches to the daemon `name`, or to the group of that name, as an observer at first.
     ///
     /// # Errors
-    /// [`ProtocolError::NoDaemon`], [`ProtocolError::ProtocolVersion`], [`ProtocolError::Handshake`],
-    /// [`ProtocolError::BadName`], [`ProtocolError::Interrupted`].
+    /// [`ProtocolError::NoDaemon`], [`ProtocolError::Grouped`], [`ProtocolError::ProtocolVersion`],
+    /// [`ProtocolError::Handshake`], [`ProtocolError::BadName`], [`ProtocolError::Interrupted`].
     pub fn attach(
         name: &str,
         options: &AttachOptions,
         hook: Hook<'_>,
     ) -> Result<Client, ProtocolError> {
-        let place = Place::new(options.root.as_deref(), name)?;
-        let deadline = Instant::now() + options.wait;
-        let beacon = loop {
-            match place.presence() {
-                Presence::Running(beacon) => break beacon,
-                Presence::Absent if Instant::now() >= deadline => {
-                    let names = running(Some(place.root()))?;
-                    let running = if names.is_empty() {
-                        "none".to_owned()
-                    } else {
-                        names.join(", ")
-                    };
-                    return Err(ProtocolError::NoDaemon {
-                        name: name.to_owned(),
-                        root: place.root().into(),
-                        running,
-                    });
-                }
-                _ => {}
-            }
-            if hook().is_break() {
-                return Err(ProtocolError::Interrupted);
-            }
-            std::thread::sleep(Duration::from_millis(2));
-        };
-        if beacon.protocol != PROTOCOL_VERSION {
-            let (daemon, client) = (beacon.protocol, PROTOCOL_VERSION);
-            return Err(ProtocolError::ProtocolVersion {
-                name: name.to_owned(),
-                daemon,
-                client,
-            });
+        let beacon = find(name, options, hook)?;
+        if beacon.groups > 1 {
+            let (name, groups) = (name.to_owned(), beacon.groups);
+            return Err(ProtocolError::Grouped { name, groups });
         }
+        let place = Place::new(options.root.as_deref(), name)?;
         let peer = Peer { place, beacon };
         let client = Client::handshake(peer.clone(), hook);
         // a daemon that ended meanwhile explains any failure better than the failure does
@@ -415,7 +389,7 @@ impl Client {
         self.link.peer.check()
     }
 
-    /// Ends the daemon and returns when it is gone and has left nothing behind.
+    /// Ends the daemon, with all of its groups, and returns when it is gone and has left nothing behind.
     ///
     /// # Errors
     /// [`ProtocolError::Timeout`], [`ProtocolError::Interrupted`].
@@ -428,7 +402,13 @@ impl Client {
             Err(error) => return Err(error),
         }
         let start = Instant::now();
-        while self.check_alive().is_ok() {
+        // the daemon goes after its groups
+        let (peer, daemon) = (&self.link.peer, self.link.peer.place.daemon()?);
+        let runs = |place: &Place| match place.presence() {
+            Presence::Running(beacon) => beacon.pid == peer.beacon.pid,
+            _ => false,
+        };
+        while self.check_alive().is_ok() || runs(&daemon) {
             if start.elapsed() > ANSWER_MAX {
                 return Err(self.link.peer.timeout(ANSWER_MAX));
             }

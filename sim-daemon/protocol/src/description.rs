@@ -17,8 +17,17 @@ pub struct Description {
     pub session: u64,
     /// Process of the daemon.
     pub pid: u32,
-    /// Number of worlds.
+    /// Number of worlds: of this group, where there are several.
     pub worlds: usize,
+    /// Which group this is.
+    #[serde(default)]
+    pub group: usize,
+    /// Groups of as many worlds that the daemon has, which step independently.
+    #[serde(default = "one")]
+    pub groups: usize,
+    /// The number of the first world among those of all groups; what is drawn depends on it.
+    #[serde(default)]
+    pub first_world: usize,
     /// Where the physics runs, such as "cpu".
     pub device: String,
     /// Name of the GPU, empty on the CPU.
@@ -27,7 +36,7 @@ pub struct Description {
     pub delivery: String,
     /// Precision of the run and of every real array of it: "f32" or "f64".
     pub precision: String,
-    /// Threads that a step uses.
+    /// Threads that a step uses; those of all groups are the same.
     pub threads: usize,
     /// Physics step [s].
     pub dt: f64,
@@ -179,8 +188,13 @@ impl Description {
         }
     }
 
-    /// Threads that a step keeps busy: one world cannot use more than one.
+    /// Threads that steps keep busy: one world cannot use more than one.
     pub fn busy_threads(&self) -> usize {
-        self.threads.min(self.worlds).max(1)
+        self.threads.min(self.worlds * self.groups).max(1)
     }
+}
+
+/// What a description has of groups that was recorded before there were any.
+fn one() -> usize {
+    1
 }

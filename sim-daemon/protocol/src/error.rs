@@ -37,6 +37,18 @@ pub enum ProtocolError {
         running: String,
     },
 
+    /// The daemon's worlds are in groups, and one of them is to be named.
+    #[error(
+        "daemon {name:?} has its worlds in {groups} groups, each with a name of its own; give one of {name}.0 to {name}.{}",
+        groups - 1
+    )]
+    Grouped {
+        /// The daemon's name.
+        name: String,
+        /// How many groups it has.
+        groups: usize,
+    },
+
     /// Another daemon has the name.
     #[error("daemon {name:?} is already running (pid {pid}); choose another name or stop it")]
     NameTaken {

@@ -16,6 +16,8 @@
 //!   after the heartbeats stopped. Reset, write, forward, snapshot and restore travel as commands too, so that they keep their order.
 //! - A recorder has a journal of its own, with the memory of it; the daemon never waits for it, and counts its entries, so that
 //!   what a slow recorder loses shows.
+//! - A daemon may have its worlds in groups, each with all of this for itself under a name of its own (`NAME.0`, `NAME.1`, …), in
+//!   lock-step with its own controller; the daemon's own name then only says how many there are.
 //! - A daemon's presence is a lock on `ROOT/NAME.lock` ([`place`], [`tenancy`]); its run is a random `session`.
 //! - Clients know no physics: the [`Description`] names what can be sent and what frames carry.
 //! - Every process here belongs to one user. A hostile process of that user is outside what shared memory can stop; against
@@ -31,6 +33,7 @@ mod controller;
 mod description;
 pub mod digest;
 mod error;
+mod find;
 mod frame;
 pub mod hash;
 pub mod header;
@@ -51,11 +54,12 @@ pub use client::{AttachOptions, Client, Hook, keep_waiting};
 pub use command::{Command, Values};
 pub use description::{Description, FieldInfo, InputInfo, ParamInfo, RobotRange};
 pub use error::ProtocolError;
+pub use find::find;
 pub use frame::{Entry, Frame, View};
 pub use header::{
     ALIGNMENT, CommandHeader, Dtype, FrameHeader, Line, Op, PROTOCOL_VERSION, RefusalKind, Row,
 };
 pub use journal::{Entry as JournalEntry, Journal, JournalHeader};
-pub use place::running;
+pub use place::{Beacon, running};
 pub use table::{ROWS_MAX, Table};
 pub use tenancy::{cleanup_after_death, sweep};

@@ -1,7 +1,8 @@
 //! Where a daemon lives in the file system: lock file, transport folder, prefix of its shared memory.
 //!
 //! ```text
-//! ROOT/NAME.lock            held by flock for the daemon's life; one line: protocol version, pid, session
+//! ROOT/NAME.lock            held by flock for the daemon's life; one line: protocol version, pid, session, how many groups if any
+//! ROOT/NAME.0.lock          of a daemon with groups: likewise for each of them, which has the rest below, too
 //! /dev/shm/tl<hash>/        nodes, services and sockets; `place`, locked too, names ROOT and NAME; hash is over both
 //! /dev/shm/tl<hash>_*       shared memory; each session has a prefix of its own
 //! ```
@@ -40,6 +41,8 @@ pub struct Beacon {
     pub pid: u32,
     /// Random number of the run.
     pub session: u64,
+    /// Groups of worlds that clients attach to, each under a name of its own ([`Place::group`]); 1 = there is only the daemon.
+    pub groups: usize,
 }
 
 /// State of a name.
@@ -72,7 +75,7 @@ pub fn default_root() -> PathBuf {
 }
 
 impl Place {
-    /// The place of `name` under `root`, or under [`default_root`].
+    /// The place of `name` under `root`, or under [`default_root`]; `NAME.0` is that of a group.
     ///
     /// # Errors
     /// [`ProtocolError::BadName`]; [`ProtocolError::Root`] when the folder cannot be made or belongs to somebody else.
@@ -81,13 +84,14 @@ impl Place {
             name: name.to_owned(),
             problem,
         };
-        if name.is_empty() {
+        let (daemon, _) = parts(name);
+        if daemon.is_empty() {
             return Err(bad("it is empty"));
         }
-        if name.len() > 64 {
+        if daemon.len() > 64 {
             return Err(bad("it is too long"));
         }
-        if !name
+        if !daemon
             .bytes()
             .all(|byte| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_')
         {
@@ -107,6 +111,27 @@ impl Place {
     /// The name.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Whether it is the place of a group, not of a daemon.
+    pub fn is_group(&self) -> bool {
+        parts(&self.name).1.is_some()
+    }
+
+    /// The place of a group of this daemon.
+    ///
+    /// # Errors
+    /// As of [`Place::new`].
+    pub fn group(&self, number: usize) -> Result<Place, ProtocolError> {
+        Place::new(Some(&self.root), &format!("{}.{number}", self.name))
+    }
+
+    /// The place of the daemon whose group this is; itself if it is none.
+    ///
+    /// # Errors
+    /// As of [`Place::new`].
+    pub fn daemon(&self) -> Result<Place, ProtocolError> {
+        Place::new(Some(&self.root), parts(&self.name).0)
     }
 
     /// The root folder, absolute.
@@ -186,8 +211,18 @@ impl Place {
 /// [`ProtocolError::Root`].
 pub fn running(root: Option<&Path>) -> Result<Vec<String>, ProtocolError> {
     let mut names = names_with_lock(root)?;
-    names.retain(|place| matches!(place.presence(), Presence::Running(_)));
+    names.retain(|place| !place.is_group() && matches!(place.presence(), Presence::Running(_)));
     Ok(names.into_iter().map(|place| place.name).collect())
+}
+
+/// The name of a daemon, and the number of its group where that has one.
+fn parts(name: &str) -> (&str, Option<usize>) {
+    let group = name.rsplit_once('.').and_then(|(daemon, number)| {
+        let group: usize = number.parse().ok()?;
+        // one way to write each number
+        (group.to_string() == number).then_some((daemon, Some(group)))
+    });
+    group.unwrap_or((name, None))
 }
 
 pub(crate) fn names_with_lock(root: Option<&Path>) -> Result<Vec<Place>, ProtocolError> {
@@ -223,6 +258,7 @@ fn read_beacon(file: &mut File) -> Option<Beacon> {
         protocol: protocol.parse().ok()?,
         pid: pid.parse().ok()?,
         session: u64::from_str_radix(session, 16).ok()?,
+        groups: words.next().map_or(Some(1), |word| word.parse().ok())?,
     })
 }
 
@@ -253,7 +289,8 @@ mod tests {
 
     #[test]
     fn names_with_slashes_dots_or_nothing_are_refused() {
-        for name in ["", "a/b", "..", "a.lock", "ä", &"x".repeat(65)] {
+        let names = ["", "a/b", "..", "a.lock", "ä", &"x".repeat(65)];
+        for name in [&names[..], &[".0", "a.", "a.-1", "a.01", "a.0.0", "a/b.0"]].concat() {
             assert!(
                 matches!(Place::new(None, name), Err(ProtocolError::BadName { .. })),
                 "{name:?}"

@@ -88,13 +88,18 @@ impl Tenancy {
         }))
     }
 
-    /// Tells clients who we are; until then they see [`Presence::Starting`].
+    /// Tells clients who we are; until then they see [`Presence::Starting`]. A daemon of several `groups` has a tenancy for
+    /// each besides its own.
     ///
     /// # Errors
     /// [`ProtocolError::Root`] when the lock file cannot be written.
-    pub fn announce(&mut self, session: u64) -> Result<(), ProtocolError> {
+    pub fn announce(&mut self, session: u64, groups: usize) -> Result<(), ProtocolError> {
         let pid = std::process::id();
-        let line = format!("tightloop {PROTOCOL_VERSION} {pid} {session:016x}\n");
+        let groups = match groups {
+            1 => String::new(),
+            _ => format!(" {groups}"),
+        };
+        let line = format!("tightloop {PROTOCOL_VERSION} {pid} {session:016x}{groups}\n");
         self.file
             .rewind()
             .and_then(|()| self.file.write_all(line.as_bytes()))
@@ -144,7 +149,7 @@ fn mark(place: &Place) -> Result<File, ProtocolError> {
     write().map_err(|error| root_error(&path, &error))
 }
 
-/// Removes what a dead daemon left. Returns whether there is nothing left, that is, false while one runs.
+/// Removes what a dead daemon left, its groups included. Returns whether there is nothing left, that is, false while one runs.
 ///
 /// # Errors
 /// [`ProtocolError::BadName`], [`ProtocolError::Root`].
@@ -152,8 +157,14 @@ pub fn cleanup_after_death(root: Option<&Path>, name: &str) -> Result<bool, Prot
     let place = Place::new(root, name)?;
     let start = Instant::now();
     loop {
-        if Tenancy::try_take(&place)?.is_some() {
-            return Ok(true); // dropping it has cleaned
+        if let Some(tenancy) = Tenancy::try_take(&place)? {
+            for group in names_with_lock(root)? {
+                if group.is_group() && group.daemon()? == place {
+                    drop(Tenancy::try_take(&group)?);
+                }
+            }
+            drop(tenancy); // which has cleaned
+            return Ok(true);
         }
         // a client's look at the lock is no daemon, nor is somebody else's sweep: that one we wait for
         let runs = matches!(place.presence(), Presence::Running(_));
@@ -235,11 +246,12 @@ mod tests {
         let place = Place::new(Some(&root), "one").unwrap();
         let mut first = Tenancy::take(&place).unwrap();
         assert_eq!(place.presence(), Presence::Starting);
-        first.announce(7).unwrap();
+        first.announce(7, 1).unwrap();
         let beacon = Beacon {
             protocol: PROTOCOL_VERSION,
             pid: std::process::id(),
             session: 7,
+            groups: 1,
         };
         assert_eq!(place.presence(), Presence::Running(beacon));
         assert_eq!(running(Some(&root)).unwrap(), ["one"]);
@@ -249,6 +261,36 @@ mod tests {
         drop(first);
         assert_eq!(place.presence(), Presence::Absent);
         assert!(!Path::new(SHARED_MEMORY).join(place.stem()).exists());
+        assert_eq!(fs::read_dir(&root).unwrap().count(), 0);
+        fs::remove_dir(&root).unwrap();
+    }
+
+    #[test]
+    fn a_daemon_with_groups_is_one_name_and_what_its_groups_left_goes_with_it() {
+        let root = root("grouped");
+        let place = Place::new(Some(&root), "many").unwrap();
+        let groups = [0, 1].map(|group| place.group(group).unwrap());
+        assert_eq!((groups[1].name(), groups[1].is_group()), ("many.1", true));
+        assert_eq!(groups[1].daemon().unwrap(), place);
+        let mut daemon = Tenancy::take(&place).unwrap();
+        let held = groups.each_ref().map(|group| {
+            let mut tenancy = Tenancy::take(group).unwrap();
+            tenancy.announce(7, 1).unwrap();
+            tenancy
+        });
+        assert!(running(Some(&root)).unwrap().is_empty());
+        daemon.announce(7, 2).unwrap();
+        assert_eq!(running(Some(&root)).unwrap(), ["many"]);
+        assert!(
+            matches!(place.presence(), Presence::Running(beacon) if beacon.groups == 2),
+            "{:?}",
+            place.presence()
+        );
+        drop((daemon, held));
+        for group in &groups {
+            fs::write(group.lock_path(), "tightloop 1 1 0000000000000001\n").unwrap();
+        }
+        assert!(cleanup_after_death(Some(&root), "many").unwrap());
         assert_eq!(fs::read_dir(&root).unwrap().count(), 0);
         fs::remove_dir(&root).unwrap();
     }

@@ -105,6 +105,7 @@ impl Run {
             device,
             compile_limit: compile_limit()?,
             worlds: told.worlds,
+            first_world: told.first_world,
             precision: match told.precision.as_str() {
                 "f64" => Precision::F64,
                 _ => Precision::F32,

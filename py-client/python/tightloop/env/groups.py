@@ -1,13 +1,22 @@
-"""Worlds in groups, each in a daemon of its own: a policy works on one group while the others step."""
+"""Worlds in groups that step independently: a policy works on one group while the others step."""
 
 from __future__ import annotations
 
-import os
+from inspect import Parameter, signature
 from typing import Any
 
+import tightloop as tl
+from tightloop import checks
+from tightloop.env.registry import make_task
+from tightloop.env.start import options_of
 from tightloop.env.task import Task
 from tightloop.env.vector import VectorEnv
 from tightloop.errors import ArgumentError
+
+#: What `VectorEnv` takes by name; the rest is the task's.
+_OF_ENVIRONMENTS = {
+    name for name, parameter in signature(VectorEnv).parameters.items() if parameter.kind is Parameter.KEYWORD_ONLY
+}
 
 
 def make_groups(
@@ -15,12 +24,14 @@ def make_groups(
     num_envs: int,
     groups: int = 2,
     *,
+    device: str = "auto",
+    precision: str | None = None,
     threads: int | None = None,
     **options: Any,
 ) -> list[VectorEnv]:
-    """Environments whose worlds are, together, those of one `VectorEnv` of ``num_envs``.
+    """Environments whose worlds are, together, those of one `VectorEnv` of ``num_envs``, kept by one daemon.
 
-    With the same seed each world does what it does there, whichever group it is in.
+    With the same seed each world does what it does there, whichever group it is in. The daemon ends with the last one.
 
     >>> groups = make_groups("FrankaReach", 4096)
     >>> for group in groups:
@@ -35,23 +46,25 @@ def make_groups(
         task: As of `VectorEnv`.
         num_envs: How many worlds all groups have.
         groups: How many groups, which divides ``num_envs``.
-        threads: Most threads a group's step may use; the cores are shared out if left out.
+        device: As of `VectorEnv`.
+        precision: As of `VectorEnv`.
+        threads: Most threads that steps may use, those of all groups together; all cores if left out.
         **options: As of `VectorEnv`.
 
     Raises:
-        ArgumentError: The worlds cannot be shared out evenly.
+        ArgumentError: The worlds cannot be shared out evenly. Other errors are those of `VectorEnv`.
     """
+    num_envs = checks.integer("make_groups: num_envs", num_envs, error=ArgumentError)
     if groups < 1 or num_envs % groups:
         raise ArgumentError(f"make_groups: {num_envs} environments cannot be shared out evenly among {groups} groups")
-    each = num_envs // groups
-    cores = len(os.sched_getaffinity(0))
-    own = max(1, cores // groups) if threads is None else threads
-    made: list[VectorEnv] = []
+    if "daemon" in options:
+        raise ArgumentError("make_groups: daemon is not taken, since the groups have one of their own; leave it out")
+    of_task = {name: options.pop(name) for name in set(options) - _OF_ENVIRONMENTS}
+    made = make_task(task, of_task)
+    own = options_of(made, list(made.controls()), device=device, precision=precision, threads=threads)
+    sims = tl.launch(made.scene(), worlds=num_envs, groups=groups, **own)
     try:
-        for group in range(groups):
-            made.append(VectorEnv(task, each, first_env=group * each, threads=own, **options))
+        return [VectorEnv(made, daemon=sim, first_env=group * sim.worlds, **options) for group, sim in enumerate(sims)]
     except BaseException:
-        for env in made:
-            env.close()
+        sims.close()
         raise
-    return made

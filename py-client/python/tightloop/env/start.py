@@ -24,7 +24,7 @@ def begin(
     controls: Sequence[Control],
     worlds: int | None,
     *,
-    daemon: str | None,
+    daemon: str | tl.Sim | None,
     device: str,
     precision: str | None,
     threads: int | None,
@@ -35,29 +35,39 @@ def begin(
     Raises:
         ArgumentError: The daemon runs something else, or another number of worlds.
     """
-    scene, read = task.scene(), fields_of(task, controls)
+    scene = task.scene()
     if daemon is None:
-        return scene, tl.launch(
-            scene,
-            worlds=1 if worlds is None else worlds,
-            fields=tuple(dict.fromkeys([*read, *fields])),
-            device=device,
-            precision=precision or "f32",
-            threads=threads,
-            **DAEMON_OPTIONS | task.launch_options,
-        )
-    if device != "auto" or threads is not None:
-        raise ArgumentError(f"device and threads are those of the daemon `{daemon}`; leave them out")
-    sim = tl.attach(daemon)
+        options = options_of(task, controls, device=device, precision=precision, threads=threads, fields=fields)
+        return scene, tl.launch(scene, worlds=1 if worlds is None else worlds, **options)
+    sim = tl.attach(daemon) if isinstance(daemon, str) else daemon
     try:
-        _check(task, scene, sim, read)
+        if isinstance(sim, tl.Groups):
+            raise ArgumentError(f"daemon `{sim.name}` has its worlds in {len(sim)} groups; join `{sim[0].name}`, …")
+        if device != "auto" or threads is not None:
+            raise ArgumentError(f"device and threads are those of the daemon `{sim.name}`; leave them out")
+        _check(task, scene, sim, fields_of(task, controls))
         for name, given, own in (("precision", precision, sim.precision), ("num_envs", worlds, sim.worlds)):
             if given is not None and given != own:
-                raise ArgumentError(f"{name} is {given}, and daemon `{daemon}` has {own}; leave it out")
+                raise ArgumentError(f"{name} is {given}, and daemon `{sim.name}` has {own}; leave it out")
     except ArgumentError:
         sim.close()
         raise
     return scene, sim
+
+
+def options_of(
+    task: Task,
+    controls: Sequence[Control],
+    *,
+    device: str,
+    precision: str | None,
+    threads: int | None,
+    fields: Sequence[str] = (),
+) -> dict[str, Any]:
+    """What `launch` is told for a task, but for the worlds."""
+    read = tuple(dict.fromkeys([*fields_of(task, controls), *fields]))
+    own = {"fields": read, "device": device, "precision": precision or "f32", "threads": threads}
+    return own | DAEMON_OPTIONS | task.launch_options
 
 
 def _check(task: Task, scene: tl.Scene, sim: tl.Sim, fields: tuple[str, ...]) -> None:

@@ -25,6 +25,7 @@ from tightloop.env.slots import Slot, Slots
 from tightloop.env.start import begin
 from tightloop.env.task import Task, episode_steps
 from tightloop.errors import ArgumentError, CommandRefused
+from tightloop.sim import Sim
 
 #: Bits of ``status`` of a world that is frozen: no longer finite, or beyond the bounds of the run.
 FROZEN = 1 | 8
@@ -66,7 +67,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         precision: str | None = None,
         threads: int | None = None,
         max_episode_steps: float | None = None,
-        daemon: str | None = None,
+        daemon: str | Sim | None = None,
         first_env: int = 0,
         render_mode: str | None = None,
         **options: Any,
@@ -87,7 +88,8 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             max_episode_steps: Steps after which an episode is truncated, ``math.inf`` for never; the task's if left
                 out.
             daemon: Name of a running daemon to join, which ``python -m tightloop.env serve`` started for that task. It
-                goes on when this process ends, however it ends. None launches one that ends with this process.
+                goes on when this process ends, however it ends. Or a simulation of your own, such as one of `Groups`,
+                which `close` then closes. None launches one that ends with this process.
             first_env: Number of the first world among those that ``reset(seed=…)`` counts, for groups of environments.
             render_mode: ``"rgb_array"`` for `render`, ``"human"`` for a page in the browser, where each step takes its
                 time; both need ``pip install "tightloop[view]"``.

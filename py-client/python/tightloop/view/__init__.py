@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tightloop.view.cameras import Camera
-    from tightloop.view.film import Film, film
+    from tightloop.view.films import Film, film
     from tightloop.view.picture import Picture
 
-_HOMES = {"Camera": "cameras", "Film": "film", "Picture": "picture", "film": "film"}
+_HOMES = {"Camera": "cameras", "Film": "films", "Picture": "picture", "film": "films"}
 
 __all__ = ["Camera", "Film", "Picture", "film"]
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -31,29 +32,51 @@ def read(path: Path) -> Surface:
         Unreadable: Why it cannot be shown; other exceptions are of broken files, and the library's.
     """
     needs.check("collada")
-    from collada import Collada
-    from collada.common import DaeError
-
     content = path.read_bytes()
     if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
         # entities can stand for more text than any memory holds
         raise Unreadable("it has a document type; delete <!DOCTYPE …>")
-    file = Collada(
-        BytesIO(content),
-        ignore=[DaeError],
-        aux_file_loader=lambda name: (path.parent / name).read_bytes(),
-    )
+    file, notes = _loaded(content, path.parent)
     asset: Any = file.assetInfo
     meter = 1.0 if asset is None or asset.unitmeter is None else float(asset.unitmeter)
     if not 0 < meter < np.inf:
         raise Unreadable("<unit meter> is no positive number; write how many metres a unit has")
     axis = "Y_UP" if asset is None else str(asset.upaxis)
-    notes = []
     if axis != "Z_UP":
         notes.append(f"is turned from {axis} to z up, as its file says; RViz leaves such files unturned")
     frame = meter * _TURNS[axis]
     pieces = [piece for bound in _bound(file) for piece in _pieces(bound, frame)]
     return joined(pieces, notes)
+
+
+def _loaded(content: bytes, folder: Path) -> tuple[Any, list[str]]:
+    """The file as the library has it, and what there is to say of it."""
+    from collada import Collada
+    from collada.common import DaeBrokenRefError, DaeError
+
+    def image(name: str) -> bytes:
+        try:
+            return (folder / name).read_bytes()
+        except OSError as error:
+            raise DaeBrokenRefError(str(error)) from error
+
+    def load(content: bytes) -> Any:
+        return Collada(BytesIO(content), ignore=[DaeError], aux_file_loader=image)
+
+    file = load(content)
+    if not file.errors:
+        return file, []
+    known = {f"#{material.id}" for material in file.materials}
+    root, lost = ElementTree.fromstring(content), 0
+    for parent in root.iter():
+        for child in list(parent):
+            if str(child.tag).endswith("}instance_material") and child.get("target") not in known:
+                parent.remove(child)
+                lost += 1
+    if not lost:
+        return file, []
+    # the library leaves out what is of a material that is broken, such as one whose image is not named
+    return load(ElementTree.tostring(root)), ["names materials that are broken or not there, and is shown without them"]
 
 
 def _bound(file: Any) -> Iterator[Any]:
@@ -64,11 +87,9 @@ def _bound(file: Any) -> Iterator[Any]:
         return
     yield from file.scene.objects("geometry")
     for controller in file.scene.objects("controller"):
-        # as it lies in the file, with its bind shape
-        skin = controller.skin if hasattr(controller, "skin") else None
-        if skin is not None:
-            matrix = np.dot(controller.matrix, np.asarray(skin.bind_shape_matrix).reshape(4, 4))
-            yield skin.geometry.bind(matrix, controller.materialnodebysymbol)
+        # a skin as it lies in the file; a morph has no geometry of its own
+        if hasattr(controller, "geometry"):
+            yield controller.geometry
 
 
 def _pieces(bound: Any, frame: Any) -> Iterator[Surface]:

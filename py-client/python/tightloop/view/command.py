@@ -28,7 +28,9 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument("target", metavar="NAME|FILE.tlrec", help="a daemon's name, or a recording")
     made.add_argument("--port", type=_port, default=8080, help="port of the page; the next free one if it is taken")
-    made.add_argument("--host", default="127.0.0.1", help="address to listen on; 0.0.0.0 lets other machines drive, too")
+    made.add_argument(
+        "--host", default="127.0.0.1", help="address to listen on; 0.0.0.0 lets other machines drive, too"
+    )
     made.add_argument("--worlds", type=_worlds, default=256, help=f"most worlds to show, up to {_WORLDS_MAX}")
     made.add_argument("--open", action="store_true", help="open the page in this machine's browser")
     made.add_argument("--parent", type=int, help=argparse.SUPPRESS)

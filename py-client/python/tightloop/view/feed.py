@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from tightloop.sim import attach
+from tightloop.launching import attach
 from tightloop.view.pilot import Pilot
 from tightloop.view.player import Player
 from tightloop.view.source import CONTACT_FIELDS, Live, Recorded
@@ -39,7 +39,7 @@ class LiveFeed:
         self._source = Live(name, worlds, FIELDS)
         self.info: dict[str, Any] = self._source.info
         self.worlds: int = self._source.worlds
-        self.driver = Pilot(attach(name), lambda: self._newest)
+        self.driver = Pilot(attach(self.info["name"]), lambda: self._newest)
 
     def poll(self, timeout: float) -> Any:
         """The newest frame, None if none came in that time [s].

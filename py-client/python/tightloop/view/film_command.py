@@ -50,7 +50,7 @@ def main(arguments: list[str]) -> int:
     given = parser().parse_args(arguments)
     shows = sys.stderr.isatty()
     try:
-        from tightloop.view.film import film
+        from tightloop.view.films import film
 
         made = film(
             given.source,

@@ -48,14 +48,13 @@ class Grip:
 
 
 def grip(
-    dynamics: Dynamics, world: int, body: int, ends: NDArray[np.float64], joint_q: Array, strength: float
+    dynamics: Dynamics, place: tuple[int, int], ends: NDArray[np.float64], joint_q: Array, strength: float
 ) -> Grip:
     """A spring that suits what a body moves with it.
 
     Args:
         dynamics: Of the scene.
-        world: The body's world.
-        body: Its place in ``body_names``.
+        place: The body's world, and its place in ``body_names``.
         ends: Where it is held and where to [m], shape ``(2, 3)``.
         joint_q: Positions of that world, shape ``(coords,)``.
         strength: How much stiffer than that.
@@ -63,12 +62,11 @@ def grip(
     Raises:
         CommandRefused: The body is fixed.
     """
+    world, body = place
     jacobian = dynamics.body_jacobian(joint_q)[body, :3]
     # how a force accelerates the body, the mean over directions: J M⁻¹ Jᵀ
     mobility = np.trace(jacobian @ np.linalg.solve(dynamics.mass_matrix(joint_q), jacobian.T)) / 3
     if mobility < _MOBILITY_LEAST:
         raise CommandRefused(f"body `{dynamics.body_names[body]}` is fixed; pull one that moves")
     mass = 1 / mobility
-    return Grip(
-        world, body, ends, strength * mass * _FREQUENCY**2, 2 * np.sqrt(strength) * mass * _FREQUENCY
-    )
+    return Grip(world, body, ends, strength * mass * _FREQUENCY**2, 2 * np.sqrt(strength) * mass * _FREQUENCY)

@@ -13,10 +13,10 @@ import numpy as np
 import viser
 
 from tightloop.view.cameras import Camera, camera
-from tightloop.view.feed import CONTACTS
 from tightloop.view.looks import Kind, Looks
 from tightloop.view.overlay import Overlay
 from tightloop.view.parts import Parts
+from tightloop.view.source import CONTACT_FIELDS
 from tightloop.view.stage import Stage
 
 # Of the browser's window, which is not known yet.
@@ -58,13 +58,13 @@ class Html:
 
     def add(self, shown: Any, chosen: Sequence[int]) -> None:
         """Add a frame, of these worlds."""
-        there = [name for name in ("body_q", "status", *CONTACTS) if hasattr(shown, name)]
+        there = [name for name in ("body_q", "status", *CONTACT_FIELDS) if hasattr(shown, name)]
         own = SimpleNamespace(**{name: np.asarray(getattr(shown, name))[list(chosen)] for name in there})
         if self._stage is None:
             self._begin(own.body_q)
         assert self._stage is not None and self._overlay is not None
         self._stage.show(own.body_q, getattr(own, "status", np.zeros(len(own.body_q), int)))
-        if all(hasattr(own, name) for name in CONTACTS):
+        if all(hasattr(own, name) for name in CONTACT_FIELDS):
             self._overlay.show_contacts(own, range(len(own.body_q)))
         if self._serializer is None:
             self._serializer = self._server.get_scene_serializer()
@@ -81,7 +81,7 @@ class Html:
         scene = self._server.scene
         self._stage = Stage(self._server, self._parts, len(body_q), self._looks, body_q[0])
         box, offsets = self._stage.box, self._stage.offsets
-        self._overlay = Overlay(self._server, self._parts, self._looks, box, offsets, self._bodies)
+        self._overlay = Overlay(self._server, self._parts, self._looks, self._stage, bodies=self._bodies)
         scene.set_up_direction("+z")
         scene.add_grid(
             "/ground", infinite_grid=True, cell_size=0.1, section_size=1.0, fade_distance=40.0, shadow_opacity=0.2

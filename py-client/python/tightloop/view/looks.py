@@ -31,7 +31,7 @@ class Looks:
     ghosts: bool = False
     frames: bool = False
     contacts: Contacts = "off"
-    force_scale: float = 0.01
+    force_scale: float = 0.02
     follow: bool = False
     _changed: threading.Event = field(default_factory=threading.Event, repr=False)
 

@@ -13,13 +13,14 @@ from tightloop.view.looks import Looks
 from tightloop.view.parts import Part
 from tightloop.view.poses import Array, wxyz
 from tightloop.view.skins import skins
+from tightloop.view.stage import Stage
 
 _POINT_COLOR = (250, 190, 30)
 _FORCE_COLOR = (230, 60, 40)
 _GHOST_COLOR = (60, 170, 240)
 _POINT_SIZE = 0.008
 # Longest arrow [m]: the first millisecond of an impact would fill the page.
-_ARROW_MAX = 1.0
+_ARROW_MAX = 0.5
 # Axes of a body are that part of the size of a world.
 _AXES_PART = 0.05
 
@@ -31,16 +32,16 @@ class Overlay:
         server: Where it is shown.
         parts: What a world looks like.
         looks: What the one who looks chose.
-        box: The box around one world [m], shape ``(2, 3)``.
-        offsets: Where each world stands [m], shape ``(worlds, 3)``.
+        stage: Where the worlds stand.
         bodies: Number of bodies of a world.
     """
 
     def __init__(
-        self, server: viser.ViserServer, parts: Iterable[Part], looks: Looks, box: Array, offsets: Array, bodies: int
+        self, server: viser.ViserServer, parts: Iterable[Part], looks: Looks, stage: Stage, *, bodies: int
     ) -> None:
         self._looks = looks
-        self._offsets = offsets
+        self._offsets = stage.offsets
+        box = stage.box
         scene = server.scene
         self._points = scene.add_point_cloud(
             "/contacts/points",

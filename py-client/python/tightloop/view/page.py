@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,8 @@ from tightloop.view.stage import Stage
 
 # A camera that goes along closes a tenth of its distance to where it should be in a frame: no jerks.
 _FOLLOW_PART = 0.1
+# Less than that it stays where it is [m].
+_FOLLOW_LEAST = 1e-5
 # The panel covers the right of the page.
 _PANEL_PART = 0.25
 
@@ -48,16 +49,12 @@ class Page:
         self._grip: Grip | None = None
         self._centre: NDArray[np.float64] | None = None
         looked = parts(info["scene"], info["scene_folder"], info["body_names"])
-        notes = [*info.get("notes", ()), *looked.notes]
+        notes = [str(note) for note in (*info.get("notes", ()), *looked.notes)]
         self._dynamics, self._driven = _dynamics(info, notes)
         body_q = np.asarray(first.body_q)
         self._stage = Stage(server, looked.parts, feed.worlds, self.looks, body_q[0])
-        self._overlay = Overlay(
-            server, looked.parts, self.looks, self._stage.box, self._stage.offsets, len(info["body_names"])
-        )
-        self._panel = Panel(
-            server, info, feed.worlds, self.looks, feed.driver, self._driven, self.aim, [str(note) for note in notes]
-        )
+        self._overlay = Overlay(server, looked.parts, self.looks, self._stage, bodies=len(info["body_names"]))
+        self._panel = Panel(server, feed, self.looks, driven=self._driven, aim=self.aim, notes=notes)
         self._stage.on_click(lambda world, _: self._panel.follow(world))
         if isinstance(feed.driver, Pilot) and feed.driver.can_push and self._dynamics is not None:
             self._stage.on_grab(self._pull)
@@ -125,14 +122,16 @@ class Page:
         if not len(body_q):
             return
         centre = body_q[:, :3].mean(axis=0, dtype=np.float64) + self._stage.offsets[self.looks.world]
-        before = self._centre
-        self._centre = centre if before is None else before + _FOLLOW_PART * (centre - before)
-        if before is None or np.allclose(self._centre, before, atol=1e-5):
+        if self._centre is None:
+            self._centre = centre
+        moved = _FOLLOW_PART * (centre - self._centre)
+        if np.linalg.norm(moved) < _FOLLOW_LEAST:
             return
+        self._centre = self._centre + moved
         for client in self._server.get_clients().values():
             with client.atomic():
-                client.camera.position = client.camera.position + (self._centre - before)
-                client.camera.look_at = client.camera.look_at + (self._centre - before)
+                client.camera.position = client.camera.position + moved
+                client.camera.look_at = client.camera.look_at + moved
 
     def _ghost(self, shown: Any, world: int) -> Array | None:
         if not self.looks.ghosts or self._dynamics is None or not self._driven:
@@ -151,7 +150,7 @@ class Page:
                 self._grip = None
             elif self._grip is None or (self._grip.world, self._grip.body) != (world, body):
                 joint_q = np.asarray(self._shown.joint_q)[world]
-                self._grip = grip(self._dynamics, world, body, ends, joint_q, self._panel.strength)
+                self._grip = grip(self._dynamics, (world, body), ends, joint_q, self._panel.strength)
             else:
                 self._grip = self._grip.towards(ends)
             driver.hold(self._grip)
@@ -159,7 +158,7 @@ class Page:
             driver.problem = str(problem)
 
 
-def _dynamics(info: dict[str, Any], notes: list[Any]) -> tuple[Dynamics | None, list[Joint]]:
+def _dynamics(info: dict[str, Any], notes: list[str]) -> tuple[Dynamics | None, list[Joint]]:
     """The scene's dynamics and driven joints; without the robots' files, a note and nothing."""
     try:
         return Dynamics.of_daemon(info), joints(info)

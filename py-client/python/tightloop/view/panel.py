@@ -11,6 +11,7 @@ import numpy as np
 import viser
 
 from tightloop.view.cameras import PRESETS
+from tightloop.view.feed import Feed
 from tightloop.view.joints import Joint
 from tightloop.view.looks import Looks
 from tightloop.view.pilot import Pilot
@@ -23,6 +24,8 @@ _STATUS = {1: "not finite, frozen", 2: "solver out of iterations", 4: "contacts 
 # How often text and plots are sent [s].
 _PERIOD = 0.1
 _RATE_SECONDS = 2.0
+# More sliders than that are folded away at first.
+_OPEN_JOINTS = 12
 
 
 class Panel:
@@ -30,10 +33,8 @@ class Panel:
 
     Args:
         server: Whose page.
-        info: What the daemon tells about itself.
-        worlds: How many worlds can be seen.
+        feed: What it shows, and whom the controls ask to play.
         looks: What the controls write.
-        driver: Whom they ask to play.
         driven: Joints that get sliders.
         aim: Called with a preset's name when one is chosen.
         notes: What is to be told about the scene's looks.
@@ -42,19 +43,18 @@ class Panel:
     def __init__(
         self,
         server: viser.ViserServer,
-        info: dict[str, Any],
-        worlds: int,
+        feed: Feed,
         looks: Looks,
-        driver: Pilot | Player,
+        *,
         driven: list[Joint],
         aim: Callable[[str], None],
         notes: list[str],
     ) -> None:
         self._gui = server.gui
-        self._info = info
-        self._worlds = worlds
+        self._info = info = feed.info
+        self._worlds = worlds = feed.worlds
         self._looks = looks
-        self._driver = driver
+        self._driver = driver = feed.driver
         self._plots: list[Plot] = []
         self._shown_at: deque[float] = deque(maxlen=400)
         self._told_at = 0.0
@@ -67,7 +67,7 @@ class Panel:
             self._add_looks(aim)
         self._sliders = None
         if isinstance(driver, Pilot):
-            with self._gui.add_folder("Joint targets", expand_by_default=0 < len(driven) <= 12):  # noqa: PLR2004
+            with self._gui.add_folder("Joint targets", expand_by_default=0 < len(driven) <= _OPEN_JOINTS):
                 self._sliders = Sliders(self._gui, driven, driver, looks, worlds)
             with self._gui.add_folder("Push", expand_by_default=False):
                 self._add_push(driver)
@@ -139,9 +139,9 @@ class Panel:
 
     def _add_time(self) -> None:
         driver = self._driver
-        self._play = self._gui.add_button("Play", color="green", icon="player-play")
-        step = self._gui.add_button("Step", icon="player-skip-forward")
-        reset = self._gui.add_button("Reset all" if driver.live else "Restart", icon="player-skip-back")
+        self._play = self._gui.add_button("Play", color="green")
+        step = self._gui.add_button("Step")
+        reset = self._gui.add_button("Reset all" if driver.live else "Restart")
         speed = self._gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1×")
         self._of_driver: list[Any] = [self._play, step, reset]
         self._play.on_click(lambda _: driver.pause() if driver.playing else driver.play())
@@ -159,7 +159,12 @@ class Panel:
     def _add_looks(self, aim: Callable[[str], None]) -> None:
         gui, looks = self._gui, self._looks
         camera = gui.add_dropdown("Camera", tuple(PRESETS), initial_value="three-quarter")
-        camera.on_update(lambda _: (looks.choose(follow=camera.value == "follow"), aim(camera.value)))
+
+        def choose_camera(_: Any) -> None:
+            looks.choose(follow=camera.value == "follow")
+            aim(camera.value)
+
+        camera.on_update(choose_camera)
         world = self._world = gui.add_slider(
             "World", 0, max(self._worlds - 1, 1), 1, looks.world, visible=self._worlds > 1
         )

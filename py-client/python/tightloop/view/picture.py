@@ -178,12 +178,16 @@ class Picture:
         """The box around one world, where each stands, and how high the floor is: as the first picture had it."""
         key = (*chosen.tolist(),)
         if key not in self._stands:
-            box = grid.extent(self._parts, body_q[chosen[0]])
+            first = next((world for world in chosen if np.isfinite(body_q[world]).all()), None)
+            # nowhere is no place to keep in mind
+            box = grid.extent(() if first is None else self._parts, body_q[0 if first is None else first])
             offsets = grid.offsets(len(chosen), box).astype(float)
             # what stands on the floor may have its rim below it by a rounding
             lowest = float(box[0, 2])
             own = [floor for floor in self._floors if np.isfinite(floor)]
             floor = max(own) if own else (lowest if lowest < -1e-3 else 0.0)
+            if first is None:
+                return box, offsets, floor
             self._stands[key] = box, offsets, floor
         return self._stands[key]
 

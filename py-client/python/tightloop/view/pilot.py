@@ -196,7 +196,9 @@ class Pilot:
         shown = np.asarray(self._newest().joint_target_q)
         if everywhere:
             held = self._targets
-            return (shown if held is None else np.atleast_2d(held))[world if held is None or held.ndim == 2 else 0].copy()
+            return (shown if held is None else np.atleast_2d(held))[
+                world if held is None or held.ndim == 2 else 0
+            ].copy()
         if self._targets is not None:
             return np.broadcast_to(self._targets, (self._sim.worlds, shown.shape[1])).copy()
         if len(shown) == self._sim.worlds:

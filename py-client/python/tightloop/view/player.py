@@ -87,7 +87,7 @@ class Player:
             if not wanted and self.playing and now >= self._due:
                 # frames that the page has no time for are passed over
                 late = now - self._due
-                wanted = 1 + int(late / self._spacing) if 0 < self._spacing and late < _LATE_MAX else 1
+                wanted = 1 + int(late / self._spacing) if self._spacing > 0 and late < _LATE_MAX else 1
                 self._due = (self._due if late < _LATE_MAX else now) + wanted * self._spacing
         shown = None
         for _ in range(wanted):

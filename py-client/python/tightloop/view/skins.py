@@ -54,20 +54,18 @@ def _skins_of(parts: list[Part], bodies: tuple[int, ...]) -> list[Skin]:
     faces = np.concatenate([part.mesh.faces + first for part, first in zip(parts, counts, strict=False)])
     colors, which = _few(np.concatenate([part.mesh.colors for part in parts]))
     return [
-        Skin(*_creased(vertices, faces[which == color]), tuple(int(value) for value in rgba), bodies)
-        for color, rgba in enumerate(colors)
+        Skin(*_creased(vertices, faces[which == color]), (int(red), int(green), int(blue), int(opacity)), bodies)
+        for color, (red, green, blue, opacity) in enumerate(colors)
     ]
 
 
 def _few(colors: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.intp]]:
     """The distinct colours, and which one each face has; near ones are one where there are too many."""
-    for bits in range(8):
-        step = 1 << bits
-        # the middle of a step stands for it
-        rounded = np.minimum(colors // step * step + (step >> 1), 255).astype(np.uint8) if bits else colors
-        distinct, which = np.unique(rounded, axis=0, return_inverse=True)
+    distinct, which = np.unique(colors, axis=0, return_inverse=True)
+    for bits in range(1, 9):
         if len(distinct) <= _COLORS_MAX:
             break
+        distinct, which = np.unique(colors >> bits if bits < 8 else colors * 0, axis=0, return_inverse=True)
     means = np.stack([colors[which.ravel() == color].mean(axis=0) for color in range(len(distinct))])
     return means.astype(np.uint8), which.ravel()
 

@@ -58,7 +58,7 @@ class Live:
     any may be asked for, whatever the frames of the daemon carry.
 
     Args:
-        name: Name of the daemon.
+        name: Name of the daemon; ``"franka.1"`` is a group of its worlds, and the first one is shown if none is named.
         worlds: How many worlds to show; the ``watch_worlds`` of the daemon if there are fewer.
         fields: What to evaluate.
 
@@ -70,7 +70,9 @@ class Live:
 
     def __init__(self, name: str, worlds: int = 256, fields: Sequence[str] = (*FIELDS, *CONTACT_FIELDS)) -> None:
         asked = checks.integer("view: worlds", worlds, least=1, error=ArgumentError)
-        self.client = _core.Client(checks.text("view: name", name, error=ArgumentError), lease=False)
+        # of worlds in groups the first is shown, unless another is named
+        named = checks.text("view: name", name, error=ArgumentError)
+        self.client = _core.Client(named if _core.groups(named) == 1 else f"{named}.0", lease=False)
         try:
             self.info: dict[str, Any] = json.loads(self.client.describe())
             self.worlds = min(asked, self.info["watch_worlds"])

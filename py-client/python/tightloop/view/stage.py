@@ -152,7 +152,7 @@ def _move(batch: _Batch, body_q: Array, shown: tuple[int, ...], offsets: Array) 
     else:
         poses = body_q[:, batch.skin.bodies][list(shown)]
         # frames of what stands still are equal, bit for bit
-        if batch.worlds == shown and np.array_equal(poses, batch.poses):
+        if batch.worlds == shown and batch.poses is not None and np.array_equal(poses, batch.poses):
             return
     places = poses[..., :3] + offsets[list(shown), None]
     batch.handle.batched_positions = places.reshape(-1, 3).astype(np.float32)

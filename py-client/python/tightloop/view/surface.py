@@ -73,7 +73,7 @@ def joined(pieces: Sequence[Surface], notes: Sequence[str] = ()) -> Surface:
     whole = _without_slivers(Surface(vertices, places.ravel()[faces].astype(np.uint32), colors, painted, list(notes)))
     if not len(whole.faces):
         raise Unreadable("its triangles have no area")
-    return _thinned(whole)
+    return _thinned(_without_strays(whole))
 
 
 def _without_slivers(surface: Surface) -> Surface:
@@ -81,6 +81,16 @@ def _without_slivers(surface: Surface) -> Surface:
     first, second, third = surface.faces.T
     kept = (first != second) & (second != third) & (third != first)
     return Surface(surface.vertices, surface.faces[kept], surface.colors[kept], surface.painted[kept], surface.notes)
+
+
+def _without_strays(surface: Surface) -> Surface:
+    """Without vertices that no face has."""
+    used = np.zeros(len(surface.vertices), bool)
+    used[surface.faces] = True
+    if used.all():
+        return surface
+    faces = (np.cumsum(used) - 1)[surface.faces].astype(np.uint32)
+    return Surface(surface.vertices[used], faces, surface.colors, surface.painted, surface.notes)
 
 
 def _thinned(surface: Surface) -> Surface:
@@ -110,4 +120,5 @@ def _thinned(surface: Surface) -> Surface:
             break
         cells *= 0.98 * np.sqrt(FACES_MAX / len(once))
     note = f"has {count:,} triangles and is shown with {len(once):,}, {1000 * size / cells:.2g} mm apart"
-    return Surface(thin.vertices, thin.faces[once], thin.colors[once], thin.painted[once], [*surface.notes, note])
+    kept = Surface(thin.vertices, thin.faces[once], thin.colors[once], thin.painted[once], [*surface.notes, note])
+    return _without_strays(kept)

@@ -12,6 +12,7 @@ mod state;
 pub use error::BackendError;
 pub use frozen::{FirstFrozen, Frozen};
 
+use crate::random::Numbering;
 use sim_core::batch::Field;
 use std::ops::Range;
 
@@ -95,6 +96,29 @@ pub enum Lanes {
     Sixteen,
 }
 
+/// Worlds in groups, each with a backend of its own; they share threads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Groups {
+    /// How many there are.
+    pub count: usize,
+    /// Worlds of each.
+    pub worlds: usize,
+    /// That of the first group; the worlds of the next ones follow.
+    pub numbering: Numbering,
+}
+
+impl Groups {
+    /// The numbering of each.
+    pub fn numberings(self) -> impl Iterator<Item = Numbering> {
+        (0..self.count).map(move |group| self.numbering.after(group * self.worlds))
+    }
+
+    /// Worlds of all.
+    pub fn all(self) -> usize {
+        self.count * self.worlds
+    }
+}
+
 /// When a world is frozen, besides where it is no longer finite, and what becomes of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Faults {
@@ -129,6 +153,9 @@ pub struct ProgramFacts {
     /// Of one that steps: how often a frame runs it.
     pub rounds: Option<usize>,
 }
+
+/// One for each group.
+pub type Backends = Vec<Box<dyn Backend>>;
 
 /// What keeps the worlds. Arguments were checked by [`crate::simulation::Simulation`].
 pub trait Backend: Send {

@@ -91,7 +91,7 @@ impl Host {
         description.session = session;
         description.pid = std::process::id();
         description.schema = description.schema_hash();
-        check_memory(&description, &frame, 0)?;
+        check(&description, &frame, 0, 1)?;
 
         let node = transport::node::<S>(&tenancy.place().transport_config(session), "daemon")?;
         let attributes = [
@@ -108,8 +108,13 @@ impl Host {
         let watch = Watch::open(&node, &description, &frame)?;
         let lane = Lane::open(&node, 1, &frame, description.frames_held)?;
         // last: from here on clients may come
-        tenancy.announce(session)?;
+        tenancy.announce(session, 1)?;
 
+        // the daemon only waits while nobody steps: its own threads are idle then, the client needs one core. Other groups may step
+        let others = match description.groups {
+            1 => 0,
+            _ => description.busy_threads(),
+        };
         let inbox = Inbox::for_commands_of(&description);
         let state = State {
             node,
@@ -127,10 +132,9 @@ impl Host {
             stop,
             apart: Apart::new(),
         };
-        // the daemon only waits while nobody steps: its own threads are idle then, the client needs one core
         Ok(Host {
             state,
-            pace: Pace::new(cores() > 1),
+            pace: Pace::new(cores() > 1 + others),
             listener,
             tenancy,
         })
@@ -231,7 +235,7 @@ impl Host {
 }
 
 /// Refuses a run whose shared memory would not fit, or not beside the `physics_bytes` of its worlds, before anything is
-/// taken.
+/// taken. Of several groups, each as described, all are counted.
 ///
 /// # Errors
 /// [`ProtocolError::SharedMemory`] or [`ProtocolError::Memory`] with the bytes free and needed.
@@ -240,15 +244,30 @@ pub fn check_memory(
     frame: &Table,
     physics_bytes: u64,
 ) -> Result<(), ProtocolError> {
+    check(description, frame, physics_bytes, description.groups)
+}
+
+/// The same for so many groups.
+fn check(
+    description: &Description,
+    frame: &Table,
+    physics_bytes: u64,
+    groups: usize,
+) -> Result<(), ProtocolError> {
+    let among = match groups {
+        1 => String::new(),
+        _ => format!(" in {groups} groups"),
+    };
     let what = format!(
-        "{} worlds, {} frames held",
-        description.worlds, description.frames_held
+        "{} worlds{among}, {} frames held",
+        description.worlds * groups,
+        description.frames_held
     );
     let own = physics_bytes.saturating_add(memory::own_bytes(description) as u64);
     memory::check(
         memory::free(),
-        memory::all_bytes(description, frame),
-        own,
+        memory::all_bytes(description, frame).saturating_mul(groups),
+        own.saturating_mul(groups as u64),
         &what,
     )
 }

@@ -40,6 +40,9 @@ fn description() -> Description {
         name: String::new(),
         session: 0,
         pid: 0,
+        group: 0,
+        groups: 1,
+        first_world: 0,
         worlds: 2,
         device: "none".to_owned(),
         adapter: String::new(),
@@ -401,7 +404,7 @@ fn facts_that_differ_are_refused_with_both_named() {
     let node = transport::node::<S>(&place.transport_config(5), "daemon").unwrap();
     let attributes = [(facts::PROTOCOL, "7".to_owned())];
     let wake = transport::create_event(&node, "wake", &attributes).unwrap();
-    tenancy.announce(5).unwrap();
+    tenancy.announce(5, 1).unwrap();
     let options = AttachOptions {
         root: Some(root.clone()),
         ..AttachOptions::default()

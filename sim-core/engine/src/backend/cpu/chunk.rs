@@ -7,7 +7,7 @@ use crate::backend::noise::Noise;
 use crate::backend::shown::{is_of_contacts, stages_for};
 use crate::backend::state::{self, Shape, StateField};
 use crate::backend::{Faults, Frozen, Values};
-use crate::random::Draws;
+use crate::random::Numbering;
 use crate::start::StartDraw;
 use sim_core::batch::{Block, Field, Layout, Slot};
 use sim_core::compiled::Stages;
@@ -37,8 +37,8 @@ pub(super) struct Job<F: Lane> {
     pub start: Vec<F::Real>,
     /// What is drawn over it.
     pub draw: StartDraw,
-    /// What draws depend on.
-    pub draws: Draws,
+    /// What stands for each world in its draws.
+    pub numbering: Numbering,
     /// What is added to commands and sensors.
     pub noise: Noise,
     /// What the contact sensors add up.
@@ -46,7 +46,7 @@ pub(super) struct Job<F: Lane> {
 }
 
 impl<F: Lane> Job<F> {
-    pub fn new(model: &Model, layout: Layout, stages: Stages<F>, draws: Draws) -> Job<F> {
+    pub fn new(model: &Model, layout: Layout, stages: Stages<F>, numbering: Numbering) -> Job<F> {
         let constants = model.constants().cast();
         let numbers = |needed: &[Stage]| {
             let needed = needed.iter().filter(|stage| stage.is_needed(&constants));
@@ -64,7 +64,7 @@ impl<F: Lane> Job<F> {
             faults: Faults::default(),
             start: state::start(model),
             draw: StartDraw::new(model),
-            draws,
+            numbering,
             noise: Noise::new(model),
             contact_sensors: model.contact_sensors().to_vec(),
         }

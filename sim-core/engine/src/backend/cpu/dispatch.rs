@@ -2,8 +2,7 @@
 
 use super::chunk::{Chunk, Job};
 use super::transfer::Arena;
-use super::{Backend, BackendError, Cpu, Lanes, Layout, Precision};
-use crate::random::Draws;
+use super::{Backend, BackendError, Backends, Cpu, Groups, Lanes, Layout, Precision, Workers};
 use sim_core::compiled::Stages;
 use sim_core::lane::Lane;
 use sim_core::model::Model;
@@ -68,22 +67,21 @@ pub fn available(lanes: Lanes) -> bool {
     }
 }
 
-/// The fastest backend that the processor has, or the one asked for.
+/// A backend for each group: the fastest that the processor has, or the one asked for.
 ///
 /// # Errors
 /// [`BackendError::Lanes`] for a width that it has not, [`BackendError::Threads`].
 pub fn create(
     model: &Model,
-    worlds: usize,
+    groups: Groups,
     precision: Precision,
     lanes: Lanes,
     layout: &Layout,
     threads: usize,
-    draws: Draws,
-) -> Result<Box<dyn Backend>, BackendError> {
+) -> Result<Backends, BackendError> {
     let lanes = match lanes {
         // a register that holds one world takes longer than a scalar, for the same bits
-        Lanes::Auto if worlds == 1 => Lanes::Scalar,
+        Lanes::Auto if groups.worlds == 1 => Lanes::Scalar,
         Lanes::Auto if available(Lanes::Sixteen) => Lanes::Sixteen,
         Lanes::Auto if available(Lanes::Eight) => Lanes::Eight,
         Lanes::Auto => Lanes::Scalar,
@@ -103,7 +101,7 @@ pub fn create(
     match (precision, lanes) {
         (Precision::F64, _) => {
             let program = least("f64 scalar, FMA", stages_f64::STAGES);
-            boxed(model, worlds, layout, threads, draws, program)
+            boxed(model, groups, layout, threads, program)
         }
         #[cfg(target_arch = "x86_64")]
         (Precision::F32, Lanes::Sixteen) => {
@@ -112,16 +110,16 @@ pub fn create(
                 stages: stages_f32x16::STAGES,
                 chunk: avx512,
             };
-            boxed(model, worlds, layout, threads, draws, program)
+            boxed(model, groups, layout, threads, program)
         }
         #[cfg(target_arch = "x86_64")]
         (Precision::F32, Lanes::Eight) => {
             let program = least("AVX2", stages_f32x8::STAGES);
-            boxed(model, worlds, layout, threads, draws, program)
+            boxed(model, groups, layout, threads, program)
         }
         (Precision::F32, _) => {
             let program = least("f32 scalar, FMA", stages_f32::STAGES);
-            boxed(model, worlds, layout, threads, draws, program)
+            boxed(model, groups, layout, threads, program)
         }
     }
 }
@@ -141,13 +139,18 @@ fn least<F: Lane>(instructions: &'static str, stages: Stages<F>) -> Program<F> {
 
 fn boxed<F: Lane>(
     model: &Model,
-    worlds: usize,
+    groups: Groups,
     layout: &Layout,
     threads: usize,
-    draws: Draws,
     program: Program<F>,
-) -> Result<Box<dyn Backend>, BackendError> {
-    Ok(Box::new(Cpu::<F>::new(
-        model, worlds, layout, threads, draws, program,
-    )?))
+) -> Result<Backends, BackendError> {
+    // a thread for each block is enough
+    let threads = threads.min(groups.count * groups.worlds.div_ceil(F::WIDTH));
+    let workers = Workers::new(threads, groups.count)?;
+    let made = groups.numberings().map(|numbering| {
+        let job = Job::new(model, layout.clone(), program.stages, numbering);
+        let cpu = Cpu::new(job, groups.worlds, threads, workers.clone(), &program);
+        Box::new(cpu) as Box<dyn Backend>
+    });
+    Ok(made.collect())
 }

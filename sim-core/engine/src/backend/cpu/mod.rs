@@ -1,6 +1,7 @@
 //! The CPU: blocks of worlds, one world a SIMD lane, spread over threads. Sole user of rayon.
 //!
-//! A control frame is one pass per block with all substeps in cache; nothing is allocated in it.
+//! A control frame is one pass per block with all substeps in cache; nothing is allocated in it, but where groups share their threads a
+//! few words for each chunk.
 
 mod chunk;
 mod contacts;
@@ -16,15 +17,14 @@ mod trouble;
 pub use dispatch::{available, create};
 
 use super::state::StateField;
-use super::{Backend, BackendError, Faults, Frozen, Lanes, Precision, Values};
-use crate::random::Draws;
+use super::{Backend, BackendError, Backends, Faults, Frozen, Groups, Lanes, Precision, Values};
 use chunk::{Chunk, Job};
 use dispatch::{Program, RunChunk};
 use rayon::prelude::*;
 use sim_core::batch::{Field, Layout};
 use sim_core::lane::Lane;
-use sim_core::model::Model;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Chunks a thread: enough that a slow block does not leave the others idle.
 pub(crate) const CHUNKS_PER_THREAD: usize = 4;
@@ -32,30 +32,58 @@ pub(crate) const CHUNKS_PER_THREAD: usize = 4;
 struct Cpu<F: Lane> {
     chunks: Vec<Chunk<F>>,
     job: Job<F>,
-    pool: Option<rayon::ThreadPool>,
+    workers: Workers,
     threads: usize,
     device: String,
     arena_words: usize,
     run: RunChunk<F>,
 }
 
+/// Who steps the chunks.
+#[derive(Clone)]
+enum Workers {
+    /// The thread of the caller.
+    Caller,
+    /// A pool for one group.
+    Own(Arc<rayon::ThreadPool>),
+    /// A pool for all groups: what one leaves idle works for another.
+    Shared(Arc<rayon::ThreadPool>),
+}
+
+impl Workers {
+    fn new(threads: usize, groups: usize) -> Result<Workers, BackendError> {
+        if threads == 1 && groups == 1 {
+            return Ok(Workers::Caller);
+        }
+        let builder = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(|i| format!("step-{i}"));
+        let failed = |e: rayon::ThreadPoolBuildError| BackendError::Threads {
+            threads,
+            reason: e.to_string(),
+        };
+        let pool = Arc::new(builder.build().map_err(failed)?);
+        Ok(match groups {
+            1 => Workers::Own(pool),
+            _ => Workers::Shared(pool),
+        })
+    }
+}
+
 impl<F: Lane> Cpu<F> {
     fn new(
-        model: &Model,
+        job: Job<F>,
         worlds: usize,
-        layout: &Layout,
         threads: usize,
-        draws: Draws,
-        program: Program<F>,
-    ) -> Result<Self, BackendError> {
+        workers: Workers,
+        program: &Program<F>,
+    ) -> Self {
         let blocks = worlds.div_ceil(F::WIDTH);
-        let threads = threads.min(blocks);
         let parts = if threads == 1 {
             1
         } else {
             (threads * CHUNKS_PER_THREAD).min(blocks)
         };
-        let job = Job::new(model, layout.clone(), program.stages, draws);
         let chunks = (0..parts)
             .map(|part| {
                 let first = part * blocks / parts * F::WIDTH;
@@ -63,23 +91,12 @@ impl<F: Lane> Cpu<F> {
                 Chunk::new(&job, first..end)
             })
             .collect();
-        let pool = if threads == 1 {
-            None
-        } else {
-            let builder = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .thread_name(|i| format!("step-{i}"));
-            let failed = |e: rayon::ThreadPoolBuildError| BackendError::Threads {
-                threads,
-                reason: e.to_string(),
-            };
-            Some(builder.build().map_err(failed)?)
-        };
         let plural = if threads == 1 { "" } else { "s" };
-        Ok(Cpu {
+        Cpu {
+            arena_words: job.layout.bytes / 8,
             chunks,
             job,
-            pool,
+            workers,
             threads,
             device: format!(
                 "cpu ({}, {} world{} a block, {threads} thread{plural})",
@@ -87,9 +104,8 @@ impl<F: Lane> Cpu<F> {
                 F::WIDTH,
                 if F::WIDTH == 1 { "" } else { "s" },
             ),
-            arena_words: layout.bytes / 8,
             run: program.chunk,
-        })
+        }
     }
 }
 
@@ -98,9 +114,17 @@ impl<F: Lane> Cpu<F> {
     fn for_each(&mut self, work: impl Fn(&mut Chunk<F>, &Job<F>) + Send + Sync) {
         let job = &self.job;
         let work = |chunk: &mut Chunk<F>| work(chunk, job);
-        match &self.pool {
-            None => self.chunks.iter_mut().for_each(work),
-            Some(pool) => pool.install(|| self.chunks.par_iter_mut().for_each(work)),
+        match &self.workers {
+            Workers::Caller => self.chunks.iter_mut().for_each(work),
+            Workers::Own(pool) => pool.install(|| self.chunks.par_iter_mut().for_each(work)),
+            // a job a chunk, in order of arrival: a thread that waits within a job, as those of an iterator do, would take up
+            // another group's meanwhile, and hold up its own
+            Workers::Shared(pool) => pool.in_place_scope(|scope| {
+                let work = &work;
+                for chunk in &mut self.chunks {
+                    scope.spawn(move |_| work(chunk));
+                }
+            }),
         }
     }
 }

@@ -42,7 +42,7 @@ impl<F: Lane> Chunk<F> {
     }
 
     fn draw(&self, job: &Job<F>, world: usize, stream: Stream) -> Draw {
-        let number = job.draws.number(self.worlds.start + world);
+        let number = job.numbering.number(self.worlds.start + world);
         let (seed, episode) = (self.seeds[world], self.episodes[world]);
         Draw::at_step(seed, number, episode, self.steps[world], stream)
     }

@@ -72,7 +72,7 @@ impl<F: Lane> Chunk<F> {
     fn draw_start(&mut self, job: &Job<F>, world: usize) {
         let shape = Shape::of(&job.constants);
         let (seed, episode) = (self.seeds[world], self.episodes[world]);
-        let number = job.draws.number(self.worlds.start + world);
+        let number = job.numbering.number(self.worlds.start + world);
         job.draw
             .draw(seed, number, episode, |field, column, value| {
                 let place = self.place(shape, world, StateField::of(field), column);

@@ -42,7 +42,7 @@ impl Gpu {
     }
 
     fn draw_of(&self, world: usize, stream: Stream) -> Draw {
-        let number = self.draws.number(world);
+        let number = self.numbering.number(world);
         let (seed, episode) = (self.host.seeds[world], self.host.episodes[world]);
         Draw::at_step(seed, number, episode, self.host.steps[world], stream)
     }

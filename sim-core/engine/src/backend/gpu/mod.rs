@@ -17,10 +17,11 @@ mod worlds;
 use super::shown::stages_for;
 use super::state::{Shape, StateField, start};
 use super::{
-    Backend, BackendError, Faults, FirstFrozen, Frozen, ProgramFacts, Values, available_memory,
+    Backend, BackendError, Backends, Faults, FirstFrozen, Frozen, Groups, ProgramFacts, Values,
+    available_memory,
 };
 use crate::backend::noise::Noise;
-use crate::random::Draws;
+use crate::random::Numbering;
 use crate::start::StartDraw;
 use compiled::{Books, Compiled};
 use host::Host;
@@ -70,7 +71,7 @@ pub(super) struct Gpu {
     record: Vec<u32>,
     start: Vec<f32>,
     draw: StartDraw,
-    draws: Draws,
+    numbering: Numbering,
     noise: Noise,
     faults: Faults,
     host: Host,
@@ -79,32 +80,49 @@ pub(super) struct Gpu {
     copied: u64,
 }
 
-/// What is asked of a GPU, besides a model.
+/// What is asked of a GPU, besides a model and its worlds.
 pub struct Wanted<'a> {
-    /// Number of worlds.
-    pub worlds: usize,
     /// Which one it is.
     pub adapter: &'a Choice,
     /// Where programs are kept, if anywhere.
     pub cache: Option<&'a Path>,
-    /// What the draws of a world depend on.
-    pub draws: Draws,
     /// How it gets the batches of a frame.
     pub replay: Replay,
     /// How long its driver may take over a program.
     pub compile_limit: Duration,
 }
 
-/// Worlds on the adapter that is meant.
+/// Worlds of a group.
+#[derive(Clone, Copy)]
+struct Part {
+    worlds: usize,
+    numbering: Numbering,
+    /// Groups of as many worlds that are not there yet, this one included: there must be memory for all.
+    coming: usize,
+}
+
+/// A backend for each group on the adapter that is meant, with a device of its own, so that none waits for another's batch.
 ///
 /// # Errors
 /// No such adapter, out of memory, a driver that cannot compile the programs.
 pub fn create(
     model: &Model,
+    groups: Groups,
     layout: &Layout,
     wanted: &Wanted<'_>,
-) -> Result<Box<dyn Backend>, BackendError> {
-    Ok(Box::new(Gpu::new(model, layout, wanted)?))
+) -> Result<Backends, BackendError> {
+    let parts = groups.numberings().zip((1..=groups.count).rev());
+    let made = parts.map(
+        |(numbering, coming)| -> Result<Box<dyn Backend>, BackendError> {
+            let part = Part {
+                worlds: groups.worlds,
+                numbering,
+                coming,
+            };
+            Ok(Box::new(Gpu::new(model, part, layout, wanted)?))
+        },
+    );
+    made.collect()
 }
 
 const MB: u64 = 1 << 20;
@@ -147,8 +165,18 @@ fn check_memory(device: &Device, worlds: usize, needed: u64) -> Result<(), Backe
 }
 
 impl Gpu {
-    fn new(model: &Model, layout: &Layout, asked: &Wanted<'_>) -> Result<Gpu, BackendError> {
-        let (worlds, limit) = (asked.worlds, asked.compile_limit);
+    fn new(
+        model: &Model,
+        part: Part,
+        layout: &Layout,
+        asked: &Wanted<'_>,
+    ) -> Result<Gpu, BackendError> {
+        let Part {
+            worlds,
+            numbering,
+            coming,
+        } = part;
+        let limit = asked.compile_limit;
         let device = Device::open(asked.adapter, asked.cache)?;
         check_frame(&device, layout.bytes as u64)?;
         let constants: Constants<f32> = model.constants().cast();
@@ -183,7 +211,7 @@ impl Gpu {
         let widest = tile::widest(&device, m, &places, worlds);
         let tiles = (worlds as u64).div_ceil(u64::from(widest));
         let needed = tiles * tile::memory(m, &places, widest) + 2 * layout.bytes as u64;
-        check_memory(&device, worlds, needed)?;
+        check_memory(&device, coming * worlds, coming as u64 * needed)?;
         let mut compiled = Compiled::new(&device, m, &places, &programs, books, widest, limit)?;
         compiled.replay = asked.replay;
         let frame = device.staging("frame", layout.bytes.max(64) as u64)?;
@@ -222,7 +250,7 @@ impl Gpu {
             record: places.record(shape),
             start: start(model),
             draw: StartDraw::new(model),
-            draws: asked.draws,
+            numbering,
             noise: Noise::new(model),
             faults: Faults::default(),
             host: Host::new(worlds, m.varying.len()),

@@ -29,7 +29,7 @@ impl Gpu {
         for &world in worlds {
             let mut record = self.start.clone();
             let (seed, episode) = (self.host.seeds[world], self.host.episodes[world]);
-            let number = self.draws.number(world);
+            let number = self.numbering.number(world);
             let shape = self.shape();
             // parameters stay as they are, but for loads and what is drawn
             for (k, x) in self.host.params_mut(world).iter_mut().enumerate() {
