@@ -84,7 +84,7 @@ published: wheel $(VENV)/.dev
 # Kept out of `test`: environments of each Python, and a build of the daemon alone, which shares nothing with the workspace's.
 packages: wheel $(VENV)/.dev
 	$(VENV)/bin/abi3audit --strict $(VENV)/wheels/*.whl
-	$(PYTHON) tests/packaging/wheel.py $(VENV)/wheels
+	$(PYTHON) tests/packaging/pythons.py $(VENV)/wheels
 	cargo install --path sim-daemon --locked --quiet --root out/packages
 	out/packages/bin/tightloop --version
 

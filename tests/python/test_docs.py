@@ -183,3 +183,14 @@ def test_the_field_page_has_every_field_that_frames_name():
     named.remove("state")
     assert "`state`" in text
     assert len(named) > 30 and all(f"| `{name}`" in text for name in named)
+
+
+def test_the_api_pages_have_every_public_name():
+    shown = re.findall(
+        r"^::: tightloop\.(\w+)$", "".join(p.read_text() for p in (PAGES / "api").glob("*.md")), re.MULTILINE
+    )
+    exceptions = {
+        name for name in tl.__all__ if isinstance(value := getattr(tl, name), type) and issubclass(value, Exception)
+    }
+    assert set(tl.__all__) - exceptions - {"__version__"} <= set(shown)
+    assert "errors" in shown  # all of them

@@ -62,5 +62,5 @@ def test_the_twin_in_rust_runs():
     subprocess.run(build, cwd=REPOSITORY, check=True)
     command = [str(REPOSITORY / "target/release/examples/franka_lesson"), "16"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert re.findall(r"^(\w+): 16 worlds", done.stdout, re.MULTILINE) == ["Torque", "Target"]
+    assert re.findall(r"^(\w+): 16 worlds", done.stdout, re.MULTILINE) == ["Target", "Torque"]
     assert "fr3_joint4" in done.stdout

@@ -13,7 +13,7 @@ import pytest
 from conftest import REPOSITORY
 
 sys.path.insert(0, str(REPOSITORY / "tests/packaging"))
-from wheel import smoke
+from pythons import smoke
 
 SOURCES = REPOSITORY / "py-client/python/tightloop"
 

@@ -1,6 +1,6 @@
 """Tries the built wheel on every Python of this machine: installed into an environment of its own, and used.
 
-    python tests/packaging/wheel.py .venv/wheels          # `make packages`; needs a package index for NumPy
+    python tests/packaging/pythons.py .venv/wheels          # `make packages`; needs a package index for NumPy
 
 It looks for ``python3.N`` on the path and in pyenv's folder. ``tests/python/test_wheel.py`` has the short version.
 """
