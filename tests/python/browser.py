@@ -39,7 +39,7 @@ def chromium() -> Iterator[Browser]:
 class View:
     """The viewer's page, open."""
 
-    def __init__(self, browser: Browser, url: str, width: int) -> None:
+    def __init__(self, browser: Browser, url: str, width: int = WIDTH) -> None:
         self.page: Page = browser.new_page(viewport={"width": width, "height": HEIGHT})
         self.scene_width = width - PANEL_WIDTH
         self.page.set_default_timeout(PATIENCE_SECONDS * 1000)

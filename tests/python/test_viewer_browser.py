@@ -62,7 +62,7 @@ def box() -> tl.Scene:
 def is_red(pixels: NDArray[np.int16]) -> NDArray[np.bool_]:
     """Where something is red: nothing of the page is, but frozen worlds."""
     red, green, blue = (pixels[..., channel] for channel in range(3))
-    return (red > 100) & (red > green + 50) & (red > blue + 50)
+    return (red > 100) & (red > green + 35) & (red > blue + 35)
 
 
 class Observer:
