@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -236,6 +237,7 @@ def test_a_recording_plays_to_its_end_and_again(box, look, unique, tmp_path):
             assert recorder.stderr is not None and "recording" in recorder.stderr.readline()
             for _ in range(90):
                 sim.step()
+            time.sleep(1.0)  # so that what waits in shared memory is read
             recorder.send_signal(signal.SIGINT)
             recorder.communicate()
     command = [sys.executable, "-m", "tightloop", "view", str(file), "--port=8300"]
