@@ -28,8 +28,9 @@ from tqdm import tqdm
 import tightloop as tl
 
 sys.path[:0] = [str(REPOSITORY / "examples"), str(REPOSITORY / "tests/python")]
-from browser import View, chromium  # noqa: E402  (neither is a package)
 from franka_lesson import FRAMES, scene, targets  # noqa: E402
+
+from browser import View, chromium  # noqa: E402  (neither is a package)
 
 WORLDS = 4096
 ASKED_PERCENT = 2.0
