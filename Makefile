@@ -91,7 +91,7 @@ packages: wheel $(VENV)/.dev
 newcomer:
 	python3 benches/newcomer.py
 
-bench: wheel $(VENV)/.dev vulkan
+bench: wheel $(VENV)/.dev vulkan browser
 	cargo bench --package tightloop --bench step
 	cargo bench --package sim-device --bench replay
 	$(PYTHON) benches/peers.py
@@ -100,6 +100,7 @@ bench: wheel $(VENV)/.dev vulkan
 	$(PYTHON) benches/round_trip.py
 	$(PYTHON) benches/snapshot.py
 	$(PYTHON) benches/recording.py
+	$(PYTHON) benches/viewer.py
 	$(PYTHON) benches/tasks.py
 	$(PYTHON) benches/groups.py
 

@@ -60,6 +60,8 @@ class Page:
             self._stage.on_grab(self._pull)
         self._preset = "three-quarter"
         server.scene.set_up_direction("+z")
+        # at viser's own brightness colours are pale
+        server.scene.configure_environment_map(environment_intensity=0.4)
         server.scene.add_grid(
             "/ground", infinite_grid=True, cell_size=0.1, section_size=1.0, fade_distance=40.0, shadow_opacity=0.2
         )

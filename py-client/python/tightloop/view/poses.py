@@ -26,7 +26,7 @@ def place(pose: Array, points: Array) -> Array:
 
 
 def compose(outer: Array, inner: Array) -> Array:
-    """Poses ``inner`` in frames whose own poses are ``outer``, as poses in what those are in; leading axes broadcast."""
+    """Poses ``inner`` in frames whose own poses are ``outer``, as poses in what those are in; leading axes cast."""
     u, w = outer[..., 3:6], outer[..., 6:]
     v, s = inner[..., 3:6], inner[..., 6:]
     position = outer[..., :3] + rotate(outer[..., 3:], inner[..., :3])

@@ -18,8 +18,8 @@ from tightloop.view.skins import Skin, skins
 
 # Bits of `status` of a world that is frozen, and how much red its colours then have.
 _FROZEN = 1 | 8
-_RED = np.array([225, 40, 40])
-_TINT = 0.7
+_RED = np.array([200, 0, 0])
+_TINT = 0.9
 # Shadows and fine meshes of more worlds than that cost the browser more than they show.
 _FINE_WORLDS = 16
 
