@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
 import tightloop as tl
+from leftovers import wait_until
 from tightloop.view import Film, Picture, film
 from tightloop.view.parts import parts
 
@@ -52,8 +54,7 @@ def pictures_of(path: Path) -> list[NDArray[np.uint8]]:
 def moves(pictures: list[NDArray[np.uint8]]) -> bool:
     """Whether each picture differs from the one before."""
     return all(
-        np.abs(before.astype(int) - after).sum(axis=-1).max() > 30
-        for before, after in itertools.pairwise(pictures)
+        np.abs(before.astype(int) - after).sum(axis=-1).max() > 30 for before, after in itertools.pairwise(pictures)
     )
 
 
@@ -175,11 +176,17 @@ def test_a_daemon_is_filmed_as_it_runs(scene: tl.Scene, tmp_path: Path, unique: 
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as filming:
             while filming.poll() is None:
                 sim.step()
-            assert filming.stderr is not None and filming.returncode == 0, filming.stderr.read()
+            _, news = filming.communicate()
+            assert filming.returncode == 0, news
         with Image.open(out) as image:
             lengths = [frame.info["duration"] for frame in ImageSequence.Iterator(image)]
         # a second of it, where equal pictures are one
         assert sum(lengths) == 1000 and 1 < len(lengths) <= 10
+        with subprocess.Popen([*command[:4], str(tmp_path / "cut"), "--seconds=60"], stdout=subprocess.PIPE) as filming:
+            assert wait_until(lambda: any((tmp_path / "cut").glob("*.png")), 60)
+            filming.send_signal(signal.SIGINT)
+            assert filming.wait(20) == 0
+        assert len(pictures_of(tmp_path / "cut")) < 60 * 30
         made = film(sim, tmp_path / "now.png", size=SIZE)
         assert made.pictures == 1 and pictures_of(tmp_path / "now.png")[0].shape == (64, 96, 3)
     with pytest.raises(tl.UnknownDaemon, match=name):

@@ -248,6 +248,9 @@ def test_the_renderer_refuses_arrays_that_do_not_fit() -> None:
         )
 
     assert render().shape == (24, 32, 3)
-    for options, said in (({"mesh": 1}, "meshes"), ({"poses": 2}, "poses"), ({"reach": 0.0}, "camera")):
-        with pytest.raises(tl.ArgumentError, match=said):
-            render(**options)
+    with pytest.raises(tl.ArgumentError, match="meshes"):
+        render(mesh=1)
+    with pytest.raises(tl.ArgumentError, match="poses"):
+        render(poses=2)
+    with pytest.raises(tl.ArgumentError, match="camera"):
+        render(reach=0.0)

@@ -55,8 +55,9 @@ def test_goals_are_marked() -> None:
     for task in ("FrankaReach", Unmarked):
         envs = VectorEnv(task, 1, render_mode="rgb_array")
         envs.reset(seed=2)
-        (picture,) = envs.render() or ()
-        seen.append(picture.astype(int))
+        pictures = envs.render()
+        assert pictures is not None
+        seen.append(pictures[0].astype(int))
         marks = envs.marks
         assert (marks is None) == (task is Unmarked)
         if marks is not None:

@@ -6,6 +6,7 @@ import argparse
 import os
 import signal
 import sys
+import threading
 
 from tightloop.errors import TightloopError
 from tightloop.view.cameras import PRESETS
@@ -21,7 +22,7 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     made = argparse.ArgumentParser(
         prog="tightloop film",
-        description="Make pictures or a film of a running daemon, or of a recording. No display is needed.",
+        description="Make pictures or a film of a running daemon, or of a recording, without a display. Ctrl-C ends.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -46,9 +47,17 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: list[str]) -> int:
     """Run the subcommand; returns its exit code: 0 done, 1 failed, 2 misused."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
     given = parser().parse_args(arguments)
     shows = sys.stderr.isatty()
+    stopped = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stopped.set())
+
+    def tell(seconds: float) -> bool:
+        if shows:
+            print(f"\r{seconds:8.2f} s", end="", file=sys.stderr, flush=True)
+        return not stopped.is_set()
+
     try:
         from tightloop.view.films import film
 
@@ -65,23 +74,17 @@ def main(arguments: list[str]) -> int:
             camera=given.camera,
             kind="collision" if given.collision else "visual",
             contacts=not given.no_contacts,
-            progress=_tell if shows else None,
+            progress=tell,
         )
     except (TightloopError, OSError) as problem:
         print(f"tightloop: {problem}", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
-        return 130
     if shows:
         print(file=sys.stderr)
     for note in made.notes:
         print(f"tightloop: {note}", file=sys.stderr)
     print(os.fspath(given.out))
     return 0
-
-
-def _tell(seconds: float) -> None:
-    print(f"\r{seconds:8.2f} s", end="", file=sys.stderr, flush=True)
 
 
 def _size(text: str) -> tuple[int, int]:

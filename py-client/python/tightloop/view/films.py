@@ -30,6 +30,7 @@ LIVE_SECONDS = 5.0
 _FIRST_SECONDS = 5.0
 # Sums of times are off by roundings.
 _SLACK = 1e-6
+Progress = Callable[[float], bool]
 _ENDINGS = (".png", ".gif", ".mp4", ".html")
 
 
@@ -169,7 +170,7 @@ def film(
     at: float | None = None,
     worlds: int | Sequence[int] = 1,
     world: int = 0,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
     **options: Any,
 ) -> Film:
     """Film a daemon as it runs, or a recording (``tightloop record``).
@@ -182,7 +183,7 @@ def film(
         at: When the film begins, or the picture is taken, after the recording's begin [s]; of a daemon, from now.
         worlds: As of `Film`.
         world: As of `Film`.
-        progress: Called with the time that was filmed [s], now and then.
+        progress: Called with the time that was filmed [s], frame by frame; the film ends where it returns False.
         **options: As of `Film`: ``size``, ``fps``, ``camera``, ``kind``, ``contacts``, ``speed``.
 
     Returns:
@@ -208,7 +209,7 @@ def film(
             # who is not seen is refused by name
             chosen_worlds(worlds, world, watched.worlds)
         with Film(out, watched, worlds=worlds, world=world, **options) as made:
-            told = progress or (lambda _: None)
+            told = progress or (lambda _: True)
             if isinstance(watched, Recorded):
                 _play(watched, made, at, 0.0 if single else seconds, told)
             else:
@@ -218,7 +219,7 @@ def film(
         watched.close()
 
 
-def _play(source: Recorded, made: Film, at: float, seconds: float | None, progress: Callable[[float], None]) -> None:
+def _play(source: Recorded, made: Film, at: float, seconds: float | None, progress: Progress) -> None:
     """A recording's frames, from a time on."""
     frames = 0
     # a frame a control period from its begin on; the last one that began by then is what is seen at a time
@@ -226,8 +227,8 @@ def _play(source: Recorded, made: Film, at: float, seconds: float | None, progre
     while (shown := source.poll()) is not None:
         if frames >= begin:
             made.add(shown)
-            progress(made.seconds)
-            if seconds is not None and made.seconds + source.period > seconds - _SLACK * source.period:
+            done = seconds is not None and made.seconds + source.period > seconds - _SLACK * source.period
+            if not progress(made.seconds) or done:
                 break
         frames += 1
     if not made.pictures:
@@ -235,7 +236,7 @@ def _play(source: Recorded, made: Film, at: float, seconds: float | None, progre
         raise ArgumentError(f"film: at is {at:g} s, and the recording ends after {ends:.6g} s")
 
 
-def _watch(source: Live, made: Film, at: float, seconds: float, progress: Callable[[float], None]) -> None:
+def _watch(source: Live, made: Film, at: float, seconds: float, progress: Progress) -> None:
     """What a daemon shows, as time passes."""
     shown = source.poll(_FIRST_SECONDS)
     if shown is None:
@@ -249,7 +250,8 @@ def _watch(source: Live, made: Film, at: float, seconds: float, progress: Callab
         # where drawing takes longer than there is time, pictures stand, and the film keeps the pace
         late = int((time.monotonic() - began) / spacing)
         made.add(shown, min(max(due, late), count - 1) * spacing - made.seconds)
-        progress(made.seconds)
+        if not progress(made.seconds):
+            break
 
 
 def most_worlds(worlds: int | Sequence[int], world: int) -> int:
