@@ -5,8 +5,8 @@
 The target demo of the lesson, each world with targets of its own, as fast as it goes, in turns: without a viewer, with
 one that no page is open of, and with a page in headless Chromium that shows 256 worlds. Viewer and page have the last
 core for themselves, the simulation the others: a browser without a GPU draws in software and takes all that it gets,
-which no simulation can help. What a frame takes of the daemon's processor, as Linux counts it, is what looking costs the
-simulation; beside it the time of a step as the caller sees it, and what the viewer takes and shows. Writes
+which no simulation can help. What a frame takes of the daemon's processor, as Linux counts it, is what looking costs
+the simulation; beside it the time of a step as the caller sees it, and what the viewer takes and shows. Writes
 benches/results/MACHINE/viewer.csv with the load of the machine, and ends with 1 when looking costs more than the 2 %
 asked.
 """

@@ -5,9 +5,8 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from browser import PATIENCE_SECONDS, SHOTS, chromium
-
 import tightloop as tl
+from browser import PATIENCE_SECONDS, SHOTS, chromium
 from tightloop.view import Film
 
 
