@@ -48,7 +48,7 @@ demo: wheel
 	@echo && echo "The same in process, without daemon and Python:"
 	@cargo build --release --quiet --workspace --example franka_lesson && target/release/examples/franka_lesson $(WORLDS)
 
-test: wheel $(VENV)/.dev $(VENV)/.docs vulkan
+test: wheel $(VENV)/.dev $(VENV)/.docs vulkan browser
 	cargo fmt --all --check
 	$(CLIPPY)
 	@if cargo nextest --version >/dev/null 2>&1; \
@@ -113,7 +113,7 @@ bench-gpu: wheel $(VENV)/.dev vulkan
 	benches/gpu/run.sh $(GPU)
 	-$(PYTHON) benches/gpu/peers.py
 
-check: wheel $(VENV)/.dev
+check: wheel $(VENV)/.docs
 	cargo fmt --all --check
 	$(CLIPPY)
 	$(VENV)/bin/ruff check --config py-client/pyproject.toml $(PYTHON_TREES)
