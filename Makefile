@@ -100,6 +100,7 @@ bench: wheel $(VENV)/.dev vulkan
 	$(PYTHON) benches/round_trip.py
 	$(PYTHON) benches/snapshot.py
 	$(PYTHON) benches/recording.py
+	$(PYTHON) benches/picture.py
 	$(PYTHON) benches/tasks.py
 	$(PYTHON) benches/groups.py
 
