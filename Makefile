@@ -101,6 +101,7 @@ bench: wheel $(VENV)/.dev vulkan browser
 	$(PYTHON) benches/snapshot.py
 	$(PYTHON) benches/recording.py
 	$(PYTHON) benches/viewer.py
+	$(PYTHON) benches/picture.py
 	$(PYTHON) benches/tasks.py
 	$(PYTHON) benches/groups.py
 

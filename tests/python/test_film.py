@@ -182,7 +182,7 @@ def test_a_daemon_is_filmed_as_it_runs(scene: tl.Scene, tmp_path: Path, unique: 
             lengths = [frame.info["duration"] for frame in ImageSequence.Iterator(image)]
         # a second of it, where equal pictures are one
         assert sum(lengths) == 1000 and 1 < len(lengths) <= 10
-        with subprocess.Popen([*command[:4], str(tmp_path / "cut"), "--seconds=60"], stdout=subprocess.PIPE) as filming:
+        with subprocess.Popen([*command[:5], str(tmp_path / "cut"), "--seconds=60"], stdout=subprocess.PIPE) as filming:
             assert wait_until(lambda: any((tmp_path / "cut").glob("*.png")), 60)
             filming.send_signal(signal.SIGINT)
             assert filming.wait(20) == 0
