@@ -130,8 +130,9 @@ impl Worlds for Shown<'_> {
         self.simulation.lost().is_none()
     }
 
-    fn state(&mut self, to: &mut [u8]) {
+    fn state(&mut self, to: &mut [u8]) -> bool {
         self.simulation.snapshot_first(self.watched, to);
+        self.simulation.lost().is_none()
     }
 }
 

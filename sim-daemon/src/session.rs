@@ -50,6 +50,7 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
     let door = Mutex::new(Door {
         daemon,
         closed: groups.len(),
+        is_ready: false,
         bytes: 0,
         session: 0,
         news: news.clone(),
@@ -70,7 +71,7 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
         result
     });
     let door = door.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let was_ready = door.closed == 0;
+    let was_ready = door.is_ready;
     // the daemon's name goes after those of its groups
     drop(door);
     match &result {
@@ -108,6 +109,8 @@ struct Door {
     daemon: Option<Tenancy>,
     /// Groups that are not open yet.
     closed: usize,
+    /// All were told.
+    is_ready: bool,
     /// Shared memory of those that are.
     bytes: u64,
     /// Of the first group's run.
@@ -163,6 +166,7 @@ impl Door {
             "threads": description.threads,
             "root": host.tenancy().place().root(),
         }}));
+        self.is_ready = true;
         Ok(())
     }
 }
@@ -210,14 +214,16 @@ fn open(serve: &Serve) -> Result<Opened, DaemonError> {
     // before anything large is taken: memory that is missing kills instead of failing
     check_memory(&told, &table, Simulation::memory_of(&model, &options))?;
     let simulations = Simulation::groups(model, &options, count)?;
+    told.state_bytes = simulations[0].snapshot_bytes(told.worlds) as u64;
+    told.watch_state_bytes = simulations[0].snapshot_bytes(told.watch_worlds) as u64;
+    // again with what observers see, of all groups before the first one opens; the worlds have their memory
+    check_memory(&told, &table, 0)?;
     let group = |(number, (tenancy, simulation)): (usize, (Tenancy, Simulation))| {
         let mut told = told.clone();
         (told.group, told.first_world) = (number, number * options.worlds);
         (told.device, told.threads) = (simulation.device().to_owned(), simulation.threads());
         told.adapter = simulation.adapter().to_owned();
         told.delivery = simulation.delivery().to_owned();
-        told.state_bytes = simulation.snapshot_bytes(told.worlds) as u64;
-        told.watch_state_bytes = simulation.snapshot_bytes(told.watch_worlds) as u64;
         if let (Some(why), true) = (simulation.device_note(), serve.device == "auto") {
             told.notes.push(format!("device auto is {why}"));
         }

@@ -4,7 +4,7 @@ use crate::common::{Demo, Run, command, lesson, lesson_with_table};
 use crate::{assert_alive, gpu, options, run};
 use sim_core::batch::{Field, status};
 use sim_engine::backend::BackendError;
-use sim_engine::options::{AUTO_WORLDS, AdapterKind, adapters, lose_after};
+use sim_engine::options::{AUTO_WORLDS, AdapterKind, adapters, compiling, lose_after};
 use sim_engine::simulation::{Device, Options, Precision, Simulation};
 use std::time::Duration;
 
@@ -104,6 +104,13 @@ fn a_device_that_is_lost_at_any_point_of_the_start_is_an_error() {
     assert!(lost >= 5, "a start has more than {lost} runs");
 }
 
+/// Waits for a driver that was given up: a process must not end while it compiles.
+fn compiled() {
+    while compiling() > 0 {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
 #[test]
 fn a_driver_that_takes_too_long_is_named_with_the_cures() {
     let model = lesson(Demo::Target).compile().unwrap();
@@ -119,6 +126,7 @@ fn a_driver_that_takes_too_long_is_named_with_the_cures() {
     ] {
         assert!(failure.contains(word), "{word}: {failure}");
     }
+    compiled();
 }
 
 /// What is wanted of a device that is left open, if software may play it.
@@ -170,6 +178,7 @@ fn auto_falls_back_to_the_processor_where_the_gpu_does_not_start_and_says_why() 
         }
         assert!(here.arena == there.arena, "{why}");
     }
+    compiled();
 }
 
 #[test]

@@ -106,8 +106,8 @@ def launch(
             ``"world"`` its number and its seed, ``"seed"`` its seed alone, so that an environment has the same numbers
             wherever it stands. Worlds of one seed are then alike, and so they begin, with seed 0: give
             ``reset(seed=...)`` a sequence with one seed a world.
-        name: Name of the daemon, for `attach`; a unique one if left out. Groups have it with their number,
-            ``"franka.0"``.
+        name: Name of the daemon, for `attach`; a unique one if left out. Several groups have it with their number,
+            ``"franka.0"``; a single one has the name itself, and `attach` gives its `Sim`.
         log: File for the daemon's news, such as how many worlds were frozen, at most one line a second; warnings and
             errors go to stderr if left out.
         frames_held: How many frames may be alive at once, at least 1; of each group.

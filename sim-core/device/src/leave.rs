@@ -11,6 +11,12 @@ unsafe extern "C" {
     safe fn _exit(code: i32) -> !;
 }
 
+/// Threads that compile. For tests, which end as libraries are taken apart and wait for them.
+#[doc(hidden)]
+pub fn compiling() -> usize {
+    COMPILING.load(Ordering::Relaxed)
+}
+
 /// Ends the process with this code if a driver that was given up still compiles; else it returns.
 ///
 /// The usual end of a process takes apart the driver's libraries, and threads that are in them crash.

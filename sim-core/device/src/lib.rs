@@ -34,6 +34,8 @@ pub use adapter::{AdapterInfo, AdapterKind, Choice, adapters};
 pub use batch::{Batch, BatchBuilder, Replay};
 pub use device::{Device, lose_after};
 pub use error::DeviceError;
+#[doc(hidden)]
+pub use leave::compiling;
 pub use leave::leave;
 pub use memory::{Buffer, Read, Staging, Write};
 pub use program::{Program, Source};

@@ -190,6 +190,28 @@ enum News<T> {
     Done(usize, Result<T, String>),
 }
 
+/// A thread that compiles, counted until it ends, however that is.
+struct Counted(Option<Arc<Inner>>);
+
+impl Counted {
+    fn new(device: &Arc<Inner>) -> Counted {
+        device.compiling.fetch_add(1, Ordering::Relaxed);
+        COMPILING.fetch_add(1, Ordering::Relaxed);
+        Counted(Some(device.clone()))
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        if let Some(device) = self.0.take() {
+            device.compiling.fetch_sub(1, Ordering::Relaxed);
+            // that may close the device, in the driver
+            drop(device);
+        }
+        COMPILING.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
 /// Does one piece of work a label, in so many threads, and gives up where one takes longer than `limit`.
 pub(crate) fn within<T: Send + 'static>(
     device: &Arc<Inner>,
@@ -205,9 +227,7 @@ pub(crate) fn within<T: Send + 'static>(
     let mut spawned = Vec::new();
     for _ in 0..threads.min(count) {
         let (work, next, stop, tell) = (work.clone(), next.clone(), stop.clone(), tell.clone());
-        let device = device.clone();
-        device.compiling.fetch_add(1, Ordering::Relaxed);
-        COMPILING.fetch_add(1, Ordering::Relaxed);
+        let counted = Counted::new(device);
         let thread = std::thread::Builder::new().name("compile".to_owned());
         let begun = thread.stack_size(STACK).spawn(move || {
             loop {
@@ -219,10 +239,7 @@ pub(crate) fn within<T: Send + 'static>(
                 let _ = tell.send(News::Done(place, work(place)));
             }
             drop((work, tell));
-            device.compiling.fetch_sub(1, Ordering::Relaxed);
-            // that may have closed the device, in the driver
-            drop(device);
-            COMPILING.fetch_sub(1, Ordering::Relaxed);
+            drop(counted);
         });
         spawned.push(begun.expect("the system has threads"));
     }

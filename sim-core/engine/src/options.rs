@@ -9,9 +9,9 @@ use sim_core::model::Model;
 use std::path::PathBuf;
 use std::time::Duration;
 
-#[doc(hidden)]
-pub use sim_device::lose_after;
 pub use sim_device::{AdapterInfo, AdapterKind, Choice as Adapter, Replay, adapters, leave};
+#[doc(hidden)]
+pub use sim_device::{compiling, lose_after};
 
 /// What keeps the worlds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -38,7 +38,7 @@ pub enum Device {
 /// Worlds from which on [`Device::Auto`] looks for a GPU: fewer leave most of it idle.
 pub const AUTO_WORLDS: usize = 1024;
 
-/// For each: lavapipe takes 12 s over all programs of a grasp together on four idle cores, and three times that on busy ones.
+/// For each: lavapipe takes up to 4 s over one program of a grasp on a busy machine, and 12 s over all of them where it compiles one after the other.
 const COMPILE_LIMIT: Duration = Duration::from_secs(180);
 /// Where another limit is said.
 const COMPILE_LIMIT_NAME: &str = "TIGHTLOOP_COMPILE_LIMIT";

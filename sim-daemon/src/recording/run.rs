@@ -34,9 +34,13 @@ impl Head {
             );
             unreadable(path, problem)
         })?;
-        let worlds = head.daemon.worlds;
-        if !(1..=WORLDS_MAX).contains(&worlds) {
-            return Err(unreadable(path, format!("has {worlds} worlds in its head")));
+        let (first, worlds) = (head.daemon.first_world, head.daemon.worlds);
+        let last = first.checked_add(worlds);
+        if worlds == 0 || last.is_none_or(|last| last > WORLDS_MAX) {
+            return Err(unreadable(
+                path,
+                format!("has {worlds} worlds from {first} on in its head"),
+            ));
         }
         Ok(head)
     }

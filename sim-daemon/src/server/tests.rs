@@ -53,6 +53,7 @@ fn serve(place: &Place, log: &Path, runs: u64, ready: impl FnOnce()) {
     let mut told = export::description(simulation.model(), &options, simulation.layout(), facts);
     told.adapter = simulation.adapter().to_owned();
     told.state_bytes = simulation.snapshot_bytes(3) as u64;
+    told.watch_state_bytes = simulation.snapshot_bytes(1) as u64;
     let table = export::frame_table(simulation.layout());
     let tenancy = Tenancy::take(place).unwrap();
     let mut host = Host::open(tenancy, told, table, Arc::new(AtomicBool::new(false))).unwrap();

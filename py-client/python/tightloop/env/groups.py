@@ -55,10 +55,11 @@ def make_groups(
         ArgumentError: The worlds cannot be shared out evenly. Other errors are those of `VectorEnv`.
     """
     num_envs = checks.integer("make_groups: num_envs", num_envs, error=ArgumentError)
-    if groups < 1 or num_envs % groups:
+    groups = checks.integer("make_groups: groups", groups, error=ArgumentError)
+    if num_envs % groups:
         raise ArgumentError(f"make_groups: {num_envs} environments cannot be shared out evenly among {groups} groups")
-    if "daemon" in options:
-        raise ArgumentError("make_groups: daemon is not taken, since the groups have one of their own; leave it out")
+    for name in {"daemon", "first_env"} & set(options):
+        raise ArgumentError(f"make_groups: {name} is not taken, since the groups have one of their own; leave it out")
     of_task = {name: options.pop(name) for name in set(options) - _OF_ENVIRONMENTS}
     made = make_task(task, of_task)
     own = options_of(made, list(made.controls()), device=device, precision=precision, threads=threads)

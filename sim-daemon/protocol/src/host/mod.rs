@@ -43,8 +43,8 @@ const RESPONSE_MIN: usize = 1024;
 pub trait Worlds {
     /// Writes the arena of a frame; returns whether there is something to be seen and recorded in it.
     fn frame(&mut self, arena: &mut [u64]) -> bool;
-    /// Writes the state of the worlds that observers see, [`Description::watch_state_bytes`] of it.
-    fn state(&mut self, to: &mut [u8]);
+    /// Writes the state of the worlds that observers see, [`Description::watch_state_bytes`] of it; returns whether there is one.
+    fn state(&mut self, to: &mut [u8]) -> bool;
 }
 
 /// The wire of one daemon.

@@ -90,8 +90,9 @@ impl Worlds for Counted {
         true
     }
 
-    fn state(&mut self, to: &mut [u8]) {
+    fn state(&mut self, to: &mut [u8]) -> bool {
         to.fill(self.0 as u8);
+        true
     }
 }
 

@@ -101,8 +101,10 @@ impl Watch {
             to[target.offset..target.offset + target.bytes]
                 .copy_from_slice(&from[source.offset - before..][..target.bytes]);
         }
-        if let [.., state] = self.table.rows() {
-            worlds.state(&mut to[state.offset..state.offset + state.bytes]);
+        if let [.., state] = self.table.rows()
+            && !worlds.state(&mut to[state.offset..state.offset + state.bytes])
+        {
+            return; // they were lost meanwhile
         }
         *loan.user_header_mut() = FrameHeader {
             rows: self.table.rows().len() as u32,
