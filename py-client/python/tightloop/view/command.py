@@ -77,7 +77,9 @@ def _host(text: str) -> str:
         with socket.socket(family, kind) as tried:
             tried.bind(place)
     except (OSError, UnicodeError) as problem:
-        raise argparse.ArgumentTypeError(f"{text!r} is no address of this machine; give 127.0.0.1 or 0.0.0.0") from problem
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no address of this machine; give 127.0.0.1 or 0.0.0.0"
+        ) from problem
     return text
 
 
