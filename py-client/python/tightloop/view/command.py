@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import signal
+import socket
 import sys
 import threading
 import webbrowser
@@ -29,7 +30,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("target", metavar="NAME|FILE.tlrec", help="a daemon's name, or a recording")
     made.add_argument("--port", type=_port, default=8080, help="port of the page; the next free one if it is taken")
     made.add_argument(
-        "--host", default="127.0.0.1", help="address to listen on; 0.0.0.0 lets other machines drive, too"
+        "--host", type=_host, default="127.0.0.1", help="address to listen on; 0.0.0.0 lets other machines drive, too"
     )
     made.add_argument("--worlds", type=_worlds, default=256, help=f"most worlds to show, up to {_WORLDS_MAX}")
     made.add_argument("--open", action="store_true", help="open the page in this machine's browser")
@@ -67,6 +68,19 @@ def main(arguments: list[str]) -> int:
 def _give_way() -> None:
     """Let the simulation go first where there are not enough cores for both."""
     os.nice(10)
+
+
+def _host(text: str) -> str:
+    # viser waits for ever for a server that cannot listen there
+    try:
+        family, kind, _, _, place = socket.getaddrinfo(text, 0, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind) as tried:
+            tried.bind(place)
+    except (OSError, UnicodeError) as problem:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no address of this machine; give 127.0.0.1 or 0.0.0.0"
+        ) from problem
+    return text
 
 
 def _port(text: str) -> int:

@@ -94,6 +94,9 @@ class Panel:
         if new:
             self._shown_at.append(now)
             for plot in self._plots:
+                # a field that was chosen since this frame was asked for comes with the next one
+                if not hasattr(shown, plot.field):
+                    continue
                 plot.add(float(shown.time[world]), np.asarray(getattr(shown, plot.field)[world]))
         if now - self._told_at < _PERIOD:
             return

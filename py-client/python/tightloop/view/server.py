@@ -44,6 +44,7 @@ class Server:
         self._worlds = worlds
         self._feed: Feed | None = open_feed(target, worlds)
         self._page: Page | None = None
+        self._told = ""
         with contextlib.redirect_stdout(io.StringIO()):  # viser greets
             self._viser = viser.ViserServer(host, port, label=f"tightloop · {target}", verbose=False)
         self._viser.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
@@ -95,6 +96,7 @@ class Server:
         if self._feed is not None:
             self._feed.close()
         self._feed = self._page = None
+        self._told = ""
         self._viser.gui.reset()
         self._viser.gui.set_panel_label(f"tightloop · {self._target}")
         self._viser.gui.add_markdown(
@@ -108,7 +110,10 @@ class Server:
             time.sleep(_WAIT_SECONDS)
             return
         except TightloopError as problem:
-            self._viser.gui.add_markdown(f"It cannot be shown: {problem}")
+            # told once, not with every try
+            if str(problem) != self._told:
+                self._told = str(problem)
+                self._viser.gui.add_markdown(f"It cannot be shown: {problem}")
             time.sleep(_WAIT_SECONDS)
             return
         self._viser.gui.reset()
