@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -30,8 +31,12 @@ WIDTH, WIDE, HEIGHT, PANEL_WIDTH = 840, 1200, 520, 360
 def chromium() -> Iterator[Browser]:
     """A browser without a display."""
     assert Path(CHROMIUM).exists(), "the viewer's tests need Chromium: apt install chromium"
+    # it brings a Vulkan of its own, whose use is none of ours to check
+    own: dict[str, str | float | bool] = {
+        name: value for name, value in os.environ.items() if not name.startswith("VK_")
+    }
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=_FLAGS)
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=_FLAGS, env=own)
         try:
             yield browser
         finally:

@@ -218,16 +218,20 @@ def test_wrong_arguments_are_named_and_nothing_is_written(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_folder_of_other_things_stays_as_it_is(scene: tl.Scene, tmp_path: Path) -> None:
-    (tmp_path / "000000.png").write_text("an older film's")
-    (tmp_path / "thesis.png").write_text("not a film's")
+def test_a_folder_with_files_stays_as_it_is(scene: tl.Scene, tmp_path: Path) -> None:
+    (tmp_path / "000000.png").write_text("somebody's picture")
     with tl.launch(scene, worlds=1) as sim:
-        with pytest.raises(tl.ArgumentError, match=r"thesis\.png"):
+        with pytest.raises(tl.ArgumentError, match=r"000000\.png"):
             Film(tmp_path, sim)
-        assert len(list(tmp_path.iterdir())) == 2
-        (tmp_path / "thesis.png").unlink()
+        assert (tmp_path / "000000.png").read_text() == "somebody's picture"
+        (tmp_path / "000000.png").unlink()
         with Film(tmp_path, sim, size=SIZE) as made:
             made.add(sim.reset())
+        with pytest.raises(tl.ArgumentError, match="no folder"):
+            Film(tmp_path / "nowhere" / "run.gif", sim)
+        with pytest.raises(tl.ArgumentError, match="at most 50"):
+            Film(tmp_path / "run.gif", sim, fps=60)
+        assert "4 worlds" in " ".join(Film(tmp_path / "run.gif", sim, worlds=4, fps=20).notes)
     assert len(pictures_of(tmp_path)) == 1
 
 

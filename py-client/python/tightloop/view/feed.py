@@ -56,9 +56,10 @@ class LiveFeed:
         """Have frames carry these fields, too, from now on."""
         wanted = self._fields | set(fields)
         if wanted != self._fields:
-            self._source.close()
+            before = self._source
             self._source = Live(self._name, self._most, tuple(sorted(wanted)))
             self._fields = wanted
+            before.close()
 
     def close(self) -> None:
         """Detach; the daemon goes on."""

@@ -31,6 +31,8 @@ _FIRST_SECONDS = 5.0
 # Sums of times are off by roundings.
 _SLACK = 1e-6
 Progress = Callable[[float], bool]
+# Browsers slow pictures down that are shown more shortly than 20 ms.
+_GIF_FPS_MAX = 50
 _ENDINGS = (".png", ".gif", ".mp4", ".html")
 
 
@@ -76,6 +78,8 @@ class Film:
         speed: float = 1.0,
     ) -> None:
         path = checks.path("film: out", out, error=ArgumentError)
+        if not path.parent.is_dir():
+            raise ArgumentError(f"film: out is {path}, and there is no folder {path.parent}; make it first")
         self._fps = checks.number("film: fps", fps, above=0.0, error=ArgumentError)
         self._speed = checks.number("film: speed", speed, above=0.0, error=ArgumentError)
         if not isinstance(camera, Camera) and camera not in PRESETS:
@@ -90,7 +94,9 @@ class Film:
         self._roll: Roll | None = None
         seen = parts(info["scene"], info["scene_folder"], info["body_names"])
         #: What could not be drawn as its file has it.
-        self.notes: list[str] = seen.notes
+        self.notes: list[str] = list(seen.notes)
+        if isinstance(worlds, int) and worlds > len(self._worlds):
+            self.notes.append(f"{worlds} worlds were asked for, and {len(self._worlds)} can be seen")
         self._picture = Picture(seen, *size, kind=kind)
         if path.suffix == ".html":
             needs.check("viser", "trimesh")
@@ -289,4 +295,6 @@ def _roll(path: Path, fps: float, size: tuple[int, int]) -> Roll:
         raise ArgumentError(f"film: out is {path.name!r}; it ends in {', '.join(_ENDINGS)}, or is a folder")
     if path.suffix == ".png":
         return Png(path)
+    if path.suffix == ".gif" and fps > _GIF_FPS_MAX:
+        raise ArgumentError(f"film: fps is {fps:g}; a GIF has at most {_GIF_FPS_MAX}, give an .mp4 for more")
     return Gif(path, fps) if path.suffix == ".gif" else Mp4(path, fps, size)

@@ -162,7 +162,7 @@ class Pilot:
                     due = (due if now - due < _LATE_MAX else now) + self._dt / self.speed
                 elif not self.playing:
                     self._let_go()
-            except TightloopError as problem:
+            except Exception as problem:  # whatever it is, the page says it, and may go on
                 self.playing = False
                 self.problem = str(problem)
                 if isinstance(problem, DaemonLost):

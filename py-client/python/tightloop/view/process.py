@@ -28,16 +28,21 @@ class Viewer:
         assert process.stdout is not None
         line = process.stdout.readline().decode().strip()
         if not line:
-            code = process.wait(_STOP_SECONDS)
+            try:
+                code: int | None = process.wait(_STOP_SECONDS)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                code = process.wait()
             raise LaunchError(f"the viewer ended with exit code {code}; stderr says why")
         self.url = line
         self.pid = process.pid
+        self._process = process
         self._end = weakref.finalize(self, _end, process, os.getpid())
 
     @property
     def open(self) -> bool:
         """Whether it runs."""
-        return self._end.alive
+        return self._end.alive and self._process.poll() is None
 
     def close(self) -> None:
         """End the viewer; the simulation goes on."""

@@ -63,8 +63,13 @@ class Server:
             try:
                 if self._turn():
                     time.sleep(max(1 / self._rate() - (time.monotonic() - began), 0.0))
-            except DaemonLost as lost:
+            except (DaemonLost, UnknownDaemon) as lost:
                 self._lose(lost)
+            except TightloopError as problem:
+                if self._page is None or self._feed is None:
+                    raise
+                self._feed.driver.problem = str(problem)
+                time.sleep(_WAIT_SECONDS)
 
     def close(self) -> None:
         """Detach, and close the page."""
@@ -91,7 +96,7 @@ class Server:
         assert self._feed is not None
         return _RATE_HZ if self._feed.worlds <= _FEW_WORLDS else _RATE_MANY_HZ
 
-    def _lose(self, lost: DaemonLost) -> None:
+    def _lose(self, lost: TightloopError) -> None:
         """Tell in the page that the daemon is gone, and wait for another of its name."""
         if self._feed is not None:
             self._feed.close()
