@@ -232,9 +232,12 @@ def test_a_recording_is_played_stepped_skipped_and_begun_anew():
     assert player.poll(0.0) == 102
     player.speed = float("inf")
     player.play()
-    shown = [player.poll(0.1) for _ in range(399)]
-    assert shown == [*range(103, 501), None]
-    assert not player.playing and "ends here" in player.problem
+    shown = []
+    while player.playing:
+        shown.append(player.poll(0.1))
+    # as fast as it goes is faster than a frame for each look of the page
+    assert shown == sorted(set(shown)) and shown[-1] == 500 and len(shown) < 100
+    assert "ends here" in player.problem
     player.reset(None)
     assert player.poll(0.0) == 1
 

@@ -39,6 +39,11 @@ class LiveFeed:
         self._source = Live(name, worlds, FIELDS)
         self.info: dict[str, Any] = self._source.info
         self.worlds: int = self._source.worlds
+        #: What is to be known about what is shown.
+        self.told: list[str] = []
+        if self.worlds < min(worlds, self.info["worlds"]):
+            cure = "launch(watch_worlds=…) or serve --watch-worlds let it show more"
+            self.told.append(f"the daemon shows its first {self.worlds} worlds of {self.info['worlds']}; {cure}")
         self.driver = Pilot(attach(self.info["name"]), lambda: self._newest)
 
     def poll(self, timeout: float) -> Any:
@@ -83,6 +88,7 @@ class RecordedFeed:
         first = self._open()
         self.info: dict[str, Any] = first.info
         self.worlds: int = first.worlds
+        self.told: list[str] = [] if first.note is None else [first.note]
         first.close()
         self.driver = Player(self._open)
 

@@ -49,7 +49,7 @@ class Page:
         self._grip: Grip | None = None
         self._centre: NDArray[np.float64] | None = None
         looked = parts(info["scene"], info["scene_folder"], info["body_names"])
-        notes = [str(note) for note in (*info.get("notes", ()), *looked.notes)]
+        notes = [str(note) for note in (*feed.told, *info.get("notes", ()), *looked.notes)]
         self._dynamics, self._driven = _dynamics(info, notes)
         body_q = np.asarray(first.body_q)
         self._stage = Stage(server, looked.parts, feed.worlds, self.looks, body_q[0])
@@ -113,6 +113,11 @@ class Page:
         if self.looks.alone or self._preset == "follow":
             offsets = offsets[[self.looks.world]]
         seen = np.stack([box[0] + offsets.min(axis=0), box[1] + offsets.max(axis=0)])
+        bodies = np.asarray(self._shown.body_q)[self.looks.world, :, :3]
+        bodies = bodies[np.isfinite(bodies).all(axis=-1)]
+        if self._preset == "follow" and len(bodies):
+            # they may be far from where the world began
+            seen = seen + 0.5 * (bodies.min(axis=0) + bodies.max(axis=0)) - box.mean(axis=0)
         with client.atomic():
             chosen = camera(self._preset, seen, aspect=client.camera.aspect * (1 - _PANEL_PART), fov=client.camera.fov)
             client.camera.up_direction = chosen.up
