@@ -137,9 +137,11 @@ def test_two_groups_do_what_one_does() -> None:
 
 
 def test_groups_that_are_not_even_are_refused() -> None:
-    for count in (3, 0, 11):
-        with pytest.raises(tl.ArgumentError, match="evenly"):
+    for count, said in ((3, "evenly"), (11, "evenly"), (0, "at least 1")):
+        with pytest.raises(tl.ArgumentError, match=said):
             make_groups("FrankaReach", 10, count)
+    with pytest.raises(tl.ArgumentError, match="first_env is not taken"):
+        make_groups("FrankaReach", 10, first_env=5)
 
 
 def test_the_daemon_that_is_killed_is_told() -> None:
