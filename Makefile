@@ -54,7 +54,7 @@ test: wheel $(VENV)/.dev $(VENV)/.docs vulkan browser
 	@if cargo nextest --version >/dev/null 2>&1; \
 	then set -x; cargo nextest run --release --workspace; \
 	else set -x; cargo test --release --workspace --lib --bins --tests; fi
-	$(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . py-client/tests tests/python
+	$(PYTHON) -m pytest -n 2 --dist loadfile -c py-client/pyproject.toml --rootdir . py-client/tests tests/python
 
 # The crates' own pages stay out of `test`: all that they need is checked once more. rustdoc takes units, [m], for links and equations for code.
 docs: wheel $(VENV)/.docs

@@ -171,7 +171,8 @@ def test_contacts_ghosts_frames_shapes_and_plots_are_shown_when_they_are_chosen(
         view.wait(lambda: view.page.locator(".uplot").count() == 1, "a plot is drawn")
         for _ in range(30):
             sim.step()
-        view.page.locator(".uplot").scroll_into_view_if_needed()
+        # in one go in the page, which draws the plot anew several times a second
+        view.page.wait_for_function("(p => p && (p.scrollIntoView(), true))(document.querySelector('.uplot'))")
         view.shot("plot")
 
 
