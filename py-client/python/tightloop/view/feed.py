@@ -9,15 +9,10 @@ from typing import Any
 from tightloop.launching import attach
 from tightloop.view.pilot import Pilot
 from tightloop.view.player import Player
-from tightloop.view.source import CONTACT_FIELDS, Live, Recorded
+from tightloop.view.source import CONTACT_FIELDS, Live, Recorded, is_recording
 
 #: What is always asked for; contacts and plots ask for more.
 FIELDS = ("body_q", "body_qd", "joint_q", "joint_target_q")
-
-
-def is_recording(target: str) -> bool:
-    """Whether a file is meant, and not the name of a daemon."""
-    return target.endswith(".tlrec") or "/" in target
 
 
 class LiveFeed:

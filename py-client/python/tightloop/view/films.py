@@ -17,7 +17,7 @@ from tightloop.view.looks import Kind
 from tightloop.view.parts import parts
 from tightloop.view.picture import Picture
 from tightloop.view.rolls import Gif, Mp4, Png, Pngs, Roll
-from tightloop.view.source import Live, Recorded, Source
+from tightloop.view.source import Live, Recorded, Source, is_recording
 
 if TYPE_CHECKING:
     from tightloop.sim import Sim
@@ -208,7 +208,7 @@ def film(
     name = source if isinstance(source, str | os.PathLike) else source.name
     text = os.fspath(name)
     most = most_worlds(worlds, world)
-    recorded = text.endswith(".tlrec") or os.sep in text
+    recorded = is_recording(text)
     watched: Live | Recorded = Recorded(text, most, FIELDS) if recorded else Live(text, most, FIELDS)
     try:
         if watched.worlds < most:

@@ -65,7 +65,6 @@ class Page:
         server.scene.add_grid(
             "/ground", infinite_grid=True, cell_size=0.1, section_size=1.0, fade_distance=40.0, shadow_opacity=0.2
         )
-        server.on_client_connect(self._aim_client)
         self.show(first, new=True)
 
     def update(self, timeout: float) -> bool:
@@ -105,9 +104,10 @@ class Page:
         """Point the cameras of all browsers."""
         self._preset, self._centre = preset, None
         for client in self._server.get_clients().values():
-            self._aim_client(client)
+            self.aim_client(client)
 
-    def _aim_client(self, client: viser.ClientHandle) -> None:
+    def aim_client(self, client: viser.ClientHandle) -> None:
+        """Point the cameras of one browser, as when it comes."""
         box = self._stage.box
         offsets = self._stage.offsets
         if self.looks.alone or self._preset == "follow":

@@ -18,6 +18,7 @@ from tightloop.view.pilot import Pilot
 from tightloop.view.player import Player
 from tightloop.view.plots import PLOTS_MAX, Plot, choices
 from tightloop.view.sliders import Sliders
+from tightloop.view.source import FROZEN
 
 SPEEDS = {"0.1×": 0.1, "0.25×": 0.25, "0.5×": 0.5, "1×": 1.0, "2×": 2.0, "5×": 5.0, "max": float("inf")}
 _STATUS = {1: "not finite, frozen", 2: "solver out of iterations", 4: "contacts left out", 8: "out of bounds, frozen"}
@@ -120,7 +121,7 @@ class Panel:
         rate = sum(now - at < _RATE_SECONDS for at in self._shown_at) / _RATE_SECONDS
         bits = int(shown.status[world])
         trouble = ", ".join(text for bit, text in _STATUS.items() if bits & bit)
-        frozen = int(np.count_nonzero(np.asarray(shown.status) & 9))
+        frozen = int(np.count_nonzero(np.asarray(shown.status) & FROZEN))
         if taken is not None:
             who = f"process **{taken}** is in control; you watch"
         elif not driver.live:

@@ -16,9 +16,8 @@ from tightloop.view.balls import ball
 from tightloop.view.cameras import PRESETS, Camera, camera
 from tightloop.view.parts import Mesh, Part
 from tightloop.view.poses import Array, compose
+from tightloop.view.source import FROZEN
 
-# Bits of `status` of a world that is frozen, and what is laid over its colours.
-_FROZEN = 1 | 8
 _RED = (225, 40, 40, 180)
 _GHOST = (60, 170, 240, 190)
 _GHOST_OPACITY = 0.35
@@ -129,7 +128,7 @@ class Picture:
         self.offsets = offsets.astype(np.float32)
         place = int(np.argmax(chosen == world))
         meshes, poses = self._instances(body_q[chosen], offsets)
-        frozen = np.asarray(_field(shown, "status", np.zeros(len(body_q), int)))[chosen] & _FROZEN
+        frozen = np.asarray(_field(shown, "status", np.zeros(len(body_q), int)))[chosen] & FROZEN
         tints = np.where(frozen[:, None, None] > 0, _RED, _PLAIN).astype(np.uint8)
         tints = np.repeat(tints, len(self._parts), axis=1).reshape(-1, 4)
         layers = [(meshes, poses, tints, np.ones(len(meshes), np.float32))]

@@ -48,6 +48,8 @@ class Server:
         with contextlib.redirect_stdout(io.StringIO()):  # viser greets
             self._viser = viser.ViserServer(host, port, label=f"tightloop · {target}", verbose=False)
         self._viser.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
+        # once for all pages that there will be
+        self._viser.on_client_connect(self._aim)
         self.port: int = self._viser.get_port()
         self.url = f"http://{'localhost' if host in ('0.0.0.0', '127.0.0.1', '::') else host}:{self.port}"
 
@@ -87,8 +89,15 @@ class Server:
             first = self._feed.poll(_WAIT_SECONDS)
             if first is not None:
                 self._page = Page(self._viser, self._feed, first)
+                for client in self._viser.get_clients().values():
+                    self._page.aim_client(client)
             return False
         return self._page.update(0.05)
+
+    def _aim(self, client: viser.ClientHandle) -> None:
+        page = self._page
+        if page is not None:
+            page.aim_client(client)
 
     def _rate(self) -> float:
         if not self._viser.get_clients():

@@ -17,6 +17,14 @@ FIELDS = ("body_q", "joint_q", "joint_qd", "joint_target_q")
 #: What they need besides to show contacts.
 CONTACT_FIELDS = ("contact_count", "contact_pos", "contact_normal", "contact_force")
 
+#: Bits of ``status`` of a world that is frozen: no longer finite, or beyond the bounds of the run.
+FROZEN = 1 | 8
+
+
+def is_recording(target: str) -> bool:
+    """Whether a file is meant, and not the name of a daemon."""
+    return target.endswith(".tlrec") or "/" in target
+
 
 class Shown:
     """The worlds at one instant. Attributes are arrays by field, worlds first, as in `Frame`; they are the caller's."""

@@ -15,9 +15,8 @@ from tightloop.view.looks import Looks
 from tightloop.view.parts import Part
 from tightloop.view.poses import IDENTITY, Array, wxyz
 from tightloop.view.skins import Skin, skins
+from tightloop.view.source import FROZEN
 
-# Bits of `status` of a world that is frozen, and how much red its colours then have.
-_FROZEN = 1 | 8
 _RED = np.array([200, 0, 0])
 _TINT = 0.9
 # Shadows and fine meshes of more worlds than that cost the browser more than they show.
@@ -122,7 +121,7 @@ class Stage:
             status: Trouble of each world, shape ``(worlds,)``.
         """
         shown = self.shown(len(body_q))
-        frozen = tuple(world for world in shown if status[world] & _FROZEN)
+        frozen = tuple(world for world in shown if status[world] & FROZEN)
         for kind, batches in self._batches.items():
             for batch in batches:
                 batch.handle.visible = kind == self._looks.kind
