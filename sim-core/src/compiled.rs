@@ -23,18 +23,13 @@ pub type Stages<F> = [RunStage<F>; Stage::ALL.len()];
 #[macro_export]
 macro_rules! compiled {
     ($number:ty, $features:literal) => {
-        $crate::compiled!(@ $number, $features,
-            0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30 31 32 33 34 35 36 37);
-    };
-    (@ $number:ty, $features:literal, $($stage:literal)*) => {
         use $crate::batch::Block;
         use $crate::compiled::Stages;
         use $crate::lane::{Num, memory::Cpu};
         use $crate::model::constants::Constants;
-        use $crate::step::Stage;
 
         #[cfg_attr(target_arch = "x86_64", target_feature(enable = $features))]
-        unsafe fn stage<const S: usize>(
+        unsafe fn stage<const STAGE: usize>(
             constants: &Constants<<$number as Num>::Real>,
             block: &mut Block<$number, $number>,
             memory: &mut [$number],
@@ -42,11 +37,11 @@ macro_rules! compiled {
             // made here, so that the compiler sees that every world is active: what is set outside of
             // blocks and loops is then a plain store, which the next load need not wait for
             let mut machine = Cpu::new(memory, &constants.contacts.tables);
-            Stage::ALL[S].run(&mut machine, constants, block);
+            $crate::step::run::<_, STAGE>(&mut machine, constants, block);
         }
 
         /// Every stage, by its number.
         // a constant would be compiled by whoever uses it
-        pub static STAGES: Stages<$number> = [$(stage::<$stage>),*];
+        pub static STAGES: Stages<$number> = $crate::every_stage!(stage);
     };
 }

@@ -10,6 +10,7 @@ mod toy;
 
 use cases::{Case, SUBSTEPS, Scalar, arm_and_cube, cases, every_joint, every_param, fr3};
 use sim_core::batch::{Block, Numbers, WorkSlot};
+use sim_core::every_stage;
 use sim_core::lane::memory::Cpu;
 use sim_core::model::Cone;
 use sim_core::model::constants::Constants;
@@ -29,11 +30,16 @@ const STATES: usize = 50;
 /// States in which each pair of kinds is to touch.
 const MANY_STATES: usize = 200;
 
+type RunStage = fn(&Constants<f32>, &mut Scalar, &mut [f32]);
+
 /// A stage on a machine of one world. Here stands the only call, since it is the whole text of physics.
-#[inline(never)]
 fn run(stage: Stage, m: &Constants<f32>, block: &mut Scalar, memory: &mut [f32]) {
-    let cx = &mut Cpu::new(memory, &m.contacts.tables);
-    stage.run(cx, m, block);
+    static STAGES: [RunStage; Stage::ALL.len()] = every_stage!(on_a_world);
+    fn on_a_world<const STAGE: usize>(m: &Constants<f32>, block: &mut Scalar, memory: &mut [f32]) {
+        let cx = &mut Cpu::new(memory, &m.contacts.tables);
+        sim_core::step::run::<_, STAGE>(cx, m, block);
+    }
+    STAGES[stage.number()](m, block, memory);
 }
 
 /// Scratch memory of the machine: it carries contacts from stage to stage.

@@ -23,29 +23,45 @@ pub enum Kind {
     Hull,
 }
 
-/// Pairs of kinds that can touch, each with the name of its stage; the order in which they are looked at.
-pub const PAIR_KINDS: [((Kind, Kind), &str); 20] = [
-    ((Kind::Plane, Kind::Sphere), "plane_sphere"),
-    ((Kind::Plane, Kind::Capsule), "plane_capsule"),
-    ((Kind::Plane, Kind::Box), "plane_box"),
-    ((Kind::Plane, Kind::Cylinder), "plane_cylinder"),
-    ((Kind::Plane, Kind::Hull), "plane_hull"),
-    ((Kind::Sphere, Kind::Sphere), "sphere_sphere"),
-    ((Kind::Sphere, Kind::Capsule), "sphere_capsule"),
-    ((Kind::Sphere, Kind::Box), "sphere_box"),
-    ((Kind::Sphere, Kind::Cylinder), "sphere_cylinder"),
-    ((Kind::Sphere, Kind::Hull), "sphere_hull"),
-    ((Kind::Capsule, Kind::Capsule), "capsule_capsule"),
-    ((Kind::Capsule, Kind::Box), "capsule_box"),
-    ((Kind::Capsule, Kind::Cylinder), "capsule_cylinder"),
-    ((Kind::Capsule, Kind::Hull), "capsule_hull"),
-    ((Kind::Box, Kind::Box), "box_box"),
-    ((Kind::Box, Kind::Cylinder), "box_cylinder"),
-    ((Kind::Box, Kind::Hull), "box_hull"),
-    ((Kind::Cylinder, Kind::Cylinder), "cylinder_cylinder"),
-    ((Kind::Cylinder, Kind::Hull), "cylinder_hull"),
-    ((Kind::Hull, Kind::Hull), "hull_hull"),
-];
+/// Defines [`PAIR_KINDS`], and the number of each of its entries as a constant with the name of its stage.
+macro_rules! pair_kinds {
+    ($($constant:ident, $name:literal, $first:ident, $second:ident;)*) => {
+        /// Numbers of the pairs of kinds in [`PAIR_KINDS`]: what a function is compiled for.
+        pub mod pair_kinds {
+            #[allow(non_camel_case_types)]
+            enum Number {
+                $($constant,)*
+            }
+            $(#[doc = $name] pub const $constant: usize = Number::$constant as usize;)*
+        }
+
+        /// Pairs of kinds that can touch, each with the name of its stage; the order in which they are looked at.
+        pub const PAIR_KINDS: [((Kind, Kind), &str); 20] = [$(((Kind::$first, Kind::$second), $name),)*];
+    };
+}
+
+pair_kinds! {
+    PLANE_SPHERE, "plane_sphere", Plane, Sphere;
+    PLANE_CAPSULE, "plane_capsule", Plane, Capsule;
+    PLANE_BOX, "plane_box", Plane, Box;
+    PLANE_CYLINDER, "plane_cylinder", Plane, Cylinder;
+    PLANE_HULL, "plane_hull", Plane, Hull;
+    SPHERE_SPHERE, "sphere_sphere", Sphere, Sphere;
+    SPHERE_CAPSULE, "sphere_capsule", Sphere, Capsule;
+    SPHERE_BOX, "sphere_box", Sphere, Box;
+    SPHERE_CYLINDER, "sphere_cylinder", Sphere, Cylinder;
+    SPHERE_HULL, "sphere_hull", Sphere, Hull;
+    CAPSULE_CAPSULE, "capsule_capsule", Capsule, Capsule;
+    CAPSULE_BOX, "capsule_box", Capsule, Box;
+    CAPSULE_CYLINDER, "capsule_cylinder", Capsule, Cylinder;
+    CAPSULE_HULL, "capsule_hull", Capsule, Hull;
+    BOX_BOX, "box_box", Box, Box;
+    BOX_CYLINDER, "box_cylinder", Box, Cylinder;
+    BOX_HULL, "box_hull", Box, Hull;
+    CYLINDER_CYLINDER, "cylinder_cylinder", Cylinder, Cylinder;
+    CYLINDER_HULL, "cylinder_hull", Cylinder, Hull;
+    HULL_HULL, "hull_hull", Hull, Hull;
+}
 
 /// Shapes, the pairs of them that may touch, and the classes of contacts.
 #[derive(Clone, Debug)]

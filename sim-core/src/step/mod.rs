@@ -14,6 +14,7 @@ mod inverse_dynamics;
 mod kinematics;
 mod mass_matrix;
 mod poses;
+mod run;
 mod site_inverse;
 mod sites;
 mod solver;
@@ -25,6 +26,7 @@ use crate::math::vec3::Vec3;
 use crate::model::constants::Constants;
 use crate::model::contact::PAIR_KINDS;
 use crate::model::params::Param;
+pub use run::run;
 
 /// The constants that a machine reads.
 pub type ConstantsOf<C> = Constants<<<C as Cx>::F as Num>::Real>;
@@ -289,32 +291,6 @@ impl Stage {
             Stage::SiteInverse => &[SiteInverse],
         }
     }
-
-    /// Runs it on a block.
-    #[inline(always)]
-    pub fn run<C: Cx>(self, cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        match self {
-            Stage::Command => command::arrive(cx, m, b),
-            Stage::Kinematics => kinematics::kinematics(cx, m, b),
-            Stage::Bias => bias::bias_force(cx, m, b),
-            Stage::MassMatrix => mass_matrix::mass_matrix(m, &b.params, &mut b.work),
-            Stage::Actuation => actuation::smooth_force(cx, m, b),
-            Stage::Constraint => constraint::rows(cx, m, b),
-            Stage::Place => collide::place(cx, m, b),
-            Stage::Touch(kinds) => collide::touch(cx, &m.contacts, PAIR_KINDS[kinds].0),
-            Stage::ContactRows => contact_rows::contact_rows(cx, m, b),
-            Stage::Solver => solver::solve(cx, m, b),
-            Stage::Refine => solver::refine(cx, m, b),
-            Stage::Integrate => integrate::implicit_fast(cx, m, b),
-            Stage::Poses => poses::body_q(cx, m, b),
-            Stage::Velocities => velocities::body_qd(m, &mut b.work),
-            Stage::Accelerations => solver::accelerations(cx, m, b),
-            Stage::JointTorque => actuation::joint_torque(cx, m, b),
-            Stage::Sites => sites::site_q(m, &mut b.work),
-            Stage::Imu => sites::imu(cx, m, b),
-            Stage::SiteInverse => site_inverse::inverse_jacobian(m, &mut b.work),
-        }
-    }
 }
 
 /// Number `k` of a parameter: the worlds' own where it varies, else the model's.
@@ -340,12 +316,4 @@ fn gravity<F: Num>(m: &Constants<F::Real>, params: &[F]) -> Vec3<F> {
         gravity[i] = param(m, params, Param::Gravity, i, m.gravity[i]);
     }
     gravity
-}
-
-/// One substep: the state moves on by `dt`.
-#[inline(always)]
-pub fn step<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    for stage in STAGES {
-        stage.run(cx, m, b);
-    }
 }

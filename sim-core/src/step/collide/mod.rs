@@ -28,7 +28,7 @@ use crate::lane::{Cx, Num, Real, Table};
 use crate::math::vec3::{Mat3, Vec3, add, constant, dot, sub, transform, transform_add};
 use crate::model::Cone;
 use crate::model::contact::{
-    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, MU_MIN, pair,
+    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, MU_MIN, PAIR_KINDS, pair,
 };
 use crate::model::params::Param;
 use crate::{span, when};
@@ -81,20 +81,21 @@ pub(super) fn place<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
     cx.fill_all(memory.origins, world, 0, [C::F::c(0.0); 3]);
 }
 
-/// Contacts of all pairs of two kinds.
+/// Contacts of all pairs of two kinds, by their number in [`PAIR_KINDS`].
 #[inline(always)]
-pub(super) fn touch<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, Kind)) {
-    for group in t.groups.iter().filter(|group| group.kinds == kinds) {
+pub(super) fn touch<C: Cx, const KINDS: usize>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>) {
+    if let Some(group) = t.group(KINDS) {
         let (first, end) = (cx.at(group.first), cx.at(group.end));
         span!(cx, p in first, end, {
-            pair_of::<C>(cx, t, kinds, p);
+            pair_of::<C, KINDS>(cx, t, p);
         });
     }
 }
 
 /// The contacts of a pair.
 #[inline(always)]
-fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, Kind), p: C::I) {
+fn pair_of<C: Cx, const KINDS: usize>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) {
+    let kinds = PAIR_KINDS[KINDS].0;
     let (numbers, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
     let (poses, origins) = (t.memory.poses, t.memory.origins);
     let a = cx.index(indices, p, pair::SOLID_A, poses.rows);
@@ -147,7 +148,7 @@ fn pair_of<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, kinds: (Kind, K
                 };
                 let base = (center_a, origin_a);
                 let mut points = points_of::<C>(cx, t, p, base);
-                narrow(cx, t, kinds, &two, &mut points);
+                narrow::<C, KINDS>(cx, t, &two, &mut points);
             });
         });
     });

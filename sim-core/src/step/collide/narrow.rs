@@ -4,7 +4,7 @@ use super::points::{Placed, Points};
 use super::{boxes, capsules, cylinders, hulls, planes, spheres};
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{Mat3, Vec3};
-use crate::model::contact::{Contacts, Kind};
+use crate::model::contact::{Contacts, Kind, pair_kinds};
 
 type ContactsOf<C> = Contacts<<<C as Cx>::F as Num>::Real>;
 
@@ -68,46 +68,48 @@ pub(super) struct Two<'a, C: Cx> {
     pub margin: C::F,
 }
 
-/// Contacts of two shapes of these kinds. The kinds are the model's: one call is compiled for each pair of them.
+/// Contacts of two shapes, of the pair of kinds with this number.
+///
+/// A number of the type and not an argument: the other functions then never reach the compiler's optimizer, which would
+/// take minutes to find that they are not called.
 #[inline(always)]
-pub(super) fn narrow<C: Cx>(
+pub(super) fn narrow<C: Cx, const KINDS: usize>(
     cx: &mut C,
     t: &ContactsOf<C>,
-    kinds: (Kind, Kind),
     two: &Two<'_, C>,
     out: &mut Points<C>,
 ) {
-    use Kind::{Box, Capsule, Cylinder, Hull, Plane, Sphere};
+    use pair_kinds::*;
     let (x, o, margin) = (two.axes, two.other, two.margin);
     let ([r, h, _], [s, k, _]) = (two.first.size, two.second.size);
     let (a, b) = (two.first.size, two.second.size);
     let (f, g) = (two.first.hull, two.second.hull);
     let (tables, cut) = (&t.hulls, t.memory.cut);
-    match kinds {
-        (Plane, Sphere) => planes::plane_sphere(cx, x, o, s, margin, out),
-        (Plane, Capsule) => planes::plane_capsule(cx, x, o, s, k, margin, out),
-        (Plane, Box) => planes::plane_box(cx, x, o, b, margin, out),
-        (Plane, Cylinder) => planes::plane_cylinder(cx, x, o, s, k, margin, out),
-        (Plane, Hull) => hulls::plane_hull(cx, x, o, g, tables, margin, out),
-        (Sphere, Sphere) => spheres::sphere_sphere(cx, r, o, s, margin, out),
-        (Sphere, Capsule) => spheres::sphere_capsule(cx, r, o, s, k, margin, out),
-        (Sphere, Box) => spheres::sphere_box(cx, r, o, b, margin, out),
-        (Sphere, Cylinder) => cylinders::sphere_cylinder(cx, r, o, s, k, margin, out),
-        (Sphere, Hull) => hulls::sphere_hull(cx, r, o, g, tables, margin, out),
-        (Capsule, Capsule) => capsules::capsule_capsule(cx, x, r, h, o, s, k, margin, out),
-        (Capsule, Box) => capsules::capsule_box(cx, x, r, h, o, b, margin, out),
-        (Capsule, Cylinder) => {
+    match KINDS {
+        PLANE_SPHERE => planes::plane_sphere(cx, x, o, s, margin, out),
+        PLANE_CAPSULE => planes::plane_capsule(cx, x, o, s, k, margin, out),
+        PLANE_BOX => planes::plane_box(cx, x, o, b, margin, out),
+        PLANE_CYLINDER => planes::plane_cylinder(cx, x, o, s, k, margin, out),
+        PLANE_HULL => hulls::plane_hull(cx, x, o, g, tables, margin, out),
+        SPHERE_SPHERE => spheres::sphere_sphere(cx, r, o, s, margin, out),
+        SPHERE_CAPSULE => spheres::sphere_capsule(cx, r, o, s, k, margin, out),
+        SPHERE_BOX => spheres::sphere_box(cx, r, o, b, margin, out),
+        SPHERE_CYLINDER => cylinders::sphere_cylinder(cx, r, o, s, k, margin, out),
+        SPHERE_HULL => hulls::sphere_hull(cx, r, o, g, tables, margin, out),
+        CAPSULE_CAPSULE => capsules::capsule_capsule(cx, x, r, h, o, s, k, margin, out),
+        CAPSULE_BOX => capsules::capsule_box(cx, x, r, h, o, b, margin, out),
+        CAPSULE_CYLINDER => {
             cylinders::capsule_cylinder(cx, x, r, h, o, s, k, margin, cut, out);
         }
-        (Capsule, Hull) => hulls::capsule_hull(cx, x, r, h, o, g, tables, margin, cut, out),
-        (Box, Box) => boxes::box_box(cx, x, a, o, b, margin, out),
-        (Box, Cylinder) => cylinders::box_cylinder(cx, x, a, o, s, k, margin, cut, out),
-        (Box, Hull) => hulls::box_hull(cx, x, a, o, g, tables, margin, cut, out),
-        (Cylinder, Cylinder) => {
+        CAPSULE_HULL => hulls::capsule_hull(cx, x, r, h, o, g, tables, margin, cut, out),
+        BOX_BOX => boxes::box_box(cx, x, a, o, b, margin, out),
+        BOX_CYLINDER => cylinders::box_cylinder(cx, x, a, o, s, k, margin, cut, out),
+        BOX_HULL => hulls::box_hull(cx, x, a, o, g, tables, margin, cut, out),
+        CYLINDER_CYLINDER => {
             cylinders::cylinder_cylinder(cx, x, r, h, o, s, k, margin, cut, out);
         }
-        (Cylinder, Hull) => cylinders::cylinder_hull(cx, x, r, h, o, g, tables, margin, cut, out),
-        (Hull, Hull) => hulls::hull_hull(cx, x, f, o, g, tables, margin, cut, out),
-        _ => unreachable!("the lower kind is the first"),
+        CYLINDER_HULL => cylinders::cylinder_hull(cx, x, r, h, o, g, tables, margin, cut, out),
+        HULL_HULL => hulls::hull_hull(cx, x, f, o, g, tables, margin, cut, out),
+        _ => unreachable!("there are no more pairs of kinds"),
     }
 }

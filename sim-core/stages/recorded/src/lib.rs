@@ -4,6 +4,7 @@
 //! matters: a recording takes milliseconds. See the profile in `Cargo.toml`.
 
 use sim_core::batch::{Block, Numbers, WorkSlot as Slot};
+use sim_core::every_stage;
 use sim_core::lane::{Cx, Num};
 use sim_core::model::constants::Constants;
 use sim_core::step::Stage;
@@ -66,9 +67,15 @@ pub const SCRATCH: [Slot; 4] = [
 ];
 
 /// Records a stage.
-#[inline(never)]
 pub fn run(stage: Stage, cx: &mut Recorder, m: &Constants<f32>, block: &mut RecordedWorlds) {
-    stage.run(cx, m, block);
+    static STAGES: [RunStage; Stage::ALL.len()] = every_stage!(recorded);
+    STAGES[stage.number()](cx, m, block);
+}
+
+type RunStage = fn(&mut Recorder, &Constants<f32>, &mut RecordedWorlds);
+
+fn recorded<const STAGE: usize>(cx: &mut Recorder, m: &Constants<f32>, block: &mut RecordedWorlds) {
+    sim_core::step::run::<_, STAGE>(cx, m, block);
 }
 
 /// Numbers of a slot, by the model.
