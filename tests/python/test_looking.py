@@ -85,6 +85,25 @@ def test_worlds_on_a_gpu_are_seen_alike(pendulum_urdf: Path) -> None:
         source.close()
 
 
+def test_an_observer_that_rested_sees_the_present_and_knows_its_daemon(
+    pendulum: tl.Scene, unique: Callable[[], str]
+) -> None:
+    name = unique()
+    with tl.launch(pendulum, worlds=3, name=name) as sim:
+        source = Live(name, worlds=2)
+        newest(source, 0)
+        source.rest()
+        for _ in range(7):
+            sim.step()
+        assert newest(source, 7).joint_q.shape[0] == 2
+        source.rest()
+    with pytest.raises(tl.DaemonLost, match=name):
+        source.poll(0.1)
+    with tl.launch(pendulum, worlds=3, name=name), pytest.raises(tl.DaemonRestarted, match=name):
+        source.poll(0.1)
+    source.close()
+
+
 def test_latest_is_for_everybody_and_control_for_one() -> None:
     with tl.launch(scene(), worlds=3, watch_worlds=2) as sim:
         onlooker = tl.attach(sim.name)

@@ -61,6 +61,10 @@ class LiveFeed:
             self._fields = wanted
             before.close()
 
+    def rest(self) -> None:
+        """Ask the daemon for nothing until the next `poll`."""
+        self._source.rest()
+
     def close(self) -> None:
         """Detach; the daemon goes on."""
         self.driver.close()
@@ -100,6 +104,9 @@ class RecordedFeed:
         if wanted != self._fields:
             self._fields = wanted
             self.driver.reset(None)
+
+    def rest(self) -> None:
+        """Between two polls nothing is played."""
 
     def close(self) -> None:
         """Close the file."""

@@ -16,8 +16,8 @@ from tightloop.view.page import Page
 
 # Frames a second that are shown: of few worlds, and of many.
 _RATE_HZ, _RATE_MANY_HZ, _FEW_WORLDS = 60.0, 30.0, 16
-# Frames are shown to nobody at this rate: text and state stay fresh for who comes next.
-_RATE_UNSEEN_HZ = 5.0
+# Without a page open, it is looked for one so often.
+_UNSEEN_SECONDS = 0.1
 _WAIT_SECONDS = 0.5
 _PARENT_SECONDS = 0.5
 
@@ -92,6 +92,10 @@ class Server:
                 for client in self._viser.get_clients().values():
                     self._page.aim_client(client)
             return False
+        if not self._viser.get_clients():
+            self._feed.rest()
+            time.sleep(_UNSEEN_SECONDS)
+            return False
         return self._page.update(0.05)
 
     def _aim(self, client: viser.ClientHandle) -> None:
@@ -100,8 +104,6 @@ class Server:
             page.aim_client(client)
 
     def _rate(self) -> float:
-        if not self._viser.get_clients():
-            return _RATE_UNSEEN_HZ
         assert self._feed is not None
         return _RATE_HZ if self._feed.worlds <= _FEW_WORLDS else _RATE_MANY_HZ
 

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 from numpy.typing import NDArray
 
 from tightloop import _core, checks
-from tightloop.errors import ArgumentError, SceneError, UnknownField
+from tightloop.errors import ArgumentError, DaemonLost, DaemonRestarted, SceneError, UnknownDaemon, UnknownField
 
 #: What viewers need of every frame; time, step, status and contacts_left_out come with it.
 FIELDS = ("body_q", "joint_q", "joint_qd", "joint_target_q")
@@ -53,6 +53,10 @@ class Source(Protocol):
         """The next thing to show, or None if there is nothing new within ``timeout`` [s]."""
         ...
 
+    def rest(self) -> None:
+        """Let it cost nothing until the next `poll`."""
+        ...
+
     def close(self) -> None:
         """Let go of it."""
         ...
@@ -80,9 +84,10 @@ class Live:
         asked = checks.integer("view: worlds", worlds, least=1, error=ArgumentError)
         # of worlds in groups the first is shown, unless another is named
         named = checks.text("view: name", name, error=ArgumentError)
-        self.client = _core.Client(named if _core.groups(named) == 1 else f"{named}.0", lease=False)
+        self._name = named if _core.groups(named) == 1 else f"{named}.0"
+        self._client: _core.Client | None = _core.Client(self._name, lease=False)
         try:
-            self.info: dict[str, Any] = json.loads(self.client.describe())
+            self.info: dict[str, Any] = json.loads(self._client.describe())
             self.worlds = min(asked, self.info["watch_worlds"])
             self.period: float = self.info["dt"] * self.info["substeps"]
             self._evaluation = _core.Evaluation(
@@ -91,7 +96,7 @@ class Live:
             if self._evaluation.model_hash != self.info["model_hash"]:
                 raise SceneError(f"the files of simulation `{name}` have changed since it started; launch it again")
         except BaseException:
-            self.client.close()
+            self.close()
             raise
 
     def poll(self, timeout: float = 0.0) -> Shown | None:
@@ -100,12 +105,29 @@ class Live:
         Raises:
             DaemonLost: The daemon went away.
         """
-        frame = self.client.wait_newer(timeout) if timeout > 0.0 else self.client.latest()
+        client = self._client = self._client or self._again()
+        frame = client.wait_newer(timeout) if timeout > 0.0 else client.latest()
         return None if frame is None else Shown(self._evaluation.evaluate(frame.state))
+
+    def rest(self) -> None:
+        """Have the daemon show nothing until the next `poll`: what nobody sees costs it nothing."""
+        self.close()
 
     def close(self) -> None:
         """Let go of the daemon, which goes on."""
-        self.client.close()
+        if self._client is not None:
+            self._client.close()
+            self._client = None
+
+    def _again(self) -> _core.Client:
+        try:
+            client = _core.Client(self._name, lease=False)
+        except UnknownDaemon as gone:
+            raise DaemonLost(str(gone)) from gone
+        if json.loads(client.describe())["session"] != self.info["session"]:
+            client.close()
+            raise DaemonRestarted(f"another daemon runs as `{self._name}`")
+        return client
 
 
 class Recorded:
@@ -150,6 +172,9 @@ class Recorded:
         """
         arrays = self._playback.next()
         return None if arrays is None else Shown(arrays)
+
+    def rest(self) -> None:
+        """It costs nothing between two polls."""
 
     def close(self) -> None:
         """Nothing is held that would have to be let go."""

@@ -81,8 +81,8 @@ fn description() -> Description {
     }
 }
 
-/// Worlds whose frames and state are a number.
-struct Counted(u64);
+/// Worlds whose frames and state are a number; the state takes a time to give.
+struct Counted(u64, Duration);
 
 impl Worlds for Counted {
     fn frame(&mut self, arena: &mut [u64]) -> bool {
@@ -91,13 +91,14 @@ impl Worlds for Counted {
     }
 
     fn state(&mut self, to: &mut [u8]) -> bool {
+        std::thread::sleep(self.1);
         to.fill(self.0 as u8);
         true
     }
 }
 
 /// Serves until told to stop; sends word when clients may come.
-fn serve(place: &Place, stop: Arc<AtomicBool>, ready: Sender<()>) {
+fn serve(place: &Place, stop: Arc<AtomicBool>, ready: Sender<()>, takes: Duration) {
     let table = Table::over_arena([("count".to_owned(), Dtype::U64, vec![2], 0)], 64);
     let tenancy = Tenancy::take(place).unwrap();
     let mut host = Host::open(tenancy, description(), table, stop).unwrap();
@@ -108,9 +109,9 @@ fn serve(place: &Place, stop: Arc<AtomicBool>, ready: Sender<()>) {
         match host.wait().unwrap() {
             Next::Command => {
                 count += 1;
-                host.answer(Instant::now(), &mut Counted(count));
+                host.answer(Instant::now(), &mut Counted(count, takes));
             }
-            Next::Watch => host.show(&mut [0; 8], &mut Counted(count)),
+            Next::Watch => host.show(&mut [0; 8], &mut Counted(count, takes)),
             Next::Record => host.record_state(&[count as u8; STATE], false),
             Next::End => break,
         }
@@ -120,11 +121,16 @@ fn serve(place: &Place, stop: Arc<AtomicBool>, ready: Sender<()>) {
 
 impl Fake {
     fn start(test: &str) -> Fake {
+        Fake::slow(test, Duration::ZERO)
+    }
+
+    /// One whose state takes a time to give.
+    fn slow(test: &str, takes: Duration) -> Fake {
         let root = std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()));
         let place = Place::new(Some(&root), "fake").unwrap();
         let (stop, (ready, wait)) = (Arc::new(AtomicBool::new(false)), channel());
         let theirs = Arc::clone(&stop);
-        let thread = std::thread::spawn(move || serve(&place, theirs, ready));
+        let thread = std::thread::spawn(move || serve(&place, theirs, ready, takes));
         wait.recv().unwrap();
         Fake {
             name: "fake".to_owned(),
@@ -395,6 +401,28 @@ fn a_journal_tells_what_was_carried_out_and_counts_what_was_lost() {
         assert_eq!(next().lost, 0, "{left}");
         left -= 1;
     }
+}
+
+/// Frames that an observer is shown while steps are made for about a second, and that time.
+fn shown(fake: &Fake) -> (u32, Duration) {
+    let (client, observer) = (fake.attach(), fake.attach());
+    let (began, mut frames) = (Instant::now(), 0);
+    while began.elapsed() < Duration::from_secs(1) {
+        client.step(&[], &mut keep_waiting()).unwrap();
+        frames += u32::from(observer.latest().unwrap().is_some());
+    }
+    (frames, began.elapsed())
+}
+
+#[test]
+fn observers_see_fewer_frames_where_it_takes_long_to_show_one() {
+    let (frames, time) = shown(&Fake::start("shown"));
+    // the first is the one shown last, and the next needs no wait
+    let most = time.div_duration_f64(watch::PERIOD) as u32 + 2;
+    assert!((5..=most).contains(&frames), "{frames} frames in {time:?}");
+    let (frames, time) = shown(&Fake::slow("slow", Duration::from_millis(5)));
+    let most = time.div_duration_f64(watch::SLOWEST) as u32 + 2;
+    assert!((1..=most).contains(&frames), "{frames} frames in {time:?}");
 }
 
 #[test]

@@ -11,9 +11,13 @@ use crate::transport::{self, FramePublisher, FrameService};
 use crate::{ALIGNMENT, Description, FrameHeader, ProtocolError, Table, loan};
 
 /// Observers see at most this many frames a second ...
-const PERIOD: Duration = Duration::from_micros(16_667);
+pub(super) const PERIOD: Duration = Duration::from_micros(16_667);
 /// ... and half of them where they see more worlds than this.
 const MANY: usize = 256;
+/// To show a frame takes at most one part in so many of the daemon's time ...
+const PARTS: u32 = 100;
+/// ... unless observers would then see fewer frames than one in this time.
+pub(super) const SLOWEST: Duration = Duration::from_millis(250);
 
 /// The observers' service.
 pub(super) struct Watch {
@@ -26,6 +30,8 @@ pub(super) struct Watch {
     /// The state has changed since they were shown one.
     unseen: bool,
     shown: Instant,
+    /// What it takes to show them one: the least of late, since others may have had the processor meanwhile.
+    cost: Duration,
 }
 
 impl Watch {
@@ -53,6 +59,7 @@ impl Watch {
             observers: 0,
             unseen: true,
             shown: Instant::now(),
+            cost: Duration::ZERO,
         })
     }
 
@@ -68,7 +75,8 @@ impl Watch {
 
     /// Somebody looks on, and has not seen the present state, nor any within the last period?
     pub fn is_due(&self) -> bool {
-        self.unseen && self.observers > 0 && self.shown.elapsed() > self.period
+        let period = self.period.max(SLOWEST.min(PARTS * self.cost));
+        self.unseen && self.observers > 0 && self.shown.elapsed() > period
     }
 
     /// Sees who is there; a new observer gets the last sample.
@@ -113,5 +121,7 @@ impl Watch {
         // an observer that cannot be reached misses a frame; one that cannot be notified looks by itself after 50 ms
         let _ = loan::send(loan);
         let _ = self.notifier.notify();
+        let took = self.shown.elapsed();
+        self.cost = took.min(self.cost + took.abs_diff(self.cost) / 8);
     }
 }
