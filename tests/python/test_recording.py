@@ -122,7 +122,7 @@ def test_ctrl_c_ends_a_recording_and_another_may_take_its_place_when_forced(pend
         recorder = Recorder(sim, out)
         for _ in range(30):
             sim.step()
-        time.sleep(0.3)
+        # at once: the last of them wait for the recorder still
         assert "30 frames" in recorder.stop(signal.SIGINT)
         again = [*COMMAND, "record", sim.name, str(out)]
         done = subprocess.run(again, capture_output=True, text=True, check=False)

@@ -22,6 +22,10 @@ use crate::error::DaemonError;
 
 /// Entries are waited for so long before anything else is looked at.
 const LOOK: Duration = Duration::from_millis(20);
+/// At the end, entries may be under way for so long, which were made before ...
+const LATE: Duration = Duration::from_millis(5);
+/// ... and where the daemon makes ever more of them, no more are taken after this.
+const LEAVE: Duration = Duration::from_secs(1);
 /// A terminal is told this often how far it is.
 const TELL_PERIOD: Duration = Duration::from_millis(500);
 
@@ -211,6 +215,7 @@ impl Recorder<'_> {
         self.writer.put(&Record::Head(head.as_bytes()))?;
         loop {
             if self.stop.load(Ordering::Relaxed) {
+                self.take_what_waits()?;
                 return Err(End::Done("stopped by a signal".to_owned()));
             }
             if self.args.frames == Some(self.tally.frames) {
@@ -218,6 +223,7 @@ impl Recorder<'_> {
             }
             let seconds = self.args.seconds;
             if seconds.is_some_and(|seconds| self.started.elapsed().as_secs_f64() >= seconds) {
+                self.take_what_waits()?;
                 return Err(End::Done("as many seconds as asked".to_owned()));
             }
             match self.journal.next(LOOK, &mut keep_waiting()) {
@@ -234,6 +240,18 @@ impl Recorder<'_> {
             self.writer.flush_old()?;
             self.tell();
         }
+    }
+
+    /// What was done before the end is recorded, though it may still wait in the journal.
+    fn take_what_waits(&mut self) -> Result<(), End> {
+        let began = Instant::now();
+        while self.args.frames != Some(self.tally.frames)
+            && began.elapsed() < LEAVE
+            && let Ok(Some(entry)) = self.journal.next(LATE, &mut keep_waiting())
+        {
+            self.take(&entry)?;
+        }
+        Ok(())
     }
 
     fn take(&mut self, entry: &JournalEntry) -> Result<(), End> {

@@ -55,7 +55,7 @@ class Server:
 
     def run(self, stopped: threading.Event, parent: int | None = None) -> None:
         """Show frames until an event is set, or the process has ended that started this one."""
-        looked_at = time.monotonic()
+        looked_at = due = time.monotonic()
         while not stopped.is_set():
             began = time.monotonic()
             if parent is not None and began - looked_at > _PARENT_SECONDS:
@@ -64,7 +64,10 @@ class Server:
                     return
             try:
                 if self._turn():
-                    time.sleep(max(1 / self._rate() - (time.monotonic() - began), 0.0))
+                    # from one due time to the next, so that a frame that was a little late delays no other
+                    now = time.monotonic()
+                    due = max(due + 1 / self._rate(), now)
+                    time.sleep(due - now)
             except (DaemonLost, UnknownDaemon) as lost:
                 self._lose(lost)
             except TightloopError as problem:

@@ -63,7 +63,7 @@ class Source(Protocol):
 
 
 class Live:
-    """The worlds of a running daemon, as its observers see them: at most 60 times a second, half as often where they
+    """The worlds of a running daemon, as its observers see them: some 60 times a second, half as often where they
     see more than 256 worlds.
 
     The daemon shows the state of its first ``watch_worlds`` worlds; fields are evaluated here, in this process, so that

@@ -10,9 +10,9 @@ use super::{S, Worlds, memory};
 use crate::transport::{self, FramePublisher, FrameService};
 use crate::{ALIGNMENT, Description, FrameHeader, ProtocolError, Table, loan};
 
-/// Observers see at most this many frames a second ...
-pub(super) const PERIOD: Duration = Duration::from_micros(16_667);
-/// ... and half of them where they see more worlds than this.
+/// Observers see a frame that comes this long after the one before, so that of 60 a second they see all, early ones too ...
+pub(super) const PERIOD: Duration = Duration::from_millis(15);
+/// ... and every other one where they see more worlds than this.
 const MANY: usize = 256;
 /// To show a frame takes at most one part in so many of the daemon's time ...
 const PARTS: u32 = 100;
