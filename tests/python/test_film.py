@@ -44,7 +44,7 @@ def pictures_of(path: Path) -> list[NDArray[np.uint8]]:
     """All pictures of a file or folder."""
     if path.is_dir():
         return [np.asarray(Image.open(file)) for file in sorted(path.iterdir())]
-    if path.suffix == ".mp4":
+    if path.suffix.lower() == ".mp4":
         with av.open(str(path)) as container:
             return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
     with Image.open(path) as image:
@@ -58,14 +58,14 @@ def moves(pictures: list[NDArray[np.uint8]]) -> bool:
     )
 
 
-@pytest.mark.parametrize("out", ["run.gif", "run.mp4", "run", "run.png"])
+@pytest.mark.parametrize("out", ["run.gif", "run.MP4", "run", "run.png", "RUN.PNG"])
 def test_frames_become_pictures_at_their_times(scene: tl.Scene, tmp_path: Path, out: str) -> None:
     with tl.launch(scene, worlds=2) as sim, Film(tmp_path / out, sim, size=SIZE, fps=20) as made:
         made.add(spin(sim))
         for _ in range(29):
             made.add(sim.step())
         # 29 periods of 1/60 s; a picture at the begin and every third frame
-        assert made.pictures == (1 if out == "run.png" else 10)
+        assert made.pictures == (1 if out.lower() == "run.png" else 10)
         assert made.seconds == pytest.approx(29 * PERIOD)
     pictures = pictures_of(tmp_path / out)
     assert len(pictures) == made.pictures

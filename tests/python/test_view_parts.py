@@ -206,6 +206,32 @@ def test_robots_without_visuals_and_scenes_are_seen_as_they_touch(tmp_path):
     assert shelf[0] is shelf[1]
 
 
+def test_a_robot_without_visuals_and_collisions_is_seen_as_its_bones(tmp_path):
+    inertia = '<mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    mass = f'<inertial><origin xyz="0 0 {{}}"/>{inertia}</inertial>'
+    links = link("a", mass.format(0)) + link("b", mass.format(-0.5)) + link("c", mass.format(0.001))
+    ends = '<parent link="{1}"/><child link="{2}"/><origin xyz="{3}"/>'
+    joint = f'<joint name="{{0}}" type="continuous">{ends}<axis xyz="1 0 0"/></joint>'
+    joints = joint.format("j", "a", "b", "0.3 0 0.4") + joint.format("k", "b", "c", "0 0 -1")
+    scene, dynamics = scene_of(tmp_path, links, joints)
+    found = parts_of(scene, dynamics)
+    assert found.of("collision") == []
+    assert len(found.notes) == 1 and "neither visuals nor collisions" in found.notes[0] and "`r`" in found.notes[0]
+    body_q = dynamics.forward_kinematics(np.zeros(2))
+    names = dynamics.body_names
+    # each link's ball is at its frame, and lines go from there to the joints and the centres of mass
+    for body in range(3):
+        ball, *lines = [part for part in found.of("visual") if part.body == body]
+        assert ball.shape == "sphere"
+        reached = [2 * line.pose[:3] for line in lines]
+        expected = {"r/a": [[0.3, 0, 0.4]], "r/b": [[0, 0, -1], [0, 0, -0.5]], "r/c": []}[names[body]]
+        np.testing.assert_allclose(np.reshape(reached, (-1, 3)), np.reshape(expected, (-1, 3)), atol=1e-12)
+        for line, end in zip(lines, expected, strict=True):
+            low, high = extent(in_world(line, body_q))
+            # as thick as 6% of the longest, which is 1 m
+            np.testing.assert_allclose(high - low, np.abs(end) + 0.06, atol=1e-3)
+
+
 def test_shapes_that_a_scene_adds_to_a_dressed_robot_are_seen(tmp_path):
     links = link("l", visual('<box size="1 1 1"/>') + collision('<sphere radius="1"/>')) + link(
         "m", collision('<sphere radius="1"/>')

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use sim_core::model::geometry::{Hull, TriMesh, triangles};
 use sim_core::model::{Description, Link, Look, Pose, Robot, Shape, Visual};
 
+use super::bones::bones;
 use super::{ConfigError, SceneFile};
 
 /// What there is to draw.
@@ -86,6 +87,10 @@ impl SceneFile {
                         drawing.visual(name, visual, *count);
                         *count += 1;
                     }
+                    let own = |link| self.own_shapes(robot, link);
+                    if found.visuals.is_empty() && robot.links.iter().all(|link| own(link) == 0) {
+                        drawing.bones(robot);
+                    }
                 }
                 Err(error) => drawing.notes.push(format!("robot `{name}`: {error}")),
             }
@@ -124,6 +129,25 @@ impl Drawing {
             "whole": whole,
             "added": added,
         }));
+    }
+
+    /// Adds what stands for a robot that would not be seen.
+    fn bones(&mut self, robot: &Robot) {
+        for (place, (link, pose, shape)) in bones(robot).into_iter().enumerate() {
+            let visual = Visual {
+                link: robot.links[link].name.clone(),
+                name: Some(format!("bone{place}")),
+                pose,
+                look: Look::Shape(shape),
+                color: None,
+                texture: None,
+            };
+            self.visual(&robot.name, &visual, place);
+        }
+        self.notes.push(format!(
+            "robot `{}`: its file has neither visuals nor collisions; its joints, and lines between them, are shown",
+            robot.name
+        ));
     }
 
     /// Adds a visual, the `index`th of its link.

@@ -98,7 +98,7 @@ class Film:
         if isinstance(worlds, int) and worlds > len(self._worlds):
             self.notes.append(f"{worlds} worlds were asked for, and {len(self._worlds)} can be seen")
         self._picture = Picture(seen, *size, kind=kind)
-        if path.suffix == ".html":
+        if _ending(path) == ".html":
             needs.check("viser", "trimesh")
             from tightloop.view.html import Html
 
@@ -106,7 +106,7 @@ class Film:
             self._page = Html(path, seen, bodies, fps=self._fps, view=camera, kind=kind, contacts=contacts)
         else:
             self._roll = _roll(path, self._fps, size)
-        self._single = path.suffix == ".png"
+        self._single = _ending(path) == ".png"
         self.pictures = 0
         self._time: float | None = None
 
@@ -204,7 +204,7 @@ def film(
     at = 0.0 if at is None else checks.number("film: at", at, least=0.0, error=ArgumentError)
     if seconds is not None:
         seconds = checks.number("film: seconds", seconds, above=0.0, error=ArgumentError)
-    single = Path(os.fspath(out)).suffix == ".png"
+    single = _ending(Path(os.fspath(out))) == ".png"
     name = source if isinstance(source, str | os.PathLike) else source.name
     text = os.fspath(name)
     most = most_worlds(worlds, world)
@@ -288,13 +288,19 @@ def chosen_worlds(worlds: int | Sequence[int], world: int, there: int) -> list[i
     return chosen
 
 
+def _ending(path: Path) -> str:
+    """What kind of file it is to be: also of a name in capitals."""
+    return path.suffix.lower()
+
+
 def _roll(path: Path, fps: float, size: tuple[int, int]) -> Roll:
-    if path.suffix == "" or path.is_dir():
+    ending = _ending(path)
+    if ending == "" or path.is_dir():
         return Pngs(path)
-    if path.suffix not in _ENDINGS:
+    if ending not in _ENDINGS:
         raise ArgumentError(f"film: out is {path.name!r}; it ends in {', '.join(_ENDINGS)}, or is a folder")
-    if path.suffix == ".png":
+    if ending == ".png":
         return Png(path)
-    if path.suffix == ".gif" and fps > _GIF_FPS_MAX:
+    if ending == ".gif" and fps > _GIF_FPS_MAX:
         raise ArgumentError(f"film: fps is {fps:g}; a GIF has at most {_GIF_FPS_MAX}, give an .mp4 for more")
-    return Gif(path, fps) if path.suffix == ".gif" else Mp4(path, fps, size)
+    return Gif(path, fps) if ending == ".gif" else Mp4(path, fps, size)
