@@ -159,6 +159,14 @@ def test_textures_of_the_robot_file_are_their_mean(tmp_path):
     assert len(found.notes) == 1 and "broken.png" in found.notes[0]
 
 
+def test_a_link_of_which_nothing_can_be_shown_is_told(tmp_path):
+    mass = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    scene, _ = scene_of(tmp_path, link("a", visual('<mesh filename="missing.stl"/>') + mass))
+    found = parts_of(scene)
+    assert len(found) == 0 and len(found.notes) == 1
+    assert "r/a/0" in found.notes[0] and "nothing of the link is shown" in found.notes[0]
+
+
 @pytest.mark.parametrize("file", ["missing.dae", "broken.stl", "http://far/away.dae", "strange.blend"])
 def test_a_visual_that_cannot_be_read_leaves_the_links_collision_shapes(tmp_path, file):
     (tmp_path / "broken.stl").write_bytes(b"solid nothing")

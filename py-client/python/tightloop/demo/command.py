@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 from pathlib import Path
 
@@ -44,7 +45,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str]) -> int:
-    """Run the subcommand; returns its exit code: 0 done, 1 failed, 2 misused."""
+    """Run the subcommand; returns its exit code: 0 done, 1 failed, 2 misused, 130 ended by Ctrl-C."""
     given = parser().parse_args(arguments)
     chosen = [stop(given.worlds or worlds) for stop, worlds in STOPS if not given.stop or stop.name in given.stop]
     plan = Plan(given.out, given.seconds, given.view, given.port, given.device, given.threads)
@@ -54,7 +55,7 @@ def main(arguments: list[str]) -> int:
         print(f"tightloop: {problem}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        return 1
+        return 128 + signal.SIGINT
     return 0
 
 

@@ -120,6 +120,7 @@ class _Assembly:
 
     def whole(self, told: Sequence[dict[str, Any]], notes: Sequence[str]) -> Parts:
         collisions = [entry for entry in told if entry["kind"] == "collision"]
+        touching = {entry["body"] for entry in collisions}
         visuals = [entry for entry in told if entry["kind"] == "visual"]
         self._notes.extend(notes)
         seen: dict[str, list[Part]] = {}
@@ -128,7 +129,8 @@ class _Assembly:
             try:
                 part = self._visual(entry)
             except Unreadable as error:
-                self._note(f"visual {entry['name']}: {error}; the link's collision shapes are shown")
+                instead = "the link's collision shapes are" if entry["body"] in touching else "nothing of the link is"
+                self._note(f"visual {entry['name']}: {error}; {instead} shown")
                 lost.add(entry["body"])
             else:
                 seen.setdefault(entry["body"], []).append(part)
