@@ -1,6 +1,6 @@
 //! The stages of a step as functions of an instruction set.
 //!
-//! A crate of its own compiles them for each kind of number (`sim-core/stages`): it takes minutes, and so they are compiled
+//! A crate of its own compiles them for each kind of number (`sim-core/stages`): it takes a minute, and so they are compiled
 //! at once, and again only when the text changes.
 
 use crate::batch::Block;

@@ -16,6 +16,7 @@ import pytest
 
 import tightloop as tl
 from conftest import START, STIFFNESS, URDF
+from tightloop.view.feed import LiveFeed
 from tightloop.view.source import CONTACT_FIELDS, FIELDS, Live, Recorded, Shown
 
 EVERYTHING = (*FIELDS, *CONTACT_FIELDS, "joint_qdd", "joint_torque", "bias_force", "body_contact_force")
@@ -99,9 +100,27 @@ def test_an_observer_that_rested_sees_the_present_and_knows_its_daemon(
         source.rest()
     with pytest.raises(tl.DaemonLost, match=name):
         source.poll(0.1)
-    with tl.launch(pendulum, worlds=3, name=name), pytest.raises(tl.DaemonRestarted, match=name):
-        source.poll(0.1)
+    for groups in (1, 2):
+        with tl.launch(pendulum, worlds=4, name=name, groups=groups), pytest.raises(tl.DaemonRestarted, match=name):
+            source.poll(0.1)
     source.close()
+    with pytest.raises(tl.SimClosed):
+        source.poll(0.1)
+
+
+def test_a_feed_that_rests_finds_that_its_daemon_is_gone(pendulum: tl.Scene, unique: Callable[[], str]) -> None:
+    name = unique()
+    with tl.launch(pendulum, worlds=3, name=name) as sim:
+        feed = LiveFeed(name, 2)
+        for _ in range(3):
+            feed.rest()
+            time.sleep(0.6)
+        os.kill(sim.pid, signal.SIGKILL)
+        with pytest.raises(tl.DaemonLost):
+            for _ in range(50):
+                feed.rest()
+                time.sleep(0.1)
+        feed.close()
 
 
 def test_latest_is_for_everybody_and_control_for_one() -> None:

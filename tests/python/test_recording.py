@@ -134,6 +134,25 @@ def test_ctrl_c_ends_a_recording_and_another_may_take_its_place_when_forced(pend
         assert "7 frames" in replay(out)[1]
 
 
+def test_a_recording_under_a_loop_that_goes_on_ends_when_it_is_told(pendulum, tmp_path):
+    with tl.launch(pendulum, worlds=WORLDS) as sim:
+        for flags, ending in (((), signal.SIGINT), (("--seconds", "0.3"), None)):
+            recorder = Recorder(sim, tmp_path / f"{ending}.tlrec", *flags)
+            for _ in range(200):
+                sim.step()
+            if ending is not None:
+                recorder.process.send_signal(ending)
+            steps = 0
+            while recorder.process.poll() is None:
+                sim.step()
+                steps += 1
+            said = recorder.finish()
+            frames = int(said.split(" frames")[0].split()[-1])
+            assert "no gaps" in said and 200 <= frames <= 200 + steps, said
+            code, told = replay(tmp_path / f"{ending}.tlrec")
+            assert code == 0 and f"{frames} frames" in told, told
+
+
 def test_a_killed_recorder_leaves_a_file_and_a_daemon_that_go_on(pendulum, tmp_path):
     out = tmp_path / "run.tlrec"
     with tl.launch(pendulum, worlds=WORLDS) as sim:

@@ -159,12 +159,18 @@ def test_textures_of_the_robot_file_are_their_mean(tmp_path):
     assert len(found.notes) == 1 and "broken.png" in found.notes[0]
 
 
-def test_a_link_of_which_nothing_can_be_shown_is_told(tmp_path):
+def test_a_link_of_which_nothing_can_be_shown_is_told_and_a_robot_is_then_seen_as_its_bones(tmp_path):
     mass = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
-    scene, _ = scene_of(tmp_path, link("a", visual('<mesh filename="missing.stl"/>') + mass))
+    lost = visual('<mesh filename="missing.stl"/>') + mass
+    joint = '<joint name="j" type="continuous"><parent link="a"/><child link="b"/><axis xyz="1 0 0"/></joint>'
+    scene, _ = scene_of(tmp_path, link("a", lost) + link("b", visual('<sphere radius="2"/>') + mass), joint)
     found = parts_of(scene)
-    assert len(found) == 0 and len(found.notes) == 1
-    assert "r/a/0" in found.notes[0] and "nothing of the link is shown" in found.notes[0]
+    assert [(part.body, part.shape) for part in found] == [(1, "sphere")]
+    assert len(found.notes) == 1 and "r/a/0" in found.notes[0] and "nothing of the link is shown" in found.notes[0]
+    scene, _ = scene_of(tmp_path, link("a", lost))
+    found = parts_of(scene)
+    assert [(part.body, part.kind, part.shape) for part in found] == [(0, "visual", "sphere")]
+    assert len(found.notes) == 2 and "its joints" in found.notes[1]
 
 
 @pytest.mark.parametrize("file", ["missing.dae", "broken.stl", "http://far/away.dae", "strange.blend"])
@@ -224,7 +230,7 @@ def test_a_robot_without_visuals_and_collisions_is_seen_as_its_bones(tmp_path):
     scene, dynamics = scene_of(tmp_path, links, joints)
     found = parts_of(scene, dynamics)
     assert found.of("collision") == []
-    assert len(found.notes) == 1 and "neither visuals nor collisions" in found.notes[0] and "`r`" in found.notes[0]
+    assert len(found.notes) == 1 and "nothing in its file" in found.notes[0] and "`r`" in found.notes[0]
     body_q = dynamics.forward_kinematics(np.zeros(2))
     names = dynamics.body_names
     # each link's ball is at its frame, and lines go from there to the joints and the centres of mass
@@ -236,8 +242,8 @@ def test_a_robot_without_visuals_and_collisions_is_seen_as_its_bones(tmp_path):
         np.testing.assert_allclose(np.reshape(reached, (-1, 3)), np.reshape(expected, (-1, 3)), atol=1e-12)
         for line, end in zip(lines, expected, strict=True):
             low, high = extent(in_world(line, body_q))
-            # as thick as 6% of the longest, which is 1 m
-            np.testing.assert_allclose(high - low, np.abs(end) + 0.06, atol=1e-3)
+            # as thick as a tenth of the middle one, which is 0.5 m long
+            np.testing.assert_allclose(high - low, np.abs(end) + 0.05, atol=1e-3)
 
 
 def test_shapes_that_a_scene_adds_to_a_dressed_robot_are_seen(tmp_path):

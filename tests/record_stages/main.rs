@@ -32,7 +32,7 @@ const MANY_STATES: usize = 200;
 
 type RunStage = fn(&Constants<f32>, &mut Scalar, &mut [f32]);
 
-/// A stage on a machine of one world. Here stands the only call, since it is the whole text of physics.
+/// A stage on a machine of one world. Here stands the only call, so that the text of physics is compiled once.
 fn run(stage: Stage, m: &Constants<f32>, block: &mut Scalar, memory: &mut [f32]) {
     static STAGES: [RunStage; Stage::ALL.len()] = every_stage!(on_a_world);
     fn on_a_world<const STAGE: usize>(m: &Constants<f32>, block: &mut Scalar, memory: &mut [f32]) {

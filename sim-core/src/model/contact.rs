@@ -36,6 +36,8 @@ macro_rules! pair_kinds {
         }
 
         /// Pairs of kinds that can touch, each with the name of its stage; the order in which they are looked at.
+        ///
+        /// One more has a stage of its own, and so an arm and a number in `step/run.rs`.
         pub const PAIR_KINDS: [((Kind, Kind), &str); 20] = [$(((Kind::$first, Kind::$second), $name),)*];
     };
 }

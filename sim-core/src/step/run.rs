@@ -9,7 +9,7 @@ use super::{
 };
 use crate::lane::Cx;
 
-/// A function that is generic over the number of a stage, for each of [`Stage::ALL`].
+/// A function that is generic over the number of a stage, for each of [`Stage::ALL`]: as many as there are.
 #[macro_export]
 macro_rules! every_stage {
     ($function:ident) => {
@@ -24,7 +24,10 @@ macro_rules! every_stage {
 /// What runs where stage `$number` is of a pattern; the stage is of exactly one.
 macro_rules! by_number {
     ($number:ident, $($stage:pat => $run:expr,)*) => {
-        const { assert!(0 $(+ matches!(Stage::ALL[$number], $stage) as usize)* == 1) }
+        const {
+            let arms = 0 $(+ matches!(Stage::ALL[$number], $stage) as usize)*;
+            assert!(arms == 1, "a stage has no arm in step/run.rs, or two");
+        }
         $(if const { matches!(Stage::ALL[$number], $stage) } {
             $run;
         })*

@@ -203,6 +203,11 @@ impl Journal {
         })
     }
 
+    /// Entries that may wait at most: of more, the oldest are lost.
+    pub fn depth(&self) -> usize {
+        self.subscriber.buffer_size()
+    }
+
     /// The next entry; `None` when none came within `timeout`.
     ///
     /// # Errors

@@ -2,8 +2,9 @@
 
 use sim_core::model::{Pose, Robot, Shape};
 
-/// Half the thickness of a line, as a part of the longest one.
-const THIN: f64 = 0.03;
+/// Half the thickness of a line, as a part of the middle one's length: one that is far longer than the others, such as to a
+/// base that is fixed far away, makes them no thicker.
+const THIN: f64 = 0.05;
 /// The same where there is no line at all [m].
 const THIN_ALONE: f64 = 0.02;
 
@@ -16,14 +17,12 @@ pub(super) fn bones(robot: &Robot) -> Vec<(usize, Pose, Shape)> {
     for (place, link) in robot.links.iter().enumerate() {
         lines.extend(link.inertial.as_ref().map(|inertial| (place, inertial.pos)));
     }
-    let longest = lines
-        .iter()
-        .map(|(_, end)| length(*end))
-        .fold(0.0, f64::max);
-    let thin = if longest > 0.0 {
-        THIN * longest
-    } else {
-        THIN_ALONE
+    let mut lengths: Vec<f64> = lines.iter().map(|(_, end)| length(*end)).collect();
+    lengths.retain(|length| *length > 0.0);
+    lengths.sort_by(f64::total_cmp);
+    let thin = match lengths.get(lengths.len() / 2) {
+        Some(length) => THIN * length,
+        None => THIN_ALONE,
     };
     let ball = Shape::Sphere { radius: 2.0 * thin };
     let balls = (0..robot.links.len()).map(|link| (link, Pose::default(), ball.clone()));

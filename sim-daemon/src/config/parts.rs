@@ -21,7 +21,7 @@ pub struct Parts {
 impl SceneFile {
     /// What the scene looks like; paths as in [`SceneFile::describe`].
     ///
-    /// A part has `kind` (`collision` or `visual`), `name`, `body` (`robot/link` as in the model's list; `null` is the world),
+    /// A part has `kind` (`collision`, `visual`, or `bone`: for a robot of which nothing else can be seen), `name`, `body` (`robot/link` as in the model's list; `null` is the world),
     /// `pos` and `quat` of its frame in that body's, `shape` (`plane`, `box`, `sphere`, `cylinder`, `capsule`, `mesh`; of
     /// visuals also `nothing`) and `mesh` (a place in the list of surfaces; `null` of a plane and of a visual's file).
     /// Collisions also have `added` (whether it is the scene's and not its robot file's) and `whole` (the surface of a mesh
@@ -87,12 +87,15 @@ impl SceneFile {
                         drawing.visual(name, visual, *count);
                         *count += 1;
                     }
-                    let own = |link| self.own_shapes(robot, link);
-                    if found.visuals.is_empty() && robot.links.iter().all(|link| own(link) == 0) {
-                        drawing.bones(robot);
-                    }
                 }
                 Err(error) => drawing.notes.push(format!("robot `{name}`: {error}")),
+            }
+            if robot
+                .links
+                .iter()
+                .all(|link| self.own_shapes(robot, link) == 0)
+            {
+                drawing.bones(robot);
             }
         }
     }
@@ -131,23 +134,21 @@ impl Drawing {
         }));
     }
 
-    /// Adds what stands for a robot that would not be seen.
+    /// Adds what stands for a robot that nothing else of its file shows.
     fn bones(&mut self, robot: &Robot) {
         for (place, (link, pose, shape)) in bones(robot).into_iter().enumerate() {
-            let visual = Visual {
-                link: robot.links[link].name.clone(),
-                name: Some(format!("bone{place}")),
-                pose,
-                look: Look::Shape(shape),
-                color: None,
-                texture: None,
-            };
-            self.visual(&robot.name, &visual, place);
+            let body = format!("{}/{}", robot.name, robot.links[link].name);
+            let mesh = self.place(&shape, false);
+            self.parts.push(json!({
+                "kind": "bone",
+                "name": format!("{body}/bone{place}"),
+                "body": body,
+                "pos": pose.pos,
+                "quat": pose.quat,
+                "shape": shape.kind(),
+                "mesh": mesh,
+            }));
         }
-        self.notes.push(format!(
-            "robot `{}`: its file has neither visuals nor collisions; its joints, and lines between them, are shown",
-            robot.name
-        ));
     }
 
     /// Adds a visual, the `index`th of its link.

@@ -22,10 +22,8 @@ use crate::error::DaemonError;
 
 /// Entries are waited for so long before anything else is looked at.
 const LOOK: Duration = Duration::from_millis(20);
-/// At the end, entries may be under way for so long, which were made before ...
-const LATE: Duration = Duration::from_millis(5);
-/// ... and where the daemon makes ever more of them, no more are taken after this.
-const LEAVE: Duration = Duration::from_secs(1);
+/// At the end, the last entry may be under way for so long.
+const LATE: Duration = Duration::from_millis(20);
 /// A terminal is told this often how far it is.
 const TELL_PERIOD: Duration = Duration::from_millis(500);
 
@@ -242,13 +240,15 @@ impl Recorder<'_> {
         }
     }
 
-    /// What was done before the end is recorded, though it may still wait in the journal.
+    /// What was done before the end is recorded, though it may still wait in the journal: no more than fits there.
     fn take_what_waits(&mut self) -> Result<(), End> {
-        let began = Instant::now();
-        while self.args.frames != Some(self.tally.frames)
-            && began.elapsed() < LEAVE
-            && let Ok(Some(entry)) = self.journal.next(LATE, &mut keep_waiting())
-        {
+        for _ in 0..self.journal.depth() {
+            if self.args.frames == Some(self.tally.frames) {
+                break;
+            }
+            let Ok(Some(entry)) = self.journal.next(LATE, &mut keep_waiting()) else {
+                break; // nothing waits any more; that the daemon has ended, too, changes nothing
+            };
             self.take(&entry)?;
         }
         Ok(())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,12 @@ from tightloop.view.pilot import Pilot
 from tightloop.view.player import Player
 from tightloop.view.source import CONTACT_FIELDS, Live, Recorded, is_recording
 
+#: So many are shown as often as the daemon does, more of them half as often.
+FEW_WORLDS = 16
+# Of 60 frames a second every other one has come by then, after the one before.
+_EVERY_OTHER_SECONDS = 0.036
+# While nobody looks, it is seen this often whether the daemon is there.
+_THERE_SECONDS = 1.0
 #: What is always asked for; contacts and plots ask for more.
 FIELDS = ("body_q", "body_qd", "joint_q", "joint_target_q")
 
@@ -31,6 +38,7 @@ class LiveFeed:
         self._most = worlds
         self._fields = frozenset(FIELDS)
         self._newest: Any = None
+        self._seen = time.monotonic()
         self._source = Live(name, worlds, FIELDS)
         self.info: dict[str, Any] = self._source.info
         self.worlds: int = self._source.worlds
@@ -41,13 +49,21 @@ class LiveFeed:
             self.told.append(f"the daemon shows its first {self.worlds} worlds of {self.info['worlds']}; {cure}")
         self.driver = Pilot(attach(self.info["name"]), lambda: self._newest)
 
+    @property
+    def came(self) -> float:
+        """When the newest frame came, by the monotonic clock [s]."""
+        return self._source.came
+
     def poll(self, timeout: float) -> Any:
         """The newest frame, None if none came in that time [s].
 
         Raises:
             DaemonLost: The daemon went away.
         """
-        shown = self._source.poll(timeout)
+        patience = 0.0
+        if self.worlds > FEW_WORLDS:
+            patience = max(self.came + _EVERY_OTHER_SECONDS - time.monotonic(), 0.0)
+        shown = self._source.poll(timeout, patience)
         if shown is not None:
             self._newest = shown
         return shown
@@ -62,8 +78,16 @@ class LiveFeed:
             before.close()
 
     def rest(self) -> None:
-        """Ask the daemon for nothing until the next `poll`."""
+        """Ask the daemon for nothing until the next `poll`, but whether it is there.
+
+        Raises:
+            DaemonLost: The daemon went away.
+        """
         self._source.rest()
+        now = time.monotonic()
+        if now - self._seen > _THERE_SECONDS:
+            self._seen = now
+            self.driver.check()
 
     def close(self) -> None:
         """Detach; the daemon goes on."""
@@ -90,13 +114,17 @@ class RecordedFeed:
         self.told: list[str] = [] if first.note is None else [first.note]
         first.close()
         self.driver = Player(self._open)
+        #: When the newest frame came, by the monotonic clock [s].
+        self.came = time.monotonic()
 
     def _open(self) -> Recorded:
         return Recorded(self._path, self._most, tuple(sorted(self._fields)))
 
     def poll(self, timeout: float) -> Any:
         """The frame that is due, None if none is in that time [s]."""
-        return self.driver.poll(timeout)
+        shown = self.driver.poll(timeout)
+        self.came = time.monotonic()
+        return shown
 
     def want(self, fields: Iterable[str]) -> None:
         """Have frames carry these fields, too; the recording then begins anew."""

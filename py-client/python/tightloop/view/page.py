@@ -67,8 +67,8 @@ class Page:
         )
         self.show(first, new=True)
 
-    def update(self, timeout: float) -> bool:
-        """Show what is new, or was chosen; whether there was anything in that time [s].
+    def update(self, timeout: float) -> float | None:
+        """Show what is new, or was chosen; when the new frame came, None if there was none in that time [s].
 
         Raises:
             DaemonLost: The daemon that is shown went away.
@@ -82,8 +82,12 @@ class Page:
         if shown is not None or changed:
             self.show(self._shown, new=shown is not None)
         else:
-            self._panel.tell(self._shown, new=False)
-        return shown is not None
+            self.tell()
+        return None if shown is None else self._feed.came
+
+    def tell(self) -> None:
+        """Keep the panel's text up to date, though there is no new frame."""
+        self._panel.tell(self._shown, new=False)
 
     def show(self, shown: Any, *, new: bool) -> None:
         """Send a frame to the browsers."""

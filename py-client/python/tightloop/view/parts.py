@@ -136,6 +136,13 @@ class _Assembly:
                 seen.setdefault(entry["body"], []).append(part)
         dressed = {entry["body"].split("/")[0] for entry in visuals}
         made = []
+        bare = {entry["body"].split("/")[0] for entry in told if entry["kind"] == "bone"}
+        bare -= {body.split("/")[0] for body in seen if body not in lost}
+        for robot in sorted(bare):
+            self._note(f"robot `{robot}`: nothing in its file can be shown; its joints, and lines between them, are")
+        for entry in told:
+            if entry["kind"] == "bone" and entry["body"].split("/")[0] in bare:
+                made.append(self._part(entry, "visual", self._of_surface(entry["mesh"], paint.PLAIN)))
         for entry in collisions:
             made.append(self._stand_in(entry, "collision"))
             body = entry["body"]

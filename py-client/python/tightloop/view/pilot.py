@@ -56,6 +56,14 @@ class Pilot:
         self._thread = threading.Thread(target=self._run, name="pilot", daemon=True)
         self._thread.start()
 
+    def check(self) -> None:
+        """Ask the daemon something.
+
+        Raises:
+            DaemonLost: It is gone.
+        """
+        self._sim.controller()
+
     @property
     def controller(self) -> int | None:
         """Process of another client that is in control, if there is one."""

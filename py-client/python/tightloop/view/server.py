@@ -11,11 +11,11 @@ import time
 import viser
 
 from tightloop.errors import DaemonLost, TightloopError, UnknownDaemon
-from tightloop.view.feed import Feed, open_feed
+from tightloop.view.feed import FEW_WORLDS, Feed, open_feed
 from tightloop.view.page import Page
 
-# Frames a second that are shown at most, of few worlds and of many: so many that none of 60 or 30 is missed.
-_RATE_HZ, _RATE_MANY_HZ, _FEW_WORLDS = 66.0, 33.0, 16
+# Least time from frame to frame: of few worlds all of 60 a second are shown, of many every other one, early ones too.
+_SPACING_SECONDS, _SPACING_MANY_SECONDS = 0.015, 0.025
 # Without a page open, it is looked for one so often.
 _UNSEEN_SECONDS = 0.1
 _WAIT_SECONDS = 0.5
@@ -55,7 +55,7 @@ class Server:
 
     def run(self, stopped: threading.Event, parent: int | None = None) -> None:
         """Show frames until an event is set, or the process has ended that started this one."""
-        looked_at = due = time.monotonic()
+        looked_at = time.monotonic()
         while not stopped.is_set():
             began = time.monotonic()
             if parent is not None and began - looked_at > _PARENT_SECONDS:
@@ -63,17 +63,17 @@ class Server:
                 if os.getppid() != parent:
                     return
             try:
-                if self._turn():
-                    # from one due time to the next, so that a frame that was a little late delays no other
-                    now = time.monotonic()
-                    due = max(due + 1 / self._rate(), now)
-                    time.sleep(due - now)
+                came = self._turn()
+                if came is not None:
+                    # counted from when it came, so that the time to show it delays no other
+                    time.sleep(max(came + self._spacing() - time.monotonic(), 0.0))
             except (DaemonLost, UnknownDaemon) as lost:
                 self._lose(lost)
             except TightloopError as problem:
                 if self._page is None or self._feed is None:
                     raise
                 self._feed.driver.problem = str(problem)
+                self._page.tell()
                 time.sleep(_WAIT_SECONDS)
 
     def close(self) -> None:
@@ -83,22 +83,22 @@ class Server:
         with contextlib.redirect_stdout(io.StringIO()):
             self._viser.stop()
 
-    def _turn(self) -> bool:
-        """One look at the feed; whether anything was new."""
+    def _turn(self) -> float | None:
+        """One look at the feed; when what is new came, if anything is."""
         if self._feed is None:
             self._await_restart()
-            return False
+            return None
         if self._page is None:
             first = self._feed.poll(_WAIT_SECONDS)
             if first is not None:
                 self._page = Page(self._viser, self._feed, first)
                 for client in self._viser.get_clients().values():
                     self._page.aim_client(client)
-            return False
+            return None
         if not self._viser.get_clients():
             self._feed.rest()
             time.sleep(_UNSEEN_SECONDS)
-            return False
+            return None
         return self._page.update(0.05)
 
     def _aim(self, client: viser.ClientHandle) -> None:
@@ -106,9 +106,9 @@ class Server:
         if page is not None:
             page.aim_client(client)
 
-    def _rate(self) -> float:
+    def _spacing(self) -> float:
         assert self._feed is not None
-        return _RATE_HZ if self._feed.worlds <= _FEW_WORLDS else _RATE_MANY_HZ
+        return _SPACING_SECONDS if self._feed.worlds <= FEW_WORLDS else _SPACING_MANY_SECONDS
 
     def _lose(self, lost: TightloopError) -> None:
         """Tell in the page that the daemon is gone, and wait for another of its name."""

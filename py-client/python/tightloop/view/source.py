@@ -1,16 +1,26 @@
-"""Where what is shown comes from: a running daemon, which pays nothing for it, or a recording."""
+"""Where what is shown comes from: a running daemon, which pays next to nothing for it, or a recording."""
 
 from __future__ import annotations
 
 import json
 import os
+import time
 from collections.abc import Sequence
 from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
 from tightloop import _core, checks
-from tightloop.errors import ArgumentError, DaemonLost, DaemonRestarted, SceneError, UnknownDaemon, UnknownField
+from tightloop.errors import (
+    ArgumentError,
+    DaemonLost,
+    DaemonRestarted,
+    ProtocolMismatch,
+    SceneError,
+    SimClosed,
+    UnknownDaemon,
+    UnknownField,
+)
 
 #: What viewers need of every frame; time, step, status and contacts_left_out come with it.
 FIELDS = ("body_q", "joint_q", "joint_qd", "joint_target_q")
@@ -85,6 +95,9 @@ class Live:
         # of worlds in groups the first is shown, unless another is named
         named = checks.text("view: name", name, error=ArgumentError)
         self._name = named if _core.groups(named) == 1 else f"{named}.0"
+        #: When the newest frame came, by the monotonic clock [s].
+        self.came = time.monotonic()
+        self._closed = False
         self._client: _core.Client | None = _core.Client(self._name, lease=False)
         try:
             self.info: dict[str, Any] = json.loads(self._client.describe())
@@ -99,31 +112,48 @@ class Live:
             self.close()
             raise
 
-    def poll(self, timeout: float = 0.0) -> Shown | None:
+    def poll(self, timeout: float = 0.0, patience: float = 0.0) -> Shown | None:
         """The newest state, or None if there is none that was not shown, within ``timeout`` [s].
+
+        Args:
+            timeout: How long to wait for one [s].
+            patience: How long to wait for the one after it, where one is there already [s]: who polls every other
+                frame so sees evenly spaced ones.
 
         Raises:
             DaemonLost: The daemon went away.
+            SimClosed: This was closed.
         """
         client = self._client = self._client or self._again()
-        frame = client.wait_newer(timeout) if timeout > 0.0 else client.latest()
+        frame = client.latest()
+        if frame is None:
+            frame = client.wait_newer(timeout) if timeout > 0.0 else None
+        elif patience > 0.0:
+            frame = client.wait_newer(patience) or frame
+        if frame is not None:
+            self.came = time.monotonic()
         return None if frame is None else Shown(self._evaluation.evaluate(frame.state))
 
     def rest(self) -> None:
         """Have the daemon show nothing until the next `poll`: what nobody sees costs it nothing."""
-        self.close()
-
-    def close(self) -> None:
-        """Let go of the daemon, which goes on."""
         if self._client is not None:
             self._client.close()
             self._client = None
 
+    def close(self) -> None:
+        """Let go of the daemon, which goes on."""
+        self._closed = True
+        self.rest()
+
     def _again(self) -> _core.Client:
+        if self._closed:
+            raise SimClosed("this view of the simulation was closed")
         try:
             client = _core.Client(self._name, lease=False)
         except UnknownDaemon as gone:
             raise DaemonLost(str(gone)) from gone
+        except (ArgumentError, ProtocolMismatch) as other:  # of groups now, or of another version
+            raise DaemonRestarted(f"another daemon runs as `{self._name}`: {other}") from other
         if json.loads(client.describe())["session"] != self.info["session"]:
             client.close()
             raise DaemonRestarted(f"another daemon runs as `{self._name}`")

@@ -1,7 +1,7 @@
 //! The stages on the machine that records.
 //!
-//! Its instance of the text is one function of a hundred thousand calls, which no optimisation makes faster in a way that
-//! matters: a recording takes milliseconds. See the profile in `Cargo.toml`.
+//! Its instance of the text is a hundred thousand calls, which no optimisation makes faster in a way that matters: a
+//! recording takes milliseconds. See the profile in `Cargo.toml`.
 
 use sim_core::batch::{Block, Numbers, WorkSlot as Slot};
 use sim_core::every_stage;

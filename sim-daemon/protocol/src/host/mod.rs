@@ -223,11 +223,11 @@ impl Host {
 
     /// Shows observers the present state; `arena` has room for a frame.
     pub fn show(&mut self, arena: &mut [u64], worlds: &mut impl Worlds) {
-        let state = &mut self.state;
+        let (began, state) = (Instant::now(), &mut self.state);
         state.frames += 1;
         if worlds.frame(arena) {
             let head = header(&state.description, &state.frame, state.frames);
-            state.watch.show(head, &state.frame, arena, worlds);
+            state.watch.show(began, head, &state.frame, arena, worlds);
         } else {
             state.watch.unchanged();
         }

@@ -219,7 +219,8 @@ impl State {
         // last: nobody waits for it
         let head = Table::head_bytes(self.frame.rows().len()) / 8;
         if is_good && self.watch.is_due() {
-            self.watch.show(common, &self.frame, &sent[head..], worlds);
+            self.watch
+                .show(Instant::now(), common, &self.frame, &sent[head..], worlds);
         }
         if is_good && self.journals.are_read() {
             let occasion = Occasion {

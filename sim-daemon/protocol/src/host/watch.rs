@@ -14,7 +14,7 @@ use crate::{ALIGNMENT, Description, FrameHeader, ProtocolError, Table, loan};
 pub(super) const PERIOD: Duration = Duration::from_millis(15);
 /// ... and every other one where they see more worlds than this.
 const MANY: usize = 256;
-/// To show a frame takes at most one part in so many of the daemon's time ...
+/// To show frames takes about one part in so many of the daemon's time at most ...
 const PARTS: u32 = 100;
 /// ... unless observers would then see fewer frames than one in this time.
 pub(super) const SLOWEST: Duration = Duration::from_millis(250);
@@ -30,8 +30,8 @@ pub(super) struct Watch {
     /// The state has changed since they were shown one.
     unseen: bool,
     shown: Instant,
-    /// What it takes to show them one: the least of late, since others may have had the processor meanwhile.
-    cost: Duration,
+    /// What it takes to show them one, over the last ones.
+    cost: Option<Duration>,
 }
 
 impl Watch {
@@ -59,7 +59,7 @@ impl Watch {
             observers: 0,
             unseen: true,
             shown: Instant::now(),
-            cost: Duration::ZERO,
+            cost: None,
         })
     }
 
@@ -75,7 +75,9 @@ impl Watch {
 
     /// Somebody looks on, and has not seen the present state, nor any within the last period?
     pub fn is_due(&self) -> bool {
-        let period = self.period.max(SLOWEST.min(PARTS * self.cost));
+        let period = self
+            .period
+            .max(SLOWEST.min(PARTS * self.cost.unwrap_or_default()));
         self.unseen && self.observers > 0 && self.shown.elapsed() > period
     }
 
@@ -86,9 +88,10 @@ impl Watch {
         self.observers = self.service.dynamic_config().number_of_subscribers();
     }
 
-    /// Shows the first worlds of an arena, which `frame` describes, and their state.
+    /// Shows the first worlds of an arena, which `frame` describes, and their state; what that takes counts from `began` on.
     pub fn show(
         &mut self,
+        began: Instant,
         head: FrameHeader,
         frame: &Table,
         arena: &[u64],
@@ -121,7 +124,11 @@ impl Watch {
         // an observer that cannot be reached misses a frame; one that cannot be notified looks by itself after 50 ms
         let _ = loan::send(loan);
         let _ = self.notifier.notify();
-        let took = self.shown.elapsed();
-        self.cost = took.min(self.cost + took.abs_diff(self.cost) / 8);
+        // one that took far longer waited for the processor
+        let took = began.elapsed();
+        self.cost = Some(
+            self.cost
+                .map_or(took, |cost| (7 * cost + took.min(8 * cost)) / 8),
+        );
     }
 }
