@@ -8,8 +8,8 @@ that takes what a browser would and draws nothing, since a browser without a GPU
 which no simulation can help. Viewer and page have the last core for themselves, the simulation the others. Before and
 after each turn comes one without a viewer, which it is compared with: a machine that changes its speed changes both.
 What a frame takes of the daemon's processor, as Linux counts it, is what looking costs the simulation; the time of a
-step is what the caller sees. Writes benches/results/MACHINE/viewer.csv with the load of the machine, and ends with 1
-when the loop loses more than the 2 % asked.
+step is what the caller sees; each with one standard error. Writes benches/results/MACHINE/viewer.csv with the load of
+the machine, and ends with 1 when the loop loses more than the 2 % asked, by more than chance.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ from franka_lesson import FRAMES, scene, targets  # noqa: E402  (the examples ar
 
 WORLDS = 4096
 ASKED_PERCENT = 2.0
-# Times that a page says how many frames it shows, before they count.
-BEGIN = 3
+# Times that a page says how many frames it shows, five a second over the last two seconds, before they count.
+BEGIN = 12
 KINDS = ("viewer, no page", "viewer and page")
 
 
@@ -147,7 +147,10 @@ def measure(rounds: int, frames: int) -> list[dict[str, str | int]]:
                     time.sleep(0.5)  # until it looks away
                 else:
                     on_the_last_core(page.pid)
+                    patience = time.monotonic() + 60
                     while not page.is_shown():
+                        if time.monotonic() > patience:
+                            raise SystemExit("the page shows no frames")
                         turn(sim, commands, FRAMES)
                 turn(sim, commands, FRAMES)
                 before = processor_ms(viewer.pid)
@@ -196,8 +199,8 @@ def loads() -> str:
 def main() -> int:
     """Measure, print and write the results; 0 when looking is as cheap as asked."""
     parser = argparse.ArgumentParser(description="Cost of a viewer.")
-    parser.add_argument("--rounds", type=int, default=40, help="turns of each kind (default 40)")
-    parser.add_argument("--frames", type=int, default=300, help="frames of a turn (default 300)")
+    parser.add_argument("--rounds", type=int, default=30, help="turns of each kind (default 30)")
+    parser.add_argument("--frames", type=int, default=500, help="frames of a turn (default 500)")
     parser.add_argument("--take", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.take is not None:
@@ -208,10 +211,15 @@ def main() -> int:
     print_table(rows)
     command = f"python benches/viewer.py --rounds {given.rounds} --frames {given.frames}"
     write_results("viewer", rows, {"command": command, "load_before": load, "load_after": loads()})
-    lost = max(float(row["slower_percent"]) for row in rows)
-    if lost > ASKED_PERCENT:
-        print(f"the loop loses {lost} %, asked {ASKED_PERCENT:.0f}")
-    return int(lost > ASKED_PERCENT)
+    failed = 0
+    for row in rows:
+        lost, error = float(row["slower_percent"]), float(row["slower_error"])
+        if lost - 2 * error > ASKED_PERCENT:
+            print(f"{row['what']}: the loop loses {lost} % (± {error}), asked {ASKED_PERCENT:.0f}")
+            failed = 1
+        elif lost + 2 * error > ASKED_PERCENT:
+            print(f"{row['what']}: {lost} % (± {error}) is too noisy to tell whether it is below {ASKED_PERCENT:.0f}")
+    return failed
 
 
 if __name__ == "__main__":
