@@ -213,9 +213,9 @@ class Sim:
     def latest(self, timeout: float = 0.0) -> Frame | None:
         """What observers see: the newest frame of the first ``info["watch_worlds"]`` worlds, whoever steps them.
 
-        It needs no control, and costs whoever has it next to nothing: 1% of the daemon's time at most. States after a
-        step are shown some 60 times a second (half as often where there are more than 256 worlds to see, more seldom
-        where it takes long), and so is any at which the simulation rests.
+        It needs no control, and costs whoever has it next to nothing: about 1% of the daemon's time at most. States
+        after a step are shown some 60 times a second (half as often where there are more than 256 worlds to see, and
+        more seldom where it takes long, but four times a second at least), and so is any at which the simulation rests.
 
         Args:
             timeout: How long to wait for one [s].
