@@ -6,7 +6,8 @@ The target demo of the lesson, each world with targets of its own, as fast as it
 one that no page is open of, and with one whose page of 256 worlds is drawn on another machine. The page is a process
 that takes what a browser would and draws nothing, since a browser without a GPU takes all of a processor that it gets,
 which no simulation can help. Viewer and page have the last core for themselves, the simulation the others. Before and
-after each turn comes one without a viewer, which it is compared with: a machine that changes its speed changes both.
+after each turn comes one without a viewer, or without a page, which it is compared with: a machine that changes its
+speed changes both.
 What a frame takes of the daemon's processor, as Linux counts it, is what looking costs the simulation; the time of a
 step is what the caller sees; each with one standard error. Writes benches/results/MACHINE/viewer.csv with the load of
 the machine, and ends with 1 when the loop loses more than the 2 % asked, by more than chance.
@@ -16,11 +17,12 @@ from __future__ import annotations
 
 import argparse
 import os
-import re
 import select
 import subprocess
 import sys
+import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -35,9 +37,6 @@ from franka_lesson import FRAMES, scene, targets  # noqa: E402  (the examples ar
 
 WORLDS = 4096
 ASKED_PERCENT = 2.0
-# Times that a page says how many frames it shows, five a second over the last two seconds, before they count.
-BEGIN = 12
-KINDS = ("viewer, no page", "viewer and page")
 
 
 def processor_ms(pid: int) -> float:
@@ -47,49 +46,91 @@ def processor_ms(pid: int) -> float:
 
 
 class Page:
-    """A page that is drawn on another machine: a process that takes all that the viewer sends."""
+    """A page that is drawn on another machine, open or not: a process that takes all that the viewer sends."""
 
     def __init__(self, url: str) -> None:
         command = [sys.executable, str(Path(__file__).resolve()), "--take", url]
-        self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stdin=subprocess.PIPE, text=True)
+        self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stdin=subprocess.PIPE, text=True, bufsize=1)
         self.pid = self._process.pid
+
+    def open(self) -> None:
+        """Open it; see `is_shown`."""
+        self._say("open")
 
     def is_shown(self) -> bool:
         """Whether it has the meshes, which are sent once, and frames come."""
         if self._process.poll() is not None:
             raise SystemExit("the page ended: see above")
         assert self._process.stdout is not None
-        return bool(select.select([self._process.stdout], [], [], 0.0)[0])
+        if not select.select([self._process.stdout], [], [], 0.0)[0]:
+            return False
+        self._hear()
+        return True
 
     def close(self) -> float:
-        """End it; the frames a second that the viewer said it showed."""
-        return float(self._process.communicate()[0].split()[-1])
+        """Close it; the frames a second that came since it was shown."""
+        self._say("close")
+        return float(self._hear())
+
+    def end(self) -> None:
+        """End the process."""
+        self._process.communicate()
+
+    def _say(self, word: str) -> None:
+        assert self._process.stdin is not None
+        print(word, file=self._process.stdin)
+
+    def _hear(self) -> str:
+        assert self._process.stdout is not None
+        return self._process.stdout.readline()
 
 
 def take(url: str) -> None:
-    """What a page does, but for drawing, until stdin ends."""
+    """What a page does, but for drawing, as stdin tells."""
     import msgspec
     import viser
     import zstandard
     from viser._messages import ViewerCameraMessage
-    from websockets.sync.client import connect
+    from websockets.exceptions import ConnectionClosed
+    from websockets.sync.client import ClientConnection, connect
 
-    place = url.replace("http://", "ws://")
     camera = ViewerCameraMessage((1, 0, 0, 0), (3, 3, 3), 0.8, 0.01, 1000, 600, 800, (0, 0, 0), (0, 0, 1))
-    rates: list[float] = []
     unpack = zstandard.ZstdDecompressor()
-    with connect(place, subprotocols=[f"viser-v{viser.__version__}"], max_size=None) as page:  # type: ignore[list-item]
-        page.send(msgspec.msgpack.encode(camera.as_serializable_dict()))
-        os.set_blocking(0, False)
-        while sys.stdin.buffer.read() is None:
-            message = page.recv()
-            assert isinstance(message, bytes)
-            size = int.from_bytes(message[8:16], "little")  # of messages, which are packed; arrays follow as they are
-            for rate in re.findall(rb"(\d+) frames/s", unpack.decompress(message[16 : 16 + size])):
-                rates.append(float(rate))
-                if len(rates) == BEGIN:
+    came: list[float] = []
+    page: ClientConnection | None = None
+    thread = threading.Thread()
+
+    def receive(page: ClientConnection) -> None:
+        shown = False
+        with suppress(ConnectionClosed):
+            while True:
+                message = page.recv()
+                assert isinstance(message, bytes)
+                size = int.from_bytes(
+                    message[8:16], "little"
+                )  # of messages, which are packed; arrays follow as they are
+                text = unpack.decompress(message[16 : 16 + size])
+                if shown and b"batched" in text:
+                    came.append(time.monotonic())
+                if not shown and b"frames/s" in text and not text.count(b" 0 frames/s"):
+                    shown = True
                     print("shown", flush=True)
-    print(rates[-1] if rates else 0.0)
+
+    for word in sys.stdin:
+        if word == "open\n":
+            came.clear()
+            page = connect(
+                url.replace("http://", "ws://"),
+                subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
+                max_size=None,
+            )
+            page.send(msgspec.msgpack.encode(camera.as_serializable_dict()))
+            thread = threading.Thread(target=receive, args=(page,))
+            thread.start()
+        elif page is not None:
+            page.close()
+            thread.join()
+            print((len(came) - 1) / (came[-1] - came[0]) if len(came) > 1 else 0.0, flush=True)
 
 
 class Turns:
@@ -133,38 +174,44 @@ def measure(rounds: int, frames: int) -> list[dict[str, str | int]]:
     os.sched_setaffinity(0, set(range(max(cores - 1, 1))))
     amplitudes = np.random.default_rng(1).uniform(0.5, 1.5, WORLDS)
     commands = [targets(frame, amplitudes) for frame in range(FRAMES)]
-    seen = {kind: Turns() for kind in KINDS}
+    absent, closed = Turns(), Turns()
     # a core for the caller, one for viewer and page, the others for the daemon
     with tl.launch(scene(driven=True), worlds=WORLDS, threads=max(cores - 2, 1)) as sim:
         turn(sim, commands, 10 * FRAMES)  # warms caches and clocks
         plain = turn(sim, commands, frames)
-        for _ in tqdm(range(rounds), desc=f"{WORLDS} worlds", disable=None):
-            for kind in KINDS:
-                viewer = sim.view(port=8400)
-                on_the_last_core(viewer.pid)
-                page = None if kind == KINDS[0] else Page(viewer.url)
-                if page is None:
-                    time.sleep(0.5)  # until it looks away
-                else:
-                    on_the_last_core(page.pid)
-                    patience = time.monotonic() + 60
-                    while not page.is_shown():
-                        if time.monotonic() > patience:
-                            raise SystemExit("the page shows no frames")
-                        turn(sim, commands, FRAMES)
-                turn(sim, commands, FRAMES)
-                before = processor_ms(viewer.pid)
-                own = turn(sim, commands, frames)
-                seconds = own[0] * frames / 1e3
-                seen[kind].viewer_percent.append((processor_ms(viewer.pid) - before) / (10 * seconds))
-                if page is not None:
-                    seen[kind].shown_hz.append(page.close())
-                viewer.close()
-                turn(sim, commands, FRAMES)
-                after = turn(sim, commands, frames)
-                seen[kind].add([plain, after], own)
-                plain = after
-    return [row(kind, seen[kind]) for kind in KINDS]
+        for _ in tqdm(range(rounds // 10), desc="viewer, no page", disable=None):
+            viewer = sim.view(port=8400)
+            on_the_last_core(viewer.pid)
+            time.sleep(0.5)  # until it looks away
+            before = processor_ms(viewer.pid)
+            own = turn(sim, commands, frames)
+            absent.viewer_percent.append((processor_ms(viewer.pid) - before) / (10 * own[0] * frames / 1e3))
+            viewer.close()
+            after = turn(sim, commands, frames)
+            absent.add([plain, after], own)
+            plain = after
+        viewer = sim.view(port=8400)
+        page = Page(viewer.url)
+        for pid in (viewer.pid, page.pid):
+            on_the_last_core(pid)
+        plain = turn(sim, commands, frames)
+        for _ in tqdm(range(rounds), desc="viewer and page", disable=None):
+            page.open()
+            patience = time.monotonic() + 60
+            while not page.is_shown():
+                if time.monotonic() > patience:
+                    raise SystemExit("the page shows no frames")
+                turn(sim, commands, FRAMES // 6)
+            before = processor_ms(viewer.pid)
+            own = turn(sim, commands, frames)
+            closed.viewer_percent.append((processor_ms(viewer.pid) - before) / (10 * own[0] * frames / 1e3))
+            closed.shown_hz.append(page.close())
+            time.sleep(0.2)  # until it looks away
+            after = turn(sim, commands, frames)
+            closed.add([plain, after], own)
+            plain = after
+        page.end()
+    return [row("viewer, no page", absent), row("viewer and page", closed)]
 
 
 def row(kind: str, seen: Turns) -> dict[str, str | int]:
@@ -199,8 +246,10 @@ def loads() -> str:
 def main() -> int:
     """Measure, print and write the results; 0 when looking is as cheap as asked."""
     parser = argparse.ArgumentParser(description="Cost of a viewer.")
-    parser.add_argument("--rounds", type=int, default=30, help="turns of each kind (default 30)")
-    parser.add_argument("--frames", type=int, default=500, help="frames of a turn (default 500)")
+    parser.add_argument(
+        "--rounds", type=int, default=200, help="turns with a page; a tenth as many without (default 200)"
+    )
+    parser.add_argument("--frames", type=int, default=150, help="frames of a turn (default 150)")
     parser.add_argument("--take", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.take is not None:
