@@ -10,8 +10,8 @@
 //! Whoever can take the lock may remove the rest. The transport folder is in /dev/shm whatever ROOT is, since the path
 //! of a Unix socket is limited to 107 bytes.
 
-use std::fs::{self, DirBuilder, File, TryLockError};
-use std::io::Read;
+use std::fs::{self, DirBuilder, File, Metadata, TryLockError};
+use std::io::{ErrorKind, Read};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
@@ -23,6 +23,8 @@ use crate::hash::Fnv;
 
 /// Where POSIX shared memory is on Linux.
 pub const SHARED_MEMORY: &str = "/dev/shm";
+/// How often a folder is made again that others remove meanwhile.
+const TRIES: usize = 1000;
 
 /// A name and the root folder it is looked up in.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -227,10 +229,17 @@ fn parts(name: &str) -> (&str, Option<usize>) {
 
 pub(crate) fn names_with_lock(root: Option<&Path>) -> Result<Vec<Place>, ProtocolError> {
     let root = private_folder(&root.map_or_else(default_root, Path::to_owned))?;
-    let entries = fs::read_dir(&root).map_err(|error| ProtocolError::Root {
-        path: root.clone(),
-        problem: error.to_string(),
-    })?;
+    let entries = match fs::read_dir(&root) {
+        Ok(entries) => entries,
+        // the last daemon took the folder with it
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) => {
+            return Err(ProtocolError::Root {
+                path: root.clone(),
+                problem: error.to_string(),
+            });
+        }
+    };
     let mut places: Vec<Place> = entries
         .flatten()
         .filter_map(|entry| {
@@ -268,24 +277,33 @@ pub(crate) fn private_folder(path: &Path) -> Result<PathBuf, ProtocolError> {
         path: path.to_owned(),
         problem,
     };
-    DirBuilder::new()
-        .recursive(true)
-        .mode(0o700)
-        .create(path)
-        .map_err(|cause| error(cause.to_string()))?;
-    let metadata = fs::metadata(path).map_err(|cause| error(cause.to_string()))?;
+    let mut tries = 0;
+    let (metadata, absolute) = loop {
+        match made_folder(path) {
+            Ok(made) => break made,
+            // the last daemon there takes the folder with it, maybe right now
+            Err(cause) if cause.kind() == ErrorKind::NotFound && tries < TRIES => tries += 1,
+            Err(cause) => return Err(error(cause.to_string())),
+        }
+    };
     if metadata.uid() != rustix::process::geteuid().as_raw() {
         return Err(error(format!("it belongs to user {}", metadata.uid())));
     }
     if metadata.mode() & 0o022 != 0 {
         return Err(error("others may write in it".to_owned()));
     }
-    fs::canonicalize(path).map_err(|cause| error(cause.to_string()))
+    Ok(absolute)
+}
+
+fn made_folder(path: &Path) -> std::io::Result<(Metadata, PathBuf)> {
+    DirBuilder::new().recursive(true).mode(0o700).create(path)?;
+    Ok((fs::metadata(path)?, fs::canonicalize(path)?))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::atomic::{AtomicBool, Ordering};
 
     #[test]
     fn names_with_slashes_dots_or_nothing_are_refused() {
@@ -296,5 +314,27 @@ mod tests {
                 "{name:?}"
             );
         }
+    }
+
+    #[test]
+    fn a_folder_that_others_remove_meanwhile_is_made_again() {
+        let path = std::env::temp_dir().join(format!("tightloop-races-{}", std::process::id()));
+        let stop = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !stop.load(Ordering::Relaxed) {
+                    let _ = fs::remove_dir(&path);
+                }
+            });
+            let made: Vec<_> = (0..2000)
+                .map(|_| (private_folder(&path), names_with_lock(Some(&path))))
+                .collect();
+            stop.store(true, Ordering::Relaxed);
+            for (folder, names) in made {
+                assert_eq!(folder.unwrap(), path);
+                assert!(names.unwrap().is_empty());
+            }
+        });
+        let _ = fs::remove_dir(&path);
     }
 }
