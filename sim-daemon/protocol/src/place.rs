@@ -281,8 +281,13 @@ pub(crate) fn private_folder(path: &Path) -> Result<PathBuf, ProtocolError> {
     let (metadata, absolute) = loop {
         match made_folder(path) {
             Ok(made) => break made,
-            // the last daemon there takes the folder with it, maybe right now
-            Err(cause) if cause.kind() == ErrorKind::NotFound && tries < TRIES => tries += 1,
+            // the last daemon there takes the folder with it, maybe right now: it was there, and is no folder any more
+            Err(cause)
+                if matches!(cause.kind(), ErrorKind::NotFound | ErrorKind::AlreadyExists)
+                    && tries < TRIES =>
+            {
+                tries += 1;
+            }
             Err(cause) => return Err(error(cause.to_string())),
         }
     };
