@@ -21,7 +21,8 @@ pub struct Parts {
 impl SceneFile {
     /// What the scene looks like; paths as in [`SceneFile::describe`].
     ///
-    /// A part has `kind` (`collision`, `visual`, or `bone`: for a robot of which nothing else can be seen), `name`, `body` (`robot/link` as in the model's list; `null` is the world),
+    /// A part has `kind` (`collision`, `visual`, or `bone`: for a robot of which nothing else can be seen), `name`,
+    /// `body` (`robot/link` as in the model's list; `null` is the world),
     /// `pos` and `quat` of its frame in that body's, `shape` (`plane`, `box`, `sphere`, `cylinder`, `capsule`, `mesh`; of
     /// visuals also `nothing`) and `mesh` (a place in the list of surfaces; `null` of a plane and of a visual's file).
     /// Collisions also have `added` (whether it is the scene's and not its robot file's) and `whole` (the surface of a mesh

@@ -134,19 +134,20 @@ class _Assembly:
                 lost.add(entry["body"])
             else:
                 seen.setdefault(entry["body"], []).append(part)
-        dressed = {entry["body"].split("/")[0] for entry in visuals}
+        dressed = {_robot(entry) for entry in visuals}
         made = []
-        bare = {entry["body"].split("/")[0] for entry in told if entry["kind"] == "bone"}
-        bare -= {body.split("/")[0] for body in seen if body not in lost}
-        for robot in sorted(bare):
-            self._note(f"robot `{robot}`: nothing in its file can be shown; its joints, and lines between them, are")
+        clad = {_robot(entry) for entry in visuals if entry["body"] in seen and entry["body"] not in lost}
         for entry in told:
-            if entry["kind"] == "bone" and entry["body"].split("/")[0] in bare:
+            robot = _robot(entry)
+            if entry["kind"] == "bone" and robot not in clad:
+                self._note(
+                    f"robot `{robot}`: nothing in its file can be shown; its joints, and lines between them, are"
+                )
                 made.append(self._part(entry, "visual", self._of_surface(entry["mesh"], paint.PLAIN)))
         for entry in collisions:
             made.append(self._stand_in(entry, "collision"))
             body = entry["body"]
-            if entry["added"] or body in lost or body.split("/")[0] not in dressed:
+            if entry["added"] or body in lost or _robot(entry) not in dressed:
                 made.append(self._stand_in(entry, "visual"))
         for body, own in seen.items():
             if body not in lost:
@@ -235,6 +236,11 @@ class _Assembly:
     def _note(self, note: str) -> None:
         if note not in self._notes:
             self._notes.append(note)
+
+
+def _robot(entry: dict[str, Any]) -> str | None:
+    """The robot whose body carries a part; None is the world."""
+    return None if entry["body"] is None else entry["body"].split("/")[0]
 
 
 def _checkers() -> Mesh:
