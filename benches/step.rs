@@ -10,10 +10,10 @@ mod robots;
 
 use common::{Demo, Run, command, lesson};
 use robots::Case;
-use sim_core::batch::Field;
-use sim_core::model::Description;
 use sim_engine::backend::cpu;
 use sim_engine::simulation::{Lanes, Options, Precision};
+use sim_model::Description;
+use sim_physics::arrays::Field;
 use std::time::{Duration, Instant};
 
 /// More worlds than this are left out one at a time, which takes long and shows nothing new.

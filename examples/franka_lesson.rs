@@ -6,9 +6,9 @@ mod lesson;
 
 use anyhow::Context;
 use lesson::{Demo, FRAMES, command, lesson};
-use sim_core::batch::Field;
 use sim_engine::backend::Values;
 use sim_engine::simulation::{Options, Simulation};
+use sim_physics::arrays::Field;
 use std::time::Instant;
 
 fn main() -> anyhow::Result<()> {

@@ -4,11 +4,11 @@ mod common;
 
 use common::shapes::shapes;
 use common::{Demo, Run, command, lesson_with_table};
-use sim_core::batch::Field;
-use sim_core::model::params::Param;
-use sim_core::model::{Cone, Distribution, Pose, Site};
 use sim_engine::backend::Values;
 use sim_engine::simulation::{Options, Precision};
+use sim_model::{Cone, Distribution, Pose, Site};
+use sim_physics::arrays::Field;
+use sim_physics::constants::params::Param;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -73,7 +73,7 @@ fn command_step_and_forward_take_no_memory() {
             };
             let mut run = Run::new(&model, options);
             for param in model.constants().varying.params() {
-                let columns = param.columns(&model);
+                let columns = param.columns(&model.sizes());
                 let ones = vec![1e-3; 100 * columns];
                 run.sim
                     .write_param(param, 0..columns, Values::F64(&ones), None)

@@ -3,10 +3,10 @@
 mod common;
 
 use common::{Demo, Run, command, lesson, noise};
-use sim_core::batch::Field;
-use sim_core::model::{Description, Model, UrdfOptions};
 use sim_engine::backend::{Values, cpu};
 use sim_engine::simulation::{Lanes, Options, Precision};
+use sim_model::{Description, Model, UrdfOptions};
+use sim_physics::arrays::Field;
 use std::sync::Arc;
 
 const FIELDS: [Field; 6] = [

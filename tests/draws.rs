@@ -5,9 +5,9 @@ mod common;
 
 use common::Run;
 use common::grouped::{FIELDS, assert_groups_are_the_whole, scene};
-use sim_core::batch::Field;
 use sim_engine::backend::{Values, cpu};
 use sim_engine::simulation::{Draws, Lanes, Options, Precision};
+use sim_physics::arrays::Field;
 
 /// Seeds of 21 worlds, three of which have that of world 5: in its block of eight, of sixteen, and in none of them.
 const SEEDS: [u64; 21] = [

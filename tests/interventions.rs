@@ -9,11 +9,11 @@ use common::any_program::{Scope, any_program, with_interventions};
 use common::any_scene::{any_scene, is_noise};
 use common::dice::{Dice, for_seeds};
 use common::program::{Kept, Op, Played, play, play_on};
-use sim_core::batch::{Field, status};
-use sim_core::model::Model;
-use sim_core::model::params::Param;
 use sim_engine::backend::{Values, cpu};
 use sim_engine::simulation::{Draws, Faults, Lanes, Options, Precision};
+use sim_model::Model;
+use sim_physics::arrays::{Field, status};
+use sim_physics::constants::params::Param;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -394,7 +394,7 @@ fn numbers_that_are_not_finite_are_refused_everywhere_and_change_nothing() {
                     }
                 };
             for field in inputs {
-                let columns = field.elements(&case.model);
+                let columns = field.elements(&case.model.sizes());
                 check(field.row().name, columns, &mut |numbers| {
                     let values = Values::F64(numbers);
                     let done = match field {
@@ -407,7 +407,7 @@ fn numbers_that_are_not_finite_are_refused_everywhere_and_change_nothing() {
                 })?;
             }
             for &param in &varying {
-                let columns = param.columns(&case.model);
+                let columns = param.columns(&case.model.sizes());
                 check(param.row().name, columns, &mut |numbers| {
                     let done =
                         run.sim

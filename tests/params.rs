@@ -3,11 +3,11 @@
 mod common;
 
 use common::{Demo, Run, START, command, lesson_with_table};
-use sim_core::batch::Field;
-use sim_core::model::params::{NO_LIMIT, Param};
-use sim_core::model::{Body, Collision, Description, Model, Pose, Shape, TargetMode};
 use sim_engine::backend::{BackendError, Values, cpu};
 use sim_engine::simulation::{Lanes, Options, Precision};
+use sim_model::{Body, Collision, Description, Model, Pose, Shape, TargetMode};
+use sim_physics::arrays::Field;
+use sim_physics::constants::params::{NO_LIMIT, Param};
 use std::sync::Arc;
 
 const FIELDS: [Field; 5] = [
@@ -228,7 +228,7 @@ fn run_own(
     let mut run = Run::new(model, options(seeds.len(), precision, lanes, threads));
     play(&mut run, 0..5);
     for param in Param::ALL {
-        let columns = 0..param.columns(model);
+        let columns = 0..param.columns(&model.sizes());
         let numbers = own(model, param, seeds);
         run.sim
             .write_param(param, columns, Values::F64(&numbers), None)
@@ -270,7 +270,7 @@ fn a_masked_write_leaves_the_other_worlds_as_they_were() {
     play(&mut untouched, 0..6);
     play(&mut run, 0..3);
     for param in Param::ALL {
-        let columns = param.columns(&model);
+        let columns = param.columns(&model.sizes());
         if columns == 0 {
             continue;
         }
@@ -302,7 +302,7 @@ fn a_reset_keeps_parameters_and_takes_loads_away() {
     let model = arm(Param::ALL).compile().unwrap();
     let mut run = Run::new(&model, options(3, Precision::F64, Lanes::Auto, 1));
     for param in Param::ALL {
-        let columns = 0..param.columns(&model);
+        let columns = 0..param.columns(&model.sizes());
         let numbers = own(&model, param, &[4, 5, 6]);
         run.sim
             .write_param(param, columns, Values::F64(&numbers), None)
@@ -311,7 +311,7 @@ fn a_reset_keeps_parameters_and_takes_loads_away() {
     let mask = [true, false, true];
     run.sim.reset(Some(&mask), None).unwrap();
     for param in Param::ALL {
-        let columns = param.columns(&model);
+        let columns = param.columns(&model.sizes());
         let mut expected = own(&model, param, &[4, 5, 6]);
         if param.is_load() {
             expected[..columns].fill(0.0);

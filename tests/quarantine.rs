@@ -3,10 +3,10 @@
 mod common;
 
 use common::{Demo, Run, command, lesson_with_table};
-use sim_core::batch::{Field, status};
-use sim_core::model::{Body, Collision, Description, Pose, Shape};
 use sim_engine::backend::{Values, cpu};
 use sim_engine::simulation::{Faults, FirstFrozen, Frozen, Lanes, Options, Precision, Simulation};
+use sim_model::{Body, Collision, Description, Pose, Shape};
+use sim_physics::arrays::{Field, status};
 
 const WORLDS: usize = 37;
 const FIELDS: [Field; 8] = [

@@ -4,9 +4,9 @@ mod common;
 
 use common::recorded::{self, worst};
 use common::{Demo, FRAMES, Run, lesson, lesson_with_table};
-use sim_core::batch::Field;
-use sim_core::model::Description;
 use sim_engine::simulation::{Lanes, Options, Precision};
+use sim_model::Description;
+use sim_physics::arrays::Field;
 
 fn run(scene: &Description, precision: Precision) -> Run {
     let options = Options {

@@ -4,9 +4,9 @@ mod common;
 
 use common::Run;
 use common::drawn::{STATE, launched, model, options};
-use sim_core::batch::Field;
 use sim_engine::backend::{BackendError, Values, cpu};
 use sim_engine::simulation::{Lanes, Precision};
+use sim_physics::arrays::Field;
 
 /// Bits of the state of each world.
 fn bits(run: &Run) -> Vec<Vec<u64>> {

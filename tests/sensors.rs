@@ -3,11 +3,11 @@
 mod common;
 
 use common::{Demo, Run, command, lesson_with_table, noise};
-use sim_core::batch::Field;
-use sim_core::model::params::Param;
-use sim_core::model::{Body, ContactSensor, Description, Pose, Site};
 use sim_engine::backend::{Values, cpu};
 use sim_engine::simulation::{Lanes, Options, Precision};
+use sim_model::{Body, ContactSensor, Description, Pose, Site};
+use sim_physics::arrays::Field;
+use sim_physics::constants::params::Param;
 
 const FIELDS: [Field; 11] = [
     Field::JointQ,
@@ -73,7 +73,7 @@ fn scene() -> Description {
 fn vary(run: &mut Run) {
     let model = run.sim.model().clone();
     for param in model.constants().varying.params() {
-        let columns = param.columns(&model);
+        let columns = param.columns(&model.sizes());
         let values: Vec<f64> = (0..run.sim.worlds() * columns)
             .map(|k| {
                 let (world, column) = (k / columns, k % columns);

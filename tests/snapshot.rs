@@ -4,11 +4,11 @@ mod common;
 
 use common::{Demo, Run, lesson_with_table};
 use common::{noise, shapes::shapes};
-use sim_core::batch::{Field, status};
-use sim_core::model::{Body, Collision, Cone, Description, Model, Pose, Shape, UrdfOptions};
 use sim_engine::backend::{COUNTERS, Values, cpu};
 use sim_engine::simulation::{Lanes, Options, Precision};
 use sim_engine::snapshot::SnapshotError;
+use sim_model::{Body, Collision, Cone, Description, Model, Pose, Shape, UrdfOptions};
+use sim_physics::arrays::{Field, status};
 use std::sync::Arc;
 
 const WORLDS: usize = 37;

@@ -3,10 +3,10 @@
 mod common;
 
 use common::drawn::{self, launched, model, scene};
-use sim_core::batch::Field;
-use sim_core::model::constants::Motion;
-use sim_core::model::{Distribution, JointKind, Pose};
 use sim_engine::simulation::Precision;
+use sim_model::{Distribution, JointKind, Pose};
+use sim_physics::arrays::Field;
+use sim_physics::constants::Motion;
 
 #[test]
 fn a_start_in_f32_is_the_rounded_one_in_f64() {

@@ -1,6 +1,6 @@
 //! The house rules of ARCHITECTURE.md and STYLE.md that a machine can check.
 
-use sim_core::batch::Field;
+use sim_physics::arrays::Field;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -10,8 +10,8 @@ const LONGEST: usize = 500;
 /// Modules of a crate, each of which may import those before it.
 const ORDER: [(&str, &[&str]); 2] = [
     (
-        "sim-core/src",
-        &["lane", "math", "model", "batch", "step", "compiled"],
+        "sim-core/physics/src",
+        &["lane", "math", "constants", "arrays", "step", "compiled"],
     ),
     (
         "sim-core/engine/src",
@@ -34,11 +34,11 @@ const DOORS: [(&str, &str); 20] = [
     ("ash", "sim-core/device/src/vulkan"),
     ("naga", "sim-core/device/src/module.rs"),
     ("wgpu", "sim-core/device/src"),
-    ("urdf_rs", "sim-core/src/model/urdf"),
-    ("faer", "sim-core/src/model"),
-    ("parry3d_f64", "sim-core/src/model/geometry"),
-    ("gltf", "sim-core/src/model/geometry/load"),
-    ("base64", "sim-core/src/model/geometry/load"),
+    ("urdf_rs", "sim-core/model/src/urdf"),
+    ("faer", "sim-core/model/src"),
+    ("parry3d_f64", "sim-core/model/src/geometry"),
+    ("gltf", "sim-core/model/src/geometry/load"),
+    ("base64", "sim-core/model/src/geometry/load"),
     ("rayon", "sim-core/engine/src/backend/cpu"),
     ("crc32fast", "sim-core/engine/src/snapshot.rs"),
     ("iceoryx2", "sim-daemon/protocol/src"),
@@ -73,11 +73,11 @@ const UNSAFE: [&str; 23] = [
     "sim-core/engine/src/backend/gpu/mod.rs",      // as imported.rs
     "sim-core/engine/src/backend/mod.rs",          // as imported.rs
     "sim-core/engine/src/simulation.rs",           // as imported.rs
-    "sim-core/src/compiled.rs", // what only a processor with the instructions may run
-    "sim-core/src/lane/simd.rs", // intrinsics
+    "sim-core/physics/src/compiled.rs", // what only a processor with the instructions may run
+    "sim-core/physics/src/lane/simd.rs", // intrinsics
     "sim-daemon/protocol/src/frame.rs", // views of a sample
-    "sim-daemon/protocol/src/loan.rs", // loaned samples
-    "sim-daemon/src/server.rs", // samples that a device writes to
+    "sim-daemon/protocol/src/loan.rs",  // loaned samples
+    "sim-daemon/src/server.rs",         // samples that a device writes to
 ];
 
 fn root() -> PathBuf {
@@ -130,7 +130,8 @@ fn code(path: &str) -> Vec<String> {
 
 fn sources() -> Vec<String> {
     [
-        "sim-core/src",
+        "sim-core/physics/src",
+        "sim-core/model/src",
         "sim-core/device/src",
         "sim-core/engine/src",
         "sim-core/stages",
@@ -170,29 +171,55 @@ fn modules_import_only_those_before_them() {
 fn crates_know_only_what_they_may() {
     for (folder, strangers) in [
         (
-            "sim-core/src",
-            &["sim_device", "sim_engine", "sim_protocol", "sim_daemon"][..],
+            "sim-core/physics/src",
+            &[
+                "sim_model",
+                "sim_device",
+                "sim_engine",
+                "sim_protocol",
+                "sim_daemon",
+            ][..],
+        ),
+        (
+            "sim-core/model/src",
+            &["sim_device", "sim_engine", "sim_protocol", "sim_daemon"],
         ),
         (
             "sim-core/device/src",
-            &["sim_core", "sim_engine", "sim_protocol", "sim_daemon"],
+            &[
+                "sim_physics",
+                "sim_model",
+                "sim_engine",
+                "sim_protocol",
+                "sim_daemon",
+            ],
         ),
         ("sim-core/engine/src", &["sim_protocol", "sim_daemon"]),
         (
             "sim-daemon/protocol/src",
-            &["sim_core", "sim_device", "sim_engine", "sim_daemon"],
+            &[
+                "sim_physics",
+                "sim_model",
+                "sim_device",
+                "sim_engine",
+                "sim_daemon",
+            ],
         ),
         (
             "sim-daemon/picture/src",
             &[
-                "sim_core",
+                "sim_physics",
+                "sim_model",
                 "sim_device",
                 "sim_engine",
                 "sim_protocol",
                 "sim_daemon",
             ],
         ),
-        ("py-client/src", &["sim_core", "sim_device", "sim_engine"]),
+        (
+            "py-client/src",
+            &["sim_physics", "sim_model", "sim_device", "sim_engine"],
+        ),
     ] {
         for path in files(folder, ".rs") {
             for stranger in strangers {
@@ -208,7 +235,7 @@ fn crates_know_only_what_they_may() {
         .into_iter()
         .filter(|path| {
             let text = code(path).join("\n");
-            text.contains("sim_core::batch") && text.contains("Layout")
+            text.contains("sim_physics::arrays") && text.contains("Layout")
         })
         .collect();
     assert_eq!(both, ["sim-daemon/src/export.rs"]);
@@ -261,7 +288,7 @@ fn unsafe_stands_where_it_may() {
 
 #[test]
 fn a_step_names_no_backend_returns_no_result_and_takes_no_memory() {
-    for path in files("sim-core/src/step", ".rs") {
+    for path in files("sim-core/physics/src/step", ".rs") {
         for line in code(&path) {
             for word in ["Result<", "Vec<", "vec!", "Box<", "backend"] {
                 assert!(!line.contains(word), "{path}: {line}");
@@ -272,7 +299,7 @@ fn a_step_names_no_backend_returns_no_result_and_takes_no_memory() {
 
 #[test]
 fn a_model_cannot_be_changed() {
-    let text = read("sim-core/src/model/frozen.rs");
+    let text = read("sim-core/model/src/frozen.rs");
     let start = text.find("impl Model {").expect("the model has methods");
     let body = &text[start..start + text[start..].find("\n}").unwrap()];
     assert!(body.contains("&self") && !body.contains("&mut self"));
@@ -306,7 +333,10 @@ fn pages_of_code_are_at_most_500_lines() {
         "tests",
         "benches",
         "examples",
-        "sim-core/tests",
+        "sim-core/physics/tests",
+        "sim-core/model/tests",
+        "sim-core/record/tests",
+        "sim-core/engine/tests",
         "sim-core/device/benches",
         "sim-core/device/tests",
         "sim-daemon/tests",

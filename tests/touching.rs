@@ -4,10 +4,10 @@ mod common;
 
 use common::shapes::shapes;
 use common::{Run, noise};
-use sim_core::batch::{Field, status};
-use sim_core::model::{Cone, Description, Model};
 use sim_engine::backend::{Values, cpu};
 use sim_engine::simulation::{Lanes, Options, Precision};
+use sim_model::{Cone, Description, Model};
+use sim_physics::arrays::{Field, status};
 use std::sync::Arc;
 
 const FIELDS: [Field; 11] = [

@@ -4,9 +4,9 @@ use crate::common::{distance, numbers};
 use crate::scenes::{Crowd, Plan, Scene};
 use crate::{Place, options};
 use anyhow::{Context, ensure};
-use sim_core::batch::Field;
 use sim_engine::backend::Values;
 use sim_engine::simulation::Simulation;
+use sim_physics::arrays::Field;
 
 /// Joint positions of MuJoCo C's runs, as tests/gpu/agreement.rs reads them.
 const TARGET: &str = include_str!("../../tests/data/mujoco_target.csv");

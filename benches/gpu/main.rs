@@ -21,9 +21,9 @@ use measure::Frames;
 use pages::Pages;
 use report::{Report, Row};
 use scenes::{Crowd, Plan, Scene};
-use sim_core::batch::Field;
 use sim_engine::options::{Adapter, AdapterInfo, Replay, adapters};
 use sim_engine::simulation::{Device, Options, Simulation};
+use sim_physics::arrays::Field;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 

@@ -3,10 +3,10 @@
 use crate::common::{Demo, FRAMES, command, lesson, lesson_with_table, noise, numbers};
 use crate::robots::{self, Case};
 use clap::ValueEnum;
-use sim_core::batch::Field;
-use sim_core::model::Model;
 use sim_engine::backend::Values;
 use sim_engine::simulation::Simulation;
+use sim_model::Model;
+use sim_physics::arrays::Field;
 use std::sync::Arc;
 
 /// Half of the square within which a cube is put [m], about its place in the record: what examples/franka_grasp.py draws from.

@@ -2,7 +2,7 @@
 //! range; benches/legged.py is the same in Python, with a swing of each world's own.
 #![allow(dead_code)] // each bench uses its part
 
-use sim_core::model::{Description, JointKind, Robot, UrdfOptions};
+use sim_model::{Description, JointKind, Robot, UrdfOptions};
 
 /// Control frames of a run.
 pub const FRAMES: usize = 100;

@@ -1,8 +1,8 @@
 //! The first lesson (NVIDIA Newton, "Controlling a Robot") as a scene and its commands, without contacts:
 //! what the Rust twin of the lesson, the tests and the benches share.
 
-use sim_core::batch::Field;
-use sim_core::model::{Description, Pose, Robot, UrdfOptions};
+use sim_model::{Description, Pose, Robot, UrdfOptions};
+use sim_physics::arrays::Field;
 
 /// Start of the lesson, joints 1..7 and fingers [rad, m]; the fingers start outside their range.
 pub const START: [f64; 9] = [

@@ -1,7 +1,7 @@
 //! Why a daemon does not start, or ends.
 
-use sim_core::model::ModelError;
 use sim_engine::backend::BackendError;
+use sim_model::ModelError;
 use sim_protocol::ProtocolError;
 
 use crate::config::ConfigError;

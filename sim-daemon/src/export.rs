@@ -1,10 +1,10 @@
 //! Between physics and wire: the only file that knows both sim-core and sim-protocol.
 
-use sim_core::batch::{Dtype, Field, FieldDtype, FieldRow, Group, Layout};
-use sim_core::model::params::Param;
-use sim_core::model::{Description as Scene, Model};
 use sim_engine::backend::{BackendError, Values};
 use sim_engine::simulation::{Options, Precision, Simulation};
+use sim_model::{Description as Scene, Model};
+use sim_physics::arrays::{Dtype, Field, FieldDtype, FieldRow, Group, Layout};
+use sim_physics::constants::params::Param;
 use sim_protocol::host::{Inbox, Numbers};
 use sim_protocol::{self as wire, InputInfo, Op, ParamInfo, RefusalKind, RobotRange, Row, Table};
 
@@ -59,7 +59,7 @@ pub(crate) fn description(
             .filter(move |field| field.row().group == group);
         rows.map(|field| InputInfo {
             name: field.row().name.to_owned(),
-            columns: field.elements(model),
+            columns: field.elements(&model.sizes()),
             unit: field.row().unit.to_owned(),
             doc: field.row().doc.to_owned(),
         })
@@ -171,7 +171,7 @@ fn param_info(model: &Model, param: Param) -> InputInfo {
     let row = param.row();
     InputInfo {
         name: row.name.to_owned(),
-        columns: param.columns(model),
+        columns: param.columns(&model.sizes()),
         unit: row.unit.to_owned(),
         doc: row.doc.to_owned(),
     }

@@ -6,9 +6,9 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
-use sim_core::batch::Field;
 use sim_engine::options::{self, Adapter};
 use sim_engine::simulation::{Device, Draws, Faults, Lanes, Options, Precision, Simulation};
+use sim_physics::arrays::Field;
 use sim_protocol::host::{Host, check_memory};
 use sim_protocol::place::Place;
 use sim_protocol::tenancy::Tenancy;

@@ -4,8 +4,8 @@ use crate::{
     GRAVITY, Quat, Top, Vec3, after, assert_first_order, conjugate, cross, distance, dot, one_body,
     quat, rounding, turned, vec3,
 };
-use sim_core::model::JointKind;
 use sim_engine::simulation::Precision;
+use sim_model::JointKind;
 
 /// A body without symmetry that spins near its middle axis, where a rotation is unstable.
 const BRICK: Top = Top {

@@ -8,9 +8,9 @@ mod pivot;
 mod planar;
 
 use common::Run;
-use sim_core::batch::Field;
-use sim_core::model::{Description, Inertial, Joint, JointKind, Link, Pose, Robot};
 use sim_engine::simulation::{Lanes, Options, Precision};
+use sim_model::{Description, Inertial, Joint, JointKind, Link, Pose, Robot};
+use sim_physics::arrays::Field;
 
 const GRAVITY: f64 = 9.81;
 /// Steps of a control frame in [`one_body`].

@@ -4,8 +4,8 @@ use crate::{
     GRAVITY, Quat, SUBSTEPS, Top, Vec3, after, assert_first_order, dot, motion, one_body, quat,
     rounding, turned, vec3,
 };
-use sim_core::model::JointKind;
 use sim_engine::simulation::Precision;
+use sim_model::JointKind;
 use std::f64::consts::TAU;
 
 /// A bob on a rod of 0.4 m below the joint.

@@ -2,8 +2,8 @@
 
 use crate::GRAVITY;
 use crate::common::Run;
-use sim_core::batch::Field;
-use sim_core::model::{Description, Inertial, Joint, JointKind, Link, Pose, Robot};
+use sim_model::{Description, Inertial, Joint, JointKind, Link, Pose, Robot};
+use sim_physics::arrays::Field;
 
 /// A link with its mass `m` [kg] at distance `l` [m] below the joint, and a small inertia about it.
 fn bob(name: &str, m: f64, l: f64) -> Link {

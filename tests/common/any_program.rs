@@ -2,10 +2,10 @@
 
 use super::dice::Dice;
 use super::program::{Op, Rows};
-use sim_core::batch::Field;
-use sim_core::model::Model;
-use sim_core::model::constants::Motion;
-use sim_core::model::params::{NO_LIMIT, Param};
+use sim_model::Model;
+use sim_physics::arrays::Field;
+use sim_physics::constants::Motion;
+use sim_physics::constants::params::{NO_LIMIT, Param};
 use std::ops::Range;
 
 /// Whom an op may touch, and how hard.
@@ -116,7 +116,7 @@ fn any_op(dice: &mut Dice, scope: &Scope<'_>, kept: &mut usize) -> Option<Op> {
                 return None;
             }
             let param = dice.pick(&varying);
-            let columns = any_columns(dice, param.columns(model));
+            let columns = any_columns(dice, param.columns(&model.sizes()));
             let row = |dice: &mut Dice| {
                 let number = |column| any_param(dice, scope, param, column);
                 columns.clone().map(number).collect()

@@ -2,11 +2,11 @@
 
 use super::dice::Dice;
 use super::shapes::every_kind;
-use sim_core::model::params::Param;
-use sim_core::model::{
+use sim_model::{
     Body, Collision, Cone, ContactSensor, Description, Distribution, Inertial, Joint, JointDof,
     JointKind, Link, Mimic, Pose, Robot, Site, Solver, Surface, TargetMode,
 };
+use sim_physics::constants::params::Param;
 
 /// Kinds of joints, the usual ones more often.
 const KINDS: [JointKind; 8] = [

@@ -1,10 +1,10 @@
 //! Robots and shapes for tests of stages, and states that take every path through them.
 
 use super::shapes::shapes as every_shape;
-use sim_core::batch::Block;
-use sim_core::model::constants::{Constants, Motion};
-use sim_core::model::params::Param;
-use sim_core::model::{Body, Collision, Cone, Description, Model, Pose, Shape, Site, UrdfOptions};
+use sim_model::{Body, Collision, Cone, Description, Model, Pose, Shape, Site, UrdfOptions};
+use sim_physics::arrays::Block;
+use sim_physics::constants::params::Param;
+use sim_physics::constants::{Constants, Motion};
 use std::path::Path;
 
 /// Substeps of a frame.

@@ -1,9 +1,9 @@
 //! A scene whose worlds start where they are drawn.
 
 use super::{Run, repo};
-use sim_core::batch::Field;
-use sim_core::model::{Body, Description, Distribution, Model, Pose, UrdfOptions};
 use sim_engine::simulation::{Lanes, Options, Precision};
+use sim_model::{Body, Description, Distribution, Model, Pose, UrdfOptions};
+use sim_physics::arrays::Field;
 use std::sync::Arc;
 
 /// Fields of its frames.

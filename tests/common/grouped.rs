@@ -1,11 +1,11 @@
 //! Worlds in groups against the same worlds together: everything that is drawn, in every frame, bit for bit.
 
 use super::{drawn, noise};
-use sim_core::batch::{Field, Group, status};
-use sim_core::model::params::Param;
-use sim_core::model::{Description, Distribution, Pose, Site};
 use sim_engine::backend::Values;
 use sim_engine::simulation::{Faults, Options, Simulation};
+use sim_model::{Description, Distribution, Pose, Site};
+use sim_physics::arrays::{Field, Group, status};
+use sim_physics::constants::params::Param;
 use std::thread;
 
 /// Fields of the frames: state, and all noise that the scene has.
@@ -104,7 +104,7 @@ fn play(mut simulation: Simulation, first: usize) -> Vec<Vec<u8>> {
         if [0, 3, 6, 8, 11].contains(&frame) {
             simulation.forward(&mut arena);
         } else {
-            let dofs = Field::JointF.elements(simulation.model());
+            let dofs = Field::JointF.elements(&simulation.model().sizes());
             let torque = |world: usize| {
                 // beyond the bounds in some worlds
                 let scale = if world % 5 == frame % 5 { 1e4 } else { 0.1 };

@@ -16,10 +16,10 @@ pub mod shapes;
 
 #[allow(unused_imports)] // as above
 pub use lesson_scene::{Demo, FRAMES, START, command, lesson};
-use sim_core::batch::{Dtype, Field};
-use sim_core::model::{Body, Collision, Description, Model, Pose, Shape, Surface};
 use sim_engine::backend::Values;
 use sim_engine::simulation::{Lanes, Options, Precision, Simulation};
+use sim_model::{Body, Collision, Description, Model, Pose, Shape, Surface};
+use sim_physics::arrays::{Dtype, Field};
 use std::path::PathBuf;
 use std::sync::Arc;
 

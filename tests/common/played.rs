@@ -1,9 +1,9 @@
 //! What a program left behind, world by world.
 
 use super::program::Played;
-use sim_core::batch::{Field, FieldDtype, Group, status};
 use sim_engine::backend::COUNTERS;
 use sim_engine::simulation::Precision;
+use sim_physics::arrays::{Field, FieldDtype, Group, status};
 
 impl Played {
     /// The state shown is finite; a frozen world stands where it was, and one that is not has made its step.

@@ -1,11 +1,11 @@
 //! Programs: what is done to the worlds of a simulation, op by op, and the frames that come of it.
 
 use super::Run;
-use sim_core::batch::Field;
-use sim_core::model::Model;
-use sim_core::model::params::Param;
 use sim_engine::backend::Values;
 use sim_engine::simulation::{Options, Precision};
+use sim_model::Model;
+use sim_physics::arrays::Field;
+use sim_physics::constants::params::Param;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;

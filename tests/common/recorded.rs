@@ -1,7 +1,7 @@
 //! Runs of the lesson beside those that were recorded of MuJoCo C (tests/data/README.md).
 
 use super::{Demo, FRAMES, Run, command, csv, distance, repo};
-use sim_core::batch::Field;
+use sim_physics::arrays::Field;
 
 /// Distance of world 0 in joint positions from a recorded run: of its start, then a frame each.
 pub fn deviations(run: &mut Run, demo: Demo, file: &str, frames: usize) -> Vec<f64> {

@@ -1,7 +1,7 @@
 //! A scene in which shapes of every kind touch.
 
-use sim_core::model::geometry::{Hull, Mesh, TriMesh};
-use sim_core::model::{Body, Collision, Cone, Description, Pose, Shape, Surface};
+use sim_model::geometry::{Hull, Mesh, TriMesh};
+use sim_model::{Body, Collision, Cone, Description, Pose, Shape, Surface};
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -4,10 +4,10 @@ use crate::common::recorded::{self, worst};
 use crate::common::shapes::shapes;
 use crate::common::{Demo, FRAMES, Run, lesson, lesson_with_table, noise, repo};
 use crate::{assert_alive, gpu, run};
-use sim_core::batch::{Field, FieldDtype, Group};
-use sim_core::model::{Cone, Description, Model, UrdfOptions};
 use sim_engine::backend::Values;
 use sim_engine::simulation::Device;
+use sim_model::{Cone, Description, Model, UrdfOptions};
+use sim_physics::arrays::{Field, FieldDtype, Group};
 use std::sync::Arc;
 
 fn start(scene: &Description) -> Run {

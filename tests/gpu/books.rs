@@ -3,11 +3,11 @@
 use crate::common::drawn;
 use crate::common::{Demo, Run, command, lesson, lesson_with_table, shapes::shapes};
 use crate::{assert_alive, gpu, options, run};
-use sim_core::batch::{Field, status};
-use sim_core::model::params::Param;
-use sim_core::model::{Cone, Model};
 use sim_engine::backend::Values;
 use sim_engine::simulation::{Device, Faults, Options, Precision};
+use sim_model::{Cone, Model};
+use sim_physics::arrays::{Field, status};
+use sim_physics::constants::params::Param;
 use std::sync::Arc;
 
 const WORLDS: usize = 70;
@@ -310,7 +310,7 @@ fn a_snapshot_has_the_commands_that_no_frame_has_taken_yet() {
 
 #[test]
 fn a_scene_in_which_nothing_moves_runs() {
-    let mut scene = sim_core::model::Description::new(0.01, 4);
+    let mut scene = sim_model::Description::new(0.01, 4);
     scene.add_ground("ground", 0.0);
     let model = scene.compile().unwrap();
     let mut run = run(&model, gpu(), 3, Field::ALL);

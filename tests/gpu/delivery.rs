@@ -3,7 +3,7 @@
 use crate::common::{Demo, command, lesson};
 use crate::{assert_alive, gpu, run};
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
-use sim_core::batch::Field;
+use sim_physics::arrays::Field;
 use std::ptr::null_mut;
 
 const FIELDS: [Field; 3] = [Field::JointQ, Field::JointQd, Field::BodyQ];

@@ -2,10 +2,10 @@
 
 use crate::common::{Demo, Run, command, lesson, lesson_with_table};
 use crate::{assert_alive, gpu, options, run};
-use sim_core::batch::{Field, status};
 use sim_engine::backend::BackendError;
 use sim_engine::options::{AUTO_WORLDS, AdapterKind, adapters, compiling, lose_after};
 use sim_engine::simulation::{Device, Options, Precision, Simulation};
+use sim_physics::arrays::{Field, status};
 use std::time::Duration;
 
 #[test]

@@ -12,10 +12,10 @@ mod programs;
 mod same_bits;
 mod stages;
 
-use sim_core::batch::Field;
-use sim_core::model::Model;
 use sim_engine::options::Adapter;
 use sim_engine::simulation::{Device, Options};
+use sim_model::Model;
+use sim_physics::arrays::Field;
 use std::sync::Arc;
 
 /// The first adapter; nothing is kept on disk.

@@ -5,8 +5,8 @@ use crate::common::any_scene::any_scene;
 use crate::common::dice::Dice;
 use crate::common::program::{Op, play};
 use crate::{gpu, options};
-use sim_core::batch::Field;
 use sim_engine::simulation::{Draws, Faults, Options};
+use sim_physics::arrays::Field;
 
 /// Each is a program of its own for the driver, which takes seconds.
 const CASES: usize = 3;

@@ -3,9 +3,9 @@
 use crate::common::grouped::assert_groups_are_the_whole;
 use crate::common::{Demo, Run, command, lesson, lesson_with_table, noise};
 use crate::{assert_alive, gpu, options, run};
-use sim_core::batch::Field;
-use sim_core::model::Model;
 use sim_engine::backend::Values;
+use sim_model::Model;
+use sim_physics::arrays::Field;
 use std::sync::Arc;
 
 const FIELDS: [Field; 4] = [Field::JointQ, Field::JointQd, Field::JointQdd, Field::BodyQ];

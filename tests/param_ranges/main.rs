@@ -6,11 +6,11 @@ mod common;
 mod motion;
 
 use common::{Demo, Run, command, lesson_with_table};
-use sim_core::batch::Field;
-use sim_core::model::params::{NO_LIMIT, Param};
-use sim_core::model::{Description, Distribution, Model};
 use sim_engine::backend::{Values, cpu};
 use sim_engine::simulation::{Lanes, Options, Precision};
+use sim_model::{Description, Distribution, Model};
+use sim_physics::arrays::Field;
+use sim_physics::constants::params::{NO_LIMIT, Param};
 use std::sync::Arc;
 
 const FIELDS: [Field; 4] = [
@@ -101,7 +101,7 @@ fn params(run: &Run) -> Vec<Vec<f64>> {
 /// A column of a parameter, in every world.
 fn column(run: &Run, param: Param, column: usize) -> Vec<f64> {
     let numbers = run.sim.param(param).unwrap();
-    let columns = param.columns(run.sim.model());
+    let columns = param.columns(&run.sim.model().sizes());
     numbers.into_iter().skip(column).step_by(columns).collect()
 }
 

@@ -2,11 +2,11 @@
 
 use crate::common::Run;
 use crate::{bits, column, drawn, launched, normal, options, place, plain, play, range, uniform};
-use sim_core::batch::{Field, status};
-use sim_core::model::params::Param;
-use sim_core::model::{Body, Description, Pose, TargetMode};
 use sim_engine::backend::Values;
 use sim_engine::simulation::{Faults, Lanes, Precision};
+use sim_model::{Body, Description, Pose, TargetMode};
+use sim_physics::arrays::{Field, status};
+use sim_physics::constants::params::Param;
 
 #[test]
 fn drawn_numbers_move_worlds_as_the_same_numbers_written_do() {
@@ -23,7 +23,7 @@ fn drawn_numbers_move_worlds_as_the_same_numbers_written_do() {
         let mut by_hand = Run::new(&writable, options(19, precision, lanes, 1));
         for episode in 0..2 {
             for param in model.constants().varying.params() {
-                let columns = 0..param.columns(&model);
+                let columns = 0..param.columns(&model.sizes());
                 let numbers = run.sim.param(param).unwrap();
                 by_hand
                     .sim

@@ -9,8 +9,8 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use daemon::{Daemon, leftovers, scene};
-use sim_core::batch::Field;
 use sim_engine::simulation::{Options, Simulation};
+use sim_physics::arrays::Field;
 use sim_protocol::{Client, Command, Dtype, Frame, ProtocolError, Values, keep_waiting};
 
 /// Not a test by itself: the process that other tests start as a daemon.

@@ -1,6 +1,6 @@
 //! Mistakes of users: each gets a sentence with the culprit and the cure, and the daemon goes on.
 
-use sim_core::batch::Field;
+use sim_physics::arrays::Field;
 use sim_protocol::{
     Command, Frame, PROTOCOL_VERSION, ProtocolError, RefusalKind, Values, keep_waiting,
 };

@@ -5,18 +5,18 @@ mod bits;
 mod cases;
 #[path = "../common/shapes.rs"]
 mod shapes;
-#[path = "../../sim-core/tests/toy/mod.rs"]
+#[path = "../../sim-core/record/tests/toy/mod.rs"]
 mod toy;
 
 use cases::{Case, SUBSTEPS, Scalar, arm_and_cube, cases, every_joint, every_param, fr3};
-use sim_core::batch::{Block, Numbers, WorkSlot};
-use sim_core::every_stage;
-use sim_core::lane::memory::Cpu;
-use sim_core::model::Cone;
-use sim_core::model::constants::Constants;
-use sim_core::model::contact::PAIR_KINDS;
-use sim_core::step::{STAGES, Stage};
-use sim_core::times;
+use sim_physics::arrays::{Block, Numbers, WorkSlot};
+use sim_physics::constants::Constants;
+use sim_physics::constants::contact::Cone;
+use sim_physics::constants::contact::PAIR_KINDS;
+use sim_physics::every_stage;
+use sim_physics::lane::memory::Cpu;
+use sim_physics::step::{STAGES, Stage};
+use sim_physics::times;
 use sim_record::wgsl::{ProgramOptions, wgsl};
 use sim_record::{Recorder, Recording};
 use stages_recorded::{RecordedWorlds, SCRATCH, SLOTS};
@@ -37,7 +37,7 @@ fn run(stage: Stage, m: &Constants<f32>, block: &mut Scalar, memory: &mut [f32])
     static STAGES: [RunStage; Stage::ALL.len()] = every_stage!(on_a_world);
     fn on_a_world<const STAGE: usize>(m: &Constants<f32>, block: &mut Scalar, memory: &mut [f32]) {
         let cx = &mut Cpu::new(memory, &m.contacts.tables);
-        sim_core::step::run::<_, STAGE>(cx, m, block);
+        sim_physics::step::run::<_, STAGE>(cx, m, block);
     }
     STAGES[stage.number()](m, block, memory);
 }
@@ -177,7 +177,7 @@ fn contacts(m: &Constants<f32>, memory: &[f32]) -> Vec<usize> {
         let count = memory[t.memory.counts.base + k] as usize;
         for row in class.first..class.first + count.min(class.capacity) {
             let place = t.memory.rows.base + row * t.memory.rows.stride;
-            pairs.push(memory[place + sim_core::model::contact::row::PAIR] as usize);
+            pairs.push(memory[place + sim_physics::constants::contact::row::PAIR] as usize);
         }
     }
     pairs

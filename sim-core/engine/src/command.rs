@@ -2,8 +2,8 @@
 
 use crate::backend::{BackendError, Values};
 use crate::simulation::Simulation;
-use sim_core::batch::{Field, Group};
-use sim_core::model::params::Param;
+use sim_physics::arrays::{Field, Group};
+use sim_physics::constants::params::Param;
 use std::ops::Range;
 
 impl Simulation {
@@ -70,7 +70,7 @@ impl Simulation {
         columns: &Range<usize>,
         values: Values<'_>,
     ) -> Result<Option<Vec<bool>>, BackendError> {
-        let all = param.columns(self.model());
+        let all = param.columns(&self.model().sizes());
         self.check_shape(param.row().name, all, columns, values.len())?;
         Ok(self.good_worlds(columns.len(), values))
     }

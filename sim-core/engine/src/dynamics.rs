@@ -1,11 +1,11 @@
 //! Kinematics and dynamics of a model at states that a caller gives, apart from any simulation.
 //!
-//! Everything is the text of [`sim_core::step`] in double precision; a state is evaluated, nothing moves.
+//! Everything is the text of [`sim_physics::step`] in double precision; a state is evaluated, nothing moves.
 
 use crate::backend::{BackendError, Lanes, Precision, Values};
 use crate::simulation::{Options, Simulation};
-use sim_core::batch::Field;
-use sim_core::model::Model;
+use sim_model::Model;
+use sim_physics::arrays::Field;
 use std::sync::Arc;
 
 /// What [`Dynamics`] can evaluate; each depends on positions and velocities only.
@@ -69,7 +69,7 @@ impl Dynamics {
         }
         let states = self.states(joint_q)?;
         self.fits(Field::JointQd, joint_qd, states, true)?;
-        let mut values = Vec::with_capacity(states * field.elements(&self.model));
+        let mut values = Vec::with_capacity(states * field.elements(&self.model.sizes()));
         let world = self.world(&[field])?;
         for state in 0..states {
             world.place(state, joint_q, joint_qd)?;
@@ -149,7 +149,7 @@ impl Dynamics {
         states: usize,
         may_be_empty: bool,
     ) -> Result<(), BackendError> {
-        let columns = field.elements(&self.model);
+        let columns = field.elements(&self.model.sizes());
         if values.len() != states * columns && !(may_be_empty && values.is_empty()) {
             return Err(BackendError::Length {
                 field: field.row().name,

@@ -4,8 +4,8 @@ use crate::backend::{
     BackendError, Backends, Faults, Groups, Lanes, Precision, available_memory, cpu, gpu,
 };
 use crate::random::{Draws, Numbering};
-use sim_core::batch::{Field, Layout};
-use sim_core::model::Model;
+use sim_model::Model;
+use sim_physics::arrays::{Field, Layout};
 use std::path::PathBuf;
 use std::time::Duration;
 

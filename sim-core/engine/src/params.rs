@@ -2,7 +2,7 @@
 
 use crate::backend::{BackendError, Values};
 use crate::simulation::Simulation;
-use sim_core::model::params::{Param, Per};
+use sim_physics::constants::params::{Param, Per};
 use std::ops::Range;
 
 /// Numbers of a parameter are written as far below their least as rounding to `f32` takes them [–].
@@ -35,7 +35,7 @@ impl Simulation {
     /// [`BackendError::Constant`].
     pub fn param(&self, param: Param) -> Result<Vec<f64>, BackendError> {
         let first = self.first_of(param)?;
-        let columns = param.columns(self.model());
+        let columns = param.columns(&self.model().sizes());
         let mut numbers = vec![0.0; self.worlds() * columns];
         self.backend().params(first..first + columns, &mut numbers);
         Ok(numbers)
@@ -56,7 +56,7 @@ impl Simulation {
         self.check_mask(mask)?;
         self.check_shape(
             param.row().name,
-            param.columns(self.model()),
+            param.columns(&self.model().sizes()),
             columns,
             values.len(),
         )?;

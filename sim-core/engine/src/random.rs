@@ -5,8 +5,8 @@
 //! multiplications turn a counter into 128 random bits under a key. The key is a seed, the counter (world, episode, stream,
 //! index), or for what is drawn in each frame (world, episode, step, stream and index).
 
-use sim_core::model::Distribution;
-use sim_core::model::params::Param;
+use sim_model::Distribution;
+use sim_physics::constants::params::Param;
 
 /// How many streams a task has, [`Stream::Task`].
 pub const TASK_STREAMS: u8 = 32;

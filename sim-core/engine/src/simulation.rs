@@ -7,9 +7,9 @@ pub use crate::random::Draws;
 use crate::backend::{Backend, BackendError, Values};
 use crate::options::{backends, check_memory, memory_of};
 use crate::snapshot::{self, Head, SnapshotError};
-use sim_core::batch::{Dtype, Field, Group, Layout};
-use sim_core::model::Model;
-use sim_core::model::constants::Motion;
+use sim_model::Model;
+use sim_physics::arrays::{Dtype, Field, Group, Layout};
+use sim_physics::constants::Motion;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -165,7 +165,7 @@ impl Simulation {
             Precision::F32 => Dtype::F32,
             Precision::F64 => Dtype::F64,
         };
-        Layout::new(model, options.worlds, real, &options.fields)
+        Layout::new(&model.sizes(), options.worlds, real, &options.fields)
     }
 
     /// Memory that the worlds take in this process, an arena not included [bytes].
@@ -334,7 +334,7 @@ impl Simulation {
                 choices: choices.map(|row| row.name).collect::<Vec<_>>().join(", "),
             });
         }
-        let all = field.elements(&self.model);
+        let all = field.elements(&self.model.sizes());
         self.check_shape(row.name, all, columns, values.len())?;
         let names = match field {
             Field::JointQ => self.model.coord_names(),

@@ -1,10 +1,10 @@
 //! What a world starts from, where that is drawn: its state, around the scene's, and its parameters.
 
 use crate::random::{Draw, Stream};
-use sim_core::batch::Field;
-use sim_core::model::constants::Motion;
-use sim_core::model::params::Param;
-use sim_core::model::{Distribution, Model, Pose};
+use sim_model::{Distribution, Model, Pose};
+use sim_physics::arrays::Field;
+use sim_physics::constants::Motion;
+use sim_physics::constants::params::Param;
 
 /// What of the start is drawn.
 #[derive(Clone, Debug)]

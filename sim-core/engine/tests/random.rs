@@ -1,8 +1,8 @@
 //! Random numbers: the generator's bits, and what the numbers made of them are distributed like.
 
-use sim_core::model::Distribution;
-use sim_core::model::params::Param;
 use sim_engine::random::{Draw, Stream, TASK_STREAMS, philox};
+use sim_model::Distribution;
+use sim_physics::constants::params::Param;
 
 /// Numbers of a sample: each statistic below is known to a few thousandths.
 const SAMPLE: usize = 100_000;

@@ -1,9 +1,9 @@
 //! What `write` looks at of a masked array, and what it leaves.
 
-use sim_core::batch::Field;
-use sim_core::model::{Description, UrdfOptions};
 use sim_engine::backend::{BackendError, Values};
 use sim_engine::simulation::{Options, Precision, Simulation};
+use sim_model::{Description, UrdfOptions};
+use sim_physics::arrays::Field;
 use std::path::Path;
 
 const WORLDS: usize = 3;

@@ -1,6 +1,6 @@
 //! What a text must not do if it is to become a program.
 
-use sim_core::lane::{Fixed, Table};
+use sim_physics::lane::{Fixed, Table};
 use std::panic::Location;
 
 /// Where in the text something was done.

@@ -3,7 +3,7 @@
 use super::Recording;
 use super::pack::WIDTH;
 use super::tree::{Binary, Cell, Entry, Op, Operand, Quad, Rounds, Row, Statement, Unary};
-use sim_core::lane::{Num, Real, Tables};
+use sim_physics::lane::{Num, Real, Tables};
 use std::collections::HashMap;
 
 /// Should the statements after this one be run?

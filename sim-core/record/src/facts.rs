@@ -7,7 +7,7 @@ use super::error::Misuse;
 use super::handles::{Owner, RecordedIndex};
 use super::state::{Kind, State};
 use super::tree::{Cell, Entry, Op, Operand, Row, Statement};
-use sim_core::lane::{Fixed, Real, Table};
+use sim_physics::lane::{Fixed, Real, Table};
 use std::collections::HashMap;
 
 /// Values known in one open block.

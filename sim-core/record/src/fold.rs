@@ -7,7 +7,7 @@
 use super::state::State;
 use super::tree::{Binary, Op, Operand, Unary};
 use Operand::Truth;
-use sim_core::lane::Num;
+use sim_physics::lane::Num;
 
 fn number(x: f32) -> Operand {
     Operand::number(x)

@@ -3,7 +3,7 @@
 use super::loops::OpenLoop;
 use super::state::Home;
 use super::tree::{Cell, Operand, Row};
-use sim_core::lane::Table;
+use sim_physics::lane::Table;
 
 /// A variable of a recording.
 #[derive(Clone, Copy, Debug)]
@@ -74,7 +74,7 @@ pub(super) struct Kept {
     pub end: usize,
 }
 
-/// An open block, to be closed by [`sim_core::lane::Cx::leave`]; nothing if the text skips its body.
+/// An open block, to be closed by [`sim_physics::lane::Cx::leave`]; nothing if the text skips its body.
 #[derive(Debug)]
 pub struct RecordedBlock(pub(super) Option<OpenBlock>);
 

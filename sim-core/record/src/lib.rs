@@ -7,9 +7,9 @@
 //! depends on is left out.
 //!
 //! ```
-//! use sim_core::lane::{Cx, Num, Tables};
+//! use sim_physics::lane::{Cx, Num, Tables};
 //! use sim_record::record;
-//! use sim_core::times;
+//! use sim_physics::times;
 //!
 //! let doubled_thrice = record(1, |cx, x| {
 //!     let mut sum = cx.var(x[0]);

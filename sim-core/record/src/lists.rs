@@ -5,7 +5,7 @@ use super::handles::{Extent, Kept, OpenBlock, Opened, Owner, RecordedLoop};
 use super::handles::{RecordedBlock, RecordedIndex, RecordedList, RecordedRow};
 use super::state::{Kind, State};
 use super::tree::{Op, Operand, Rounds, Row, Statement};
-use sim_core::lane::{Real, Table};
+use sim_physics::lane::{Real, Table};
 
 impl State {
     pub(super) fn list(&mut self, capacity: usize) -> RecordedList {

@@ -2,7 +2,7 @@
 
 use super::state::{Home, NOWHERE, State, here, with};
 use super::tree::Operand;
-use sim_core::lane::Num;
+use sim_physics::lane::Num;
 use std::ops::{Add, Mul, Neg, Sub};
 use std::panic::Location;
 

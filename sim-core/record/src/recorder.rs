@@ -8,7 +8,7 @@ use super::handles::{
 use super::state::{Kind, NOWHERE, with};
 use super::tree::{Cell, Op, Operand, Rounds, Row, Statement};
 use super::{Recorded, RecordedMask};
-use sim_core::lane::{Cx, Fixed, Table};
+use sim_physics::lane::{Cx, Fixed, Table};
 use std::marker::PhantomData;
 use std::panic::Location;
 

@@ -8,7 +8,7 @@ use super::error::{Misuse, Place, RecordError};
 use super::facts::Facts;
 use super::handles::Owner;
 use super::tree::{Op, Operand, Statement};
-use sim_core::lane::Table;
+use sim_physics::lane::Table;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -1,6 +1,6 @@
 //! What a recording is made of: values in the order they were computed, statements in blocks.
 
-use sim_core::lane::{Fixed, Table};
+use sim_physics::lane::{Fixed, Table};
 
 /// What an operation reads: a constant, or a value computed before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use sim_core::model::Body;
-use sim_core::model::geometry::DENSITY;
+use sim_model::Body;
+use sim_model::geometry::DENSITY;
 
 use super::{ConfigError, Number, ShapeTable, no_rotation, pose};
 

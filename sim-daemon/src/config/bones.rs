@@ -1,6 +1,6 @@
 //! What stands for a robot whose file says nothing of its looks: a ball at each joint, and lines between them.
 
-use sim_core::model::{Pose, Robot, Shape};
+use sim_model::{Pose, Robot, Shape};
 
 /// Half the thickness of a line, as a part of the middle one's length: one that is far longer than the others, such as to a
 /// base that is fixed far away, makes them no thicker.

@@ -17,8 +17,8 @@ mod surface;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sim_core::model::params::Param;
-use sim_core::model::{Cone, Description, ModelError, Pose, Solver};
+use sim_model::{Cone, Description, ModelError, Pose, Solver};
+use sim_physics::constants::params::Param;
 
 pub use bodies::BodyTable;
 pub use number::{Number, PerDof};
@@ -28,12 +28,12 @@ pub use randomize::{DistributionTable, ParamTable, RandomizeTable};
 pub use robots::{ModeName, RobotTable};
 pub use sensors::{ContactSensorTable, SiteTable};
 pub use shapes::{ShapeName, ShapeTable};
-pub use sim_core::batch::Field;
-pub use sim_core::model::UrdfOptions;
-pub use sim_core::model::geometry::MeshOptions;
 pub use sim_engine::backend::BackendError;
 pub use sim_engine::dynamics::Dynamics;
 pub use sim_engine::random::{Draw, Stream, TASK_STREAMS};
+pub use sim_model::UrdfOptions;
+pub use sim_model::geometry::MeshOptions;
+pub use sim_physics::arrays::Field;
 pub(crate) use summary::{joint_type, mesh_facts, robot_summary};
 pub use summary::{mesh_summary, urdf_summary};
 

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use serde_json::{Value, json};
-use sim_core::model::geometry::{Hull, TriMesh, triangles};
-use sim_core::model::{Description, Link, Look, Pose, Robot, Shape, Visual};
+use sim_model::geometry::{Hull, TriMesh, triangles};
+use sim_model::{Description, Link, Look, Pose, Robot, Shape, Visual};
 
 use super::bones::bones;
 use super::{ConfigError, SceneFile};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use sim_core::model::{Description, Distribution, Joint, JointDof, JointKind, Robot};
+use sim_model::{Description, Distribution, Joint, JointDof, JointKind, Robot};
 
 use super::{ConfigError, Number, param};
 

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sim_core::model::geometry::MeshOptions;
-use sim_core::model::{ModelError, Robot, TargetMode, UrdfOptions};
+use sim_model::geometry::MeshOptions;
+use sim_model::{ModelError, Robot, TargetMode, UrdfOptions};
 
 use super::summary::driven;
 use super::surface::given;

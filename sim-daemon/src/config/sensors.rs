@@ -1,7 +1,7 @@
 //! What a scene file has of sensors: sites, and sums of contact forces.
 
 use serde::{Deserialize, Serialize};
-use sim_core::model::{ContactSensor, Site};
+use sim_model::{ContactSensor, Site};
 
 use super::{Number, no_rotation, pose};
 

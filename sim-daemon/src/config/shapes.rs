@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sim_core::model::geometry::MeshOptions;
-use sim_core::model::{Collision, Pose, Shape, Surface};
+use sim_model::geometry::MeshOptions;
+use sim_model::{Collision, Pose, Shape, Surface};
 
 use super::surface::given;
 use super::{BodyTable, ConfigError, Number, no_rotation, pose};

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use serde_json::{Value, json};
-use sim_core::model::geometry::{Mesh, MeshOptions};
-use sim_core::model::{Joint, JointDof, JointKind, Robot, UrdfOptions};
+use sim_model::geometry::{Mesh, MeshOptions};
+use sim_model::{Joint, JointDof, JointKind, Robot, UrdfOptions};
 
 use super::{ConfigError, Number};
 

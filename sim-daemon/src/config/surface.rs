@@ -1,6 +1,6 @@
 //! What a shape or robot of a scene file says of surfaces.
 
-use sim_core::model::Surface;
+use sim_model::Surface;
 
 use super::Number;
 

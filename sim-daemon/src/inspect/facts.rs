@@ -1,6 +1,6 @@
 //! What follows from a description: who carries whom, sums, and numbers as people write them.
 
-use sim_core::model::{Joint, JointKind, Robot};
+use sim_model::{Joint, JointKind, Robot};
 
 /// A robot and its links in body order.
 pub(super) struct Facts<'a> {

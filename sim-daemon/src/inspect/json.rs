@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde_json::{Value, json};
-use sim_core::model::{Collision, Pose, Shape, principal_moments};
+use sim_model::{Collision, Pose, Shape, principal_moments};
 
 use super::facts::Facts;
 use crate::config::{joint_type, mesh_facts, robot_summary};

@@ -10,9 +10,9 @@ mod tree;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use sim_core::model::geometry::{MeshOptions, triangles};
-use sim_core::model::{Description, ModelError, Pose, Robot, Shape, UrdfOptions};
 use sim_engine::dynamics::Dynamics;
+use sim_model::geometry::{MeshOptions, triangles};
+use sim_model::{Description, ModelError, Pose, Robot, Shape, UrdfOptions};
 
 use crate::cli::Inspect;
 use crate::config::hull_sides;

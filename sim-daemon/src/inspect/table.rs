@@ -1,6 +1,6 @@
 //! The table of dofs.
 
-use sim_core::model::{Joint, JointDof, JointKind, Robot};
+use sim_model::{Joint, JointDof, JointKind, Robot};
 
 use super::facts::{Facts, short, unit};
 use super::text::wrapped;

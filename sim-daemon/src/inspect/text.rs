@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use sim_core::model::{JointKind, Shape};
+use sim_model::{JointKind, Shape};
 
 use super::facts::{Facts, count, short};
 use super::{table, tree};

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use sim_core::model::{Collision, Joint, JointKind, Link, Pose, Shape, principal_moments};
+use sim_model::{Collision, Joint, JointKind, Link, Pose, Shape, principal_moments};
 
 use super::facts::{Facts, axis, count, rounded, short, triple, unit};
 use super::text::{COLUMNS, NO_BREAK, motion, wrapped};

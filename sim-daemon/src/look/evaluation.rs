@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use sim_core::batch::Field;
 use sim_engine::simulation::{Options, Precision, Simulation};
+use sim_physics::arrays::Field;
 
 use super::Arrays;
 use crate::config;

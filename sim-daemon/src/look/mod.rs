@@ -6,8 +6,8 @@ mod evaluation;
 
 pub use arrays::{Array, Arrays};
 pub use evaluation::Evaluation;
-pub use sim_core::batch::Field;
 pub use sim_engine::simulation::Precision;
+pub use sim_physics::arrays::Field;
 pub use sim_protocol::Dtype;
 
 pub use crate::error::DaemonError;

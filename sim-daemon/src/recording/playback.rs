@@ -4,9 +4,9 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use sim_core::batch::Field;
 use sim_engine::options::{Adapter, cache_folder};
 use sim_engine::simulation::Device;
+use sim_physics::arrays::Field;
 use sim_protocol::Description;
 
 use super::entries::{Entries, Entry};

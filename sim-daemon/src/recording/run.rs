@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use serde::Deserialize;
-use sim_core::batch::Field;
 use sim_engine::options::compile_limit;
 use sim_engine::simulation::{Device, Draws, Faults, Lanes, Options, Precision, Simulation};
+use sim_physics::arrays::Field;
 use sim_protocol::host::{Inbox, free_memory};
 use sim_protocol::{CommandHeader, Description, Op};
 

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
-use sim_core::batch::Field;
 use sim_engine::simulation::{Options, Simulation};
+use sim_physics::arrays::Field;
 use sim_protocol::digest::{digest, digests_of};
 use sim_protocol::{Dtype, Op, Table};
 

@@ -10,9 +10,9 @@ use std::sync::mpsc::channel;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use sim_core::batch::{Field, status};
 use sim_engine::options::{Adapter, lose_after};
 use sim_engine::simulation::{Device, Options, Simulation};
+use sim_physics::arrays::{Field, status};
 use sim_protocol::host::Host;
 use sim_protocol::place::Place;
 use sim_protocol::tenancy::Tenancy;

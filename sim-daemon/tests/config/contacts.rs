@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use sim_core::model::{Cone, Shape, Surface};
 use sim_daemon::config::{self, SceneFile};
+use sim_model::{Cone, Shape, Surface};
 
 use crate::{assert_says, assets, parse};
 

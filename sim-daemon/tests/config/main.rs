@@ -7,8 +7,8 @@ mod randomize;
 use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
-use sim_core::model::{Cone, Shape, TargetMode};
 use sim_daemon::config::{self, ConfigError, Number, PerDof, SceneFile, UrdfOptions};
+use sim_model::{Cone, Shape, TargetMode};
 
 const LESSON: &str = r#"
 dt = 0.0020833333333333333

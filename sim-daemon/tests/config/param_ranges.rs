@@ -1,9 +1,9 @@
 //! Ranges of parameters in scene files.
 
 use super::{assert_says, assets, parse, refusal};
-use sim_core::model::Distribution;
-use sim_core::model::params::Param;
 use sim_daemon::config::SceneFile;
+use sim_model::Distribution;
+use sim_physics::constants::params::Param;
 
 const SCENE: &str = r#"
 dt = 0.002

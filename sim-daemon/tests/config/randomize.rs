@@ -1,7 +1,7 @@
 //! Distributions of the start state in scene files.
 
 use super::{assert_says, assets, parse, refusal};
-use sim_core::model::Distribution;
+use sim_model::Distribution;
 
 const SCENE: &str = r#"
 dt = 0.002

@@ -1,11 +1,11 @@
 //! What a stage leaves, part by part, and how far apart two machines are in it.
 
 use super::worlds::Left;
-use sim_core::batch::WorkSlot as Slot;
-use sim_core::lane::Table;
-use sim_core::model::constants::Constants;
-use sim_core::model::contact::row;
-use sim_core::step::Stage;
+use sim_physics::arrays::WorkSlot as Slot;
+use sim_physics::constants::Constants;
+use sim_physics::constants::contact::row;
+use sim_physics::lane::Table;
+use sim_physics::step::Stage;
 use std::fmt;
 
 /// Numbers of a kind that a stage leaves in a world.

@@ -1,13 +1,13 @@
 //! A stage on the processor: in double precision, one world at a time, and as many worlds a register as there can be.
 
 use super::worlds::{Given, Left, numbers};
-use sim_core::batch::Block;
-use sim_core::compiled::RunStage;
-use sim_core::lane::{Lane, Real};
-use sim_core::model::constants::Constants;
-use sim_core::step::Stage;
 use sim_engine::backend::cpu::available;
 use sim_engine::simulation::Lanes;
+use sim_physics::arrays::Block;
+use sim_physics::compiled::RunStage;
+use sim_physics::constants::Constants;
+use sim_physics::lane::{Lane, Real};
+use sim_physics::step::Stage;
 
 /// Runs a stage, `F::WIDTH` worlds at a time.
 ///
@@ -68,7 +68,7 @@ macro_rules! machine {
         $(#[$attribute])*
         unsafe fn $name(
             stage: RunStage<$number>,
-            m: &Constants<<$number as sim_core::lane::Num>::Real>,
+            m: &Constants<<$number as sim_physics::lane::Num>::Real>,
             of: Stage,
             given: &[Given],
         ) -> Vec<Left> {
@@ -81,12 +81,12 @@ macro_rules! machine {
 machine!(
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma,bmi1,bmi2")]
-    sixteen sim_core::lane::simd::F32x16
+    sixteen sim_physics::lane::simd::F32x16
 );
 machine!(
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,fma,bmi1,bmi2")]
-    eight sim_core::lane::simd::F32x8
+    eight sim_physics::lane::simd::F32x8
 );
 
 /// The reference: double precision, of a model and states that are rounded to `f32`.

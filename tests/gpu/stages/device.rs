@@ -1,9 +1,9 @@
 //! A stage as a program of a GPU, by itself.
 
 use super::worlds::{Given, Left};
-use sim_core::model::constants::Constants;
-use sim_core::step::Stage;
 use sim_device::{Choice, Device, Program, Replay, Source, Staging};
+use sim_physics::constants::Constants;
+use sim_physics::step::Stage;
 use sim_record::Recording;
 use sim_record::wgsl::{ProgramOptions, wgsl};
 use std::time::Duration;

@@ -10,10 +10,10 @@ mod worlds;
 use crate::common::cases::{self, Case};
 use compare::{POSITIONS, errors, list, parts, touches};
 use device::Gpu;
-use sim_core::model::Cone;
-use sim_core::model::constants::Constants;
-use sim_core::model::contact::{Kind, PAIR_KINDS};
-use sim_core::step::{STAGES, Stage};
+use sim_physics::constants::Constants;
+use sim_physics::constants::contact::Cone;
+use sim_physics::constants::contact::{Kind, PAIR_KINDS};
+use sim_physics::step::{STAGES, Stage};
 use worlds::{Left, Worlds};
 
 /// How far from double precision a stage may be, in each part of what it leaves.

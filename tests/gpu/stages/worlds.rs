@@ -2,10 +2,10 @@
 
 use crate::common::cases::Case;
 use crate::common::dice::Dice;
-use sim_core::batch::{Block, Numbers};
-use sim_core::math::factor::multiply;
-use sim_core::model::constants::Constants;
-use sim_core::step::Stage;
+use sim_physics::arrays::{Block, Numbers};
+use sim_physics::constants::Constants;
+use sim_physics::math::factor::multiply;
+use sim_physics::step::Stage;
 use stages_recorded::SLOTS;
 
 /// What a stage is given in a world: the numbers of what it reads, and the memory of the machine.

@@ -1,10 +1,10 @@
 //! Fields out of a block: what a frame shows of a world, in the order of its row.
 
-use sim_core::batch::{Field, Workspace};
-use sim_core::lane::{Cx, Num};
-use sim_core::math::vec3::cross_add;
-use sim_core::model::constants::Constants;
-use sim_core::step::{BlockOf, ConstantsOf};
+use sim_physics::arrays::{Field, Workspace};
+use sim_physics::constants::Constants;
+use sim_physics::lane::{Cx, Num};
+use sim_physics::math::vec3::cross_add;
+use sim_physics::step::{BlockOf, ConstantsOf};
 
 /// Gathers a field that is neither of contacts nor a counter, one number an element.
 #[inline(always)]

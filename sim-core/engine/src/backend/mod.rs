@@ -13,7 +13,7 @@ pub use error::BackendError;
 pub use frozen::{FirstFrozen, Frozen};
 
 use crate::random::Numbering;
-use sim_core::batch::Field;
+use sim_physics::arrays::Field;
 use std::ops::Range;
 
 /// Bytes of a world's counters in a record: steps `u64`, status `u32`, contacts left out `u32`, seed `u64`, episode `u32`,

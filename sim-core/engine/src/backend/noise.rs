@@ -4,12 +4,12 @@
 //! precision (rounded). Two frames of the same state show the same noise.
 
 use crate::random::{Draw, Stream};
-use sim_core::batch::Field;
-use sim_core::lane::Real;
-use sim_core::math::quat::{self, Quat};
-use sim_core::model::Model;
-use sim_core::model::constants::Motion;
-use sim_core::model::params::{COMMAND_NOISES, Param};
+use sim_model::Model;
+use sim_physics::arrays::Field;
+use sim_physics::constants::Motion;
+use sim_physics::constants::params::{COMMAND_NOISES, Param};
+use sim_physics::lane::Real;
+use sim_physics::math::quat::{self, Quat};
 
 /// A field that has noise, its stream, and the place of its first standard deviation.
 pub(super) type FieldNoise = (Field, Stream, usize);

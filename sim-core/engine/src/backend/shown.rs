@@ -1,7 +1,7 @@
 //! Which stages evaluate what a frame shows.
 
-use sim_core::batch::{Field, Layout};
-use sim_core::step::{FORWARD, Stage};
+use sim_physics::arrays::{Field, Layout};
+use sim_physics::step::{FORWARD, Stage};
 
 /// The leading stages of [`FORWARD`] that the fields need, and link frames and velocities where they are asked for.
 pub(super) fn stages_for(layout: &Layout) -> Vec<Stage> {

@@ -1,9 +1,9 @@
 //! How the numbers of a world lie: state, commands, and parameters that vary.
 
-use sim_core::batch::Field;
-use sim_core::lane::Real;
-use sim_core::model::Model;
-use sim_core::model::constants::Constants;
+use sim_model::Model;
+use sim_physics::arrays::Field;
+use sim_physics::constants::Constants;
+use sim_physics::lane::Real;
 
 /// Groups of numbers of a world, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

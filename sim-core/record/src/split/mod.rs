@@ -19,7 +19,7 @@ pub(crate) use uses::Rename;
 
 use crate::Recording;
 use crate::wgsl::{ProgramOptions, wgsl};
-use sim_core::lane::Tables;
+use sim_physics::lane::Tables;
 
 /// Kernels that do what a recording does, and their order.
 #[derive(Clone, Debug, PartialEq)]

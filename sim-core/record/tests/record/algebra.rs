@@ -1,8 +1,8 @@
 //! What the recorder computes by itself: constants, shared values, loads of what was stored.
 
 use crate::{TABLE, accepted, c, evaluated};
-use sim_core::lane::{Cx, Num, Table, Tables};
-use sim_core::{each, push, times};
+use sim_physics::lane::{Cx, Num, Table, Tables};
+use sim_physics::{each, push, times};
 use sim_record::{Recorded, Recorder};
 
 /// Statements but for the loads of inputs and the stores of outputs.

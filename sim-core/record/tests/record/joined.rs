@@ -1,8 +1,8 @@
 //! Loops that become one, and variables that stay with a kernel: the same bits.
 
 use crate::{accepted, c, toy};
-use sim_core::lane::{Cx, Num, Table, Tables};
-use sim_core::{each, times, when};
+use sim_physics::lane::{Cx, Num, Table, Tables};
+use sim_physics::{each, times, when};
 use sim_record::split::{Limits, split};
 use sim_record::wgsl::{ProgramOptions, wgsl};
 use sim_record::{Recorded, Recorder, Recording, record};

@@ -2,8 +2,8 @@
 
 use crate::toy::{self, contacts};
 use crate::{TABLE, accepted, c, refused};
-use sim_core::lane::{Cx, Fixed, Num, Table, Tables};
-use sim_core::{break_if, each, push, span, times, when};
+use sim_physics::lane::{Cx, Fixed, Num, Table, Tables};
+use sim_physics::{break_if, each, push, span, times, when};
 use sim_record::wgsl::{ProgramOptions, wgsl};
 use sim_record::{Misuse, Recorded, Recorder, Recording, record};
 

@@ -8,10 +8,10 @@ mod programs;
 mod refusals;
 mod refused_blocks;
 mod split;
-#[path = "../../../tests/toy/mod.rs"]
+#[path = "../toy/mod.rs"]
 mod toy;
 
-use sim_core::lane::{Num, Table, Tables};
+use sim_physics::lane::{Num, Table, Tables};
 use sim_record::wgsl::{ProgramOptions, wgsl};
 use sim_record::{Misuse, Recorded, Recorder, Recording, record};
 

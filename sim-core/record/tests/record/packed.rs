@@ -1,8 +1,8 @@
 //! Memory four numbers at a time: what shares an access, what must not, and the same bits.
 
 use crate::{accepted, c, evaluated, toy};
-use sim_core::lane::{Cx, Num, Table};
-use sim_core::{times, when};
+use sim_physics::lane::{Cx, Num, Table};
+use sim_physics::{times, when};
 use sim_record::Recording;
 use sim_record::wgsl::{ProgramOptions, wgsl};
 

@@ -1,7 +1,7 @@
 //! Whole programs: their text, and their results against the scalar machine.
 
 use crate::{TABLE, accepted, c, toy};
-use sim_core::lane::{Cx, Num};
+use sim_physics::lane::{Cx, Num};
 use sim_record::wgsl::{ProgramOptions, wgsl};
 use sim_record::{Recorded, record};
 

@@ -1,8 +1,8 @@
 //! Refused: values that leave their block, rounds that differ, constants. Each beside a good twin.
 
 use crate::{TABLE, accepted, c, evaluated, refused};
-use sim_core::lane::{Cx, Num};
-use sim_core::{break_if, each, push, times, when};
+use sim_physics::lane::{Cx, Num};
+use sim_physics::{break_if, each, push, times, when};
 use sim_record::{Misuse, Recorded, Recorder, record};
 
 #[test]

@@ -1,8 +1,8 @@
 //! Refused: rows, breaks, variables and tables out of place. Each beside a good twin.
 
 use crate::{TABLE, accepted, c, evaluated, refused};
-use sim_core::lane::{Cx, Num, Table};
-use sim_core::{break_if, each, push, times, when};
+use sim_physics::lane::{Cx, Num, Table};
+use sim_physics::{break_if, each, push, times, when};
 use sim_record::{MAX_NESTING, Misuse, Recorded, Recorder};
 
 #[test]

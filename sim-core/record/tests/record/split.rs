@@ -1,8 +1,8 @@
 //! Recordings in several kernels: the same bits, however short the kernels.
 
 use crate::{accepted, c, toy};
-use sim_core::lane::{Cx, Num, Tables};
-use sim_core::{break_if, times, when};
+use sim_physics::lane::{Cx, Num, Tables};
+use sim_physics::{break_if, times, when};
 use sim_record::Recording;
 use sim_record::split::{Limits, Part, split};
 use sim_record::wgsl::ProgramOptions;

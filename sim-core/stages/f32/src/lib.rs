@@ -1,3 +1,3 @@
 //! Single precision, one world at a time.
 
-sim_core::compiled!(f32, "avx2,fma,bmi1,bmi2");
+sim_physics::compiled!(f32, "avx2,fma,bmi1,bmi2");

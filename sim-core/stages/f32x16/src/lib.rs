@@ -2,7 +2,7 @@
 
 #![cfg(target_arch = "x86_64")]
 
-sim_core::compiled!(
-    sim_core::lane::simd::F32x16,
+sim_physics::compiled!(
+    sim_physics::lane::simd::F32x16,
     "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma,bmi1,bmi2"
 );

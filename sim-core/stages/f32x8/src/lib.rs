@@ -2,4 +2,4 @@
 
 #![cfg(target_arch = "x86_64")]
 
-sim_core::compiled!(sim_core::lane::simd::F32x8, "avx2,fma,bmi1,bmi2");
+sim_physics::compiled!(sim_physics::lane::simd::F32x8, "avx2,fma,bmi1,bmi2");

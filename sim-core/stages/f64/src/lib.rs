@@ -1,3 +1,3 @@
 //! Double precision, the reference.
 
-sim_core::compiled!(f64, "avx2,fma,bmi1,bmi2");
+sim_physics::compiled!(f64, "avx2,fma,bmi1,bmi2");

@@ -3,11 +3,11 @@
 //! Its instance of the text is a hundred thousand calls, which no optimisation makes faster in a way that matters: a
 //! recording takes milliseconds. See the profile in `Cargo.toml`.
 
-use sim_core::batch::{Block, Numbers, WorkSlot as Slot};
-use sim_core::every_stage;
-use sim_core::lane::{Cx, Num};
-use sim_core::model::constants::Constants;
-use sim_core::step::Stage;
+use sim_physics::arrays::{Block, Numbers, WorkSlot as Slot};
+use sim_physics::constants::Constants;
+use sim_physics::every_stage;
+use sim_physics::lane::{Cx, Num};
+use sim_physics::step::Stage;
 use sim_record::{RecordError, Recorded, RecordedVariable, Recorder, Recording, record};
 
 /// A block of the machine that records.
@@ -75,7 +75,7 @@ pub fn run(stage: Stage, cx: &mut Recorder, m: &Constants<f32>, block: &mut Reco
 type RunStage = fn(&mut Recorder, &Constants<f32>, &mut RecordedWorlds);
 
 fn recorded<const STAGE: usize>(cx: &mut Recorder, m: &Constants<f32>, block: &mut RecordedWorlds) {
-    sim_core::step::run::<_, STAGE>(cx, m, block);
+    sim_physics::step::run::<_, STAGE>(cx, m, block);
 }
 
 /// Numbers of a slot, by the model.

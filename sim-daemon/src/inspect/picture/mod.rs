@@ -14,8 +14,8 @@ mod surface;
 #[cfg(test)]
 mod tests;
 
-use sim_core::model::Pose;
-use sim_core::model::geometry::TriMesh;
+use sim_model::Pose;
+use sim_model::geometry::TriMesh;
 
 pub(super) use canvas::Canvas;
 pub(super) use file::{is_ours, write};

@@ -1,6 +1,6 @@
 //! The page: where each view lies, its labels, and the legend.
 
-use sim_core::model::Pose;
+use sim_model::Pose;
 
 use super::Drawing;
 use super::backdrop::{AXES, Backdrop, Shadow, round_spacing};

@@ -1,7 +1,7 @@
 //! Triangles of all links in world axes, with the normals they are shaded by.
 
-use sim_core::model::Pose;
-use sim_core::model::geometry::TriMesh;
+use sim_model::Pose;
+use sim_model::geometry::TriMesh;
 
 use sim_picture::corner_normals;
 use sim_picture::vector::{Vector, along, dot, extent, middle, sub};

@@ -1,7 +1,7 @@
 //! The renderer against geometry that can be worked out by hand.
 
-use sim_core::model::geometry::triangles;
-use sim_core::model::{Pose, Shape};
+use sim_model::geometry::triangles;
+use sim_model::{Pose, Shape};
 
 use super::backdrop::{Backdrop, Shadow, round_spacing};
 use super::raster::{cover, render_on};

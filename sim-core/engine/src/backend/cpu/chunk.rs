@@ -9,12 +9,12 @@ use crate::backend::state::{self, Shape, StateField};
 use crate::backend::{Faults, Frozen, Values};
 use crate::random::Numbering;
 use crate::start::StartDraw;
-use sim_core::batch::{Block, Field, Layout, Slot};
-use sim_core::compiled::Stages;
-use sim_core::lane::{Lane, Real};
-use sim_core::model::constants::Constants;
-use sim_core::model::{Model, SensedShapes};
-use sim_core::step::{STAGES, Stage};
+use sim_model::{Model, SensedShapes};
+use sim_physics::arrays::{Block, Field, Layout, Slot};
+use sim_physics::compiled::Stages;
+use sim_physics::constants::Constants;
+use sim_physics::lane::{Lane, Real};
+use sim_physics::step::{STAGES, Stage};
 use std::ops::Range;
 
 /// What all chunks share.

@@ -2,11 +2,11 @@
 
 use super::chunk::{Chunk, Job};
 use super::transfer::Arena;
-use sim_core::batch::{Dtype, Field, Slot};
-use sim_core::lane::{Lane, Real};
-use sim_core::model::SensedShapes;
-use sim_core::model::constants::Constants;
-use sim_core::model::contact::{Class, Memory, row};
+use sim_model::SensedShapes;
+use sim_physics::arrays::{Dtype, Field, Slot};
+use sim_physics::constants::Constants;
+use sim_physics::constants::contact::{Class, Memory, row};
+use sim_physics::lane::{Lane, Real};
 
 /// A contact of one world: its row, and the class that it is of.
 struct Contact<'a, R> {

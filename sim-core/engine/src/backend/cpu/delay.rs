@@ -2,8 +2,8 @@
 
 use super::chunk::{Chunk, Job};
 use crate::backend::state::{Shape, StateField};
-use sim_core::batch::status::FROZEN;
-use sim_core::lane::Lane;
+use sim_physics::arrays::status::FROZEN;
+use sim_physics::lane::Lane;
 use std::ops::Range;
 
 impl<F: Lane> Chunk<F> {

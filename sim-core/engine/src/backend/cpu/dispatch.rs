@@ -3,9 +3,9 @@
 use super::chunk::{Chunk, Job};
 use super::transfer::Arena;
 use super::{Backend, BackendError, Backends, Cpu, Groups, Lanes, Layout, Precision, Workers};
-use sim_core::compiled::Stages;
-use sim_core::lane::Lane;
-use sim_core::model::Model;
+use sim_model::Model;
+use sim_physics::compiled::Stages;
+use sim_physics::lane::Lane;
 
 /// A chunk, compiled for an instruction set.
 ///

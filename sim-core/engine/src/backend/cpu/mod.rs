@@ -21,8 +21,8 @@ use super::{Backend, BackendError, Backends, Faults, Frozen, Groups, Lanes, Prec
 use chunk::{Chunk, Job};
 use dispatch::{Program, RunChunk};
 use rayon::prelude::*;
-use sim_core::batch::{Field, Layout};
-use sim_core::lane::Lane;
+use sim_physics::arrays::{Field, Layout};
+use sim_physics::lane::Lane;
 use std::ops::Range;
 use std::sync::Arc;
 

@@ -4,7 +4,7 @@ use super::chunk::{Chunk, Job};
 use crate::backend::noise::{FieldNoise, sample};
 use crate::backend::state::{Shape, StateField};
 use crate::random::{Draw, Stream};
-use sim_core::lane::{Lane, Real};
+use sim_physics::lane::{Lane, Real};
 
 impl<F: Lane> Chunk<F> {
     /// Draws what is added to the commands of the frame.

@@ -3,7 +3,7 @@
 use super::chunk::{Chunk, Job};
 use crate::backend::COUNTERS;
 use crate::backend::state::{Shape, StateField};
-use sim_core::lane::{Lane, Real};
+use sim_physics::lane::{Lane, Real};
 use std::array;
 
 impl<F: Lane> Job<F> {

@@ -2,7 +2,7 @@
 
 use super::chunk::{Chunk, Job};
 use crate::backend::state::{Shape, StateField};
-use sim_core::lane::{Lane, Real};
+use sim_physics::lane::{Lane, Real};
 
 impl<F: Lane> Chunk<F> {
     /// Puts every lane at its start; those past the last world run along from the scene's.

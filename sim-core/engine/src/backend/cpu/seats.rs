@@ -6,8 +6,8 @@
 
 use super::chunk::{Chunk, Job};
 use crate::backend::state::Shape;
-use sim_core::lane::Lane;
-use sim_core::model::constants::Constants;
+use sim_physics::constants::Constants;
+use sim_physics::lane::Lane;
 use std::ops::Range;
 
 /// A bit for every class of contacts that a world has, modulo the bits there are.

@@ -2,10 +2,10 @@
 
 use super::chunk::Chunk;
 use crate::backend::gather::gather;
-use sim_core::batch::Slot;
-use sim_core::lane::Lane;
-use sim_core::lane::memory::Cpu;
-use sim_core::model::constants::Constants;
+use sim_physics::arrays::Slot;
+use sim_physics::constants::Constants;
+use sim_physics::lane::Lane;
+use sim_physics::lane::memory::Cpu;
 use std::ops::Range;
 
 /// The arena of a frame, shared by the threads that write it.

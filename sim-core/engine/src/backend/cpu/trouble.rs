@@ -3,8 +3,8 @@
 use super::chunk::{Chunk, Job};
 use crate::backend::state::{Shape, StateField};
 use crate::backend::{FirstFrozen, Frozen};
-use sim_core::batch::status;
-use sim_core::lane::{Lane, Real};
+use sim_physics::arrays::status;
+use sim_physics::lane::{Lane, Real};
 use std::ops::Range;
 
 /// Least square of a quaternion that is still a rotation: steps keep it at 1 to the last bits [–].

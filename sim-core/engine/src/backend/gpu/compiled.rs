@@ -6,8 +6,8 @@ use super::programs::{self, Programs};
 use super::show;
 use super::upkeep::{self, WORKGROUP};
 use crate::backend::{BackendError, ProgramFacts};
-use sim_core::model::constants::Constants;
 use sim_device::{Buffer, Device, DeviceError, Program, Replay, Source};
+use sim_physics::constants::Constants;
 use sim_record::split::Part;
 use std::time::Duration;
 

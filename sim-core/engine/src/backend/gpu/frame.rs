@@ -5,7 +5,7 @@ use super::{Gpu, host};
 use crate::backend::noise::sample;
 use crate::backend::{BackendError, FirstFrozen};
 use crate::random::{Draw, Stream};
-use sim_core::batch::{Dtype, Field, WorkSlot, status};
+use sim_physics::arrays::{Dtype, Field, WorkSlot, status};
 
 impl Gpu {
     /// Draws what is added to the commands of the frame.

@@ -29,10 +29,10 @@ use host::Host;
 use imported::Imported;
 use places::Places;
 use programs::Programs;
-use sim_core::batch::{Field, Layout, status};
-use sim_core::model::Model;
-use sim_core::model::constants::Constants;
 use sim_device::{AdapterKind, Buffer, Choice, Device, Replay, Staging};
+use sim_model::Model;
+use sim_physics::arrays::{Field, Layout, status};
+use sim_physics::constants::Constants;
 use sim_record::split::Limits;
 use std::ops::Range;
 use std::path::Path;
@@ -225,7 +225,7 @@ impl Gpu {
         };
         let pairs = tile::pairs(m, sensors);
         let runs = show::runs(m, &places, layout);
-        let finds_contacts = shown.contains(&sim_core::step::Stage::ContactRows);
+        let finds_contacts = shown.contains(&sim_physics::step::Stage::ContactRows);
         let target = drawn.as_ref().unwrap_or(&frame);
         let mut tiles = Vec::new();
         for first in (0..worlds).step_by(widest as usize) {

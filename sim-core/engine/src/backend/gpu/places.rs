@@ -4,8 +4,8 @@
 //! `fields[(i / 4) * worlds + w]`. Every array begins at a multiple of four.
 
 use crate::backend::state::{Shape, StateField};
-use sim_core::batch::{Field, WorkSlot as Slot};
-use sim_core::model::constants::Constants;
+use sim_physics::arrays::{Field, WorkSlot as Slot};
+use sim_physics::constants::Constants;
 use stages_recorded::{SLOTS, length};
 use std::ops::Range;
 

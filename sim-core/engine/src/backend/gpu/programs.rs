@@ -2,11 +2,11 @@
 
 use super::places::Places;
 use crate::backend::gather::gather;
-use sim_core::batch::{Field, WorkSlot as Slot};
-use sim_core::lane::Num;
-use sim_core::model::constants::Constants;
-use sim_core::step::{STAGES, Stage};
-use sim_core::times;
+use sim_physics::arrays::{Field, WorkSlot as Slot};
+use sim_physics::constants::Constants;
+use sim_physics::lane::Num;
+use sim_physics::step::{STAGES, Stage};
+use sim_physics::times;
 use sim_record::split::{Limits, Part, split};
 use sim_record::wgsl::ProgramOptions;
 use sim_record::{RecordError, Recorded, Recording};

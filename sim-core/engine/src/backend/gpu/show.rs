@@ -2,9 +2,9 @@
 
 use super::places::Places;
 use crate::backend::shown::is_of_contacts;
-use sim_core::batch::{Field, Layout, Slot as Array, WorkSlot as Slot};
-use sim_core::model::constants::Constants;
-use sim_core::model::contact::row;
+use sim_physics::arrays::{Field, Layout, Slot as Array, WorkSlot as Slot};
+use sim_physics::constants::Constants;
+use sim_physics::constants::contact::row;
 use std::fmt::Write;
 
 /// Neighbouring numbers of a world that go to neighbouring places of its row.

@@ -7,10 +7,10 @@ use super::show::Run;
 use super::upkeep::WORKGROUP;
 use crate::backend::BackendError;
 use crate::backend::state::StateField;
-use sim_core::batch::Field;
-use sim_core::model::SensedShapes;
-use sim_core::model::constants::Constants;
 use sim_device::{Batch, BatchBuilder, Buffer, Device, Program, Replay, Staging};
+use sim_model::SensedShapes;
+use sim_physics::arrays::Field;
+use sim_physics::constants::Constants;
 use sim_record::split::Part;
 use std::ops::Range;
 

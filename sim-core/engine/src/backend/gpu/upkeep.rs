@@ -5,8 +5,8 @@
 
 use super::places::Places;
 use crate::backend::state::StateField;
-use sim_core::batch::{WorkSlot as Slot, status};
-use sim_core::model::constants::Constants;
+use sim_physics::arrays::{WorkSlot as Slot, status};
+use sim_physics::constants::Constants;
 use std::fmt::Write;
 use std::ops::Range;
 

@@ -1,0 +1,202 @@
+//! A mesh of a scene: what a file holds, scaled, and what bodies are made of it.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use super::hull::Hull;
+use super::load::load;
+use super::parry::convex_parts;
+use super::polytope::triangles_around;
+use super::trimesh::TriMesh;
+use super::vector::size;
+use crate::error::ModelError;
+
+/// Smallest size of a mesh [m]: below a micrometre a scale is wrong.
+const SIZE_MIN: f64 = 1e-6;
+/// Largest size of a mesh [m]: above it a unit is wrong, and inertias lose their meaning.
+const SIZE_MAX: f64 = 1e6;
+/// Least volume of a solid over the cube of its size: a folded sheet is closed and holds roundings only [–].
+const FILL_MIN: f64 = 1e-12;
+/// Share of the hull's volume that a mesh may lack and still count as convex [–].
+const CONVEX: f64 = 1e-3;
+/// Error of a hull that is worth a note [m].
+const NOTED_ERROR: f64 = 1e-3;
+/// The same, relative to the size [–].
+const NOTED_SHARE: f64 = 0.01;
+/// Bounds of `max_hull_vertices`: a box needs 8; contacts of more than some hundred cost more than they tell.
+const HULL_VERTICES: std::ops::RangeInclusive<usize> = 8..=1024;
+
+/// How meshes become shapes that contacts can be found with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MeshOptions {
+    /// Most vertices of a convex hull, 8 to 1024.
+    pub max_hull_vertices: usize,
+    /// Whether a concave mesh becomes several convex hulls; otherwise it becomes its convex hull.
+    pub convex_decomposition: bool,
+}
+
+impl Default for MeshOptions {
+    fn default() -> MeshOptions {
+        MeshOptions {
+            max_hull_vertices: 64,
+            convex_decomposition: false,
+        }
+    }
+}
+
+impl MeshOptions {
+    /// Refuses a number of vertices out of bounds.
+    ///
+    /// # Errors
+    /// The number and its bounds.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        if HULL_VERTICES.contains(&self.max_hull_vertices) {
+            return Ok(());
+        }
+        Err(ModelError::OutOfRange {
+            what: "mesh_max_hull_vertices".to_owned(),
+            value: self.max_hull_vertices as f64,
+            rule: "it must be between 8 and 1024",
+        })
+    }
+}
+
+/// Triangles of a file, scaled.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mesh {
+    /// The file, as resolved.
+    pub path: PathBuf,
+    /// Factor on each axis of the file [–].
+    pub scale: [f64; 3],
+    /// What the file holds, scaled, vertices at the same place joined; if closed, counter-clockwise from outside.
+    pub triangles: TriMesh,
+    /// Whether the triangles bound a solid.
+    pub closed: bool,
+    /// What stands for it in contacts.
+    pub hulls: Vec<Hull>,
+    /// What was done to it that its author may not expect, a sentence each without a subject.
+    pub notes: Vec<String>,
+}
+
+impl Mesh {
+    /// Reads a mesh file; `scale` [–] multiplies its coordinates, a negative factor mirrors.
+    ///
+    /// # Errors
+    /// Why the file cannot be used, by its path, with the cure.
+    pub fn load(path: &Path, scale: [f64; 3], options: &MeshOptions) -> Result<Mesh, ModelError> {
+        options.validate()?;
+        let (mut triangles, notes) = load(path).map_err(|reason| fault(path, reason))?;
+        for vertex in &mut triangles.vertices {
+            for axis in 0..3 {
+                vertex[axis] *= scale[axis];
+            }
+        }
+        // a mirror turns the inside out
+        if scale.iter().product::<f64>() < 0.0 {
+            triangles.turn_over();
+        }
+        let size = size(&triangles.vertices);
+        if !(SIZE_MIN..=SIZE_MAX).contains(&size) {
+            return Err(fault(
+                path,
+                format!(
+                    "its size is {size:e} m, scale {scale:?}; it must be between {SIZE_MIN:e} and {SIZE_MAX:e} m, mend the scale"
+                ),
+            ));
+        }
+        let closed = triangles.is_closed()
+            && triangles.turn_outward()
+            && triangles.signed_volume() > FILL_MIN * size.powi(3);
+        let mut mesh = Mesh {
+            path: path.to_owned(),
+            scale,
+            triangles,
+            closed,
+            hulls: Vec::new(),
+            notes,
+        };
+        mesh.make_hulls(size, options)?;
+        Ok(mesh)
+    }
+
+    fn make_hulls(&mut self, size: f64, options: &MeshOptions) -> Result<(), ModelError> {
+        let most = options.max_hull_vertices;
+        let vertices = &self.triangles.vertices;
+        let whole = Hull::of(vertices, most)
+            .map_err(|why| fault(&self.path, format!("{why}; give it an area, or mend it")))?;
+        let flat = whole.flat;
+        if flat {
+            let thickness = size / 1000.0;
+            self.notes.push(format!(
+                "is flat; in contacts it is a plate of {thickness:.1e} m"
+            ));
+        } else if whole.error > NOTED_ERROR || whole.error > NOTED_SHARE * size {
+            self.notes.push(format!(
+                "has a hull of more than {most} vertices; that many leave {:.2e} m of it out (see mesh_max_hull_vertices)",
+                whole.error
+            ));
+        }
+        self.hulls = if options.convex_decomposition && !flat {
+            let parts = self.convex_parts(whole, most).ok_or_else(|| {
+                let cure = "mend the mesh, or leave convex_decomposition off";
+                fault(
+                    &self.path,
+                    format!("it cannot be decomposed into convex parts; {cure}"),
+                )
+            })?;
+            if parts.len() > 1 {
+                self.notes
+                    .push(format!("is decomposed into {} convex parts", parts.len()));
+            }
+            parts
+        } else {
+            vec![whole]
+        };
+        Ok(())
+    }
+
+    /// Hulls that cover the mesh together, its own where it is convex; `None` where none can be made.
+    fn convex_parts(&self, whole: Hull, vertices_max: usize) -> Option<Vec<Hull>> {
+        // measured on the hull of all points: that of few vertices is smaller
+        let full = Hull::of(&self.triangles.vertices, usize::MAX)
+            .ok()?
+            .volume();
+        if self.closed && self.triangles.signed_volume() >= (1.0 - CONVEX) * full {
+            return Some(vec![whole]);
+        }
+        // a part without surface is inside others; a thin one adds nothing to its neighbours
+        let parts = convex_parts(&self.triangles)?;
+        let hulls = parts
+            .iter()
+            .filter_map(|part| Hull::of(part, vertices_max).ok());
+        let hulls: Vec<Hull> = hulls.collect();
+        (!hulls.is_empty()).then_some(hulls)
+    }
+
+    /// The surface of the body that the mesh stands for: its own if closed, else that of its convex hull.
+    ///
+    /// # Errors
+    /// A mesh without volume, by its file.
+    pub(super) fn solid(&self) -> Result<Cow<'_, TriMesh>, ModelError> {
+        if self.closed {
+            return Ok(Cow::Borrowed(&self.triangles));
+        }
+        let vertices = &self.triangles.vertices;
+        let triangles = triangles_around(vertices, usize::MAX).map_err(|why| {
+            let cure = "so it has no volume; give it thickness, or the link an <inertial>";
+            fault(&self.path, format!("{why}, {cure}"))
+        })?;
+        Ok(Cow::Owned(TriMesh {
+            vertices: vertices.clone(),
+            triangles,
+        }))
+    }
+}
+
+pub(super) fn fault(path: &Path, reason: String) -> ModelError {
+    ModelError::Mesh {
+        owner: String::new(),
+        path: path.to_owned(),
+        reason,
+    }
+}

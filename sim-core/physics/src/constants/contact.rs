@@ -1,0 +1,474 @@
+//! What the text reads of a model's shapes: where they are, which pairs may touch, and how soft they are.
+
+use super::clip::Cut;
+use super::hull::HullTables;
+use crate::lane::{Fixed, Real, Table, Tables};
+
+/// Shape of the friction cone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Cone {
+    /// The cone of Coulomb's law.
+    #[default]
+    Elliptic,
+    /// A pyramid inside it.
+    Pyramidal,
+}
+
+/// Kinds of shapes; of a pair, the lower kind is the first. A sphere's size is its radius; a capsule's and a
+/// cylinder's radius and half height; a box's and a hull's half extents (those of the box around it).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// z ≤ 0.
+    Plane,
+    /// Around its centre.
+    Sphere,
+    /// Along z.
+    Capsule,
+    /// Along its axes.
+    Box,
+    /// Along z.
+    Cylinder,
+    /// A row of the hull table.
+    Hull,
+}
+
+/// Defines [`PAIR_KINDS`], and the number of each of its entries as a constant with the name of its stage.
+macro_rules! pair_kinds {
+    ($($constant:ident, $name:literal, $first:ident, $second:ident;)*) => {
+        /// Numbers of the pairs of kinds in [`PAIR_KINDS`]: what a function is compiled for.
+        pub mod pair_kinds {
+            #[allow(non_camel_case_types)]
+            enum Number {
+                $($constant,)*
+            }
+            $(#[doc = $name] pub const $constant: usize = Number::$constant as usize;)*
+        }
+
+        /// Pairs of kinds that can touch, each with the name of its stage; the order in which they are looked at.
+        ///
+        /// One more has a stage of its own, and so an arm and a number in `step/run.rs`.
+        pub const PAIR_KINDS: [((Kind, Kind), &str); 20] = [$(((Kind::$first, Kind::$second), $name),)*];
+    };
+}
+
+pair_kinds! {
+    PLANE_SPHERE, "plane_sphere", Plane, Sphere;
+    PLANE_CAPSULE, "plane_capsule", Plane, Capsule;
+    PLANE_BOX, "plane_box", Plane, Box;
+    PLANE_CYLINDER, "plane_cylinder", Plane, Cylinder;
+    PLANE_HULL, "plane_hull", Plane, Hull;
+    SPHERE_SPHERE, "sphere_sphere", Sphere, Sphere;
+    SPHERE_CAPSULE, "sphere_capsule", Sphere, Capsule;
+    SPHERE_BOX, "sphere_box", Sphere, Box;
+    SPHERE_CYLINDER, "sphere_cylinder", Sphere, Cylinder;
+    SPHERE_HULL, "sphere_hull", Sphere, Hull;
+    CAPSULE_CAPSULE, "capsule_capsule", Capsule, Capsule;
+    CAPSULE_BOX, "capsule_box", Capsule, Box;
+    CAPSULE_CYLINDER, "capsule_cylinder", Capsule, Cylinder;
+    CAPSULE_HULL, "capsule_hull", Capsule, Hull;
+    BOX_BOX, "box_box", Box, Box;
+    BOX_CYLINDER, "box_cylinder", Box, Cylinder;
+    BOX_HULL, "box_hull", Box, Hull;
+    CYLINDER_CYLINDER, "cylinder_cylinder", Cylinder, Cylinder;
+    CYLINDER_HULL, "cylinder_hull", Cylinder, Hull;
+    HULL_HULL, "hull_hull", Hull, Hull;
+}
+
+/// Shapes, the pairs of them that may touch, and the classes of contacts.
+#[derive(Clone, Debug)]
+pub struct Contacts<R> {
+    /// Shape of the friction cone.
+    pub cone: Cone,
+    /// Friction impedance over normal impedance [–].
+    pub impratio: R,
+    /// Shapes that some pair has.
+    pub solids: Vec<Solid<R>>,
+    /// Pairs by kinds.
+    pub groups: Vec<Group>,
+    /// Contacts by the bodies that they may be of.
+    pub classes: Vec<Class<R>>,
+    /// Pairs, in the order of the tables.
+    pub pairs: Vec<Pair>,
+    /// Contacts that a world has room for.
+    pub contacts_max: usize,
+    /// Rows that they may have.
+    pub rows_max: usize,
+    /// Can more be found than there is room for?
+    pub may_overflow: bool,
+    /// Numbers of pairs, and of hulls.
+    pub tables: Tables<R>,
+    /// Where they are.
+    pub handles: Handles,
+    /// Where the hulls are.
+    pub hulls: HullTables,
+    /// Where the stages keep what they find.
+    pub memory: Memory,
+}
+
+/// Tables of the model.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Handles {
+    /// Numbers of a pair; see [`pair`].
+    pub pair_numbers: Fixed,
+    /// Indices of a pair; see [`pair`].
+    pub pair_indices: Fixed,
+    /// First row and capacity of a class.
+    pub class_rows: Fixed,
+}
+
+/// Scratch tables.
+#[derive(Clone, Copy, Debug)]
+pub struct Memory {
+    /// Axes (9) [–] and centre relative to the reference point of its tree (3) [m] of each solid.
+    pub poses: Table,
+    /// Reference point of each tree, and at last the world's origin [m].
+    pub origins: Table,
+    /// Contacts of each class; then contacts, rows, and contacts left out of the world.
+    pub counts: Table,
+    /// A row a contact; see [`row`].
+    pub rows: Table,
+    /// Scratch of the narrow phase of faces.
+    pub cut: Cut,
+    /// Coefficient of friction of each solid, where it varies [–].
+    pub mu: Table,
+    /// Numbers of all of them.
+    pub len: usize,
+}
+
+/// A shape of a body, or one that stands still.
+#[derive(Clone, Debug)]
+pub struct Solid<R> {
+    /// What it is.
+    pub kind: Kind,
+    /// Its shape, as in `shape_names`.
+    pub shape: usize,
+    /// The body that bears it, or none.
+    pub body: Option<usize>,
+    /// Its axes in the body's frame, or in the world: columns [–].
+    pub axes: [[R; 3]; 3],
+    /// Are they those of the frame?
+    pub is_upright: bool,
+    /// Its centre in the body's frame, or in the world [m].
+    pub center: [R; 3],
+}
+
+/// Pairs of two kinds of shapes.
+#[derive(Clone, Copy, Debug)]
+pub struct Group {
+    /// The lower kind first.
+    pub kinds: (Kind, Kind),
+    /// Its first pair.
+    pub first: usize,
+    /// The pair after its last.
+    pub end: usize,
+}
+
+/// A pair for people: numbers of shapes in the order of [`super::Model::shape_names`]; the normal points from the first to
+/// the second.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pair {
+    /// The two shapes.
+    pub shapes: [usize; 2],
+    /// Their links, as in `body_names`; none of a static shape.
+    pub links: [Option<usize>; 2],
+    /// The class of its contacts.
+    pub class: usize,
+}
+
+/// Contacts of like bodies: the columns of their Jacobians are the same dofs.
+#[derive(Clone, Debug)]
+pub struct Class<R> {
+    /// Trees of the bodies on its two sides; the first is none where that side stands still.
+    pub trees: (Option<usize>, usize),
+    /// Its dofs, rising.
+    pub columns: Vec<Column>,
+    /// The same dofs, by runs.
+    pub runs: Vec<Run>,
+    /// Of each column, the entries of JᵀWJ with it and those before it that may differ from 0, by runs of columns whose
+    /// places follow each other: in the mass matrix's pattern, or in that of couplings if the class couples.
+    pub entries: Vec<Vec<Run>>,
+    /// Does any entry lie outside the pattern of the mass matrix?
+    pub couples: bool,
+    /// Parts of the mass matrix that its columns are of, each once, as [`Pattern::parts`](crate::math::factor::Pattern::parts) counts them.
+    pub parts: Vec<usize>,
+    /// Numbers of a pair that all its pairs share.
+    pub shared: Vec<Option<R>>,
+    /// First row of its contacts.
+    pub first: usize,
+    /// Their number at most.
+    pub capacity: usize,
+}
+
+/// A dof that moves bodies of a class.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Column {
+    /// The dof.
+    pub dof: usize,
+    /// Is it of the first side's tree?
+    pub is_first: bool,
+    /// Where the number of a pair is that says how it moves the second body relative to the first: 1, -1 or 0.
+    pub lever: usize,
+}
+
+/// Columns of a class, and what belongs to them, one after the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Run {
+    /// The first column.
+    pub column: usize,
+    /// Where what belongs to it is kept.
+    pub place: usize,
+    /// How many they are.
+    pub len: usize,
+}
+
+impl Run {
+    /// The runs of rising columns with their places.
+    pub fn of(columns: impl IntoIterator<Item = (usize, usize)>) -> Vec<Run> {
+        let mut runs: Vec<Run> = Vec::new();
+        for (column, place) in columns {
+            match runs.last_mut() {
+                Some(run) if (run.column + run.len, run.place + run.len) == (column, place) => {
+                    run.len += 1;
+                }
+                _ => runs.push(Run {
+                    column,
+                    place,
+                    len: 1,
+                }),
+            }
+        }
+        runs
+    }
+
+    /// Its columns.
+    pub fn columns(&self) -> std::ops::Range<usize> {
+        self.column..self.column + self.len
+    }
+
+    /// Where what belongs to them is kept.
+    #[inline(always)]
+    pub fn places(&self) -> std::ops::Range<usize> {
+        self.place..self.place + self.len
+    }
+}
+
+/// Places of the numbers and indices of a pair.
+pub mod pair {
+    /// Distance below which contacts are found [m].
+    pub const REACH: usize = 0;
+    /// Radii around the centres, and the reach [m].
+    pub const RADIUS: usize = 1;
+    /// Radius around the first shape's centre, and the reach [m].
+    pub const RADIUS_A: usize = 2;
+    /// Radius around the second shape's centre, and the reach [m].
+    pub const RADIUS_B: usize = 3;
+    /// Radius around the centre of the smaller shape, a plane counting as large [m].
+    pub const SMALLER: usize = 4;
+    /// Size of the first shape (3) [m].
+    pub const SIZE_A: usize = 5;
+    /// Size of the second shape (3) [m].
+    pub const SIZE_B: usize = 8;
+    /// -1 where the first shape of the class's side is the pair's second, else 1.
+    pub const FLIP: usize = 11;
+    /// Distance below which a contact pushes [m].
+    pub const MARGIN: usize = 12;
+    /// Coefficient of friction [–].
+    pub const MU: usize = 13;
+    /// Inverse weight of both bodies [1/kg].
+    pub const WEIGHT: usize = 14;
+    /// Reference stiffness k [1/s²].
+    pub const STIFFNESS: usize = 15;
+    /// Reference damping b [1/s].
+    pub const DAMPING: usize = 16;
+    /// Reference damping of friction rows [1/s].
+    pub const SLIDING: usize = 17;
+    /// 1 with friction, 0 without.
+    pub const RUBS: usize = 18;
+    /// Constraint rows of a contact.
+    pub const ROWS: usize = 19;
+    /// First of the levers.
+    pub const LEVERS: usize = 20;
+
+    /// Number of the first shape among the solids.
+    pub const SOLID_A: usize = 0;
+    /// Number of the second shape among the solids.
+    pub const SOLID_B: usize = 1;
+    /// Row of the first shape's reference point.
+    pub const ORIGIN_A: usize = 2;
+    /// Row of the second shape's reference point.
+    pub const ORIGIN_B: usize = 3;
+    /// Row of the reference point that contacts of the class are relative to.
+    pub const ORIGIN: usize = 4;
+    /// The class.
+    pub const CLASS: usize = 5;
+    /// Hull of the first shape, if it is one.
+    pub const HULL_A: usize = 6;
+    /// Hull of the second shape, if it is one.
+    pub const HULL_B: usize = 7;
+    /// Indices of a pair.
+    pub const INDICES: usize = 8;
+}
+
+/// Places of the numbers of a contact.
+pub mod row {
+    /// Point between the surfaces, relative to the reference point of the class's last tree (3) [m].
+    pub const POINT: usize = 0;
+    /// Distance of the surfaces [m].
+    pub const DISTANCE: usize = 3;
+    /// From the class's first side to its second (3) [–].
+    pub const NORMAL: usize = 4;
+    /// Number of the pair.
+    pub const PAIR: usize = 7;
+    /// Regularised stiffness D of the normal row, or of an edge of the pyramid [kg].
+    pub const STIFFNESS: usize = 8;
+    /// Coefficient of friction, 0 without [–].
+    pub const MU: usize = 9;
+    /// Reference acceleration: normal, two tangents [m/s²].
+    pub const AREF: usize = 10;
+    /// J a - aref (3) [m/s²].
+    pub const JAR: usize = 13;
+    /// The same somewhere else, or its change (3) [m/s²].
+    pub const AHEAD: usize = 16;
+    /// Force along normal and tangents (3) [N].
+    pub const FORCE: usize = 19;
+    /// Tangents (6) [–].
+    pub const TANGENTS: usize = 22;
+    /// Stiffness of an elliptic cone's contact that slides, along its own slope [kg].
+    pub const SOFT: usize = 28;
+    /// Of a round of the solver: which piece of its cost the contact is on.
+    pub const STATE: usize = 29;
+    /// Of a line search: force times the change of `AHEAD` [N·m/s²].
+    pub const POWER: usize = 30;
+    /// Of a line search: stiffness times the square of that change [N·m/s²].
+    pub const BEND: usize = 31;
+    /// Of a line search, along the tangents: jar · jar, jar · `AHEAD`, `AHEAD` · `AHEAD` [m²/s⁴].
+    pub const SQUARES: usize = 32;
+    /// Jacobian: normal row, then tangents.
+    pub const JACOBIAN: usize = 35;
+}
+
+/// Least coefficient of friction of a contact that has any (MuJoCo: `mjMINMU`) [–].
+pub const MU_MIN: f64 = 1e-5;
+
+/// What follows the classes in `counts`.
+pub const COUNT_CONTACTS: usize = 0;
+/// Rows in use.
+pub const COUNT_ROWS: usize = 1;
+/// Contacts that did not fit.
+pub const COUNT_LEFT_OUT: usize = 2;
+/// Rows of `counts` after the classes.
+pub const COUNTS: usize = 3;
+
+impl<R> Contacts<R> {
+    /// The pairs of two kinds, by their place in [`PAIR_KINDS`].
+    #[inline(always)]
+    pub fn group(&self, kinds: usize) -> Option<&Group> {
+        let kinds = PAIR_KINDS[kinds].0;
+        self.groups.iter().find(|group| group.kinds == kinds)
+    }
+}
+
+impl<R> Contacts<R> {
+    /// Bounds of the first rows and of the capacities of classes: what a machine may know of `class_rows`.
+    #[inline(always)]
+    pub fn row_ends(&self) -> [usize; 2] {
+        let capacity = self.classes.iter().map(|class| class.capacity).max();
+        let first = self.classes.last().map_or(0, |class| class.first);
+        [first + 1, capacity.unwrap_or(0) + 1]
+    }
+}
+
+impl<R: Real> Contacts<R> {
+    /// None at all.
+    pub fn none(cone: Cone, impratio: f64) -> Contacts<R> {
+        let table = Table {
+            base: 0,
+            stride: 1,
+            rows: 0,
+        };
+        Contacts {
+            cone,
+            impratio: R::of(impratio),
+            solids: Vec::new(),
+            groups: Vec::new(),
+            classes: Vec::new(),
+            pairs: Vec::new(),
+            contacts_max: 0,
+            rows_max: 0,
+            may_overflow: false,
+            tables: Tables {
+                numbers: Vec::new(),
+                indices: Vec::new(),
+            },
+            handles: Handles::default(),
+            hulls: HullTables::default(),
+            memory: Memory {
+                poses: table,
+                origins: table,
+                counts: table,
+                rows: table,
+                mu: table,
+                cut: Cut {
+                    corners: table,
+                    candidates: table,
+                    edges: table,
+                },
+                len: 0,
+            },
+        }
+    }
+
+    /// Does any class reach beyond the pattern of the mass matrix?
+    #[inline(always)]
+    pub fn couples(&self) -> bool {
+        self.classes.iter().any(|class| class.couples)
+    }
+
+    /// The same numbers, rounded to another precision.
+    pub(super) fn cast<S: Real>(&self) -> Contacts<S> {
+        let cast = |x: R| S::of(x.to_f64());
+        Contacts {
+            cone: self.cone,
+            impratio: cast(self.impratio),
+            solids: self
+                .solids
+                .iter()
+                .map(|s| Solid {
+                    kind: s.kind,
+                    shape: s.shape,
+                    body: s.body,
+                    axes: s.axes.map(|column| column.map(cast)),
+                    is_upright: s.is_upright,
+                    center: s.center.map(cast),
+                })
+                .collect(),
+            groups: self.groups.clone(),
+            classes: self
+                .classes
+                .iter()
+                .map(|c| Class {
+                    trees: c.trees,
+                    columns: c.columns.clone(),
+                    runs: c.runs.clone(),
+                    entries: c.entries.clone(),
+                    couples: c.couples,
+                    parts: c.parts.clone(),
+                    shared: c.shared.iter().map(|x| x.map(cast)).collect(),
+                    first: c.first,
+                    capacity: c.capacity,
+                })
+                .collect(),
+            pairs: self.pairs.clone(),
+            contacts_max: self.contacts_max,
+            rows_max: self.rows_max,
+            may_overflow: self.may_overflow,
+            tables: Tables {
+                numbers: self.tables.numbers.iter().copied().map(cast).collect(),
+                indices: self.tables.indices.clone(),
+            },
+            handles: self.handles,
+            hulls: self.hulls,
+            memory: self.memory,
+        }
+    }
+}

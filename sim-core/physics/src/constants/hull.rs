@@ -1,0 +1,26 @@
+//! Where the convex hulls of a model are in its tables.
+
+use crate::lane::Fixed;
+
+/// Most corners of a face in a table: of a face with more, so many are kept, evenly around it.
+/// The deepest point of a contact does not depend on them, only how far its support reaches.
+pub const CORNERS_MAX: usize = 12;
+
+/// Where the hulls of a model are in its tables.
+///
+/// A hull's frame has the axes of the frame that its vertices were given in and the centre of their bounding box.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HullTables {
+    /// Of each hull: first and end of its rows of vertices, of faces, of edges. Indices. `(hulls, 6)`
+    pub spans: Fixed,
+    /// Of each hull: half extents of its bounding box, then its radius about the centre. `(hulls, 4)` [m]
+    pub sizes: Fixed,
+    /// Four vertices a row; the last row of a hull repeats its last vertex. `(rows, 12)` [m]
+    pub vertices: Fixed,
+    /// Outward unit normal and offset of the plane; first row in `corners`, and how many. `(faces, 6)` [–, m, –]
+    pub faces: Fixed,
+    /// Corners of the faces, counter-clockwise from outside. `(corners, 3)` [m]
+    pub corners: Fixed,
+    /// One end, unit direction, outward normals of the faces beside it, and length. `(edges, 13)` [m, –]
+    pub edges: Fixed,
+}

@@ -1,0 +1,213 @@
+//! THE table of parameters: numbers of a model that may differ from world to world, and change while it runs.
+//!
+//! Those that a scene names (`Description::params` in `sim-model`) vary; the others are constants of the program.
+
+use super::{Constants, Dof, Sizes};
+
+/// What a parameter has a number for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Per {
+    /// A fixed number of entries.
+    Entry(usize),
+    /// Each degree of freedom.
+    Dof,
+    /// Each link, and this many entries.
+    Body(usize),
+    /// Each collision shape.
+    Shape,
+    /// Each site, and this many entries.
+    Site(usize),
+    /// Each contact sensor.
+    ContactSensor,
+}
+
+/// One row of the table.
+#[derive(Clone, Copy, Debug)]
+pub struct ParamRow {
+    /// Its name for clients.
+    pub name: &'static str,
+    /// What it has a number for.
+    pub per: Per,
+    /// Unit; `–` for none.
+    pub unit: &'static str,
+    /// The least that it may be; none = any number.
+    pub least: Option<f64>,
+    /// What it is.
+    pub doc: &'static str,
+}
+
+macro_rules! params {
+    ($($param:ident $name:literal $per:expr, $unit:literal $least:expr, $doc:literal;)*) => {
+        /// A number of a model that may vary.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub enum Param {
+            $(#[doc = $doc] $param,)*
+        }
+
+        impl Param {
+            /// All rows, in order.
+            pub const ALL: [Param; [$(Param::$param),*].len()] = [$(Param::$param),*];
+
+            /// Its row of the table.
+            pub fn row(self) -> &'static ParamRow {
+                match self {
+                    $(Param::$param => {
+                        const ROW: ParamRow = ParamRow {
+                            name: $name,
+                            per: $per,
+                            unit: $unit,
+                            least: $least,
+                            doc: $doc,
+                        };
+                        &ROW
+                    })*
+                }
+            }
+        }
+    };
+}
+
+params! {
+    Gravity "gravity" Per::Entry(3), "m/s²" None, "Gravity in world axes.";
+    BodyMassScale "body_mass_scale" Per::Body(1), "–" Some(MASS_SCALE_MIN), "Mass and inertia of each link over those of the scene. What derives from masses at the reference pose, such as the softness of contacts and limits, stays, and so does the point that the velocity of a free joint is of: the centre of mass that the scene has.";
+    JointArmature "joint_armature" Per::Dof, "kg·m² or kg" Some(0.0), "Inertia of the drive; of a free joint, mass and inertia that are added to its body's without weight.";
+    JointDamping "joint_damping" Per::Dof, "N·m·s/rad or N·s/m" Some(0.0), "Passive damping.";
+    JointFriction "joint_friction" Per::Dof, "N·m or N" Some(0.0), "Bound of the dry friction's force. Free joints have no dry friction.";
+    JointTargetKe "joint_target_ke" Per::Dof, "N·m/rad or N/m" Some(0.0), "Proportional gain of the drive. Free joints have no drive.";
+    JointTargetKd "joint_target_kd" Per::Dof, "N·m·s/rad or N·s/m" Some(0.0), "Derivative gain of the drive. Free joints have no drive.";
+    JointEffortLimit "joint_effort_limit" Per::Dof, "N·m or N" Some(0.0), "Bound of the drive's force; 1e30 where there is none. Free joints have no drive.";
+    ShapeMu "shape_mu" Per::Shape, "–" Some(0.0), "Coefficient of sliding friction of each collision shape; of two shapes the larger counts.";
+    CommandDelay "command_delay" Per::Entry(1), "substeps" Some(0.0), "Substeps from the start of a frame until its joint_f and targets act; a part of one counts as a whole one. Before the first have come, those of the reset act.";
+    JointFNoise "joint_f_noise" Per::Dof, "N·m or N" Some(0.0), "Standard deviation of what is added to joint_f, drawn for each frame.";
+    JointTargetQNoise "joint_target_q_noise" Per::Dof, "rad or m" Some(0.0), "Standard deviation of what is added to joint_target_q, drawn for each frame. Free joints have no drive.";
+    JointTargetQdNoise "joint_target_qd_noise" Per::Dof, "rad/s or m/s" Some(0.0), "Standard deviation of what is added to joint_target_qd, drawn for each frame. Free joints have no drive.";
+    JointQNoise "joint_q_noise" Per::Dof, "rad or m" Some(0.0), "Standard deviation of joint_q_measured around joint_q: of a ball a rotation vector in the child's axes, of a free joint its position, then a rotation vector in world axes.";
+    JointQdNoise "joint_qd_noise" Per::Dof, "rad/s or m/s" Some(0.0), "Standard deviation of joint_qd_measured around joint_qd.";
+    JointTorqueNoise "joint_torque_noise" Per::Dof, "N·m or N" Some(0.0), "Standard deviation of joint_torque.";
+    SiteQNoise "site_q_noise" Per::Site(2), "m, rad" Some(0.0), "Standard deviation of site_q: of each part of the position, and of a rotation vector in the site's axes.";
+    SiteQdNoise "site_qd_noise" Per::Site(2), "m/s, rad/s" Some(0.0), "Standard deviation of site_qd: of each part of the velocity, and of the angular velocity.";
+    GyroNoise "gyro_noise" Per::Site(1), "rad/s" Some(0.0), "Standard deviation of each part of gyro.";
+    AccelerometerNoise "accelerometer_noise" Per::Site(1), "m/s²" Some(0.0), "Standard deviation of each part of accelerometer.";
+    ContactSensorNoise "contact_sensor_noise" Per::ContactSensor, "N" Some(0.0), "Standard deviation of each part of contact_sensor.";
+    BodyF "body_f" Per::Body(6), "N, N·m" None, "Force on each link at its centre of mass, then torque, in world axes, until it is written again; a reset clears it.";
+}
+
+/// Least mass and inertia of a link over those of the scene [–].
+const MASS_SCALE_MIN: f64 = 1e-3;
+/// Stands for no limit of the effort [N·m or N].
+pub const NO_LIMIT: f64 = 1e30;
+
+impl Param {
+    /// The parameter of this name.
+    pub fn named(name: &str) -> Option<Param> {
+        Param::ALL
+            .into_iter()
+            .find(|param| param.row().name == name)
+    }
+
+    /// Numbers of a world that it has.
+    pub fn columns(self, sizes: &Sizes) -> usize {
+        match self.row().per {
+            Per::Entry(n) => n,
+            Per::Dof => sizes.dofs,
+            Per::Body(n) => n * sizes.bodies,
+            Per::Shape => sizes.shapes,
+            Per::Site(n) => n * sizes.sites,
+            Per::ContactSensor => sizes.contact_sensors,
+        }
+    }
+
+    /// What worlds start from; `mu` is of each shape, and there are so many contact sensors.
+    pub fn starts(self, m: &Constants<f64>, mu: &[f64], sensors: usize) -> Vec<f64> {
+        let of_dofs = |number: fn(&Dof<f64>) -> f64| m.dofs.iter().map(number).collect();
+        match self {
+            Param::Gravity => m.gravity.to_vec(),
+            Param::BodyMassScale => vec![1.0; m.frames.len()],
+            Param::JointArmature => of_dofs(|dof| dof.armature),
+            Param::JointDamping => of_dofs(|dof| dof.damping),
+            Param::JointFriction => {
+                let mut losses = vec![0.0; m.dofs.len()];
+                m.frictions.iter().for_each(|f| losses[f.dof] = f.loss);
+                losses
+            }
+            Param::JointTargetKe => of_dofs(|dof| dof.ke),
+            Param::JointTargetKd => of_dofs(|dof| dof.kd),
+            Param::JointEffortLimit => of_dofs(|dof| dof.effort_limit.unwrap_or(NO_LIMIT)),
+            Param::ShapeMu => mu.to_vec(),
+            Param::CommandDelay => vec![0.0],
+            Param::JointFNoise
+            | Param::JointTargetQNoise
+            | Param::JointTargetQdNoise
+            | Param::JointQNoise
+            | Param::JointQdNoise
+            | Param::JointTorqueNoise => vec![0.0; m.dofs.len()],
+            Param::SiteQNoise | Param::SiteQdNoise => vec![0.0; 2 * m.sites.len()],
+            Param::GyroNoise | Param::AccelerometerNoise => vec![0.0; m.sites.len()],
+            Param::ContactSensorNoise => vec![0.0; sensors],
+            Param::BodyF => vec![0.0; 6 * m.frames.len()],
+        }
+    }
+
+    /// Is it a load that a reset takes away?
+    pub fn is_load(self) -> bool {
+        self == Param::BodyF
+    }
+}
+
+/// The noise of each command, in the order `joint_f`, `joint_target_q`, `joint_target_qd`.
+pub const COMMAND_NOISES: [Param; 3] = [
+    Param::JointFNoise,
+    Param::JointTargetQNoise,
+    Param::JointTargetQdNoise,
+];
+
+/// Which parameters vary, and where their numbers are among those of a world.
+#[derive(Clone, Debug, Default)]
+pub struct Varying {
+    first: [Option<usize>; Param::ALL.len()],
+    starts: Vec<(Param, f64)>,
+}
+
+impl Varying {
+    /// Adds a parameter with the numbers that worlds start from.
+    pub fn add(&mut self, param: Param, numbers: impl IntoIterator<Item = f64>) {
+        self.first[param as usize] = Some(self.starts.len());
+        self.starts.extend(numbers.into_iter().map(|x| (param, x)));
+    }
+
+    /// The first of its numbers, if it varies.
+    #[inline(always)]
+    pub fn first(&self, param: Param) -> Option<usize> {
+        self.first[param as usize]
+    }
+
+    /// Its numbers, if it varies.
+    pub fn range(&self, param: Param) -> Option<std::ops::Range<usize>> {
+        let first = self.first(param)?;
+        let len = self.starts.iter().filter(|(of, _)| *of == param).count();
+        Some(first..first + len)
+    }
+
+    /// Those that vary, in the order of the table.
+    pub fn params(&self) -> impl Iterator<Item = Param> + '_ {
+        let all = Param::ALL.into_iter();
+        all.filter(|param| self.first(*param).is_some())
+    }
+
+    /// What worlds start from, number by number, each with its parameter.
+    pub fn starts(&self) -> &[(Param, f64)] {
+        &self.starts
+    }
+
+    /// Numbers of a world.
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.starts.len()
+    }
+
+    /// Does none vary?
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.starts.is_empty()
+    }
+}

@@ -1,0 +1,22 @@
+//! How many of everything a model has: what the shapes of arrays are made of.
+
+/// Lengths of a model's arrays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sizes {
+    /// Degrees of freedom.
+    pub dofs: usize,
+    /// Position coordinates.
+    pub coords: usize,
+    /// Links of all robots, fixed ones included.
+    pub bodies: usize,
+    /// Constraint rows of joints: equalities, frictions, limits.
+    pub rows: usize,
+    /// Contacts that a world has room for.
+    pub contacts: usize,
+    /// Collision shapes.
+    pub shapes: usize,
+    /// Sites.
+    pub sites: usize,
+    /// Contact sensors.
+    pub contact_sensors: usize,
+}

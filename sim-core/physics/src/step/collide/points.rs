@@ -1,0 +1,118 @@
+//! Shapes of a pair where they are, and the list that their contact points go to.
+
+use crate::constants::contact::row;
+use crate::lane::{Cx, MaskOf, Num, Table};
+use crate::math::vec3::{Mat3, Vec3, add, scale};
+use crate::{push, when};
+
+/// A shape where it is, relative to the centre of the pair's first shape.
+#[derive(Clone, Copy)]
+pub struct Placed<F> {
+    /// Its axes, one a column [–].
+    pub axes: Mat3<F>,
+    /// Its centre [m].
+    pub center: Vec3<F>,
+}
+
+/// The list of contact points of a pair's class.
+pub struct Points<C: Cx> {
+    /// Where they go.
+    pub list: C::List,
+    /// The rows; see [`crate::constants::contact::row`].
+    pub table: Table,
+    /// The pair.
+    pub pair: C::F,
+    /// Centre of the pair's first shape from where the rows' points are counted [m].
+    pub base: Vec3<C::F>,
+    /// -1 where rows have the normal from the second shape to the first, else 1.
+    pub flip: C::F,
+    /// Coefficient of friction, where it varies [–].
+    pub mu: Option<C::F>,
+    /// Along this the first tangent lies if it is not 0 [–]; none where the direction of tangents does not matter.
+    pub along: Option<Vec3<C::F>>,
+    /// What a world has room for.
+    pub room: Room<C::F>,
+}
+
+/// Contacts and rows of a world, and its room for them.
+#[derive(Clone, Copy)]
+pub struct Room<F> {
+    /// The table of counts.
+    pub counts: Table,
+    /// Its row of contacts.
+    pub contacts: usize,
+    /// Its row of constraint rows.
+    pub rows: usize,
+    /// Its row of contacts left out.
+    pub left_out: usize,
+    /// Most contacts.
+    pub contacts_max: F,
+    /// Most constraint rows.
+    pub rows_max: F,
+    /// Constraint rows of a contact.
+    pub of_a_contact: F,
+    /// Can it become full?
+    pub is_tight: bool,
+}
+
+impl<C: Cx> Points<C> {
+    /// Adds a point in the worlds of the mask: half-way between the surfaces, relative to the centre of the pair's first
+    /// shape [m]; the distance of the surfaces, negative in penetration [m]; the normal from the first shape to the second.
+    #[inline(always)]
+    pub fn add(
+        &mut self,
+        cx: &mut C,
+        mask: MaskOf<C>,
+        point: Vec3<C::F>,
+        distance: C::F,
+        normal: Vec3<C::F>,
+    ) {
+        let mask = if self.room.is_tight {
+            self.room.take(cx, mask)
+        } else {
+            mask
+        };
+        let (list, table, number) = (&mut self.list, self.table, self.pair);
+        let (along, mu) = (self.along, self.mu);
+        let (point, normal) = (add(self.base, point), scale(normal, self.flip));
+        push!(cx, *list, mask, fresh, {
+            let ([x, y, z], [u, v, w]) = (point, normal);
+            // in the order of `row`
+            cx.init_all(table, fresh, &[x, y, z, distance, u, v, w, number]);
+            if let Some(mu) = mu {
+                cx.init(table, fresh, row::MU, mu);
+            }
+            if let Some(along) = along {
+                for (i, x) in along.iter().enumerate() {
+                    cx.init(table, fresh, row::TANGENTS + i, *x);
+                }
+            }
+        });
+    }
+}
+
+impl<F: Num> Room<F> {
+    /// Takes room for a contact; the worlds that have it.
+    #[inline(always)]
+    fn take<C: Cx<F = F>>(&self, cx: &mut C, mask: MaskOf<C>) -> MaskOf<C> {
+        let one = F::c(1.0);
+        let (contacts, rows, left_out) =
+            (cx.at(self.contacts), cx.at(self.rows), cx.at(self.left_out));
+        let used = cx.load(self.counts, contacts, 0);
+        let used_rows = cx.load(self.counts, rows, 0) + self.of_a_contact;
+        // whole numbers: half a one keeps roundings out
+        let fits = F::and(
+            (used + F::c(0.5)).lt(self.contacts_max),
+            used_rows.lt(self.rows_max + F::c(0.5)),
+        );
+        when!(cx, F::and(mask, fits), {
+            cx.store(self.counts, contacts, 0, used + one);
+            cx.store(self.counts, rows, 0, used_rows);
+        });
+        when!(cx, F::and(mask, F::not(fits)), {
+            let more = cx.load(self.counts, left_out, 0) + one;
+            cx.store(self.counts, left_out, 0, more);
+        });
+        F::and(mask, fits)
+    }
+}

@@ -1,0 +1,60 @@
+//! Commands as they act: late by the delay of the world, and with the noise of the frame.
+//!
+//! ```text
+//! applied(s) = sent in the last frame that began at s - delay or before, + noise        s counts substeps
+//! ```
+
+use super::{BlockOf, ConstantsOf};
+use crate::constants::params::Param;
+use crate::lane::{Cx, Num};
+
+/// A command, by its place in `applied`, in a frame of the history and in the noise.
+#[derive(Clone, Copy)]
+pub(super) enum Command {
+    Force,
+    Position,
+    Velocity,
+}
+
+#[inline(always)]
+pub(super) fn arrive<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let n = m.dofs.len();
+    let applied = &mut b.work.applied;
+    applied[..n].copy_from_slice(&b.joint_f);
+    applied[n..2 * n].copy_from_slice(&b.joint_target_q);
+    applied[2 * n..].copy_from_slice(&b.joint_target_qd);
+    let delay = m.varying.first(Param::CommandDelay);
+    if let Some(delay) = delay.filter(|_| m.delay.frames > 0) {
+        let substep = cx.get(&b.substep[0]);
+        let late = b.params[delay] - substep;
+        for (age, sent) in b.command_history.chunks_exact(3 * n).enumerate() {
+            // later than what came in the frame after it
+            let is_due = C::F::c((age * m.delay.substeps) as f64).lt(late);
+            for (applied, sent) in applied.iter_mut().zip(sent) {
+                *applied = C::F::select(is_due, *sent, *applied);
+            }
+        }
+        cx.set(&mut b.substep[0], substep + C::F::c(1.0));
+    }
+    for (applied, noise) in applied.iter_mut().zip(&b.command_noise) {
+        *applied = *applied + *noise;
+    }
+}
+
+/// The command of dof `j` that acts.
+#[inline(always)]
+pub(super) fn acting<C: Cx>(
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    command: Command,
+    j: usize,
+) -> C::F {
+    if m.alters_commands() {
+        return b.work.applied[command as usize * m.dofs.len() + j];
+    }
+    match command {
+        Command::Force => b.joint_f[j],
+        Command::Position => b.joint_target_q[j],
+        Command::Velocity => b.joint_target_qd[j],
+    }
+}

@@ -1,0 +1,125 @@
+//! What takes a small displacement of a site to one of the joints, for output: the inverse of its Jacobian by damped least
+//! squares (Wampler 1986; Nakamura and Hanafusa 1986; Buss 2004).
+//!
+//! ```text
+//! J(d) = ± [v(d) + ω(d) × p, ω(d)]      + for a dof that moves the site, - for one that moves what it is measured from
+//! J⁺ = Jᵀ (J Jᵀ + λ² 1)⁻¹
+//! [Jᵀ; λ 1] = [Q; S] R                  columns of [Q; S] orthonormal, R upper triangular: Rᵀ R = J Jᵀ + λ² 1
+//! J⁺ = Q R⁻ᵀ = Q Sᵀ / λ                 its rows in the axes of what the site is measured from
+//! ```
+//!
+//! J⁺ x is the motion of the joints that makes |J q - x|² + λ² |q|² smallest: the more damping, the shorter it is where the arm
+//! is stretched. A dof that moves both moves neither against the other, and has no column. So J q̇ is the velocity of
+//! [`super::sites`], and displacements are in the axes of that.
+//!
+//! R is found from J (modified Gram-Schmidt), not from J Jᵀ, in whose rounding small λ² would drown in `f32`: no column ever is
+//! shorter than λ, and no number of J⁺ much above 1 / λ, whatever rounds.
+
+use super::sites::{back, position, reference};
+use crate::arrays::Workspace;
+use crate::constants::Constants;
+use crate::constants::site::Site;
+use crate::lane::Num;
+use crate::math::vec3::{add, cross_add, sub};
+
+/// Numbers of a displacement: of the origin, then of the rotation.
+const SIX: usize = 6;
+
+/// The rows of J⁺ of the dofs that move each site, one site after the other.
+#[inline(always)]
+pub(super) fn inverse_jacobian<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
+    let mut end = 0;
+    for site in &m.sites {
+        let first = end;
+        end += site.columns.len();
+        jacobian(w, site, first);
+        let damping = F::k(site.damping);
+        let mut s = [[F::c(0.0); SIX]; SIX];
+        for i in 0..SIX {
+            s[i][i] = damping;
+        }
+        orthonormalize(&mut w.site_inverse[first..end], &mut s);
+        let undamped = F::c(1.0).div(damping);
+        for i in 0..SIX {
+            for j in i..SIX {
+                s[i][j] = s[i][j] * undamped;
+            }
+        }
+        for k in first..end {
+            let q = w.site_inverse[k];
+            let mut row = [F::c(0.0); SIX];
+            for i in 0..SIX {
+                for j in i..SIX {
+                    row[i] = q[j].fma(s[i][j], row[i]);
+                }
+            }
+            if let Some(other) = &site.relative_to {
+                let [x, y, z, turn_x, turn_y, turn_z] = row;
+                let [x, y, z] = back(w, other, [x, y, z]);
+                let [turn_x, turn_y, turn_z] = back(w, other, [turn_x, turn_y, turn_z]);
+                row = [x, y, z, turn_x, turn_y, turn_z];
+            }
+            w.site_inverse[k] = row;
+        }
+    }
+}
+
+/// Jᵀ of a site in world axes, from row `first` on.
+#[inline(always)]
+fn jacobian<F: Num>(w: &mut Workspace<F>, site: &Site<F::Real>, first: usize) {
+    let here = position(w, &site.mount);
+    let mut there = here;
+    if let Some(other) = &site.relative_to
+        && site.mount.tree != other.tree
+    {
+        // the same point, from the reference point of the other robot
+        there = add(here, sub(reference(w, &site.mount), reference(w, other)));
+    }
+    for (k, column) in site.columns.iter().enumerate() {
+        let [linear, angular] = w.motion[column.dof];
+        let [turn_x, turn_y, turn_z] = angular;
+        w.site_inverse[first + k] = if column.is_of_other {
+            let [x, y, z] = cross_add(angular, there, linear);
+            [-x, -y, -z, -turn_x, -turn_y, -turn_z]
+        } else {
+            let [x, y, z] = cross_add(angular, here, linear);
+            [x, y, z, turn_x, turn_y, turn_z]
+        };
+    }
+}
+
+/// Makes the columns of [q; s] orthonormal, one after the other; `s` is upper triangular and stays so.
+#[inline(always)]
+fn orthonormalize<F: Num>(q: &mut [[F; SIX]], s: &mut [[F; SIX]; SIX]) {
+    for c in 0..SIX {
+        let mut square = F::c(0.0);
+        for row in s[..c + 1].iter() {
+            square = row[c].fma(row[c], square);
+        }
+        for row in q.iter() {
+            square = row[c].fma(row[c], square);
+        }
+        let inverse = F::c(1.0).div(square.sqrt());
+        for row in s[..c + 1].iter_mut() {
+            row[c] = row[c] * inverse;
+        }
+        for row in q.iter_mut() {
+            row[c] = row[c] * inverse;
+        }
+        for d in c + 1..SIX {
+            let mut along = F::c(0.0);
+            for row in s[..c + 1].iter() {
+                along = row[c].fma(row[d], along);
+            }
+            for row in q.iter() {
+                along = row[c].fma(row[d], along);
+            }
+            for row in s[..c + 1].iter_mut() {
+                row[d] = along.fnma(row[c], row[d]);
+            }
+            for row in q.iter_mut() {
+                row[d] = along.fnma(row[c], row[d]);
+            }
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Sites for output: their frames and velocities, and what an inertial measurement unit in each would show.
+//!
+//! ```text
+//! q = p + r             v = v(b) + ω × p                                   in the world
+//! q = Rᵀ (p - p')       v = Rᵀ (v - v' - ω' × (p - p'))      ω = Rᵀ (ω - ω')      from a frame R, p', v', ω'
+//! gyro = Rᵀ ω           accelerometer = Rᵀ (a(b) + α × s + ω × (ω × s))    a less gravity, s from the body's origin
+//! ```
+//!
+//! p is about the reference point r of the robot, so that a site measured from another of the same robot loses nothing far
+//! from the origin.
+
+use super::inverse_dynamics::{carried_along, proper_accelerations};
+use super::{BlockOf, ConstantsOf};
+use crate::arrays::Workspace;
+use crate::constants::Constants;
+use crate::constants::site::Mount;
+use crate::lane::{Cx, Num};
+use crate::math::quat::{self, Quat, conjugate, mul};
+use crate::math::spatial::{ANGULAR, LINEAR, Spatial};
+use crate::math::vec3::{
+    Vec3, add, constant, cross, cross_add, sub, transform, transform_add, transform_back, zero,
+};
+
+/// Frames and velocities of the sites.
+#[inline(always)]
+pub(super) fn site_q<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
+    for (k, site) in m.sites.iter().enumerate() {
+        let mount = &site.mount;
+        let (mut position, mut orientation) = (position(w, mount), orientation(w, mount));
+        let mut velocity = velocity(w, mount, position);
+        match &site.relative_to {
+            None => position = add(position, reference(w, mount)),
+            Some(other) => {
+                let (there, from) = (self::position(w, other), self::orientation(w, other));
+                let [linear, angular] = self::velocity(w, other, there);
+                position = sub(position, there);
+                if mount.tree != other.tree {
+                    let apart = sub(reference(w, mount), reference(w, other));
+                    position = add(position, apart);
+                }
+                let carried = cross_add(angular, position, linear);
+                velocity = [
+                    back(w, other, sub(velocity[LINEAR], carried)),
+                    back(w, other, sub(velocity[ANGULAR], angular)),
+                ];
+                position = back(w, other, position);
+                orientation = mul(conjugate(from), orientation);
+            }
+        }
+        let ([px, py, pz], [qx, qy, qz, qw]) = (position, orientation);
+        w.site_q[k] = [px, py, pz, qx, qy, qz, qw];
+        w.site_qd[k] = velocity;
+    }
+}
+
+/// What turns and accelerates each site, in its own axes.
+#[inline(always)]
+pub(super) fn imu<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let base = proper_accelerations(cx, m, b);
+    let w = &mut b.work;
+    for (k, site) in m.sites.iter().enumerate() {
+        let mount = &site.mount;
+        let (acceleration, omega) = match mount.body {
+            Some(body) => {
+                let arm = transform(&w.rotation[body], constant(mount.position));
+                let omega = w.velocity[body][ANGULAR];
+                (carried_along(w.force[body], omega, arm), omega)
+            }
+            None => (base, zero()),
+        };
+        w.gyro[k] = back(w, mount, omega);
+        w.accelerometer[k] = back(w, mount, acceleration);
+    }
+}
+
+/// Where it is, from the reference point of its robot.
+#[inline(always)]
+pub(super) fn position<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
+    let own = constant(mount.position);
+    match mount.body {
+        Some(body) => transform_add(&w.rotation[body], own, w.origin[body]),
+        None => own,
+    }
+}
+
+/// The reference point of its robot.
+#[inline(always)]
+pub(super) fn reference<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
+    match mount.tree {
+        Some(tree) => w.reference[tree],
+        None => zero(),
+    }
+}
+
+#[inline(always)]
+fn orientation<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Quat<F> {
+    let own = quat::constant(mount.quat);
+    match mount.body {
+        Some(body) => mul(w.orientation[body], own),
+        None => own,
+    }
+}
+
+/// How the point moves, in world axes.
+#[inline(always)]
+fn velocity<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>, position: Vec3<F>) -> Spatial<F> {
+    match mount.body {
+        Some(body) => {
+            let [linear, angular] = w.velocity[body];
+            [add(linear, cross(angular, position)), angular]
+        }
+        None => [zero(), zero()],
+    }
+}
+
+/// A vector of the world in the axes of a frame.
+#[inline(always)]
+pub(super) fn back<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>, vector: Vec3<F>) -> Vec3<F> {
+    let [x, y, z] = mount.rotation;
+    let own = [constant(x), constant(y), constant(z)];
+    match mount.body {
+        Some(body) => transform_back(&own, transform_back(&w.rotation[body], vector)),
+        None => transform_back(&own, vector),
+    }
+}

@@ -1,0 +1,206 @@
+//! The cost along a segment, and its exact minimum.
+
+use super::super::ConstantsOf;
+use super::contacts;
+use super::rows::{Law, bounds, dry_friction, equality, one_sided};
+use crate::constants::Constants;
+use crate::lane::{Cx, Num, Real};
+use crate::{break_if, times};
+
+/// The cost p along the segment from `a` (α = 0) to the minimum of its quadratic model (α = 1).
+///
+/// ```text
+/// p'(α) = -(1 - α) d + Σ (f(model) - f) jv        d = -p'(0) = sᵀ M s + Σ W jv²
+/// ```
+///
+/// Rows that stay on their piece of cost follow the model, and add nothing.
+pub(super) struct Line<'a, F> {
+    /// -p'(0), what the model says of the gain at α = 1, twice.
+    pub descent: F,
+    /// The gain that rounding alone may promise.
+    ///
+    /// Of a correction: ½ gᵀ H⁻¹ g of a gradient g that is but the rounding of jar in Jᵀ W jar and of τ, hence at most about
+    /// ε² (Σ W (|J a| + |aref|)² + |τ a|). Else, where each round solves for the whole minimum, the rounding of p'.
+    pub noise: F,
+    /// Has any world contacts?
+    touches: bool,
+    params: &'a [F],
+    weight: &'a [F],
+    jar: &'a [F],
+    jv: &'a [F],
+}
+
+/// First and second derivative of the cost along a line, and the size of the terms of the first.
+struct Derivative<F> {
+    slope: F,
+    curvature: F,
+    size: F,
+}
+
+impl<'a, F: Num> Line<'a, F> {
+    /// `curvature` is sᵀ M s, `power` |τ a|; of rows: stiffness of those that act, `jar`, its change `jv` over the segment,
+    /// and `aref`. In the worlds where the solver `corrects`, they touch.
+    ///
+    /// Turns what contacts have ahead into its change.
+    #[inline(always)]
+    pub fn new<C: Cx<F = F>>(
+        cx: &mut C,
+        m: &Constants<F::Real>,
+        params: &'a [F],
+        curvature: F,
+        power: F,
+        [weight, jar, jv, aref]: [&'a [F]; 4],
+        corrects: Option<F::Mask>,
+    ) -> Self {
+        let epsilon = F::c(<F::Real as Real>::EPSILON);
+        let (mut descent, mut size) = (curvature, curvature);
+        let mut terms = power;
+        for r in 0..m.rows() {
+            let law = law(m, params, r, jar[r], weight[r]);
+            descent = (law.stiffness * jv[r]).fma(jv[r], descent);
+            size = size + (law.force * jv[r]).abs();
+            let rounded = (jar[r] + aref[r]).abs() + aref[r].abs();
+            terms = (law.stiffness * rounded).fma(rounded, terms);
+        }
+        let mut noise = size * epsilon;
+        if let Some(corrects) = corrects {
+            let (mut sum, mut all) = (cx.var(descent), cx.var(terms));
+            contacts::begin_line(cx, &m.contacts, &mut sum, &mut all);
+            descent = cx.get(&sum);
+            noise = F::select(corrects, cx.get(&all) * (epsilon * epsilon), noise);
+        }
+        Line {
+            descent,
+            noise,
+            touches: corrects.is_some(),
+            params,
+            weight,
+            jar,
+            jv,
+        }
+    }
+
+    #[inline(always)]
+    fn derivative<C: Cx<F = F>>(
+        &self,
+        cx: &mut C,
+        m: &Constants<F::Real>,
+        alpha: F,
+    ) -> Derivative<F> {
+        let rest = F::c(1.0) - alpha;
+        let slope = -(rest * self.descent);
+        let mut d = Derivative {
+            slope,
+            curvature: self.descent,
+            size: slope.abs(),
+        };
+        // equalities have one piece only
+        for r in m.equalities.len()..m.rows() {
+            let (jv, weight) = (self.jv[r], self.weight[r]);
+            let start = law(m, self.params, r, self.jar[r], weight);
+            let here = law(m, self.params, r, alpha.fma(jv, self.jar[r]), weight);
+            let model = (start.stiffness * alpha).fnma(jv, start.force);
+            // exactly nothing where the piece is the same, whatever rounding says
+            let moved = F::c(0.5).lt((here.state - start.state).abs());
+            let power = F::select(moved, (model - here.force) * jv, F::c(0.0));
+            d.slope = d.slope + power;
+            d.size = d.size + power.abs();
+            d.curvature = ((here.stiffness - start.stiffness) * jv).fma(jv, d.curvature);
+        }
+        if self.touches {
+            let mut slope = cx.var(d.slope);
+            let mut curvature = cx.var(d.curvature);
+            let mut size = cx.var(d.size);
+            let t = &m.contacts;
+            contacts::derivative(cx, t, alpha, &mut slope, &mut curvature, &mut size);
+            d = Derivative {
+                slope: cx.get(&slope),
+                curvature: cx.get(&curvature),
+                size: cx.get(&size),
+            };
+        }
+        d
+    }
+}
+
+/// The law of a row by its number.
+#[inline(always)]
+fn law<F: Num>(m: &Constants<F::Real>, params: &[F], r: usize, jar: F, weight: F) -> Law<F> {
+    let frictions = m.equalities.len();
+    let limits = frictions + m.frictions.len();
+    if r < frictions {
+        equality(jar, weight)
+    } else if r < limits {
+        let friction = &m.frictions[r - frictions];
+        let [zone, loss] = bounds(m, params, friction);
+        dry_friction(jar, weight, zone, loss)
+    } else {
+        one_sided(jar, weight)
+    }
+}
+
+/// Slope over that at the start below which a search ends in `f32`: the next round finds the rest, and a search to MuJoCo's
+/// `ls_tolerance` of 0.01 takes half as many steps again.
+const SLACK: f64 = 0.1;
+/// Beyond any minimum [–].
+const FAR: f64 = 1e10;
+
+/// The exact minimum on the segment, and beyond it: p'(α) = 0 by Newton's method while its moves halve, and otherwise by the
+/// chord between the ends of the bracket, of which an end that stays counts half (Illinois; Dowell and Jarratt 1971).
+#[inline(always)]
+pub(super) fn search<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    line: &Line<'_, C::F>,
+    length: &mut C::V,
+) {
+    let (zero, half, one) = (C::F::c(0.0), C::F::c(0.5), C::F::c(1.0));
+    let resolution = C::F::c(4.0 * <<C::F as Num>::Real as Real>::EPSILON);
+    let slack = if <<C::F as Num>::Real as Real>::DOUBLE {
+        0.0
+    } else {
+        SLACK
+    };
+    let mut low = cx.var(zero);
+    let mut low_slope = cx.var(-line.descent);
+    let mut high = cx.var(C::F::c(FAR));
+    let mut high_slope = cx.var(one);
+    // -1 after a point below the minimum, 1 after one above it
+    let mut side = cx.var(zero);
+    let mut last_move = cx.var(one);
+    times!(cx, m.solver.ls_iterations, {
+        let alpha = cx.get(length);
+        let d = line.derivative(cx, m, alpha);
+        let falls = d.slope.lt(zero);
+        let below = C::F::select(falls, alpha, cx.get(&low));
+        let above = C::F::select(falls, cx.get(&high), alpha);
+        let close = (d.size * resolution).max(line.descent * C::F::c(slack));
+        let found = C::F::not(close.lt(d.slope.abs()));
+        break_if!(cx, C::F::or(found, (above - below).lt(above * resolution)));
+        cx.set(&mut low, below);
+        cx.set(&mut high, above);
+        let before = cx.get(&side);
+        let now = C::F::select(falls, -one, one);
+        // the end that stays for the second time counts half
+        let weight = C::F::select(half.lt(before * now), half, one);
+        let below_slope = C::F::select(falls, d.slope, cx.get(&low_slope) * weight);
+        let above_slope = C::F::select(falls, cx.get(&high_slope) * weight, d.slope);
+        cx.set(&mut side, now);
+        cx.set(&mut low_slope, below_slope);
+        cx.set(&mut high_slope, above_slope);
+
+        let newton = alpha - d.slope.div(d.curvature);
+        let is_open = C::F::c(0.5 * FAR).lt(above);
+        let halves = (newton - alpha).abs().lt(half * cx.get(&last_move));
+        let inside = C::F::and(below.lt(newton), newton.lt(above));
+        let is_newton = C::F::and(inside, C::F::or(is_open, halves));
+        let rise = above_slope - below_slope;
+        let chord = below.fma(above_slope, -(above * below_slope)).div(rise);
+        let is_chord = C::F::and(below.lt(chord), chord.lt(above));
+        let middle = half * (below + above);
+        let other = C::F::select(is_chord, chord, middle);
+        let next = C::F::select(is_newton, newton, other);
+        cx.set(&mut last_move, (next - alpha).abs());
+        cx.set(length, next);
+    });
+}

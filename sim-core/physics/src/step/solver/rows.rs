@@ -1,0 +1,231 @@
+//! Laws of the constraint rows, and sums over them.
+
+use crate::constants::params::Param;
+use crate::constants::{Constants, Friction};
+use crate::lane::Num;
+use crate::step::param;
+
+/// What a row does at `jar`: force -s', stiffness s'', and which piece of s it is on.
+pub(super) struct Law<F> {
+    pub force: F,
+    pub stiffness: F,
+    pub state: F,
+}
+
+/// s = ½ D jar²
+#[inline(always)]
+pub(super) fn equality<F: Num>(jar: F, weight: F) -> Law<F> {
+    Law {
+        force: -(weight * jar),
+        stiffness: weight,
+        state: F::c(0.0),
+    }
+}
+
+/// s = ½ D jar² within the zone R × loss, beyond it a line of slope ± loss (Huber).
+#[inline(always)]
+pub(super) fn dry_friction<F: Num>(jar: F, weight: F, zone: F, loss: F) -> Law<F> {
+    let (zero, one) = (F::c(0.0), F::c(1.0));
+    let (below, above) = (jar.lt(-zone), zone.lt(jar));
+    let slides = F::or(below, above);
+    let bound = F::select(below, loss, -loss);
+    Law {
+        force: F::select(slides, bound, -(weight * jar)),
+        stiffness: F::select(slides, zero, weight),
+        state: F::select(below, -one, F::select(above, one, zero)),
+    }
+}
+
+/// Zone and loss of a dry friction.
+#[inline(always)]
+pub(super) fn bounds<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    friction: &Friction<F::Real>,
+) -> [F; 2] {
+    if m.varying.first(Param::JointFriction).is_none() {
+        return [F::k(friction.zone), F::k(friction.loss)];
+    }
+    let loss = param(m, params, Param::JointFriction, friction.dof, friction.loss);
+    [loss * F::k(friction.regularizer), loss]
+}
+
+/// s = ½ D jar² where jar < 0, else 0. A row of weight 0 is never active.
+#[inline(always)]
+pub(super) fn one_sided<F: Num>(jar: F, weight: F) -> Law<F> {
+    let zero = F::c(0.0);
+    let push = -(weight * jar);
+    let active = zero.lt(push);
+    Law {
+        force: F::select(active, push, zero),
+        stiffness: F::select(active, weight, zero),
+        state: F::select(active, F::c(1.0), zero),
+    }
+}
+
+/// jar = J a - aref
+#[inline(always)]
+pub(super) fn residual<F: Num>(
+    m: &Constants<F::Real>,
+    side: &[F],
+    aref: &[F],
+    a: &[F],
+    jar: &mut [F],
+) {
+    let mut r = 0;
+    for e in &m.equalities {
+        jar[r] = F::k(e.multiplier).fnma(a[e.leader], a[e.follower]) - aref[r];
+        r += 1;
+    }
+    for f in &m.frictions {
+        jar[r] = a[f.dof] - aref[r];
+        r += 1;
+    }
+    for (l, side) in m.limits.iter().zip(side) {
+        jar[r] = side.fma(a[l.dof], -aref[r]);
+        r += 1;
+    }
+}
+
+/// f + W J a, or f alone where the solver `corrects`.
+#[inline(always)]
+fn pull<F: Num>(law: &Law<F>, jar: F, aref: F, corrects: Option<F::Mask>) -> F {
+    let whole = law.stiffness.fma(jar + aref, law.force);
+    match corrects {
+        Some(corrects) => F::select(corrects, law.force, whole),
+        None => whole,
+    }
+}
+
+/// Adds Jᵀ W J to the Hessian, and to the right-hand side Jᵀ (f + W J a), or Jᵀ f in the worlds where the solver `corrects`.
+#[allow(clippy::too_many_arguments)]
+#[inline(always)]
+pub(super) fn assemble<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    side: &[F],
+    weight: &[F],
+    aref: &[F],
+    jar: &[F],
+    hessian: &mut [F],
+    rhs: &mut [F],
+    corrects: Option<F::Mask>,
+) {
+    let mut r = 0;
+    for e in &m.equalities {
+        let law = equality(jar[r], weight[r]);
+        let pull = pull(&law, jar[r], aref[r], corrects);
+        let (f, l, ratio) = (e.follower, e.leader, F::k(e.multiplier));
+        let shared = law.stiffness * ratio;
+        let (own, others) = (m.pattern.at(f, f), m.pattern.at(l, l));
+        hessian[own] = hessian[own] + law.stiffness;
+        hessian[others] = shared.fma(ratio, hessian[others]);
+        let coupling = m.pattern.at(f.max(l), f.min(l));
+        hessian[coupling] = hessian[coupling] - shared;
+        rhs[f] = rhs[f] + pull;
+        rhs[l] = ratio.fnma(pull, rhs[l]);
+        r += 1;
+    }
+    for f in &m.frictions {
+        let [zone, loss] = bounds(m, params, f);
+        let law = dry_friction(jar[r], weight[r], zone, loss);
+        let diagonal = m.pattern.at(f.dof, f.dof);
+        hessian[diagonal] = hessian[diagonal] + law.stiffness;
+        rhs[f.dof] = rhs[f.dof] + pull(&law, jar[r], aref[r], corrects);
+        r += 1;
+    }
+    for (l, side) in m.limits.iter().zip(side) {
+        let law = one_sided(jar[r], weight[r]);
+        let diagonal = m.pattern.at(l.dof, l.dof);
+        hessian[diagonal] = hessian[diagonal] + law.stiffness;
+        let pull = pull(&law, jar[r], aref[r], corrects);
+        rhs[l.dof] = side.fma(pull, rhs[l.dof]);
+        r += 1;
+    }
+}
+
+/// How many rows are on another piece of their cost; and how many dry frictions slide the other way.
+#[inline(always)]
+pub(super) fn changes<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    weight: &[F],
+    jar: &[F],
+    other: &[F],
+) -> [F; 2] {
+    let (zero, one) = (F::c(0.0), F::c(1.0));
+    let (mut sum, mut turned) = (zero, zero);
+    let mut r = m.equalities.len();
+    for f in &m.frictions {
+        let [zone, loss] = bounds(m, params, f);
+        let before = dry_friction(jar[r], weight[r], zone, loss).state;
+        let after = dry_friction(other[r], weight[r], zone, loss).state;
+        let moved = (before - after).abs();
+        sum = sum + moved;
+        turned = turned + F::select(one.lt(moved), one, zero);
+        r += 1;
+    }
+    for _ in &m.limits {
+        let before = one_sided(jar[r], weight[r]).state;
+        let after = one_sided(other[r], weight[r]).state;
+        sum = sum + (before - after).abs();
+        r += 1;
+    }
+    [sum, turned]
+}
+
+/// Force of every row, and their sum in joint space.
+#[inline(always)]
+pub(super) fn forces<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    side: &[F],
+    weight: &[F],
+    jar: &[F],
+    force: &mut [F],
+    joint: &mut [F],
+) {
+    let mut r = 0;
+    for e in &m.equalities {
+        force[r] = equality(jar[r], weight[r]).force;
+        joint[e.follower] = joint[e.follower] + force[r];
+        joint[e.leader] = F::k(e.multiplier).fnma(force[r], joint[e.leader]);
+        r += 1;
+    }
+    for f in &m.frictions {
+        let [zone, loss] = bounds(m, params, f);
+        force[r] = dry_friction(jar[r], weight[r], zone, loss).force;
+        joint[f.dof] = joint[f.dof] + force[r];
+        r += 1;
+    }
+    for (l, side) in m.limits.iter().zip(side) {
+        force[r] = one_sided(jar[r], weight[r]).force;
+        joint[l.dof] = side.fma(force[r], joint[l.dof]);
+        r += 1;
+    }
+}
+
+/// Σ s(jar)
+#[inline(always)]
+pub(super) fn cost<F: Num>(m: &Constants<F::Real>, params: &[F], weight: &[F], jar: &[F]) -> F {
+    let half = F::c(0.5);
+    let mut sum = F::c(0.0);
+    let mut r = 0;
+    for _ in &m.equalities {
+        sum = (half * weight[r] * jar[r]).fma(jar[r], sum);
+        r += 1;
+    }
+    for f in &m.frictions {
+        let ([zone, loss], size) = (bounds(m, params, f), jar[r].abs());
+        let inside = half * weight[r] * jar[r] * jar[r];
+        let outside = loss * half.fnma(zone, size);
+        sum = sum + F::select(zone.lt(size), outside, inside);
+        r += 1;
+    }
+    for _ in &m.limits {
+        let push = one_sided(jar[r], weight[r]).force;
+        sum = (half * push).fnma(jar[r], sum);
+        r += 1;
+    }
+    sum
+}
