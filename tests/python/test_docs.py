@@ -60,6 +60,7 @@ def test_blocks_that_do_not_run_say_why():
     assert needs == {
         "needs a Vulkan driver": 1,
         "needs a browser": 1,
+        "needs a checkout": 7,
         "needs a compiler": 2,
         "needs a network": 2,
         "needs docker": 1,
