@@ -81,6 +81,12 @@ def test_wrong_commands_are_found(monkeypatch):
     assert errors_of("w.yml", WORKFLOW)[1] == ["w.yml: no make target all", "w.yml: no make target publish"]
 
 
+def test_links_between_files_of_the_root_lead_somewhere():
+    for path in REPOSITORY.glob("*.md"):
+        targets = re.findall(r"\]\(([\w./-]+)(?:#[\w-]*)?\)", path.read_text())
+        assert [target for target in targets if not (REPOSITORY / target).exists()] == [], path
+
+
 def test_make_help_lists_every_target():
     phony = re.search(r"^\.PHONY: (.+)", makefile().replace("\\\n", " "), re.MULTILINE)
     assert phony
