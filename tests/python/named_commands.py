@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from functools import cache
 from itertools import pairwise
@@ -82,15 +83,12 @@ def cargo_targets(crate: str, option: str) -> set[str]:
 
 
 @cache
-def help_of(*command: str) -> str:
-    line = [sys.executable, "-m", "tightloop", *command, "--help"]
-    return subprocess.run(line, check=True, capture_output=True, text=True).stdout
-
-
-@cache
-def subcommands() -> set[str]:
-    lines = help_of().partition("Commands:\n")[2].partition("\n\n")[0].splitlines()
-    return {line.split()[0] for line in lines}
+def manuals() -> dict[str, str]:
+    """Manual pages of tightloop's subcommands, by name; one process writes them all."""
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([sys.executable, "-m", "tightloop", "man", folder], check=True, capture_output=True)
+        pages = {path.stem: path.read_text().replace("\\-", "-") for path in Path(folder).glob("tightloop-*.1")}
+    return {name.removeprefix("tightloop-"): page for name, page in pages.items()}
 
 
 # What a text names.
@@ -208,11 +206,11 @@ def python_errors(words: list[str]) -> Iterator[str]:
 def tightloop_errors(words: list[str]) -> Iterator[str]:
     if not words or words[0].startswith("-") or is_placeholder(words[0]):
         return
-    if words[0] not in subcommands():
+    if words[0] not in {*manuals(), "help"}:
         yield f"no command tightloop {words[0]}"
         return
     for flag in (word.partition("=")[0] for word in words[1:] if word.startswith("--")):
-        if not re.search(rf"{flag}\b", help_of(words[0])):
+        if not re.search(rf"{flag}\b", manuals().get(words[0], "")):
             yield f"tightloop {words[0]} has no {flag}"
 
 
