@@ -151,12 +151,12 @@ def test_trouble_is_one_line(tmp_path, capsys):
 
 def test_without_the_libraries_of_pictures_there_are_numbers(tmp_path, capsys, monkeypatch):
     def missing(*modules: str) -> None:
-        raise MissingLibrary(f'the viewer needs `{modules[0]}`: pip install "tightloop[view]"')
+        raise MissingLibrary(f"the viewer needs `{modules[0]}`: {needs.INSTALL}")
 
     monkeypatch.setattr(needs, "check", missing)
     assert main(["--stop", "torque", "--seconds", "0.01", "--worlds", "2", "--out", str(tmp_path)]) == 0
     said = capsys.readouterr()
-    assert "physics steps/s" in said.out and 'pip install "tightloop[view]"' in said.err
+    assert "physics steps/s" in said.out and needs.INSTALL in said.err
     assert not list(tmp_path.iterdir())
 
 

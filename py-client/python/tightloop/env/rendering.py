@@ -47,7 +47,7 @@ class Rendering:
 
     Raises:
         ArgumentError: The frames of a daemon that was joined carry no ``body_q``.
-        MissingLibrary: ``pip install "tightloop[view]"`` has not been run.
+        MissingLibrary: The extra ``view`` is not installed.
     """
 
     def __init__(self, sim: Sim, task: Task, mode: str) -> None:

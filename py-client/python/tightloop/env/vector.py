@@ -92,7 +92,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
                 which `close` then closes. None launches one that ends with this process.
             first_env: Number of the first world among those that ``reset(seed=…)`` counts, for groups of environments.
             render_mode: ``"rgb_array"`` for `render`, ``"human"`` for a page in the browser, where each step takes its
-                time; both need ``pip install "tightloop[view]"``.
+                time; both need the extra ``view``.
             **options: What the task's class takes.
 
         Raises:

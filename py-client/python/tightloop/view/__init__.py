@@ -1,6 +1,6 @@
 """Looking at worlds: in a browser, as pictures, as films; from a running daemon or from a recording.
 
-Its libraries come with ``pip install "tightloop[view]"``.
+Its libraries come with the extra ``view``; docs/pages/install.md says how to install it.
 
 >>> from tightloop.view import Film
 >>> with Film("run.mp4", sim) as film:

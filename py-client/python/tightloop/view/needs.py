@@ -1,4 +1,4 @@
-"""What the viewer needs beyond tightloop's own dependencies; they come with the extra ``tightloop[view]``."""
+"""Checks for the libraries of the extra ``view``, which the viewer needs beyond tightloop's own dependencies."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ from importlib import import_module
 
 from tightloop.errors import MissingLibrary
 
+#: How the extra ``view`` is installed. tightloop is on no package index.
+INSTALL = 'run `pip install "./py-client[view]"` in the repository, or `pip install "FILE.whl[view]"` with a built wheel'
+
 
 def check(*modules: str) -> None:
-    """Import libraries of the viewer, or say how they are installed.
+    """Import libraries of the viewer.
 
     Args:
         modules: Their names.
@@ -23,4 +26,4 @@ def check(*modules: str) -> None:
             # what the library itself misses is for the library to say
             if error.name != module:
                 raise
-            raise MissingLibrary(f'the viewer needs `{module}`: pip install "tightloop[view]"') from error
+            raise MissingLibrary(f"the viewer needs `{module}`: {INSTALL}") from error
