@@ -1,17 +1,9 @@
-"""The command line, in its own words."""
+"""The help texts of the command line."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
-
-INTRODUCTION = """# Command line
-
-What `tightloop --help` and `tightloop COMMAND --help` say. `tightloop completions bash` (or `zsh`, `fish`) prints
-what a shell needs to complete them, `tightloop man FOLDER` writes manual pages;
-[installing](install.md#shell-completions-and-manual-pages) says where they go. Exit codes: 0 done, 1 failed, 2
-misused.
-"""
 
 
 def commands() -> list[str]:
@@ -27,8 +19,8 @@ def help_of(*command: str) -> str:
     return subprocess.run(line, check=True, capture_output=True, text=True).stdout
 
 
-def page() -> str:
-    """The page."""
-    parts = [INTRODUCTION, "```text\n" + help_of() + "```\n"]
-    parts += [f"## tightloop {name}\n\n```text\n{help_of(name).rstrip()}\n```\n" for name in commands()]
-    return "\n".join(parts)
+def parts() -> dict[str, str]:
+    """Parts of the page `command-line.md`."""
+    texts = ["```text\n" + help_of() + "```\n"]
+    texts += [f"## tightloop {name}\n\n```text\n{help_of(name).rstrip()}\n```\n" for name in commands()]
+    return {"commands": "\n".join(texts)}

@@ -1,33 +1,34 @@
-"""What mkdocs runs: it puts the generated pages among those that are written by hand."""
+"""Hooks of mkdocs: they put the generated parts into the pages, and pictures of the repository beside them."""
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
+from typing import Any
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
 
-REPOSITORY = Path(__file__).parents[2]
-sys.path.insert(0, str(REPOSITORY / "docs"))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from generate import command_line, fields, performance, protocol, scene_file, tasks  # noqa: E402
-
-PAGES = {
-    "command-line.md": command_line.page,
-    "fields.md": fields.page,
-    "performance.md": performance.page,
-    "protocol.md": protocol.page,
-    "scene-file.md": scene_file.page,
-    "tasks.md": tasks.page,
-}
+from generate import pages
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the generated pages, and the pictures of the repository that pages show."""
-    for name, page in PAGES.items():
-        files.append(File.generated(config, name, content=page()))
-    for picture in ("examples/franka_lesson.png", "examples/trained/FrankaPickCube-1.png"):
-        content = (REPOSITORY / picture).read_bytes()
-        files.append(File.generated(config, f"pictures/{Path(picture).name}", content=content))
+    """Add the pictures that pages show from outside of docs/pages."""
+    for picture in pages.pictures():
+        files.append(File.generated(config, f"pictures/{picture.name}", content=picture.read_bytes()))
     return files
+
+
+def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
+    """Fill the page, and keep its links inside of the site."""
+    name = page.file.src_uri
+    text = pages.inside(name, pages.fill(name, markdown))
+    if name == "api/rust.md":
+        # rustdoc lies beside the site, where mkdocs sees no page
+        link = r'| <a href="../rust/\1/index.html"><code>\1</code></a> |'
+        text = re.sub(r"^\| `(sim_\w+)` \|", link, text, flags=re.MULTILINE)
+    return text

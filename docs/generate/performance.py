@@ -1,73 +1,134 @@
-"""Results of the benches, as they are committed."""
+"""The performance page and the README's table of speed, from the committed results of the benches.
+
+    cd docs && python -m generate.performance     # rewrites docs/pages/performance.md and the table of README.md
+
+Both files are committed, so that a forge shows them. ``tests/python/test_prose.py`` holds them to the results.
+"""
 
 from __future__ import annotations
 
 import csv
+import re
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from generate.benches import BENCHES, INTRODUCTION, SUMMARY, Bench
 from generate.rust import REPOSITORY
 from generate.tables import table
 
 RESULTS = REPOSITORY / "benches/results"
+PAGE = REPOSITORY / "docs/pages/performance.md"
+README = REPOSITORY / "README.md"
+_MARKED = re.compile(r"(?<=<!-- speed: docs/generate/performance\.py -->\n\n).*?(?=\n<!-- end -->)", re.DOTALL)
 
-INTRODUCTION = """# Performance
 
-Every table is a file of `benches/results`, written by the command above it on the machine that its heading names, and
-made into this page when the site is built. `–` is what was not measured or has no number to reach; `asked` columns
-are what the project wanted to reach, whether it did or not. Steps are physics steps of all worlds together.
+@dataclass
+class Result:
+    """A file of ``benches/results``.
 
-Read with care: MuJoCo computes in double precision, world after world; tightloop in single precision, 16 worlds in a
-register. `make bench`, `make bench-env` and `make bench-gpu` measure your machine.
-"""
-# What the files measure, in the order of the page; others follow by their names.
-TITLES = {
-    "peers": "An arm without contacts, beside MuJoCo C on one thread",
-    "contacts": "An arm with contacts, beside MuJoCo C on one thread",
-    "legged": "Floating robots, beside MuJoCo C on one thread",
-    "round_trip": "One world: how long a control frame takes",
-    "env": "Environments, beside envpool and gymnasium's",
-    "groups": "Two groups of worlds and a policy in NumPy",
-    "tasks": "Observations and rewards of tasks",
-    "libraries": "Training with libraries of reinforcement learning",
-    "gpu": "Worlds on a GPU",
-    "viewer": "With a viewer attached",
-    "newcomer": "From a clean checkout to the first picture",
-    "snapshot": "Snapshots",
-    "recording": "With a recorder",
-}
+    Attributes:
+        path: The file.
+        facts: What its head says, in order: machine, commit, date, command and others.
+        rows: Its rows by column.
+    """
+
+    path: Path
+    facts: dict[str, str] = field(default_factory=dict)
+    rows: list[dict[str, str]] = field(default_factory=list)
+
+
+def read(path: Path) -> Result:
+    """Read a file of results; facts of one name are joined."""
+    lines = path.read_text().splitlines()
+    made = Result(path)
+    for line in lines:
+        name, separator, value = line.removeprefix("# ").partition(": ")
+        if line.startswith("#") and separator:
+            made.facts[name] = f"{made.facts[name]}; {value}" if name in made.facts else value
+    made.rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    return made
 
 
 def page() -> str:
     """The page."""
-    files = sorted(RESULTS.glob("*/*.csv"), key=_order)
-    parts, last = [INTRODUCTION], ""
-    for path in files:
+    parts, last = [INTRODUCTION, summary()], ""
+    for path in sorted(RESULTS.glob("*/*.csv"), key=_order):
+        bench = BENCHES.get(path.stem, Bench(path.stem.replace("_", " ").capitalize(), ""))
         if path.stem != last:
-            parts.append(f"## {TITLES.get(path.stem, path.stem.replace('_', ' ').capitalize())}\n")
+            parts.append(f"## {bench.title}\n\n{bench.text}")
             last = path.stem
-        parts.append(section(path))
+        parts.append(section(read(path), bench))
     return "\n".join(parts)
 
 
-def _order(path: Path) -> tuple[int, str, str]:
-    titles = list(TITLES)
-    place = titles.index(path.stem) if path.stem in titles else len(titles)
-    return place, path.stem, path.parent.name
-
-
-def section(path: Path) -> str:
-    """A file: its machine, what it says of itself, its rows."""
-    text = path.read_text().splitlines()
-    facts = [line.removeprefix("# ") for line in text if line.startswith("#")]
-    rows = list(csv.reader(line for line in text if not line.startswith("#")))
-    said = dict(fact.split(": ", 1) for fact in facts if ": " in fact)
-    machine = said.pop("cpu", path.parent.name)
-    others = "; ".join(f"{what}: {value}" for what, value in said.items() if what != "command")
-    return f"### {machine}: {path.name}\n\n`{said.get('command', 'command unknown')}`  \n{others}\n\n" + table(
-        [name.replace("_", " ") for name in rows[0]], [[_readable(cell) for cell in row] for row in rows[1:]]
+def section(result: Result, bench: Bench) -> str:
+    """A file: its rows, then where they come from."""
+    columns = bench.columns or {name: name.replace("_", " ") for name in result.rows[0]}
+    rows = [[_readable(bench.words.get(row[name], row[name])) for name in columns] for row in result.rows]
+    facts = dict(result.facts)
+    machine = facts.pop("cpu", result.path.parent.name)
+    source = f"[`{result.path.name}`](../../{result.path.relative_to(REPOSITORY)})"
+    known = {"machine": machine, "results": source, "commit": facts.pop("commit", "unknown")}
+    known["command"] = f"`{facts.pop('command', 'unknown')}`"
+    return (
+        f"### {bench.title.partition(',')[0]}: {facts.get('adapter', machine)}\n\n"
+        + table(list(columns.values()), rows)
+        + "\n"
+        + table(["source", ""], [[name, value] for name, value in (known | facts).items()])
     )
+
+
+def summary() -> str:
+    """The table that the README shows, too."""
+    return table(
+        ["workload", "compared with", "its steps/s", "tightloop, steps/s", "ratio"],
+        [
+            [
+                line.workload,
+                line.peer,
+                _readable(theirs[line.theirs]),
+                _readable(ours[line.ours]),
+                f"**{ratio(line.file, line.ratio):.0f}×**",
+            ]
+            for line in SUMMARY
+            for theirs, ours in [(_row(line.file, line.their_row), _row(line.file, line.our_row))]
+        ],
+    )
+
+
+def ratio(file: str, where: dict[str, str]) -> float:
+    """A ratio of the summary: the one number of that row whose column says what."""
+    chosen = dict(where)
+    column = chosen.pop("column")
+    return float(_row(file, chosen)[column])
+
+
+def _row(file: str, chosen: dict[str, str]) -> dict[str, str]:
+    rows = [row for row in read(RESULTS / file).rows if chosen.items() <= row.items()]
+    if len(rows) != 1:
+        raise LookupError(f"benches/results/{file} has {len(rows)} rows with {chosen}; give what names one")
+    return rows[0]
+
+
+def _order(path: Path) -> tuple[int, str, str]:
+    names = list(BENCHES)
+    place = names.index(path.stem) if path.stem in names else len(names)
+    return place, path.stem, path.parent.name
 
 
 def _readable(cell: str) -> str:
     """Whole numbers in groups of three; anything else as it stands."""
     return f"{int(cell):,}" if cell.isdigit() and len(cell) > 4 else cell
+
+
+def readme() -> str:
+    """The README with the newest table."""
+    text, count = _MARKED.subn(lambda _: summary(), README.read_text())
+    if count != 1:
+        raise LookupError("README.md has no place for the table: put it between `<!-- speed: … -->` and `<!-- end -->`")
+    return text
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page())
+    README.write_text(readme())

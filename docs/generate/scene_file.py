@@ -15,44 +15,6 @@ from tightloop import _core
 
 CONFIG = "sim-daemon/src/config"
 
-INTRODUCTION = """# Scene file
-
-A scene is TOML: `scene.save(path)` writes it, `tl.Scene.load(path)` and `tightloop serve` read it. SI units, radians,
-z up, quaternions (x, y, z, w). Paths are relative to the file. A key that is unknown, of a wrong type or without
-sense here is refused with its line and what would be right, so nothing is ignored in silence.
-
-A whole one:
-
-```toml
-{whole}```
-"""
-WHOLE = """dt = 0.0020833333333333333      # 480 physics steps a second
-substeps = 8                    # in a control frame: 60 of them a second
-
-[[robot]]
-name = "arm"
-urdf = "examples/assets/fr3/fr3_franka_hand.urdf"
-pos = [-0.5, -0.5, 0.1]
-joint_q = [0, 0, 0, -2.4, 0, 2.4, 0.8, 0.04, 0.04]
-joint_target_ke = 2000          # one value is for all dofs
-joint_target_kd = 200
-
-[[shape]]
-name = "table"
-type = "box"
-half_extents = [0.4, 0.4, 0.05]
-pos = [0, -0.5, 0.05]
-
-[[body]]
-name = "cube"
-pos = [0, -0.35, 0.125]
-
-[[shape]]
-body = "cube"
-type = "box"
-half_extents = [0.025, 0.025, 0.025]
-density = 400
-"""
 # Beside `dt` and `substeps`, which every file has.
 HEAD = "dt = 0.002\nsubsteps = 8\n"
 
@@ -78,7 +40,7 @@ TABLES = (
         (),
         "",
         'gravity = [0, 0, -3.7]\nparams = ["shape_mu"]\ncontacts_max = 16\n',
-        "Then come the tables below.",
+        "The tables below follow these keys.",
     ),
     Table(
         "[solver]",
@@ -126,7 +88,7 @@ TABLES = (
         '[[site]]\nname = "a"\n',
         '[[robot]]\nname = "arm"\nurdf = "examples/assets/fr3/fr3_franka_hand.urdf"\n\n'
         '[[site]]\nname = "tcp"\nbody = "arm/fr3_hand"\npos = [0, 0, 0.1034]\n',
-        "Fields `site_q`, `site_qd`, `gyro`, `accelerometer` and `site_inverse_jacobian` are of sites.",
+        "Sites give the fields `site_q`, `site_qd`, `gyro`, `accelerometer` and `site_inverse_jacobian`.",
     ),
     Table(
         "[[contact_sensor]]",
@@ -137,7 +99,7 @@ TABLES = (
         '[[shape]]\nname = "ground"\ntype = "plane"\n\n[[body]]\nname = "foot"\npos = [0, 0, 0.1]\n\n'
         '[[shape]]\nbody = "foot"\ntype = "sphere"\nradius = 0.05\n\n'
         '[[contact_sensor]]\nname = "step"\nof = "foot"\nagainst = "ground"\n',
-        "The field `contact_sensor` is of these.",
+        "The field `contact_sensor` holds their forces.",
     ),
     Table(
         "[randomize]",
@@ -150,7 +112,7 @@ TABLES = (
         "[randomize.body_q]\ncube = { x = { uniform = [-0.05, 0.05] }, yaw = { normal = [0, 0.3] } }\n\n"
         "[randomize.params]\nshape_mu = { ground = { uniform = [0.2, 1.0] } }\n",
         "A distribution is `{ uniform = [low, high] }` or `{ normal = [mean, standard deviation] }`. "
-        "What is drawn depends on seed, world and episode alone; parameters with a range vary from world to world.",
+        "Draws depend only on seed, world and episode. Parameters with a range vary between worlds.",
     ),
 )
 # Words that a key may be, and which key of which table.
@@ -196,9 +158,9 @@ def words(source: str, enum: str) -> list[rust.Item]:
     return rust.listing(f"{CONFIG}/{source}", enum).items
 
 
-def page() -> str:
-    """The page."""
-    parts = [INTRODUCTION.format(whole=WHOLE)]
+def parts() -> dict[str, str]:
+    """Parts of the page `scene-file.md`."""
+    texts = list[str]()
     for shown in TABLES:
         struct = rust.listing(f"{CONFIG}/{shown.source}", shown.struct)
         defaults = _defaults(shown)
@@ -207,13 +169,13 @@ def page() -> str:
             for key in struct.items
             if not key.type.startswith("Vec<") or not key.type.endswith("Table>")  # tables of their own
         ]
-        parts.append(f"## {shown.heading}\n\n{struct.doc} {shown.text}\n")
-        parts.append(table(["key", "type", "left out", "what it is"], rows))
+        texts.append(f"## {shown.heading}\n\n{struct.doc} {shown.text}\n")
+        texts.append(table(["key", "type", "default", "meaning"], rows))
         for source, enum, heading, key in WORDS:
             if heading == shown.heading:
-                parts.append(table([key, "what it is"], [[f"`{word.name}`", word.doc] for word in words(source, enum)]))
-        parts.append(f"```toml\n{shown.example}```\n")
-    return "\n".join(parts)
+                texts.append(table([key, "meaning"], [[f"`{word.name}`", word.doc] for word in words(source, enum)]))
+        texts.append(f"```toml\n{shown.example}```\n")
+    return {"tables": "\n".join(texts)}
 
 
 def _type(type_: str) -> str:
@@ -227,7 +189,7 @@ def _default(key: rust.Item, struct: str, defaults: dict[str, Any]) -> tuple[str
     """What a key is that is left out, and its meaning without that."""
     said = re.fullmatch(r"(.*); left out, (.*?)( \[[^\]]*\])?\.", key.doc)
     if "default" not in key.serde and "default" not in struct:
-        return "needed", key.doc
+        return "required", key.doc
     if key.name in defaults:
         value = defaults[key.name]
         return "its defaults" if isinstance(value, dict) else f"`{json.dumps(value)}`", key.doc

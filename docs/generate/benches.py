@@ -1,0 +1,332 @@
+"""Words of the performance page: what each bench measures, which columns stand on the page, what to keep in mind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+INTRODUCTION = """# Performance
+
+This page holds every benchmark number of the project. Each table is a file of `benches/results`. The rows below a
+table name its machine, commit and command.
+
+- A *step* is one physics step of one world. Rates add up all worlds.
+- A *ratio* is the median over paired runs: both sides take turns in one run. So it can differ slightly from the
+  quotient of the two rates.
+- *Identical commands*: every world gets the same command. *Independent commands*: every world gets its own.
+- `asked` columns hold the project's goals. A row can miss its goal.
+- `–` means that a value was not measured, or that no goal exists.
+- A commit that ends in `-dirty` had uncommitted changes.
+
+`make bench`, `make bench-env` and `make bench-gpu` measure your machine and write the same files.
+
+## Summary
+
+These rows use independent commands. The rows of MuJoCo compare one thread with one thread. In the rows of EnvPool and
+gymnasium, each side uses all four cores. The first two rows come from a 2-core machine, the others from a 4-core
+machine.
+
+- **Precision differs.** MuJoCo computes in float64, one world at a time. tightloop computes in float32, with 16 worlds
+  in one AVX-512 register.
+- **Hulls differ.** MuJoCo keeps all vertices of a mesh's convex hull. tightloop keeps at most 64.
+- **EnvPool's scene is lighter.** Of its arm, only the hand and the fingers collide. Its solver stops after 5
+  iterations.
+- **mjbatch is missing.** The project has no measurement of it yet.
+"""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """One bench on the page.
+
+    Attributes:
+        title: Heading of its section.
+        text: What it measures, and its caveats.
+        columns: Columns of the file that are shown, with their headings; all where it is empty.
+        words: Cells of the file, and what the page says for them.
+    """
+
+    title: str
+    text: str
+    columns: dict[str, str] = field(default_factory=dict)
+    words: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A row of the summary: a file, the row of each side, their columns, and where the ratio stands."""
+
+    workload: str
+    peer: str
+    file: str
+    their_row: dict[str, str]
+    our_row: dict[str, str]
+    theirs: str
+    ours: str
+    ratio: dict[str, str]
+
+
+def _peers(workload: str, demo: str) -> Line:
+    row = {"demo": demo, "commands": "own"}
+    theirs, ours = row | {"side": "MuJoCo C rollout"}, row | {"side": "tightloop, daemon and Python"}
+    rate = "median_steps_per_s"
+    place = "amd-epyc-2-cores/peers.csv"
+    return Line(workload, _ROLLOUT, place, theirs, ours, rate, rate, ours | {"column": "median_ratio"})
+
+
+def _beside(workload: str, file: str, row: dict[str, str]) -> Line:
+    ratio = row | {"column": "median_ratio"}
+    return Line(workload, _ROLLOUT, file, row, row, "mujoco_steps_per_s", "tightloop_steps_per_s", ratio)
+
+
+def _environments(peer: str, side: str) -> Line:
+    theirs, rate = {"side": side}, "physics_steps_per_s"
+    ratio = theirs | {"column": "physics_ratio"}
+    file = "amd-epyc-4-cores/env.csv"
+    return Line("FrankaPickCube, random actions", peer, file, theirs, {"side": "tightloop"}, rate, rate, ratio)
+
+
+_ROLLOUT = "MuJoCo C 3.17, `rollout`"
+_CONTACTS = "amd-epyc-4-cores/contacts.csv"
+SUMMARY = (
+    _peers("FR3 arm, position targets, no contacts", "target"),
+    _peers("FR3 arm, torques, no contacts", "torque"),
+    _beside("FR3 arm, torques, above its table", _CONTACTS, {"demo": "torque", "worlds_alike": "no"}),
+    _beside("FR3 arm grasps a cube", _CONTACTS, {"demo": "grasp", "worlds_alike": "no"}),
+    _beside("FR3 arm and cube, random targets", _CONTACTS, {"demo": "random", "worlds_alike": "no"}),
+    _beside("Quadruped, 18 dofs, no contacts", "amd-epyc-4-cores/legged.csv", {"robot": "quadruped"}),
+    _environments("EnvPool 1.2.5, `PandaPickCube-v1`", "envpool PandaPickCube-v1"),
+    _environments("gymnasium 1.2.2, `AsyncVectorEnv` over MuJoCo C", "gymnasium AsyncVectorEnv, MuJoCo C"),
+)
+
+_COMMANDS = {"one": "identical", "own": "independent", "yes": "identical", "no": "independent"}
+_BESIDE_MUJOCO = {
+    "mujoco_steps_per_s": "MuJoCo steps/s",
+    "tightloop_steps_per_s": "tightloop steps/s",
+    "median_ratio": "ratio",
+    "asked_ratio": "asked",
+}
+
+BENCHES = {
+    "peers": Bench(
+        "Arm without contacts, beside MuJoCo C on one thread",
+        """The bench runs the two demos of the lesson. `sixteen` (AVX-512) and `eight` (AVX2) are worlds per register.
+
+- Both sides use one model, one time step, one solver and the same commands.
+- Over the 3 s of the target demo, tightloop stays within 2·10⁻⁶ rad of MuJoCo. Rounding MuJoCo's own state to float32
+  moves it as far. `tests/python/test_newton_lesson.py` checks this.
+""",
+        {
+            "demo": "demo",
+            "commands": "commands",
+            "side": "side",
+            "lanes": "lanes",
+            "precision": "precision",
+            "worlds": "worlds",
+            "median_steps_per_s": "steps/s",
+            "median_ratio": "ratio",
+        },
+        _COMMANDS,
+    ),
+    "contacts": Bench(
+        "Arm with contacts, beside MuJoCo C on one thread",
+        """The arm is the published FR3 with its meshes as convex hulls. The demos:
+
+- `torque`: recorded torques above a table
+- `grasp`: a recorded grasp of a cube
+- `random`: random targets around that grasp
+
+Keep in mind:
+
+- MuJoCo keeps all vertices of a hull, tightloop at most 64. So the two find different contact points on meshes.
+- The solver dominates under random targets. A SIMD register waits for the slowest of its 16 worlds, and each world can
+  need a dozen Newton iterations when contacts begin or slide.
+- For that reason, tightloop groups worlds with similar contacts in the same registers. The run on 2 cores predates this
+  (commit 2fca836), so its `random` row is slower.
+""",
+        {"demo": "demo", "worlds_alike": "commands", "worlds": "worlds", **_BESIDE_MUJOCO},
+        _COMMANDS,
+    ),
+    "legged": Bench(
+        "Floating robots, beside MuJoCo C on one thread",
+        """The project's own quadruped and humanoid, in `benches/robots`, have position targets, joint limits
+and damping, but no contacts. All commands are independent. `dofs` includes the 6 of the base.
+
+- Without dry friction, the solver runs only where a joint meets its limit. With it, the solver runs in every step.
+""",
+        {"robot": "robot", "dofs": "dofs", "worlds": "worlds", **_BESIDE_MUJOCO},
+    ),
+    "round_trip": Bench(
+        "Latency of one world",
+        """The time of one control frame of 8 physics steps, for one world on one thread.
+
+- Each side had a core of its own. The time grows where another program uses one of the two cores.
+""",
+        {"side": "side", "p50_us": "median [µs]", "p99_us": "99 % [µs]", "p999_us": "99.9 % [µs]"},
+    ),
+    "env": Bench(
+        "Environments, beside EnvPool and gymnasium",
+        """All sides step a pick-and-place task with random actions, on all cores, with NumPy in and out. Resets count.
+
+- The EnvPool task is its nearest one, not the same. Of its arm, only the hand and the fingers collide. Its solver stops
+  after 5 iterations.
+- The `AsyncVectorEnv` steps the same scene, observations and rewards over MuJoCo C.
+- `ring` is `copy=False`: results are views of a ring of buffers.
+- tightloop runs two groups of worlds. One steps while the other receives its actions.
+- Ratios compare physics steps per second by the clock. The last two columns compare them per second of CPU time.
+""",
+        {
+            "side": "side",
+            "environments": "environments",
+            "env_steps_per_s": "env steps/s",
+            "physics_steps_per_s": "physics steps/s",
+            "physics_ratio": "ratio",
+            "asked_physics_ratio": "asked",
+            "physics_steps_per_core_s": "physics steps per CPU second",
+            "physics_ratio_per_core_s": "ratio per CPU second",
+        },
+    ),
+    "groups": Bench(
+        "Two groups of worlds and a policy",
+        """One environment of 4096 worlds waits for the policy. Two groups of 2048 worlds do not: one steps while NumPy
+evaluates the policy of the other. Rates count control frames of single worlds.
+
+- The policy is also faster on half of the rows. So part of the gain is not due to the overlap.
+""",
+        {
+            "what": "what",
+            "worlds": "worlds",
+            "threads": "threads",
+            "policy_ms": "policy [ms]",
+            "one": "one group, steps/s",
+            "two_groups": "two groups, steps/s",
+            "ratio": "ratio",
+        },
+    ),
+    "tasks": Bench(
+        "Observations and rewards",
+        """The time that a task's Python functions take for one step of 4096 worlds, on one core.
+
+- The parts and their sum are the fastest of many runs. `median` is the median of the sum.
+""",
+        {
+            "task": "task",
+            "worlds": "worlds",
+            "observe_us": "observation [µs]",
+            "reward_us": "reward [µs]",
+            "success_us": "success [µs]",
+            "terminated_us": "termination [µs]",
+            "sum_us": "sum [µs]",
+            "median_us": "median [µs]",
+            "asked_us": "asked [µs]",
+        },
+    ),
+    "libraries": Bench(
+        "Training with libraries of reinforcement learning",
+        """Each run trains a policy on two cores. `load` is the load of other programs when a run began: these
+machines were busy.
+
+- CPU time is that of the trainer. It excludes the daemon.
+- Success and error come from an evaluation after training.
+""",
+        {
+            "library": "library",
+            "task": "task",
+            "seed": "seed",
+            "steps_M": "env steps [10⁶]",
+            "seconds": "time [s]",
+            "cpu_s": "CPU time [s]",
+            "success": "success",
+            "error_cm": "mean error [cm]",
+            "load": "load",
+        },
+    ),
+    "gpu": Bench(
+        "GPU backend",
+        """`benches/gpu/run.sh --adapter NAME --csv FILE` runs on any machine with a Vulkan driver.
+
+1. It compares the lesson and the grasp with MuJoCo's runs.
+2. It requires equal bits for 1, 7 and 4031 worlds.
+3. Only then it prints rates, beside those of the CPU.
+
+`make bench-gpu` measures MuJoCo-Warp and MJX too, where they are installed.
+
+- Every adapter below is named in the table of its source. Mesa's llvmpipe is a software driver: it runs on the CPU.
+- On llvmpipe, `device="gpu"` is slower than `device="cpu"` on the same cores. `GPU/CPU` shows the ratio.
+- `cold` is the first build of a model, `cached` a later build.
+""",
+        {
+            "scene": "scene",
+            "worlds": "worlds",
+            "dofs": "dofs",
+            "cold_s": "cold [s]",
+            "cached_s": "cached [s]",
+            "steps_per_s": "GPU steps/s",
+            "cpu_steps_per_s": "CPU steps/s",
+            "gpu_over_cpu": "GPU/CPU",
+            "frame_p50_ms": "frame, median [ms]",
+            "frame_p99_ms": "frame, 99 % [ms]",
+        },
+    ),
+    "viewer": Bench(
+        "Overhead of a viewer",
+        """A loop steps 4096 worlds as fast as it can. A viewer shows 256 of them. `±` is one standard error.
+
+- The browser's drawing is not part of the measurement: on real machines it runs on the GPU.
+""",
+        {
+            "what": "what",
+            "worlds": "worlds",
+            "step_ms": "step [ms]",
+            "slower_percent": "slower [%]",
+            "slower_error": "± [%]",
+            "asked_percent": "asked [%]",
+            "daemon_cost_percent": "daemon CPU [%]",
+            "daemon_cost_error": "± [%]",
+            "viewer_cpu_percent": "viewer CPU [%]",
+            "shown_hz": "shown [Hz]",
+        },
+    ),
+    "newcomer": Bench(
+        "From a clean checkout to the first picture",
+        """`make demo` with empty caches, and again in the same checkout. Rust and Python were installed before.
+""",
+        {
+            "caches": "caches",
+            "first_picture_s": "first picture [s]",
+            "whole_demo_s": "whole demo [s]",
+            "asked_s": "asked [s]",
+        },
+    ),
+    "snapshot": Bench(
+        "Snapshots",
+        """The time to keep and to restore 4096 worlds of the grasp, through the daemon and Python.
+""",
+        {
+            "what": "what",
+            "worlds": "worlds",
+            "megabytes": "size [MB]",
+            "median_ms": "median [ms]",
+            "p99_ms": "99 % [ms]",
+            "asked_ms": "asked [ms]",
+        },
+    ),
+    "recording": Bench(
+        "Overhead of a recorder",
+        """The CPU time of the daemon per frame of the target demo, with and without `tightloop record`.
+
+- The clock of the machine varies between runs. A negative overhead is such noise.
+""",
+        {
+            "what": "what",
+            "worlds": "worlds",
+            "daemon_cpu_ms": "daemon CPU [ms]",
+            "recorded_cpu_ms": "while recorded [ms]",
+            "cost_percent": "overhead [%]",
+            "asked_percent": "asked [%]",
+            "recorder_cpu_ms": "recorder CPU [ms]",
+            "frames": "frames",
+            "lost": "lost",
+            "kB_a_frame": "kB per frame",
+        },
+    ),
+}

@@ -1,0 +1,77 @@
+"""Pages whose tables repeat what the code says: the prose is in docs/pages, the tables are generated at each build.
+
+A page has ``<!-- generated: NAME -->`` where a part of its module belongs. What stands between ``<!-- forge -->`` and
+``<!-- end -->`` is for readers of the repository, and not on the site.
+"""
+
+from __future__ import annotations
+
+import os.path
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from generate import command_line, fields, protocol, scene_file, tasks
+from generate.rust import REPOSITORY
+
+DOCS = REPOSITORY / "docs/pages"
+#: The parts of each page, by their names.
+PARTS: dict[str, Callable[[], dict[str, str]]] = {
+    "command-line.md": command_line.parts,
+    "fields.md": fields.parts,
+    "protocol.md": protocol.parts,
+    "scene-file.md": scene_file.parts,
+    "tasks.md": tasks.parts,
+}
+
+_FORGE = re.compile(r"<!-- forge -->.*?<!-- end -->\n*", re.DOTALL)
+_PLACE = re.compile(r"<!-- generated: (\w+) -->")
+_LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(((?:\.\./)+[^)]+)\)")
+
+
+def page(name: str) -> str:
+    """A page with its generated parts.
+
+    Raises:
+        LookupError: The page lacks the place of a part, or has one that no part is for.
+    """
+    return fill(name, (DOCS / name).read_text())
+
+
+def fill(name: str, text: str) -> str:
+    """A page's text as the site has it; pages without generated parts lose what is for a forge."""
+    text = _FORGE.sub("", text)
+    parts = PARTS[name]() if name in PARTS else {}
+    places = set(_PLACE.findall(text))
+    if places != set(parts):
+        raise LookupError(f"docs/pages/{name} has places for {sorted(places)}; give it those for {sorted(parts)}")
+    return _PLACE.sub(lambda place: parts[place.group(1)].rstrip(), text)
+
+
+def inside(name: str, text: str) -> str:
+    """A page's text without links that leave docs/pages: pictures are taken along, of other links the words stay."""
+
+    def moved(match: re.Match[str]) -> str:
+        picture, words, target = match.groups()
+        if _leaves(name, target) is None:
+            return match.group()
+        up = "../" * name.count("/")
+        return f"![{words}]({up}pictures/{Path(target).name})" if picture else words
+
+    return _LINK.sub(moved, text)
+
+
+def pictures() -> list[Path]:
+    """Pictures of the repository that pages show from outside of docs/pages."""
+    found = set[Path]()
+    for path in DOCS.rglob("*.md"):
+        name = str(path.relative_to(DOCS))
+        shown = [target for picture, _, target in _LINK.findall(path.read_text()) if picture]
+        found |= {file for target in shown if (file := _leaves(name, target)) is not None}
+    return sorted(found)
+
+
+def _leaves(name: str, target: str) -> Path | None:
+    """The file that a link of a page leads to; None if it is in docs/pages."""
+    file = Path(os.path.normpath((DOCS / name).parent / target.partition("#")[0]))
+    return None if file.is_relative_to(DOCS) else file
