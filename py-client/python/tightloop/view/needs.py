@@ -6,8 +6,8 @@ from importlib import import_module
 
 from tightloop.errors import MissingLibrary
 
-#: How the extra ``view`` is installed. tightloop is on no package index.
-INSTALL = 'run `pip install "./py-client[view]"` in the repository, or `pip install "FILE.whl[view]"` with a built wheel'
+#: How to install the extra ``view``. tightloop-sim is on no package index, so the hint names local files.
+INSTALL = 'run `pip install "./py-client[view]"` in the repository, or `pip install "FILE.whl[view]"` from a wheel'
 
 
 def check(*modules: str) -> None:
