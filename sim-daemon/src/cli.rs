@@ -1,4 +1,4 @@
-//! The command line. Doc comments here are the help.
+//! The command line. Its doc comments are the help texts.
 
 mod pages;
 mod python;
@@ -14,7 +14,7 @@ use crate::config::MeshOptions;
 use crate::error::DaemonError;
 use crate::{devices, inspect, recording, session};
 
-/// Batched robot simulation, served over shared memory.
+/// Step many robot worlds at once, and serve them over shared memory.
 #[derive(Debug, Parser)]
 #[command(name = "tightloop", version, propagate_version = true)]
 struct Cli {
@@ -24,42 +24,44 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Keep the worlds of a scene and serve them to clients until stopped.
+    /// Run the worlds of a scene and serve them to clients until stopped.
     ///
-    /// Prints one line of JSON when clients may attach: {"ready": {…}}, or {"error": {"kind": …, "message": …}}.
+    /// Prints one line of JSON when clients can attach: {"ready": {…}}, or {"error": {"kind": …, "message": …}}.
     ///
     /// Example: tightloop serve scene.toml --worlds 4096 --name franka
     Serve(Box<Serve>),
-    /// Show what a URDF file means: its tree, dofs, masses, limits, what was ignored or mended, and a picture.
+    /// Show what a URDF file means: tree, dofs, masses, limits, repairs, and a picture.
     ///
-    /// The picture shows the collision shapes; it is written as ROBOT.png into the working folder.
+    /// Also lists what the reader ignored. The picture shows the collision shapes and goes to ROBOT.png in the working
+    /// folder.
     ///
     /// Example: tightloop inspect robot.urdf --package-dir ~/robots
     Inspect(Inspect),
-    /// Write what a daemon does into a file, from which `replay` does it again: commands, resets, parameters, digests of frames.
+    /// Record every command that a daemon executes into a file for `replay`.
     ///
-    /// Runs until stopped (Ctrl-C), or until the daemon ends. The daemon never waits for it: what is lost is a gap, and is told.
+    /// Writes states, commands, resets, parameters and digests of frames until Ctrl-C or until the daemon ends. The
+    /// daemon never waits for the recorder. Lost entries become a gap in the file, and the recorder reports it.
     ///
     /// Example: tightloop record franka run.tlrec --frames 10000
     Record(Record),
-    /// Run a recording again, without a daemon, and compare every frame bit for bit.
+    /// Replay a recording without a daemon, and compare every frame bit for bit.
     ///
-    /// Exit code 0: all frames are equal. 1: the first frame (counted from 0), world and field that differ are named, or a gap, where it stops. 2: the
-    /// file cannot be replayed.
+    /// Exit code 0: all frames are equal. Exit code 1: a frame differs, or the recording has a gap. The message names
+    /// the first frame (counted from 0), world and field. Exit code 2: the file cannot be replayed.
     ///
-    /// The robot files and meshes of the scene are not in the recording: they must be where they were, and as they were.
+    /// A recording does not contain robot files and meshes. They must be unchanged and at the same place.
     ///
     /// Example: tightloop replay run.tlrec
     Replay(Replay),
-    /// List the GPUs of this machine, those that software plays last, and what fits on each.
+    /// List the GPUs of this machine, software drivers last, and how many worlds fit on each.
     ///
     /// Example: tightloop devices
     Devices,
-    /// List the daemons that run, one name a line.
+    /// List the running daemons, one name per line.
     ///
     /// Example: tightloop list
     List,
-    /// Stop a daemon, with all of its groups, and wait until it is gone.
+    /// Stop a daemon with all its groups, and wait until it has ended.
     ///
     /// Example: tightloop stop franka
     Stop {
@@ -68,7 +70,7 @@ enum Command {
     },
     #[command(flatten)]
     Python(python::Python),
-    /// Print what a shell needs to complete command lines.
+    /// Print the completion script of a shell.
     ///
     /// Example: tightloop completions bash > ~/.local/share/bash-completion/completions/tightloop
     Completions {
@@ -79,7 +81,7 @@ enum Command {
     ///
     /// Example: tightloop man ~/.local/share/man/man1 && man tightloop-serve
     Man {
-        /// The folder; it is made if it is not there.
+        /// Folder of the manual pages; created if it is missing.
         folder: Option<PathBuf>,
     },
 }
@@ -87,22 +89,22 @@ enum Command {
 /// Arguments of `serve` as given; `session` checks them.
 #[derive(Debug, Args)]
 pub(crate) struct Serve {
-    /// Scene file in TOML; `-` reads it from standard input, with paths relative to the working folder.
+    /// Scene file in TOML; `-` reads standard input, with paths relative to the working folder.
     pub(crate) scene: PathBuf,
 
     /// Number of worlds.
     #[arg(long, default_value_t = 1)]
     pub(crate) worlds: u64,
 
-    /// Groups that the worlds are split into, which step independently; clients attach to NAME.0, NAME.1, ….
+    /// Number of groups of worlds that step independently; clients attach to NAME.0, NAME.1, ….
     #[arg(long, default_value_t = 1)]
     pub(crate) groups: u64,
 
-    /// Where the physics runs: cpu, gpu, or auto for a GPU if there is one and the worlds are many, else the CPU.
+    /// Where the physics runs: cpu, gpu, or auto for a hardware GPU from 1024 worlds on, and the CPU otherwise.
     #[arg(long, default_value = "auto")]
     pub(crate) device: String,
 
-    /// Which GPU: its number or part of its name, as `devices` lists them; the first if left out.
+    /// Which GPU: its number or part of its name, as `devices` lists them; default: the first.
     #[arg(long)]
     pub(crate) adapter: Option<String>,
 
@@ -110,7 +112,7 @@ pub(crate) struct Serve {
     #[arg(long, default_value = "tightloop")]
     pub(crate) name: String,
 
-    /// Threads of a step, shared by all groups; one a core if left out.
+    /// Threads of a step, shared by all groups; default: one per core.
     #[arg(long)]
     pub(crate) threads: Option<usize>,
 
@@ -118,47 +120,48 @@ pub(crate) struct Serve {
     #[arg(long, default_value = "f32")]
     pub(crate) precision: String,
 
-    /// Fields that frames carry, separated by commas; time, step, status and contacts_left_out come with every frame.
+    /// Fields in each frame, separated by commas; time, step, status and contacts_left_out are always there.
     #[arg(long, value_delimiter = ',', default_value = "joint_q,joint_qd,body_q")]
     pub(crate) fields: Vec<String>,
 
-    /// Parameters that vary from world to world and may be written, besides those of the scene, separated by commas.
+    /// Parameters that clients can write for each world, besides those of the scene, separated by commas.
     #[arg(long, value_delimiter = ',')]
     pub(crate) params: Vec<String>,
 
-    /// Largest |joint_q| of a world [rad or m]; one beyond it is frozen at its state before that frame.
+    /// Largest |joint_q| [rad or m]; a world beyond it is frozen at its state before that frame.
     #[arg(long, value_name = "Q", default_value_t = f64::INFINITY)]
     pub(crate) joint_q_max: f64,
 
-    /// Largest |joint_qd| of a world [rad/s or m/s], likewise.
+    /// Largest |joint_qd| [rad/s or m/s]; a world beyond it is frozen at its state before that frame.
     #[arg(long, value_name = "QD", default_value_t = f64::INFINITY)]
     pub(crate) joint_qd_max: f64,
 
-    /// What becomes of a frozen world: freeze keeps it until it is reset, reset resets it before its next step.
+    /// What happens to a faulted world: freeze keeps it until a reset, reset resets it before its next step.
     #[arg(long, default_value = "freeze")]
     pub(crate) on_fault: String,
 
-    /// What becomes of a command that is NaN or infinite in some world: refuse refuses it for all worlds, freeze freezes that world.
+    /// What happens to a command that is NaN or infinite: refuse rejects it for all worlds, freeze freezes the worlds
+    /// concerned.
     #[arg(long, default_value = "refuse")]
     pub(crate) on_nan: String,
 
-    /// What is drawn of a world depends on: world for its number and its seed, seed for its seed alone.
+    /// What random draws depend on: world for the index and the seed of a world, seed for the seed alone.
     #[arg(long, default_value = "world")]
     pub(crate) draws: String,
 
-    /// Frames that a client may hold at once.
+    /// Most frames that a client can hold at once.
     #[arg(long, default_value_t = 4)]
     pub(crate) frames_held: usize,
 
-    /// Worlds that observers see: the first ones.
+    /// Number of worlds that observers see, from the first on.
     #[arg(long, default_value_t = 256)]
     pub(crate) watch_worlds: usize,
 
-    /// End when this process, our parent, ends.
+    /// End when this parent process ends.
     #[arg(long, value_name = "PID")]
     pub(crate) parent: Option<u32>,
 
-    /// Append news to this file instead of telling them on stderr.
+    /// Append log messages to this file instead of stderr.
     #[arg(long, value_name = "FILE")]
     pub(crate) log: Option<PathBuf>,
 }
@@ -172,19 +175,19 @@ pub(crate) struct Record {
     /// File to write, such as run.tlrec.
     pub(crate) out: PathBuf,
 
-    /// Fields of the daemon's frames to write whole, separated by commas, so that a replay tells both numbers.
+    /// Fields to write as whole arrays, separated by commas; a replay that differs then prints both values.
     #[arg(long, value_delimiter = ',')]
     pub(crate) fields: Vec<String>,
 
-    /// End after so many frames.
+    /// Stop after this many frames.
     #[arg(long)]
     pub(crate) frames: Option<u64>,
 
-    /// End after so many seconds.
+    /// Stop after this many seconds.
     #[arg(long)]
     pub(crate) seconds: Option<f64>,
 
-    /// Overwrite the file if it is there.
+    /// Overwrite an existing file.
     #[arg(long)]
     pub(crate) force: bool,
 }
@@ -195,11 +198,11 @@ pub(crate) struct Replay {
     /// File that `record` wrote.
     pub(crate) file: PathBuf,
 
-    /// Threads of a step; one a core if left out. The bits are the same with any number.
+    /// Threads of a step; default: one per core. Any number gives the same bits.
     #[arg(long)]
     pub(crate) threads: Option<usize>,
 
-    /// End after so many frames.
+    /// Stop after this many frames.
     #[arg(long)]
     pub(crate) frames: Option<u64>,
 }
@@ -210,31 +213,31 @@ pub(crate) struct Inspect {
     /// URDF file of the robot.
     pub(crate) urdf: PathBuf,
 
-    /// Let the root link move freely.
+    /// Free the base: let the root link move.
     #[arg(long)]
     pub(crate) floating: bool,
 
-    /// Refuse an inertia that no body can have, instead of balancing it.
+    /// Refuse an inertia that no rigid body can have, instead of balancing it.
     #[arg(long)]
     pub(crate) strict: bool,
 
-    /// Folder that holds the packages of package:// paths; may be given several times.
+    /// Folder that holds the packages of package:// paths; can be repeated.
     #[arg(long = "package-dir", value_name = "DIR")]
     pub(crate) package_dirs: Vec<PathBuf>,
 
-    /// Most vertices of the convex hull of a collision mesh.
+    /// Most vertices of a collision mesh's convex hull.
     #[arg(long, value_name = "COUNT", default_value_t = MeshOptions::default().max_hull_vertices)]
     pub(crate) mesh_max_hull_vertices: usize,
 
-    /// Make several convex hulls of a concave collision mesh.
+    /// Split a concave collision mesh into several convex hulls.
     #[arg(long)]
     pub(crate) convex_decomposition: bool,
 
-    /// Draw the convex hulls that stand for meshes in contacts, not the meshes.
+    /// Draw the convex hulls that collide, instead of the meshes.
     #[arg(long)]
     pub(crate) hulls: bool,
 
-    /// Joint positions of the picture, one a coordinate [rad or m], separated by commas; 0 if left out.
+    /// Joint positions of the picture [rad or m], one per coordinate, separated by commas; default: 0.
     #[arg(
         long,
         value_name = "Q",
@@ -243,11 +246,11 @@ pub(crate) struct Inspect {
     )]
     pub(crate) joint_q: Option<Vec<f64>>,
 
-    /// Print frames, inertias and the places of shapes, too.
+    /// Also print frames, inertias and positions of shapes.
     #[arg(long)]
     pub(crate) long: bool,
 
-    /// Print JSON, and write no picture unless --png says where.
+    /// Print JSON; write a picture only with --png.
     #[arg(long, conflicts_with = "long")]
     pub(crate) json: bool,
 
@@ -260,7 +263,7 @@ pub(crate) struct Inspect {
     pub(crate) no_png: bool,
 }
 
-/// Runs a command line; the exit code is 0 done, 1 failed, 2 misused.
+/// Runs a command line. Exit codes: 0 for success, 1 for failure, 2 for wrong usage.
 pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
     let cli = match Cli::try_parse_from(args) {
         Ok(cli) => cli,

@@ -1,5 +1,5 @@
-//! Commands that the Python package carries out, before this command line sees them. They stand here for its help, its
-//! completions and its manual; who calls them here has no Python package. tests/python/test_shells.py compares both.
+//! Commands that the Python package runs before this command line sees them. They are here for help, completions and
+//! manual pages. Without the Python package they end with an error. tests/python/test_shells.py compares both.
 
 use std::net::IpAddr;
 use std::path::PathBuf;
@@ -11,15 +11,15 @@ use crate::error::DaemonError;
 /// A command of the Python package.
 #[derive(Debug, Subcommand)]
 pub(super) enum Python {
-    /// Show a daemon's worlds, or a recording, in the browser.
+    /// Show the worlds of a daemon or a recording in the browser.
     ///
     /// Example: tightloop view franka --worlds 64
     View(View),
-    /// Make a picture, a film or a web page of a daemon's worlds or of a recording, without a display.
+    /// Make a picture, a film or a web page of a daemon or a recording, without a display.
     ///
     /// Example: tightloop film run.tlrec run.mp4 --worlds 16
     Film(Film),
-    /// Tour what there is: torques, targets, a grasp, many worlds, a trained policy.
+    /// Tour the features: torques, targets, a grasp, many worlds, a trained policy.
     ///
     /// Example: tightloop demo --view
     Demo(Demo),
@@ -27,15 +27,15 @@ pub(super) enum Python {
 
 #[derive(Debug, Args)]
 pub(super) struct View {
-    /// Name of a daemon, or a file that `record` wrote.
+    /// Name of a daemon, or a recording.
     #[arg(value_name = "NAME|FILE.tlrec")]
     target: PathBuf,
 
-    /// Port of the page; the next free one if it is taken.
+    /// Port of the page; the next free port if it is taken.
     #[arg(long, default_value_t = 8080)]
     port: u16,
 
-    /// Address to listen on; 0.0.0.0 lets other machines drive, too.
+    /// Address to listen on; 0.0.0.0 also lets other machines control the worlds.
     #[arg(long, default_value = "127.0.0.1")]
     host: IpAddr,
 
@@ -50,26 +50,26 @@ pub(super) struct View {
 
 #[derive(Debug, Args)]
 pub(super) struct Film {
-    /// Name of a daemon, or a file that `record` wrote.
+    /// Name of a daemon, or a recording.
     #[arg(value_name = "NAME|FILE.tlrec")]
     source: PathBuf,
 
-    /// What to write: a .png, .gif, .mp4 or .html file, or a folder of .png files.
+    /// Output: a .png, .gif, .mp4 or .html file, or a folder of .png files.
     out: PathBuf,
 
-    /// When to begin; of a .png, when it is taken [s].
+    /// Start of the film, or time of a .png [s].
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     at: f64,
 
-    /// How long: of a daemon as time passes, 5 if left out; of a recording simulated time, all if left out.
+    /// Length of the film [s]; default: 5 s of real time of a daemon, or the whole recording.
     #[arg(long)]
     seconds: Option<f64>,
 
-    /// Pictures a second.
+    /// Pictures per second.
     #[arg(long, default_value_t = 30.0)]
     fps: f64,
 
-    /// Seconds of the run a second of film.
+    /// Simulated seconds per second of film.
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
 
@@ -77,58 +77,58 @@ pub(super) struct Film {
     #[arg(long, value_name = "WxH", default_value = "640x480")]
     size: String,
 
-    /// How many worlds, on a grid.
+    /// Number of worlds to show, on a grid.
     #[arg(long, default_value_t = 1)]
     worlds: usize,
 
-    /// The one that is seen alone, or followed.
+    /// World to show alone, or to follow.
     #[arg(long, default_value_t = 0)]
     world: usize,
 
-    /// Where it is seen from; follow goes with the world.
+    /// Camera position; follow moves with the world.
     #[arg(long, default_value = "three-quarter", value_parser = ["three-quarter", "front", "side", "top", "follow"])]
     camera: String,
 
-    /// Show the shapes that touch, not what robots look like.
+    /// Show collision shapes instead of visuals.
     #[arg(long)]
     collision: bool,
 
-    /// Leave contact points and forces out.
+    /// Hide contact points and forces.
     #[arg(long)]
     no_contacts: bool,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct Demo {
-    /// Only this stop, such as grasp; may be given several times.
+    /// Show only this stop, such as grasp; can be repeated.
     #[arg(long = "stop", value_name = "NAME")]
     stops: Vec<String>,
 
-    /// How long to stay at each stop; one round if left out.
+    /// Seconds at each stop; default: one round.
     #[arg(long)]
     seconds: Option<f64>,
 
-    /// Worlds of every stop.
+    /// Number of worlds of every stop.
     #[arg(long)]
     worlds: Option<usize>,
 
-    /// Show it in the browser, in real time.
+    /// Show the tour in the browser, in real time.
     #[arg(long)]
     view: bool,
 
-    /// Port of the page; the next free one if it is taken.
+    /// Port of the page; the next free port if it is taken.
     #[arg(long, default_value_t = 8080)]
     port: u16,
 
-    /// Folder of the pictures.
+    /// Folder for the pictures.
     #[arg(long, default_value = "demo")]
     out: PathBuf,
 
-    /// Where the physics runs: cpu, gpu, or auto.
+    /// Where the physics runs: cpu, gpu or auto.
     #[arg(long, default_value = "auto")]
     device: String,
 
-    /// Most threads a step may use; all cores if left out.
+    /// Most threads of a step; default: all cores.
     #[arg(long)]
     threads: Option<usize>,
 }
