@@ -15,7 +15,7 @@ _EPILOG = """stops:
   {stops}
 
 examples:
-  tightloop demo                           all stops, a line and a picture each
+  tightloop demo                           all stops, with a line and a picture each
   tightloop demo --view                    the same in the browser, in real time
   tightloop demo --stop grasp --seconds 60 --view"""
 
@@ -26,21 +26,23 @@ def parser() -> argparse.ArgumentParser:
     stops = "\n  ".join(f"{stop.name:<{width}}{worlds} {stop.title}" for stop, worlds in STOPS)
     made = argparse.ArgumentParser(
         prog="tightloop demo",
-        description="Show what tightloop does, stop by stop: a line of numbers and a picture each.",
+        description="Tour the features of tightloop. Each stop prints a line of numbers and writes a picture.",
         epilog=_EPILOG.format(stops=stops),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     names = [stop.name for stop, _ in STOPS]
     made.add_argument(
-        "--stop", action="append", choices=names, metavar="NAME", help="only this one; may be given again"
+        "--stop", action="append", choices=names, metavar="NAME", help="show only this stop; can be repeated"
     )
-    made.add_argument("--seconds", type=_positive, help="how long to stay at each stop; one round if left out")
-    made.add_argument("--worlds", type=_count, help="worlds of every stop; those below if left out")
-    made.add_argument("--view", action="store_true", help="show it in the browser, in real time")
-    made.add_argument("--port", type=_count, default=8080, help="port of the page; the next free one if it is taken")
-    made.add_argument("--out", type=Path, default=Path("demo"), help="folder of the pictures (default demo)")
-    made.add_argument("--device", default="auto", help="cpu, gpu, or auto")
-    made.add_argument("--threads", type=_count, help="most threads a step may use; all cores if left out")
+    made.add_argument("--seconds", type=_positive, help="seconds at each stop (default: one round)")
+    made.add_argument("--worlds", type=_count, help="number of worlds of every stop (default: see below)")
+    made.add_argument("--view", action="store_true", help="show the tour in the browser, in real time")
+    made.add_argument(
+        "--port", type=_count, default=8080, help="port of the page; the next free port if it is taken (default 8080)"
+    )
+    made.add_argument("--out", type=Path, default=Path("demo"), help="folder for the pictures (default demo)")
+    made.add_argument("--device", default="auto", help="where the physics runs: cpu, gpu or auto (default auto)")
+    made.add_argument("--threads", type=_count, help="most threads of a step (default: all cores)")
     return made
 
 

@@ -125,7 +125,7 @@ class Torque(_Recorded):
     """Torques, and nothing else."""
 
     name = "torque"
-    title = "arms that torques push, each by another amount"
+    title = "arms pushed by torques, each with its own amplitude"
     # an arm on which nothing but torques act is chaos, and rounding grows: f32 and f64 part after a second
     until = 60
 
@@ -161,7 +161,7 @@ class Grasp(_Recorded):
     """A cube, grasped and lifted."""
 
     name = "grasp"
-    title = "arms that lift a cube, wherever in 5 mm it stands and however it rubs"
+    title = "arms that lift a cube with randomized position and friction"
     params = ("shape_mu",)
     # frames until the fingers close: from there on the cube's slips decide
     until = 90
@@ -197,7 +197,7 @@ class Many(Stop):
     """Thousands of worlds in one daemon."""
 
     name = "worlds"
-    title = "arms that nod in a wave, one daemon for all"
+    title = "arms in one daemon, moving in a wave"
     shown = 256
 
     def __init__(self, worlds: int) -> None:
@@ -222,7 +222,7 @@ class Trained(Stop):
     """A policy that was learned here."""
 
     name = "policy"
-    title = "arms that take a cube to a place in the air, by a policy that learned it in 35 minutes"
+    title = "arms that pick and place a cube, by a policy trained in 35 minutes"
     frames = 50
 
     def open(self, name: str | None, device: str, threads: int | None) -> None:

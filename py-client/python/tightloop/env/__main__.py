@@ -35,24 +35,28 @@ def arguments_of(
 def main() -> int:
     """Serve a task until stopped; returns the exit code of ``tightloop serve``."""
     parser = argparse.ArgumentParser(
-        prog="python -m tightloop.env", description="Environments in a daemon of their own."
+        prog="python -m tightloop.env", description="Run environments in a daemon of their own."
     )
     serve = parser.add_subparsers(required=True).add_parser(
         "serve",
-        help="keep the worlds of a task for trainers to join, and outlive them",
+        help="run the worlds of a task for trainers that come and go",
         epilog="Example: python -m tightloop.env serve FrankaReach --num-envs 2048 --name reach; then "
         'VectorEnv("FrankaReach", daemon="reach"). `tightloop stop reach` ends it.',
     )
-    serve.add_argument("task", help=f"{', '.join(TASKS)}, or a class of your own, FILE.py:CLASS")
+    serve.add_argument("task", help=f"{', '.join(TASKS)}, or your own class as FILE.py:CLASS")
     serve.add_argument("--num-envs", type=int, default=1, help="number of worlds (default 1)")
-    serve.add_argument("--name", required=True, help="name under which trainers find it")
+    serve.add_argument("--name", required=True, help="name under which trainers find the daemon")
     serve.add_argument(
-        "--option", action="append", default=[], metavar="NAME=VALUE", help="of the task: control=torque"
+        "--option",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="option of the task, such as control=torque; can be repeated",
     )
-    serve.add_argument("--device", default="auto", help="as launch has it, such as gpu (default auto)")
+    serve.add_argument("--device", default="auto", help="where the physics runs: cpu, gpu or auto (default auto)")
     serve.add_argument("--precision", default="f32", help="f32 or f64 (default f32)")
-    serve.add_argument("--threads", type=int, help="threads of a step; one a core if left out")
-    serve.add_argument("--render", action="store_true", help="for trainers that draw pictures (render_mode)")
+    serve.add_argument("--threads", type=int, help="threads of a step (default: one per core)")
+    serve.add_argument("--render", action="store_true", help="export the fields that trainers with a render_mode need")
     args = parser.parse_args()
     options = dict(option.partition("=")[::2] for option in args.option)
     extra = [

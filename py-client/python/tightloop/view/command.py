@@ -17,7 +17,7 @@ from tightloop.view import needs
 
 _WORLDS_MAX = 1024
 _EPILOG = """examples:
-  tightloop view franka                    look at the daemon `franka`, and drive it while nobody trains
+  tightloop view franka                    observe the daemon `franka`, and control it while nobody trains
   tightloop view run.tlrec --worlds 16     play a recording"""
 
 
@@ -25,16 +25,23 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     made = argparse.ArgumentParser(
         prog="tightloop view",
-        description="Show a running daemon, or a recording, in the browser. Ends with Ctrl-C.",
+        description="Show the worlds of a daemon or a recording in the browser. Stop with Ctrl-C.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    made.add_argument("target", metavar="NAME|FILE.tlrec", help="a daemon's name, or a recording")
-    made.add_argument("--port", type=_port, default=8080, help="port of the page; the next free one if it is taken")
+    made.add_argument("target", metavar="NAME|FILE.tlrec", help="name of a daemon, or a recording")
     made.add_argument(
-        "--host", type=_host, default="127.0.0.1", help="address to listen on; 0.0.0.0 lets other machines drive, too"
+        "--port", type=_port, default=8080, help="port of the page; the next free port if it is taken (default 8080)"
     )
-    made.add_argument("--worlds", type=_worlds, default=256, help=f"most worlds to show, up to {_WORLDS_MAX}")
+    made.add_argument(
+        "--host",
+        type=_host,
+        default="127.0.0.1",
+        help="address to listen on; 0.0.0.0 also lets other machines control the worlds (default 127.0.0.1)",
+    )
+    made.add_argument(
+        "--worlds", type=_worlds, default=256, help=f"most worlds to show, up to {_WORLDS_MAX} (default 256)"
+    )
     made.add_argument("--open", action="store_true", help="open the page in this machine's browser")
     made.add_argument("--parent", type=int, help=argparse.SUPPRESS)
     return made

@@ -12,36 +12,45 @@ from tightloop.errors import TightloopError
 from tightloop.view.cameras import PRESETS
 
 _EPILOG = """examples:
-  tightloop film franka out.mp4                           five seconds of the daemon `franka`
-  tightloop film run.tlrec run.gif --worlds 16 --fps 15   16 worlds of a recording, all of it
-  tightloop film run.tlrec at3.png --at 3 --camera side   one picture, 3 s after its begin
-  tightloop film run.tlrec run.html --seconds 10          to be turned and zoomed in a browser"""
+  tightloop film franka out.mp4                           5 s of the daemon `franka`
+  tightloop film run.tlrec run.gif --worlds 16 --fps 15   16 worlds, the whole recording
+  tightloop film run.tlrec at3.png --at 3 --camera side   one picture, 3 s after the start
+  tightloop film run.tlrec run.html --seconds 10          a page to rotate and zoom in a browser"""
 
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     made = argparse.ArgumentParser(
         prog="tightloop film",
-        description="Make pictures or a film of a running daemon, or of a recording, without a display. Ctrl-C ends.",
+        description="Make pictures or a film of a daemon or a recording, without a display. Stop with Ctrl-C.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    made.add_argument("source", metavar="NAME|FILE.tlrec", help="a daemon's name, or a recording")
-    made.add_argument("out", metavar="OUT", help="a file .png, .gif, .mp4 or .html, or a folder of PNG files")
+    made.add_argument("source", metavar="NAME|FILE.tlrec", help="name of a daemon, or a recording")
+    made.add_argument("out", metavar="OUT", help="a .png, .gif, .mp4 or .html file, or a folder of PNG files")
     made.add_argument(
-        "--at", type=float, metavar="SECONDS", help="when to begin; of a .png, when it is taken (default 0)"
+        "--at", type=float, metavar="SECONDS", help="start of the film, or time of a .png [s] (default 0)"
     )
     made.add_argument(
-        "--seconds", type=float, help="how long: of a daemon as time passes (default 5), of a recording simulated time"
+        "--seconds",
+        type=float,
+        help="length of the film [s] (default: 5 s of real time of a daemon, or the whole recording)",
     )
-    made.add_argument("--fps", type=float, default=30.0, help="pictures a second (default 30)")
-    made.add_argument("--speed", type=float, default=1.0, help="seconds of the run a second of film (default 1)")
-    made.add_argument("--size", type=_size, default=(640, 480), metavar="WxH", help="of the pictures (default 640x480)")
-    made.add_argument("--worlds", type=int, default=1, help="how many worlds, on a grid (default 1)")
-    made.add_argument("--world", type=int, default=0, help="the one that is seen alone, or followed (default 0)")
-    made.add_argument("--camera", choices=list(PRESETS), default="three-quarter", help="default three-quarter")
-    made.add_argument("--collision", action="store_true", help="show the shapes that touch, not what robots look like")
-    made.add_argument("--no-contacts", action="store_true", help="leave contact points and forces out")
+    made.add_argument("--fps", type=float, default=30.0, help="pictures per second (default 30)")
+    made.add_argument("--speed", type=float, default=1.0, help="simulated seconds per second of film (default 1)")
+    made.add_argument(
+        "--size", type=_size, default=(640, 480), metavar="WxH", help="size of the pictures (default 640x480)"
+    )
+    made.add_argument("--worlds", type=int, default=1, help="number of worlds to show, on a grid (default 1)")
+    made.add_argument("--world", type=int, default=0, help="world to show alone, or to follow (default 0)")
+    made.add_argument(
+        "--camera",
+        choices=list(PRESETS),
+        default="three-quarter",
+        help="camera position; follow moves with the world (default three-quarter)",
+    )
+    made.add_argument("--collision", action="store_true", help="show collision shapes instead of visuals")
+    made.add_argument("--no-contacts", action="store_true", help="hide contact points and forces")
     return made
 
 
