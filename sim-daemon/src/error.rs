@@ -116,7 +116,9 @@ pub enum DaemonError {
         problem: String,
     },
     /// A command of the Python package, where there is none.
-    #[error("`{command}` comes with the Python package: run `pip install \"./py-client[view]\"` in the repository")]
+    #[error(
+        "`{command}` comes with the Python package: run `pip install \"./py-client[view]\"` in the repository"
+    )]
     NeedsPython {
         /// The command.
         command: &'static str,
