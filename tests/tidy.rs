@@ -11,7 +11,15 @@ const LONGEST: usize = 500;
 const ORDER: [(&str, &[&str]); 2] = [
     (
         "sim-core/physics/src",
-        &["lane", "math", "constants", "arrays", "step", "compiled"],
+        &[
+            "lane",
+            "math",
+            "constants",
+            "arrays",
+            "step",
+            "schedule",
+            "compiled",
+        ],
     ),
     (
         "sim-core/engine/src",

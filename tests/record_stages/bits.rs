@@ -14,9 +14,8 @@ fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
     for case in cases() {
         let m = &case.m;
         let mut random = toy::Random(1);
-        let recordings: Vec<Option<(Recording, Recording, [Split; 2])>> = Stage::ALL
-            .iter()
-            .map(|&stage| {
+        let recordings: Vec<Option<(Recording, Recording, [Split; 2])>> = StageId::all()
+            .map(|stage| {
                 let recording = stage.is_needed(m).then(|| recorded_stage(m, stage))?;
                 let packed = recording.packed();
                 let splits = KERNEL_COSTS.map(|most| toy::in_kernels(&recording, most));
@@ -26,19 +25,11 @@ fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
         for n in 0..STATES {
             let mut block = case.random_state(|| random.unit());
             let mut memory = memory(m);
-            // poses belong to the state before it moves on
-            let last = [
-                Stage::Accelerations,
-                Stage::JointTorque,
-                Stage::Poses,
-                Stage::Velocities,
-                Stage::Sites,
-                Stage::Imu,
-                Stage::SiteInverse,
-                Stage::Integrate,
-            ];
-            for stage in needed(m, before_integrate()).chain(needed(m, &last)) {
-                let recorded = recordings[stage.number()].as_ref();
+            // outputs belong to the state before it moves on
+            let (moves, others): (Vec<_>, Vec<_>) =
+                needed(m).partition(|stage| stage.row().runs == Runs::Step);
+            for stage in others.into_iter().chain(moves) {
+                let recorded = recordings[stage.index()].as_ref();
                 let (recording, packed, splits) = recorded.expect("it is needed");
                 let what = format!("{}: {}", case.name, stage.name());
                 let inputs = gathered(&mut block, stage.reads());

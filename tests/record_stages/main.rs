@@ -9,17 +9,18 @@ mod shapes;
 mod toy;
 
 use cases::{Case, SUBSTEPS, Scalar, arm_and_cube, cases, every_joint, every_param, fr3};
-use sim_physics::arrays::{Block, Numbers, WorkSlot};
+use sim_physics::arrays::{Array, Block, Flat, Writer};
 use sim_physics::constants::Constants;
 use sim_physics::constants::contact::Cone;
 use sim_physics::constants::contact::PAIR_KINDS;
 use sim_physics::every_stage;
 use sim_physics::lane::memory::Cpu;
-use sim_physics::step::{STAGES, Stage};
+use sim_physics::schedule::step_stages;
+use sim_physics::step::{Runs, Stage, StageId};
 use sim_physics::times;
 use sim_record::wgsl::{ProgramOptions, wgsl};
 use sim_record::{Recorder, Recording};
-use stages_recorded::{RecordedWorlds, SCRATCH, SLOTS};
+use stages_recorded::RecordedWorlds;
 use std::time::Instant;
 
 /// Past this a GPU driver takes seconds to compile a kernel.
@@ -32,14 +33,14 @@ const MANY_STATES: usize = 200;
 
 type RunStage = fn(&Constants<f32>, &mut Scalar, &mut [f32]);
 
-/// A stage on a machine of one world. Here stands the only call, so that the text of physics is compiled once.
-fn run(stage: Stage, m: &Constants<f32>, block: &mut Scalar, memory: &mut [f32]) {
-    static STAGES: [RunStage; Stage::ALL.len()] = every_stage!(on_a_world);
-    fn on_a_world<const STAGE: usize>(m: &Constants<f32>, block: &mut Scalar, memory: &mut [f32]) {
+/// A stage on a backend of one world. Here stands the only call, so that the physics is compiled once.
+fn run(stage: StageId, m: &Constants<f32>, block: &mut Scalar, memory: &mut [f32]) {
+    static STAGES: [RunStage; StageId::COUNT] = every_stage!(stage_functions(on_a_world));
+    fn on_a_world<S: Stage>(m: &Constants<f32>, block: &mut Scalar, memory: &mut [f32]) {
         let cx = &mut Cpu::new(memory, &m.contacts.tables);
-        sim_physics::step::run::<_, STAGE>(cx, m, block);
+        S::run(cx, m, block);
     }
-    STAGES[stage.number()](m, block, memory);
+    STAGES[stage.index()](m, block, memory);
 }
 
 /// Scratch memory of the machine: it carries contacts from stage to stage.
@@ -47,36 +48,40 @@ fn memory(m: &Constants<f32>) -> Vec<f32> {
     vec![0.0; m.contacts.memory.len]
 }
 
-/// The stages of a list that a model needs.
-fn needed<'a>(m: &'a Constants<f32>, stages: &'a [Stage]) -> impl Iterator<Item = Stage> + 'a {
-    stages.iter().copied().filter(|stage| stage.is_needed(m))
+/// The stages that a model needs.
+fn needed(m: &Constants<f32>) -> impl Iterator<Item = StageId> {
+    StageId::all().filter(|stage| stage.is_needed(m))
 }
 
-/// Stages that leave the state as it is.
-fn before_integrate() -> &'static [Stage] {
-    const LAST: usize = STAGES.len() - 1;
-    assert_eq!(STAGES[LAST], Stage::Integrate);
-    &STAGES[..LAST]
+/// The stages of a step that leave the state as it is.
+fn before_integrate(m: &Constants<f32>) -> impl Iterator<Item = StageId> {
+    needed(m).filter(|stage| stage.row().runs == Runs::Both)
 }
 
-fn numbers(block: &mut Scalar, slot: WorkSlot) -> &mut [f32] {
-    match block.numbers(slot) {
-        Numbers::Cells(x) | Numbers::Values(x) => x,
+/// Arrays that a stage leaves for others.
+fn lasting() -> impl Iterator<Item = Array> {
+    let all = Array::ALL.iter().copied();
+    all.filter(|array| array.writer() != Writer::Scratch)
+}
+
+fn numbers(block: &mut Scalar, array: Array) -> &mut [f32] {
+    match block.array_mut(array) {
+        Flat::Cells(x) | Flat::Values(x) => x,
     }
 }
 
-fn gathered(block: &mut Scalar, slots: &[WorkSlot]) -> Vec<f32> {
-    slots
+fn gathered(block: &mut Scalar, arrays: &[Array]) -> Vec<f32> {
+    arrays
         .iter()
-        .flat_map(|slot| numbers(block, *slot).to_vec())
+        .flat_map(|array| numbers(block, *array).to_vec())
         .collect()
 }
 
 /// The recording of a text between two sets of slots.
 fn recorded(
     m: &Constants<f32>,
-    reads: &[WorkSlot],
-    writes: &[WorkSlot],
+    reads: &[Array],
+    writes: &[Array],
     text: impl FnOnce(&mut Recorder, &mut RecordedWorlds),
 ) -> Recording {
     let recording = stages_recorded::between(m, reads, writes, |cx, b| {
@@ -100,7 +105,7 @@ fn assert_same(got: &[f32], expected: &[f32], what: &str) {
 }
 
 /// The recording of a stage.
-fn recorded_stage(m: &Constants<f32>, stage: Stage) -> Recording {
+fn recorded_stage(m: &Constants<f32>, stage: StageId) -> Recording {
     recorded(m, stage.reads(), stage.writes(), |cx, b| {
         stages_recorded::run(stage, cx, m, b);
     })
@@ -109,7 +114,7 @@ fn recorded_stage(m: &Constants<f32>, stage: Stage) -> Recording {
 #[test]
 fn every_stage_is_recorded_and_its_program_is_valid() {
     for Case { name, m, .. } in cases() {
-        for stage in needed(&m, &Stage::ALL) {
+        for stage in needed(&m) {
             let start = Instant::now();
             let recording = recorded_stage(&m, stage);
             let taken = start.elapsed();
@@ -127,8 +132,8 @@ fn every_stage_is_recorded_and_its_program_is_valid() {
                 stage.name(),
                 statements.total()
             );
-            let most = match stage {
-                Stage::Solver if !m.contacts.classes.is_empty() => SOLVER_STATEMENTS_MAX,
+            let most = match stage.name() {
+                "solver" if !m.contacts.classes.is_empty() => SOLVER_STATEMENTS_MAX,
                 _ => STATEMENTS_MAX,
             };
             assert!(
@@ -153,7 +158,7 @@ fn the_random_states_of_these_tests_take_every_path() {
             let mut block = case.random_state(|| random.unit());
             let mut hurried = case.random_state(|| same.unit());
             let (mut memory, mut other) = (memory(m), memory(m));
-            for stage in needed(m, before_integrate()) {
+            for stage in before_integrate(m) {
                 run(stage, m, &mut block, &mut memory);
                 run(stage, &one_round, &mut hurried, &mut other);
             }
@@ -196,11 +201,11 @@ fn the_random_shapes_of_these_tests_touch_in_every_pair_of_kinds() {
         for _ in 0..MANY_STATES {
             let mut block = case.random_state(|| random.unit());
             let mut memory = memory(m);
-            for stage in needed(m, before_integrate()) {
+            for stage in before_integrate(m) {
                 run(stage, m, &mut block, &mut memory);
             }
             let found = contacts(m, &memory);
-            for (kinds, count) in touching.iter_mut().enumerate() {
+            for (kinds, count) in PAIR_KINDS.into_iter().zip(&mut touching) {
                 let group = m
                     .contacts
                     .group(kinds)
@@ -231,7 +236,7 @@ fn the_random_shapes_of_these_tests_touch_in_every_pair_of_kinds() {
 
 #[test]
 fn a_control_frame_is_recorded_as_a_loop_over_substeps() {
-    use WorkSlot::*;
+    use Array::*;
     // the searches of hulls are loops as deep as a text may have them: with those of a frame around them, too deep
     for case in [fr3(), every_joint(), arm_and_cube(), every_param()] {
         let m = &case.m;
@@ -254,7 +259,7 @@ fn a_control_frame_is_recorded_as_a_loop_over_substeps() {
         let start = Instant::now();
         let recording = recorded(m, &reads, &writes, |cx, b| {
             times!(cx, SUBSTEPS, {
-                for stage in needed(m, &STAGES) {
+                for stage in step_stages(m) {
                     stages_recorded::run(stage, cx, m, b);
                 }
             });
@@ -274,7 +279,7 @@ fn a_control_frame_is_recorded_as_a_loop_over_substeps() {
             let inputs = gathered(&mut block, &reads);
             let (mut memory, mut scratch) = (memory(m), memory(m));
             for _ in 0..SUBSTEPS {
-                for stage in needed(m, &STAGES) {
+                for stage in step_stages(m) {
                     run(stage, m, &mut block, &mut memory);
                 }
             }
@@ -297,39 +302,41 @@ fn what_a_stage_does_not_name_it_neither_reads_nor_writes() {
         let mut random = toy::Random(3);
         let mut start = case.random_state(|| random.unit());
         let mut memory = memory(m);
-        for stage in needed(m, &Stage::ALL) {
+        for stage in needed(m) {
             let mut named = stage.reads().iter().chain(stage.writes());
             assert!(
-                named.all(|slot| SLOTS.contains(slot)),
-                "{} names a slot that is not here",
+                named.all(|array| array.writer() != Writer::Scratch),
+                "{} names scratch of another stage",
                 stage.name()
             );
             let mut poisoned = Block::new(m, 0.0);
-            for slot in SLOTS {
+            for array in lasting() {
                 let (from, to) = (
-                    numbers(&mut start, slot).to_vec(),
-                    numbers(&mut poisoned, slot),
+                    numbers(&mut start, array).to_vec(),
+                    numbers(&mut poisoned, array),
                 );
                 to.copy_from_slice(&from);
-                if !stage.reads().contains(&slot) && !stage.writes().contains(&slot) {
+                if !stage.reads().contains(&array) && !stage.writes().contains(&array) {
                     to.fill(f32::NAN);
                 }
             }
-            for slot in SCRATCH {
-                numbers(&mut poisoned, slot).fill(f32::NAN);
+            for &array in Array::ALL {
+                if array.writer() == Writer::Scratch {
+                    numbers(&mut poisoned, array).fill(f32::NAN);
+                }
             }
             let mut other = memory.clone();
             run(stage, m, &mut start, &mut memory);
             run(stage, m, &mut poisoned, &mut other);
             assert_same(&other, &memory, stage.name());
-            for slot in SLOTS {
-                let (got, expected) = (numbers(&mut poisoned, slot), numbers(&mut start, slot));
-                if stage.writes().contains(&slot) {
+            for array in lasting() {
+                let (got, expected) = (numbers(&mut poisoned, array), numbers(&mut start, array));
+                if stage.writes().contains(&array) {
                     assert_same(got, expected, stage.name());
-                } else if !stage.reads().contains(&slot) {
+                } else if !stage.reads().contains(&array) {
                     assert!(
                         got.iter().all(|x| x.is_nan()),
-                        "{} writes {slot:?}",
+                        "{} writes {array:?}",
                         stage.name()
                     );
                 }

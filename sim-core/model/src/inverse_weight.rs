@@ -3,8 +3,8 @@
 use super::ModelError;
 use faer::linalg::solvers::DenseSolveCore;
 use sim_physics::constants::{Constants, Motion};
-use sim_physics::math::spatial::{Spatial, momentum, place, power};
-use sim_physics::math::vec3::{cross, cross_add, dot, transform, transform_add};
+use sim_physics::math::spatial::{Inertia, Spatial};
+use sim_physics::math::vec3::{Mat3, Vec3};
 
 /// Inverse weights at q = 0.
 pub(super) struct Reference {
@@ -56,7 +56,7 @@ pub(super) fn at_reference(
             None => 0.0,
             Some(body) => {
                 let (rotation, origin) = &frames[body];
-                let center = transform_add(rotation, link.center, *origin);
+                let center = rotation.mul_add(Vec3(link.center), *origin);
                 link_weight(&path(constants, body), &motions, center, &inverse)
             }
         })
@@ -88,21 +88,21 @@ pub(super) fn at_reference(
 fn link_weight(
     path: &[usize],
     motions: &[Spatial<f64>],
-    center: [f64; 3],
+    center: Vec3<f64>,
     inverse: &faer::Mat<f64>,
 ) -> f64 {
     let columns: Vec<Spatial<f64>> = path
         .iter()
         .map(|&d| {
-            let [linear, angular] = motions[d];
-            [cross_add(angular, center, linear), angular]
+            let Spatial([linear, angular]) = motions[d];
+            Spatial([angular.cross_add(center, linear), angular])
         })
         .collect();
     let [linear, angular] = [0, 1].map(|part| {
         let mut sum = 0.0;
         for (a, &i) in columns.iter().zip(path) {
             for (b, &j) in columns.iter().zip(path) {
-                sum += dot(a[part], b[part]) * inverse[(i, j)];
+                sum += a[part].dot(b[part]) * inverse[(i, j)];
             }
         }
         sum / 3.0
@@ -119,7 +119,7 @@ fn link_weight(
 const WEIGHT_MIN: f64 = 1e-15;
 
 /// Rotation, by columns, and origin of each body's frame.
-type Frames = Vec<([[f64; 3]; 3], [f64; 3])>;
+type Frames = Vec<(Mat3<f64>, Vec3<f64>)>;
 
 fn mass_matrix(constants: &Constants<f64>) -> (faer::Mat<f64>, Frames, Vec<Spatial<f64>>) {
     let n = constants.dofs.len();
@@ -131,33 +131,33 @@ fn mass_matrix(constants: &Constants<f64>) -> (faer::Mat<f64>, Frames, Vec<Spati
             Some(p) => {
                 let (r, o) = &frames[p];
                 (
-                    body.rotation.map(|c| transform(r, c)),
-                    transform_add(r, body.position, *o),
+                    Mat3(body.rotation.map(|c| r * Vec3(c))),
+                    r.mul_add(Vec3(body.position), *o),
                 )
             }
-            None => (body.rotation, body.position),
+            None => (Mat3::constant(body.rotation), Vec3(body.position)),
         };
-        let turn = |axis| [cross(origin, axis), axis];
+        let turn = |axis| Spatial([origin.cross(axis), axis]);
         let z = rotation[2];
         match body.motion {
             Motion::Revolute => motions.push(turn(z)),
-            Motion::Prismatic => motions.push([z, [0.0; 3]]),
-            Motion::Ball => motions.extend(rotation.map(turn)),
+            Motion::Prismatic => motions.push(Spatial([z, Vec3::zero()])),
+            Motion::Ball => motions.extend(rotation.0.map(turn)),
             Motion::Free => {
                 // about its centre of mass; how it lies in the world changes no inverse weight below it
-                origin = body.center.map(|x| -x);
-                motions.extend(rotation.map(|axis| [axis, [0.0; 3]]));
-                motions.extend(rotation.map(|axis| [[0.0; 3], axis]));
+                origin = -Vec3(body.center);
+                motions.extend(rotation.0.map(|axis| Spatial([axis, Vec3::zero()])));
+                motions.extend(rotation.0.map(|axis| Spatial([Vec3::zero(), axis])));
             }
         }
-        let inertia = place::<f64>(body.mass, body.center, body.inertia, &rotation, origin);
+        let inertia = Inertia::placed(body.mass, body.center, body.inertia, &rotation, origin);
         frames.push((rotation, origin));
         let path = path(constants, frames.len() - 1);
         for &a in &path {
-            let force = momentum(&inertia, &motions[a]);
+            let force = inertia * motions[a];
             // the factor reads the lower triangle
             for &b in path.iter().filter(|&&b| b <= a) {
-                mass_matrix[(a, b)] += power(&motions[b], &force);
+                mass_matrix[(a, b)] += motions[b].dot(force);
             }
         }
     }

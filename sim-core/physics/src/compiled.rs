@@ -1,12 +1,12 @@
 //! The stages of a step as functions of an instruction set.
 //!
-//! A crate of its own compiles them for each kind of number (`sim-core/stages`): it takes a minute, and so they are compiled
-//! at once, and again only when the text changes.
+//! A crate of its own compiles them for each kind of scalar (`sim-core/stages`): it takes a minute, so the crates are
+//! compiled side by side, and again only when the physics changes.
 
 use crate::arrays::Block;
 use crate::constants::Constants;
 use crate::lane::Num;
-use crate::step::Stage;
+use crate::step::StageId;
 
 /// A stage on a block, compiled for an instruction set: a function of its own, so that registers are given out for one page
 /// of equations and a profile names it.
@@ -15,33 +15,45 @@ use crate::step::Stage;
 /// The processor has the instructions that it was compiled for.
 pub type RunStage<F> = unsafe fn(&Constants<<F as Num>::Real>, &mut Block<F, F>, &mut [F]);
 
-/// Every stage, by its number in [`Stage::ALL`].
-pub type Stages<F> = [RunStage<F>; Stage::ALL.len()];
+/// Every stage, by [`StageId::index`].
+pub type Stages<F> = [RunStage<F>; StageId::COUNT];
 
-/// Defines `STAGES` of a number, compiled for instructions of x86-64; elsewhere for what the target has, since another text
-/// would take as long to compile as the others.
+/// Defines `STAGES` of a scalar, compiled for instructions of x86-64; elsewhere for what the target has, since one more
+/// instance would take as long to compile as the others.
 #[macro_export]
 macro_rules! compiled {
-    ($number:ty, $features:literal) => {
+    ($scalar:ty, $features:literal) => {
+        $crate::every_stage!(compiled_stages($scalar, $features));
+    };
+}
+
+/// A function named after each row of `every_stage!`, and the table of them.
+#[macro_export]
+#[doc(hidden)]
+macro_rules! compiled_stages {
+    (($scalar:ty, $features:literal) $($name:ident [$($page:tt)*] $runs:ident;)*) => {
         use $crate::arrays::Block;
         use $crate::compiled::Stages;
         use $crate::constants::Constants;
         use $crate::lane::{Num, memory::Cpu};
+        use $crate::step::Stage;
 
-        #[cfg_attr(target_arch = "x86_64", target_feature(enable = $features))]
-        unsafe fn stage<const STAGE: usize>(
-            constants: &Constants<<$number as Num>::Real>,
-            block: &mut Block<$number, $number>,
-            memory: &mut [$number],
-        ) {
-            // made here, so that the compiler sees that every world is active: what is set outside of
-            // blocks and loops is then a plain store, which the next load need not wait for
-            let mut machine = Cpu::new(memory, &constants.contacts.tables);
-            $crate::step::run::<_, STAGE>(&mut machine, constants, block);
-        }
+        $(
+            #[cfg_attr(target_arch = "x86_64", target_feature(enable = $features))]
+            unsafe fn $name(
+                constants: &Constants<<$scalar as Num>::Real>,
+                block: &mut Block<$scalar, $scalar>,
+                memory: &mut [$scalar],
+            ) {
+                // made here, so that the compiler sees that every world is active: what is set outside of
+                // blocks and loops is then a plain store, which the next load need not wait for
+                let mut cx = Cpu::new(memory, &constants.contacts.tables);
+                <$crate::step::$($page)* as Stage>::run(&mut cx, constants, block);
+            }
+        )*
 
-        /// Every stage, by its number.
+        /// Every stage, by its place in the list.
         // a constant would be compiled by whoever uses it
-        pub static STAGES: Stages<$number> = $crate::every_stage!(stage);
+        pub static STAGES: Stages<$scalar> = [$($name),*];
     };
 }

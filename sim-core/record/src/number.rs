@@ -3,7 +3,7 @@
 use super::state::{Home, NOWHERE, State, here, with};
 use super::tree::Operand;
 use sim_physics::lane::Num;
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, BitAnd, BitOr, Mul, Neg, Not, Sub};
 use std::panic::Location;
 
 /// A number of a world, not computed but written down.
@@ -98,6 +98,30 @@ impl Neg for Recorded {
     }
 }
 
+impl BitAnd for RecordedMask {
+    type Output = RecordedMask;
+    #[track_caller]
+    fn bitand(self, b: RecordedMask) -> RecordedMask {
+        RecordedMask(binary(State::and, self.0, b.0))
+    }
+}
+
+impl BitOr for RecordedMask {
+    type Output = RecordedMask;
+    #[track_caller]
+    fn bitor(self, b: RecordedMask) -> RecordedMask {
+        RecordedMask(binary(State::or, self.0, b.0))
+    }
+}
+
+impl Not for RecordedMask {
+    type Output = RecordedMask;
+    #[track_caller]
+    fn not(self) -> RecordedMask {
+        RecordedMask(unary(State::not, self.0))
+    }
+}
+
 impl Num for Recorded {
     type Real = f32;
     type Mask = RecordedMask;
@@ -148,17 +172,5 @@ impl Num for Recorded {
             let x = s.select(mask, a, b);
             s.handle(x)
         })
-    }
-    #[track_caller]
-    fn and(a: RecordedMask, b: RecordedMask) -> RecordedMask {
-        RecordedMask(binary(State::and, a.0, b.0))
-    }
-    #[track_caller]
-    fn or(a: RecordedMask, b: RecordedMask) -> RecordedMask {
-        RecordedMask(binary(State::or, a.0, b.0))
-    }
-    #[track_caller]
-    fn not(a: RecordedMask) -> RecordedMask {
-        RecordedMask(unary(State::not, a.0))
     }
 }

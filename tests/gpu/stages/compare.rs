@@ -1,11 +1,11 @@
 //! What a stage leaves, part by part, and how far apart two machines are in it.
 
 use super::worlds::Left;
-use sim_physics::arrays::WorkSlot as Slot;
+use sim_physics::arrays::Array;
 use sim_physics::constants::Constants;
-use sim_physics::constants::contact::row;
+use sim_physics::constants::contact::{Kind, row};
 use sim_physics::lane::Table;
-use sim_physics::step::Stage;
+use sim_physics::step::StageId;
 use std::fmt;
 
 /// Numbers of a kind that a stage leaves in a world.
@@ -33,31 +33,34 @@ const ROWS: [(&str, usize, usize); 9] = [
 ];
 
 /// The parts of what a stage leaves: its slots, where shapes are, and the lists of contacts.
-pub fn parts(m: &Constants<f32>, stage: Stage, left: &Left) -> Vec<Part> {
+pub fn parts(m: &Constants<f32>, stage: StageId, left: &Left) -> Vec<Part> {
     let mut parts = Vec::new();
     let mut add = |name: &str, numbers: Vec<f64>| {
         let name = name.to_owned();
         parts.push(Part { name, numbers });
     };
     let mut numbers = left.numbers.iter().copied();
-    let mut slots: Vec<(Slot, Vec<f64>)> = (stage.writes().iter())
-        .map(|&slot| {
-            let count = stages_recorded::length(m, slot);
-            (slot, numbers.by_ref().take(count).collect())
+    let mut arrays: Vec<(Array, Vec<f64>)> = (stage.writes().iter())
+        .map(|&array| {
+            let count = array.scalars(m);
+            (array, numbers.by_ref().take(count).collect())
         })
         .collect();
-    if let Some(rest) = slots.iter().position(|(slot, _)| *slot == Slot::JointQRest) {
-        let (_, rests) = slots.remove(rest);
-        let (_, q) = (slots.iter_mut())
-            .find(|(slot, _)| *slot == Slot::JointQ)
+    if let Some(rest) = arrays
+        .iter()
+        .position(|(array, _)| *array == Array::JointQRest)
+    {
+        let (_, rests) = arrays.remove(rest);
+        let (_, q) = (arrays.iter_mut())
+            .find(|(array, _)| *array == Array::JointQ)
             .expect("what has rests");
         let turns = |k: usize| m.quaternions().any(|first| (first..first + 4).contains(&k));
         let straight = (0..q.len()).filter(|&k| !turns(k));
         add(POSITIONS, straight.map(|k| q[k] + rests[k]).collect());
         *q = (0..q.len()).filter(|&k| turns(k)).map(|k| q[k]).collect();
     }
-    for (slot, numbers) in slots {
-        add(&format!("{slot:?}"), numbers);
+    for (array, numbers) in arrays {
+        add(&format!("{array:?}"), numbers);
     }
     let memory = &m.contacts.memory;
     for (name, table) in [
@@ -97,8 +100,8 @@ pub fn list(m: &Constants<f32>, left: &Left) -> Vec<usize> {
     counted.copied().chain(pairs).map(|x| x as usize).collect()
 }
 
-/// Does a world have contacts of two kinds of shapes, by their place in `PAIR_KINDS`?
-pub fn touches(m: &Constants<f32>, kinds: usize, left: &Left) -> bool {
+/// Does a world have contacts of two kinds of shapes, by their stage?
+pub fn touches(m: &Constants<f32>, kinds: (Kind, Kind), left: &Left) -> bool {
     let group = m.contacts.group(kinds).expect("the model has such pairs");
     let pair = |row: usize| left.memory[row + self::row::PAIR] as usize;
     rows(m, &left.memory).any(|row| (group.first..group.end).contains(&pair(row)))
@@ -138,7 +141,7 @@ const SMALLEST: f64 = 1e-2;
 /// Errors in each part; `passed_over` are worlds whose accelerations the stage leaves to another.
 pub fn errors(
     m: &Constants<f32>,
-    stage: Stage,
+    stage: StageId,
     reference: &[Left],
     machine: &[Left],
     passed_over: &[bool],

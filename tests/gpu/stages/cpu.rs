@@ -7,7 +7,7 @@ use sim_physics::arrays::Block;
 use sim_physics::compiled::RunStage;
 use sim_physics::constants::Constants;
 use sim_physics::lane::{Lane, Real};
-use sim_physics::step::Stage;
+use sim_physics::step::StageId;
 
 /// Runs a stage, `F::WIDTH` worlds at a time.
 ///
@@ -17,7 +17,7 @@ use sim_physics::step::Stage;
 unsafe fn run<F: Lane>(
     run: RunStage<F>,
     m: &Constants<F::Real>,
-    stage: Stage,
+    stage: StageId,
     given: &[Given],
 ) -> Vec<Left> {
     let mut all = Vec::new();
@@ -31,8 +31,8 @@ unsafe fn run<F: Lane>(
         };
         let mut block = Block::<F, F>::new(m, F::c(0.0));
         let mut k = 0;
-        for slot in stage.reads() {
-            for x in numbers(block.numbers(*slot)) {
+        for array in stage.reads() {
+            for x in numbers(block.array_mut(*array)) {
                 *x = number(&|world| world.numbers[k]);
                 k += 1;
             }
@@ -44,8 +44,8 @@ unsafe fn run<F: Lane>(
         unsafe { run(m, &mut block, &mut memory) };
         let mut left: Vec<Left> = worlds.iter().map(|_| Left::default()).collect();
         let mut lanes = vec![F::Real::default(); F::WIDTH];
-        for slot in stage.writes() {
-            for x in numbers(block.numbers(*slot)) {
+        for array in stage.writes() {
+            for x in numbers(block.array_mut(*array)) {
                 x.store(&mut lanes);
                 for (world, x) in left.iter_mut().zip(&lanes) {
                     world.numbers.push(x.to_f64());
@@ -69,7 +69,7 @@ macro_rules! machine {
         unsafe fn $name(
             stage: RunStage<$number>,
             m: &Constants<<$number as sim_physics::lane::Num>::Real>,
-            of: Stage,
+            of: StageId,
             given: &[Given],
         ) -> Vec<Left> {
             // SAFETY: by contract.
@@ -90,31 +90,31 @@ machine!(
 );
 
 /// The reference: double precision, of a model and states that are rounded to `f32`.
-pub fn double(m: &Constants<f64>, stage: Stage, given: &[Given]) -> Vec<Left> {
+pub fn double(m: &Constants<f64>, stage: StageId, given: &[Given]) -> Vec<Left> {
     assert!(available(Lanes::Scalar));
     // SAFETY: as just asked.
-    unsafe { run::<f64>(stages_f64::STAGES[stage.number()], m, stage, given) }
+    unsafe { run::<f64>(stages_f64::STAGES[stage.index()], m, stage, given) }
 }
 
 /// Single precision, a world at a time.
-pub fn scalar(m: &Constants<f32>, stage: Stage, given: &[Given]) -> Vec<Left> {
+pub fn scalar(m: &Constants<f32>, stage: StageId, given: &[Given]) -> Vec<Left> {
     assert!(available(Lanes::Scalar));
     // SAFETY: as just asked.
-    unsafe { run::<f32>(stages_f32::STAGES[stage.number()], m, stage, given) }
+    unsafe { run::<f32>(stages_f32::STAGES[stage.index()], m, stage, given) }
 }
 
 /// Single precision, in every register that this processor has.
-pub fn registers(m: &Constants<f32>, stage: Stage, given: &[Given]) -> Vec<Vec<Left>> {
+pub fn registers(m: &Constants<f32>, stage: StageId, given: &[Given]) -> Vec<Vec<Left>> {
     let mut found = Vec::new();
     #[cfg(target_arch = "x86_64")]
     {
         if available(Lanes::Eight) {
             // SAFETY: as just asked.
-            found.push(unsafe { eight(stages_f32x8::STAGES[stage.number()], m, stage, given) });
+            found.push(unsafe { eight(stages_f32x8::STAGES[stage.index()], m, stage, given) });
         }
         if available(Lanes::Sixteen) {
             // SAFETY: as just asked.
-            found.push(unsafe { sixteen(stages_f32x16::STAGES[stage.number()], m, stage, given) });
+            found.push(unsafe { sixteen(stages_f32x16::STAGES[stage.index()], m, stage, given) });
         }
     }
     found

@@ -3,7 +3,7 @@
 use super::worlds::{Given, Left};
 use sim_device::{Choice, Device, Program, Replay, Source, Staging};
 use sim_physics::constants::Constants;
-use sim_physics::step::Stage;
+use sim_physics::step::StageId;
 use sim_record::Recording;
 use sim_record::wgsl::{ProgramOptions, wgsl};
 use std::time::Duration;
@@ -16,7 +16,7 @@ const WIDTH: usize = 4;
 
 /// A program of a stage.
 struct Kernel {
-    stage: Stage,
+    stage: StageId,
     /// None where the stage has nothing to leave.
     program: Option<Program>,
     inputs: usize,
@@ -34,7 +34,7 @@ pub struct Gpu {
 
 impl Gpu {
     /// Compiles stages of a model for so many worlds.
-    pub fn new(m: &Constants<f32>, stages: &[Stage], worlds: usize) -> Gpu {
+    pub fn new(m: &Constants<f32>, stages: &[StageId], worlds: usize) -> Gpu {
         let device = Device::open(&Choice::First, None).expect("the tests need an adapter");
         let recordings: Vec<_> = (stages.iter())
             .map(|&stage| {
@@ -84,7 +84,7 @@ impl Gpu {
     }
 
     /// Runs a stage.
-    pub fn run(&self, stage: Stage, given: &[Given]) -> Vec<Left> {
+    pub fn run(&self, stage: StageId, given: &[Given]) -> Vec<Left> {
         assert_eq!(given.len(), self.worlds);
         let kernel = self.kernels.iter().find(|kernel| kernel.stage == stage);
         let kernel = kernel.expect("it was compiled");

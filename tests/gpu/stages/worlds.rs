@@ -2,11 +2,10 @@
 
 use crate::common::cases::Case;
 use crate::common::dice::Dice;
-use sim_physics::arrays::{Block, Numbers};
+use sim_physics::arrays::{Array, Block, Flat};
 use sim_physics::constants::Constants;
 use sim_physics::math::factor::multiply;
-use sim_physics::step::Stage;
-use stages_recorded::SLOTS;
+use sim_physics::step::StageId;
 
 /// What a stage is given in a world: the numbers of what it reads, and the memory of the machine.
 pub struct Given {
@@ -34,9 +33,9 @@ impl Worlds {
         let block = |_| {
             let mut state = case.random_state(|| dice.number());
             let mut block = Block::new(&case.m, 0.0);
-            for slot in SLOTS {
-                let from = numbers(state.numbers(slot)).iter();
-                for (to, x) in numbers(block.numbers(slot)).iter_mut().zip(from) {
+            for &array in Array::ALL {
+                let from = numbers(state.array_mut(array)).iter();
+                for (to, x) in numbers(block.array_mut(array)).iter_mut().zip(from) {
                     *to = f64::from(*x);
                 }
             }
@@ -49,18 +48,18 @@ impl Worlds {
     }
 
     /// What a stage reads.
-    pub fn given(&mut self, stage: Stage) -> Vec<Given> {
+    pub fn given(&mut self, stage: StageId) -> Vec<Given> {
         (self.blocks.iter_mut().zip(&self.memory))
             .map(|(block, memory)| Given {
                 numbers: (stage.reads().iter())
-                    .flat_map(|slot| numbers(block.numbers(*slot)).to_vec())
+                    .flat_map(|array| numbers(block.array_mut(*array)).to_vec())
                     .collect(),
                 memory: memory.clone(),
             })
             .collect()
     }
 
-    /// What [`Stage::Integrate`] reads, with M q̈ - smooth for the constraint forces of worlds that touch: in `f32` it takes what
+    /// What `integrate` reads, with M q̈ - smooth for the constraint forces of worlds that touch: in `f32` it takes what
     /// acts from M q̈, since stiff forces cancel and leave their rounding.
     pub fn given_uncancelled(&mut self, m: &Constants<f32>) -> Vec<Given> {
         let kept: Vec<Vec<f64>> = (self.blocks.iter_mut().zip(&self.memory))
@@ -79,7 +78,7 @@ impl Worlds {
                 kept
             })
             .collect();
-        let given = self.given(Stage::Integrate);
+        let given = self.given(StageId::named("integrate").expect("a stage"));
         for (block, kept) in self.blocks.iter_mut().zip(kept) {
             block.constraint_force = kept;
         }
@@ -87,12 +86,12 @@ impl Worlds {
     }
 
     /// Goes on with what a stage left.
-    pub fn take(&mut self, stage: Stage, left: &[Left]) {
+    pub fn take(&mut self, stage: StageId, left: &[Left]) {
         let worlds = self.blocks.iter_mut().zip(&mut self.memory);
         for ((block, memory), left) in worlds.zip(left) {
             let mut from = left.numbers.iter();
-            for slot in stage.writes() {
-                for (to, x) in numbers(block.numbers(*slot)).iter_mut().zip(&mut from) {
+            for array in stage.writes() {
+                for (to, x) in numbers(block.array_mut(*array)).iter_mut().zip(&mut from) {
                     *to = *x;
                 }
             }
@@ -100,9 +99,9 @@ impl Worlds {
         }
     }
 
-    /// Worlds whose accelerations `f32` leaves to [`Stage::Accelerations`]: limits are all that could act, and none does.
-    pub fn passed_over(&mut self, m: &Constants<f32>, stage: Stage) -> Vec<bool> {
-        let may_be = matches!(stage, Stage::Solver | Stage::Refine)
+    /// Worlds whose accelerations `f32` leaves to `accelerations`: limits are all that could act, and none does.
+    pub fn passed_over(&mut self, m: &Constants<f32>, stage: StageId) -> Vec<bool> {
+        let may_be = matches!(stage.name(), "solver" | "refine")
             && m.equalities.is_empty()
             && m.frictions.is_empty()
             && m.contacts.classes.is_empty();
@@ -113,9 +112,9 @@ impl Worlds {
     }
 }
 
-/// The numbers of a slot.
-pub fn numbers<F>(of: Numbers<'_, F, F>) -> &mut [F] {
+/// The scalars of an array.
+pub fn numbers<'a, F>(of: Flat<&'a mut [F], &'a mut [F]>) -> &'a mut [F] {
     match of {
-        Numbers::Cells(x) | Numbers::Values(x) => x,
+        Flat::Cells(x) | Flat::Values(x) => x,
     }
 }

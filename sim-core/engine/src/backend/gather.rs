@@ -1,9 +1,9 @@
 //! Fields out of a block: what a frame shows of a world, in the order of its row.
 
-use sim_physics::arrays::{Field, Workspace};
+use sim_physics::arrays::{Field, Flat, Source, Workspace};
 use sim_physics::constants::Constants;
 use sim_physics::lane::{Cx, Num};
-use sim_physics::math::vec3::cross_add;
+use sim_physics::math::spatial::Spatial;
 use sim_physics::step::{BlockOf, ConstantsOf};
 
 /// Gathers a field that is neither of contacts nor a counter, one number an element.
@@ -16,36 +16,23 @@ pub(super) fn gather<C: Cx>(
     to: &mut [C::F],
 ) {
     let w = &b.work;
-    match field {
-        Field::JointQ | Field::JointQMeasured => cells(cx, &b.joint_q, to),
-        Field::JointQd | Field::JointQdMeasured => cells(cx, &b.joint_qd, to),
-        Field::JointQdd => cells(cx, &b.joint_qdd, to),
-        Field::JointF => to.copy_from_slice(&b.joint_f),
-        Field::JointTargetQ => to.copy_from_slice(&b.joint_target_q),
-        Field::JointTargetQd => to.copy_from_slice(&b.joint_target_qd),
-        Field::BodyQ => to.copy_from_slice(w.body_q.as_flattened()),
-        Field::BodyQd => to.copy_from_slice(w.body_qd.as_flattened().as_flattened()),
-        Field::JointTorque => to.copy_from_slice(&w.joint_torque),
-        Field::SiteQ => to.copy_from_slice(w.site_q.as_flattened()),
-        Field::SiteQd => to.copy_from_slice(w.site_qd.as_flattened().as_flattened()),
-        Field::Gyro => to.copy_from_slice(w.gyro.as_flattened()),
-        Field::Accelerometer => to.copy_from_slice(w.accelerometer.as_flattened()),
-        Field::SiteInverseJacobian => inverse_jacobian(m, w, to),
-        Field::BodyJacobian => body_jacobian(m, w, to),
-        Field::BiasForce => to.copy_from_slice(&w.bias_force),
-        Field::SmoothForce => to.copy_from_slice(&w.smooth_force),
-        Field::ConstraintForce => cells(cx, &b.constraint_force, to),
-        Field::EfcD => cells(cx, &b.efc_weight, to),
-        Field::EfcAref => cells(cx, &b.efc_aref, to),
-        Field::EfcForce => cells(cx, &b.efc_force, to),
-        Field::MassMatrix => mass_matrix(m, w, to),
-        Field::EfcJ => jacobian(cx, m, &b.efc_weight, &w.limit_side, to),
-        _ => unreachable!("`{}` is not gathered", field.row().name),
+    match field.row().source {
+        Source::Array(array) => match b.array(array) {
+            Flat::Cells(cells) => copy_cells(cx, cells, to),
+            Flat::Values(values) => to.copy_from_slice(values),
+        },
+        _ => match field {
+            Field::MassMatrix => mass_matrix(m, w, to),
+            Field::BodyJacobian => body_jacobian(m, w, to),
+            Field::SiteInverseJacobian => inverse_jacobian(m, w, to),
+            Field::EfcJ => jacobian(cx, m, &b.efc_weight, &w.limit_side, to),
+            _ => unreachable!("`{}` is not gathered", field.row().name),
+        },
     }
 }
 
 #[inline(always)]
-fn cells<C: Cx>(cx: &C, cells: &[C::V], to: &mut [C::F]) {
+fn copy_cells<C: Cx>(cx: &C, cells: &[C::V], to: &mut [C::F]) {
     assert_eq!(cells.len(), to.len());
     for (x, cell) in to.iter_mut().zip(cells) {
         *x = cx.get(cell);
@@ -76,8 +63,8 @@ fn body_jacobian<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, to: &mut [F])
         let mut next = frame.body;
         while let Some(b) = next {
             for d in m.bodies[b].dofs() {
-                let [linear, angular] = w.motion[d];
-                let moved = cross_add(angular, w.link_center[k], linear);
+                let Spatial([linear, angular]) = w.motion[d];
+                let moved = angular.cross_add(w.link_center[k], linear);
                 for i in 0..3 {
                     rows[i * dofs + d] = moved[i];
                     rows[(3 + i) * dofs + d] = angular[i];

@@ -6,7 +6,6 @@ mod frozen;
 mod gather;
 pub mod gpu;
 mod noise;
-mod shown;
 mod state;
 
 pub use error::BackendError;

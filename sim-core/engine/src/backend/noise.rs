@@ -10,6 +10,7 @@ use sim_physics::constants::Motion;
 use sim_physics::constants::params::{COMMAND_NOISES, Param};
 use sim_physics::lane::Real;
 use sim_physics::math::quat::{self, Quat};
+use sim_physics::math::vec3::Vec3;
 
 /// A field that has noise, its stream, and the place of its first standard deviation.
 pub(super) type FieldNoise = (Field, Stream, usize);
@@ -156,7 +157,7 @@ fn turn<R: Real>(quat: &mut [R], vector: [f64; 3], in_world: bool) {
         return;
     }
     let here: Quat<f64> = std::array::from_fn(|k| quat[k].to_f64());
-    let turn = quat::exp(vector);
+    let turn = quat::exp(Vec3(vector));
     let turned = match in_world {
         true => quat::mul(turn, here),
         false => quat::mul(here, turn),

@@ -1,102 +1,109 @@
-//! How the numbers of a world lie: state, commands, and parameters that vary.
+//! How the scalars of a world lie in its record: state, commands, and parameters that vary.
 
 use sim_model::Model;
-use sim_physics::arrays::Field;
+use sim_physics::arrays::{Array, Field, Source, Writer};
 use sim_physics::constants::Constants;
 use sim_physics::lane::Real;
+use sim_physics::step::StageId;
 
-/// Groups of numbers of a world, in their order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::backend) enum StateField {
-    Qd,
-    Qdd,
-    F,
-    TargetQ,
-    TargetQd,
-    Q,
-    QRest,
-    /// Commands of the frames before, the last one first, each as F, TargetQ, TargetQd.
-    History,
-    /// Last, so that clients find them in a snapshot.
-    Params,
+/// The arrays of a record in their order, which is that of a snapshot's file: arrays with an entry for each dof first, the
+/// parameters last.
+pub(in crate::backend) const RECORD: [Array; 9] = [
+    Array::JointQd,
+    Array::JointQdd,
+    Array::JointF,
+    Array::JointTargetQ,
+    Array::JointTargetQd,
+    Array::JointQ,
+    Array::JointQRest,
+    Array::CommandHistory,
+    Array::Params,
+];
+
+/// Is it what a step changes, and not a command?
+pub(in crate::backend) fn is_motion(array: &Array) -> bool {
+    array.writer() == Writer::Motion
 }
 
-/// Numbers of a world's state and commands.
+/// Lengths of the arrays of a world's record.
 #[derive(Clone, Copy)]
 pub(in crate::backend) struct Shape {
     pub dofs: usize,
-    coords: usize,
-    /// Numbers of the commands of the frames before.
-    pub history: usize,
-    params: usize,
+    /// First scalar of each array of [`RECORD`], then the end of the last.
+    starts: [usize; RECORD.len() + 1],
 }
 
 impl Shape {
     pub(in crate::backend) fn of<R: Real>(m: &Constants<R>) -> Shape {
-        let dofs = m.dofs.len();
+        let mut starts = [0; RECORD.len() + 1];
+        for (k, array) in RECORD.into_iter().enumerate() {
+            starts[k + 1] = starts[k] + array.scalars(m);
+        }
         Shape {
-            dofs,
-            coords: m.coords,
-            history: m.delay.frames * 3 * dofs,
-            params: m.varying.len(),
+            dofs: m.dofs.len(),
+            starts,
         }
     }
 
-    /// The first number of a group.
-    pub(in crate::backend) fn start(self, field: StateField) -> usize {
-        let (dofs, coords) = (5 * self.dofs, self.coords);
-        match field {
-            StateField::Qd => 0,
-            StateField::Qdd => self.dofs,
-            StateField::F => 2 * self.dofs,
-            StateField::TargetQ => 3 * self.dofs,
-            StateField::TargetQd => 4 * self.dofs,
-            StateField::Q => dofs,
-            StateField::QRest => dofs + coords,
-            StateField::History => dofs + 2 * coords,
-            StateField::Params => dofs + 2 * coords + self.history,
-        }
+    /// The first scalar of an array.
+    pub(in crate::backend) fn start(&self, array: Array) -> usize {
+        self.starts[place(array)]
     }
 
-    /// Numbers of a world.
-    pub(in crate::backend) fn total(self) -> usize {
-        self.start(StateField::Params) + self.params
+    /// Scalars of an array.
+    pub(in crate::backend) fn len(&self, array: Array) -> usize {
+        self.starts[place(array) + 1] - self.start(array)
+    }
+
+    /// Scalars of a world.
+    pub(in crate::backend) fn total(&self) -> usize {
+        self.starts[RECORD.len()]
     }
 }
 
-impl StateField {
-    pub(in crate::backend) fn of(field: Field) -> StateField {
-        match field {
-            Field::JointQ => StateField::Q,
-            Field::JointQd => StateField::Qd,
-            Field::JointF => StateField::F,
-            Field::JointTargetQ => StateField::TargetQ,
-            Field::JointTargetQd => StateField::TargetQd,
-            other => unreachable!("`{}` is not written from outside", other.row().name),
-        }
+fn place(array: Array) -> usize {
+    let found = RECORD.iter().position(|known| *known == array);
+    found.unwrap_or_else(|| unreachable!("{array:?} is not of a record"))
+}
+
+/// Do these stages look for contacts, and count those that do not fit?
+pub(in crate::backend) fn finds_contacts(stages: &[StageId]) -> bool {
+    stages
+        .iter()
+        .any(|stage| stage.row().writes.contains(&Array::LeftOut))
+}
+
+/// The array that a field of a state or a command is.
+pub(in crate::backend) fn array_of(field: Field) -> Array {
+    match field.row().source {
+        Source::Array(array) => array,
+        _ => unreachable!("`{}` is not written from outside", field.row().name),
     }
 }
 
-/// State and commands of a world after a reset, in the order of [`StateField`].
+/// State and commands of a world after a reset, in the order of [`RECORD`].
 pub(in crate::backend) fn start<R: Real>(model: &Model) -> Vec<R> {
     let shape = Shape::of(model.constants());
     let start = model.start();
     let mut reset = vec![R::default(); shape.total()];
-    for (field, values) in [
-        (StateField::Q, &start.joint_q),
-        (StateField::TargetQ, &start.joint_target_q),
-        (StateField::TargetQd, &start.joint_target_qd),
+    for (array, values) in [
+        (Array::JointQ, &start.joint_q),
+        (Array::JointTargetQ, &start.joint_target_q),
+        (Array::JointTargetQd, &start.joint_target_qd),
     ] {
-        for (to, from) in reset[shape.start(field)..].iter_mut().zip(values) {
+        for (to, from) in reset[shape.start(array)..].iter_mut().zip(values) {
             *to = R::of(*from);
         }
     }
-    let (sent, history) = (shape.start(StateField::F), shape.start(StateField::History));
-    for k in 0..shape.history {
+    let (sent, history) = (
+        shape.start(Array::JointF),
+        shape.start(Array::CommandHistory),
+    );
+    for k in 0..shape.len(Array::CommandHistory) {
         reset[history + k] = reset[sent + k % (3 * shape.dofs)];
     }
     for (k, &(_, x)) in model.constants().varying.starts().iter().enumerate() {
-        reset[shape.start(StateField::Params) + k] = R::of(x);
+        reset[shape.start(Array::Params) + k] = R::of(x);
     }
     reset
 }

@@ -3,7 +3,7 @@
 use sim_engine::backend::{Lanes, Precision, Values};
 use sim_engine::simulation::{Options, Simulation};
 use sim_model::geometry::{Hull, Mesh, TriMesh};
-use sim_model::{self, Body, Collision, Description, Pose};
+use sim_model::{Body, Collision, Description, Pose};
 use sim_physics::arrays::{Dtype, Field};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -110,20 +110,20 @@ pub enum Shape {
 }
 
 impl Shape {
-    fn described(self, hulls: &[Hull]) -> model::Shape {
+    fn described(self, hulls: &[Hull]) -> sim_model::Shape {
         match self {
-            Shape::Plane => model::Shape::Plane,
-            Shape::Sphere(radius) => model::Shape::Sphere { radius },
-            Shape::Capsule(radius, half_height) => model::Shape::Capsule {
+            Shape::Plane => sim_model::Shape::Plane,
+            Shape::Sphere(radius) => sim_model::Shape::Sphere { radius },
+            Shape::Capsule(radius, half_height) => sim_model::Shape::Capsule {
                 radius,
                 half_height,
             },
-            Shape::Box(half_extents) => model::Shape::Box { half_extents },
-            Shape::Cylinder(radius, half_height) => model::Shape::Cylinder {
+            Shape::Box(half_extents) => sim_model::Shape::Box { half_extents },
+            Shape::Cylinder(radius, half_height) => sim_model::Shape::Cylinder {
                 radius,
                 half_height,
             },
-            Shape::Hull(number) => model::Shape::Mesh(Arc::new(mesh(&hulls[number]))),
+            Shape::Hull(number) => sim_model::Shape::Mesh(Arc::new(mesh(&hulls[number]))),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Where each field lies in the arena of a frame.
 
-use super::fields::{Dtype, Field, FieldDtype, Group};
+use super::fields::{Dtype, FieldDtype, Group};
+use super::table::Field;
 use crate::constants::Sizes;
 
 /// Alignment of every array in an arena [bytes]: what NumPy, torch and JAX take without a copy.

@@ -1,11 +1,14 @@
-//! Many worlds: the table of fields, their layout in a frame, and one block of worlds at work.
+//! Many worlds: the table of arrays, their layout in a frame, and one block of worlds at work.
 
-mod block;
+mod define;
+mod element;
 mod fields;
 mod layout;
 pub mod status;
+mod table;
 
 pub use crate::constants::Sizes;
-pub use block::{Block, Numbers, Slot as WorkSlot, Workspace};
-pub use fields::{Axis, Dtype, Field, FieldDtype, FieldRow, Group};
+pub use define::Flat;
+pub use fields::{Axis, Dtype, FieldDtype, FieldRow, Group};
 pub use layout::{Layout, Slot};
+pub use table::{Array, Block, Field, Source, Workspace, Writer};

@@ -2,6 +2,7 @@
 
 use super::clip::Cut;
 use super::hull::HullTables;
+use super::recast::{Recast, recast, same};
 use crate::lane::{Fixed, Real, Table, Tables};
 
 /// Shape of the friction cone.
@@ -32,77 +33,64 @@ pub enum Kind {
     Hull,
 }
 
-/// Defines [`PAIR_KINDS`], and the number of each of its entries as a constant with the name of its stage.
-macro_rules! pair_kinds {
-    ($($constant:ident, $name:literal, $first:ident, $second:ident;)*) => {
-        /// Numbers of the pairs of kinds in [`PAIR_KINDS`]: what a function is compiled for.
-        pub mod pair_kinds {
-            #[allow(non_camel_case_types)]
-            enum Number {
-                $($constant,)*
-            }
-            $(#[doc = $name] pub const $constant: usize = Number::$constant as usize;)*
-        }
+/// Pairs of kinds that can touch, in the order in which they are looked at. Each has a stage of its own.
+pub const PAIR_KINDS: [(Kind, Kind); 20] = {
+    use Kind::*;
+    [
+        (Plane, Sphere),
+        (Plane, Capsule),
+        (Plane, Box),
+        (Plane, Cylinder),
+        (Plane, Hull),
+        (Sphere, Sphere),
+        (Sphere, Capsule),
+        (Sphere, Box),
+        (Sphere, Cylinder),
+        (Sphere, Hull),
+        (Capsule, Capsule),
+        (Capsule, Box),
+        (Capsule, Cylinder),
+        (Capsule, Hull),
+        (Box, Box),
+        (Box, Cylinder),
+        (Box, Hull),
+        (Cylinder, Cylinder),
+        (Cylinder, Hull),
+        (Hull, Hull),
+    ]
+};
 
-        /// Pairs of kinds that can touch, each with the name of its stage; the order in which they are looked at.
-        ///
-        /// One more has a stage of its own, and so an arm and a number in `step/run.rs`.
-        pub const PAIR_KINDS: [((Kind, Kind), &str); 20] = [$(((Kind::$first, Kind::$second), $name),)*];
-    };
-}
-
-pair_kinds! {
-    PLANE_SPHERE, "plane_sphere", Plane, Sphere;
-    PLANE_CAPSULE, "plane_capsule", Plane, Capsule;
-    PLANE_BOX, "plane_box", Plane, Box;
-    PLANE_CYLINDER, "plane_cylinder", Plane, Cylinder;
-    PLANE_HULL, "plane_hull", Plane, Hull;
-    SPHERE_SPHERE, "sphere_sphere", Sphere, Sphere;
-    SPHERE_CAPSULE, "sphere_capsule", Sphere, Capsule;
-    SPHERE_BOX, "sphere_box", Sphere, Box;
-    SPHERE_CYLINDER, "sphere_cylinder", Sphere, Cylinder;
-    SPHERE_HULL, "sphere_hull", Sphere, Hull;
-    CAPSULE_CAPSULE, "capsule_capsule", Capsule, Capsule;
-    CAPSULE_BOX, "capsule_box", Capsule, Box;
-    CAPSULE_CYLINDER, "capsule_cylinder", Capsule, Cylinder;
-    CAPSULE_HULL, "capsule_hull", Capsule, Hull;
-    BOX_BOX, "box_box", Box, Box;
-    BOX_CYLINDER, "box_cylinder", Box, Cylinder;
-    BOX_HULL, "box_hull", Box, Hull;
-    CYLINDER_CYLINDER, "cylinder_cylinder", Cylinder, Cylinder;
-    CYLINDER_HULL, "cylinder_hull", Cylinder, Hull;
-    HULL_HULL, "hull_hull", Hull, Hull;
-}
-
-/// Shapes, the pairs of them that may touch, and the classes of contacts.
-#[derive(Clone, Debug)]
-pub struct Contacts<R> {
-    /// Shape of the friction cone.
-    pub cone: Cone,
-    /// Friction impedance over normal impedance [–].
-    pub impratio: R,
-    /// Shapes that some pair has.
-    pub solids: Vec<Solid<R>>,
-    /// Pairs by kinds.
-    pub groups: Vec<Group>,
-    /// Contacts by the bodies that they may be of.
-    pub classes: Vec<Class<R>>,
-    /// Pairs, in the order of the tables.
-    pub pairs: Vec<Pair>,
-    /// Contacts that a world has room for.
-    pub contacts_max: usize,
-    /// Rows that they may have.
-    pub rows_max: usize,
-    /// Can more be found than there is room for?
-    pub may_overflow: bool,
-    /// Numbers of pairs, and of hulls.
-    pub tables: Tables<R>,
-    /// Where they are.
-    pub handles: Handles,
-    /// Where the hulls are.
-    pub hulls: HullTables,
-    /// Where the stages keep what they find.
-    pub memory: Memory,
+recast! {
+    /// Shapes, the pairs of them that may touch, and the classes of contacts.
+    #[derive(Clone, Debug)]
+    pub struct Contacts<R> {
+        /// Shape of the friction cone.
+        pub cone: Cone,
+        /// Friction impedance over normal impedance [–].
+        pub impratio: R,
+        /// Shapes that some pair has.
+        pub solids: Vec<Solid<R>>,
+        /// Pairs by kinds.
+        pub groups: Vec<Group>,
+        /// Contacts by the bodies that they may be of.
+        pub classes: Vec<Class<R>>,
+        /// Pairs, in the order of the tables.
+        pub pairs: Vec<Pair>,
+        /// Contacts that a world has room for.
+        pub contacts_max: usize,
+        /// Rows that they may have.
+        pub rows_max: usize,
+        /// Can more be found than there is room for?
+        pub may_overflow: bool,
+        /// Numbers of pairs, and of hulls.
+        pub tables: Tables<R>,
+        /// Where they are.
+        pub handles: Handles,
+        /// Where the hulls are.
+        pub hulls: HullTables,
+        /// Where the stages keep what they find.
+        pub memory: Memory,
+    }
 }
 
 /// Tables of the model.
@@ -135,21 +123,23 @@ pub struct Memory {
     pub len: usize,
 }
 
-/// A shape of a body, or one that stands still.
-#[derive(Clone, Debug)]
-pub struct Solid<R> {
-    /// What it is.
-    pub kind: Kind,
-    /// Its shape, as in `shape_names`.
-    pub shape: usize,
-    /// The body that bears it, or none.
-    pub body: Option<usize>,
-    /// Its axes in the body's frame, or in the world: columns [–].
-    pub axes: [[R; 3]; 3],
-    /// Are they those of the frame?
-    pub is_upright: bool,
-    /// Its centre in the body's frame, or in the world [m].
-    pub center: [R; 3],
+recast! {
+    /// A shape of a body, or one that stands still.
+    #[derive(Clone, Debug)]
+    pub struct Solid<R> {
+        /// What it is.
+        pub kind: Kind,
+        /// Its shape, as in `shape_names`.
+        pub shape: usize,
+        /// The body that bears it, or none.
+        pub body: Option<usize>,
+        /// Its axes in the body's frame, or in the world: columns [–].
+        pub axes: [[R; 3]; 3],
+        /// Are they those of the frame?
+        pub is_upright: bool,
+        /// Its centre in the body's frame, or in the world [m].
+        pub center: [R; 3],
+    }
 }
 
 /// Pairs of two kinds of shapes.
@@ -175,28 +165,30 @@ pub struct Pair {
     pub class: usize,
 }
 
-/// Contacts of like bodies: the columns of their Jacobians are the same dofs.
-#[derive(Clone, Debug)]
-pub struct Class<R> {
-    /// Trees of the bodies on its two sides; the first is none where that side stands still.
-    pub trees: (Option<usize>, usize),
-    /// Its dofs, rising.
-    pub columns: Vec<Column>,
-    /// The same dofs, by runs.
-    pub runs: Vec<Run>,
-    /// Of each column, the entries of JᵀWJ with it and those before it that may differ from 0, by runs of columns whose
-    /// places follow each other: in the mass matrix's pattern, or in that of couplings if the class couples.
-    pub entries: Vec<Vec<Run>>,
-    /// Does any entry lie outside the pattern of the mass matrix?
-    pub couples: bool,
-    /// Parts of the mass matrix that its columns are of, each once, as [`Pattern::parts`](crate::math::factor::Pattern::parts) counts them.
-    pub parts: Vec<usize>,
-    /// Numbers of a pair that all its pairs share.
-    pub shared: Vec<Option<R>>,
-    /// First row of its contacts.
-    pub first: usize,
-    /// Their number at most.
-    pub capacity: usize,
+recast! {
+    /// Contacts of like bodies: the columns of their Jacobians are the same dofs.
+    #[derive(Clone, Debug)]
+    pub struct Class<R> {
+        /// Trees of the bodies on its two sides; the first is none where that side stands still.
+        pub trees: (Option<usize>, usize),
+        /// Its dofs, rising.
+        pub columns: Vec<Column>,
+        /// The same dofs, by runs.
+        pub runs: Vec<Run>,
+        /// Of each column, the entries of JᵀWJ with it and those before it that may differ from 0, by runs of columns whose
+        /// places follow each other: in the mass matrix's pattern, or in that of couplings if the class couples.
+        pub entries: Vec<Vec<Run>>,
+        /// Does any entry lie outside the pattern of the mass matrix?
+        pub couples: bool,
+        /// Parts of the mass matrix that its columns are of, each once, as [`Pattern::parts`](crate::math::factor::Pattern::parts) counts them.
+        pub parts: Vec<usize>,
+        /// Numbers of a pair that all its pairs share.
+        pub shared: Vec<Option<R>>,
+        /// First row of its contacts.
+        pub first: usize,
+        /// Their number at most.
+        pub capacity: usize,
+    }
 }
 
 /// A dof that moves bodies of a class.
@@ -360,10 +352,9 @@ pub const COUNT_LEFT_OUT: usize = 2;
 pub const COUNTS: usize = 3;
 
 impl<R> Contacts<R> {
-    /// The pairs of two kinds, by their place in [`PAIR_KINDS`].
+    /// The pairs of two kinds.
     #[inline(always)]
-    pub fn group(&self, kinds: usize) -> Option<&Group> {
-        let kinds = PAIR_KINDS[kinds].0;
+    pub fn group(&self, kinds: (Kind, Kind)) -> Option<&Group> {
         self.groups.iter().find(|group| group.kinds == kinds)
     }
 }
@@ -423,52 +414,6 @@ impl<R: Real> Contacts<R> {
     pub fn couples(&self) -> bool {
         self.classes.iter().any(|class| class.couples)
     }
-
-    /// The same numbers, rounded to another precision.
-    pub(super) fn cast<S: Real>(&self) -> Contacts<S> {
-        let cast = |x: R| S::of(x.to_f64());
-        Contacts {
-            cone: self.cone,
-            impratio: cast(self.impratio),
-            solids: self
-                .solids
-                .iter()
-                .map(|s| Solid {
-                    kind: s.kind,
-                    shape: s.shape,
-                    body: s.body,
-                    axes: s.axes.map(|column| column.map(cast)),
-                    is_upright: s.is_upright,
-                    center: s.center.map(cast),
-                })
-                .collect(),
-            groups: self.groups.clone(),
-            classes: self
-                .classes
-                .iter()
-                .map(|c| Class {
-                    trees: c.trees,
-                    columns: c.columns.clone(),
-                    runs: c.runs.clone(),
-                    entries: c.entries.clone(),
-                    couples: c.couples,
-                    parts: c.parts.clone(),
-                    shared: c.shared.iter().map(|x| x.map(cast)).collect(),
-                    first: c.first,
-                    capacity: c.capacity,
-                })
-                .collect(),
-            pairs: self.pairs.clone(),
-            contacts_max: self.contacts_max,
-            rows_max: self.rows_max,
-            may_overflow: self.may_overflow,
-            tables: Tables {
-                numbers: self.tables.numbers.iter().copied().map(cast).collect(),
-                indices: self.tables.indices.clone(),
-            },
-            handles: self.handles,
-            hulls: self.hulls,
-            memory: self.memory,
-        }
-    }
 }
+
+same! { Cone, Kind, Group, Pair, Column, Run, Handles, HullTables, Memory }

@@ -4,62 +4,67 @@ pub mod clip;
 pub mod contact;
 pub mod hull;
 pub mod params;
+mod recast;
 pub mod site;
 mod sizes;
 
+pub use self::recast::Recast;
 pub use self::sizes::Sizes;
 
 use self::contact::Contacts;
 use self::params::{COMMAND_NOISES, Varying};
+use self::recast::{recast, same};
 use self::site::Site;
 use crate::lane::Real;
 use crate::math::factor::Pattern;
 
-/// A model's constants. Bodies are sorted so that parents precede children, dofs by their bodies.
-#[derive(Clone, Debug)]
-pub struct Constants<R> {
-    /// Duration of one substep [s].
-    pub dt: R,
-    /// Gravity in world axes [m/s²].
-    pub gravity: [R; 3],
-    /// Bodies that move, each with the joint that carries it.
-    pub bodies: Vec<Body<R>>,
-    /// Degrees of freedom.
-    pub dofs: Vec<Dof<R>>,
-    /// Robots: where their reference points are.
-    pub trees: Vec<Tree<R>>,
-    /// Frames of all links, those that move with another included.
-    pub frames: Vec<Frame<R>>,
-    /// Does any joint or drive have damping?
-    pub damped: bool,
-    /// Entries of the mass matrix, dof by dof, each with the place where it is kept: the dof itself last.
-    pub mass_entries: Vec<MassEntry>,
-    /// Places of the pattern that are 0 in the mass matrix.
-    pub mass_zeros: Vec<usize>,
-    /// Position coordinates of all joints.
-    pub coords: usize,
-    /// Soft equality of two joints.
-    pub equalities: Vec<Equality<R>>,
-    /// Dry friction of a joint.
-    pub frictions: Vec<Friction<R>>,
-    /// Range of a joint.
-    pub limits: Vec<Limit<R>>,
-    /// Entries of the mass matrix and of the solver's Hessian that may differ from zero.
-    pub pattern: Pattern,
-    /// The same where contacts couple what the mass matrix does not; empty where none can.
-    pub coupled: Coupled,
-    /// Shapes, and which may touch.
-    pub contacts: Contacts<R>,
-    /// Impedance of contacts.
-    pub contact_impedance: Impedance<R>,
-    /// Solver options.
-    pub solver: Newton<R>,
-    /// Which of all these numbers vary from world to world.
-    pub varying: Varying,
-    /// How late commands may be.
-    pub delay: Delay,
-    /// Frames of interest.
-    pub sites: Vec<Site<R>>,
+recast! {
+    /// A model's constants. Bodies are sorted so that parents precede children, dofs by their bodies.
+    #[derive(Clone, Debug)]
+    pub struct Constants<R> {
+        /// Duration of one substep [s].
+        pub dt: R,
+        /// Gravity in world axes [m/s²].
+        pub gravity: [R; 3],
+        /// Bodies that move, each with the joint that carries it.
+        pub bodies: Vec<Body<R>>,
+        /// Degrees of freedom.
+        pub dofs: Vec<Dof<R>>,
+        /// Robots: where their reference points are.
+        pub trees: Vec<Tree<R>>,
+        /// Frames of all links, those that move with another included.
+        pub frames: Vec<Frame<R>>,
+        /// Does any joint or drive have damping?
+        pub damped: bool,
+        /// Entries of the mass matrix, dof by dof, each with the place where it is kept: the dof itself last.
+        pub mass_entries: Vec<MassEntry>,
+        /// Places of the pattern that are 0 in the mass matrix.
+        pub mass_zeros: Vec<usize>,
+        /// Position coordinates of all joints.
+        pub coords: usize,
+        /// Soft equality of two joints.
+        pub equalities: Vec<Equality<R>>,
+        /// Dry friction of a joint.
+        pub frictions: Vec<Friction<R>>,
+        /// Range of a joint.
+        pub limits: Vec<Limit<R>>,
+        /// Entries of the mass matrix and of the solver's Hessian that may differ from zero.
+        pub pattern: Pattern,
+        /// The same where contacts couple what the mass matrix does not; empty where none can.
+        pub coupled: Coupled,
+        /// Shapes, and which may touch.
+        pub contacts: Contacts<R>,
+        /// Impedance of contacts.
+        pub contact_impedance: Impedance<R>,
+        /// Solver options.
+        pub solver: Newton<R>,
+        /// Which of all these numbers vary from world to world.
+        pub varying: Varying,
+        /// How late commands may be.
+        pub delay: Delay,
+        /// Frames of interest.
+        pub sites: Vec<Site<R>>,
+    }
 }
 
 /// How late commands may be.
@@ -114,48 +119,52 @@ impl Motion {
     }
 }
 
-/// A body and its joint. The axis of a joint with one is the z axis of the body's frame.
-#[derive(Clone, Debug)]
-pub struct Body<R> {
-    /// How it moves.
-    pub motion: Motion,
-    /// The body that carries this one; none for the base or the world.
-    pub parent: Option<usize>,
-    /// Its robot.
-    pub tree: usize,
-    /// Its first dof.
-    pub dof: usize,
-    /// Its first position coordinate.
-    pub coord: usize,
-    /// Frame at rest in the carrier's frame: columns of the rotation [–].
-    pub rotation: [[R; 3]; 3],
-    /// The same rotation, where it only exchanges axes: which of the carrier's each one is, and whether turned round.
-    pub exchange: Option<[(usize, bool); 3]>,
-    /// The same rotation as a quaternion (x, y, z, w) [–].
-    pub quat: [R; 4],
-    /// Origin of the frame at rest in the carrier's frame [m].
-    pub position: [R; 3],
-    /// Mass, links fixed to it included [kg].
-    pub mass: R,
-    /// Centre of mass in the body's frame [m].
-    pub center: [R; 3],
-    /// xx yy zz xy xz yz about the centre of mass, in the body's axes [kg·m²].
-    pub inertia: [R; 6],
-    /// The links that make it up, where their masses vary.
-    pub parts: Vec<Part<R>>,
+recast! {
+    /// A body and its joint. The axis of a joint with one is the z axis of the body's frame.
+    #[derive(Clone, Debug)]
+    pub struct Body<R> {
+        /// How it moves.
+        pub motion: Motion,
+        /// The body that carries this one; none for the base or the world.
+        pub parent: Option<usize>,
+        /// Its robot.
+        pub tree: usize,
+        /// Its first dof.
+        pub dof: usize,
+        /// Its first position coordinate.
+        pub coord: usize,
+        /// Frame at rest in the carrier's frame: columns of the rotation [–].
+        pub rotation: [[R; 3]; 3],
+        /// The same rotation, where it only exchanges axes: which of the carrier's each one is, and whether turned round.
+        pub exchange: Option<[(usize, bool); 3]>,
+        /// The same rotation as a quaternion (x, y, z, w) [–].
+        pub quat: [R; 4],
+        /// Origin of the frame at rest in the carrier's frame [m].
+        pub position: [R; 3],
+        /// Mass, links fixed to it included [kg].
+        pub mass: R,
+        /// Centre of mass in the body's frame [m].
+        pub center: [R; 3],
+        /// xx yy zz xy xz yz about the centre of mass, in the body's axes [kg·m²].
+        pub inertia: [R; 6],
+        /// The links that make it up, where their masses vary.
+        pub parts: Vec<Part<R>>,
+    }
 }
 
-/// A link that is fixed to others, or the only one of a body.
-#[derive(Clone, Debug)]
-pub struct Part<R> {
-    /// Its number among the links.
-    pub link: usize,
-    /// [kg]
-    pub mass: R,
-    /// Its centre of mass in the body's frame [m].
-    pub center: [R; 3],
-    /// xx yy zz xy xz yz about its centre of mass, in the body's axes [kg·m²].
-    pub inertia: [R; 6],
+recast! {
+    /// A link that is fixed to others, or the only one of a body.
+    #[derive(Clone, Debug)]
+    pub struct Part<R> {
+        /// Its number among the links.
+        pub link: usize,
+        /// [kg]
+        pub mass: R,
+        /// Its centre of mass in the body's frame [m].
+        pub center: [R; 3],
+        /// xx yy zz xy xz yz about its centre of mass, in the body's axes [kg·m²].
+        pub inertia: [R; 6],
+    }
 }
 
 impl<R> Body<R> {
@@ -166,29 +175,31 @@ impl<R> Body<R> {
     }
 }
 
-/// A degree of freedom.
-#[derive(Clone, Debug)]
-pub struct Dof<R> {
-    /// The body that it moves.
-    pub body: usize,
-    /// The position coordinate that it changes, where there is just one.
-    pub coord: usize,
-    /// Its part of `mass_entries`.
-    pub entries: (usize, usize),
-    /// Inertia of the drive, added to the diagonal of the mass matrix [kg·m² or kg].
-    pub armature: R,
-    /// Passive damping [N·m·s/rad or N·s/m].
-    pub damping: R,
-    /// Proportional gain, 0 in velocity mode [N·m/rad or N/m].
-    pub ke: R,
-    /// Derivative gain [N·m·s/rad or N·s/m].
-    pub kd: R,
-    /// Does the drive follow the position target?
-    pub follows_position: bool,
-    /// Does the drive follow the velocity target?
-    pub follows_velocity: bool,
-    /// Bound of the drive's force; none = no limit [N·m or N].
-    pub effort_limit: Option<R>,
+recast! {
+    /// A degree of freedom.
+    #[derive(Clone, Debug)]
+    pub struct Dof<R> {
+        /// The body that it moves.
+        pub body: usize,
+        /// The position coordinate that it changes, where there is just one.
+        pub coord: usize,
+        /// Its part of `mass_entries`.
+        pub entries: (usize, usize),
+        /// Inertia of the drive, added to the diagonal of the mass matrix [kg·m² or kg].
+        pub armature: R,
+        /// Passive damping [N·m·s/rad or N·s/m].
+        pub damping: R,
+        /// Proportional gain, 0 in velocity mode [N·m/rad or N/m].
+        pub ke: R,
+        /// Derivative gain [N·m·s/rad or N·s/m].
+        pub kd: R,
+        /// Does the drive follow the position target?
+        pub follows_position: bool,
+        /// Does the drive follow the velocity target?
+        pub follows_velocity: bool,
+        /// Bound of the drive's force; none = no limit [N·m or N].
+        pub effort_limit: Option<R>,
+    }
 }
 
 /// An entry of the mass matrix: a dof, and one on its path to the root or itself.
@@ -200,246 +211,137 @@ pub struct MassEntry {
     pub place: usize,
 }
 
-/// A robot. Its kinematics are about a reference point, so that f32 does not lose what is far from the origin.
-#[derive(Clone, Debug)]
-pub struct Tree<R> {
-    /// World position of the base, the reference point of a robot that is fixed to the world [m].
-    pub base: [R; 3],
-    /// The free body whose centre of mass is the reference point instead.
-    pub free: Option<usize>,
+recast! {
+    /// A robot. Its kinematics are about a reference point, so that f32 does not lose what is far from the origin.
+    #[derive(Clone, Debug)]
+    pub struct Tree<R> {
+        /// World position of the base, the reference point of a robot that is fixed to the world [m].
+        pub base: [R; 3],
+        /// The free body whose centre of mass is the reference point instead.
+        pub free: Option<usize>,
+    }
 }
 
-/// A link's frame: a constant pose in the frame of the body that carries it.
-#[derive(Clone, Debug)]
-pub struct Frame<R> {
-    /// The carrying body; none for what is fixed to the world.
-    pub body: Option<usize>,
-    /// Its robot.
-    pub tree: usize,
-    /// Origin in the carrier's frame, or relative to the base [m].
-    pub position: [R; 3],
-    /// Orientation in the carrier's frame, (x, y, z, w) [–].
-    pub quat: [R; 4],
-    /// The link's own centre of mass in the carrier's frame, or relative to the base; its origin if nothing says where that is [m].
-    pub center: [R; 3],
+recast! {
+    /// A link's frame: a constant pose in the frame of the body that carries it.
+    #[derive(Clone, Debug)]
+    pub struct Frame<R> {
+        /// The carrying body; none for what is fixed to the world.
+        pub body: Option<usize>,
+        /// Its robot.
+        pub tree: usize,
+        /// Origin in the carrier's frame, or relative to the base [m].
+        pub position: [R; 3],
+        /// Orientation in the carrier's frame, (x, y, z, w) [–].
+        pub quat: [R; 4],
+        /// The link's own centre of mass in the carrier's frame, or relative to the base; its origin if nothing says where that is [m].
+        pub center: [R; 3],
+    }
 }
 
-/// Softness of a constraint row whose impedance depends on its position.
-#[derive(Clone, Copy, Debug)]
-pub struct Soft<R> {
-    /// Reference stiffness k of `aref = -b v - k imp pos` [1/s²].
-    pub stiffness: R,
-    /// Reference damping b [1/s].
-    pub damping: R,
-    /// Approximate inverse inertia seen by the row [1/(kg·m²) or 1/kg].
-    pub inverse_weight: R,
-    /// Impedance.
-    pub impedance: Impedance<R>,
+recast! {
+    /// Softness of a constraint row whose impedance depends on its position.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Soft<R> {
+        /// Reference stiffness k of `aref = -b v - k imp pos` [1/s²].
+        pub stiffness: R,
+        /// Reference damping b [1/s].
+        pub damping: R,
+        /// Approximate inverse inertia seen by the row [1/(kg·m²) or 1/kg].
+        pub inverse_weight: R,
+        /// Impedance.
+        pub impedance: Impedance<R>,
+    }
 }
 
-/// MuJoCo's `solimp`: impedance rises from `d_min` at 0 to `d_max` at `width`, along two parabolas that meet at `midpoint`.
-#[derive(Clone, Copy, Debug)]
-pub struct Impedance<R> {
-    /// At the constraint's surface [–].
-    pub d_min: R,
-    /// At `width` and beyond [–].
-    pub d_max: R,
-    /// 1 / width, the position at which `d_max` is reached [1/m or 1/rad].
-    pub inverse_width: R,
-    /// Where the parabolas meet, as a share of the width [–].
-    pub midpoint: R,
+recast! {
+    /// MuJoCo's `solimp`: impedance rises from `d_min` at 0 to `d_max` at `width`, along two parabolas that meet at `midpoint`.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Impedance<R> {
+        /// At the constraint's surface [–].
+        pub d_min: R,
+        /// At `width` and beyond [–].
+        pub d_max: R,
+        /// 1 / width, the position at which `d_max` is reached [1/m or 1/rad].
+        pub inverse_width: R,
+        /// Where the parabolas meet, as a share of the width [–].
+        pub midpoint: R,
+    }
 }
 
-/// `q[follower] = offset + multiplier q[leader]`.
-#[derive(Clone, Debug)]
-pub struct Equality<R> {
-    /// Dof that follows.
-    pub follower: usize,
-    /// Dof that leads.
-    pub leader: usize,
-    /// [–]
-    pub multiplier: R,
-    /// [rad or m]
-    pub offset: R,
-    /// Softness.
-    pub soft: Soft<R>,
+recast! {
+    /// `q[follower] = offset + multiplier q[leader]`.
+    #[derive(Clone, Debug)]
+    pub struct Equality<R> {
+        /// Dof that follows.
+        pub follower: usize,
+        /// Dof that leads.
+        pub leader: usize,
+        /// [–]
+        pub multiplier: R,
+        /// [rad or m]
+        pub offset: R,
+        /// Softness.
+        pub soft: Soft<R>,
+    }
 }
 
-/// Dry friction: a force of at most `loss` against motion.
-#[derive(Clone, Debug)]
-pub struct Friction<R> {
-    /// Dof that rubs.
-    pub dof: usize,
-    /// Bound of the force [N·m or N].
-    pub loss: R,
-    /// Reference damping b of `aref = -b v` [1/s].
-    pub damping: R,
-    /// Regularised stiffness D = 1/R.
-    pub weight: R,
-    /// R = 1/D: beyond R × loss the force is at its bound.
-    pub regularizer: R,
-    /// R × loss.
-    pub zone: R,
+recast! {
+    /// Dry friction: a force of at most `loss` against motion.
+    #[derive(Clone, Debug)]
+    pub struct Friction<R> {
+        /// Dof that rubs.
+        pub dof: usize,
+        /// Bound of the force [N·m or N].
+        pub loss: R,
+        /// Reference damping b of `aref = -b v` [1/s].
+        pub damping: R,
+        /// Regularised stiffness D = 1/R.
+        pub weight: R,
+        /// R = 1/D: beyond R × loss the force is at its bound.
+        pub regularizer: R,
+        /// R × loss.
+        pub zone: R,
+    }
 }
 
-/// Range of a joint, soft on both sides.
-#[derive(Clone, Debug)]
-pub struct Limit<R> {
-    /// Dof that is limited.
-    pub dof: usize,
-    /// [rad or m]
-    pub lower: R,
-    /// [rad or m]
-    pub upper: R,
-    /// Softness.
-    pub soft: Soft<R>,
+recast! {
+    /// Range of a joint, soft on both sides.
+    #[derive(Clone, Debug)]
+    pub struct Limit<R> {
+        /// Dof that is limited.
+        pub dof: usize,
+        /// [rad or m]
+        pub lower: R,
+        /// [rad or m]
+        pub upper: R,
+        /// Softness.
+        pub soft: Soft<R>,
+    }
 }
 
-/// Options of the constraint solver.
-#[derive(Clone, Debug)]
-pub struct Newton<R> {
-    /// Most iterations.
-    pub iterations: usize,
-    /// Most line-search evaluations an iteration.
-    pub ls_iterations: usize,
-    /// Improvement of the cost below which the solver stops: the option × mean inertia × dofs.
-    pub tolerance: R,
-    /// How often `f32` corrects its accelerations (`step/solver/refine.rs`).
-    pub refinements: usize,
+recast! {
+    /// Options of the constraint solver.
+    #[derive(Clone, Debug)]
+    pub struct Newton<R> {
+        /// Most iterations.
+        pub iterations: usize,
+        /// Most line-search evaluations an iteration.
+        pub ls_iterations: usize,
+        /// Improvement of the cost below which the solver stops: the option × mean inertia × dofs.
+        pub tolerance: R,
+        /// How often `f32` corrects its accelerations (`step/solver/refine.rs`).
+        pub refinements: usize,
+    }
 }
 
 impl<R: Real> Constants<R> {
-    /// The same numbers, rounded to another precision.
-    pub fn cast<S: Real>(&self) -> Constants<S> {
-        let impedance = |i: &Impedance<R>| Impedance {
-            d_min: cast(i.d_min),
-            d_max: cast(i.d_max),
-            inverse_width: cast(i.inverse_width),
-            midpoint: cast(i.midpoint),
-        };
-        let soft = |s: &Soft<R>| Soft {
-            stiffness: cast(s.stiffness),
-            damping: cast(s.damping),
-            inverse_weight: cast(s.inverse_weight),
-            impedance: impedance(&s.impedance),
-        };
-        Constants {
-            dt: cast(self.dt),
-            gravity: self.gravity.map(cast),
-            bodies: self
-                .bodies
-                .iter()
-                .map(|b| Body {
-                    motion: b.motion,
-                    parent: b.parent,
-                    tree: b.tree,
-                    dof: b.dof,
-                    coord: b.coord,
-                    rotation: b.rotation.map(|column| column.map(cast)),
-                    exchange: b.exchange,
-                    quat: b.quat.map(cast),
-                    position: b.position.map(cast),
-                    mass: cast(b.mass),
-                    center: b.center.map(cast),
-                    inertia: b.inertia.map(cast),
-                    parts: b
-                        .parts
-                        .iter()
-                        .map(|part| Part {
-                            link: part.link,
-                            mass: cast(part.mass),
-                            center: part.center.map(cast),
-                            inertia: part.inertia.map(cast),
-                        })
-                        .collect(),
-                })
-                .collect(),
-            dofs: self
-                .dofs
-                .iter()
-                .map(|d| Dof {
-                    body: d.body,
-                    coord: d.coord,
-                    entries: d.entries,
-                    armature: cast(d.armature),
-                    damping: cast(d.damping),
-                    ke: cast(d.ke),
-                    kd: cast(d.kd),
-                    follows_position: d.follows_position,
-                    follows_velocity: d.follows_velocity,
-                    effort_limit: d.effort_limit.map(cast),
-                })
-                .collect(),
-            trees: self
-                .trees
-                .iter()
-                .map(|t| Tree {
-                    base: t.base.map(cast),
-                    free: t.free,
-                })
-                .collect(),
-            frames: self
-                .frames
-                .iter()
-                .map(|f| Frame {
-                    body: f.body,
-                    tree: f.tree,
-                    position: f.position.map(cast),
-                    quat: f.quat.map(cast),
-                    center: f.center.map(cast),
-                })
-                .collect(),
-            damped: self.damped,
-            mass_entries: self.mass_entries.clone(),
-            mass_zeros: self.mass_zeros.clone(),
-            coords: self.coords,
-            equalities: self
-                .equalities
-                .iter()
-                .map(|e| Equality {
-                    follower: e.follower,
-                    leader: e.leader,
-                    multiplier: cast(e.multiplier),
-                    offset: cast(e.offset),
-                    soft: soft(&e.soft),
-                })
-                .collect(),
-            frictions: self
-                .frictions
-                .iter()
-                .map(|f| Friction {
-                    dof: f.dof,
-                    loss: cast(f.loss),
-                    damping: cast(f.damping),
-                    weight: cast(f.weight),
-                    regularizer: cast(f.regularizer),
-                    zone: cast(f.zone),
-                })
-                .collect(),
-            limits: self
-                .limits
-                .iter()
-                .map(|l| Limit {
-                    dof: l.dof,
-                    lower: cast(l.lower),
-                    upper: cast(l.upper),
-                    soft: soft(&l.soft),
-                })
-                .collect(),
-            pattern: self.pattern.clone(),
-            coupled: self.coupled.clone(),
-            contacts: self.contacts.cast(),
-            contact_impedance: impedance(&self.contact_impedance),
-            solver: Newton {
-                iterations: self.solver.iterations,
-                ls_iterations: self.solver.ls_iterations,
-                tolerance: cast(self.solver.tolerance),
-                refinements: self.solver.refinements,
-            },
-            varying: self.varying.clone(),
-            delay: self.delay,
-            sites: self.sites.iter().map(Site::cast).collect(),
-        }
+    /// The same constants, rounded to another precision.
+    pub fn cast<S: Real>(&self) -> Constants<S>
+    where
+        R: Recast<S, Out = S>,
+    {
+        self.recast()
     }
 
     /// Do commands come late, or with noise?
@@ -472,6 +374,4 @@ impl<R: Real> Constants<R> {
     }
 }
 
-pub(super) fn cast<R: Real, S: Real>(x: R) -> S {
-    S::of(x.to_f64())
-}
+same! { Motion, MassEntry, Pattern, Coupled, Varying, Delay }

@@ -1,19 +1,20 @@
 //! Frames of interest, as the text of physics reads them.
 
-use super::cast;
-use crate::lane::Real;
+use super::recast::{Recast, recast, same};
 
-/// A frame of interest.
-#[derive(Clone, Debug)]
-pub struct Site<R> {
-    /// Where it is.
-    pub mount: Mount<R>,
-    /// What its pose and velocity are measured from; none for the world.
-    pub relative_to: Option<Mount<R>>,
-    /// Damping λ of its inverse Jacobian [m and rad alike].
-    pub damping: R,
-    /// The dofs that move it against what it is measured from, rising.
-    pub columns: Vec<Column>,
+recast! {
+    /// A frame of interest.
+    #[derive(Clone, Debug)]
+    pub struct Site<R> {
+        /// Where it is.
+        pub mount: Mount<R>,
+        /// What its pose and velocity are measured from; none for the world.
+        pub relative_to: Option<Mount<R>>,
+        /// Damping λ of its inverse Jacobian [m and rad alike].
+        pub damping: R,
+        /// The dofs that move it against what it is measured from, rising.
+        pub columns: Vec<Column>,
+    }
 }
 
 /// A dof that moves a site against the frame that it is measured from.
@@ -25,40 +26,21 @@ pub struct Column {
     pub is_of_other: bool,
 }
 
-/// A frame on a body, or in the world.
-#[derive(Clone, Debug)]
-pub struct Mount<R> {
-    /// The body that carries it; none for what stands still.
-    pub body: Option<usize>,
-    /// The robot of that body.
-    pub tree: Option<usize>,
-    /// Origin in the carrier's frame, or in the world [m].
-    pub position: [R; 3],
-    /// Orientation in the carrier's frame, (x, y, z, w) [–].
-    pub quat: [R; 4],
-    /// The same by columns [–].
-    pub rotation: [[R; 3]; 3],
-}
-
-impl<R: Real> Site<R> {
-    pub(super) fn cast<S: Real>(&self) -> Site<S> {
-        Site {
-            mount: self.mount.cast(),
-            relative_to: self.relative_to.as_ref().map(Mount::cast),
-            damping: cast(self.damping),
-            columns: self.columns.clone(),
-        }
+recast! {
+    /// A frame on a body, or in the world.
+    #[derive(Clone, Debug)]
+    pub struct Mount<R> {
+        /// The body that carries it; none for what stands still.
+        pub body: Option<usize>,
+        /// The robot of that body.
+        pub tree: Option<usize>,
+        /// Origin in the carrier's frame, or in the world [m].
+        pub position: [R; 3],
+        /// Orientation in the carrier's frame, (x, y, z, w) [–].
+        pub quat: [R; 4],
+        /// The same by columns [–].
+        pub rotation: [[R; 3]; 3],
     }
 }
 
-impl<R: Real> Mount<R> {
-    fn cast<S: Real>(&self) -> Mount<S> {
-        Mount {
-            body: self.body,
-            tree: self.tree,
-            position: self.position.map(cast),
-            quat: self.quat.map(cast),
-            rotation: self.rotation.map(|column| column.map(cast)),
-        }
-    }
-}
+same! { Column }

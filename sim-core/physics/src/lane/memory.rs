@@ -218,7 +218,7 @@ impl<F: Lane> Cx for Cpu<'_, F> {
         }
         debug_assert!(k < t.stride, "number {k} of {t:?}");
         debug_assert!(
-            !F::any(F::and(self.mask, F::c(t.rows as f64 - 0.5).lt(row.row))),
+            !F::any(self.mask & F::c(t.rows as f64 - 0.5).lt(row.row)),
             "a row beyond {t:?}"
         );
         let rows = &mut self.memory[t.base + k..];
@@ -247,7 +247,7 @@ impl<F: Lane> Cx for Cpu<'_, F> {
     #[inline(always)]
     fn push(&mut self, list: &mut Rows<F>, mask: F::Mask) -> (F::Mask, Option<Fresh<F>>) {
         let outer = self.mask;
-        let pushing = F::and(outer, mask);
+        let pushing = outer & mask;
         if !F::any(pushing) {
             return (outer, None);
         }
@@ -257,15 +257,15 @@ impl<F: Lane> Cx for Cpu<'_, F> {
             Some(home) => self.memory[home] = more,
             None => list.count = more,
         }
-        let fits = F::and(pushing, count.lt(F::c(list.capacity as f64 - 0.5)));
+        let fits = pushing & count.lt(F::c(list.capacity as f64 - 0.5));
         if !F::any(fits) {
             return (outer, None);
         }
         self.mask = fits;
         let lowest = count.lane(F::bits(fits).trailing_zeros() as usize);
         let same = F::k(lowest);
-        let differs = F::or(count.lt(same), same.lt(count));
-        let shared = match F::any(F::and(fits, differs)) {
+        let differs = count.lt(same) | same.lt(count);
+        let shared = match F::any(fits & differs) {
             true => None,
             false => Some(list.first + lowest.to_usize()),
         };
@@ -279,12 +279,12 @@ impl<F: Lane> Cx for Cpu<'_, F> {
     #[inline(always)]
     fn enter(&mut self, mask: F::Mask) -> (F::Mask, bool) {
         let outer = self.mask;
-        self.mask = F::and(outer, mask);
+        self.mask = outer & mask;
         (outer, F::any(self.mask))
     }
     #[inline(always)]
     fn anywhere(&mut self, mask: F::Mask) -> bool {
-        F::any(F::and(self.mask, mask))
+        F::any(self.mask & mask)
     }
     #[inline(always)]
     fn leave(&mut self, block: F::Mask) {
@@ -326,7 +326,7 @@ impl<F: Lane> Cx for Cpu<'_, F> {
         }
         if round < l.rounds {
             self.mask = match l.count {
-                Some(count) => F::and(l.live, F::c(round as f64 + 0.5).lt(count)),
+                Some(count) => l.live & F::c(round as f64 + 0.5).lt(count),
                 None => l.live,
             };
             if F::any(self.mask) {
@@ -339,7 +339,7 @@ impl<F: Lane> Cx for Cpu<'_, F> {
     }
     #[inline(always)]
     fn stop(&mut self, mask: F::Mask) -> bool {
-        self.mask = F::and(self.mask, F::not(mask));
+        self.mask = self.mask & !mask;
         !F::any(self.mask)
     }
 }

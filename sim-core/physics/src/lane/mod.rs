@@ -12,7 +12,7 @@ pub mod memory;
 pub mod scalar;
 pub mod simd;
 
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, BitAnd, BitOr, Mul, Neg, Not, Sub};
 
 /// The precision in which constants of the model are kept: `f32` or `f64`.
 pub trait Real: Copy + Default + PartialOrd + Send + Sync + std::fmt::Debug + 'static {
@@ -66,8 +66,11 @@ pub trait Num:
 {
     /// Precision of constants.
     type Real: Real;
-    /// A truth value of every world.
-    type Mask: Copy;
+    /// A truth value of every world; `&`, `|` and `!` combine them.
+    type Mask: Copy
+        + BitAnd<Output = Self::Mask>
+        + BitOr<Output = Self::Mask>
+        + Not<Output = Self::Mask>;
 
     /// The same constant in every world.
     fn k(x: Self::Real) -> Self;
@@ -96,12 +99,6 @@ pub trait Num:
     fn lt(self, b: Self) -> Self::Mask;
     /// `a` where the mask holds, else `b`.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
-    /// Both hold.
-    fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Either holds.
-    fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Does not hold.
-    fn not(a: Self::Mask) -> Self::Mask;
 
     /// The angle of the point (x, self) for self ≥ 0, x ≥ 0, not both 0: in [0, π/2].
     ///

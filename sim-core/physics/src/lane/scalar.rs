@@ -52,18 +52,6 @@ macro_rules! scalar {
             fn select(mask: bool, a: Self, b: Self) -> Self {
                 if mask { a } else { b }
             }
-            #[inline(always)]
-            fn and(a: bool, b: bool) -> bool {
-                a & b
-            }
-            #[inline(always)]
-            fn or(a: bool, b: bool) -> bool {
-                a | b
-            }
-            #[inline(always)]
-            fn not(a: bool) -> bool {
-                !a
-            }
         }
 
         impl Lane for $real {

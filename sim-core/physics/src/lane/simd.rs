@@ -8,7 +8,7 @@
 
 use super::{Lane, Num};
 use std::arch::x86_64::*;
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, BitAnd, BitOr, Mul, Neg, Not, Sub};
 
 /// Implements [`Num`] and [`Lane`] for a register type.
 /// The bracketed names are intrinsics or the functions below that make up for missing ones.
@@ -17,7 +17,7 @@ macro_rules! register {
      arithmetic [$add:ident $sub:ident $mul:ident $div:ident $fma:ident $fnma:ident $sqrt:ident $min:ident $max:ident],
      memory [$splat:ident $load:ident $store:ident $transpose:ident $block:ident],
      bits [$neg:ident $abs:ident $round:ident $lt:ident $select:ident],
-     masks [$and:ident $or:ident $not:ident $any:ident $all:ident $mask_bits:ident], places [$gather:ident $scatter:ident]) => {
+     masks [$any:ident $all:ident $mask_bits:ident], places [$gather:ident $scatter:ident]) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug)]
         #[repr(transparent)]
@@ -105,18 +105,6 @@ macro_rules! register {
             fn select(mask: $mask, a: Self, b: Self) -> Self {
                 Self(unsafe { $select(mask, a.0, b.0) })
             }
-            #[inline(always)]
-            fn and(a: $mask, b: $mask) -> $mask {
-                unsafe { $and(a, b) }
-            }
-            #[inline(always)]
-            fn or(a: $mask, b: $mask) -> $mask {
-                unsafe { $or(a, b) }
-            }
-            #[inline(always)]
-            fn not(a: $mask) -> $mask {
-                unsafe { $not(a) }
-            }
         }
 
         impl Lane for $name {
@@ -188,12 +176,12 @@ macro_rules! register {
 
 register!(
     /// Eight worlds in an AVX2 register.
-    F32x8(__m256), width 8, mask __m256,
+    F32x8(__m256), width 8, mask Mask8,
     arithmetic [_mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_fmadd_ps _mm256_fnmadd_ps
         _mm256_sqrt_ps _mm256_min_ps _mm256_max_ps],
     memory [_mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps transpose8 block8],
     bits [neg8 abs8 round8 lt8 select8],
-    masks [_mm256_and_ps _mm256_or_ps not8 any8 all8 bits8], places [gather8 scatter8]
+    masks [any8 all8 bits8], places [gather8 scatter8]
 );
 
 register!(
@@ -203,8 +191,35 @@ register!(
         _mm512_sqrt_ps _mm512_min_ps _mm512_max_ps],
     memory [_mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps transpose16 block16],
     bits [neg16 _mm512_abs_ps round16 lt16 select16],
-    masks [and16 or16 not16 any16 all16 bits16], places [gather16 scatter16]
+    masks [any16 all16 bits16], places [gather16 scatter16]
 );
+
+/// Truth values of eight worlds: all bits of a lane, or none. AVX-512 has registers for masks, which Rust knows as `u16`.
+#[derive(Clone, Copy, Debug)]
+#[repr(transparent)]
+pub struct Mask8(__m256);
+
+impl BitAnd for Mask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, b: Self) -> Self {
+        Self(unsafe { _mm256_and_ps(self.0, b.0) })
+    }
+}
+impl BitOr for Mask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitor(self, b: Self) -> Self {
+        Self(unsafe { _mm256_or_ps(self.0, b.0) })
+    }
+}
+impl Not for Mask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self(unsafe { _mm256_xor_ps(self.0, all8().0) })
+    }
+}
 
 #[inline(always)]
 unsafe fn neg8(a: __m256) -> __m256 {
@@ -219,28 +234,24 @@ unsafe fn round8(a: __m256) -> __m256 {
     unsafe { _mm256_round_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(a) }
 }
 #[inline(always)]
-unsafe fn lt8(a: __m256, b: __m256) -> __m256 {
-    unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(a, b) }
+unsafe fn lt8(a: __m256, b: __m256) -> Mask8 {
+    unsafe { Mask8(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)) }
 }
 #[inline(always)]
-unsafe fn select8(mask: __m256, a: __m256, b: __m256) -> __m256 {
-    unsafe { _mm256_blendv_ps(b, a, mask) }
+unsafe fn select8(mask: Mask8, a: __m256, b: __m256) -> __m256 {
+    unsafe { _mm256_blendv_ps(b, a, mask.0) }
 }
 #[inline(always)]
-unsafe fn all8() -> __m256 {
-    unsafe { _mm256_castsi256_ps(_mm256_set1_epi32(-1)) }
+unsafe fn all8() -> Mask8 {
+    unsafe { Mask8(_mm256_castsi256_ps(_mm256_set1_epi32(-1))) }
 }
 #[inline(always)]
-unsafe fn not8(a: __m256) -> __m256 {
-    unsafe { _mm256_xor_ps(a, all8()) }
+unsafe fn any8(a: Mask8) -> bool {
+    unsafe { _mm256_movemask_ps(a.0) != 0 }
 }
 #[inline(always)]
-unsafe fn any8(a: __m256) -> bool {
-    unsafe { _mm256_movemask_ps(a) != 0 }
-}
-#[inline(always)]
-unsafe fn bits8(a: __m256) -> u32 {
-    unsafe { _mm256_movemask_ps(a) as u32 }
+unsafe fn bits8(a: Mask8) -> u32 {
+    unsafe { _mm256_movemask_ps(a.0) as u32 }
 }
 /// Numbers of `from` at whole places inside it.
 #[inline(always)]
@@ -250,7 +261,7 @@ unsafe fn gather8(from: &[f32], places: __m256) -> __m256 {
 
 /// Writes the number of each world w of the mask to `to[rows * stride + w]`, where `rows` are whole.
 #[inline(always)]
-unsafe fn scatter8(x: __m256, mask: __m256, to: &mut [f32], rows: __m256, stride: usize) {
+unsafe fn scatter8(x: __m256, mask: Mask8, to: &mut [f32], rows: __m256, stride: usize) {
     let (mut numbers, mut places) = ([0.0; 8], [0u32; 8]);
     unsafe {
         _mm256_storeu_ps(numbers.as_mut_ptr(), x);
@@ -303,18 +314,6 @@ unsafe fn lt16(a: __m512, b: __m512) -> __mmask16 {
 #[inline(always)]
 unsafe fn select16(mask: __mmask16, a: __m512, b: __m512) -> __m512 {
     unsafe { _mm512_mask_blend_ps(mask, b, a) }
-}
-#[inline(always)]
-unsafe fn and16(a: __mmask16, b: __mmask16) -> __mmask16 {
-    a & b
-}
-#[inline(always)]
-unsafe fn or16(a: __mmask16, b: __mmask16) -> __mmask16 {
-    a | b
-}
-#[inline(always)]
-unsafe fn not16(a: __mmask16) -> __mmask16 {
-    !a
 }
 #[inline(always)]
 unsafe fn any16(a: __mmask16) -> bool {

@@ -1,6 +1,6 @@
 //! Unit quaternions (x, y, z, w).
 
-use super::vec3::{Mat3, Vec3, dot, scale};
+use super::vec3::{Mat3, Vec3};
 use crate::lane::Num;
 
 /// x, y, z, w
@@ -44,17 +44,17 @@ pub fn matrix<F: Num>(q: Quat<F>) -> Mat3<F> {
     let (xx, yy, zz) = (x * x, y * y, z * z);
     let (xy, xz, yz) = (x * y, x * z, y * z);
     let (wx, wy, wz) = (w * x, w * y, w * z);
-    [
-        [two.fnma(yy + zz, one), two * (xy + wz), two * (xz - wy)],
-        [two * (xy - wz), two.fnma(xx + zz, one), two * (yz + wx)],
-        [two * (xz + wy), two * (yz - wx), two.fnma(xx + yy, one)],
-    ]
+    Mat3([
+        Vec3([two.fnma(yy + zz, one), two * (xy + wz), two * (xz - wy)]),
+        Vec3([two * (xy - wz), two.fnma(xx + zz, one), two * (yz + wx)]),
+        Vec3([two * (xz + wy), two * (yz - wx), two.fnma(xx + yy, one)]),
+    ])
 }
 
 /// The quaternion after turning with angular velocity `spin` (in its own axes) for a time, made unit again.
 #[inline(always)]
 pub fn turned<F: Num>(q: Quat<F>, spin: Vec3<F>, time: F) -> Quat<F> {
-    let r = mul(q, exp(scale(spin, time)));
+    let r = mul(q, exp(spin * time));
     let norm = r[0].fma(r[0], r[1].fma(r[1], r[2].fma(r[2], r[3] * r[3])));
     let inverse = F::c(1.0).div(norm.sqrt());
     [
@@ -75,12 +75,12 @@ pub fn conjugate<F: Num>(q: Quat<F>) -> Quat<F> {
 #[inline(always)]
 pub fn exp<F: Num>(turn: Vec3<F>) -> Quat<F> {
     let half = F::c(0.5);
-    let angle = dot(turn, turn).sqrt();
+    let angle = turn.dot(turn).sqrt();
     let (sin, cos) = (angle * half).sincos();
     // sin(θ/2) / θ; where θ is too small for a quotient, its limit 1/2
     let small = angle.lt(F::c(1e-15));
     let ratio = F::select(small, half, sin.div(F::select(small, F::c(1.0), angle)));
-    let [x, y, z] = scale(turn, ratio);
+    let Vec3([x, y, z]) = turn * ratio;
     [x, y, z, cos]
 }
 
@@ -91,8 +91,8 @@ pub fn log<F: Num>(q: Quat<F>) -> Vec3<F> {
     // q and -q are the same turn: take the short way
     let w = q[3];
     let sign = F::select(w.lt(zero), -two, two);
-    let axis = [q[0], q[1], q[2]];
-    let sin = dot(axis, axis).sqrt();
+    let axis = Vec3([q[0], q[1], q[2]]);
+    let sin = axis.dot(axis).sqrt();
     let small = sin.lt(F::c(1e-15));
     let angle = sin.atan2_positive(w.abs());
     let ratio = F::select(
@@ -100,7 +100,7 @@ pub fn log<F: Num>(q: Quat<F>) -> Vec3<F> {
         F::c(1.0),
         angle.div(F::select(small, F::c(1.0), sin)),
     );
-    scale(axis, ratio * sign)
+    axis * (ratio * sign)
 }
 
 #[cfg(test)]
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn rotation_vector_of_a_turn_is_that_turn() {
         for angle in [0.0, 1e-16, 1e-9, 1e-3, 1.0, 2.0, 3.1] {
-            let turn = [angle * 0.6, angle * -0.64, angle * 0.48];
+            let turn = Vec3([angle * 0.6, angle * -0.64, angle * 0.48]);
             let back = log(exp(turn));
             let error = (0..3)
                 .map(|i| (back[i] - turn[i]).abs())
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn turns_past_half_a_circle_are_taken_the_short_way() {
-        let back = log(exp([0.0, 0.0, 4.0]));
+        let back = log(exp(Vec3([0.0, 0.0, 4.0])));
         assert!(
             (back[2] - (4.0 - std::f64::consts::TAU)).abs() < 1e-14,
             "{back:?}"

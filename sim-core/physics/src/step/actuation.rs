@@ -7,19 +7,65 @@
 //!
 //! The target of a ball is a rotation vector; its error is the rotation vector from here to there.
 
-use super::command::{Command, acting};
+use super::command::{Kind, acting};
 use super::kinematics::read_quat;
-use super::{BlockOf, ConstantsOf, param};
-use crate::arrays::Workspace;
+use super::{BlockOf, ConstantsOf, Stage, param};
+use crate::arrays::{Array as A, Workspace};
 use crate::constants::params::Param;
 use crate::constants::{Body, Constants, Motion};
 use crate::lane::{Cx, Num};
 use crate::math::quat::{self, conjugate, mul};
-use crate::math::spatial::{power, sum};
-use crate::math::vec3::{Vec3, constant, cross_add, transform_add, zero};
+use crate::math::spatial::Spatial;
+use crate::math::vec3::Vec3;
+
+/// Applied, drive and damping forces.
+pub struct Actuation;
+
+impl Stage for Actuation {
+    const READS: &'static [A] = &[
+        A::JointQ,
+        A::JointQd,
+        A::JointF,
+        A::JointTargetQ,
+        A::JointTargetQd,
+        A::Applied,
+        A::Params,
+        A::Rotation,
+        A::Origin,
+        A::Motion,
+        A::BiasForce,
+    ];
+    const WRITES: &'static [A] = &[A::SmoothForce];
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        smooth_force(cx, m, b);
+    }
+}
+
+/// What drives the joints, for output.
+pub struct JointTorque;
+
+impl Stage for JointTorque {
+    const READS: &'static [A] = &[
+        A::JointQ,
+        A::JointQd,
+        A::JointF,
+        A::JointTargetQ,
+        A::JointTargetQd,
+        A::Applied,
+        A::Params,
+    ];
+    const WRITES: &'static [A] = &[A::JointTorque];
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        joint_torque(cx, m, b);
+    }
+}
 
 #[inline(always)]
-pub(super) fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     for body in &m.bodies {
         let torques = torques(cx, m, b, body);
         for (j, torque) in body.dofs().zip(torques) {
@@ -35,7 +81,7 @@ pub(super) fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
 
 /// What the joints are driven by, for output.
 #[inline(always)]
-pub(super) fn joint_torque<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+fn joint_torque<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     for body in &m.bodies {
         let torques = torques(cx, m, b, body);
         b.work.joint_torque[body.dofs()].copy_from_slice(&torques[..body.motion.dofs()]);
@@ -54,7 +100,7 @@ fn torques<C: Cx>(
     let first = body.dof;
     match body.motion {
         Motion::Revolute | Motion::Prismatic => {
-            let target = acting::<C>(m, b, Command::Position, first);
+            let target = acting::<C>(m, b, Kind::Position, first);
             let error = target - cx.get(&b.joint_q[body.coord]);
             torques[0] = driven(cx, m, b, first, error);
         }
@@ -66,7 +112,7 @@ fn torques<C: Cx>(
         }
         Motion::Free => {
             for k in 0..6 {
-                torques[k] = acting::<C>(m, b, Command::Force, first + k);
+                torques[k] = acting::<C>(m, b, Kind::Force, first + k);
             }
         }
     }
@@ -79,7 +125,7 @@ fn driven<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, j: usize, error
     let dof = &m.dofs[j];
     let qd = cx.get(&b.joint_qd[j]);
     let rate = if dof.follows_velocity {
-        acting::<C>(m, b, Command::Velocity, j) - qd
+        acting::<C>(m, b, Kind::Velocity, j) - qd
     } else {
         -qd
     };
@@ -94,36 +140,36 @@ fn driven<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, j: usize, error
     if let Some(limit) = limit {
         drive = drive.min(limit).max(-limit);
     }
-    acting::<C>(m, b, Command::Force, j) + drive
+    acting::<C>(m, b, Kind::Force, j) + drive
 }
 
 /// Adds the forces on links to those of the joints that carry them.
 #[inline(always)]
 fn push<F: Num>(m: &Constants<F::Real>, params: &[F], first: usize, w: &mut Workspace<F>) {
     for force in &mut w.force {
-        *force = [zero(), zero()];
+        *force = Spatial::zero();
     }
     for (link, frame) in m.frames.iter().enumerate() {
         if let Some(body) = frame.body {
             let given = &params[first + 6 * link..first + 6 * link + 6];
-            let force = [given[0], given[1], given[2]];
-            let torque = [given[3], given[4], given[5]];
-            let point = transform_add(&w.rotation[body], constant(frame.center), w.origin[body]);
-            let wrench = [force, cross_add(point, force, torque)];
-            w.force[body] = sum(w.force[body], wrench);
+            let force = Vec3([given[0], given[1], given[2]]);
+            let torque = Vec3([given[3], given[4], given[5]]);
+            let point = w.rotation[body].mul_add(Vec3::constant(frame.center), w.origin[body]);
+            let wrench = Spatial([force, point.cross_add(force, torque)]);
+            w.force[body] = w.force[body] + wrench;
         }
     }
     for (k, body) in m.bodies.iter().enumerate().rev() {
         let force = w.force[k];
         for (axis, d) in body.dofs().enumerate() {
             let pushed = match body.motion {
-                Motion::Free => force.as_flattened()[axis],
-                _ => power(&w.motion[d], &force),
+                Motion::Free => force.scalars()[axis],
+                _ => w.motion[d].dot(force),
             };
             w.smooth_force[d] = w.smooth_force[d] + pushed;
         }
         if let Some(parent) = body.parent {
-            w.force[parent] = sum(w.force[parent], force);
+            w.force[parent] = w.force[parent] + force;
         }
     }
 }
@@ -137,9 +183,9 @@ fn ball_error<C: Cx>(
     coord: usize,
     dof: usize,
 ) -> Vec3<C::F> {
-    let mut turn = zero();
+    let mut turn = Vec3::zero();
     for k in 0..3 {
-        turn[k] = acting::<C>(m, b, Command::Position, dof + k);
+        turn[k] = acting::<C>(m, b, Kind::Position, dof + k);
     }
     let target = quat::exp(turn);
     let here = read_quat(cx, &b.joint_q, coord);

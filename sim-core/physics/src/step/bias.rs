@@ -7,63 +7,84 @@
 //!
 //! A free body has S = 1. Its axes stand still, but those of its rotation follow its centre of mass: a = v × ω.
 
-use super::{BlockOf, ConstantsOf, gravity};
-use crate::constants::Motion;
-use crate::lane::Cx;
-use crate::math::spatial::{
-    ANGULAR, LINEAR, Spatial, cross_force_add, cross_motion, momentum, power, scale_sum, sum,
-};
-use crate::math::vec3::{cross_add, scale, zero};
+use super::{BlockOf, ConstantsOf, Stage, gravity};
+use crate::arrays::Array as A;
+use crate::constants::{Body, Motion};
+use crate::lane::{Cx, Num};
+use crate::math::spatial::{ANGULAR, LINEAR, Spatial};
+use crate::math::vec3::Vec3;
 
+/// Coriolis, centrifugal and gravity forces.
+pub struct Bias;
+
+impl Stage for Bias {
+    const READS: &'static [A] = &[A::JointQd, A::Motion, A::Inertia, A::Params];
+    const WRITES: &'static [A] = &[A::BiasForce, A::Velocity];
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        let base = Spatial([-gravity(m, &b.params), Vec3::zero()]);
+        // `force` holds the acceleration of a body until the backward pass
+        for (k, body) in m.bodies.iter().enumerate() {
+            let own = joint_velocity(cx, b, body);
+            let w = &mut b.work;
+            let (velocity, acceleration) = match (body.parent, body.motion) {
+                (_, Motion::Free) => {
+                    let swing = own[LINEAR].cross_add(own[ANGULAR], base[LINEAR]);
+                    (own, Spatial([swing, base[ANGULAR]]))
+                }
+                (Some(parent), _) => {
+                    let v = w.velocity[parent];
+                    (v + own, w.force[parent] + v.cross_motion(own))
+                }
+                (None, _) => (own, base),
+            };
+            w.velocity[k] = velocity;
+            w.force[k] = acceleration;
+        }
+        let w = &mut b.work;
+        for k in 0..m.bodies.len() {
+            let v = w.velocity[k];
+            let inertial = w.inertia[k] * w.force[k];
+            w.force[k] = v.cross_force_add(w.inertia[k] * v, inertial);
+        }
+        // children come after their parents, so the backward pass has all of a body's force when it comes to it
+        for (k, body) in m.bodies.iter().enumerate().rev() {
+            let force = w.force[k];
+            if body.motion == Motion::Free {
+                w.bias_force[body.dofs()].copy_from_slice(&force.scalars());
+                continue;
+            }
+            for d in body.dofs() {
+                w.bias_force[d] = w.motion[d].dot(force);
+            }
+            if let Some(parent) = body.parent {
+                w.force[parent] = w.force[parent] + force;
+            }
+        }
+    }
+}
+
+/// Σ S q̇: what a body's own joint adds to the velocity of its parent.
 #[inline(always)]
-pub(super) fn bias_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    let gravity = gravity(m, &b.params);
-    let w = &mut b.work;
-    let base: Spatial<C::F> = [[-gravity[0], -gravity[1], -gravity[2]], zero()];
-    // `force` holds the acceleration of a body until the backward pass
-    for (k, body) in m.bodies.iter().enumerate() {
-        let s = w.motion[body.dof];
-        let qd = cx.get(&b.joint_qd[body.dof]);
-        let mut own: Spatial<C::F> = [scale(s[LINEAR], qd), scale(s[ANGULAR], qd)];
-        if body.motion == Motion::Free {
-            for (x, d) in own.as_flattened_mut().iter_mut().zip(body.dofs()) {
-                *x = cx.get(&b.joint_qd[d]);
-            }
-        } else {
-            for d in body.dof + 1..body.dof + body.motion.dofs() {
-                own = scale_sum(w.motion[d], cx.get(&b.joint_qd[d]), own);
-            }
+fn joint_velocity<C: Cx>(
+    cx: &mut C,
+    b: &BlockOf<C>,
+    body: &Body<<C::F as Num>::Real>,
+) -> Spatial<C::F> {
+    let qd = &b.joint_qd[body.dofs()];
+    if body.motion == Motion::Free {
+        let (mut linear, mut angular) = (Vec3::zero(), Vec3::zero());
+        for i in 0..3 {
+            linear[i] = cx.get(&qd[i]);
+            angular[i] = cx.get(&qd[3 + i]);
         }
-        let (velocity, acceleration) = match (body.parent, body.motion) {
-            (_, Motion::Free) => {
-                let swing = cross_add(own[LINEAR], own[ANGULAR], base[LINEAR]);
-                (own, [swing, base[ANGULAR]])
-            }
-            (Some(parent), _) => {
-                let v = w.velocity[parent];
-                (sum(v, own), sum(w.force[parent], cross_motion(&v, &own)))
-            }
-            (None, _) => (own, base),
-        };
-        w.velocity[k] = velocity;
-        w.force[k] = acceleration;
+        return Spatial([linear, angular]);
     }
-    for k in 0..m.bodies.len() {
-        let v = w.velocity[k];
-        let inertial = momentum(&w.inertia[k], &w.force[k]);
-        w.force[k] = cross_force_add(&v, &momentum(&w.inertia[k], &v), inertial);
+    let motion = &b.work.motion[body.dofs()];
+    let mut own = motion[0] * cx.get(&qd[0]);
+    for d in 1..body.motion.dofs() {
+        own = motion[d].scale_add(cx.get(&qd[d]), own);
     }
-    for (k, body) in m.bodies.iter().enumerate().rev() {
-        let force = w.force[k];
-        if body.motion == Motion::Free {
-            w.bias_force[body.dofs()].copy_from_slice(force.as_flattened());
-            continue;
-        }
-        for d in body.dofs() {
-            w.bias_force[d] = power(&w.motion[d], &force);
-        }
-        if let Some(parent) = body.parent {
-            w.force[parent] = sum(w.force[parent], force);
-        }
-    }
+    own
 }

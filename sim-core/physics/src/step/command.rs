@@ -4,20 +4,47 @@
 //! applied(s) = sent in the last frame that began at s - delay or before, + noise        s counts substeps
 //! ```
 
-use super::{BlockOf, ConstantsOf};
+use super::{BlockOf, ConstantsOf, Stage};
+use crate::arrays::Array as A;
+use crate::constants::Constants;
 use crate::constants::params::Param;
-use crate::lane::{Cx, Num};
+use crate::lane::{Cx, Num, Real};
+
+/// Commands as they act in this substep.
+pub struct Commands;
+
+impl Stage for Commands {
+    const READS: &'static [A] = &[
+        A::JointF,
+        A::JointTargetQ,
+        A::JointTargetQd,
+        A::Params,
+        A::Substep,
+        A::CommandHistory,
+        A::CommandNoise,
+    ];
+    const WRITES: &'static [A] = &[A::Substep, A::Applied];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        m.alters_commands()
+    }
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        arrive(cx, m, b);
+    }
+}
 
 /// A command, by its place in `applied`, in a frame of the history and in the noise.
 #[derive(Clone, Copy)]
-pub(super) enum Command {
+pub(super) enum Kind {
     Force,
     Position,
     Velocity,
 }
 
 #[inline(always)]
-pub(super) fn arrive<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+fn arrive<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let n = m.dofs.len();
     let applied = &mut b.work.applied;
     applied[..n].copy_from_slice(&b.joint_f);
@@ -43,18 +70,13 @@ pub(super) fn arrive<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) 
 
 /// The command of dof `j` that acts.
 #[inline(always)]
-pub(super) fn acting<C: Cx>(
-    m: &ConstantsOf<C>,
-    b: &BlockOf<C>,
-    command: Command,
-    j: usize,
-) -> C::F {
+pub(super) fn acting<C: Cx>(m: &ConstantsOf<C>, b: &BlockOf<C>, command: Kind, j: usize) -> C::F {
     if m.alters_commands() {
         return b.work.applied[command as usize * m.dofs.len() + j];
     }
     match command {
-        Command::Force => b.joint_f[j],
-        Command::Position => b.joint_target_q[j],
-        Command::Velocity => b.joint_target_qd[j],
+        Kind::Force => b.joint_f[j],
+        Kind::Position => b.joint_target_q[j],
+        Kind::Velocity => b.joint_target_qd[j],
     }
 }

@@ -8,13 +8,27 @@
 //! Rows stand in MuJoCo's order: equalities, frictions, limits. Their Jacobians have one or two
 //! entries, known when the model is compiled; only the side of a limit is found at run time.
 
-use super::{BlockOf, ConstantsOf};
+use super::{BlockOf, ConstantsOf, Stage};
+use crate::arrays::Array as A;
 use crate::constants::{Impedance, Soft};
 use crate::lane::{Cx, Num, Real};
 use crate::when;
 
+/// Constraint rows of joints: stiffness and reference acceleration.
+pub struct Constraint;
+
+impl Stage for Constraint {
+    const READS: &'static [A] = &[A::JointQ, A::JointQd, A::Params];
+    const WRITES: &'static [A] = &[A::EfcD, A::EfcAref, A::LimitSide];
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        rows(cx, m, b);
+    }
+}
+
 #[inline(always)]
-pub(super) fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let w = &mut b.work;
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     let mut row = 0;
@@ -36,7 +50,7 @@ pub(super) fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         cx.set(&mut b.efc_aref[row], aref);
         row += 1;
     }
-    let [distance, ..] = &mut w.row;
+    let distance = &mut w.limit_distance;
     let mut nearest = zero;
     for (n, limit) in m.limits.iter().enumerate() {
         let q = cx.get(&b.joint_q[m.dofs[limit.dof].coord]);

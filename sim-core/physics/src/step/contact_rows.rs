@@ -8,37 +8,61 @@
 //! aref = -b v - k d (r - margin)  along the normal,   -b' v along a tangent
 //! ```
 
-use super::{BlockOf, ConstantsOf};
+use super::{BlockOf, ConstantsOf, Stage};
+use crate::arrays::Array as A;
+use crate::constants::Constants;
 use crate::constants::contact::Cone;
 use crate::constants::contact::{COUNT_LEFT_OUT, Class, Contacts, pair, row};
 use crate::each;
 use crate::lane::{Cx, Num, Real};
-use crate::math::vec3::{Vec3, cross, dot, scale, scale_add, sub};
+use crate::math::spatial::Spatial;
+use crate::math::vec3::{Vec3, load_vec3};
 use crate::step::collide::contact_slack;
 use crate::step::constraint::impedance;
 
-#[inline(always)]
-pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    let t = &m.contacts;
-    if t.groups.is_empty() {
-        return;
+/// Constraint rows of contacts.
+pub struct ContactRows;
+
+impl Stage for ContactRows {
+    const READS: &'static [A] = &[
+        A::LeftOut,
+        A::JointQd,
+        A::Origin,
+        A::Reference,
+        A::Motion,
+        A::ContactPoints,
+    ];
+    const WRITES: &'static [A] = &[A::LeftOut, A::ContactRows];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        !m.contacts.groups.is_empty()
     }
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        contact_rows(cx, m, b);
+    }
+}
+
+#[inline(always)]
+fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let t = &m.contacts;
     note_overflow(cx, t, &mut b.left_out[0]);
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
             let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
-            let normal = cx.load3(t.memory.rows, r, row::NORMAL);
-            let point = cx.load3(t.memory.rows, r, row::POINT);
+            let normal = load_vec3(cx, t.memory.rows, r, row::NORMAL);
+            let point = load_vec3(cx, t.memory.rows, r, row::POINT);
             let number = cx.load(t.memory.rows, r, row::PAIR);
             let rubs = shared(cx, t, class, number, pair::RUBS);
             let along = match t.cone {
                 Cone::Elliptic => None,
-                Cone::Pyramidal => Some(cx.load3(t.memory.rows, r, row::TANGENTS)),
+                Cone::Pyramidal => Some(load_vec3(cx, t.memory.rows, r, row::TANGENTS)),
             };
             let tangents = tangents(normal, along);
             // without friction a contact has no tangents
-            let frame = [normal, scale(tangents[0], rubs), scale(tangents[1], rubs)];
+            let frame = [normal, tangents[0] * rubs, tangents[1] * rubs];
             let mut velocity = [zero; 3];
             let w = &b.work;
             let second = w.reference[class.trees.1];
@@ -48,26 +72,26 @@ pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
                 }
                 _ => point,
             };
-            let mut torques = [[[zero; 3]; 3]; 2];
+            let mut torques = [[Vec3::zero(); 3]; 2];
             for (i, axis) in frame.iter().enumerate() {
-                torques[0][i] = cross(point_first, *axis);
-                torques[1][i] = cross(point, *axis);
+                torques[0][i] = point_first.cross(*axis);
+                torques[1][i] = point.cross(*axis);
             }
             for (c, column) in class.columns.iter().enumerate() {
-                let [linear, angular] = w.motion[column.dof];
+                let Spatial([linear, angular]) = w.motion[column.dof];
                 let lever = shared(cx, t, class, number, column.lever);
                 let speed = cx.get(&b.joint_qd[column.dof]);
                 let torques = &torques[usize::from(!column.is_first)];
                 let mut jacobian = [zero; 3];
                 for i in 0..3 {
-                    let turned = dot(linear, frame[i]) + dot(angular, torques[i]);
+                    let turned = linear.dot(frame[i]) + angular.dot(Vec3(torques[i].0));
                     jacobian[i] = lever * turned;
                     velocity[i] = jacobian[i].fma(speed, velocity[i]);
                 }
                 cx.fill_all(t.memory.rows, r, row::JACOBIAN + 3 * c, jacobian);
             }
-            cx.fill_all(t.memory.rows, r, row::TANGENTS, frame[1]);
-            cx.fill_all(t.memory.rows, r, row::TANGENTS + 3, frame[2]);
+            cx.fill_all(t.memory.rows, r, row::TANGENTS, frame[1].0);
+            cx.fill_all(t.memory.rows, r, row::TANGENTS + 3, frame[2].0);
             let swing = swing_between(cx, m, b, class);
             let distance = cx.load(t.memory.rows, r, row::DISTANCE);
             let position = distance - shared(cx, t, class, number, pair::MARGIN);
@@ -111,7 +135,7 @@ pub(super) fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
             cx.fill(t.memory.rows, r, row::MU, mu);
             for (x, axis) in aref.iter_mut().zip(frame) {
                 if let Some(swing) = swing {
-                    *x = *x + dot(axis, swing);
+                    *x = *x + axis.dot(swing);
                 }
                 *x = C::F::select(pushes, *x, zero);
             }
@@ -143,8 +167,8 @@ fn swing_between<C: Cx>(
     let first = first.and_then(|tree| swing(cx, m, b, tree));
     let second = swing(cx, m, b, second);
     match (first, second) {
-        (Some(first), Some(second)) => Some(sub(second, first)),
-        (Some(first), None) => Some(scale(first, -C::F::c(1.0))),
+        (Some(first), Some(second)) => Some(second - first),
+        (Some(first), None) => Some(first * -C::F::c(1.0)),
         (None, second) => second,
     }
 }
@@ -157,12 +181,12 @@ fn swing<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, tree: usize) -> 
     if body.center.iter().all(|x| x.to_f64() == 0.0) {
         return None;
     }
-    let mut spin = [C::F::c(0.0); 3];
+    let mut spin = Vec3::zero();
     for (i, x) in spin.iter_mut().enumerate() {
         *x = cx.get(&b.joint_qd[body.dof + 3 + i]);
     }
     // the frame's origin is kept relative to the centre
-    Some(cross(spin, cross(b.work.origin[free], spin)))
+    Some(spin.cross(b.work.origin[free].cross(spin)))
 }
 
 /// Keeps the largest number of contacts that did not fit.
@@ -212,7 +236,7 @@ fn shared<C: Cx>(
 /// a + (b - c)
 #[inline(always)]
 fn add_difference<F: Num>(a: Vec3<F>, b: Vec3<F>, c: Vec3<F>) -> Vec3<F> {
-    crate::math::vec3::add(a, sub(b, c))
+    a + (b - c)
 }
 
 /// Two unit vectors across the normal, as MuJoCo's `mju_makeFrame` chooses them: the first lies along a direction if one
@@ -221,26 +245,26 @@ fn add_difference<F: Num>(a: Vec3<F>, b: Vec3<F>, c: Vec3<F>) -> Vec3<F> {
 fn tangents<F: Num>(normal: Vec3<F>, along: Option<Vec3<F>>) -> [Vec3<F>; 2] {
     let (zero, one) = (F::c(0.0), F::c(1.0));
     let steep = normal[1].abs().lt(F::c(0.5));
-    let axis = [
+    let axis = Vec3([
         zero,
         F::select(steep, one, zero),
         F::select(steep, zero, one),
-    ];
+    ]);
     let mut across = across(normal, axis);
     if let Some(along) = along {
         let first = self::across(normal, along);
         // a capsule that stands upright has no direction, to the rounding of f32
-        let lies = F::c(1e-12).lt(dot(first, first));
-        for (x, y) in across.iter_mut().zip(first) {
+        let lies = F::c(1e-12).lt(first.dot(first));
+        for (x, y) in across.iter_mut().zip(*first) {
             *x = F::select(lies, y, *x);
         }
     }
-    let first = scale(across, one.div(dot(across, across).sqrt()));
-    [first, cross(normal, first)]
+    let first = across * one.div(across.dot(across).sqrt());
+    [first, normal.cross(first)]
 }
 
 /// The part of a direction across the normal.
 #[inline(always)]
 fn across<F: Num>(normal: Vec3<F>, axis: Vec3<F>) -> Vec3<F> {
-    scale_add(normal, -dot(axis, normal), axis)
+    normal.scale_add(-axis.dot(normal), axis)
 }

@@ -23,86 +23,108 @@
 //! ```
 
 use super::kinematics::read_quat;
-use super::{BlockOf, ConstantsOf, param};
+use super::{BlockOf, ConstantsOf, Stage, param};
+use crate::arrays::Array as A;
 use crate::constants::params::Param;
 use crate::constants::{Body, Constants, Motion};
 use crate::lane::{Cx, Num, Real};
 use crate::math::factor::{multiply, solve};
 use crate::math::quat::{self, Quat};
 use crate::math::spatial::symmetric;
-use crate::math::vec3::{
-    Mat3, Vec3, add, constant, cross, cross_add, dot, scale, scale_add, sub, transform,
-    transform_back, zero,
-};
+use crate::math::vec3::{Mat3, Vec3};
 
+/// The next state.
+pub struct Integrate;
+
+impl Stage for Integrate {
+    const READS: &'static [A] = &[
+        A::Params,
+        A::Rotation,
+        A::JointQ,
+        A::JointQRest,
+        A::JointQd,
+        A::JointQdd,
+        A::MassMatrix,
+        A::SmoothForce,
+        A::ConstraintForce,
+    ];
+    // the last stage of a step: nobody needs the mass matrix after it
+    const WRITES: &'static [A] = &[A::JointQ, A::JointQRest, A::JointQd, A::MassMatrix];
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        if m.damped {
+            implicit_acceleration(cx, m, b);
+        } else {
+            for j in 0..m.dofs.len() {
+                b.work.acceleration[j] = cx.get(&b.joint_qdd[j]);
+            }
+        }
+        for (k, body) in m.bodies.iter().enumerate() {
+            if body.motion == Motion::Free {
+                // a body that carries nothing is implicit in its gyroscopic force
+                if m.bodies.iter().all(|other| other.parent != Some(k)) {
+                    gyroscopic(cx, m, b, k);
+                }
+                free(cx, m, b, k);
+            } else {
+                joint(cx, m, b, body);
+            }
+        }
+    }
+}
+
+/// (M + h D) a = τ + Jᵀ f, with the damping D of joints and drives on the diagonal.
 #[inline(always)]
-pub(super) fn implicit_fast<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    let w = &mut b.work;
-    let dt = C::F::k(m.dt);
-    let [acceleration, found, _, inertial] = &mut w.vector;
+fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let (w, dt) = (&mut b.work, C::F::k(m.dt));
     // M q̈ is what acts, and without the rounding of stiff forces that cancel
     let mut rounded = None;
     if !<<C::F as Num>::Real as Real>::DOUBLE {
         rounded = super::solver::touching(cx, m);
     }
-    if m.damped && rounded.is_some() {
+    if rounded.is_some() {
         for j in 0..m.dofs.len() {
-            found[j] = cx.get(&b.joint_qdd[j]);
+            w.start[j] = cx.get(&b.joint_qdd[j]);
         }
-        multiply(&m.pattern, &w.mass_matrix, found, inertial);
+        multiply(&m.pattern, &w.mass_matrix, &w.start, &mut w.joint_force);
     }
-    if m.damped {
-        // the last stage: nobody needs the mass matrix after it
-        for (j, dof) in m.dofs.iter().enumerate() {
-            // a clamped drive keeps its damping here, as under MuJoCo's `actfrcrange`
-            let mut damping = param(m, &b.params, Param::JointDamping, j, dof.damping);
-            // nothing drives a free body
-            if m.bodies[dof.body].motion != Motion::Free {
-                damping = damping + param(m, &b.params, Param::JointTargetKd, j, dof.kd);
-            }
-            let diagonal = m.pattern.at(j, j);
-            w.mass_matrix[diagonal] = dt.fma(damping, w.mass_matrix[diagonal]);
-            acceleration[j] = w.smooth_force[j] + cx.get(&b.constraint_force[j]);
-            if let Some(touching) = rounded {
-                acceleration[j] = C::F::select(touching, inertial[j], acceleration[j]);
-            }
+    for (j, dof) in m.dofs.iter().enumerate() {
+        // a clamped drive keeps its damping here, as under MuJoCo's `actfrcrange`
+        let mut damping = param(m, &b.params, Param::JointDamping, j, dof.damping);
+        // nothing drives a free body
+        if m.bodies[dof.body].motion != Motion::Free {
+            damping = damping + param(m, &b.params, Param::JointTargetKd, j, dof.kd);
         }
-        solve(&m.pattern, &mut w.mass_matrix, acceleration);
+        let diagonal = m.pattern.at(j, j);
+        w.mass_matrix[diagonal] = dt.fma(damping, w.mass_matrix[diagonal]);
+        w.acceleration[j] = w.smooth_force[j] + cx.get(&b.constraint_force[j]);
+        if let Some(touching) = rounded {
+            w.acceleration[j] = C::F::select(touching, w.joint_force[j], w.acceleration[j]);
+        }
+    }
+    solve(&m.pattern, &mut w.mass_matrix, &mut w.acceleration);
+}
+
+/// Velocity first, then the position by the new velocity.
+#[inline(always)]
+fn joint<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    body: &Body<<C::F as Num>::Real>,
+) {
+    let (c, dt) = (body.coord, C::F::k(m.dt));
+    let mut qd = Vec3::zero();
+    for (qd, d) in qd.iter_mut().zip(body.dofs()) {
+        *qd = dt.fma(b.work.acceleration[d], cx.get(&b.joint_qd[d]));
+        cx.set(&mut b.joint_qd[d], *qd);
+    }
+    if body.motion == Motion::Ball {
+        let turned = quat::turned(read_quat(cx, &b.joint_q, c), qd, dt);
+        write_quat(cx, &mut b.joint_q, c, turned);
     } else {
-        for j in 0..m.dofs.len() {
-            acceleration[j] = cx.get(&b.joint_qdd[j]);
-        }
-    }
-    for (k, body) in m.bodies.iter().enumerate() {
-        if body.motion == Motion::Free {
-            let rotation = w.rotation[k];
-            if m.bodies.iter().all(|other| other.parent != Some(k)) {
-                let [acceleration, ..] = &mut w.vector;
-                gyroscopic::<C>(cx, m, &b.params, body, &rotation, acceleration, &b.joint_qd);
-            }
-            free::<C>(
-                cx,
-                body,
-                dt,
-                &rotation,
-                &w.vector[0],
-                [&mut b.joint_q, &mut b.joint_q_rest],
-                &mut b.joint_qd,
-            );
-            continue;
-        }
-        let c = body.coord;
-        let mut qd = zero();
-        for (qd, d) in qd.iter_mut().zip(body.dofs()) {
-            *qd = dt.fma(w.vector[0][d], cx.get(&b.joint_qd[d]));
-            cx.set(&mut b.joint_qd[d], *qd);
-        }
-        if body.motion == Motion::Ball {
-            let turned = quat::turned(read_quat(cx, &b.joint_q, c), qd, dt);
-            write_quat(cx, &mut b.joint_q, c, turned);
-        } else {
-            advance(cx, &mut b.joint_q[c], &mut b.joint_q_rest[c], qd[0], dt);
-        }
+        advance(cx, &mut b.joint_q[c], &mut b.joint_q_rest[c], qd[0], dt);
     }
 }
 
@@ -123,18 +145,11 @@ fn advance<C: Cx>(cx: &mut C, q: &mut C::V, rest: &mut C::V, v: C::F, dt: C::F) 
 
 /// Makes the accelerations of a free body implicit in its gyroscopic force.
 #[inline(always)]
-fn gyroscopic<C: Cx>(
-    cx: &C,
-    m: &ConstantsOf<C>,
-    params: &[C::F],
-    body: &Body<<C::F as Num>::Real>,
-    rotation: &Mat3<C::F>,
-    acceleration: &mut [C::F],
-    joint_qd: &[C::V],
-) {
-    let d = body.dof;
-    let dt = C::F::k(m.dt);
-    let (mut spin, mut angular) = (zero(), zero());
+fn gyroscopic<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize) {
+    let (body, dt) = (&m.bodies[k], C::F::k(m.dt));
+    let (d, params, joint_qd) = (body.dof, &b.params, &b.joint_qd);
+    let (rotation, acceleration) = (&b.work.rotation[k], &mut b.work.acceleration);
+    let (mut spin, mut angular) = (Vec3::zero(), Vec3::zero());
     for i in 0..3 {
         spin[i] = cx.get(&joint_qd[d + 3 + i]);
         angular[i] = acceleration[d + 3 + i];
@@ -142,31 +157,31 @@ fn gyroscopic<C: Cx>(
     // relative to the trace, so that determinants of small bodies stay within f32
     let trace: f64 = body.inertia[..3].iter().map(|x| x.to_f64()).sum();
     let unit = C::F::c(1.0 / trace);
-    let momentum = scale(turned(m, params, body, rotation, spin), unit);
-    let mut columns = [zero(); 3];
+    let momentum = turned(m, params, body, rotation, spin) * unit;
+    let mut columns = [Vec3::zero(); 3];
     for (i, column) in columns.iter_mut().enumerate() {
-        let mut axis = zero();
+        let mut axis = Vec3::zero();
         axis[i] = C::F::c(1.0);
-        let inertia = scale(turned(m, params, body, rotation, axis), unit);
-        let rate = cross_add(axis, momentum, cross(spin, inertia));
-        *column = scale_add(rate, dt, inertia);
+        let inertia = turned(m, params, body, rotation, axis) * unit;
+        let rate = axis.cross_add(momentum, spin.cross(inertia));
+        *column = rate.scale_add(dt, inertia);
         let (j, dof) = (d + 3 + i, &m.dofs[d + 3 + i]);
         let damping = param(m, params, Param::JointDamping, j, dof.damping);
         let armature = param(m, params, Param::JointArmature, j, dof.armature);
         let driven = dt.fma(damping, armature);
         column[i] = driven.fma(unit, column[i]);
     }
-    let inertia = scale(turned(m, params, body, rotation, angular), unit);
-    let rate = cross_add(angular, momentum, cross(spin, inertia));
-    let change = scale(rate, -dt);
+    let inertia = turned(m, params, body, rotation, angular) * unit;
+    let rate = angular.cross_add(momentum, spin.cross(inertia));
+    let change = rate * -dt;
     let [x, y, z] = columns;
-    let minors = [cross(y, z), cross(z, x), cross(x, y)];
-    let determinant = dot(x, minors[0]);
+    let minors = [y.cross(z), z.cross(x), x.cross(y)];
+    let determinant = x.dot(minors[0]);
     for i in 0..3 {
-        angular[i] = angular[i] + dot(minors[i], change).div(determinant);
+        angular[i] = angular[i] + minors[i].dot(change).div(determinant);
     }
-    let arm = transform(rotation, constant(body.center));
-    let swing = cross_add(angular, cross(spin, arm), cross(spin, cross(angular, arm)));
+    let arm = rotation * Vec3::constant(body.center);
+    let swing = angular.cross_add(spin.cross(arm), spin.cross(angular.cross(arm)));
     for i in 0..3 {
         // of the centre of mass: the origin's, which the step takes, lags behind it by so much
         acceleration[d + i] = dt.fnma(swing[i], acceleration[d + i]);
@@ -183,64 +198,56 @@ fn turned<F: Num>(
     rotation: &Mat3<F>,
     v: Vec3<F>,
 ) -> Vec3<F> {
-    let v = transform_back(rotation, v);
+    let v = rotation.transpose_mul(v);
     let own = match m.varying.first(Param::BodyMassScale) {
         None => symmetric(body.inertia, v),
         Some(first) => {
-            let mut sum = zero();
+            let mut sum = Vec3::zero();
             for part in &body.parts {
                 let scale = params[first + part.link];
                 // about the centre that the scene has
-                let arm = sub(constant(part.center), constant(body.center));
-                let swing = cross(arm, cross(v, arm));
-                let own = scale_add(swing, F::k(part.mass), symmetric(part.inertia, v));
-                sum = scale_add(own, scale, sum);
+                let arm = Vec3::constant(part.center) - Vec3::constant(body.center);
+                let swing = arm.cross(v.cross(arm));
+                let own = swing.scale_add(F::k(part.mass), symmetric(part.inertia, v));
+                sum = own.scale_add(scale, sum);
             }
             sum
         }
     };
-    transform(rotation, own)
+    rotation * own
 }
 
+/// A free body, in MuJoCo's coordinates: velocity of its frame's origin, angular velocity in its own axes.
 #[inline(always)]
-fn free<C: Cx>(
-    cx: &mut C,
-    body: &Body<<C::F as Num>::Real>,
-    dt: C::F,
-    rotation: &Mat3<C::F>,
-    acceleration: &[C::F],
-    [joint_q, rests]: [&mut [C::V]; 2],
-    joint_qd: &mut [C::V],
-) {
+fn free<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize) {
+    let (body, dt) = (&m.bodies[k], C::F::k(m.dt));
     let (c, d) = (body.coord, body.dof);
-    let (mut velocity, mut spin, mut linear, mut angular) = (zero(), zero(), zero(), zero());
+    let (rotation, acceleration) = (b.work.rotation[k], &b.work.acceleration);
+    let (joint_q, rests, joint_qd) = (&mut b.joint_q, &mut b.joint_q_rest, &mut b.joint_qd);
+    let (mut velocity, mut spin, mut linear, mut angular) =
+        (Vec3::zero(), Vec3::zero(), Vec3::zero(), Vec3::zero());
     for i in 0..3 {
         velocity[i] = cx.get(&joint_qd[d + i]);
         spin[i] = cx.get(&joint_qd[d + 3 + i]);
         linear[i] = acceleration[d + i];
         angular[i] = acceleration[d + 3 + i];
     }
-    let arm = transform(rotation, constant(body.center));
-    let swing = cross(spin, arm);
-    let origin = sub(velocity, swing);
-    let pull = sub(sub(linear, cross(angular, arm)), cross(spin, swing));
-    let origin = scale_add(pull, dt, origin);
-    let own = scale_add(
-        transform_back(rotation, angular),
-        dt,
-        transform_back(rotation, spin),
-    );
+    let arm = rotation * Vec3::constant(body.center);
+    let swing = spin.cross(arm);
+    let origin = velocity - swing;
+    let pull = (linear - angular.cross(arm)) - spin.cross(swing);
+    let origin = pull.scale_add(dt, origin);
+    let own = rotation
+        .transpose_mul(angular)
+        .scale_add(dt, rotation.transpose_mul(spin));
     for i in 0..3 {
         advance(cx, &mut joint_q[c + i], &mut rests[c + i], origin[i], dt);
     }
     let turned = quat::turned(read_quat(cx, joint_q, c + 3), own, dt);
     write_quat(cx, joint_q, c + 3, turned);
     let rotation = quat::matrix(turned);
-    let spin = transform(&rotation, own);
-    let velocity = add(
-        origin,
-        cross(spin, transform(&rotation, constant(body.center))),
-    );
+    let spin = rotation * own;
+    let velocity = origin + spin.cross(rotation * Vec3::constant(body.center));
     for i in 0..3 {
         cx.set(&mut joint_qd[d + i], velocity[i]);
         cx.set(&mut joint_qd[d + 3 + i], spin[i]);

@@ -14,13 +14,10 @@ use super::{BlockOf, ConstantsOf, gravity, param};
 use crate::constants::params::Param;
 use crate::constants::{Body, Motion};
 use crate::lane::{Cx, Num};
-use crate::math::spatial::{ANGULAR, LINEAR, Spatial, scale_sum, sum, symmetric};
-use crate::math::vec3::{
-    Mat3, Vec3, add, constant, cross, cross_add, dot, scale, scale_add, sub, transform,
-    transform_add, transform_back, zero,
-};
+use crate::math::spatial::{ANGULAR, LINEAR, Spatial, symmetric};
+use crate::math::vec3::{Mat3, Vec3};
 
-/// The forces of `joint_qdd` at this state, into `vector[0]`.
+/// The forces of `joint_qdd` at this state, into `missing`.
 #[inline(always)]
 pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     // `force` holds the acceleration of a body's origin until its force is known
@@ -38,7 +35,7 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
                 w.force[k],
             ),
             Some(first) => {
-                let mut whole = [zero(), zero()];
+                let mut whole = Spatial::zero();
                 for part in &body.parts {
                     let own = held::<C::F>(
                         part.mass,
@@ -48,7 +45,7 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
                         omega,
                         w.force[k],
                     );
-                    whole = scale_sum(own, b.params[first + part.link], whole);
+                    whole = own.scale_add(b.params[first + part.link], whole);
                 }
                 whole
             }
@@ -57,26 +54,27 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
     for (k, body) in m.bodies.iter().enumerate().rev() {
         let arm = arm(cx, b, k, body);
         let w = &mut b.work;
-        let [force, moment] = w.force[k];
+        let Spatial([force, moment]) = w.force[k];
         let (axes, d) = (w.rotation[k], body.dof);
-        let [torque, ..] = &mut w.vector;
+        let torque = &mut w.missing;
         match body.motion {
-            Motion::Revolute => torque[d] = dot(axes[2], moment),
-            Motion::Prismatic => torque[d] = dot(axes[2], force),
-            Motion::Ball => torque[d..d + 3].copy_from_slice(&transform_back(&axes, moment)),
+            Motion::Revolute => torque[d] = axes[2].dot(moment),
+            Motion::Prismatic => torque[d] = axes[2].dot(force),
+            Motion::Ball => torque[d..d + 3].copy_from_slice(&*axes.transpose_mul(moment)),
             Motion::Free => {
-                let center = transform(&axes, constant(body.center));
-                torque[d..d + 3].copy_from_slice(&force);
-                torque[d + 3..d + 6].copy_from_slice(&sub(moment, cross(center, force)));
+                let center = axes * Vec3::constant(body.center);
+                torque[d..d + 3].copy_from_slice(&*force);
+                torque[d + 3..d + 6].copy_from_slice(&*(moment - center.cross(force)));
             }
         }
         if let Some(parent) = body.parent {
-            w.force[parent] = sum(w.force[parent], [force, cross_add(arm, force, moment)]);
+            let carried = Spatial([force, arm.cross_add(force, moment)]);
+            w.force[parent] = w.force[parent] + carried;
         }
     }
     for (j, dof) in m.dofs.iter().enumerate() {
         let driven = param(m, &b.params, Param::JointArmature, j, dof.armature);
-        b.work.vector[0][j] = driven.fma(cx.get(&b.joint_qdd[j]), b.work.vector[0][j]);
+        b.work.missing[j] = driven.fma(cx.get(&b.joint_qdd[j]), b.work.missing[j]);
     }
 }
 
@@ -87,46 +85,45 @@ pub(super) fn proper_accelerations<C: Cx>(
     m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
 ) -> Vec3<C::F> {
-    let gravity = gravity(m, &b.params);
-    let base: Spatial<C::F> = [[-gravity[0], -gravity[1], -gravity[2]], zero()];
+    let base = Spatial([-gravity(m, &b.params), Vec3::zero()]);
     for (k, body) in m.bodies.iter().enumerate() {
         let arm = arm(cx, b, k, body);
         let w = &mut b.work;
         let (above, spin) = match body.parent {
             Some(parent) => (w.force[parent], w.velocity[parent][ANGULAR]),
-            None => (base, zero()),
+            None => (base, Vec3::zero()),
         };
         let carried = [carried_along(above, spin, arm), above[ANGULAR]];
-        let [x, y, z] = w.rotation[k];
+        let axes = w.rotation[k];
+        let z = axes[2];
         let d = body.dof;
-        w.force[k] = match body.motion {
+        w.force[k] = Spatial(match body.motion {
             Motion::Revolute => {
-                let turn = scale(z, cx.get(&b.joint_qd[d]));
-                let own = scale_add(z, cx.get(&b.joint_qdd[d]), cross(spin, turn));
-                [carried[LINEAR], add(carried[ANGULAR], own)]
+                let turn = z * cx.get(&b.joint_qd[d]);
+                let own = z.scale_add(cx.get(&b.joint_qdd[d]), spin.cross(turn));
+                [carried[LINEAR], carried[ANGULAR] + own]
             }
             Motion::Prismatic => {
-                let slide = scale(z, cx.get(&b.joint_qd[d]) * C::F::c(2.0));
-                let own = scale_add(z, cx.get(&b.joint_qdd[d]), cross(spin, slide));
-                [add(carried[LINEAR], own), carried[ANGULAR]]
+                let slide = z * (cx.get(&b.joint_qd[d]) * C::F::c(2.0));
+                let own = z.scale_add(cx.get(&b.joint_qdd[d]), spin.cross(slide));
+                [carried[LINEAR] + own, carried[ANGULAR]]
             }
             Motion::Ball => {
-                let axes = [x, y, z];
-                let turn = transform(&axes, read::<C>(cx, &b.joint_qd, d));
-                let own = transform_add(&axes, read::<C>(cx, &b.joint_qdd, d), cross(spin, turn));
-                [carried[LINEAR], add(carried[ANGULAR], own)]
+                let turn = axes * read::<C>(cx, &b.joint_qd, d);
+                let own = axes.mul_add(read::<C>(cx, &b.joint_qdd, d), spin.cross(turn));
+                [carried[LINEAR], carried[ANGULAR] + own]
             }
             Motion::Free => {
                 let (linear, angular) = (
                     read::<C>(cx, &b.joint_qdd, d),
                     read::<C>(cx, &b.joint_qdd, d + 3),
                 );
-                let center = [add(base[LINEAR], linear), angular];
-                let back = sub(zero(), transform(&[x, y, z], constant(body.center)));
+                let center = Spatial([base[LINEAR] + linear, angular]);
+                let back = Vec3::zero() - axes * Vec3::constant(body.center);
                 let omega = w.velocity[k][ANGULAR];
                 [carried_along(center, omega, back), angular]
             }
-        };
+        });
     }
     base[LINEAR]
 }
@@ -135,27 +132,27 @@ pub(super) fn proper_accelerations<C: Cx>(
 #[inline(always)]
 fn held<F: Num>(
     mass: F::Real,
-    center: Vec3<F::Real>,
+    center: [F::Real; 3],
     inertia: [F::Real; 6],
     axes: &Mat3<F>,
     omega: Vec3<F>,
     acceleration: Spatial<F>,
 ) -> Spatial<F> {
-    let center = transform(axes, constant(center));
-    let force = scale(carried_along(acceleration, omega, center), F::k(mass));
+    let center = axes * Vec3::constant(center);
+    let force = carried_along(acceleration, omega, center) * F::k(mass);
     let (spin, turn) = (
-        transform_back(axes, omega),
-        transform_back(axes, acceleration[ANGULAR]),
+        axes.transpose_mul(omega),
+        axes.transpose_mul(acceleration[ANGULAR]),
     );
-    let own = cross_add(spin, symmetric(inertia, spin), symmetric(inertia, turn));
-    [force, transform_add(axes, own, cross(center, force))]
+    let own = spin.cross_add(symmetric(inertia, spin), symmetric(inertia, turn));
+    Spatial([force, axes.mul_add(own, center.cross(force))])
 }
 
 /// Acceleration of a point `arm` away on a body that moves so: a + α × r + ω × (ω × r).
 #[inline(always)]
 pub(super) fn carried_along<F: Num>(origin: Spatial<F>, omega: Vec3<F>, arm: Vec3<F>) -> Vec3<F> {
-    let swing = cross_add(origin[ANGULAR], arm, origin[LINEAR]);
-    cross_add(omega, cross(omega, arm), swing)
+    let swing = origin[ANGULAR].cross_add(arm, origin[LINEAR]);
+    omega.cross_add(omega.cross(arm), swing)
 }
 
 /// From the origin of the carrier to that of body `k`; the difference of their origins would round as these do.
@@ -168,11 +165,11 @@ fn arm<C: Cx>(
 ) -> Vec3<C::F> {
     let w = &b.work;
     let rest = match body.parent {
-        Some(parent) => transform(&w.rotation[parent], constant(body.position)),
-        None => constant(body.position),
+        Some(parent) => w.rotation[parent] * Vec3::constant(body.position),
+        None => Vec3::constant(body.position),
     };
     match body.motion {
-        Motion::Prismatic => scale_add(w.rotation[k][2], cx.get(&b.joint_q[body.coord]), rest),
+        Motion::Prismatic => w.rotation[k][2].scale_add(cx.get(&b.joint_q[body.coord]), rest),
         Motion::Revolute | Motion::Ball | Motion::Free => rest,
     }
 }
@@ -180,9 +177,9 @@ fn arm<C: Cx>(
 /// Three cells from `first` on.
 #[inline(always)]
 fn read<C: Cx>(cx: &mut C, cells: &[C::V], first: usize) -> Vec3<C::F> {
-    [
+    Vec3([
         cx.get(&cells[first]),
         cx.get(&cells[first + 1]),
         cx.get(&cells[first + 2]),
-    ]
+    ])
 }

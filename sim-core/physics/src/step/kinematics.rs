@@ -10,122 +10,142 @@
 //!
 //! The reference point is the base, or the centre of mass c of a free body, for which S = 1.
 
-use super::{BlockOf, ConstantsOf};
+use super::{BlockOf, ConstantsOf, Stage};
+use crate::arrays::{Array as A, Block};
 use crate::constants::params::Param;
-use crate::constants::{Body, Motion};
+use crate::constants::{Body, Constants, Motion};
 use crate::lane::{Cx, Num};
 use crate::math::quat;
-use crate::math::spatial::place;
-use crate::math::vec3::{
-    Mat3, Vec3, add, constant, cross, scale, scale_add, sub, transform, transform_add, zero,
-};
+use crate::math::spatial::{Inertia, Spatial};
+use crate::math::vec3::{Mat3, Vec3};
 
-#[inline(always)]
-pub(super) fn kinematics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    let w = &mut b.work;
-    for (t, tree) in m.trees.iter().enumerate() {
-        w.reference[t] = constant(tree.base);
-    }
-    // parents precede children (model/compile.rs sorts them), so one forward pass suffices
-    for (k, body) in m.bodies.iter().enumerate() {
-        let ([x, y, z], mut origin) = match body.parent {
-            Some(parent) => {
-                let r = &w.rotation[parent];
-                let origin = transform_add(r, constant(body.position), w.origin[parent]);
-                (at_rest(r, body), origin)
-            }
-            None => {
-                let [x, y, z] = body.rotation;
-                let rest = [constant(x), constant(y), constant(z)];
-                (rest, constant(body.position))
-            }
-        };
-        let (c, d) = (body.coord, body.dof);
-        let rotation;
-        match body.motion {
-            Motion::Revolute => {
-                let (sin, cos) = cx.get(&b.joint_q[c]).sincos();
-                rotation = [
-                    scale_add(y, sin, scale(x, cos)),
-                    sub(scale(y, cos), scale(x, sin)),
-                    z,
-                ];
-                w.motion[d] = [cross(origin, z), z];
-            }
-            Motion::Prismatic => {
-                origin = scale_add(z, cx.get(&b.joint_q[c]), origin);
-                rotation = [x, y, z];
-                w.motion[d] = [z, zero()];
-            }
-            Motion::Ball => {
-                let turn = quat::matrix(read_quat(cx, &b.joint_q, c));
-                let rest: Mat3<C::F> = [x, y, z];
-                rotation = [
-                    transform(&rest, turn[0]),
-                    transform(&rest, turn[1]),
-                    transform(&rest, turn[2]),
-                ];
-                for i in 0..3 {
-                    w.motion[d + i] = [cross(origin, rotation[i]), rotation[i]];
-                }
-            }
-            Motion::Free => {
-                rotation = quat::matrix(read_quat(cx, &b.joint_q, c + 3));
-                let center = transform(&rotation, constant(body.center));
-                origin = sub(zero(), center);
-                let position = [
-                    cx.get(&b.joint_q[c]),
-                    cx.get(&b.joint_q[c + 1]),
-                    cx.get(&b.joint_q[c + 2]),
-                ];
-                w.reference[body.tree] = add(position, center);
-                for i in 0..3 {
-                    let mut axis = zero();
-                    axis[i] = C::F::c(1.0);
-                    w.motion[d + i] = [axis, zero()];
-                    w.motion[d + 3 + i] = [zero(), axis];
-                }
-            }
+/// Frames, motion axes and inertias in the world.
+pub struct Kinematics;
+
+impl Stage for Kinematics {
+    const READS: &'static [A] = &[A::JointQ, A::Params];
+    const WRITES: &'static [A] = &[A::Rotation, A::Origin, A::Reference, A::Motion, A::Inertia];
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        for (t, tree) in m.trees.iter().enumerate() {
+            b.work.reference[t] = Vec3::constant(tree.base);
         }
-        w.inertia[k] = match m.varying.first(Param::BodyMassScale) {
-            None => place::<C::F>(body.mass, body.center, body.inertia, &rotation, origin),
-            Some(first) => {
-                let mut sum = [C::F::c(0.0); 10];
-                for part in &body.parts {
-                    let own =
-                        place::<C::F>(part.mass, part.center, part.inertia, &rotation, origin);
-                    for (sum, own) in sum.iter_mut().zip(own) {
-                        *sum = own.fma(b.params[first + part.link], *sum);
-                    }
-                }
-                sum
-            }
-        };
-        w.rotation[k] = rotation;
-        w.origin[k] = origin;
+        // parents precede children (sim-model sorts them), so one forward pass suffices
+        for (k, body) in m.bodies.iter().enumerate() {
+            let (rest, origin) = at_zero(b, body);
+            let (rotation, origin) = moved(cx, b, body, rest, origin);
+            b.work.rotation[k] = rotation;
+            b.work.origin[k] = origin;
+            b.work.inertia[k] = inertia(m, &b.params, body, &rotation, origin);
+        }
     }
+}
+
+/// Axes and origin of a body whose joint is at 0.
+#[inline(always)]
+fn at_zero<F: Num, V>(b: &Block<F, V>, body: &Body<F::Real>) -> (Mat3<F>, Vec3<F>) {
+    match body.parent {
+        Some(parent) => {
+            let r = &b.work.rotation[parent];
+            let origin = r.mul_add(Vec3::constant(body.position), b.work.origin[parent]);
+            (rested(r, body), origin)
+        }
+        None => (Mat3::constant(body.rotation), Vec3::constant(body.position)),
+    }
+}
+
+/// Axes and origin of a body as its joint has moved it; writes the joint's motion axes.
+#[inline(always)]
+fn moved<C: Cx>(
+    cx: &mut C,
+    b: &mut BlockOf<C>,
+    body: &Body<<C::F as Num>::Real>,
+    rest: Mat3<C::F>,
+    origin: Vec3<C::F>,
+) -> (Mat3<C::F>, Vec3<C::F>) {
+    let Mat3([x, y, z]) = rest;
+    let (c, d, w) = (body.coord, body.dof, &mut b.work);
+    match body.motion {
+        Motion::Revolute => {
+            let (sin, cos) = cx.get(&b.joint_q[c]).sincos();
+            w.motion[d] = Spatial([origin.cross(z), z]);
+            let turned = [y.scale_add(sin, x * cos), y * cos - x * sin, z];
+            (Mat3(turned), origin)
+        }
+        Motion::Prismatic => {
+            w.motion[d] = Spatial([z, Vec3::zero()]);
+            (rest, z.scale_add(cx.get(&b.joint_q[c]), origin))
+        }
+        Motion::Ball => {
+            let Mat3([x, y, z]) = quat::matrix(read_quat(cx, &b.joint_q, c));
+            let rotation = Mat3([rest * x, rest * y, rest * z]);
+            for i in 0..3 {
+                w.motion[d + i] = Spatial([origin.cross(rotation[i]), rotation[i]]);
+            }
+            (rotation, origin)
+        }
+        Motion::Free => {
+            let rotation = quat::matrix(read_quat(cx, &b.joint_q, c + 3));
+            let center = rotation * Vec3::constant(body.center);
+            let position = Vec3([
+                cx.get(&b.joint_q[c]),
+                cx.get(&b.joint_q[c + 1]),
+                cx.get(&b.joint_q[c + 2]),
+            ]);
+            w.reference[body.tree] = position + center;
+            for i in 0..3 {
+                let mut axis = Vec3::zero();
+                axis[i] = C::F::c(1.0);
+                w.motion[d + i] = Spatial([axis, Vec3::zero()]);
+                w.motion[d + 3 + i] = Spatial([Vec3::zero(), axis]);
+            }
+            (rotation, Vec3::zero() - center)
+        }
+    }
+}
+
+/// Inertia of a body about the reference point; where masses vary, the sum of those of its links.
+#[inline(always)]
+fn inertia<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    body: &Body<F::Real>,
+    rotation: &Mat3<F>,
+    origin: Vec3<F>,
+) -> Inertia<F> {
+    let Some(first) = m.varying.first(Param::BodyMassScale) else {
+        return Inertia::placed(body.mass, body.center, body.inertia, rotation, origin);
+    };
+    let mut sum = Inertia::zero();
+    for part in &body.parts {
+        let own = Inertia::placed(part.mass, part.center, part.inertia, rotation, origin);
+        for (sum, own) in sum.iter_mut().zip(*own) {
+            *sum = own.fma(params[first + part.link], *sum);
+        }
+    }
+    sum
 }
 
 /// R(parent) E(b); most joints stand at right angles to each other, which costs no product.
 #[inline(always)]
-fn at_rest<F: Num>(r: &Mat3<F>, body: &Body<F::Real>) -> Mat3<F> {
+fn rested<F: Num>(r: &Mat3<F>, body: &Body<F::Real>) -> Mat3<F> {
     match body.exchange {
-        Some([x, y, z]) => [exchanged(r, x), exchanged(r, y), exchanged(r, z)],
+        Some([x, y, z]) => Mat3([exchanged(r, x), exchanged(r, y), exchanged(r, z)]),
         None => {
             let [x, y, z] = body.rotation;
-            [
-                transform(r, constant(x)),
-                transform(r, constant(y)),
-                transform(r, constant(z)),
-            ]
+            Mat3([
+                r * Vec3::constant(x),
+                r * Vec3::constant(y),
+                r * Vec3::constant(z),
+            ])
         }
     }
 }
 
 #[inline(always)]
 fn exchanged<F: Num>(r: &Mat3<F>, (axis, back): (usize, bool)) -> Vec3<F> {
-    let [x, y, z] = r[axis];
-    if back { [-x, -y, -z] } else { [x, y, z] }
+    if back { -r[axis] } else { r[axis] }
 }
 
 /// The quaternion that begins at coordinate `c`.

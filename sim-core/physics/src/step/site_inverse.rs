@@ -16,18 +16,37 @@
 //! shorter than λ, and no number of J⁺ much above 1 / λ, whatever rounds.
 
 use super::sites::{back, position, reference};
-use crate::arrays::Workspace;
+use super::{BlockOf, ConstantsOf, Stage};
+use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
 use crate::constants::site::Site;
-use crate::lane::Num;
-use crate::math::vec3::{add, cross_add, sub};
+use crate::lane::{Cx, Num, Real};
+use crate::math::spatial::Spatial;
+use crate::math::vec3::Vec3;
 
 /// Numbers of a displacement: of the origin, then of the rotation.
 const SIX: usize = 6;
 
+/// What moves the sites by a little, for output.
+pub struct SiteInverse;
+
+impl Stage for SiteInverse {
+    const READS: &'static [A] = &[A::Rotation, A::Origin, A::Reference, A::Motion];
+    const WRITES: &'static [A] = &[A::SiteInverse];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        !m.sites.is_empty()
+    }
+
+    #[inline(always)]
+    fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        inverse_jacobian(m, &mut b.work);
+    }
+}
+
 /// The rows of J⁺ of the dofs that move each site, one site after the other.
 #[inline(always)]
-pub(super) fn inverse_jacobian<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
+fn inverse_jacobian<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
     let mut end = 0;
     for site in &m.sites {
         let first = end;
@@ -55,8 +74,9 @@ pub(super) fn inverse_jacobian<F: Num>(m: &Constants<F::Real>, w: &mut Workspace
             }
             if let Some(other) = &site.relative_to {
                 let [x, y, z, turn_x, turn_y, turn_z] = row;
-                let [x, y, z] = back(w, other, [x, y, z]);
-                let [turn_x, turn_y, turn_z] = back(w, other, [turn_x, turn_y, turn_z]);
+                let Vec3([x, y, z]) = back(w, other, Vec3([x, y, z]));
+                let turn = back(w, other, Vec3([turn_x, turn_y, turn_z]));
+                let Vec3([turn_x, turn_y, turn_z]) = turn;
                 row = [x, y, z, turn_x, turn_y, turn_z];
             }
             w.site_inverse[k] = row;
@@ -73,16 +93,16 @@ fn jacobian<F: Num>(w: &mut Workspace<F>, site: &Site<F::Real>, first: usize) {
         && site.mount.tree != other.tree
     {
         // the same point, from the reference point of the other robot
-        there = add(here, sub(reference(w, &site.mount), reference(w, other)));
+        there = here + (reference(w, &site.mount) - reference(w, other));
     }
     for (k, column) in site.columns.iter().enumerate() {
-        let [linear, angular] = w.motion[column.dof];
-        let [turn_x, turn_y, turn_z] = angular;
+        let Spatial([linear, angular]) = w.motion[column.dof];
+        let Vec3([turn_x, turn_y, turn_z]) = angular;
         w.site_inverse[first + k] = if column.is_of_other {
-            let [x, y, z] = cross_add(angular, there, linear);
+            let Vec3([x, y, z]) = angular.cross_add(there, linear);
             [-x, -y, -z, -turn_x, -turn_y, -turn_z]
         } else {
-            let [x, y, z] = cross_add(angular, here, linear);
+            let Vec3([x, y, z]) = angular.cross_add(here, linear);
             [x, y, z, turn_x, turn_y, turn_z]
         };
     }

@@ -10,44 +10,89 @@
 //! from the origin.
 
 use super::inverse_dynamics::{carried_along, proper_accelerations};
-use super::{BlockOf, ConstantsOf};
-use crate::arrays::Workspace;
+use super::{BlockOf, ConstantsOf, Stage};
+use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
 use crate::constants::site::Mount;
-use crate::lane::{Cx, Num};
+use crate::lane::{Cx, Num, Real};
 use crate::math::quat::{self, Quat, conjugate, mul};
 use crate::math::spatial::{ANGULAR, LINEAR, Spatial};
-use crate::math::vec3::{
-    Vec3, add, constant, cross, cross_add, sub, transform, transform_add, transform_back, zero,
-};
+use crate::math::vec3::{Mat3, Vec3};
+
+/// Frames and velocities of sites, for output.
+pub struct Sites;
+
+impl Stage for Sites {
+    const READS: &'static [A] = &[
+        A::Rotation,
+        A::Origin,
+        A::Reference,
+        A::Velocity,
+        A::Orientation,
+    ];
+    const WRITES: &'static [A] = &[A::SiteQ, A::SiteQd];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        !m.sites.is_empty()
+    }
+
+    #[inline(always)]
+    fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        site_q(m, &mut b.work);
+    }
+}
+
+/// What inertial measurement units in the sites show, for output.
+pub struct Imu;
+
+impl Stage for Imu {
+    const READS: &'static [A] = &[
+        A::JointQ,
+        A::JointQd,
+        A::JointQdd,
+        A::Params,
+        A::Rotation,
+        A::Velocity,
+    ];
+    const WRITES: &'static [A] = &[A::Gyro, A::Accelerometer];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        !m.sites.is_empty()
+    }
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        imu(cx, m, b);
+    }
+}
 
 /// Frames and velocities of the sites.
 #[inline(always)]
-pub(super) fn site_q<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
+fn site_q<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
     for (k, site) in m.sites.iter().enumerate() {
         let mount = &site.mount;
         let (mut position, mut orientation) = (position(w, mount), orientation(w, mount));
         let mut velocity = velocity(w, mount, position);
         match &site.relative_to {
-            None => position = add(position, reference(w, mount)),
+            None => position = position + reference(w, mount),
             Some(other) => {
                 let (there, from) = (self::position(w, other), self::orientation(w, other));
-                let [linear, angular] = self::velocity(w, other, there);
-                position = sub(position, there);
+                let Spatial([linear, angular]) = self::velocity(w, other, there);
+                position = position - there;
                 if mount.tree != other.tree {
-                    let apart = sub(reference(w, mount), reference(w, other));
-                    position = add(position, apart);
+                    let apart = reference(w, mount) - reference(w, other);
+                    position = position + apart;
                 }
-                let carried = cross_add(angular, position, linear);
-                velocity = [
-                    back(w, other, sub(velocity[LINEAR], carried)),
-                    back(w, other, sub(velocity[ANGULAR], angular)),
-                ];
+                let carried = angular.cross_add(position, linear);
+                velocity = Spatial([
+                    back(w, other, velocity[LINEAR] - carried),
+                    back(w, other, velocity[ANGULAR] - angular),
+                ]);
                 position = back(w, other, position);
                 orientation = mul(conjugate(from), orientation);
             }
         }
-        let ([px, py, pz], [qx, qy, qz, qw]) = (position, orientation);
+        let (Vec3([px, py, pz]), [qx, qy, qz, qw]) = (position, orientation);
         w.site_q[k] = [px, py, pz, qx, qy, qz, qw];
         w.site_qd[k] = velocity;
     }
@@ -55,18 +100,18 @@ pub(super) fn site_q<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
 
 /// What turns and accelerates each site, in its own axes.
 #[inline(always)]
-pub(super) fn imu<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+fn imu<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let base = proper_accelerations(cx, m, b);
     let w = &mut b.work;
     for (k, site) in m.sites.iter().enumerate() {
         let mount = &site.mount;
         let (acceleration, omega) = match mount.body {
             Some(body) => {
-                let arm = transform(&w.rotation[body], constant(mount.position));
+                let arm = w.rotation[body] * Vec3::constant(mount.position);
                 let omega = w.velocity[body][ANGULAR];
                 (carried_along(w.force[body], omega, arm), omega)
             }
-            None => (base, zero()),
+            None => (base, Vec3::zero()),
         };
         w.gyro[k] = back(w, mount, omega);
         w.accelerometer[k] = back(w, mount, acceleration);
@@ -76,9 +121,9 @@ pub(super) fn imu<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
 /// Where it is, from the reference point of its robot.
 #[inline(always)]
 pub(super) fn position<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
-    let own = constant(mount.position);
+    let own = Vec3::constant(mount.position);
     match mount.body {
-        Some(body) => transform_add(&w.rotation[body], own, w.origin[body]),
+        Some(body) => w.rotation[body].mul_add(own, w.origin[body]),
         None => own,
     }
 }
@@ -88,7 +133,7 @@ pub(super) fn position<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3
 pub(super) fn reference<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
     match mount.tree {
         Some(tree) => w.reference[tree],
-        None => zero(),
+        None => Vec3::zero(),
     }
 }
 
@@ -106,20 +151,19 @@ fn orientation<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Quat<F> {
 fn velocity<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>, position: Vec3<F>) -> Spatial<F> {
     match mount.body {
         Some(body) => {
-            let [linear, angular] = w.velocity[body];
-            [add(linear, cross(angular, position)), angular]
+            let Spatial([linear, angular]) = w.velocity[body];
+            Spatial([linear + angular.cross(position), angular])
         }
-        None => [zero(), zero()],
+        None => Spatial::zero(),
     }
 }
 
 /// A vector of the world in the axes of a frame.
 #[inline(always)]
 pub(super) fn back<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>, vector: Vec3<F>) -> Vec3<F> {
-    let [x, y, z] = mount.rotation;
-    let own = [constant(x), constant(y), constant(z)];
+    let own = Mat3::constant(mount.rotation);
     match mount.body {
-        Some(body) => transform_back(&own, transform_back(&w.rotation[body], vector)),
-        None => transform_back(&own, vector),
+        Some(body) => own.transpose_mul(w.rotation[body].transpose_mul(vector)),
+        None => own.transpose_mul(vector),
     }
 }

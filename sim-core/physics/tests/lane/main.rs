@@ -214,7 +214,7 @@ fn a_world_writes_its_place_of_its_own_row_and_nothing_beyond_the_memory() {
             }
         }
         // world 4 is the only one of row 6: the memory ends before it
-        let even = F::not(F::c(0.5).lt(odd));
+        let even = !F::c(0.5).lt(odd);
         let panics = |mask: F::Mask, len: usize| {
             let mut to = vec![F::c(0.0); len];
             let scatter = || x.scatter(mask, &mut to, rows, 2);

@@ -252,8 +252,8 @@ impl<C: Cx> Reach<C> {
         let first = a.lt(C::F::c(f.constant));
         match f.kind % 4 {
             0 => first,
-            1 => C::F::and(C::F::not(first), d.lt(b)),
-            2 => C::F::or(first, b.lt(d)),
+            1 => !first & d.lt(b),
+            2 => first | b.lt(d),
             _ => b.lt(a),
         }
     }

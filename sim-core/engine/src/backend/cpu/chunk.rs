@@ -4,26 +4,28 @@ use super::contacts;
 use super::seats::Seats;
 use super::transfer::{self, Arena};
 use crate::backend::noise::Noise;
-use crate::backend::shown::{is_of_contacts, stages_for};
-use crate::backend::state::{self, Shape, StateField};
+use crate::backend::state::{self, RECORD, Shape};
 use crate::backend::{Faults, Frozen, Values};
 use crate::random::Numbering;
 use crate::start::StartDraw;
 use sim_model::{Model, SensedShapes};
-use sim_physics::arrays::{Block, Field, Layout, Slot};
+use sim_physics::arrays::{Array, Block, Field, Flat, Layout, Slot, Source};
 use sim_physics::compiled::Stages;
 use sim_physics::constants::Constants;
 use sim_physics::lane::{Lane, Real};
-use sim_physics::step::{STAGES, Stage};
+use sim_physics::schedule::{evaluation_stages, step_stages};
+use sim_physics::step::StageId;
 use std::ops::Range;
 
 /// What all chunks share.
 pub(super) struct Job<F: Lane> {
     pub constants: Constants<F::Real>,
-    /// Every stage, by its number in [`Stage::ALL`].
+    /// Every stage, by [`StageId::index`].
     stages: Stages<F>,
+    /// How the scalars of a world lie.
+    pub shape: Shape,
     pub layout: Layout,
-    /// Stages of a step that the model needs, by their numbers.
+    /// Stages of a step that the model needs, by their places.
     step: Vec<usize>,
     /// Stages that evaluate the fields of the layout.
     evaluate: Vec<usize>,
@@ -33,7 +35,7 @@ pub(super) struct Job<F: Lane> {
     pub frame_s: f64,
     /// When a world is frozen.
     pub faults: Faults,
-    /// State and commands of a world after a reset, in the order of [`StateField`].
+    /// State and commands of a world after a reset, in the order of [`RECORD`].
     pub start: Vec<F::Real>,
     /// What is drawn over it.
     pub draw: StartDraw,
@@ -48,15 +50,14 @@ pub(super) struct Job<F: Lane> {
 impl<F: Lane> Job<F> {
     pub fn new(model: &Model, layout: Layout, stages: Stages<F>, numbering: Numbering) -> Job<F> {
         let constants = model.constants().cast();
-        let numbers = |needed: &[Stage]| {
-            let needed = needed.iter().filter(|stage| stage.is_needed(&constants));
-            needed.map(|stage| stage.number()).collect()
-        };
-        let shown = stages_for(&layout);
+        let places = |stages: &[StageId]| stages.iter().map(|stage| stage.index()).collect();
+        let fields = layout.slots.iter().map(|slot| slot.field);
+        let evaluation = evaluation_stages(&constants, fields);
         Job {
-            step: numbers(&STAGES),
-            evaluate: numbers(&shown),
-            finds_contacts: shown.contains(&Stage::ContactRows),
+            shape: Shape::of(&constants),
+            step: places(&step_stages(&constants)),
+            evaluate: places(&evaluation),
+            finds_contacts: state::finds_contacts(&evaluation),
             constants,
             stages,
             layout,
@@ -73,10 +74,7 @@ impl<F: Lane> Job<F> {
 
 /// Is it a number that a chunk keeps of each world, and not of its state?
 fn is_counter(field: Field) -> bool {
-    matches!(
-        field,
-        Field::Time | Field::Step | Field::Status | Field::ContactsLeftOut
-    )
+    field.row().source == Source::Counter
 }
 
 pub(super) struct Chunk<F: Lane> {
@@ -119,7 +117,7 @@ impl<F: Lane> Chunk<F> {
             .map(|slot| slot.shape[1..].iter().product());
         let elements: usize = elements.max().unwrap_or(1);
         let mut chunk = Chunk {
-            state: vec![F::Real::default(); blocks * Shape::of(&job.constants).total() * F::WIDTH],
+            state: vec![F::Real::default(); blocks * job.shape.total() * F::WIDTH],
             steps: vec![0; worlds.len()],
             status: vec![0; worlds.len()],
             left_out: vec![0; worlds.len()],
@@ -140,16 +138,16 @@ impl<F: Lane> Chunk<F> {
     }
 
     /// Place of a number of a world (counted from the chunk's first) in `state`.
-    pub(super) fn place(&self, shape: Shape, world: usize, field: StateField, k: usize) -> usize {
+    pub(super) fn place(&self, shape: Shape, world: usize, array: Array, k: usize) -> usize {
         let seat = self.seats.of(world);
         let (block, lane) = (seat / F::WIDTH, seat % F::WIDTH);
-        (block * shape.total() + shape.start(field) + k) * F::WIDTH + lane
+        (block * shape.total() + shape.start(array) + k) * F::WIDTH + lane
     }
 
     pub fn write(
         &mut self,
         job: &Job<F>,
-        target: StateField,
+        target: Array,
         columns: &Range<usize>,
         values: Values<'_>,
         mask: Option<&[bool]>,
@@ -158,8 +156,8 @@ impl<F: Lane> Chunk<F> {
         if columns.is_empty() {
             return;
         }
-        let shape = Shape::of(&job.constants);
-        let writes_state = matches!(target, StateField::Q | StateField::Qd);
+        let shape = job.shape;
+        let writes_state = state::is_motion(&target);
         for world in 0..self.worlds.len() {
             let outside = self.worlds.start + world;
             if mask.is_some_and(|mask| !mask[outside]) {
@@ -182,13 +180,13 @@ impl<F: Lane> Chunk<F> {
             }
             if writes_state {
                 for dof in 0..shape.dofs {
-                    let place = self.place(shape, world, StateField::Qdd, dof);
+                    let place = self.place(shape, world, Array::JointQdd, dof);
                     self.state[place] = F::Real::default();
                 }
             }
-            if matches!(target, StateField::Q) {
+            if matches!(target, Array::JointQ) {
                 for coord in columns.clone() {
-                    let place = self.place(shape, world, StateField::QRest, coord);
+                    let place = self.place(shape, world, Array::JointQRest, coord);
                     self.state[place] = F::Real::default();
                 }
                 self.normalize(job, world, columns);
@@ -198,11 +196,11 @@ impl<F: Lane> Chunk<F> {
 
     /// Columns of the parameters of every world, as the backend's.
     pub fn params(&self, job: &Job<F>, columns: &Range<usize>, to: &mut [f64]) {
-        let shape = Shape::of(&job.constants);
+        let shape = job.shape;
         for world in 0..self.worlds.len() {
             let row = (self.worlds.start + world) * columns.len();
             for (k, column) in columns.clone().enumerate() {
-                let place = self.place(shape, world, StateField::Params, column);
+                let place = self.place(shape, world, Array::Params, column);
                 to[row + k] = self.state[place].to_f64();
             }
         }
@@ -210,10 +208,10 @@ impl<F: Lane> Chunk<F> {
 
     /// Makes the quaternions of a world in these columns unit.
     fn normalize(&mut self, job: &Job<F>, world: usize, columns: &Range<usize>) {
-        let shape = Shape::of(&job.constants);
+        let shape = job.shape;
         let written = job.constants.quaternions();
         for first in written.filter(|first| columns.contains(first)) {
-            let place = self.place(shape, world, StateField::Q, first);
+            let place = self.place(shape, world, Array::JointQ, first);
             let at = |i: usize| place + i * F::WIDTH;
             let square: f64 = (0..4).map(|i| self.state[at(i)].to_f64().powi(2)).sum();
             // one that is unit to the last bits stays as it was written
@@ -231,7 +229,7 @@ impl<F: Lane> Chunk<F> {
     /// The processor has the instructions of `F`; the arena holds the job's layout.
     #[inline(always)]
     pub unsafe fn run(&mut self, job: &Job<F>, substeps: usize, arena: Arena) {
-        let shape = Shape::of(&job.constants);
+        let shape = job.shape;
         let stride = shape.total() * F::WIDTH;
         self.frames += u64::from(substeps > 0);
         for block in 0..self.worlds.len().div_ceil(F::WIDTH) {
@@ -278,7 +276,7 @@ impl<F: Lane> Chunk<F> {
             {
                 // SAFETY: the arena holds the layout, and these worlds are this chunk's alone.
                 unsafe {
-                    if is_of_contacts(slot.field) {
+                    if let Source::Contacts(_) = slot.field.row().source {
                         contacts::export(self, job, slot, block, arena);
                     } else {
                         transfer::export(self, &job.constants, slot, block, arena);
@@ -336,20 +334,10 @@ impl<F: Lane> Chunk<F> {
     #[inline(always)]
     fn load(&mut self, state: Range<usize>) {
         let b = &mut self.block;
-        let groups = [
-            &mut b.joint_qd,
-            &mut b.joint_qdd,
-            &mut b.joint_f,
-            &mut b.joint_target_q,
-            &mut b.joint_target_qd,
-            &mut b.joint_q,
-            &mut b.joint_q_rest,
-            &mut b.command_history,
-            &mut b.params,
-        ];
         let mut from = self.state[state].chunks_exact(F::WIDTH);
-        for group in groups {
-            for x in group.iter_mut() {
+        for array in RECORD {
+            let (Flat::Cells(x) | Flat::Values(x)) = b.array_mut(array);
+            for x in x {
                 *x = F::load(from.next().expect("a register for every number"));
             }
         }
@@ -361,18 +349,12 @@ impl<F: Lane> Chunk<F> {
 
     /// The state of a block out of its workspace; commands did not change.
     #[inline(always)]
-    fn store(&mut self, shape: Shape, state: Range<usize>) {
-        let b = &self.block;
-        let groups = [
-            (StateField::Qd, &b.joint_qd),
-            (StateField::Qdd, &b.joint_qdd),
-            (StateField::Q, &b.joint_q),
-            (StateField::QRest, &b.joint_q_rest),
-        ];
-        for (field, group) in groups {
-            let first = state.start + shape.start(field) * F::WIDTH;
+    fn store(&mut self, shape: Shape, range: Range<usize>) {
+        for array in RECORD.into_iter().filter(state::is_motion) {
+            let first = range.start + shape.start(array) * F::WIDTH;
             let to = self.state[first..].chunks_exact_mut(F::WIDTH);
-            for (x, to) in group.iter().zip(to) {
+            let (Flat::Cells(x) | Flat::Values(x)) = self.block.array(array);
+            for (x, to) in x.iter().zip(to) {
                 x.store(to);
             }
         }

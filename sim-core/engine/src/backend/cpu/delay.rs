@@ -1,7 +1,7 @@
 //! Commands that act late: those of the frames before are kept.
 
 use super::chunk::{Chunk, Job};
-use crate::backend::state::{Shape, StateField};
+use sim_physics::arrays::Array;
 use sim_physics::arrays::status::FROZEN;
 use sim_physics::lane::Lane;
 use std::ops::Range;
@@ -12,15 +12,15 @@ impl<F: Lane> Chunk<F> {
     /// What is then evaluated shows what acts next if nothing else is sent.
     #[inline(always)]
     pub(super) fn age_commands(&mut self, job: &Job<F>, block: usize, state: Range<usize>) {
-        let shape = Shape::of(&job.constants);
-        if shape.history == 0 {
+        let shape = job.shape;
+        if shape.len(Array::CommandHistory) == 0 {
             return;
         }
         let numbers = &mut self.state[state];
-        let first = shape.start(StateField::History) * F::WIDTH;
-        let sent = shape.start(StateField::F) * F::WIDTH;
+        let first = shape.start(Array::CommandHistory) * F::WIDTH;
+        let sent = shape.start(Array::JointF) * F::WIDTH;
         let frame = 3 * shape.dofs * F::WIDTH;
-        let end = first + shape.history * F::WIDTH;
+        let end = first + shape.len(Array::CommandHistory) * F::WIDTH;
         let status = &self.status;
         let seats = &self.seats;
         let stays = |lane: usize| {

@@ -16,11 +16,12 @@ mod trouble;
 
 pub use dispatch::{available, create};
 
-use super::state::StateField;
+use super::state;
 use super::{Backend, BackendError, Backends, Faults, Frozen, Groups, Lanes, Precision, Values};
 use chunk::{Chunk, Job};
 use dispatch::{Program, RunChunk};
 use rayon::prelude::*;
+use sim_physics::arrays::Array;
 use sim_physics::arrays::{Field, Layout};
 use sim_physics::lane::Lane;
 use std::ops::Range;
@@ -156,13 +157,13 @@ impl<F: Lane> Backend for Cpu<F> {
         mask: Option<&[bool]>,
     ) {
         for chunk in &mut self.chunks {
-            chunk.write(&self.job, StateField::of(field), &columns, values, mask);
+            chunk.write(&self.job, state::array_of(field), &columns, values, mask);
         }
     }
 
     fn write_params(&mut self, columns: Range<usize>, values: Values<'_>, mask: Option<&[bool]>) {
         for chunk in &mut self.chunks {
-            chunk.write(&self.job, StateField::Params, &columns, values, mask);
+            chunk.write(&self.job, Array::Params, &columns, values, mask);
         }
     }
 

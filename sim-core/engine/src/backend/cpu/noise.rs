@@ -2,14 +2,15 @@
 
 use super::chunk::{Chunk, Job};
 use crate::backend::noise::{FieldNoise, sample};
-use crate::backend::state::{Shape, StateField};
+use crate::backend::state::Shape;
 use crate::random::{Draw, Stream};
+use sim_physics::arrays::Array;
 use sim_physics::lane::{Lane, Real};
 
 impl<F: Lane> Chunk<F> {
     /// Draws what is added to the commands of the frame.
     pub(super) fn draw_command_noise(&mut self, job: &Job<F>, block: usize) {
-        let shape = Shape::of(&job.constants);
+        let shape = job.shape;
         for (k, &(stream, first)) in job.noise.commands.iter().enumerate() {
             let Some(first) = first else { continue };
             for dof in 0..shape.dofs {
@@ -35,7 +36,7 @@ impl<F: Lane> Chunk<F> {
         world: usize,
         row: &mut [F::Real],
     ) {
-        let shape = Shape::of(&job.constants);
+        let shape = job.shape;
         let draw = self.draw(job, world, noise.1);
         let deviation = |number| self.deviation(shape, world, number);
         job.noise.add_to(noise, row, &draw, deviation);
@@ -49,6 +50,6 @@ impl<F: Lane> Chunk<F> {
 
     /// A standard deviation, by its number among the parameters of a world.
     fn deviation(&self, shape: Shape, world: usize, number: usize) -> f64 {
-        self.state[self.place(shape, world, StateField::Params, number)].to_f64()
+        self.state[self.place(shape, world, Array::Params, number)].to_f64()
     }
 }

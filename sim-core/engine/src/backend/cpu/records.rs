@@ -2,14 +2,14 @@
 
 use super::chunk::{Chunk, Job};
 use crate::backend::COUNTERS;
-use crate::backend::state::{Shape, StateField};
+use sim_physics::arrays::Array;
 use sim_physics::lane::{Lane, Real};
 use std::array;
 
 impl<F: Lane> Job<F> {
     /// Numbers of a world's state and commands.
     pub fn numbers(&self) -> usize {
-        Shape::of(&self.constants).total()
+        self.shape.total()
     }
 
     fn record(&self) -> usize {
@@ -20,7 +20,7 @@ impl<F: Lane> Job<F> {
 impl<F: Lane> Chunk<F> {
     /// Writes the chunk's worlds into the records of all.
     pub fn save(&self, job: &Job<F>, records: &mut [u8]) {
-        let shape = Shape::of(&job.constants);
+        let shape = job.shape;
         let records = records.chunks_exact_mut(job.record());
         let own = records.skip(self.worlds.start).take(self.worlds.len());
         for (world, record) in own.enumerate() {
@@ -31,7 +31,7 @@ impl<F: Lane> Chunk<F> {
             counters[16..24].copy_from_slice(&self.seeds[world].to_le_bytes());
             counters[24..].copy_from_slice(&self.episodes[world].to_le_bytes());
             // of a scene in which nothing moves, there are none
-            let first = self.place(shape, world, StateField::Qd, 0);
+            let first = self.place(shape, world, Array::JointQd, 0);
             let state = self.state.iter().skip(first).step_by(F::WIDTH);
             let to = numbers.chunks_exact_mut(size_of::<F::Real>());
             for (to, x) in to.zip(state) {
@@ -52,7 +52,7 @@ impl<F: Lane> Chunk<F> {
         mask: Option<&[bool]>,
         from_world: Option<usize>,
     ) {
-        let shape = Shape::of(&job.constants);
+        let shape = job.shape;
         for world in 0..self.worlds.len() {
             let outside = self.worlds.start + world;
             if mask.is_some_and(|mask| !mask[outside]) {
@@ -65,7 +65,7 @@ impl<F: Lane> Chunk<F> {
             self.left_out[world] = u32::from_le_bytes(array::from_fn(|i| counters[12 + i]));
             self.seeds[world] = u64::from_le_bytes(array::from_fn(|i| counters[16 + i]));
             self.episodes[world] = u32::from_le_bytes(array::from_fn(|i| counters[24 + i]));
-            let first = self.place(shape, world, StateField::Qd, 0);
+            let first = self.place(shape, world, Array::JointQd, 0);
             let state = self.state.iter_mut().skip(first).step_by(F::WIDTH);
             for (x, from) in state.zip(numbers.chunks_exact(size_of::<F::Real>())) {
                 *x = if F::Real::DOUBLE {

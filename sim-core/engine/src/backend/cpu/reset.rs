@@ -1,7 +1,7 @@
 //! Worlds go back to their start.
 
 use super::chunk::{Chunk, Job};
-use crate::backend::state::{Shape, StateField};
+use sim_physics::arrays::Array;
 use sim_physics::lane::{Lane, Real};
 
 impl<F: Lane> Chunk<F> {
@@ -55,14 +55,14 @@ impl<F: Lane> Chunk<F> {
 
     /// State and commands of a lane as the scene starts them; parameters stay as they are, but for loads and what is drawn.
     fn reset_lane(&mut self, job: &Job<F>, lane: usize) {
-        let params = Shape::of(&job.constants).start(StateField::Params);
+        let params = job.shape.start(Array::Params);
         let starts = job.constants.varying.starts();
         self.start_lane(job, lane, |k| k < params || starts[k - params].0.is_load());
     }
 
     /// The numbers of a lane that are chosen, as the scene starts them.
     fn start_lane(&mut self, job: &Job<F>, lane: usize, chosen: impl Fn(usize) -> bool) {
-        let first = self.place(Shape::of(&job.constants), lane, StateField::Qd, 0);
+        let first = self.place(job.shape, lane, Array::JointQd, 0);
         for (k, &x) in job.start.iter().enumerate().filter(|(k, _)| chosen(*k)) {
             self.state[first + k * F::WIDTH] = x;
         }
@@ -70,16 +70,17 @@ impl<F: Lane> Chunk<F> {
 
     /// What is drawn of the state and of the parameters.
     fn draw_start(&mut self, job: &Job<F>, world: usize) {
-        let shape = Shape::of(&job.constants);
+        let shape = job.shape;
         let (seed, episode) = (self.seeds[world], self.episodes[world]);
         let number = job.numbering.number(self.worlds.start + world);
         job.draw
             .draw(seed, number, episode, |field, column, value| {
-                let place = self.place(shape, world, StateField::of(field), column);
+                let place =
+                    self.place(shape, world, crate::backend::state::array_of(field), column);
                 self.state[place] = F::Real::of(value);
             });
         job.draw.draw_params(seed, number, episode, |k, value| {
-            let place = self.place(shape, world, StateField::Params, k);
+            let place = self.place(shape, world, Array::Params, k);
             self.state[place] = F::Real::of(value);
         });
     }

@@ -5,7 +5,6 @@
 //! No number of a world depends on where it sits, nor on its neighbours.
 
 use super::chunk::{Chunk, Job};
-use crate::backend::state::Shape;
 use sim_physics::constants::Constants;
 use sim_physics::lane::Lane;
 use std::ops::Range;
@@ -130,7 +129,7 @@ impl<F: Lane> Chunk<F> {
 
     /// Seats worlds that touch alike side by side, their numbers with them.
     pub(super) fn group_worlds(&mut self, job: &Job<F>) {
-        let numbers = Shape::of(&job.constants).total();
+        let numbers = job.shape.total();
         let place = |seat: usize| (seat / F::WIDTH) * numbers * F::WIDTH + seat % F::WIDTH;
         let state = &mut self.state;
         self.seats.group(|one, other| {

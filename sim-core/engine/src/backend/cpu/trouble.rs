@@ -1,8 +1,9 @@
 //! Trouble of worlds: told in their status, and kept from what comes after.
 
 use super::chunk::{Chunk, Job};
-use crate::backend::state::{Shape, StateField};
+use crate::backend::state::{RECORD, Shape, is_motion};
 use crate::backend::{FirstFrozen, Frozen};
+use sim_physics::arrays::Flat;
 use sim_physics::arrays::status;
 use sim_physics::lane::{Lane, Real};
 use std::ops::Range;
@@ -63,7 +64,7 @@ impl<F: Lane> Chunk<F> {
             }
         }
         if frozen {
-            self.put_back(Shape::of(&job.constants), state);
+            self.put_back(job.shape, state);
         }
     }
 
@@ -113,17 +114,11 @@ impl<F: Lane> Chunk<F> {
     #[inline(always)]
     fn put_back(&mut self, shape: Shape, state: Range<usize>) {
         let frozen = F::c(0.5).lt(F::load(&self.lanes));
-        let b = &mut self.block;
-        let groups = [
-            (StateField::Qd, &mut b.joint_qd),
-            (StateField::Qdd, &mut b.joint_qdd),
-            (StateField::Q, &mut b.joint_q),
-            (StateField::QRest, &mut b.joint_q_rest),
-        ];
-        for (field, group) in groups {
-            let first = state.start + shape.start(field) * F::WIDTH;
+        for array in RECORD.into_iter().filter(is_motion) {
+            let first = state.start + shape.start(array) * F::WIDTH;
             let from = self.state[first..].chunks_exact(F::WIDTH);
-            for (x, from) in group.iter_mut().zip(from) {
+            let (Flat::Cells(x) | Flat::Values(x)) = self.block.array_mut(array);
+            for (x, from) in x.iter_mut().zip(from) {
                 *x = F::select(frozen, F::load(from), *x);
             }
         }

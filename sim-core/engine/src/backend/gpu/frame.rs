@@ -5,7 +5,7 @@ use super::{Gpu, host};
 use crate::backend::noise::sample;
 use crate::backend::{BackendError, FirstFrozen};
 use crate::random::{Draw, Stream};
-use sim_physics::arrays::{Dtype, Field, WorkSlot, status};
+use sim_physics::arrays::{Array, Dtype, Field, status};
 
 impl Gpu {
     /// Draws what is added to the commands of the frame.
@@ -29,7 +29,7 @@ impl Gpu {
                 row
             })
             .collect();
-        let place = self.places.of(WorkSlot::CommandNoise);
+        let place = self.places.of(Array::CommandNoise);
         self.send(
             &worlds,
             Rows::Fields,

@@ -15,8 +15,7 @@ mod tile;
 mod upkeep;
 mod worlds;
 
-use super::shown::stages_for;
-use super::state::{Shape, StateField, start};
+use super::state::{Shape, array_of, finds_contacts, start};
 use super::{
     Backend, BackendError, Backends, Faults, FirstFrozen, Frozen, Groups, ProgramFacts, Values,
     available_memory,
@@ -31,8 +30,10 @@ use places::Places;
 use programs::Programs;
 use sim_device::{AdapterKind, Buffer, Choice, Device, Replay, Staging};
 use sim_model::Model;
+use sim_physics::arrays::Array;
 use sim_physics::arrays::{Field, Layout, status};
 use sim_physics::constants::Constants;
+use sim_physics::schedule::evaluation_stages;
 use sim_record::split::Limits;
 use std::ops::Range;
 use std::path::Path;
@@ -190,11 +191,9 @@ impl Gpu {
             .map(|slot| (slot.field, slot.shape[1..].iter().product()))
             .collect();
         let mut places = Places::new(m, &computed);
-        let shown = stages_for(layout);
-        let wanted: Vec<_> = (layout.slots.iter())
-            .flat_map(|slot| show::slots_of(slot.field))
-            .copied()
-            .collect();
+        let fields = layout.slots.iter().map(|slot| slot.field);
+        let shown = evaluation_stages(m, fields.clone());
+        let wanted: Vec<Array> = fields.flat_map(show::copied).collect();
         let limits = match device.info().kind {
             AdapterKind::Software => SOFTWARE,
             _ => HARDWARE,
@@ -225,7 +224,7 @@ impl Gpu {
         };
         let pairs = tile::pairs(m, sensors);
         let runs = show::runs(m, &places, layout);
-        let finds_contacts = shown.contains(&sim_physics::step::Stage::ContactRows);
+        let finds_contacts = finds_contacts(&shown);
         let target = drawn.as_ref().unwrap_or(&frame);
         let mut tiles = Vec::new();
         for first in (0..worlds).step_by(widest as usize) {
@@ -267,7 +266,7 @@ impl Gpu {
         // those past the last world run along from the scene's start
         let all: Vec<usize> = (0..worlds).collect();
         gpu.host
-            .fill_params(&gpu.start[shape.start(StateField::Params)..]);
+            .fill_params(&gpu.start[shape.start(Array::Params)..]);
         let padding = gpu.start.clone();
         gpu.pad(&padding)?;
         gpu.begin(&all)?;
@@ -331,7 +330,7 @@ impl Backend for Gpu {
         values: Values<'_>,
         mask: Option<&[bool]>,
     ) {
-        let target = StateField::of(field);
+        let target = array_of(field);
         if let (None, Some(command), Values::F32(values)) = (mask, tile::command(field), values)
             && columns.len() == self.shape().dofs
         {
@@ -349,7 +348,7 @@ impl Backend for Gpu {
     }
 
     fn write_params(&mut self, columns: Range<usize>, values: Values<'_>, mask: Option<&[bool]>) {
-        let written = self.write_columns(StateField::Params, &columns, values, mask);
+        let written = self.write_columns(Array::Params, &columns, values, mask);
         self.check(written);
     }
 

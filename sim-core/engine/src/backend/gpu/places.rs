@@ -3,30 +3,20 @@
 //! Memory is a structure of arrays of four numbers, the world innermost: number i of world w is component i % 4 of
 //! `fields[(i / 4) * worlds + w]`. Every array begins at a multiple of four.
 
-use crate::backend::state::{Shape, StateField};
-use sim_physics::arrays::{Field, WorkSlot as Slot};
+use crate::backend::state::{RECORD, Shape, is_motion};
+use sim_physics::arrays::{Array, Field, Writer};
 use sim_physics::constants::Constants;
-use stages_recorded::{SLOTS, length};
 use std::ops::Range;
 
-/// State that a frame changes, then commands and parameters: all that a step begins from.
-const STATE: [(StateField, Slot); 9] = [
-    (StateField::Qd, Slot::JointQd),
-    (StateField::Qdd, Slot::JointQdd),
-    (StateField::Q, Slot::JointQ),
-    (StateField::QRest, Slot::JointQRest),
-    (StateField::F, Slot::JointF),
-    (StateField::TargetQ, Slot::JointTargetQ),
-    (StateField::TargetQd, Slot::JointTargetQd),
-    (StateField::History, Slot::CommandHistory),
-    (StateField::Params, Slot::Params),
-];
-/// How many of them a frame changes.
-const MOVING: usize = 4;
+/// The arrays of a record as they lie here: what a frame changes first.
+fn record() -> impl Iterator<Item = Array> {
+    let motion = RECORD.into_iter().filter(is_motion);
+    motion.chain(RECORD.into_iter().filter(|array| !is_motion(array)))
+}
 
 /// First number of every array.
 pub(super) struct Places {
-    slots: Vec<(Slot, Range<u32>)>,
+    arrays: Vec<(Array, Range<u32>)>,
     /// Numbers of the state that a frame changes; they come first.
     pub moving: u32,
     /// A copy of them from before the frame.
@@ -49,19 +39,20 @@ impl Places {
             end = (end + u32::try_from(numbers).expect("numbers of a world")).next_multiple_of(4);
             first..first + numbers as u32
         };
-        let mut slots = Vec::new();
+        let mut arrays = Vec::new();
         let (mut moving, mut state) = (0, 0);
-        for (k, (_, slot)) in STATE.into_iter().enumerate() {
-            let place = take(length(m, slot));
+        for array in record() {
+            let place = take(array.scalars(m));
             state = place.end.next_multiple_of(4);
-            if k < MOVING {
+            if is_motion(&array) {
                 moving = state;
             }
-            slots.push((slot, place));
+            arrays.push((array, place));
         }
-        for slot in SLOTS {
-            if !slots.iter().any(|(known, _)| *known == slot) {
-                slots.push((slot, take(length(m, slot))));
+        for &array in Array::ALL {
+            let is_known = arrays.iter().any(|(known, _)| *known == array);
+            if !is_known && array.writer() != Writer::Scratch {
+                arrays.push((array, take(array.scalars(m))));
             }
         }
         let before = take(moving as usize).start;
@@ -71,7 +62,7 @@ impl Places {
             .map(|&(field, numbers)| (field, take(numbers).start))
             .collect();
         Places {
-            slots,
+            arrays,
             moving,
             before,
             state,
@@ -81,10 +72,12 @@ impl Places {
         }
     }
 
-    /// The numbers of a slot.
-    pub fn of(&self, slot: Slot) -> Range<u32> {
-        let found = self.slots.iter().find(|(known, _)| *known == slot);
-        found.map(|(_, place)| place.clone()).expect("a slot")
+    /// The numbers of an array.
+    pub fn of(&self, array: Array) -> Range<u32> {
+        let found = self.arrays.iter().find(|(known, _)| *known == array);
+        found
+            .map(|(_, place)| place.clone())
+            .expect("an array of the table")
     }
 
     /// The first number of a field that is computed for output.
@@ -93,21 +86,12 @@ impl Places {
         found.map(|(_, place)| *place).expect("a computed field")
     }
 
-    /// The first number of a group of the state.
-    pub fn group(&self, group: StateField) -> u32 {
-        let (_, slot) = STATE
-            .into_iter()
-            .find(|(known, _)| *known == group)
-            .expect("a group");
-        self.of(slot).start
-    }
-
     /// Where each number of a world's record lies, in the order of [`Shape`].
     pub fn record(&self, shape: Shape) -> Vec<u32> {
         let mut places = vec![0; shape.total()];
-        for (group, slot) in STATE {
-            let first = shape.start(group);
-            for (k, place) in self.of(slot).enumerate() {
+        for array in RECORD {
+            let first = shape.start(array);
+            for (k, place) in self.of(array).enumerate() {
                 places[first + k] = place;
             }
         }

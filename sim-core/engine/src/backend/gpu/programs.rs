@@ -2,10 +2,11 @@
 
 use super::places::Places;
 use crate::backend::gather::gather;
-use sim_physics::arrays::{Field, WorkSlot as Slot};
+use sim_physics::arrays::{Array, Field, Writer};
 use sim_physics::constants::Constants;
 use sim_physics::lane::Num;
-use sim_physics::step::{STAGES, Stage};
+use sim_physics::schedule::step_stages;
+use sim_physics::step::StageId;
 use sim_physics::times;
 use sim_record::split::{Limits, Part, split};
 use sim_record::wgsl::ProgramOptions;
@@ -13,15 +14,10 @@ use sim_record::{RecordError, Recorded, Recording};
 use stages_recorded::{between, run};
 
 /// What outlasts a substep.
-const KEPT: [Slot; 7] = [
-    Slot::JointQ,
-    Slot::JointQRest,
-    Slot::JointQd,
-    Slot::JointQdd,
-    Slot::Unconverged,
-    Slot::LeftOut,
-    Slot::Substep,
-];
+fn kept() -> Vec<Array> {
+    let kept = |array: &Array| matches!(array.writer(), Writer::Motion | Writer::Counter);
+    Array::ALL.iter().copied().filter(kept).collect()
+}
 
 /// Kernels, and the order in which they are dispatched.
 pub(super) struct Program {
@@ -50,21 +46,17 @@ impl Programs {
         m: &Constants<f32>,
         places: &Places,
         substeps: usize,
-        shown: &[Stage],
+        shown: &[StageId],
         computed: &[(Field, usize)],
-        wanted: &[Slot],
+        wanted: &[Array],
         limits: Limits,
     ) -> Result<Programs, RecordError> {
-        let needed = |stages: &[Stage]| -> Vec<Stage> {
-            let stages = stages.iter().copied();
-            stages.filter(|stage| stage.is_needed(m)).collect()
-        };
         // the searches of hulls are loops as deep as a text may have them: no loop of substeps goes around them
         let (inside, outside) = match m.contacts.groups.is_empty() {
             true => (substeps, 1),
             false => (1, substeps),
         };
-        let (recording, options) = step(m, places, &needed(&STAGES), inside)?;
+        let (recording, options) = step(m, places, &step_stages(m), inside)?;
         let (mut step, step_spare) = cut(&recording, &options, limits, places.len);
         if outside > 1 {
             step.order = vec![Part::Repeat {
@@ -73,7 +65,7 @@ impl Programs {
                 out: None,
             }];
         }
-        let (recording, options) = evaluation(m, places, &needed(shown), computed, wanted)?;
+        let (recording, options) = evaluation(m, places, shown, computed, wanted)?;
         let (evaluate, evaluate_spare) = cut(&recording, &options, limits, places.len);
         Ok(Programs {
             step,
@@ -99,17 +91,17 @@ fn cut(
 }
 
 /// What a run of stages reads from before it, and what it writes.
-fn effects(stages: &[Stage]) -> (Vec<Slot>, Vec<Slot>) {
+fn effects(stages: &[StageId]) -> (Vec<Array>, Vec<Array>) {
     let (mut reads, mut writes) = (Vec::new(), Vec::new());
     for stage in stages {
-        for slot in stage.reads() {
-            if !writes.contains(slot) && !reads.contains(slot) {
-                reads.push(*slot);
+        for array in stage.row().reads {
+            if !writes.contains(array) && !reads.contains(array) {
+                reads.push(*array);
             }
         }
-        for slot in stage.writes() {
-            if !writes.contains(slot) {
-                writes.push(*slot);
+        for array in stage.row().writes {
+            if !writes.contains(array) {
+                writes.push(*array);
             }
         }
     }
@@ -120,17 +112,18 @@ fn effects(stages: &[Stage]) -> (Vec<Slot>, Vec<Slot>) {
 fn step(
     m: &Constants<f32>,
     places: &Places,
-    stages: &[Stage],
+    stages: &[StageId],
     substeps: usize,
 ) -> Result<(Recording, ProgramOptions), RecordError> {
     let (mut reads, _) = effects(stages);
+    let kept = kept();
     // what a substep leaves to the next is read by all of them together
-    for slot in KEPT {
-        if !reads.contains(&slot) {
-            reads.push(slot);
+    for array in &kept {
+        if !reads.contains(array) {
+            reads.push(*array);
         }
     }
-    let recording = between(m, &reads, &KEPT, |cx, b| {
+    let recording = between(m, &reads, &kept, |cx, b| {
         if substeps == 1 {
             stages.iter().for_each(|stage| run(*stage, cx, m, b));
         } else {
@@ -142,8 +135,8 @@ fn step(
         }
         Vec::new()
     })?;
-    let inputs = reads.iter().flat_map(|slot| places.of(*slot)).collect();
-    let outputs = KEPT.iter().flat_map(|slot| places.of(*slot)).collect();
+    let inputs = reads.iter().flat_map(|array| places.of(*array)).collect();
+    let outputs = kept.iter().flat_map(|array| places.of(*array)).collect();
     Ok((recording, options(inputs, outputs)))
 }
 
@@ -151,14 +144,14 @@ fn step(
 fn evaluation(
     m: &Constants<f32>,
     places: &Places,
-    stages: &[Stage],
+    stages: &[StageId],
     computed: &[(Field, usize)],
-    wanted: &[Slot],
+    wanted: &[Array],
 ) -> Result<(Recording, ProgramOptions), RecordError> {
     let (reads, written) = effects(stages);
     // contacts that do not fit are counted in what is shown, too
-    let is_kept = |slot: &Slot| wanted.contains(slot) || *slot == Slot::LeftOut;
-    let writes: Vec<Slot> = written.into_iter().filter(is_kept).collect();
+    let is_kept = |array: &Array| wanted.contains(array) || *array == Array::LeftOut;
+    let writes: Vec<Array> = written.into_iter().filter(is_kept).collect();
     let recording = between(m, &reads, &writes, |cx, b| {
         stages.iter().for_each(|stage| run(*stage, cx, m, b));
         let mut rows = Vec::new();
@@ -169,16 +162,16 @@ fn evaluation(
         }
         rows
     })?;
-    let inputs = reads.iter().flat_map(|slot| places.of(*slot)).collect();
+    let inputs = reads.iter().flat_map(|array| places.of(*array)).collect();
     let mut outputs = Vec::new();
-    for slot in &writes {
-        match slot {
+    for array in &writes {
+        match array {
             // the solver's next start stays as it is
-            Slot::JointQdd => {
+            Array::JointQdd => {
                 let first = places.shown_qdd;
                 outputs.extend(first..first + m.dofs.len() as u32);
             }
-            _ => outputs.extend(places.of(*slot)),
+            _ => outputs.extend(places.of(*array)),
         }
     }
     for &(field, numbers) in computed {

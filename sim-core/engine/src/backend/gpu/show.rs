@@ -1,16 +1,16 @@
 //! Programs that write a frame: arrays of all worlds, world-major, out of a structure of arrays.
 
 use super::places::Places;
-use crate::backend::shown::is_of_contacts;
-use sim_physics::arrays::{Field, Layout, Slot as Array, WorkSlot as Slot};
+use sim_physics::arrays::{Array, Field, Layout, Slot, Source};
 use sim_physics::constants::Constants;
 use sim_physics::constants::contact::row;
 use std::fmt::Write;
+use std::ops::Range;
 
 /// Neighbouring numbers of a world that go to neighbouring places of its row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Run {
-    /// First number; [`ZERO`] where 0 is shown.
+    /// First number.
     pub from: u32,
     /// Word of the frame at which it begins in the row of the first world.
     pub to: u32,
@@ -20,109 +20,58 @@ pub(super) struct Run {
     pub stride: u32,
 }
 
-/// Nothing is read: the number shown is 0.
-pub(super) const ZERO: u32 = u32::MAX;
-
-/// Fields that are made of others by a program of their own.
+/// Is it a field that a program of its own makes of several arrays?
 pub(super) fn is_computed(field: Field) -> bool {
-    matches!(field, Field::BodyJacobian | Field::EfcJ)
+    matches!(field.row().source, Source::Computed(_))
 }
 
-/// The slots that a field of numbers shows, for what is evaluated.
-pub(super) fn slots_of(field: Field) -> &'static [Slot] {
-    match field {
-        Field::JointQdd => &[Slot::JointQdd],
-        Field::BodyQ => &[Slot::BodyQ],
-        Field::BodyQd => &[Slot::BodyQd],
-        Field::JointTorque => &[Slot::JointTorque],
-        Field::SiteQ => &[Slot::SiteQ],
-        Field::SiteQd => &[Slot::SiteQd],
-        Field::Gyro => &[Slot::Gyro],
-        Field::Accelerometer => &[Slot::Accelerometer],
-        Field::SiteInverseJacobian => &[Slot::SiteInverse],
-        Field::BiasForce => &[Slot::BiasForce],
-        Field::SmoothForce => &[Slot::SmoothForce],
-        Field::ConstraintForce => &[Slot::ConstraintForce],
-        Field::EfcD => &[Slot::EfcWeight],
-        Field::EfcAref => &[Slot::EfcAref],
-        Field::EfcForce => &[Slot::EfcForce],
-        Field::MassMatrix => &[Slot::MassMatrix],
-        Field::ContactPos => &[Slot::Reference],
-        _ => &[],
+/// The arrays that a field is copied from, after an evaluation has written them.
+pub(super) fn copied(field: Field) -> Vec<Array> {
+    match field.row().source {
+        Source::Array(array) => vec![array],
+        Source::Contacts(arrays) => arrays.to_vec(),
+        Source::Computed(_) | Source::Counter => Vec::new(),
     }
 }
 
-/// Where the elements of a field's row come from; none for counters and contacts.
-fn sources(m: &Constants<f32>, places: &Places, field: Field) -> Option<Vec<u32>> {
-    let slot = |slot: Slot| places.of(slot).collect::<Vec<u32>>();
-    Some(match field {
-        Field::JointQ | Field::JointQMeasured => slot(Slot::JointQ),
-        Field::JointQd | Field::JointQdMeasured => slot(Slot::JointQd),
-        Field::JointF => slot(Slot::JointF),
-        Field::JointTargetQ => slot(Slot::JointTargetQ),
-        Field::JointTargetQd => slot(Slot::JointTargetQd),
-        Field::JointQdd => (places.shown_qdd..places.shown_qdd + m.dofs.len() as u32).collect(),
-        Field::BodyJacobian => {
-            let first = places.computed(field);
-            (first..first + (m.frames.len() * 6 * m.dofs.len()) as u32).collect()
-        }
-        Field::EfcJ => {
-            let first = places.computed(field);
-            (first..first + (m.rows() * m.dofs.len()) as u32).collect()
-        }
-        Field::MassMatrix => {
-            let (n, first) = (m.dofs.len(), places.of(Slot::MassMatrix).start);
-            let all = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
-            all.map(|(i, j)| {
-                m.pattern
-                    .find(i, j)
-                    .map_or(ZERO, |place| first + place as u32)
-            })
-            .collect()
-        }
-        Field::SiteInverseJacobian => {
-            let (n, first) = (m.dofs.len(), places.of(Slot::SiteInverse).start);
-            let mut all = vec![ZERO; m.sites.len() * n * 6];
-            let columns = m.sites.iter().enumerate();
-            let columns =
-                columns.flat_map(|(k, site)| site.columns.iter().map(move |c| (k, c.dof)));
-            for (row, (k, dof)) in columns.enumerate() {
-                for i in 0..6 {
-                    all[6 * (k * n + dof) + i] = first + (6 * row + i) as u32;
-                }
-            }
-            all
-        }
-        _ => match slots_of(field) {
-            [one] if !is_of_contacts(field) => slot(*one),
-            _ => return None,
-        },
-    })
+/// Is it a field that is made of the lists of contacts?
+fn is_of_contacts(field: Field) -> bool {
+    matches!(field.row().source, Source::Contacts(_))
 }
 
-/// What is copied of every world.
+/// Where the elements of a field's row come from; none for counters and contacts.
+fn sources(
+    m: &Constants<f32>,
+    places: &Places,
+    field: Field,
+    elements: usize,
+) -> Option<Range<u32>> {
+    match field.row().source {
+        // the accelerations of the state that is shown
+        Source::Array(Array::JointQdd) => {
+            Some(places.shown_qdd..places.shown_qdd + m.dofs.len() as u32)
+        }
+        Source::Array(array) => Some(places.of(array)),
+        Source::Computed(_) => {
+            let first = places.computed(field);
+            Some(first..first + elements as u32)
+        }
+        Source::Contacts(_) | Source::Counter => None,
+    }
+}
+
+/// What is copied of every world: a field's scalars lie side by side, here and there.
 pub(super) fn runs(m: &Constants<f32>, places: &Places, layout: &Layout) -> Vec<Run> {
-    let mut runs: Vec<Run> = Vec::new();
+    let mut runs = Vec::new();
     for array in layout.slots.iter().filter(|array| array.bytes > 0) {
-        let Some(sources) = sources(m, places, array.field) else {
-            continue;
-        };
-        let (word, stride) = (array.offset as u32 / 4, sources.len() as u32);
-        let first = runs.len();
-        for (k, &from) in sources.iter().enumerate() {
-            let follows = |run: &Run| match run.from {
-                ZERO => from == ZERO,
-                start => from != ZERO && start + run.len == from,
-            };
-            match runs[first..].last_mut().filter(|run| follows(run)) {
-                Some(run) => run.len += 1,
-                None => runs.push(Run {
-                    from,
-                    to: word + k as u32,
-                    len: 1,
-                    stride,
-                }),
-            }
+        let elements = array.shape[1..].iter().product();
+        if let Some(from) = sources(m, places, array.field, elements) {
+            runs.push(Run {
+                from: from.start,
+                to: array.offset as u32 / 4,
+                len: from.end - from.start,
+                stride: elements as u32,
+            });
         }
     }
     runs
@@ -145,10 +94,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var r = 1u; r <= runs; r++) {
         let run = what[r];
         for (var k = 0u; k < run.z; k++) {
-            var x = 0u;
             let i = run.x + k;
-            if (run.x != 0xffffffffu) { x = fields[(i / 4u) * worlds + w][i % 4u]; }
-            frame[run.y + world * run.w + k] = x;
+            frame[run.y + world * run.w + k] = fields[(i / 4u) * worlds + w][i % 4u];
         }
     }
 }
@@ -248,7 +195,7 @@ pub(super) fn contacts(
     layout: &Layout,
     shapes: usize,
 ) -> Option<String> {
-    let arrays: Vec<&Array> = (layout.slots.iter())
+    let arrays: Vec<&Slot> = (layout.slots.iter())
         .filter(|array| is_of_contacts(array.field) && array.bytes > 0)
         .collect();
     if arrays.is_empty() {
@@ -296,7 +243,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
         );
     }
     for (k, class) in m.contacts.classes.iter().enumerate() {
-        let reference = places.of(Slot::Reference).start + 3 * class.trees.1 as u32;
+        let reference = places.of(Array::Reference).start + 3 * class.trees.1 as u32;
         let _ = write!(
             text,
             "    let end{k} = min(u32(kept({}u, w)), {}u);

@@ -6,9 +6,9 @@ use super::places::Places;
 use super::show::Run;
 use super::upkeep::WORKGROUP;
 use crate::backend::BackendError;
-use crate::backend::state::StateField;
 use sim_device::{Batch, BatchBuilder, Buffer, Device, Program, Replay, Staging};
 use sim_model::SensedShapes;
+use sim_physics::arrays::Array;
 use sim_physics::arrays::Field;
 use sim_physics::constants::Constants;
 use sim_record::split::Part;
@@ -62,7 +62,7 @@ pub(super) enum Rows {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Command(usize);
 
-const COMMANDS: [StateField; 3] = [StateField::F, StateField::TargetQ, StateField::TargetQd];
+const COMMANDS: [Array; 3] = [Array::JointF, Array::JointTargetQ, Array::JointTargetQd];
 
 /// The command that a field is.
 pub(super) fn command(field: Field) -> Option<Command> {
@@ -171,7 +171,7 @@ impl Tile {
             let dofs = m.dofs.len() as u64;
             let rows = device.staging("commands", bytes(dofs))?;
             let what = device.staging("what commands are", 16)?;
-            let head = [worlds.len() as u32, dofs as u32, places.group(group), 0];
+            let head = [worlds.len() as u32, dofs as u32, places.of(group).start, 0];
             what.write().copy_from_slice(bytemuck::cast_slice(&head));
             let mut batch = device.batch(compiled.replay);
             placed(&mut batch, &compiled.rows, &fields, &rows, &what, width);

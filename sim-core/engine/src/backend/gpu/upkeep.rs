@@ -4,8 +4,7 @@
 //! number. The CPU does the same in `backend/cpu/trouble.rs` and `delay.rs`.
 
 use super::places::Places;
-use crate::backend::state::StateField;
-use sim_physics::arrays::{WorkSlot as Slot, status};
+use sim_physics::arrays::{Array, status};
 use sim_physics::constants::Constants;
 use std::fmt::Write;
 use std::ops::Range;
@@ -46,7 +45,7 @@ pub(super) fn begin(places: &Places, saves: bool) -> String {
             "    for (var q = 0u; q < {quads}u; q++) {{ fields[({before}u + q) * worlds + w] = fields[q * worlds + w]; }}"
         );
     }
-    for slot in [Slot::Unconverged, Slot::LeftOut, Slot::Substep] {
+    for slot in [Array::Unconverged, Array::LeftOut, Array::Substep] {
         clear(&mut text, places.of(slot));
     }
     text + "}\n"
@@ -56,7 +55,7 @@ pub(super) fn begin(places: &Places, saves: bool) -> String {
 pub(super) fn note(places: &Places, m: &Constants<f32>) -> String {
     let mut text = HEAD.to_owned();
     text += "    var lost = false;\n    var outside = false;\n";
-    for (slot, bound) in [(Slot::JointQ, 0), (Slot::JointQd, 1)] {
+    for (slot, bound) in [(Array::JointQ, 0), (Array::JointQd, 1)] {
         let Range { start, end } = places.of(slot);
         let _ = write!(
             text,
@@ -68,7 +67,7 @@ pub(super) fn note(places: &Places, m: &Constants<f32>) -> String {
 "
         );
     }
-    let q = places.of(Slot::JointQ).start;
+    let q = places.of(Array::JointQ).start;
     for first in m.quaternions() {
         let part = |k: usize| format!("bitcast<f32>(number({}u, w))", q + (first + k) as u32);
         // a turn beyond all numbers leaves a quaternion of zeros
@@ -84,7 +83,7 @@ pub(super) fn note(places: &Places, m: &Constants<f32>) -> String {
     }
     let (not_finite, bounds, frozen) = (status::NOT_FINITE, status::OUT_OF_BOUNDS, status::FROZEN);
     let converged = status::NOT_CONVERGED;
-    let unconverged = places.of(Slot::Unconverged).start;
+    let unconverged = places.of(Array::Unconverged).start;
     let (quads, before) = (places.moving / 4, places.before / 4);
     let _ = write!(
         text,
@@ -104,7 +103,7 @@ pub(super) fn note(places: &Places, m: &Constants<f32>) -> String {
 "
     );
     // what is evaluated is a function of the state: the noise of the next frame is not drawn yet
-    clear(&mut text, places.of(Slot::CommandNoise));
+    clear(&mut text, places.of(Array::CommandNoise));
     age(&mut text, places, m);
     text + "}\n"
 }
@@ -114,7 +113,7 @@ fn age(text: &mut String, places: &Places, m: &Constants<f32>) {
     if m.delay.frames == 0 {
         return;
     }
-    let history = places.of(Slot::CommandHistory);
+    let history = places.of(Array::CommandHistory);
     let dofs = m.dofs.len() as u32;
     let frozen = status::FROZEN;
     let _ = write!(
@@ -126,7 +125,7 @@ fn age(text: &mut String, places: &Places, m: &Constants<f32>) {
         second = history.start + 3 * dofs,
         frame = 3 * dofs,
     );
-    for (k, group) in [StateField::F, StateField::TargetQ, StateField::TargetQd]
+    for (k, group) in [Array::JointF, Array::JointTargetQ, Array::JointTargetQd]
         .into_iter()
         .enumerate()
     {
@@ -134,17 +133,17 @@ fn age(text: &mut String, places: &Places, m: &Constants<f32>) {
             text,
             "        for (var i = 0u; i < {dofs}u; i++) {{ put({}u + i, w, number({}u + i, w)); }}",
             history.start + k as u32 * dofs,
-            places.group(group),
+            places.of(group).start,
         );
     }
     *text += "    }\n";
-    clear(text, places.of(Slot::Substep));
+    clear(text, places.of(Array::Substep));
 }
 
 /// After contacts were looked for, in steps or for output: how many did not fit.
 pub(super) fn count_left_out(places: &Places) -> String {
     let (frozen, bit) = (status::FROZEN, status::CONTACTS_LEFT_OUT);
-    let left_out = places.of(Slot::LeftOut).start;
+    let left_out = places.of(Array::LeftOut).start;
     format!(
         "{HEAD}    var count = counters[w];
     let stays = (count.z & {frozen}u) != 0u;

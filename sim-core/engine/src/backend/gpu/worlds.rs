@@ -2,8 +2,9 @@
 
 use super::tile::Rows;
 use super::{Gpu, host};
-use crate::backend::state::{Shape, StateField};
+use crate::backend::state::{Shape, array_of};
 use crate::backend::{BackendError, COUNTERS, Values};
+use sim_physics::arrays::Array;
 use std::ops::Range;
 
 impl Gpu {
@@ -23,7 +24,7 @@ impl Gpu {
 
     /// Begins the episodes of these worlds, which the host has counted already.
     pub(super) fn begin(&mut self, worlds: &[usize]) -> Result<(), BackendError> {
-        let params = self.shape().start(StateField::Params);
+        let params = self.shape().start(Array::Params);
         let starts = self.constants.varying.starts().to_vec();
         let mut records = Vec::with_capacity(worlds.len());
         for &world in worlds {
@@ -40,7 +41,7 @@ impl Gpu {
             }
             self.draw
                 .draw(seed, number, episode, |field, column, value| {
-                    record[shape.start(StateField::of(field)) + column] = value as f32;
+                    record[shape.start(array_of(field)) + column] = value as f32;
                 });
             let own = self.host.params_mut(world);
             self.draw.draw_params(seed, number, episode, |k, value| {
@@ -110,7 +111,7 @@ impl Gpu {
 
     pub(super) fn write_columns(
         &mut self,
-        target: StateField,
+        target: Array,
         columns: &Range<usize>,
         values: Values<'_>,
         mask: Option<&[bool]>,
@@ -121,7 +122,7 @@ impl Gpu {
         }
         let worlds = self.meant(mask);
         let quaternions: Vec<usize> = match target {
-            StateField::Q => self
+            Array::JointQ => self
                 .constants
                 .quaternions()
                 .filter(|q| columns.contains(q))
@@ -132,7 +133,7 @@ impl Gpu {
             Values::F32(v) => v[world * n + k],
             Values::F64(v) => v[world * n + k] as f32,
         };
-        let first = self.places.group(target) + columns.start as u32;
+        let first = self.places.of(target).start + columns.start as u32;
         self.send(&worlds, Rows::Fields, first, n as u32, |j, to| {
             let mut row: Vec<f32> = (0..n).map(|k| value(worlds[j], k)).collect();
             for quaternion in &quaternions {
@@ -143,19 +144,19 @@ impl Gpu {
             }
         })?;
         match target {
-            StateField::Params => {
+            Array::Params => {
                 for &world in &worlds {
                     for k in 0..n {
                         self.host.params_mut(world)[columns.start + k] = value(world, k);
                     }
                 }
             }
-            StateField::Q | StateField::Qd => {
-                let qdd = self.places.group(StateField::Qdd);
+            Array::JointQ | Array::JointQd => {
+                let qdd = self.places.of(Array::JointQdd).start;
                 let dofs = self.shape().dofs as u32;
                 self.send(&worlds, Rows::Fields, qdd, dofs, |_, to| to.fill(0))?;
-                if target == StateField::Q {
-                    let rest = self.places.group(StateField::QRest) + columns.start as u32;
+                if target == Array::JointQ {
+                    let rest = self.places.of(Array::JointQRest).start + columns.start as u32;
                     self.send(&worlds, Rows::Fields, rest, n as u32, |_, to| to.fill(0))?;
                 }
             }
@@ -199,7 +200,7 @@ impl Gpu {
     ) -> Result<(), BackendError> {
         self.flush()?;
         let size = COUNTERS + 4 * self.shape().total();
-        let params = self.shape().start(StateField::Params);
+        let params = self.shape().start(Array::Params);
         let worlds = self.meant(mask);
         let mut states = Vec::with_capacity(worlds.len());
         let mut counts = Vec::with_capacity(worlds.len());

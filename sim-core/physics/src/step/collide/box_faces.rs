@@ -4,7 +4,7 @@ use super::boxes::Axis;
 use super::choose::{reciprocal, select, sign, steepest, turned, turned_numbers};
 use super::points::{Placed, Points};
 use crate::lane::{Cx, MaskOf, Num, Real};
-use crate::math::vec3::{Mat3, Vec3, scale, scale_add};
+use crate::math::vec3::{Mat3, Vec3};
 
 /// The reference rectangle is larger by this, relatively, in roundings, so that equal faces keep their corners.
 const INCLUSIVE: f64 = 16.0;
@@ -44,7 +44,7 @@ pub fn view<F: Num>(
         }
     }
     let [in_a, in_b] = best.center;
-    let t = select(of_b, [-in_b[0], -in_b[1], -in_b[2]], in_a);
+    let t = select(of_b, Vec3([-in_b[0], -in_b[1], -in_b[2]]), in_a);
     let half = select(of_b, half_b, half_a);
     let other = select(of_b, half_a, half_b);
     let axes = [
@@ -52,33 +52,36 @@ pub fn view<F: Num>(
         select(of_b, b.axes[1], axes_a[1]),
         select(of_b, b.axes[2], axes_a[2]),
     ];
-    let base = select(of_b, b.center, [F::c(0.0); 3]);
+    let base = select(of_b, b.center, Vec3([F::c(0.0); 3]));
 
-    let [n, u, v] = turned(e, k);
-    let [tn, tu, tv] = turned_numbers(e, t);
-    let [hn, hu, hv] = turned_numbers(e, half);
-    let [an, au, av] = turned(e, axes);
+    let Mat3([n, u, v]) = turned(e, k);
+    let Vec3([tn, tu, tv]) = turned_numbers(e, t);
+    let Vec3([hn, hu, hv]) = turned_numbers(e, half);
+    let Mat3([an, au, av]) = turned(e, Mat3(axes));
     let side = sign(tn);
-    let outwards = scale(an, side);
+    let outwards = an * side;
 
     let f = steepest(n);
-    let [u0, u1, u2] = turned_numbers(f, u);
-    let [v0, v1, v2] = turned_numbers(f, v);
-    let [n0, n1, n2] = turned_numbers(f, scale(n, side));
-    let [g0, g1, g2] = turned_numbers(f, other);
+    let Vec3([u0, u1, u2]) = turned_numbers(f, u);
+    let Vec3([v0, v1, v2]) = turned_numbers(f, v);
+    let Vec3([n0, n1, n2]) = turned_numbers(f, n * side);
+    let Vec3([g0, g1, g2]) = turned_numbers(f, other);
     let down = sign(n0) * g0;
     View {
         sides: [hu, hv],
-        middle: [
+        middle: Vec3([
             down.fnma(u0, tu),
             down.fnma(v0, tv),
             down.fnma(n0, tn * side) - hn,
+        ]),
+        edges: [
+            Vec3([u1 * g1, v1 * g1, n1 * g1]),
+            Vec3([u2 * g2, v2 * g2, n2 * g2]),
         ],
-        edges: [[u1 * g1, v1 * g1, n1 * g1], [u2 * g2, v2 * g2, n2 * g2]],
-        origin: scale_add(outwards, hn, base),
+        origin: outwards.scale_add(hn, base),
         axes: [au, av],
         outwards,
-        normal: scale(outwards, F::select(of_b, F::c(-1.0), F::c(1.0))),
+        normal: (outwards * F::select(of_b, F::c(-1.0), F::c(1.0))),
     }
 }
 
@@ -100,7 +103,7 @@ pub fn cut<C: Cx>(cx: &mut C, view: &View<C::F>, margin: C::F, out: &mut Points<
         let (x, y) = (reciprocal(run[0]), reciprocal(run[1]));
         let (wx, wy) = (wide_u * x.abs(), wide_v * y.abs());
         for s in [-1.0, 1.0] {
-            let start = scale_add(across, c(s), middle);
+            let start = across.scale_add(c(s), middle);
             let (at_x, at_y) = (start[0] * x, start[1] * y);
             let low = (-at_x - wx).max(-at_y - wy).max(-one);
             let high = (wx - at_x).min(wy - at_y).min(one);
@@ -110,8 +113,8 @@ pub fn cut<C: Cx>(cx: &mut C, view: &View<C::F>, margin: C::F, out: &mut Points<
                 true => (low, high, high.lt(one)),
                 false => (high, low, (-one).lt(low)),
             };
-            let is_cut = C::F::and(inside, is_cut);
-            let (enter, leave) = (scale_add(run, enter, start), scale_add(run, leave, start));
+            let is_cut = inside & is_cut;
+            let (enter, leave) = (run.scale_add(enter, start), run.scale_add(leave, start));
             point(cx, view, inside, enter, margin, &mut least, out);
             point(cx, view, is_cut, leave, margin, &mut least, out);
         }
@@ -121,9 +124,17 @@ pub fn cut<C: Cx>(cx: &mut C, view: &View<C::F>, margin: C::F, out: &mut Points<
         let (dx, dy) = (x - middle[0], y - middle[1]);
         let along1 = dy.fnma(e2[0], dx * e2[1]) * inverse;
         let along2 = dx.fnma(e1[1], dy * e1[0]) * inverse;
-        let inside = C::F::and(along1.abs().lt(interior), along2.abs().lt(interior));
+        let inside = along1.abs().lt(interior) & along2.abs().lt(interior);
         let height = along1.fma(e1[2], along2.fma(e2[2], middle[2]));
-        point(cx, view, inside, [x, y, height], margin, &mut least, out);
+        point(
+            cx,
+            view,
+            inside,
+            Vec3([x, y, height]),
+            margin,
+            &mut least,
+            out,
+        );
     }
     least
 }
@@ -139,9 +150,9 @@ fn point<C: Cx>(
     least: &mut C::F,
     out: &mut Points<C>,
 ) {
-    let mask = C::F::and(mask, at[2].lt(margin));
+    let mask = mask & at[2].lt(margin);
     *least = C::F::select(mask, least.min(at[2]), *least);
-    let up = scale_add(view.outwards, at[2] * C::F::c(0.5), view.origin);
-    let position = scale_add(view.axes[0], at[0], scale_add(view.axes[1], at[1], up));
+    let up = view.outwards.scale_add(at[2] * C::F::c(0.5), view.origin);
+    let position = view.axes[0].scale_add(at[0], view.axes[1].scale_add(at[1], up));
     out.add(cx, mask, position, at[2], view.normal);
 }

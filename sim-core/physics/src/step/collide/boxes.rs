@@ -10,9 +10,7 @@ use super::box_faces::{cut, view};
 use super::choose::{clamped, one_of, one_of_numbers, select, sign, transposed, unless};
 use super::points::{Placed, Points};
 use crate::lane::{Cx, Num, Real};
-use crate::math::vec3::{
-    Mat3, Vec3, add, dot, scale, scale_add, sub, transform, transform_add, transform_back,
-};
+use crate::math::vec3::{Mat3, Vec3};
 use crate::{times, when};
 
 /// How much the separation along a face of B must exceed that along the faces of A, in roundings of the boxes' size, so
@@ -71,14 +69,14 @@ pub fn box_box<C: Cx>(
 ) {
     let c = C::F::c;
     let faces = faces(axes_a, half_a, b, half_b);
-    when!(cx, C::F::not(margin.lt(faces.separation)), {
+    when!(cx, !margin.lt(faces.separation), {
         let edge = edge(&faces, half_a, half_b);
         // separation over √square against the margin
         let far = (margin * margin * edge.square).lt(edge.score);
-        when!(cx, C::F::not(far), {
+        when!(cx, !far, {
             let best = best(&faces, &edge, half_a, half_b);
             let mut least = cx.var(c(1e9));
-            when!(cx, C::F::not(best.edge), {
+            when!(cx, !best.edge, {
                 let view = view(&best, axes_a, half_a, b, half_b);
                 let nearest = cut(cx, &view, margin, out);
                 cx.set(&mut least, nearest);
@@ -90,7 +88,7 @@ pub fn box_box<C: Cx>(
             // what rounding may leave between the separation and the point that attains it
             let noise = c(16.0 * <C::F as Num>::Real::EPSILON) * size(half_a, half_b);
             let reach = noise.fma(best.inverse, best.separation);
-            let apart = C::F::and(c(0.0).lt(best.separation), reach.lt(cx.get(&least)));
+            let apart = c(0.0).lt(best.separation) & reach.lt(cx.get(&least));
             when!(cx, apart, {
                 let nearest = cx.get(&least).min(margin);
                 vertices(cx, axes_a, half_a, b, half_b, &best, nearest, out);
@@ -113,26 +111,27 @@ struct Faces<F> {
 #[inline(always)]
 fn faces<F: Num>(axes_a: &Mat3<F>, half_a: Vec3<F>, b: &Placed<F>, half_b: Vec3<F>) -> Faces<F> {
     let c = F::c;
-    let mut turn = [[c(0.0); 3]; 3];
+    let mut turn = Mat3::zero();
     let mut width = turn;
     for i in 0..3 {
         for j in 0..3 {
-            turn[i][j] = dot(axes_a[i], b.axes[j]);
+            turn[i][j] = axes_a[i].dot(b.axes[j]);
             width[i][j] = turn[i][j].abs();
         }
     }
-    let in_a = transform_back(axes_a, b.center);
-    let in_b = transform_back(&b.axes, b.center);
+    let in_a = axes_a.transpose_mul(b.center);
+    let in_b = b.axes.transpose_mul(b.center);
     let (mut first, mut code) = (c(-1e9), c(0.0));
     for i in 0..3 {
-        let x = in_a[i].abs() - half_a[i] - dot(half_b, width[i]);
+        let x = in_a[i].abs() - half_a[i] - half_b.dot(Vec3(width[i].0));
         let better = first.lt(x);
         first = F::select(better, x, first);
         code = F::select(better, c(i as f64), code);
     }
     let (mut second, mut code_b) = (c(-1e9), c(0.0));
     for j in 0..3 {
-        let x = in_b[j].abs() - half_b[j] - dot(half_a, [width[0][j], width[1][j], width[2][j]]);
+        let x =
+            in_b[j].abs() - half_b[j] - half_a.dot(Vec3([width[0][j], width[1][j], width[2][j]]));
         let better = second.lt(x);
         second = F::select(better, x, second);
         code_b = F::select(better, c(3.0 + j as f64), code_b);
@@ -176,7 +175,7 @@ fn edge<F: Num>(faces: &Faces<F>, half_a: Vec3<F>, half_b: Vec3<F>) -> Edge<F> {
             let of_b = half_b[j1].fma(width[i][j2], half_b[j2].fma(width[i][j1], of_a));
             let x = between - of_b;
             let here = x * x.abs();
-            let better = F::and(c(PARALLEL).lt(l), (score * l).lt(here * square));
+            let better = c(PARALLEL).lt(l) & (score * l).lt(here * square);
             score = F::select(better, here, score);
             square = F::select(better, l, square);
             code = F::select(better, c((3 * i + j) as f64), code);
@@ -210,17 +209,17 @@ fn best<F: Num>(faces: &Faces<F>, edge: &Edge<F>, half_a: Vec3<F>, half_b: Vec3<
     let column = one_of(pair[1], columns);
     let product = one_of(
         first,
-        [
-            [c(0.0), -column[2], column[1]],
-            [column[2], c(0.0), -column[0]],
-            [-column[1], column[0], c(0.0)],
-        ],
+        Mat3([
+            Vec3([c(0.0), -column[2], column[1]]),
+            Vec3([column[2], c(0.0), -column[0]]),
+            Vec3([-column[1], column[0], c(0.0)]),
+        ]),
     );
-    let product = scale(product, inverse * sign(dot(product, faces.center[0])));
+    let product = product * (inverse * sign(product.dot(faces.center[0])));
     let of_b = c(2.5).lt(faces.code);
     let number = faces.code - F::select(of_b, c(3.0), c(0.0));
     let facing = one_of(number, columns);
-    let along_face = F::select(of_b, dot(product, facing), one_of_numbers(number, product));
+    let along_face = F::select(of_b, product.dot(facing), one_of_numbers(number, product));
     // the other box's axes along the face axis
     let theirs = select(of_b, facing, one_of(number, turn));
     let parallel = theirs[0].abs().max(theirs[1].abs()).max(theirs[2].abs());
@@ -228,8 +227,8 @@ fn best<F: Num>(faces: &Faces<F>, edge: &Edge<F>, half_a: Vec3<F>, half_b: Vec3<
     let little = (separation - faces.separation).lt(faces.separation.abs() * c(FLAT_GAIN));
     let close = faces.separation.lt(size(half_a, half_b) * c(FLAT_APART));
     let found = c(-0.5).lt(edge.code);
-    let is_flat = F::and(F::and(found, close), F::and(flat, little));
-    let is_edge = F::and(found, F::not(is_flat));
+    let is_flat = found & close & (flat & little);
+    let is_edge = found & !is_flat;
     // faces that are kept so are not taken for apart: their points stand
     let face = F::select(is_flat, c(0.0), faces.separation);
     Axis {
@@ -262,7 +261,7 @@ fn edges<C: Cx>(
     let q = &best.turn;
     let normal = best.product;
     let columns = transposed(q);
-    let normal_b = transform_back(&columns, normal);
+    let normal_b = columns.transpose_mul(normal);
     // middles of the edges, in the axes of A
     let mut a = [c(0.0); 3];
     let mut other = a;
@@ -270,31 +269,28 @@ fn edges<C: Cx>(
         a[k] = unless(best.pair[0], k, sign(normal[k]) * half_a[k]);
         other[k] = unless(best.pair[1], k, -(sign(normal_b[k]) * half_b[k]));
     }
-    let apart = sub(transform_add(&columns, other, best.center[0]), a);
-    let distance = dot(apart, normal);
+    let apart = columns.mul_add(Vec3(other), best.center[0]) - Vec3(a);
+    let distance = apart.dot(normal);
     // a + x aᵢ and apart + y bⱼ: the shortest way between the lines
     let run = one_of(best.pair[1], columns);
     let along_a = one_of_numbers(best.pair[0], apart);
-    let along_b = dot(apart, run);
+    let along_b = apart.dot(run);
     let cosine = one_of_numbers(best.pair[0], run);
     let factor = best.inverse * best.inverse;
     let x = cosine.fnma(along_b, along_a) * factor;
     let y = cosine.fma(along_a, -along_b) * factor;
     let long_a = one_of_numbers(best.pair[0], half_a);
     let long_b = one_of_numbers(best.pair[1], half_b);
-    let over = C::F::or(long_a.lt(x.abs()), long_b.lt(y.abs()));
+    let over = long_a.lt(x.abs()) | long_b.lt(y.abs());
     let (x, y) = (x.min(long_a).max(-long_a), y.min(long_b).max(-long_b));
     let first = one_of(best.pair[0], *axes_a);
     let second = one_of(best.pair[1], b.axes);
-    let on_a = scale_add(first, x, transform(axes_a, a));
-    let on_b = scale_add(second, y, transform_add(&b.axes, other, b.center));
-    let at = scale(add(on_a, on_b), c(0.5));
+    let on_a = first.scale_add(x, axes_a * Vec3(a));
+    let on_b = second.scale_add(y, b.axes.mul_add(Vec3(other), b.center));
+    let at = (on_a + on_b) * c(0.5);
     // past an end the lines do not meet: then something else is nearest, unless the boxes overlap
-    let found = C::F::and(
-        distance.lt(margin),
-        C::F::not(C::F::and(over, c(0.0).lt(distance))),
-    );
-    out.add(cx, found, at, distance, transform(axes_a, normal));
+    let found = distance.lt(margin) & !(over & c(0.0).lt(distance));
+    out.add(cx, found, at, distance, axes_a * normal);
     C::F::select(found, distance, c(1e9))
 }
 
@@ -329,20 +325,20 @@ fn vertices<C: Cx>(
             let (half, box_half) = if of_b { (half_b, half_a) } else { (half_a, half_b) };
             let local = [corner[0] * half[0], corner[1] * half[1], corner[2] * half[2]];
             let vertex = match of_b {
-                true => transform_add(&into_a, local, in_a),
-                false => sub(transform(&into_b, local), in_b),
+                true => into_a.mul_add(Vec3(local), in_a),
+                false => (into_b * Vec3(local)) - in_b,
             };
             let clamped = clamped(vertex, box_half);
-            let apart = sub(vertex, clamped);
-            let middle = scale_add(apart, c(0.5), clamped);
+            let apart = vertex - clamped;
+            let middle = apart.scale_add(c(0.5), clamped);
             let (middle, apart) = match of_b {
-                true => (transform(axes_a, middle), transform(axes_a, apart)),
+                true => (axes_a * middle, axes_a * apart),
                 false => (
-                    transform_add(&b.axes, middle, b.center),
-                    scale(transform(&b.axes, apart), c(-1.0)),
+                    b.axes.mul_add(middle, b.center),
+                    (b.axes * apart) * c(-1.0),
                 ),
             };
-            let new = dot(apart, apart);
+            let new = apart.dot(apart);
             let better = new.lt(cx.get(&square));
             let kept = C::F::select(better, new, cx.get(&square));
             cx.put(&mut square, kept);
@@ -354,14 +350,14 @@ fn vertices<C: Cx>(
             }
         }
     });
-    let mut at = [c(0.0); 3];
+    let mut at = Vec3::zero();
     let mut apart = at;
     for k in 0..3 {
         at[k] = cx.get(&middles[k]);
         apart[k] = cx.get(&between[k]);
     }
-    let distance = dot(apart, apart).sqrt();
-    let normal = scale(apart, c(1.0).div(distance));
+    let distance = apart.dot(apart).sqrt();
+    let normal = apart * c(1.0).div(distance);
     out.add(cx, c(0.0).lt(distance), at, distance, normal);
 }
 

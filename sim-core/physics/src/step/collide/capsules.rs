@@ -4,7 +4,7 @@ use super::choose::{clamped, one_of, one_of_numbers, reciprocal, select, sign, u
 use super::points::{Placed, Points};
 use super::spheres::{leave_box, sphere_off_box, spheres};
 use crate::lane::{Cx, MaskOf, Num, Real};
-use crate::math::vec3::{Mat3, Vec3, cross, dot, scale, scale_add, sub, transform_back};
+use crate::math::vec3::{Mat3, Vec3};
 use crate::when;
 
 /// Below this sine axes are parallel, or perpendicular to a normal: then two points are given, or one end rocks.
@@ -41,14 +41,14 @@ pub fn capsule_capsule<C: Cx>(
     let c = C::F::c;
     let one = c(1.0);
     let (a, d, center) = (axes_a[2], b.axes[2], b.center);
-    let (along_a, along_b) = (dot(a, center), dot(d, center));
-    let cosine = dot(a, d);
-    let product = cross(a, d);
-    let square = dot(product, product);
+    let (along_a, along_b) = (a.dot(center), d.dot(center));
+    let cosine = a.dot(d);
+    let product = a.cross(d);
+    let square = product.dot(product);
     let parallel = square.lt(c(PARALLEL * PARALLEL));
     let safe = C::F::select(c(1e-12).lt(square), square, one);
 
-    let free = dot(cross(center, d), product).div(safe);
+    let free = center.cross(d).dot(product).div(safe);
     let x = free.min(half_height_a).max(-half_height_a);
     let y = cosine
         .fma(x, -along_b)
@@ -58,16 +58,16 @@ pub fn capsule_capsule<C: Cx>(
         .fma(y, along_a)
         .min(half_height_a)
         .max(-half_height_a);
-    let nearest = [scale(a, x), scale_add(d, y, center)];
+    let nearest = [a * x, d.scale_add(y, center)];
 
     // the ends of what the axes have in common; where they have nothing, both are the nearest end
     let reach = half_height_b * cosine.abs();
     let low = (along_a - reach).max(-half_height_a).min(half_height_a);
     let high = (along_a + reach).min(half_height_a).max(-half_height_a);
-    let common = C::F::and(parallel, (low + c(SAME) * half_height_a).lt(high));
+    let common = parallel & (low + c(SAME) * half_height_a).lt(high);
     let beside = select(
         c(1e-12).lt(square),
-        scale(product, one.div(safe.sqrt())),
+        product * one.div(safe.sqrt()),
         axes_a[0],
     );
     let mut least = c(1e9);
@@ -77,15 +77,15 @@ pub fn capsule_capsule<C: Cx>(
             .fma(at, -along_b)
             .min(half_height_b)
             .max(-half_height_b);
-        *end = [scale(a, at), scale_add(d, y, center)];
-        let between = sub(end[1], end[0]);
-        least = least.min(dot(between, between).sqrt());
+        *end = [a * at, d.scale_add(y, center)];
+        let between = end[1] - end[0];
+        least = least.min(between.dot(between).sqrt());
     }
     let size = radius_a + radius_b + half_height_a + half_height_b;
-    let between = sub(nearest[1], nearest[0]);
+    let between = nearest[1] - nearest[0];
     let middle =
-        (dot(between, between).sqrt() + size * c(NEARER * <C::F as Num>::Real::EPSILON)).lt(least);
-    let alone = C::F::or(C::F::not(common), middle);
+        (between.dot(between).sqrt() + size * c(NEARER * <C::F as Num>::Real::EPSILON)).lt(least);
+    let alone = !common | middle;
     when!(cx, alone, {
         let [p, q] = nearest;
         spheres(cx, p, radius_a, q, radius_b, beside, margin, out);
@@ -113,8 +113,8 @@ pub fn capsule_box<C: Cx>(
 ) {
     let c = C::F::c;
     let axis = Axis {
-        middle: scale(transform_back(&b.axes, b.center), c(-1.0)),
-        along: transform_back(&b.axes, axes_a[2]),
+        middle: (b.axes.transpose_mul(b.center) * c(-1.0)),
+        along: b.axes.transpose_mul(axes_a[2]),
         half_height,
         radius,
     };
@@ -123,11 +123,11 @@ pub fn capsule_box<C: Cx>(
     let (distance, way) = leave_box(axis.at(nearest), half);
     let inside = distance.lt(size * c(INSIDE));
     let touches = (distance - radius).lt(margin);
-    when!(cx, C::F::and(touches, C::F::not(inside)), {
+    when!(cx, touches & !inside, {
         let (low, high) = over(&axis, way, half);
         let close = half_height * c(SAME);
         let at_low = (nearest - low).abs().lt(close);
-        let at_high = C::F::and(C::F::not(at_low), (high - nearest).abs().lt(close));
+        let at_high = !at_low & (high - nearest).abs().lt(close);
         let low = C::F::select(at_low, nearest, low);
         let high = C::F::select(at_high, nearest, high);
         let two = (low + close).lt(high);
@@ -136,8 +136,8 @@ pub fn capsule_box<C: Cx>(
         let second = leave_box(axis.at(high), half).0;
         let nearer =
             (distance + size * c(NEARER * <C::F as Num>::Real::EPSILON)).lt(first.min(second));
-        let between = C::F::and(two, nearer);
-        let all = C::F::or(two, C::F::not(two));
+        let between = two & nearer;
+        let all = two | !two;
         sphere(cx, &axis, low, half, b, all, margin, out);
         sphere(cx, &axis, high, half, b, two, margin, out);
         sphere(cx, &axis, nearest, half, b, between, margin, out);
@@ -159,7 +159,7 @@ impl<F: Num> Axis<F> {
     /// The point at a height.
     #[inline(always)]
     fn at(&self, height: F) -> Vec3<F> {
-        scale_add(self.along, height, self.middle)
+        self.along.scale_add(height, self.middle)
     }
 }
 
@@ -180,10 +180,10 @@ fn nearest<F: Num>(axis: &Axis<F>, half: Vec3<F>) -> F {
             let height = ((face - axis.middle[k]) * inverse).min(highest).max(lowest);
             let here = slope(axis, height, half);
             let falls = here.lt(zero);
-            let up = F::and(falls, low.lt(height));
+            let up = falls & low.lt(height);
             low = F::select(up, height, low);
             below = F::select(up, here, below);
-            let down = F::and(F::not(falls), height.lt(high));
+            let down = !falls & height.lt(high);
             high = F::select(down, height, high);
             above = F::select(down, here, above);
         }
@@ -198,7 +198,7 @@ fn nearest<F: Num>(axis: &Axis<F>, half: Vec3<F>) -> F {
 #[inline(always)]
 fn slope<F: Num>(axis: &Axis<F>, height: F, half: Vec3<F>) -> F {
     let at = axis.at(height);
-    dot(axis.along, sub(at, clamped(at, half)))
+    axis.along.dot(at - clamped(at, half))
 }
 
 /// The part of the axis over the face or edge that a normal belongs to: between the planes of the faces beside it.
@@ -265,53 +265,53 @@ fn pierced<C: Cx>(
         let parallel = l.lt(c(PARALLEL_EDGE));
         let length = C::F::select(parallel, one, l).sqrt();
         let x = (x - noise).div(length);
-        let better = C::F::and(C::F::not(parallel), score.lt(x));
+        let better = !parallel & score.lt(x);
         score = C::F::select(better, x, score);
         square = C::F::select(better, l, square);
         across = C::F::select(better, c(k as f64), across);
     }
     let edge = c(-0.5).lt(across);
-    when!(cx, C::F::not(edge), {
+    when!(cx, !edge, {
         let side = sign(one_of_numbers(number, p));
-        let way = [
+        let way = Vec3([
             one_if(number, 0, side),
             one_if(number, 1, side),
             one_if(number, 2, side),
-        ];
+        ]);
         let (low, high) = over(axis, way, half);
         let two = (low + h * c(SAME)).lt(high);
         // of ends that close the deeper one
-        let falls = dot(way, d).lt(zero);
+        let falls = way.dot(d).lt(zero);
         let (low, high) = (
             C::F::select(falls, high, low),
             C::F::select(falls, low, high),
         );
-        for (height, mask) in [(low, C::F::or(two, C::F::not(two))), (high, two)] {
+        for (height, mask) in [(low, two | !two), (high, two)] {
             let at = axis.at(height);
-            let distance = dot(way, at) - one_of_numbers(number, half);
+            let distance = way.dot(at) - one_of_numbers(number, half);
             sphere_off_box(cx, axis.radius, at, distance, way, b, mask, margin, out);
         }
     });
     when!(cx, edge, {
         let product = one_of(
             across,
-            [
-                [zero, d[2], -d[1]],
-                [-d[2], zero, d[0]],
-                [d[1], -d[0], zero],
-            ],
+            Mat3([
+                Vec3([zero, d[2], -d[1]]),
+                Vec3([-d[2], zero, d[0]]),
+                Vec3([d[1], -d[0], zero]),
+            ]),
         );
-        let way = scale(product, sign(dot(product, p)).div(square.sqrt()));
-        let mut corner = [zero; 3];
+        let way = product * sign(product.dot(p)).div(square.sqrt());
+        let mut corner = Vec3::zero();
         let mut flat = corner;
         for k in 0..3 {
             corner[k] = unless(across, k, sign(way[k]) * half[k]);
             flat[k] = unless(across, k, d[k]);
         }
-        let to = dot(flat, sub(corner, p)).div(square);
+        let to = flat.dot(corner - p).div(square);
         let at = axis.at(to.min(h).max(-h));
-        let distance = dot(way, sub(at, corner));
-        let all = C::F::or(edge, C::F::not(edge));
+        let distance = way.dot(at - Vec3(corner.0));
+        let all = edge | !edge;
         sphere_off_box(cx, axis.radius, at, distance, way, b, all, margin, out);
     });
 }

@@ -9,21 +9,21 @@ const TINY: f64 = 1e-30;
 /// The nearest point of a box with those half extents.
 #[inline(always)]
 pub fn clamped<F: Num>(x: Vec3<F>, half: Vec3<F>) -> Vec3<F> {
-    [
+    Vec3([
         x[0].min(half[0]).max(-half[0]),
         x[1].min(half[1]).max(-half[1]),
         x[2].min(half[2]).max(-half[2]),
-    ]
+    ])
 }
 
 /// mᵀ
 #[inline(always)]
 pub fn transposed<F: Num>(m: &Mat3<F>) -> Mat3<F> {
-    [
-        [m[0][0], m[1][0], m[2][0]],
-        [m[0][1], m[1][1], m[2][1]],
-        [m[0][2], m[1][2], m[2][2]],
-    ]
+    Mat3([
+        Vec3([m[0][0], m[1][0], m[2][0]]),
+        Vec3([m[0][1], m[1][1], m[2][1]]),
+        Vec3([m[0][2], m[1][2], m[2][2]]),
+    ])
 }
 
 /// -1 where x < 0, else 1.
@@ -35,11 +35,11 @@ pub fn sign<F: Num>(x: F) -> F {
 /// `a` where the mask holds, else `b`.
 #[inline(always)]
 pub fn select<F: Num>(mask: F::Mask, a: Vec3<F>, b: Vec3<F>) -> Vec3<F> {
-    [
+    Vec3([
         F::select(mask, a[0], b[0]),
         F::select(mask, a[1], b[1]),
         F::select(mask, a[2], b[2]),
-    ]
+    ])
 }
 
 /// The axis along which a vector is longest, as a number.
@@ -75,17 +75,20 @@ pub fn unless<F: Num>(number: F, k: usize, x: F) -> F {
 /// Three vectors turned round until that of a number is first.
 #[inline(always)]
 pub fn turned<F: Num>(number: F, of: Mat3<F>) -> Mat3<F> {
-    [
+    Mat3([
         one_of(number, of),
-        one_of(number, [of[1], of[2], of[0]]),
-        one_of(number, [of[2], of[0], of[1]]),
-    ]
+        one_of(number, Mat3([of[1], of[2], of[0]])),
+        one_of(number, Mat3([of[2], of[0], of[1]])),
+    ])
 }
 
 /// Three numbers turned round until that of a number is first.
 #[inline(always)]
 pub fn turned_numbers<F: Num>(number: F, of: Vec3<F>) -> Vec3<F> {
-    one_of(number, [of, [of[1], of[2], of[0]], [of[2], of[0], of[1]]])
+    one_of(
+        number,
+        Mat3([of, Vec3([of[1], of[2], of[0]]), Vec3([of[2], of[0], of[1]])]),
+    )
 }
 
 /// The least of three numbers, and which it is.

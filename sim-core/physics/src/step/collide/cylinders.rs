@@ -16,7 +16,7 @@ use super::support::{Block, Cylinder, Polyhedron, Segment, Upright, negated, sig
 use crate::constants::clip::Cut;
 use crate::constants::hull::HullTables;
 use crate::lane::{Cx, Num};
-use crate::math::vec3::{Mat3, Vec3, cross, dot, scale, scale_add, transform, transform_back};
+use crate::math::vec3::{Mat3, Vec3};
 use crate::when;
 
 /// Segments turned to each other less than this lie along each other [–]: 1.8°.
@@ -38,7 +38,7 @@ pub fn sphere_cylinder<C: Cx>(
 ) {
     let c = C::F::c;
     let (zero, one) = (c(0.0), c(1.0));
-    let [x, y, z] = negated(transform_back(&b.axes, b.center));
+    let Vec3([x, y, z]) = negated(b.axes.transpose_mul(b.center));
     let width = x.fma(x, y * y).sqrt();
     // on the axis any direction across it is as good
     let on_axis = width.lt(c(1e-12));
@@ -59,9 +59,9 @@ pub fn sphere_cylinder<C: Cx>(
     );
     let core = C::F::select(outside, length, beside.max(above));
     let normal = [-(rx * radial), -(ry * radial), signed(-axial, z)];
-    let normal = transform(&b.axes, normal);
+    let normal = b.axes * Vec3(normal);
     let distance = core - radius;
-    let point = scale(normal, (radius + core) * c(0.5));
+    let point = normal * ((radius + core) * c(0.5));
     out.add(cx, distance.lt(margin), point, distance, normal);
 }
 
@@ -82,7 +82,7 @@ pub fn capsule_cylinder<C: Cx>(
 ) {
     let c = C::F::c;
     let (axes, center) = in_frame_of(b, axes_a);
-    let half = scale(axes[2], half_height);
+    let half = axes[2] * half_height;
     let pair = Rough {
         axes: &axes,
         center,
@@ -90,15 +90,15 @@ pub fn capsule_cylinder<C: Cx>(
         b: &CylinderReach(radius_b, half_height_b),
     };
     let mut start = pair.along(unit_z());
-    start = better(start, pair.along(cross(axes[2], unit_z())), c(0.0));
+    start = better(start, pair.along(axes[2].cross(unit_z())), c(0.0));
     start = better(
         start,
-        pair.along(beside(scale_add(half, c(-1.0), center))),
+        pair.along(beside(half.scale_add(c(-1.0), center))),
         c(0.0),
     );
     start = better(
         start,
-        pair.along(beside(scale_add(half, c(1.0), center))),
+        pair.along(beside(half.scale_add(c(1.0), center))),
         c(0.0),
     );
     start = better(start, pair.along(beside(center)), c(0.0));
@@ -119,16 +119,16 @@ pub fn capsule_cylinder<C: Cx>(
         .near();
         let near = Near {
             distance: core.distance - radius,
-            point: scale_add(core.normal, radius * c(0.5), core.point),
+            point: core.normal.scale_add(radius * c(0.5), core.point),
             ..core
         };
         when!(cx, near.distance.lt(margin), {
             let n = near.normal;
-            let side = SegmentSide::new(scale_add(n, radius, center), half, n);
+            let side = SegmentSide::new(n.scale_add(radius, center), half, n);
             let other =
                 CylinderSide::find(&unit_axes(), radius_b, half_height_b, zero3(), negated(n));
-            let along = C::F::and(C::F::not(other.cap), c(PARALLEL).lt(axes[2][2].abs()));
-            let flat = C::F::or(other.flat(n), along);
+            let along = !other.cap & c(PARALLEL).lt(axes[2][2].abs());
+            let flat = other.flat(n) | along;
             let size = (radius + half_height).min(around(radius_b, half_height_b));
             add_points(
                 cx,
@@ -173,19 +173,22 @@ pub fn box_cylinder<C: Cx>(
     let mut start = pair.along(unit_z());
     for j in 0..3 {
         start = better(start, pair.along(axes[j]), c(0.0));
-        start = better(start, pair.along(cross(axes[j], unit_z())), c(0.0));
+        start = better(start, pair.along(axes[j].cross(unit_z())), c(0.0));
     }
     start = better(start, pair.along(beside(center)), c(0.0));
     start = better(start, pair.along(center), c(0.0));
     when!(cx, start.distance.lt(margin), {
         let half = [
-            scale(axes[0], half_a[0]),
-            scale(axes[1], half_a[1]),
-            scale(axes[2], half_a[2]),
+            axes[0] * half_a[0],
+            axes[1] * half_a[1],
+            axes[2] * half_a[2],
         ];
-        let block = Block { center, half };
+        let block = Block {
+            center,
+            half: Mat3(half),
+        };
         let cylinder = upright(radius_b, half_height_b);
-        let (size_a, size_b) = (dot(half_a, half_a).sqrt(), around(radius_b, half_height_b));
+        let (size_a, size_b) = (half_a.dot(half_a).sqrt(), around(radius_b, half_height_b));
         let near = closest(
             cx,
             &block,
@@ -201,7 +204,7 @@ pub fn box_cylinder<C: Cx>(
             let side =
                 CylinderSide::find(&unit_axes(), radius_b, half_height_b, zero3(), negated(n));
             let face = BoxSide::find(&axes, half_a, center, n);
-            let flat = C::F::or(side.flat(n), aligned(face.outward, n));
+            let flat = side.flat(n) | aligned(face.outward, n);
             let size = size_a.min(size_b);
             add_points(
                 cx,
@@ -246,9 +249,9 @@ pub fn cylinder_cylinder<C: Cx>(
     };
     let mut start = pair.along(unit_z());
     start = better(start, pair.along(axes[2]), c(0.0));
-    start = better(start, pair.along(cross(axes[2], unit_z())), c(0.0));
+    start = better(start, pair.along(axes[2].cross(unit_z())), c(0.0));
     start = better(start, pair.along(beside(center)), c(0.0));
-    let across_a = scale_add(axes[2], -dot(axes[2], center), center);
+    let across_a = axes[2].scale_add(-axes[2].dot(center), center);
     start = better(start, pair.along(across_a), c(0.0));
     start = better(start, pair.along(center), c(0.0));
     when!(cx, start.distance.lt(margin), {
@@ -278,11 +281,11 @@ pub fn cylinder_cylinder<C: Cx>(
             let side_a = CylinderSide::find(&axes, radius_a, half_height_a, center, n);
             let side_b =
                 CylinderSide::find(&unit_axes(), radius_b, half_height_b, zero3(), negated(n));
-            let lines = C::F::not(C::F::or(side_a.cap, side_b.cap));
-            let along = C::F::and(lines, c(PARALLEL).lt(axes[2][2].abs()));
-            let flat = C::F::or(along, C::F::or(side_a.flat(n), side_b.flat(n)));
+            let lines = !(side_a.cap | side_b.cap);
+            let along = lines & c(PARALLEL).lt(axes[2][2].abs());
+            let flat = along | (side_a.flat(n) | side_b.flat(n));
             // what is cut may be a line, what cuts it a line only beside another
-            let swap = C::F::and(side_a.cap, C::F::not(side_b.cap));
+            let swap = side_a.cap & !side_b.cap;
             let cut_one = CylinderSide::select(swap, &side_b, &side_a);
             let cutting = CylinderSide::select(swap, &side_a, &side_b);
             let which = C::F::select(swap, c(-1.0), c(1.0));
@@ -348,7 +351,7 @@ pub fn cylinder_hull<C: Cx>(
                 let n = near.normal;
                 let side = CylinderSide::find(&axes, radius, half_height, center, n);
                 let face = HullSide::find(cx, &hull, None, negated(n));
-                let flat = C::F::or(side.flat(n), aligned(face.outward, n));
+                let flat = side.flat(n) | aligned(face.outward, n);
                 let size = size_a.min(size_b);
                 add_points(
                     cx,
@@ -386,24 +389,28 @@ fn around<F: Num>(radius: F, half_height: F) -> F {
 
 #[inline(always)]
 fn zero3<F: Num>() -> Vec3<F> {
-    [F::c(0.0); 3]
+    Vec3([F::c(0.0); 3])
 }
 
 #[inline(always)]
 fn unit_z<F: Num>() -> Vec3<F> {
-    [F::c(0.0), F::c(0.0), F::c(1.0)]
+    Vec3([F::c(0.0), F::c(0.0), F::c(1.0)])
 }
 
 #[inline(always)]
 fn unit_axes<F: Num>() -> Mat3<F> {
     let (zero, one) = (F::c(0.0), F::c(1.0));
-    [[one, zero, zero], [zero, one, zero], [zero, zero, one]]
+    Mat3([
+        Vec3([one, zero, zero]),
+        Vec3([zero, one, zero]),
+        Vec3([zero, zero, one]),
+    ])
 }
 
 /// What of a vector is across z.
 #[inline(always)]
 fn beside<F: Num>(x: Vec3<F>) -> Vec3<F> {
-    [x[0], x[1], F::c(0.0)]
+    Vec3([x[0], x[1], F::c(0.0)])
 }
 
 /// Two shapes by their reaches: the first with these axes and centre, the second in its own frame.
@@ -430,11 +437,11 @@ impl<'a, F: Num, A: Reach<F>, B: Reach<F>> Rough<'a, F, A, B> {
     /// Their distance along a direction or against it; a vector without length is no axis.
     #[inline(always)]
     fn along(&self, d: Vec3<F>) -> Axis<F> {
-        let square = dot(d, d);
+        let square = d.dot(d);
         let unit = F::c(1.0).div(square.max(F::c(1e-16)).sqrt());
-        let height = dot(d, self.center);
-        let normal = scale(d, signed(-unit, height));
-        let reach = self.a.reach(transform_back(self.axes, normal)) + self.b.reach(normal);
+        let height = d.dot(self.center);
+        let normal = d * signed(-unit, height);
+        let reach = self.a.reach(self.axes.transpose_mul(normal)) + self.b.reach(normal);
         let distance = F::select(
             F::c(1e-14).lt(square),
             height.abs() * unit - reach,

@@ -10,7 +10,7 @@ use super::hull_axes::Axis;
 use super::manifold::Near;
 use super::support::{Support, difference, get3, set3, var3};
 use crate::lane::{Cx, Num, Real};
-use crate::math::vec3::{Vec3, add, cross, dot, scale, scale_add, sub};
+use crate::math::vec3::Vec3;
 use crate::{break_if, times, when};
 
 /// Another axis to start from, where the first leads to a depth that may not be the least.
@@ -99,40 +99,40 @@ pub(super) fn closest<C: Cx, R: Restart<C>>(
     let mut axis = var3(cx, start);
     let mut best = cx.var(c(-1e18));
     let mut normal = var3(cx, start);
-    let mut point = var3(cx, [zero; 3]);
+    let mut point = var3(cx, Vec3([zero; 3]));
     let mut restarts = cx.var(zero);
     let mut tried = var3(cx, start);
     times!(cx, stand_offs::<RealOf<C>>(), {
         let m = get3(cx, &axis);
         let (on_a, w) = difference(cx, a, b, m);
-        let before = dot(m, w);
+        let before = m.dot(w);
         let known = cx.get(&best);
         cx.set(&mut best, known.max(before));
         break_if!(cx, limit.lt(before));
         let shift = (gap - before).max(zero);
-        let away = scale(m, shift);
-        let found = apart(cx, a, b, m, away, on_a, add(w, away), size, limit + shift);
-        let after = found.distance - shift * dot(found.normal, m);
+        let away = m * shift;
+        let found = apart(cx, a, b, m, away, on_a, w + away, size, limit + shift);
+        let after = found.distance - shift * found.normal.dot(m);
         let gained = (before + settled_at).lt(after);
         let (x, n) = (
             C::F::select(gained, after, before),
             select(gained, found.normal, m),
         );
         // half-way between the closest points, B moved back
-        let middle = scale_add(sub(found.way, away), c(0.5), found.on_a);
-        let better = C::F::not(x.lt(cx.get(&best)));
+        let middle = (found.way - away).scale_add(c(0.5), found.on_a);
+        let better = !x.lt(cx.get(&best));
         let (kept_normal, kept_point) = (get3(cx, &normal), get3(cx, &point));
         let old = cx.get(&best);
         cx.set(&mut best, C::F::select(better, x, old));
         set3(cx, &mut normal, select(better, n, kept_normal));
         set3(cx, &mut point, select(better, middle, kept_point));
         set3(cx, &mut axis, n);
-        let settled = C::F::or(C::F::not(gained), C::F::or(gap.lt(before), limit.lt(x)));
+        let settled = !gained | (gap.lt(before) | limit.lt(x));
         if R::TRIES > 0 {
             let tries = cx.get(&restarts);
             let mut again = cx.var(zero);
-            let deep = C::F::and(x.lt(-restart.depth()), tries.lt(c(R::TRIES as f64 - 0.5)));
-            when!(cx, C::F::and(settled, deep), {
+            let deep = x.lt(-restart.depth()) & tries.lt(c(R::TRIES as f64 - 0.5));
+            when!(cx, settled & deep, {
                 let known = Axis {
                     normal: get3(cx, &normal),
                     distance: cx.get(&best) + settled_at,
@@ -148,7 +148,7 @@ pub(super) fn closest<C: Cx, R: Restart<C>>(
                     C::F::select(least.lt(other.distance), one, zero),
                 );
             });
-            let settled = C::F::and(settled, cx.get(&again).lt(c(0.5)));
+            let settled = settled & cx.get(&again).lt(c(0.5));
             break_if!(cx, settled);
         } else {
             break_if!(cx, settled);
@@ -197,26 +197,26 @@ fn apart<C: Cx>(
     // three corners of the simplex: differences, and points of A; their shares in the nearest point
     let mut corners = [var3(cx, w), var3(cx, w), var3(cx, w)];
     let mut points = [var3(cx, on_a), var3(cx, on_a), var3(cx, on_a)];
-    let mut shares = var3(cx, [one, zero, zero]);
+    let mut shares = var3(cx, Vec3([one, zero, zero]));
     let mut nearest = var3(cx, w);
     let mut normal = var3(cx, m);
-    let mut low = cx.var(dot(m, w));
+    let mut low = cx.var(m.dot(w));
     times!(cx, rounds::<RealOf<C>>(), {
         let v = get3(cx, &nearest);
-        let square = dot(v, v);
+        let square = v.dot(v);
         let length = square.sqrt();
         let (on_a, w) = difference(cx, a, b, v);
-        let w = add(w, away);
-        let along = dot(v, w);
+        let w = w + away;
+        let along = v.dot(w);
         let unit = one.div(length.max(c(1e-18)));
         let bound = along * unit;
         let old = cx.get(&low);
         let better = old.lt(bound);
         let kept = get3(cx, &normal);
         cx.set(&mut low, C::F::select(better, bound, old));
-        set3(cx, &mut normal, select(better, scale(v, unit), kept));
+        set3(cx, &mut normal, select(better, v * unit, kept));
         let done = (square - along).lt(tolerance.fma(square, noise * length));
-        let done = C::F::or(done, limit.lt(bound));
+        let done = done | limit.lt(bound);
         break_if!(cx, done);
 
         // the nearest point of the tetrahedron of the new corner and the three: on a corner, edge or face at the new one
@@ -230,16 +230,16 @@ fn apart<C: Cx>(
             get3(cx, &points[1]),
             get3(cx, &points[2]),
         ];
-        let e = [sub(o[0], w), sub(o[1], w), sub(o[2], w)];
-        let ew = [dot(e[0], w), dot(e[1], w), dot(e[2], w)];
-        let ee = [dot(e[0], e[0]), dot(e[1], e[1]), dot(e[2], e[2])];
+        let e = [o[0] - w, o[1] - w, o[2] - w];
+        let ew = [e[0].dot(w), e[1].dot(w), e[2].dot(w)];
+        let ee = [e[0].dot(e[0]), e[1].dot(e[1]), e[2].dot(e[2])];
         let (mut least, mut s_best, mut t_best) = (c(1e18), zero, zero);
         let mut foot = w;
         let (mut o1, mut o2, mut p1, mut p2) = (o[0], o[1], p[0], p[1]);
         for k in 0..3 {
             let t = (-ew[k]).div(ee[k].max(c(1e-30))).max(zero).min(one);
-            let x = scale_add(e[k], t, w);
-            let distance = dot(x, x);
+            let x = e[k].scale_add(t, w);
+            let distance = x.dot(x);
             let is = distance.lt(least);
             let l = (k + 1) % 3;
             least = C::F::select(is, distance, least);
@@ -249,28 +249,28 @@ fn apart<C: Cx>(
             (p1, p2) = (select(is, p[k], p1), select(is, p[l], p2));
         }
         // by cross products: of thin triangles, as many near points of a curved surface make, dots lose too much
-        let moment = [cross(e[0], w), cross(e[1], w), cross(e[2], w)];
+        let moment = [e[0].cross(w), e[1].cross(w), e[2].cross(w)];
         for k in 0..3 {
             let l = (k + 1) % 3;
-            let area = cross(e[k], e[l]);
-            let square = dot(area, area);
+            let area = e[k].cross(e[l]);
+            let square = area.dot(area);
             let inverse = one.div(square.max(c(1e-36)));
-            let s = dot(moment[l], area) * inverse;
-            let t = -(dot(moment[k], area) * inverse);
-            let height = dot(area, w);
+            let s = moment[l].dot(area) * inverse;
+            let t = -(moment[k].dot(area) * inverse);
+            let height = area.dot(w);
             let distance = height * height * inverse;
             let wide =
                 (ee[k] * ee[l] * c(1e4 * RealOf::<C>::EPSILON * RealOf::<C>::EPSILON)).lt(square);
-            let inside = C::F::and(C::F::and(zero.lt(s), zero.lt(t)), (s + t).lt(one));
-            let is = C::F::and(C::F::and(wide, inside), distance.lt(least));
+            let inside = zero.lt(s) & zero.lt(t) & (s + t).lt(one);
+            let is = wide & inside & distance.lt(least);
             least = C::F::select(is, distance, least);
-            foot = select(is, scale(area, height * inverse), foot);
+            foot = select(is, area * (height * inverse), foot);
             s_best = C::F::select(is, s, s_best);
             t_best = C::F::select(is, t, t_best);
             (o1, o2) = (select(is, o[k], o1), select(is, o[l], o2));
             (p1, p2) = (select(is, p[k], p1), select(is, p[l], p2));
         }
-        let stuck = C::F::not(least.lt(square));
+        let stuck = !least.lt(square);
         break_if!(cx, stuck);
         for (place, x) in [(0, w), (1, o1), (2, o2)] {
             set3(cx, &mut corners[place], x);
@@ -278,7 +278,11 @@ fn apart<C: Cx>(
         for (place, x) in [(0, on_a), (1, p1), (2, p2)] {
             set3(cx, &mut points[place], x);
         }
-        set3(cx, &mut shares, [one - s_best - t_best, s_best, t_best]);
+        set3(
+            cx,
+            &mut shares,
+            Vec3([one - s_best - t_best, s_best, t_best]),
+        );
         set3(cx, &mut nearest, foot);
     });
     let share = get3(cx, &shares);
@@ -290,7 +294,7 @@ fn apart<C: Cx>(
     Found {
         normal: get3(cx, &normal),
         distance: cx.get(&low),
-        on_a: scale_add(p0, share[0], scale_add(p1, share[1], scale(p2, share[2]))),
+        on_a: p0.scale_add(share[0], p1.scale_add(share[1], p2 * share[2])),
         way: get3(cx, &nearest),
     }
 }

@@ -8,7 +8,7 @@
 use super::choose::select;
 use super::support::{Polyhedron, four, get3, negated, put3, rounding, set3, signed, var3};
 use crate::lane::{Cx, Num};
-use crate::math::vec3::{Mat3, Vec3, add, cross, dot, scale, sub, transform_back};
+use crate::math::vec3::{Mat3, Vec3};
 use crate::{break_if, span, when};
 
 /// What a shape about its centre reaches along a direction in its own axes.
@@ -35,7 +35,7 @@ impl<F: Num> Reach<F> for BoxReach<F> {
     const EDGES: &'static [usize] = &[0, 1, 2];
     #[inline(always)]
     fn reach(&self, d: Vec3<F>) -> F {
-        dot(self.0, [d[0].abs(), d[1].abs(), d[2].abs()])
+        self.0.dot(Vec3([d[0].abs(), d[1].abs(), d[2].abs()]))
     }
 }
 
@@ -90,7 +90,7 @@ impl<F: Num> Best<F> {
     /// Is it the normal of a face of the other shape?
     #[inline(always)]
     pub fn of_other(&self) -> F::Mask {
-        F::and(F::c(0.5).lt(self.kind), self.kind.lt(F::c(1.5)))
+        F::c(0.5).lt(self.kind) & self.kind.lt(F::c(1.5))
     }
 
     /// Is it across two edges?
@@ -121,26 +121,33 @@ pub(super) fn bounding_axis<F: Num, R: Reach<F>>(
     other: &R,
 ) -> Axis<F> {
     let own = BoxReach(half);
-    let length = dot(center, center).sqrt();
+    let length = center.dot(center).sqrt();
     let apart = F::c(1e-12).lt(length);
-    let ray = scale(center, F::c(-1.0).div(length.max(F::c(1e-12))));
+    let ray = center * F::c(-1.0).div(length.max(F::c(1e-12)));
     let up = [F::c(0.0), F::c(0.0), F::c(1.0)];
-    let normal = select(apart, ray, up);
-    let distance = length - own.reach(normal) - other.reach(transform_back(axes, normal));
+    let normal = select(apart, ray, Vec3(up));
+    let distance = length - own.reach(normal) - other.reach(axes.transpose_mul(normal));
     let mut best = Axis { normal, distance };
     for i in 0..3 {
         let row = [axes[0][i], axes[1][i], axes[2][i]];
         let mut normal = [F::c(0.0); 3];
         normal[i] = signed(F::c(-1.0), center[i]);
-        let distance = center[i].abs() - half[i] - other.reach(row);
-        best = better(best, Axis { normal, distance }, F::c(0.0));
+        let distance = center[i].abs() - half[i] - other.reach(Vec3(row));
+        best = better(
+            best,
+            Axis {
+                normal: Vec3(normal),
+                distance,
+            },
+            F::c(0.0),
+        );
     }
     for &j in R::FACES {
         let mut unit = [F::c(0.0); 3];
         unit[j] = F::c(1.0);
-        let height = dot(center, axes[j]);
-        let normal = scale(axes[j], signed(F::c(-1.0), height));
-        let distance = height.abs() - own.reach(axes[j]) - other.reach(unit);
+        let height = center.dot(axes[j]);
+        let normal = axes[j] * signed(F::c(-1.0), height);
+        let distance = height.abs() - own.reach(axes[j]) - other.reach(Vec3(unit));
         best = better(best, Axis { normal, distance }, F::c(0.0));
     }
     best
@@ -164,32 +171,32 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
     let tables = hull.tables;
     let (first, end) = hull.span(cx, 1);
     let mut best = cx.var(c(-1e18));
-    let mut normal = var3(cx, [c(0.0); 3]);
+    let mut normal = var3(cx, Vec3([c(0.0); 3]));
     let mut kind = cx.var(c(0.0));
     let mut place = [cx.var(c(0.0)), cx.var(c(0.0))];
     span!(cx, face in first, end, {
         let [mx, my, mz, offset] = cx.constants(tables.faces, face, 0);
-        let m = [mx, my, mz];
-        let x = dot(m, center) - offset - other.reach(transform_back(axes, m));
+        let m = Vec3([mx, my, mz]);
+        let x = m.dot(center) - offset - other.reach(axes.transpose_mul(m));
         let old = cx.get(&best);
         let farther = old.lt(x);
         let kept = get3(cx, &normal);
         cx.put(&mut best, C::F::select(farther, x, old));
-        put3(cx, &mut normal, select(farther, m, kept));
+        put3(cx, &mut normal, select(farther, Vec3(m.0), kept));
         // farther apart than asked, by whichever face
         break_if!(cx, limit.lt(x));
     });
     if !R::FACES.is_empty() {
         let near = cx.get(&best).lt(limit);
         when!(cx, near, {
-            let mut highest = var3(cx, [c(-1e18); 3]);
-            let mut lowest = var3(cx, [c(1e18); 3]);
+            let mut highest = var3(cx, Vec3([c(-1e18); 3]));
+            let mut lowest = var3(cx, Vec3([c(1e18); 3]));
             let (first, end) = hull.span(cx, 0);
             span!(cx, row in first, end, {
                 let (mut high, mut low) = (get3(cx, &highest), get3(cx, &lowest));
                 for vertex in four(cx, tables, row) {
                     for &j in R::FACES {
-                        let x = dot(vertex, axes[j]);
+                        let x = vertex.dot(axes[j]);
                         high[j] = high[j].max(x);
                         low[j] = low[j].min(x);
                     }
@@ -201,7 +208,7 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
             for &j in R::FACES {
                 let mut unit = [c(0.0); 3];
                 unit[j] = c(1.0);
-                let (height, half) = (dot(axes[j], center), other.reach(unit));
+                let (height, half) = (axes[j].dot(center), other.reach(Vec3(unit)));
                 let above = height - half - high[j];
                 let below = low[j] - height - half;
                 let side = signed(c(1.0), above - below);
@@ -210,7 +217,7 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
                 let farther = old.lt(x);
                 let kept = get3(cx, &normal);
                 cx.set(&mut best, C::F::select(farther, x, old));
-                set3(cx, &mut normal, select(farther, scale(axes[j], side), kept));
+                set3(cx, &mut normal, select(farther, axes[j] * side, kept));
                 let was = cx.get(&kind);
                 cx.set(&mut kind, C::F::select(farther, c(1.0), was));
             }
@@ -221,36 +228,36 @@ pub(super) fn hull_axis<C: Cx, R: Reach<C::F>>(
         when!(cx, near, {
             let start = cx.get(&best) + slack;
             let mut edge_best = cx.var(start);
-            let mut edge_normal = var3(cx, [c(0.0); 3]);
+            let mut edge_normal = var3(cx, Vec3([c(0.0); 3]));
             let (first, end) = hull.span(cx, 2);
             // Two edges that are the way out pass each other at the depth that they tell. The other shape reaches along the
             // best axis so far to that axis' depth below the hull's end, and an edge to no more than twice that.
             let (m, x) = (get3(cx, &normal), cx.get(&best));
-            let top = dot(m, center) - other.reach(transform_back(axes, m)) - x;
-            let is_apart = C::F::not(x.lt(c(0.0)));
+            let top = m.dot(center) - other.reach(axes.transpose_mul(m)) - x;
+            let is_apart = !x.lt(c(0.0));
             let floor = C::F::select(is_apart, c(-1e18), top + (x + x) - slack);
             span!(cx, edge in first, end, {
                 let [px, py, pz, ax, ay, az] = cx.constants(tables.edges, edge, 0);
-                let (point, along) = ([px, py, pz], [ax, ay, az]);
+                let (point, along) = (Vec3([px, py, pz]), Vec3([ax, ay, az]));
                 let length = cx.constant(tables.edges, edge, 12);
-                let height = dot(m, point) + (dot(m, along) * length).max(c(0.0));
-                let reaches = C::F::not(height.lt(floor));
+                let height = m.dot(point) + (m.dot(along) * length).max(c(0.0));
+                let reaches = !height.lt(floor);
                 when!(cx, reaches, {
                 let [n1x, n1y, n1z, n2x, n2y, n2z] = cx.constants(tables.edges, edge, 6);
-                let (n1, n2) = ([n1x, n1y, n1z], [n2x, n2y, n2z]);
-                let (way, outward) = (sub(center, point), add(n1, n2));
+                let (n1, n2) = (Vec3([n1x, n1y, n1z]), Vec3([n2x, n2y, n2z]));
+                let (way, outward) = (center - point, n1 + n2);
                 for &j in R::EDGES {
                     let q = axes[j];
-                    let crosses = (dot(n1, q) * dot(n2, q)).lt(c(0.0));
+                    let crosses = (n1.dot(q) * n2.dot(q)).lt(c(0.0));
                     when!(cx, crosses, {
-                        let axis = cross(along, q);
-                        let square = dot(axis, axis);
+                        let axis = along.cross(q);
+                        let square = axis.dot(axis);
                         let unit = c(1.0).div(square.max(c(1e-6)).sqrt());
-                        let unit = scale(axis, signed(unit, dot(axis, outward)));
-                        let x = dot(unit, way) - other.reach(transform_back(axes, unit));
+                        let unit = axis * signed(unit, axis.dot(outward));
+                        let x = unit.dot(way) - other.reach(axes.transpose_mul(unit));
                         let old = cx.get(&edge_best);
                         // of nearly parallel edges the normal is a face's
-                        let farther = C::F::and(old.lt(x), c(1e-6).lt(square));
+                        let farther = old.lt(x) & c(1e-6).lt(square);
                         cx.set(&mut edge_best, C::F::select(farther, x, old));
                         let kept = get3(cx, &edge_normal);
                         set3(cx, &mut edge_normal, select(farther, unit, kept));

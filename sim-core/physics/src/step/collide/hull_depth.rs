@@ -10,9 +10,7 @@ use super::gjk::Restart;
 use super::hull_axes::Axis;
 use super::support::{Polyhedron, Support, Turned, get3, negated, pick3, set3, signed, var3};
 use crate::lane::{Cx, Num, Table};
-use crate::math::vec3::{
-    Vec3, add, cross, dot, scale, sub, transform, transform_add, transform_back,
-};
+use crate::math::vec3::Vec3;
 use crate::{each, push, span, when};
 
 /// Two hulls, in the frame of the second.
@@ -78,9 +76,9 @@ impl<C: Cx> LeastDepth<'_, '_, C> {
         let faces = second.tables.faces;
         let (start, end) = first.own.span(cx, 1);
         span!(cx, face in start, end, {
-            let n = transform(&first.axes, cx.constants(faces, face, 0));
-            let height = cx.constant(faces, face, 3) + dot(n, first.center);
-            let bound = height - dot(n, on_b);
+            let n = first.axes * Vec3(cx.constants(faces, face, 0));
+            let height = cx.constant(faces, face, 3) + n.dot(first.center);
+            let bound = height - n.dot(on_b);
             when!(cx, bound.lt(cx.get(&best.depth)), {
                 let depth = second.reach(cx, negated(n)) + height;
                 best.offer(cx, depth, n);
@@ -88,12 +86,12 @@ impl<C: Cx> LeastDepth<'_, '_, C> {
         });
         let (start, end) = second.span(cx, 1);
         span!(cx, face in start, end, {
-            let n = negated(cx.constants(faces, face, 0));
+            let n = negated(Vec3(cx.constants(faces, face, 0)));
             let height = cx.constant(faces, face, 3);
-            let bound = height + dot(n, on_a);
+            let bound = height + n.dot(on_a);
             when!(cx, bound.lt(cx.get(&best.depth)), {
-                let far = height + dot(n, first.center);
-                let depth = first.own.reach(cx, transform_back(&first.axes, n)) + far;
+                let far = height + n.dot(first.center);
+                let depth = first.own.reach(cx, first.axes.transpose_mul(n)) + far;
                 best.offer(cx, depth, n);
             });
         });
@@ -106,16 +104,16 @@ impl<C: Cx> LeastDepth<'_, '_, C> {
         let edges = second.tables.edges;
         let (start, end) = first.own.span(cx, 2);
         span!(cx, edge in start, end, {
-            let n1 = transform(&first.axes, cx.constants(edges, edge, 6));
-            let n2 = transform(&first.axes, cx.constants(edges, edge, 9));
+            let n1 = first.axes * Vec3(cx.constants(edges, edge, 6));
+            let n2 = first.axes * Vec3(cx.constants(edges, edge, 9));
             let point = cx.constants(edges, edge, 0);
-            let point = transform_add(&first.axes, point, first.center);
-            let way = sub(point, on_b);
-            let bound = dot(way, n1).min(dot(way, n2));
+            let point = first.axes.mul_add(Vec3(point), first.center);
+            let way = point - on_b;
+            let bound = way.dot(n1).min(way.dot(n2));
             when!(cx, bound.lt(cx.get(&best.depth)), {
-                let vertex = second.farthest(cx, negated(add(n1, n2)));
-                let way = sub(point, vertex);
-                let bound = dot(way, n1).min(dot(way, n2));
+                let vertex = second.farthest(cx, negated(n1 + n2));
+                let way = point - vertex;
+                let bound = way.dot(n1).min(way.dot(n2));
                 push!(cx, *promising, bound.lt(cx.get(&best.depth)), row, {
                     let number = cx.number(edge);
                     cx.init(self.promising, row, 0, number);
@@ -133,32 +131,29 @@ impl<C: Cx> LeastDepth<'_, '_, C> {
         each!(cx, row in *promising, {
             let edge = cx.load(self.promising, row, 0);
             let point = pick3(cx, edges, edge, 0);
-            let point = transform_add(&first.axes, point, first.center);
-            let d = transform(&first.axes, pick3(cx, edges, edge, 3));
-            let n1 = transform(&first.axes, pick3(cx, edges, edge, 6));
-            let n2 = transform(&first.axes, pick3(cx, edges, edge, 9));
-            let outward = add(n1, n2);
+            let point = first.axes.mul_add(point, first.center);
+            let d = first.axes * pick3(cx, edges, edge, 3);
+            let n1 = first.axes * pick3(cx, edges, edge, 6);
+            let n2 = first.axes * pick3(cx, edges, edge, 9);
+            let outward = n1 + n2;
             let (start, end) = second.span(cx, 2);
             span!(cx, other in start, end, {
-                let q = cx.constants(edges, other, 3);
-                let n3 = cx.constants(edges, other, 6);
-                let n4 = cx.constants(edges, other, 9);
+                let q = Vec3(cx.constants(edges, other, 3));
+                let n3 = Vec3(cx.constants(edges, other, 6));
+                let n4 = Vec3(cx.constants(edges, other, 9));
                 // d is across n₁ and n₂, q across n₃ and n₄: each arc crosses the other's plane, on the same side
-                let crosses = C::F::and(
-                    (dot(d, n3) * dot(d, n4)).lt(c(0.0)),
-                    (dot(q, n1) * dot(q, n2)).lt(c(0.0)),
-                );
+                let crosses = (d.dot(n3) * d.dot(n4)).lt(c(0.0)) & (q.dot(n1) * q.dot(n2)).lt(c(0.0));
                 when!(cx, crosses, {
-                    let axis = cross(d, q);
-                    let square = dot(axis, axis);
-                    let side = dot(axis, outward);
-                    let same = (side * dot(axis, add(n3, n4))).lt(c(0.0));
+                    let axis = d.cross(q);
+                    let square = axis.dot(axis);
+                    let side = axis.dot(outward);
+                    let same = (side * axis.dot(n3 + n4)).lt(c(0.0));
                     let unit = c(1.0).div(square.max(c(1e-8)).sqrt());
-                    let axis = scale(axis, signed(unit, side));
+                    let axis = axis * signed(unit, side);
                     let point_b = cx.constants(edges, other, 0);
-                    let depth = dot(axis, sub(point, point_b));
+                    let depth = axis.dot(point - Vec3(point_b));
                     // of nearly parallel edges the normal is a face's
-                    let is = C::F::and(same, c(1e-8).lt(square));
+                    let is = same & c(1e-8).lt(square);
                     best.offer(cx, C::F::select(is, depth, c(1e18)), axis);
                 });
             });

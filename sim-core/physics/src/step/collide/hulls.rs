@@ -22,9 +22,7 @@ use super::support::{
 use crate::constants::clip::Cut;
 use crate::constants::hull::HullTables;
 use crate::lane::{Cx, Num};
-use crate::math::vec3::{
-    Mat3, Vec3, cross, dot, scale, scale_add, sub, transform, transform_add, transform_back,
-};
+use crate::math::vec3::{Mat3, Vec3};
 use crate::{span, when};
 
 /// A plane and a hull: the deepest vertex below the margin and three others that span most.
@@ -40,20 +38,20 @@ pub fn plane_hull<C: Cx>(
 ) {
     let c = C::F::c;
     let hull = Polyhedron { tables, hull };
-    let n = transform_back(&b.axes, axes_a[2]);
-    let height = dot(axes_a[2], b.center);
+    let n = b.axes.transpose_mul(axes_a[2]);
+    let height = axes_a[2].dot(b.center);
     let half = hull.half_extents(cx);
     let reach = BoxReach(half).reach(n);
     when!(cx, (height - reach).lt(margin), {
         let size = hull.radius(cx);
         let u = across(n);
-        let view = [u, cross(n, u), n];
+        let view = Mat3([u, n.cross(u), n]);
         let (first, end) = hull.span(cx, 0);
         let mut spot = [
-            var3(cx, [c(0.0); 3]),
-            var3(cx, [c(0.0); 3]),
-            var3(cx, [c(0.0); 3]),
-            var3(cx, [c(0.0); 3]),
+            var3(cx, Vec3::zero()),
+            var3(cx, Vec3::zero()),
+            var3(cx, Vec3::zero()),
+            var3(cx, Vec3::zero()),
         ];
         let mut found = [
             cx.var(c(0.0)),
@@ -62,10 +60,10 @@ pub fn plane_hull<C: Cx>(
             cx.var(c(0.0)),
         ];
         // of vertices as deep up to rounding the first stays, so that a resting hull keeps its points
-        let mut lowest = var3(cx, [c(0.0), c(0.0), c(1e18)]);
+        let mut lowest = var3(cx, Vec3([c(0.0), c(0.0), c(1e18)]));
         span!(cx, row in first, end, {
             for point in four(cx, tables, row) {
-                let x = transform_back(&view, point);
+                let x = view.transpose_mul(point);
                 let old = get3(cx, &lowest);
                 let deeper = (x[2] + c(2e-6) * size).lt(old[2]);
                 set3(cx, &mut lowest, select(deeper, x, old));
@@ -86,10 +84,10 @@ pub fn plane_hull<C: Cx>(
             let mut is = cx.var(c(0.0));
             span!(cx, row in first, end, {
                 for point in four(cx, tables, row) {
-                    let x = transform_back(&view, point);
+                    let x = view.transpose_mul(point);
                     let score = spread.score(x[0], x[1]);
                     let (old, kept, had) = (cx.get(&best), get3(cx, &place), cx.get(&is));
-                    let farther = C::F::and(old.lt(score), (x[2] + height).lt(margin));
+                    let farther = old.lt(score) & (x[2] + height).lt(margin);
                     cx.set(&mut best, C::F::select(farther, score, old));
                     set3(cx, &mut place, select(farther, x, kept));
                     cx.set(&mut is, C::F::select(farther, c(1.0), had));
@@ -102,16 +100,15 @@ pub fn plane_hull<C: Cx>(
         for k in 0..4 {
             let x = get3(cx, &spot[k]);
             let distance = x[2] + height;
-            let on_hull = scale_add(
-                view[0],
+            let on_hull = view[0].scale_add(
                 x[0],
-                scale_add(view[1], x[1], scale(n, x[2] - c(0.5) * distance)),
+                view[1].scale_add(x[1], n * (x[2] - c(0.5) * distance)),
             );
             let is = c(0.5).lt(cx.get(&found[k]));
             out.add(
                 cx,
                 is,
-                transform_add(&b.axes, on_hull, b.center),
+                b.axes.mul_add(on_hull, b.center),
                 distance,
                 axes_a[2],
             );
@@ -133,8 +130,12 @@ pub fn sphere_hull<C: Cx>(
     let c = C::F::c;
     let hull = Polyhedron { tables, hull };
     let (zero, one) = (c(0.0), c(1.0));
-    let upright = [[one, zero, zero], [zero, one, zero], [zero, zero, one]];
-    let center = negated(transform_back(&b.axes, b.center));
+    let upright = Mat3([
+        Vec3([one, zero, zero]),
+        Vec3([zero, one, zero]),
+        Vec3([zero, zero, one]),
+    ]);
+    let center = negated(b.axes.transpose_mul(b.center));
     let near = near_hull(
         cx,
         &hull,
@@ -146,8 +147,8 @@ pub fn sphere_hull<C: Cx>(
         radius,
         margin,
     );
-    let point = transform_add(&b.axes, near.point, b.center);
-    let normal = transform(&b.axes, near.normal);
+    let point = b.axes.mul_add(near.point, b.center);
+    let normal = b.axes * near.normal;
     out.add(cx, near.distance.lt(margin), point, near.distance, normal);
 }
 
@@ -168,7 +169,7 @@ pub fn capsule_hull<C: Cx>(
 ) {
     let hull = Polyhedron { tables, hull };
     let (axes, center) = in_frame_of(b, axes_a);
-    let half = scale(axes[2], half_height);
+    let half = axes[2] * half_height;
     let other = SegmentReach(half_height);
     let segment = Segment { center, half };
     let size = radius + half_height;
@@ -177,7 +178,7 @@ pub fn capsule_hull<C: Cx>(
     );
     when!(cx, near.distance.lt(margin), {
         let face = HullSide::find(cx, &hull, None, negated(near.normal));
-        let side = SegmentSide::new(scale_add(near.normal, radius, center), half, near.normal);
+        let side = SegmentSide::new(near.normal.scale_add(radius, center), half, near.normal);
         let flat = aligned(face.outward, near.normal);
         let size = size.min(hull.radius(cx));
         add_points(
@@ -214,12 +215,15 @@ pub fn box_hull<C: Cx>(
     let hull = Polyhedron { tables, hull };
     let (axes, center) = in_frame_of(b, axes_a);
     let half = [
-        scale(axes[0], half_a[0]),
-        scale(axes[1], half_a[1]),
-        scale(axes[2], half_a[2]),
+        axes[0] * half_a[0],
+        axes[1] * half_a[1],
+        axes[2] * half_a[2],
     ];
-    let block = Block { center, half };
-    let size = dot(half_a, half_a).sqrt();
+    let block = Block {
+        center,
+        half: Mat3(half),
+    };
+    let size = half_a.dot(half_a).sqrt();
     let zero = C::F::c(0.0);
     let near = near_hull(
         cx,
@@ -235,10 +239,7 @@ pub fn box_hull<C: Cx>(
     when!(cx, near.distance.lt(margin), {
         let face = HullSide::find(cx, &hull, None, negated(near.normal));
         let side = BoxSide::find(&axes, half_a, center, near.normal);
-        let flat = C::F::or(
-            aligned(face.outward, near.normal),
-            aligned(side.outward, near.normal),
-        );
+        let flat = aligned(face.outward, near.normal) | aligned(side.outward, near.normal);
         let size = size.min(hull.radius(cx));
         add_points(
             cx,
@@ -305,10 +306,7 @@ pub fn hull_hull<C: Cx>(
         when!(cx, near.distance.lt(margin), {
             let side = HullSide::find(cx, &first.own, Some((axes, center)), near.normal);
             let face = HullSide::find(cx, &second, None, negated(near.normal));
-            let flat = C::F::or(
-                aligned(face.outward, near.normal),
-                aligned(side.outward, near.normal),
-            );
+            let flat = aligned(face.outward, near.normal) | aligned(side.outward, near.normal);
             add_points(
                 cx,
                 &near,
@@ -334,11 +332,11 @@ const DEEP: f64 = 0.01;
 #[inline(always)]
 pub(super) fn in_frame_of<F: Num>(b: &Placed<F>, axes_a: &Mat3<F>) -> (Mat3<F>, Vec3<F>) {
     let axes = [
-        transform_back(&b.axes, axes_a[0]),
-        transform_back(&b.axes, axes_a[1]),
-        transform_back(&b.axes, axes_a[2]),
+        b.axes.transpose_mul(axes_a[0]),
+        b.axes.transpose_mul(axes_a[1]),
+        b.axes.transpose_mul(axes_a[2]),
     ];
-    (axes, negated(transform_back(&b.axes, b.center)))
+    (Mat3(axes), negated(b.axes.transpose_mul(b.center)))
 }
 
 /// Where a shape, with `radius` around what `other` and `shape` say of it, is nearest to a hull; 1e18 m away where they
@@ -359,15 +357,15 @@ fn near_hull<C: Cx, R: Reach<C::F>>(
     let c = C::F::c;
     let limit = margin + radius;
     let mut distance = cx.var(c(1e18));
-    let mut normal = var3(cx, [c(0.0); 3]);
-    let mut point = var3(cx, [c(0.0); 3]);
+    let mut normal = var3(cx, Vec3::zero());
+    let mut point = var3(cx, Vec3::zero());
     let half = hull.half_extents(cx);
     let outer = bounding_axis(half, axes, center, other);
     when!(cx, outer.distance.lt(limit), {
         let size = size + hull.radius(cx);
         let best = hull_axis(cx, hull, axes, center, other, limit, slack(size));
-        let apart = C::F::and(c(0.0).lt(best.axis.distance), best.axis.distance.lt(limit));
-        let inside = C::F::not(c(0.0).lt(best.axis.distance));
+        let apart = c(0.0).lt(best.axis.distance) & best.axis.distance.lt(limit);
+        let inside = !c(0.0).lt(best.axis.distance);
         when!(cx, apart, {
             let found = closest(cx, shape, hull, best.axis.normal, size, limit, &NoRestart);
             set3(cx, &mut normal, found.axis.normal);
@@ -385,7 +383,7 @@ fn near_hull<C: Cx, R: Reach<C::F>>(
     Near {
         normal,
         distance: cx.get(&distance) - radius,
-        point: scale_add(normal, c(0.5) * radius, get3(cx, &point)),
+        point: normal.scale_add(c(0.5) * radius, get3(cx, &point)),
     }
 }
 
@@ -400,17 +398,17 @@ fn deepest_point<C: Cx>(
 ) -> Vec3<C::F> {
     let c = C::F::c;
     let n = best.axis.normal;
-    let half = scale(n, c(0.5) * best.axis.distance);
+    let half = n * (c(0.5) * best.axis.distance);
     let corner = shape.farthest(cx, n);
     let middle = [
         corner[0] + half[0],
         corner[1] + half[1],
         corner[2] + half[2],
     ];
-    let mut point = var3(cx, middle);
+    let mut point = var3(cx, Vec3(middle));
     when!(cx, best.of_other(), {
         let vertex = hull.farthest(cx, negated(n));
-        set3(cx, &mut point, sub(vertex, half));
+        set3(cx, &mut point, vertex - half);
     });
     when!(cx, best.of_edges(), {
         // the hull's edge x = p + s d and the other's x = r + t q, where n is across both: (p - r + s d - t q) ∥ n
@@ -421,11 +419,11 @@ fn deepest_point<C: Cx>(
         );
         let (first, second) = (best.along.lt(c(0.5)), best.along.lt(c(1.5)));
         let q = select(first, axes[0], select(second, axes[1], axes[2]));
-        let mixed = dot(d, q);
+        let mixed = d.dot(q);
         let square = mixed.fnma(mixed, c(1.0)).max(c(1e-7));
-        let way = sub(corner, p);
-        let s = mixed.fnma(dot(way, q), dot(way, d)).div(square);
-        set3(cx, &mut point, sub(scale_add(d, s, p), half));
+        let way = corner - p;
+        let s = mixed.fnma(way.dot(q), way.dot(d)).div(square);
+        set3(cx, &mut point, d.scale_add(s, p) - half);
     });
     get3(cx, &point)
 }

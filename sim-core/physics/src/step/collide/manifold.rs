@@ -12,9 +12,7 @@ use super::support::{across, get3, rounding, set3, var3};
 use crate::constants::clip::Cut;
 use crate::constants::hull::CORNERS_MAX;
 use crate::lane::{Cx, MaskOf, Num, Table};
-use crate::math::vec3::{
-    Mat3, Vec3, cross, dot, scale_add, sub, transform, transform_add, transform_back,
-};
+use crate::math::vec3::{Mat3, Vec3};
 use crate::{break_if, times, when};
 
 /// Faces that are turned to the normal less than this touch face on [–]: 1.8°.
@@ -58,7 +56,7 @@ struct Plane<F> {
 /// Whether a side with this outward normal is flat on the other shape.
 #[inline(always)]
 pub(super) fn aligned<F: Num>(outward: Vec3<F>, normal: Vec3<F>) -> F::Mask {
-    F::c(ALIGNED).lt(dot(outward, normal).abs())
+    F::c(ALIGNED).lt(outward.dot(normal).abs())
 }
 
 /// Adds the contact points of a pair.
@@ -86,17 +84,17 @@ pub(super) fn add_points<C: Cx>(
     let (zero, one) = (c(0.0), c(1.0));
     let n = near.normal;
     let u = across(n);
-    let v = cross(n, u);
-    let basis = [u, v, n];
+    let v = n.cross(u);
+    let basis = Mat3([u, v, n]);
     // the deepest point; the closest one where no candidate is as deep
     let mut spot = [
-        var3(cx, [zero, zero, near.distance]),
-        var3(cx, [zero; 3]),
-        var3(cx, [zero; 3]),
-        var3(cx, [zero; 3]),
+        var3(cx, Vec3([zero, zero, near.distance])),
+        var3(cx, Vec3([zero; 3])),
+        var3(cx, Vec3([zero; 3])),
+        var3(cx, Vec3([zero; 3])),
     ];
     let mut found = [cx.var(zero), cx.var(zero), cx.var(zero)];
-    let mut plane = var3(cx, [zero; 3]);
+    let mut plane = var3(cx, Vec3([zero; 3]));
     let mut closest = cx.var(one);
     when!(cx, flat, {
         let counts = [first.count(), second.count()];
@@ -104,8 +102,8 @@ pub(super) fn add_points<C: Cx>(
         times!(cx, i in CORNERS_MAX + 1, {
             let p = first.corner(cx, i);
             let q = second.corner(cx, i);
-            let p = transform_back(&basis, sub(p, near.point));
-            let q = transform_back(&basis, sub(q, near.point));
+            let p = basis.transpose_mul(p - near.point);
+            let q = basis.transpose_mul(q - near.point);
             for k in 0..3 {
                 cx.fill(cut.corners, i, k, p[k]);
                 cx.fill(cut.corners, i, 3 + k, q[k]);
@@ -117,12 +115,12 @@ pub(super) fn add_points<C: Cx>(
             }
         });
         let zeroth = cx.at(0);
-        let p = plane_of(cx, cut, zeroth, 0, transform_back(&basis, first.normal()));
-        let q = plane_of(cx, cut, zeroth, 3, transform_back(&basis, second.normal()));
-        set3(cx, &mut plane, [p.slope[0], p.slope[1], p.base]);
+        let p = plane_of(cx, cut, zeroth, 0, basis.transpose_mul(first.normal()));
+        let q = plane_of(cx, cut, zeroth, 3, basis.transpose_mul(second.normal()));
+        set3(cx, &mut plane, Vec3([p.slope[0], p.slope[1], p.base]));
         half_planes(cx, cut, counts[1], q.turn);
-        let steep = C::F::or(p.facing.lt(c(FACING)), q.facing.lt(c(FACING)));
-        when!(cx, C::F::not(steep), {
+        let steep = p.facing.lt(c(FACING)) | q.facing.lt(c(FACING));
+        when!(cx, !steep, {
             cut_edges(cx, cut, counts, &q, side, size, margin);
             add_corners(cx, cut, counts, &p, side, size, margin);
         });
@@ -149,18 +147,18 @@ pub(super) fn add_points<C: Cx>(
             );
         }
     });
-    let normal = transform(frame, n);
+    let normal = frame * n;
     let slope = get3(cx, &plane);
     for k in 0..4 {
-        let [x, y, distance] = get3(cx, &spot[k]);
+        let Vec3([x, y, distance]) = get3(cx, &spot[k]);
         let distance = distance.max(near.distance);
         let height = slope[0].fma(x, slope[1].fma(y, slope[2])) + distance * side * c(0.5);
         let height = match k {
             0 => C::F::select(c(0.5).lt(cx.get(&closest)), zero, height),
             _ => height,
         };
-        let point = scale_add(u, x, scale_add(v, y, scale_add(n, height, near.point)));
-        let point = transform_add(frame, point, center);
+        let point = u.scale_add(x, v.scale_add(y, n.scale_add(height, near.point)));
+        let point = frame.mul_add(point, center);
         let is = match k {
             0 => distance.lt(margin),
             _ => c(0.5).lt(cx.get(&found[k - 1])),
@@ -179,7 +177,7 @@ fn plane_of<C: Cx>(cx: &mut C, cut: Cut, zeroth: C::I, k: usize, m: Vec3<C::F>) 
         cx.load(cut.corners, zeroth, k + 2),
     );
     let facing = m[2].abs();
-    let length = dot(m, m).sqrt().max(c(1e-18));
+    let length = m.dot(m).sqrt().max(c(1e-18));
     let back = m[2].lt(c(0.0));
     let size = facing.max(c(0.01) * length);
     let k = c(-1.0).div(C::F::select(back, -size, size));
@@ -240,8 +238,8 @@ fn cut_edges<C: Cx>(
     let inclusive = c(1e-5) * size;
     times!(cx, i in CORNERS_MAX, {
         let start: Vec3<C::F> = load3(cx, cut.corners, i, 0);
-        let end = [following(cx, cut, i, 0), following(cx, cut, i, 1), following(cx, cut, i, 2)];
-        let way = sub(end, start);
+        let end = Vec3([following(cx, cut, i, 0), following(cx, cut, i, 1), following(cx, cut, i, 2)]);
+        let way = end - start;
         let mut low = cx.var(zero);
         let mut high = cx.var(one);
         times!(cx, j in CORNERS_MAX, {
@@ -259,16 +257,16 @@ fn cut_edges<C: Cx>(
             let (l, h) = (cx.get(&low), cx.get(&high));
             let entry = C::F::select(leaves, c(2.0), l.max(t));
             cx.set(&mut low, C::F::select(outside, entry, l));
-            cx.set(&mut high, C::F::select(C::F::and(leaves, C::F::not(outside)), h.min(t), h));
+            cx.set(&mut high, C::F::select(leaves & !outside, h.min(t), h));
             let done = (counts[1] - c(1.5)).lt(cx.number(j));
             break_if!(cx, done);
         });
         let (l, h) = (cx.get(&low), cx.get(&high));
         let some = l.lt(h);
-        for (slot, t, is) in [(0, l, some), (1, h, C::F::and(some, h.lt(one)))] {
-            let [x, y, height] = scale_add(way, t, start);
+        for (slot, t, is) in [(0, l, some), (1, h, some & h.lt(one))] {
+            let Vec3([x, y, height]) = way.scale_add(t, start);
             let other = q.slope[0].fma(x, q.slope[1].fma(y, q.base));
-            keep(cx, cut.candidates, i, slot, [x, y, (other - height) * side], is, margin);
+            keep(cx, cut.candidates, i, slot, Vec3([x, y, (other - height) * side]), is, margin);
         }
         let done = (counts[0] - c(1.5)).lt(cx.number(i));
         break_if!(cx, done);
@@ -289,7 +287,7 @@ fn add_corners<C: Cx>(
     let c = C::F::c;
     let inside = c(-1e-6) * size;
     times!(cx, i in CORNERS_MAX, {
-        let [x, y, height] = load3(cx, cut.corners, i, 3);
+        let Vec3([x, y, height]) = load3(cx, cut.corners, i, 3);
         let mut outside = cx.var(c(-1e18));
         times!(cx, j in CORNERS_MAX, {
             let (x0, y0) = (cx.load(cut.corners, j, 0), cx.load(cut.corners, j, 1));
@@ -304,10 +302,10 @@ fn add_corners<C: Cx>(
             let done = (counts[0] - c(1.5)).lt(cx.number(j));
             break_if!(cx, done);
         });
-        let within = C::F::and(cx.get(&outside).lt(inside), c(2.5).lt(counts[0]));
-        let within = C::F::and(within, c(2.5).lt(counts[1]));
+        let within = cx.get(&outside).lt(inside) & c(2.5).lt(counts[0]);
+        let within = within & c(2.5).lt(counts[1]);
         let other = p.slope[0].fma(x, p.slope[1].fma(y, p.base));
-        keep(cx, cut.candidates, i, 2, [x, y, (height - other) * side], within, margin);
+        keep(cx, cut.candidates, i, 2, Vec3([x, y, (height - other) * side]), within, margin);
         let done = (counts[1] - c(1.5)).lt(cx.number(i));
         break_if!(cx, done);
     });
@@ -315,7 +313,7 @@ fn add_corners<C: Cx>(
 
 #[inline(always)]
 fn load3<C: Cx>(cx: &mut C, t: Table, i: C::I, k: usize) -> Vec3<C::F> {
-    [cx.load(t, i, k), cx.load(t, i, k + 1), cx.load(t, i, k + 2)]
+    Vec3([cx.load(t, i, k), cx.load(t, i, k + 1), cx.load(t, i, k + 2)])
 }
 
 /// Writes a candidate; `is` and nearer than the margin, or else none.
@@ -325,11 +323,11 @@ fn keep<C: Cx>(
     t: Table,
     i: C::I,
     slot: usize,
-    [x, y, distance]: Vec3<C::F>,
+    Vec3([x, y, distance]): Vec3<C::F>,
     is: MaskOf<C>,
     margin: C::F,
 ) {
-    let is = C::F::and(is, distance.lt(margin));
+    let is = is & distance.lt(margin);
     cx.store(t, i, 3 * slot, x);
     cx.store(t, i, 3 * slot + 1, y);
     cx.store(
@@ -394,7 +392,7 @@ fn farthest<C: Cx>(
             let x: Vec3<C::F> = load3(cx, cut.candidates, i, 3 * slot);
             let score = span.score(x[0], x[1]);
             let old = cx.get(&best);
-            let farther = C::F::and(old.lt(score), x[2].lt(c(0.5 * NONE)));
+            let farther = old.lt(score) & x[2].lt(c(0.5 * NONE));
             cx.set(&mut best, C::F::select(farther, score, old));
             let kept = get3(cx, &place);
             set3(cx, &mut place, select(farther, x, kept));

@@ -23,93 +23,103 @@ pub mod spheres;
 mod spread;
 mod support;
 
-use super::{BlockOf, ConstantsOf};
+use super::{BlockOf, ConstantsOf, Stage};
+use crate::arrays::Array as A;
+use crate::constants::Constants;
 use crate::constants::contact::Cone;
 use crate::constants::contact::{
-    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, MU_MIN, PAIR_KINDS, pair,
+    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, MU_MIN, pair,
 };
 use crate::constants::params::Param;
 use crate::lane::{Cx, Num, Real, Table};
-use crate::math::vec3::{Mat3, Vec3, add, constant, dot, sub, transform, transform_add};
+use crate::math::vec3::{Mat3, Vec3, load_vec3};
 use crate::{span, when};
-use narrow::{Shape, Two, narrow};
+pub use narrow::*;
 use points::{Placed, Points, Room};
+
+/// Where the shapes are.
+pub struct Place;
+
+impl Stage for Place {
+    const READS: &'static [A] = &[A::Params, A::Rotation, A::Origin, A::Reference];
+    const WRITES: &'static [A] = &[A::ShapePoses, A::ContactPoints];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        !m.contacts.groups.is_empty()
+    }
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        place(cx, m, b);
+    }
+}
 
 /// Poses of all shapes, and the reference points that they are relative to; no contacts yet.
 #[inline(always)]
-pub(super) fn place<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
+fn place<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
     let (w, memory) = (&b.work, &m.contacts.memory);
-    if m.contacts.groups.is_empty() {
-        return;
-    }
     for count in 0..memory.counts.rows {
         let (row, zero) = (cx.at(count), C::F::c(0.0));
         cx.fill(memory.counts, row, 0, zero);
     }
     for (k, solid) in m.contacts.solids.iter().enumerate() {
-        let [x, y, z] = solid.axes;
-        let mut axes: Mat3<C::F> = [constant(x), constant(y), constant(z)];
-        let mut center = constant(solid.center);
+        let mut axes = Mat3::constant(solid.axes);
+        let mut center = Vec3::constant(solid.center);
         if let Some(body) = solid.body {
             let r = &w.rotation[body];
             if solid.is_upright {
                 axes = *r;
             } else {
-                axes = [
-                    transform(r, axes[0]),
-                    transform(r, axes[1]),
-                    transform(r, axes[2]),
-                ];
+                axes = Mat3([r * axes[0], r * axes[1], r * axes[2]]);
             }
-            center = transform_add(r, center, w.origin[body]);
+            center = r.mul_add(center, w.origin[body]);
         }
         let row = cx.at(k);
-        let [x, y, z] = axes;
-        cx.fill_all(memory.poses, row, 0, x);
-        cx.fill_all(memory.poses, row, 3, y);
-        cx.fill_all(memory.poses, row, 6, z);
-        cx.fill_all(memory.poses, row, 9, center);
+        cx.fill_all(memory.poses, row, 0, axes[0].0);
+        cx.fill_all(memory.poses, row, 3, axes[1].0);
+        cx.fill_all(memory.poses, row, 6, axes[2].0);
+        cx.fill_all(memory.poses, row, 9, center.0);
         if let Some(first) = m.varying.first(Param::ShapeMu) {
             cx.fill(memory.mu, row, 0, b.params[first + solid.shape]);
         }
     }
     for (t, reference) in w.reference.iter().enumerate() {
         let row = cx.at(t);
-        cx.fill_all(memory.origins, row, 0, *reference);
+        cx.fill_all(memory.origins, row, 0, reference.0);
     }
     let world = cx.at(w.reference.len());
     cx.fill_all(memory.origins, world, 0, [C::F::c(0.0); 3]);
 }
 
-/// Contacts of all pairs of two kinds, by their number in [`PAIR_KINDS`].
+/// Contacts of all pairs of two kinds.
 #[inline(always)]
-pub(super) fn touch<C: Cx, const KINDS: usize>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>) {
-    if let Some(group) = t.group(KINDS) {
+fn touch<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>) {
+    if let Some(group) = t.group(N::KINDS) {
         let (first, end) = (cx.at(group.first), cx.at(group.end));
         span!(cx, p in first, end, {
-            pair_of::<C, KINDS>(cx, t, p);
+            pair_of::<C, N>(cx, t, p);
         });
     }
 }
 
 /// The contacts of a pair.
 #[inline(always)]
-fn pair_of<C: Cx, const KINDS: usize>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) {
-    let kinds = PAIR_KINDS[KINDS].0;
+fn pair_of<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) {
+    let kinds = N::KINDS;
     let (numbers, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
     let (poses, origins) = (t.memory.poses, t.memory.origins);
     let a = cx.index(indices, p, pair::SOLID_A, poses.rows);
     let b = cx.index(indices, p, pair::SOLID_B, poses.rows);
     let origin_a = cx.index(indices, p, pair::ORIGIN_A, origins.rows);
     let origin_b = cx.index(indices, p, pair::ORIGIN_B, origins.rows);
-    let center_a = cx.load3(poses, a, 9);
-    let origin_a = cx.load3(origins, origin_a, 0);
-    let between = sub(cx.load3(origins, origin_b, 0), origin_a);
-    let center = add(sub(cx.load3(poses, b, 9), center_a), between);
+    let center_a = load_vec3(cx, poses, a, 9);
+    let origin_a = load_vec3(cx, origins, origin_a, 0);
+    let between = load_vec3(cx, origins, origin_b, 0) - origin_a;
+    let center = (load_vec3(cx, poses, b, 9) - center_a) + between;
     let radius = cx.constant(numbers, p, pair::RADIUS);
     let near = match kinds.0 {
-        Kind::Plane => dot(cx.load3(poses, a, 6), center).lt(radius),
-        _ => dot(center, center).lt(radius * radius),
+        Kind::Plane => load_vec3(cx, poses, a, 6).dot(center).lt(radius),
+        _ => center.dot(center).lt(radius * radius),
     };
     when!(cx, near, {
         let axes = axes_of(cx, poses, a);
@@ -136,7 +146,7 @@ fn pair_of<C: Cx, const KINDS: usize>(cx: &mut C, t: &Contacts<<C::F as Num>::Re
             // the boxes around both, where what comes next takes longer: boxes begin with this themselves
             if kinds.0 >= Kind::Box && kinds.1 > Kind::Box {
                 let halves = [first.half(kinds.0), second.half(kinds.1)];
-                near = C::F::and(near, overlap(&axes, &other, halves, margin));
+                near = near & overlap(&axes, &other, halves, margin);
             }
             when!(cx, near, {
                 let two = Two {
@@ -148,7 +158,7 @@ fn pair_of<C: Cx, const KINDS: usize>(cx: &mut C, t: &Contacts<<C::F as Num>::Re
                 };
                 let base = (center_a, origin_a);
                 let mut points = points_of::<C>(cx, t, p, base);
-                narrow::<C, KINDS>(cx, t, &two, &mut points);
+                N::contacts(cx, t, &two, &mut points);
             });
         });
     });
@@ -165,19 +175,19 @@ pub(super) fn contact_slack<F: Num>(radius: F) -> F {
 /// Axes of a shape.
 #[inline(always)]
 fn axes_of<C: Cx>(cx: &mut C, poses: Table, row: C::I) -> Mat3<C::F> {
-    [
-        cx.load3(poses, row, 0),
-        cx.load3(poses, row, 3),
-        cx.load3(poses, row, 6),
-    ]
+    Mat3([
+        load_vec3(cx, poses, row, 0),
+        load_vec3(cx, poses, row, 3),
+        load_vec3(cx, poses, row, 6),
+    ])
 }
 
 /// Is a ball at `center` (from a box, or to it) within a radius of the box?
 #[inline(always)]
 fn within<F: Num>(axes: &Mat3<F>, half: Vec3<F>, center: Vec3<F>, radius: F) -> F::Mask {
     let mut square = F::c(0.0);
-    for (axis, half) in axes.iter().zip(half) {
-        let beyond = (dot(*axis, center).abs() - half).max(F::c(0.0));
+    for (axis, half) in axes.iter().zip(*half) {
+        let beyond = ((*axis).dot(center).abs() - half).max(F::c(0.0));
         square = beyond.fma(beyond, square);
     }
     square.lt(radius * radius)
@@ -193,18 +203,18 @@ fn overlap<F: Num>(
 ) -> F::Mask {
     let mut gap = F::c(-1.0);
     let mut widths = [F::c(0.0); 3];
-    for (axis, half) in axes.iter().zip(half) {
+    for (axis, half) in axes.iter().zip(*half) {
         let mut width = half;
         for j in 0..3 {
-            let turn = dot(*axis, other.axes[j]).abs();
+            let turn = (*axis).dot(other.axes[j]).abs();
             width = turn.fma(other_half[j], width);
             widths[j] = turn.fma(half, widths[j]);
         }
-        gap = gap.max(dot(*axis, other.center).abs() - (width + reach));
+        gap = gap.max((*axis).dot(other.center).abs() - (width + reach));
     }
     for j in 0..3 {
         let width = widths[j] + other_half[j] + reach;
-        gap = gap.max(dot(other.axes[j], other.center).abs() - width);
+        gap = gap.max(other.axes[j].dot(other.center).abs() - width);
     }
     gap.lt(F::c(0.0))
 }
@@ -230,7 +240,7 @@ fn points_of<C: Cx>(
     let (numbers, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
     let origins = t.memory.origins;
     let origin = cx.index(indices, p, pair::ORIGIN, origins.rows);
-    let origin = cx.load3(origins, origin, 0);
+    let origin = load_vec3(cx, origins, origin, 0);
     let class = cx.index(indices, p, pair::CLASS, t.classes.len());
     let [first_end, capacity_end] = t.row_ends();
     let first = cx.index(t.handles.class_rows, class, 0, first_end);
@@ -239,14 +249,14 @@ fn points_of<C: Cx>(
         list: cx.kept(t.memory.counts, class, first, capacity),
         table: t.memory.rows,
         pair: cx.number(p),
-        base: add(center_a, sub(origin_a, origin)),
+        base: (center_a + (origin_a - Vec3(origin.0))),
         flip: cx.constant(numbers, p, pair::FLIP),
         mu: match t.memory.mu.rows {
             0 => None,
             _ => Some(friction(cx, t, p)),
         },
         // a pyramid is not the same along all tangents
-        along: (t.cone == Cone::Pyramidal).then_some([C::F::c(0.0); 3]),
+        along: (t.cone == Cone::Pyramidal).then_some(Vec3([C::F::c(0.0); 3])),
         room: Room {
             counts: t.memory.counts,
             contacts: t.classes.len() + COUNT_CONTACTS,

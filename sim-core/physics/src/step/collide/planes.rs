@@ -3,7 +3,7 @@
 use super::choose::{select, sign};
 use super::points::{Placed, Points};
 use crate::lane::{Cx, Num};
-use crate::math::vec3::{Mat3, Vec3, add, cross, dot, scale, scale_add, sub};
+use crate::math::vec3::{Mat3, Vec3};
 
 /// Below this sine between axis and normal a cylinder stands: its lowest rim point is then its x axis'. Above the rounding
 /// of f32; the height of the rim is wrong by that part of the radius at most.
@@ -19,7 +19,7 @@ fn lowest<C: Cx>(
     margin: C::F,
     out: &mut Points<C>,
 ) {
-    let middle = scale_add(normal, distance * C::F::c(-0.5), at);
+    let middle = normal.scale_add(distance * C::F::c(-0.5), at);
     out.add(cx, distance.lt(margin), middle, distance, normal);
 }
 
@@ -34,8 +34,8 @@ pub fn plane_sphere<C: Cx>(
     out: &mut Points<C>,
 ) {
     let normal = axes_a[2];
-    let distance = dot(normal, b.center) - radius;
-    let at = scale_add(normal, -radius, b.center);
+    let distance = normal.dot(b.center) - radius;
+    let at = normal.scale_add(-radius, b.center);
     lowest(cx, normal, at, distance, margin, out);
 }
 
@@ -56,7 +56,7 @@ pub fn plane_capsule<C: Cx>(
     for half in [half_height, -half_height] {
         let end = Placed {
             axes: b.axes,
-            center: scale_add(b.axes[2], half, b.center),
+            center: b.axes[2].scale_add(half, b.center),
         };
         plane_sphere(cx, axes_a, &end, radius, margin, out);
     }
@@ -73,19 +73,19 @@ pub fn plane_box<C: Cx>(
     out: &mut Points<C>,
 ) {
     let normal = axes_a[2];
-    let height = dot(normal, b.center);
-    let x = scale(b.axes[0], half[0]);
-    let y = scale(b.axes[1], half[1]);
-    let z = scale(b.axes[2], half[2]);
+    let height = normal.dot(b.center);
+    let x = b.axes[0] * half[0];
+    let y = b.axes[1] * half[1];
+    let z = b.axes[2] * half[2];
     for (y, z) in [
         (y, z),
-        (scale(y, C::F::c(-1.0)), z),
-        (y, scale(z, C::F::c(-1.0))),
-        (scale(y, C::F::c(-1.0)), scale(z, C::F::c(-1.0))),
+        (y * C::F::c(-1.0), z),
+        (y, z * C::F::c(-1.0)),
+        (y * C::F::c(-1.0), z * C::F::c(-1.0)),
     ] {
-        let corner = add(x, add(y, z));
-        let above = dot(normal, corner);
-        let at = scale_add(corner, -sign(above), b.center);
+        let corner = x + (y + z);
+        let above = normal.dot(corner);
+        let at = corner.scale_add(-sign(above), b.center);
         lowest(cx, normal, at, height - above.abs(), margin, out);
     }
 }
@@ -104,58 +104,23 @@ pub fn plane_cylinder<C: Cx>(
 ) {
     let c = C::F::c;
     let normal = axes_a[2];
-    let height = dot(normal, b.center);
-    let down = scale(b.axes[2], -sign(dot(normal, b.axes[2])));
-    let cosine = dot(normal, down);
+    let height = normal.dot(b.center);
+    let down = b.axes[2] * -sign(normal.dot(b.axes[2]));
+    let cosine = normal.dot(down);
     // the part of -normal across the axis
-    let across = sub(scale(down, cosine), normal);
-    let sine = dot(across, across).sqrt();
+    let across = (down * cosine) - normal;
+    let sine = across.dot(across).sqrt();
     let upright = sine.lt(c(UPRIGHT));
     let unit = c(1.0).div(C::F::select(upright, c(1.0), sine));
-    let rim = scale(select(upright, b.axes[0], scale(across, unit)), radius);
-    let side = cross(down, rim);
-    let end = scale_add(down, half_height, b.center);
-    let other = scale_add(down, -half_height, b.center);
+    let rim = select(upright, b.axes[0], across * unit) * radius;
+    let side = down.cross(rim);
+    let end = down.scale_add(half_height, b.center);
+    let other = down.scale_add(-half_height, b.center);
     let reach = half_height * cosine;
-    let (fall, lean) = (dot(normal, rim), dot(normal, side));
-    lowest(
-        cx,
-        normal,
-        add(end, rim),
-        height + reach + fall,
-        margin,
-        out,
-    );
-    lowest(
-        cx,
-        normal,
-        add(other, rim),
-        height - reach + fall,
-        margin,
-        out,
-    );
-    lowest(
-        cx,
-        normal,
-        add(end, side),
-        height + reach + lean,
-        margin,
-        out,
-    );
-    lowest(
-        cx,
-        normal,
-        sub(end, side),
-        height + reach - lean,
-        margin,
-        out,
-    );
-    lowest(
-        cx,
-        normal,
-        sub(end, rim),
-        height + reach - fall,
-        margin,
-        out,
-    );
+    let (fall, lean) = (normal.dot(rim), normal.dot(side));
+    lowest(cx, normal, end + rim, height + reach + fall, margin, out);
+    lowest(cx, normal, other + rim, height - reach + fall, margin, out);
+    lowest(cx, normal, end + side, height + reach + lean, margin, out);
+    lowest(cx, normal, end - side, height + reach - lean, margin, out);
+    lowest(cx, normal, end - rim, height + reach - fall, margin, out);
 }

@@ -2,7 +2,7 @@
 
 use crate::constants::contact::row;
 use crate::lane::{Cx, MaskOf, Num, Table};
-use crate::math::vec3::{Mat3, Vec3, add, scale};
+use crate::math::vec3::{Mat3, Vec3};
 use crate::{push, when};
 
 /// A shape where it is, relative to the centre of the pair's first shape.
@@ -74,9 +74,9 @@ impl<C: Cx> Points<C> {
         };
         let (list, table, number) = (&mut self.list, self.table, self.pair);
         let (along, mu) = (self.along, self.mu);
-        let (point, normal) = (add(self.base, point), scale(normal, self.flip));
+        let (point, normal) = (self.base + point, normal * self.flip);
         push!(cx, *list, mask, fresh, {
-            let ([x, y, z], [u, v, w]) = (point, normal);
+            let (Vec3([x, y, z]), Vec3([u, v, w])) = (point, normal);
             // in the order of `row`
             cx.init_all(table, fresh, &[x, y, z, distance, u, v, w, number]);
             if let Some(mu) = mu {
@@ -101,18 +101,16 @@ impl<F: Num> Room<F> {
         let used = cx.load(self.counts, contacts, 0);
         let used_rows = cx.load(self.counts, rows, 0) + self.of_a_contact;
         // whole numbers: half a one keeps roundings out
-        let fits = F::and(
-            (used + F::c(0.5)).lt(self.contacts_max),
-            used_rows.lt(self.rows_max + F::c(0.5)),
-        );
-        when!(cx, F::and(mask, fits), {
+        let fits =
+            (used + F::c(0.5)).lt(self.contacts_max) & used_rows.lt(self.rows_max + F::c(0.5));
+        when!(cx, mask & fits, {
             cx.store(self.counts, contacts, 0, used + one);
             cx.store(self.counts, rows, 0, used_rows);
         });
-        when!(cx, F::and(mask, F::not(fits)), {
+        when!(cx, mask & !fits, {
             let more = cx.load(self.counts, left_out, 0) + one;
             cx.store(self.counts, left_out, 0, more);
         });
-        F::and(mask, fits)
+        mask & fits
     }
 }

@@ -5,7 +5,7 @@ use super::gjk::Restart;
 use super::hull_axes::{Axis, Reach};
 use super::support::{Polyhedron, get3, negated, set3, var3};
 use crate::lane::{Cx, Num};
-use crate::math::vec3::{Mat3, Vec3, dot, transform_back};
+use crate::math::vec3::{Mat3, Vec3};
 use crate::times;
 
 /// Directions on the sphere [–]: 20° apart.
@@ -68,15 +68,15 @@ impl<C: Cx, A: Reach<C::F>, B: Extent<C>> Restart<C> for Samples<'_, C::F, A, B>
             let z = number.fma(c(2.0 / DIRECTIONS as f64), c(1.0 / DIRECTIONS as f64 - 1.0));
             let width = z.fnma(z, c(1.0)).sqrt();
             let (sin, cos) = (number * c(2.399_963_229_728_653)).sincos();
-            let n = [cos * width, sin * width, z];
-            let reach = self.b.extent(cx, negated(n)) + self.a.reach(transform_back(self.axes, n));
-            let distance = -(reach + dot(n, self.center));
+            let n = Vec3([cos * width, sin * width, z]);
+            let reach = self.b.extent(cx, negated(n)) + self.a.reach(self.axes.transpose_mul(n));
+            let distance = -(reach + n.dot(self.center));
             let old = cx.get(&best);
-            let other = dot(n, known.normal).max(dot(n, tried)).lt(c(KNOWN));
-            let is = C::F::and(old.lt(distance), other);
+            let other = n.dot(known.normal).max(n.dot(tried)).lt(c(KNOWN));
+            let is = old.lt(distance) & other;
             let kept = get3(cx, &axis);
             cx.set(&mut best, C::F::select(is, distance, old));
-            set3(cx, &mut axis, select(is, n, kept));
+            set3(cx, &mut axis, select(is, Vec3(n.0), kept));
         });
         Axis {
             normal: get3(cx, &axis),

@@ -5,9 +5,7 @@ use super::manifold::{Side, aligned};
 use super::support::{Polyhedron, pick3, signed};
 use crate::constants::hull::{CORNERS_MAX, HullTables};
 use crate::lane::{Cx, Num};
-use crate::math::vec3::{
-    Mat3, Vec3, cross, dot, scale, scale_add, sub, transform, transform_add, transform_back,
-};
+use crate::math::vec3::{Mat3, Vec3};
 use crate::span;
 
 /// The face of a hull that faces a direction best.
@@ -32,15 +30,15 @@ impl<'a, F: Num> HullSide<'a, F> {
     ) -> HullSide<'a, F> {
         let faces = hull.tables.faces;
         let d = match &placed {
-            Some((axes, _)) => transform_back(axes, d),
+            Some((axes, _)) => axes.transpose_mul(d),
             None => d,
         };
         let (start, end) = hull.span(cx, 1);
         let mut best = cx.var(F::c(-2.0));
         let mut at = cx.var(F::c(0.0));
         span!(cx, face in start, end, {
-            let m = cx.constants(faces, face, 0);
-            let facing = dot(m, d);
+            let m = Vec3(cx.constants(faces, face, 0));
+            let facing = m.dot(d);
             let old = cx.get(&best);
             let (number, kept) = (cx.number(face), cx.get(&at));
             cx.put(&mut at, F::select(old.lt(facing), number, kept));
@@ -51,7 +49,7 @@ impl<'a, F: Num> HullSide<'a, F> {
         HullSide {
             tables: hull.tables,
             outward: match &placed {
-                Some((axes, _)) => transform(axes, m),
+                Some((axes, _)) => axes * m,
                 None => m,
             },
             first: cx.pick(faces, at, 4),
@@ -77,7 +75,7 @@ impl<C: Cx> Side<C> for HullSide<'_, C::F> {
         let place = C::F::select(place.lt(self.count - half), place, C::F::c(0.0));
         let corner = pick3(cx, self.tables.corners, self.first + place, 0);
         match &self.placed {
-            Some((axes, center)) => transform_add(axes, corner, *center),
+            Some((axes, center)) => axes.mul_add(corner, *center),
             None => corner,
         }
     }
@@ -96,7 +94,7 @@ impl<F: Num> BoxSide<F> {
     /// Of the box with these axes, half extents and centre, for the direction `d`.
     #[inline(always)]
     pub fn find(axes: &Mat3<F>, half: Vec3<F>, center: Vec3<F>, d: Vec3<F>) -> BoxSide<F> {
-        let facing = transform_back(axes, d);
+        let facing = axes.transpose_mul(d);
         let mut best = BoxSide::face(axes, half, center, 0, facing[0]);
         let mut most = facing[0].abs();
         for j in 1..3 {
@@ -116,12 +114,12 @@ impl<F: Num> BoxSide<F> {
     #[inline(always)]
     fn face(axes: &Mat3<F>, half: Vec3<F>, center: Vec3<F>, j: usize, facing: F) -> BoxSide<F> {
         let (k, l) = ((j + 1) % 3, (j + 2) % 3);
-        let outward = scale(axes[j], signed(F::c(1.0), facing));
+        let outward = axes[j] * signed(F::c(1.0), facing);
         BoxSide {
             outward,
-            center: scale_add(outward, half[j], center),
-            u: scale(axes[k], half[k]),
-            v: scale(axes[l], signed(half[l], facing)),
+            center: outward.scale_add(half[j], center),
+            u: (axes[k] * half[k]),
+            v: (axes[l] * signed(half[l], facing)),
         }
     }
 }
@@ -139,13 +137,13 @@ impl<C: Cx> Side<C> for BoxSide<C::F> {
     fn corner(&self, cx: &mut C, i: C::I) -> Vec3<C::F> {
         let c = C::F::c;
         let place = cx.number(i);
-        let left = C::F::and(c(0.5).lt(place), place.lt(c(2.5)));
-        let low = C::F::and(c(1.5).lt(place), place.lt(c(3.5)));
+        let left = c(0.5).lt(place) & place.lt(c(2.5));
+        let low = c(1.5).lt(place) & place.lt(c(3.5));
         let (x, y) = (
             C::F::select(left, c(-1.0), c(1.0)),
             C::F::select(low, c(-1.0), c(1.0)),
         );
-        scale_add(self.u, x, scale_add(self.v, y, self.center))
+        self.u.scale_add(x, self.v.scale_add(y, self.center))
     }
 }
 
@@ -160,12 +158,12 @@ impl<F: Num> SegmentSide<F> {
     /// From `center - half` to `center + half`, seen along `normal`, which points outward.
     #[inline(always)]
     pub fn new(center: Vec3<F>, half: Vec3<F>, normal: Vec3<F>) -> SegmentSide<F> {
-        let square = dot(half, half).max(F::c(1e-24));
-        let slope = dot(half, normal).div(square);
+        let square = half.dot(half).max(F::c(1e-24));
+        let slope = half.dot(normal).div(square);
         SegmentSide {
             center,
             half,
-            outward: sub(normal, scale(half, slope)),
+            outward: (normal - (half * slope)),
         }
     }
 }
@@ -183,9 +181,9 @@ impl<C: Cx> Side<C> for SegmentSide<C::F> {
     fn corner(&self, cx: &mut C, i: C::I) -> Vec3<C::F> {
         let c = C::F::c;
         let place = cx.number(i);
-        let second = C::F::and(c(0.5).lt(place), place.lt(c(1.5)));
+        let second = c(0.5).lt(place) & place.lt(c(1.5));
         let side = C::F::select(second, c(1.0), c(-1.0));
-        scale_add(self.half, side, self.center)
+        self.half.scale_add(side, self.center)
     }
 }
 
@@ -211,7 +209,7 @@ impl<F: Num> CylinderSide<F> {
         center: Vec3<F>,
         d: Vec3<F>,
     ) -> CylinderSide<F> {
-        let local = transform_back(axes, d);
+        let local = axes.transpose_mul(d);
         // an upright one keeps its rim points: their direction is not left to rounding
         let width = local[0].fma(local[0], local[1] * local[1]).sqrt();
         let upright = width.lt(F::c(1e-4));
@@ -220,19 +218,19 @@ impl<F: Num> CylinderSide<F> {
             F::select(upright, F::c(1.0), local[0] * unit),
             F::select(upright, F::c(0.0), local[1] * unit),
         );
-        let rim = scale_add(axes[0], x, scale(axes[1], y));
+        let rim = axes[0].scale_add(x, axes[1] * y);
         let cap = F::c(0.7).lt(local[2].abs());
-        let end = scale(axes[2], signed(F::c(1.0), local[2]));
-        let half = scale(axes[2], half_height);
+        let end = axes[2] * signed(F::c(1.0), local[2]);
+        let half = axes[2] * half_height;
         CylinderSide {
             outward: select(cap, end, rim),
             center: select(
                 cap,
-                scale_add(end, half_height, center),
-                scale_add(rim, radius, center),
+                end.scale_add(half_height, center),
+                rim.scale_add(radius, center),
             ),
-            u: select(cap, scale(rim, radius), half),
-            v: scale(cross(end, rim), radius),
+            u: select(cap, rim * radius, half),
+            v: (end.cross(rim) * radius),
             count: F::select(cap, F::c(CORNERS_MAX as f64), F::c(2.0)),
             cap,
         }
@@ -241,13 +239,13 @@ impl<F: Num> CylinderSide<F> {
     /// Is it a cap that is flat on the other shape?
     #[inline(always)]
     pub fn flat(&self, normal: Vec3<F>) -> F::Mask {
-        F::and(self.cap, aligned(self.outward, normal))
+        self.cap & aligned(self.outward, normal)
     }
 
     /// `a` where the mask holds, else `b`.
     #[inline(always)]
     pub fn select(mask: F::Mask, a: &CylinderSide<F>, b: &CylinderSide<F>) -> CylinderSide<F> {
-        let cap = F::or(F::and(mask, a.cap), F::and(F::not(mask), b.cap));
+        let cap = (mask & a.cap) | (!mask & b.cap);
         CylinderSide {
             outward: select(mask, a.outward, b.outward),
             center: select(mask, a.center, b.center),
@@ -279,6 +277,6 @@ impl<C: Cx> Side<C> for CylinderSide<C::F> {
             C::F::select(self.cap, cos, c(2.0).fma(place, c(-1.0))),
             C::F::select(self.cap, sin, c(0.0)),
         );
-        scale_add(self.u, x, scale_add(self.v, y, self.center))
+        self.u.scale_add(x, self.v.scale_add(y, self.center))
     }
 }

@@ -3,9 +3,7 @@
 use super::choose::{clamped, lowest_of, one_of, select, sign};
 use super::points::{Placed, Points};
 use crate::lane::{Cx, MaskOf, Num};
-use crate::math::vec3::{
-    Vec3, dot, scale, scale_add, sub, transform, transform_add, transform_back, zero,
-};
+use crate::math::vec3::{Mat3, Vec3};
 
 /// Adds the contact of two spheres; `beside` is the normal where their centres coincide.
 #[inline(always)]
@@ -21,14 +19,14 @@ pub fn spheres<C: Cx>(
     out: &mut Points<C>,
 ) {
     let c = C::F::c;
-    let between = sub(center_b, center_a);
-    let square = dot(between, between);
+    let between = center_b - center_a;
+    let square = between.dot(between);
     let apart = c(0.0).lt(square);
     let length = square.sqrt();
     let inverse = c(1.0).div(C::F::select(apart, length, c(1.0)));
-    let normal = select(apart, scale(between, inverse), beside);
+    let normal = select(apart, between * inverse, beside);
     let distance = length - radius_a - radius_b;
-    let at = scale_add(normal, distance.fma(c(0.5), radius_a), center_a);
+    let at = normal.scale_add(distance.fma(c(0.5), radius_a), center_a);
     out.add(cx, distance.lt(margin), at, distance, normal);
 }
 
@@ -42,8 +40,17 @@ pub fn sphere_sphere<C: Cx>(
     margin: C::F,
     out: &mut Points<C>,
 ) {
-    let up = [C::F::c(0.0), C::F::c(0.0), C::F::c(1.0)];
-    spheres(cx, zero(), radius_a, b.center, radius_b, up, margin, out);
+    let up = Vec3([C::F::c(0.0), C::F::c(0.0), C::F::c(1.0)]);
+    spheres(
+        cx,
+        Vec3::zero(),
+        radius_a,
+        b.center,
+        radius_b,
+        up,
+        margin,
+        out,
+    );
 }
 
 /// Contact point of a sphere and a capsule: of the sphere and that of the capsule's axis nearest to it.
@@ -57,13 +64,13 @@ pub fn sphere_capsule<C: Cx>(
     margin: C::F,
     out: &mut Points<C>,
 ) {
-    let along = (-dot(b.axes[2], b.center))
+    let along = (-b.axes[2].dot(b.center))
         .min(half_height)
         .max(-half_height);
-    let nearest = scale_add(b.axes[2], along, b.center);
+    let nearest = b.axes[2].scale_add(along, b.center);
     spheres(
         cx,
-        zero(),
+        Vec3::zero(),
         radius_a,
         nearest,
         radius_b,
@@ -83,9 +90,9 @@ pub fn sphere_box<C: Cx>(
     margin: C::F,
     out: &mut Points<C>,
 ) {
-    let center = scale(transform_back(&b.axes, b.center), C::F::c(-1.0));
+    let center = b.axes.transpose_mul(b.center) * C::F::c(-1.0);
     let (distance, way) = leave_box(center, half);
-    let always = C::F::not(margin.lt(margin));
+    let always = !margin.lt(margin);
     sphere_off_box(cx, radius, center, distance, way, b, always, margin, out);
 }
 
@@ -106,14 +113,14 @@ pub fn sphere_off_box<C: Cx>(
 ) {
     let c = C::F::c;
     // the surfaces are at -radius and at -distance
-    let middle = scale_add(way, (radius + distance) * c(-0.5), at);
+    let middle = way.scale_add((radius + distance) * c(-0.5), at);
     let distance = distance - radius;
     out.add(
         cx,
-        C::F::and(mask, distance.lt(margin)),
-        transform_add(&b.axes, middle, b.center),
+        mask & distance.lt(margin),
+        b.axes.mul_add(middle, b.center),
         distance,
-        scale(transform(&b.axes, way), c(-1.0)),
+        (b.axes * way) * c(-1.0),
     );
 }
 
@@ -121,22 +128,22 @@ pub fn sphere_off_box<C: Cx>(
 #[inline(always)]
 pub fn leave_box<F: Num>(point: Vec3<F>, half: Vec3<F>) -> (F, Vec3<F>) {
     let (zero, one) = (F::c(0.0), F::c(1.0));
-    let apart = sub(point, clamped(point, half));
-    let square = dot(apart, apart);
+    let apart = point - clamped(point, half);
+    let square = apart.dot(apart);
     let outside = zero.lt(square);
     let length = square.sqrt();
     let inverse = one.div(F::select(outside, length, one));
-    let depths = [
+    let depths = Vec3([
         half[0] - point[0].abs(),
         half[1] - point[1].abs(),
         half[2] - point[2].abs(),
-    ];
+    ]);
     let (face, depth) = lowest_of(depths);
-    let faces = [
-        [sign(point[0]), zero, zero],
-        [zero, sign(point[1]), zero],
-        [zero, zero, sign(point[2])],
-    ];
-    let direction = select(outside, scale(apart, inverse), one_of(face, faces));
+    let faces = Mat3([
+        Vec3([sign(point[0]), zero, zero]),
+        Vec3([zero, sign(point[1]), zero]),
+        Vec3([zero, zero, sign(point[2])]),
+    ]);
+    let direction = select(outside, apart * inverse, one_of(face, faces));
     (F::select(outside, length, -depth), direction)
 }

@@ -3,7 +3,7 @@
 use super::choose::select;
 use crate::constants::hull::HullTables;
 use crate::lane::{Cx, Fixed, Num, Real};
-use crate::math::vec3::{Mat3, Vec3, dot, scale, scale_add, sub, transform_add, transform_back};
+use crate::math::vec3::{Mat3, Vec3};
 use crate::span;
 
 /// Rounding errors of a few operations, relative to the largest number in them.
@@ -21,7 +21,7 @@ pub(super) fn var3<C: Cx>(cx: &mut C, x: Vec3<C::F>) -> [C::V; 3] {
 /// Their values.
 #[inline(always)]
 pub(super) fn get3<C: Cx>(cx: &C, v: &[C::V; 3]) -> Vec3<C::F> {
-    [cx.get(&v[0]), cx.get(&v[1]), cx.get(&v[2])]
+    Vec3([cx.get(&v[0]), cx.get(&v[1]), cx.get(&v[2])])
 }
 
 /// Assigns in the active worlds.
@@ -43,17 +43,17 @@ pub(super) fn put3<C: Cx>(cx: &mut C, v: &mut [C::V; 3], x: Vec3<C::F>) {
 /// Three numbers of a row of the model, another in each world.
 #[inline(always)]
 pub(super) fn pick3<C: Cx>(cx: &mut C, t: Fixed, row: C::F, k: usize) -> Vec3<C::F> {
-    [
+    Vec3([
         cx.pick(t, row, k),
         cx.pick(t, row, k + 1),
         cx.pick(t, row, k + 2),
-    ]
+    ])
 }
 
 /// -a
 #[inline(always)]
 pub(super) fn negated<F: Num>(a: Vec3<F>) -> Vec3<F> {
-    [-a[0], -a[1], -a[2]]
+    Vec3([-a[0], -a[1], -a[2]])
 }
 
 /// `size` with the sign of `x`.
@@ -68,8 +68,8 @@ pub(super) fn across<F: Num>(a: Vec3<F>) -> Vec3<F> {
     // without its largest or middle component at least a third of its square is left
     let flat = F::c(0.6).lt(a[0].abs());
     let zero = F::c(0.0);
-    let b = select(flat, [-a[1], a[0], zero], [zero, -a[2], a[1]]);
-    scale(b, F::c(1.0).div(dot(b, b).sqrt()))
+    let b = select(flat, Vec3([-a[1], a[0], zero]), Vec3([zero, -a[2], a[1]]));
+    b * F::c(1.0).div(b.dot(b).sqrt())
 }
 
 /// What the closest points of two convex shapes are found by.
@@ -131,17 +131,17 @@ impl<C: Cx> Support<C> for Point<C::F> {
 impl<C: Cx> Support<C> for Segment<C::F> {
     #[inline(always)]
     fn farthest(&self, _: &mut C, d: Vec3<C::F>) -> Vec3<C::F> {
-        let side = signed(C::F::c(1.0), dot(self.half, d));
-        scale_add(self.half, side, self.center)
+        let side = signed(C::F::c(1.0), self.half.dot(d));
+        self.half.scale_add(side, self.center)
     }
 }
 
 impl<C: Cx> Support<C> for Block<C::F> {
     #[inline(always)]
     fn farthest(&self, _: &mut C, d: Vec3<C::F>) -> Vec3<C::F> {
-        let (one, x) = (C::F::c(1.0), transform_back(&self.half, d));
+        let (one, x) = (C::F::c(1.0), self.half.transpose_mul(d));
         let side = [signed(one, x[0]), signed(one, x[1]), signed(one, x[2])];
-        transform_add(&self.half, side, self.center)
+        self.half.mul_add(Vec3(side), self.center)
     }
 }
 
@@ -151,7 +151,7 @@ impl<C: Cx> Support<C> for Upright<C::F> {
         // along the axis any point of the cap is farthest
         let width = d[0].fma(d[0], d[1] * d[1]).sqrt().max(C::F::c(1e-18));
         let rim = self.radius.div(width);
-        [d[0] * rim, d[1] * rim, signed(self.half_height, d[2])]
+        Vec3([d[0] * rim, d[1] * rim, signed(self.half_height, d[2])])
     }
 }
 
@@ -162,8 +162,8 @@ impl<C: Cx> Support<C> for Cylinder<C::F> {
             radius: self.radius,
             half_height: self.half_height,
         };
-        let point = own.farthest(cx, transform_back(&self.axes, d));
-        transform_add(&self.axes, point, self.center)
+        let point = own.farthest(cx, self.axes.transpose_mul(d));
+        self.axes.mul_add(point, self.center)
     }
 }
 
@@ -180,7 +180,7 @@ impl<C: Cx> Polyhedron<'_, C> {
     /// Half extents of its bounding box.
     #[inline(always)]
     pub fn half_extents(&self, cx: &mut C) -> Vec3<C::F> {
-        cx.constants(self.tables.sizes, self.hull, 0)
+        Vec3(cx.constants(self.tables.sizes, self.hull, 0))
     }
 
     /// Radius about its centre.
@@ -197,7 +197,7 @@ impl<C: Cx> Polyhedron<'_, C> {
         span!(cx, row in first, end, {
             let mut reach = cx.get(&best);
             for point in four(cx, self.tables, row) {
-                reach = reach.max(dot(point, d));
+                reach = reach.max(point.dot(d));
             }
             cx.put(&mut best, reach);
         });
@@ -215,7 +215,7 @@ impl<C: Cx> Support<C> for Polyhedron<'_, C> {
             let number = cx.number(row);
             let (mut reach, mut place) = (cx.get(&best), cx.get(&at));
             for (k, point) in four(cx, self.tables, row).into_iter().enumerate() {
-                let x = dot(point, d);
+                let x = point.dot(d);
                 let farther = reach.lt(x);
                 reach = reach.max(x);
                 place = C::F::select(farther, number + C::F::c(0.25 * k as f64), place);
@@ -237,14 +237,19 @@ impl<C: Cx> Support<C> for Polyhedron<'_, C> {
 #[inline(always)]
 pub(super) fn four<C: Cx>(cx: &mut C, tables: &HullTables, row: C::I) -> [Vec3<C::F>; 4] {
     let [a, b, c, d, e, f, g, h, i, j, k, l] = cx.constants(tables.vertices, row, 0);
-    [[a, b, c], [d, e, f], [g, h, i], [j, k, l]]
+    [
+        Vec3([a, b, c]),
+        Vec3([d, e, f]),
+        Vec3([g, h, i]),
+        Vec3([j, k, l]),
+    ]
 }
 
 impl<C: Cx> Support<C> for Turned<'_, C> {
     #[inline(always)]
     fn farthest(&self, cx: &mut C, d: Vec3<C::F>) -> Vec3<C::F> {
-        let point = self.own.farthest(cx, transform_back(&self.axes, d));
-        transform_add(&self.axes, point, self.center)
+        let point = self.own.farthest(cx, self.axes.transpose_mul(d));
+        self.axes.mul_add(point, self.center)
     }
 }
 
@@ -258,5 +263,5 @@ pub(super) fn difference<C: Cx>(
 ) -> (Vec3<C::F>, Vec3<C::F>) {
     let on_a = a.farthest(cx, d);
     let on_b = b.farthest(cx, negated(d));
-    (on_a, sub(on_b, on_a))
+    (on_a, on_b - on_a)
 }

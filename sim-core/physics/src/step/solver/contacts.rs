@@ -48,11 +48,11 @@ fn elliptic<F: Num>(impratio: F::Real, jar: [F; 3], stiff: F, soft: F, mu: F) ->
     let inverse = one.div(F::select(zero.lt(slip), slip, one));
     let (x, y) = (jar[1] * inverse, jar[2] * inverse);
     let excess = mu.fnma(slip, jar[0]);
-    let leaves = F::not(excess.lt(zero));
-    let sticks = F::not(zero.lt(mu.fma(jar[0], slip * F::c(ratio))));
-    let acts = F::and(F::not(leaves), zero.lt(stiff));
-    let sticks = F::and(acts, sticks);
-    let slides = F::and(acts, F::not(sticks));
+    let leaves = !excess.lt(zero);
+    let sticks = !zero.lt(mu.fma(jar[0], slip * F::c(ratio)));
+    let acts = !leaves & zero.lt(stiff);
+    let sticks = acts & sticks;
+    let slides = acts & !sticks;
     let across = stiff * F::c(ratio);
     let push = -(soft * excess);
     // of a sliding contact: soft (1, -μ d)(1, -μ d)ᵀ, and the turning of the friction force
@@ -112,11 +112,11 @@ fn along_line<F: Num>(
     let slip = square.sqrt();
     let inverse = one.div(F::select(zero.lt(slip), slip, one));
     let excess = mu.fnma(slip, normal);
-    let leaves = F::not(excess.lt(zero));
-    let sticks = F::not(zero.lt(mu.fma(normal, slip * F::c(ratio))));
-    let acts = F::and(F::not(leaves), zero.lt(stiff));
-    let sticks = F::and(acts, sticks);
-    let slides = F::and(acts, F::not(sticks));
+    let leaves = !excess.lt(zero);
+    let sticks = !zero.lt(mu.fma(normal, slip * F::c(ratio)));
+    let acts = !leaves & zero.lt(stiff);
+    let sticks = acts & sticks;
+    let slides = acts & !sticks;
     let across = stiff * F::c(ratio);
     let push = -(soft * excess);
     // of a sliding contact: rates of the slip and of the excess, and how fast the slip's rate grows

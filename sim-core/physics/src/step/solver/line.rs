@@ -3,6 +3,7 @@
 use super::super::ConstantsOf;
 use super::contacts;
 use super::rows::{Law, bounds, dry_friction, equality, one_sided};
+use crate::arrays::Workspace;
 use crate::constants::Constants;
 use crate::lane::{Cx, Num, Real};
 use crate::{break_if, times};
@@ -38,8 +39,8 @@ struct Derivative<F> {
 }
 
 impl<'a, F: Num> Line<'a, F> {
-    /// `curvature` is sᵀ M s, `power` |τ a|; of rows: stiffness of those that act, `jar`, its change `jv` over the segment,
-    /// and `aref`. In the worlds where the solver `corrects`, they touch.
+    /// `curvature` is sᵀ M s, `power` |τ a|; `jar_minimum` has the change of `jar` over the segment. In the worlds where the
+    /// solver `corrects`, they touch.
     ///
     /// Turns what contacts have ahead into its change.
     #[inline(always)]
@@ -49,9 +50,11 @@ impl<'a, F: Num> Line<'a, F> {
         params: &'a [F],
         curvature: F,
         power: F,
-        [weight, jar, jv, aref]: [&'a [F]; 4],
+        w: &'a Workspace<F>,
         corrects: Option<F::Mask>,
     ) -> Self {
+        let (weight, aref) = (&w.row_weight, &w.row_aref);
+        let (jar, jv) = (&w.jar, &w.jar_minimum);
         let epsilon = F::c(<F::Real as Real>::EPSILON);
         let (mut descent, mut size) = (curvature, curvature);
         let mut terms = power;
@@ -175,8 +178,8 @@ pub(super) fn search<C: Cx>(
         let below = C::F::select(falls, alpha, cx.get(&low));
         let above = C::F::select(falls, cx.get(&high), alpha);
         let close = (d.size * resolution).max(line.descent * C::F::c(slack));
-        let found = C::F::not(close.lt(d.slope.abs()));
-        break_if!(cx, C::F::or(found, (above - below).lt(above * resolution)));
+        let found = !close.lt(d.slope.abs());
+        break_if!(cx, found | (above - below).lt(above * resolution));
         cx.set(&mut low, below);
         cx.set(&mut high, above);
         let before = cx.get(&side);
@@ -192,11 +195,11 @@ pub(super) fn search<C: Cx>(
         let newton = alpha - d.slope.div(d.curvature);
         let is_open = C::F::c(0.5 * FAR).lt(above);
         let halves = (newton - alpha).abs().lt(half * cx.get(&last_move));
-        let inside = C::F::and(below.lt(newton), newton.lt(above));
-        let is_newton = C::F::and(inside, C::F::or(is_open, halves));
+        let inside = below.lt(newton) & newton.lt(above);
+        let is_newton = inside & (is_open | halves);
         let rise = above_slope - below_slope;
         let chord = below.fma(above_slope, -(above * below_slope)).div(rise);
-        let is_chord = C::F::and(below.lt(chord), chord.lt(above));
+        let is_chord = below.lt(chord) & chord.lt(above);
         let middle = half * (below + above);
         let other = C::F::select(is_chord, chord, middle);
         let next = C::F::select(is_newton, newton, other);

@@ -5,7 +5,7 @@
 //! minimise over a    ½ (a - M⁻¹ τ)ᵀ M (a - M⁻¹ τ) + Σ rows s(J a - aref)
 //! ```
 //!
-//! A round solves the quadratic model around `a`, whose minimum is `a⁺`:
+//! An iteration solves the quadratic model around `a`, whose minimum is `a⁺`:
 //!
 //! ```text
 //! (M + Jᵀ W J) a⁺ = τ + Jᵀ (f + W J a)        f = -s',  W = s''
@@ -15,187 +15,94 @@
 //! If no row changes its state between `a` and `a⁺` the model was exact and `a⁺` is the answer.
 //! Otherwise an exact line search on the segment finds the next `a` (in `f32` only if three whole steps
 //! did not get there, or would overshoot). The start is the last step's
-//! result, which mostly makes the first round the only one; in `f64`, the reference, it is chosen as
+//! result, which mostly makes the first iteration the only one; in `f64`, the reference, it is chosen as
 //! MuJoCo does (see [`choose_start`]).
 
 mod contacts;
 mod line;
+mod linear;
+mod progress;
 mod refine;
 mod rows;
 
-pub(super) use refine::{accelerations, refine};
+pub use refine::{Accelerations, Refine};
 
-use super::{BlockOf, ConstantsOf};
-use crate::constants::contact::Cone;
+use super::{BlockOf, ConstantsOf, Stage};
+use crate::arrays::Array as A;
 use crate::constants::contact::row;
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::factor::{multiply, solve as solve_linear};
 use crate::{break_if, times, when};
 use line::{Line, search};
-use rows::{assemble, changes, cost, forces, residual};
+use progress::{Found, Pieces, Plan, Progress};
+use rows::{assemble, cost, forces, residual};
 
+/// Accelerations and constraint forces.
+pub struct Solver;
+
+impl Stage for Solver {
+    const READS: &'static [A] = &[
+        A::JointQdd,
+        A::Unconverged,
+        A::Params,
+        A::MassMatrix,
+        A::SmoothForce,
+        A::EfcD,
+        A::EfcAref,
+        A::LimitSide,
+        A::ContactRows,
+    ];
+    const WRITES: &'static [A] = &[
+        A::JointQdd,
+        A::Unconverged,
+        A::EfcForce,
+        A::ConstraintForce,
+        A::ContactForces,
+    ];
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        solve(cx, m, b);
+    }
+}
+
+/// Newton's method, from the last step's accelerations to the minimum of the cost.
 #[inline(always)]
-pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    let n = m.dofs.len();
-    let (zero, half, one) = (C::F::c(0.0), C::F::c(0.5), C::F::c(1.0));
+fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     if <<C::F as Num>::Real as Real>::DOUBLE {
         choose_start(cx, m, b);
     }
     let acts = acts(cx, m, &b.efc_weight);
-    let [_, _, weight, aref] = &mut b.work.row;
-    gather(cx, &b.efc_weight, weight);
-    gather(cx, &b.efc_aref, aref);
-    let t = &m.contacts;
+    gather(cx, &b.efc_weight, &mut b.work.row_weight);
+    gather(cx, &b.efc_aref, &mut b.work.row_aref);
     // contacts are so stiff that M is lost in the rounding of H a⁺; of H (a⁺ - a) less is asked
-    let corrects = contacts::touching(cx, t);
-    // A factor of rows a million times as stiff as M leaves a step its first digits only: one more round finds the rest
-    let polished = match corrects {
-        Some(corrects) => C::F::select(corrects, zero, one),
-        None => one,
-    };
-    let mut calm = cx.var(polished);
-    let mut busy = cx.var(C::F::select(acts, one, zero));
-    let mut round = cx.var(zero);
-    let mut last_gain = cx.var(C::F::c(2.0 * UNKNOWN));
+    let corrects = contacts::touching(cx, &m.contacts);
+    let mut progress = Progress::new(cx, acts, corrects);
     times!(cx, m.solver.iterations, {
         if may_idle::<C>(m) {
-            break_if!(cx, C::F::not(acts));
+            break_if!(cx, !acts);
         }
-        let w = &mut b.work;
-        let [a, minimum, _, pull] = &mut w.vector;
-        let [jar, _, weight, aref] = &mut w.row;
-        for j in 0..n {
-            a[j] = cx.get(&b.joint_qdd[j]);
-            minimum[j] = w.smooth_force[j];
-        }
-        if let Some(corrects) = corrects {
-            multiply(&m.pattern, &w.mass_matrix, a, pull);
-            for j in 0..n {
-                minimum[j] = C::F::select(corrects, minimum[j] - pull[j], minimum[j]);
-            }
-        }
-        w.hessian.copy_from_slice(&w.mass_matrix);
-        residual(m, &w.limit_side, aref, a, jar);
-        assemble(
-            m,
-            &b.params,
-            &w.limit_side,
-            weight,
-            aref,
-            jar,
-            &mut w.hessian,
-            minimum,
-            corrects,
-        );
-        if corrects.is_some() {
-            contacts::residual(cx, t, a, row::JAR);
-        }
-        solve_system(cx, m, b, MINIMUM, true, corrects);
-        let gain = match corrects {
-            Some(corrects) if !<<C::F as Num>::Real as Real>::DOUBLE => {
-                C::F::select(corrects, touched_gain(cx, m, b), C::F::c(UNKNOWN))
-            }
-            _ => C::F::c(UNKNOWN),
-        };
-        let w = &mut b.work;
-        let [a, minimum, step, pull] = &mut w.vector;
-        if let Some(corrects) = corrects {
-            for j in 0..n {
-                minimum[j] = C::F::select(corrects, a[j] + minimum[j], minimum[j]);
-            }
-        }
-        let [jar, jar_minimum, weight, aref] = &mut w.row;
-        residual(m, &w.limit_side, aref, minimum, jar_minimum);
-        let [sum, turned] = changes(m, &b.params, weight, jar, jar_minimum);
-        let mut moved = cx.var(sum);
-        // a whole step overshoots where a contact slides, and where a dry friction turns, which it may do for ever
-        let mut curved = cx.var(turned);
-        if corrects.is_some() {
-            contacts::residual(cx, t, minimum, row::AHEAD);
-            contacts::changes(cx, t, &mut moved, &mut curved);
-        }
-        let changed = half.lt(cx.get(&moved));
-        let later = half.lt(cx.get(&round));
-        let early = cx.get(&round).lt(C::F::c(trusted_rounds::<C::F>()));
-        let mut trusted = C::F::and(early, cx.get(&curved).lt(half));
-        // and where a pyramid's edges are too stiff for their factor
-        if let (Some(corrects), Cone::Pyramidal) = (corrects, t.cone) {
-            trusted = C::F::and(trusted, C::F::not(corrects));
-        }
-        // what bodies that touch would gain by another round is less than the tolerance already
-        let quiet = C::F::and(C::F::not(changed), gain.lt(C::F::k(m.solver.tolerance)));
-        let searches = C::F::and(C::F::or(changed, later), C::F::not(trusted));
-        let searches = C::F::and(searches, C::F::not(quiet));
-        let mut length = cx.var(one);
-        let mut settled = cx.var(zero);
-        when!(cx, searches, {
-            for j in 0..n {
-                step[j] = minimum[j] - a[j];
-            }
-            multiply(&m.pattern, &w.mass_matrix, step, pull);
-            let (mut curvature, mut power) = (zero, zero);
-            for j in 0..n {
-                curvature = step[j].fma(pull[j], curvature);
-                power = power + (w.smooth_force[j] * a[j]).abs();
-            }
-            for r in 0..m.rows() {
-                jar_minimum[r] = jar_minimum[r] - jar[r];
-            }
-            let rows = [&weight[..], jar, jar_minimum, aref];
-            let line = Line::new(cx, m, &b.params, curvature, power, rows, corrects);
-            search::<C>(cx, m, &line, &mut length);
-            // The model promises a gain of ½ |p'(0)|. Below the tolerance the step is not taken, as in
-            // MuJoCo, but for the first; below what rounding makes it is the last that can help. In `f32` it is the last
-            // too if Newton's next one, of which the gain shrinks with the square, would be below the tolerance.
-            let gain = half * line.descent;
-            let small = C::F::and(later, gain.lt(C::F::k(m.solver.tolerance)));
-            let mut last = gain.lt(line.noise);
-            if let Some(corrects) = corrects {
-                let before = cx.get(&last_gain);
-                // Newton's gains shrink fast; one that does not, and is hardly more than rounding, is rounding
-                let stalls = (C::F::c(STALLED) * before).lt(gain);
-                let is_small = gain.lt(line.noise * C::F::c(DOUBTED));
-                let mut ends = C::F::and(stalls, is_small);
-                if !<<C::F as Num>::Real as Real>::DOUBLE {
-                    let next = gain * gain;
-                    let is_enough = next.lt(C::F::k(m.solver.tolerance) * before);
-                    let off = (cx.get(&length) - one).abs();
-                    let is_newtons = C::F::and(off.lt(C::F::c(0.25)), before.lt(C::F::c(UNKNOWN)));
-                    ends = C::F::or(ends, C::F::and(is_enough, is_newtons));
-                }
-                last = C::F::or(last, C::F::and(corrects, ends));
-                cx.set(&mut last_gain, gain);
-            }
-            cx.set(&mut settled, C::F::select(C::F::or(small, last), one, zero));
-            let alpha = cx.get(&length);
-            cx.set(&mut length, C::F::select(small, zero, alpha));
-        });
-        let alpha = cx.get(&length);
-        for j in 0..n {
-            let moved = alpha.fma(minimum[j] - a[j], a[j]);
-            cx.set(
-                &mut b.joint_qdd[j],
-                C::F::select(searches, moved, minimum[j]),
-            );
-        }
-        let is_calm = C::F::or(half.lt(cx.get(&calm)), quiet);
-        let ends = C::F::and(C::F::not(changed), is_calm);
-        let done = C::F::or(ends, half.lt(cx.get(&settled)));
-        if let Some(corrects) = corrects {
-            let again = C::F::and(corrects, changed);
-            cx.set(&mut calm, C::F::select(again, zero, one));
-        }
-        cx.set(&mut busy, C::F::select(done, zero, one));
+        // the cost at a: residuals of the rows, H = M + Jᵀ W J and the right-hand side
+        model_cost(cx, m, b, corrects);
+        // its minimum a⁺, and what bodies that touch gain by going there
+        let gain = minimize_model(cx, m, b, corrects);
+        // rows that are on another piece of their cost at a⁺
+        let pieces = Pieces::compare(cx, m, b, corrects);
+        // the worlds that search the segment from a to a⁺
+        let plan = progress.plan(cx, m, &pieces, gain, corrects);
+        // where on it the cost is least
+        let found = search_segment(cx, m, b, &mut progress, &plan, corrects);
+        // the next a, and the worlds that have arrived
+        advance(cx, b, &plan, &found);
+        let done = progress.note(cx, &plan, &found, corrects);
         break_if!(cx, done);
-        let rounds = cx.get(&round) + one;
-        cx.set(&mut round, rounds);
+        progress.count(cx);
     });
-    let unconverged = cx.get(&b.unconverged[0]).max(cx.get(&busy));
-    cx.set(&mut b.unconverged[0], unconverged);
+    progress.report(cx, b);
 
     if may_idle::<C>(m) {
         for force in b.efc_force.iter_mut().chain(&mut b.constraint_force) {
-            cx.set(force, zero);
+            cx.set(force, C::F::c(0.0));
         }
         when!(cx, acts, {
             constraint_forces(cx, m, b);
@@ -203,6 +110,106 @@ pub(super) fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     } else {
         constraint_forces(cx, m, b);
     }
+}
+
+/// H and the right-hand side at `a`: τ + Jᵀ (f + W J a), or in the worlds that correct τ + Jᵀ f - M a. Contacts add theirs
+/// in [`linear::solve_system`].
+#[inline(always)]
+fn model_cost<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    corrects: Option<MaskOf<C>>,
+) {
+    let w = &mut b.work;
+    for j in 0..m.dofs.len() {
+        w.start[j] = cx.get(&b.joint_qdd[j]);
+        w.minimum[j] = w.smooth_force[j];
+    }
+    if let Some(corrects) = corrects {
+        multiply(&m.pattern, &w.mass_matrix, &w.start, &mut w.joint_force);
+        for j in 0..m.dofs.len() {
+            let less = w.minimum[j] - w.joint_force[j];
+            w.minimum[j] = C::F::select(corrects, less, w.minimum[j]);
+        }
+    }
+    w.hessian.copy_from_slice(&w.mass_matrix);
+    residual(m, &w.limit_side, &w.row_aref, &w.start, &mut w.jar);
+    assemble(m, &b.params, w, corrects);
+    if corrects.is_some() {
+        contacts::residual(cx, &m.contacts, &w.start, row::JAR);
+    }
+}
+
+/// Solves for the minimum a⁺ of the model; returns the gain of bodies that touch, where it is known.
+#[inline(always)]
+fn minimize_model<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    corrects: Option<MaskOf<C>>,
+) -> C::F {
+    linear::solve_system(cx, m, b, linear::Unknown::Minimum, corrects);
+    let gain = match corrects {
+        Some(corrects) if !<<C::F as Num>::Real as Real>::DOUBLE => {
+            C::F::select(corrects, linear::touched_gain(cx, m, b), C::F::c(UNKNOWN))
+        }
+        _ => C::F::c(UNKNOWN),
+    };
+    let w = &mut b.work;
+    if let Some(corrects) = corrects {
+        for j in 0..m.dofs.len() {
+            let whole = w.start[j] + w.minimum[j];
+            w.minimum[j] = C::F::select(corrects, whole, w.minimum[j]);
+        }
+    }
+    gain
+}
+
+/// Moves to the minimum of the model, or to the point of the segment that was found.
+#[inline(always)]
+fn advance<C: Cx>(cx: &mut C, b: &mut BlockOf<C>, plan: &Plan<C>, found: &Found<C>) {
+    let (w, alpha) = (&b.work, cx.get(&found.length));
+    for (j, qdd) in b.joint_qdd.iter_mut().enumerate() {
+        let moved = alpha.fma(w.minimum[j] - w.start[j], w.start[j]);
+        cx.set(qdd, C::F::select(plan.searches, moved, w.minimum[j]));
+    }
+}
+
+/// The segment from a to a⁺ in the worlds that search: how far the cost falls, and whether that ends the solve.
+#[inline(always)]
+fn search_segment<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    progress: &mut Progress<C>,
+    plan: &Plan<C>,
+    corrects: Option<MaskOf<C>>,
+) -> Found<C> {
+    let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+    let mut found = Found {
+        length: cx.var(one),
+        settled: cx.var(zero),
+    };
+    when!(cx, plan.searches, {
+        let w = &mut b.work;
+        for j in 0..m.dofs.len() {
+            w.step[j] = w.minimum[j] - w.start[j];
+        }
+        multiply(&m.pattern, &w.mass_matrix, &w.step, &mut w.joint_force);
+        let (mut curvature, mut power) = (zero, zero);
+        for j in 0..m.dofs.len() {
+            curvature = w.step[j].fma(w.joint_force[j], curvature);
+            power = power + (w.smooth_force[j] * w.start[j]).abs();
+        }
+        for r in 0..m.rows() {
+            w.jar_minimum[r] = w.jar_minimum[r] - w.jar[r];
+        }
+        let line = Line::new(cx, m, &b.params, curvature, power, &b.work, corrects);
+        search::<C>(cx, m, &line, &mut found.length);
+        progress.judge(cx, m, &line, &mut found, plan, corrects);
+    });
+    found
 }
 
 /// The worlds that have contacts now; none if no world has.
@@ -215,8 +222,9 @@ pub(super) fn touching<C: Cx>(cx: &mut C, m: &ConstantsOf<C>) -> Option<MaskOf<C
 #[inline(always)]
 fn constraint_forces<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let w = &mut b.work;
-    let [a, joint, ..] = &mut w.vector;
-    let [jar, force, weight, aref] = &mut w.row;
+    let (a, joint) = (&mut w.start, &mut w.joint_force);
+    let (jar, force) = (&mut w.jar, &mut w.row_force);
+    let (weight, aref) = (&w.row_weight, &w.row_aref);
     for j in 0..m.dofs.len() {
         a[j] = cx.get(&b.joint_qdd[j]);
         joint[j] = C::F::c(0.0);
@@ -233,118 +241,8 @@ fn constraint_forces<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) 
     contacts::forces(cx, &m.contacts, &mut b.constraint_force);
 }
 
-/// A gain above this share of the last round's is no progress of Newton's method [–].
-const STALLED: f64 = 0.25;
-/// Without progress, a gain up to this many times [`Line::noise`] is taken for noise [–]. Of 327 states of random piles,
-/// both cones, no acceleration is then off by more than 3e-4 in `f32`, where 10,000 times leave 2e-3.
-const DOUBTED: f64 = 100.0;
-
 /// No gain is as large [J/s²].
 const UNKNOWN: f64 = 1e30;
-
-/// Which of the scratch vectors has the right-hand side of a round, and then its minimum.
-const MINIMUM: usize = 1;
-
-/// Solves (M + JᵀWJ) x = rhs in place, in scratch vector `x`; the Hessian has the joint rows already, and the
-/// contacts' force is added to the right-hand side if `pulls`. `touching` is that of [`contacts::touching`].
-///
-/// A world whose contacts couple what the mass matrix does not solves a larger system; the others need not.
-#[inline(always)]
-fn solve_system<C: Cx>(
-    cx: &mut C,
-    m: &ConstantsOf<C>,
-    b: &mut BlockOf<C>,
-    x: usize,
-    pulls: bool,
-    touching: Option<MaskOf<C>>,
-) {
-    let t = &m.contacts;
-    let w = &mut b.work;
-    let touches = touching.is_some();
-    if touches {
-        for (cell, value) in b.system.iter_mut().zip(&w.hessian) {
-            cx.put(cell, *value);
-        }
-        for (cell, value) in b.pull.iter_mut().zip(&w.vector[x]) {
-            cx.put(cell, *value);
-        }
-    }
-    let couples = touches && t.couples();
-    let coupling = contacts::coupling(cx, t);
-    let (none, half) = (coupling.lt(C::F::c(0.5)), C::F::c(0.5));
-    // a loop, so that assembly and solver are compiled once: they are long
-    for larger in [false, true] {
-        if larger && !couples {
-            break;
-        }
-        let solves = if larger { half.lt(coupling) } else { none };
-        if larger {
-            when!(cx, solves, {
-                for cell in &mut b.coupled_system {
-                    cx.put(cell, C::F::c(0.0));
-                }
-                for (cell, &place) in b.system.iter().zip(&m.coupled.places) {
-                    let value = cx.get(cell);
-                    cx.put(&mut b.coupled_system[place], value);
-                }
-            });
-        }
-        let (pattern, cells, matrix) = if larger {
-            (
-                &m.coupled.pattern,
-                &mut b.coupled_system,
-                &mut w.coupled_hessian,
-            )
-        } else {
-            (&m.pattern, &mut b.system, &mut w.hessian)
-        };
-        if touches {
-            for k in 0..t.classes.len() {
-                if t.classes[k].couples == larger {
-                    contacts::assemble(cx, t, k, cells, &mut b.pull, pulls);
-                }
-            }
-        }
-        when!(cx, solves, {
-            if touches {
-                gather(cx, cells, matrix);
-                gather(cx, &b.pull, &mut w.vector[x]);
-            }
-            solve_linear(pattern, matrix, &mut w.vector[x]);
-            for (cell, value) in b.solution.iter_mut().zip(&w.vector[x]) {
-                cx.set(cell, *value);
-            }
-        });
-    }
-    gather(cx, &b.solution, &mut w.vector[x]);
-}
-
-/// The gain of a whole step, ½ gᵀ H⁻¹ g, of the parts of the mass matrix in which bodies touch; more where contacts
-/// of several classes touch one part. The others are solved to rounding, however far they go.
-///
-/// The step is in scratch vector [`MINIMUM`], the gradient is the right-hand side that it was solved for.
-#[inline(always)]
-fn touched_gain<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) -> C::F {
-    let (zero, half) = (C::F::c(0.0), C::F::c(0.5));
-    let [_, step, gains, _] = &mut b.work.vector;
-    for (gain, rows) in gains.iter_mut().zip(m.pattern.parts()) {
-        let mut sum = zero;
-        for j in rows {
-            sum = cx.get(&b.pull[j]).fma(step[j], sum);
-        }
-        // alone, a part of what contacts couple may lose
-        *gain = half * sum.abs();
-    }
-    let mut sum = zero;
-    for (k, class) in m.contacts.classes.iter().enumerate() {
-        let at = cx.at(k);
-        let touches = half.lt(cx.load(m.contacts.memory.counts, at, 0));
-        for &part in &class.parts {
-            sum = sum + C::F::select(touches, gains[part], zero);
-        }
-    }
-    sum
-}
 
 /// The values of cells.
 #[inline(always)]
@@ -380,14 +278,6 @@ fn acts<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, weight: &[C::V]) -> MaskOf<C> {
     zero.lt(stiffest)
 }
 
-/// Rounds that take the whole step without a line search, which costs as much as two rounds.
-///
-/// Newton's method on a piecewise quadratic mostly ends by itself in two or three; a world that goes
-/// on after these searches. The reference always searches, since MuJoCo does.
-fn trusted_rounds<F: Num>() -> f64 {
-    if F::Real::DOUBLE { -1.0 } else { 2.5 }
-}
-
 /// Starts from M⁻¹ τ where that costs less than the last step's result (MuJoCo: `mj_warmstart`).
 ///
 /// The minimum is the same; where the tolerance stops the solver short of it depends on the start by
@@ -397,10 +287,11 @@ fn trusted_rounds<F: Num>() -> f64 {
 fn choose_start<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let n = m.dofs.len();
     let w = &mut b.work;
-    let [warm, smooth, ahead, pull] = &mut w.vector;
-    let [jar, jar_smooth, weight, aref] = &mut w.row;
-    gather(cx, &b.efc_weight, weight);
-    gather(cx, &b.efc_aref, aref);
+    gather(cx, &b.efc_weight, &mut w.row_weight);
+    gather(cx, &b.efc_aref, &mut w.row_aref);
+    let (warm, smooth, ahead) = (&mut w.start, &mut w.minimum, &mut w.step);
+    let (jar, jar_smooth) = (&mut w.jar, &mut w.jar_minimum);
+    let (weight, aref) = (&w.row_weight, &w.row_aref);
     w.hessian.copy_from_slice(&w.mass_matrix);
     smooth.copy_from_slice(&w.smooth_force);
     solve_linear(&m.pattern, &mut w.hessian, smooth);
@@ -410,10 +301,10 @@ fn choose_start<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     }
     residual(m, &w.limit_side, aref, warm, jar);
     residual(m, &w.limit_side, aref, smooth, jar_smooth);
-    multiply(&m.pattern, &w.mass_matrix, ahead, pull);
+    multiply(&m.pattern, &w.mass_matrix, ahead, &mut w.joint_force);
     let mut gauss = C::F::c(0.0);
     for j in 0..n {
-        gauss = ahead[j].fma(pull[j], gauss);
+        gauss = ahead[j].fma(w.joint_force[j], gauss);
     }
     let mut cost_warm = cx.var(gauss.fma(C::F::c(0.5), cost(m, &b.params, weight, jar)));
     let mut cost_smooth = cx.var(cost(m, &b.params, weight, jar_smooth));

@@ -9,16 +9,90 @@
 //! masses and lengths moves it by 1e-7, and inverse dynamics body by body keeps that. One pass takes
 //! an error of 1e-3 to 1e-6; `Newton::refinements` says how many a model needs.
 
+use super::linear::{Unknown, solve_system};
 use super::rows::{assemble, forces, residual};
-use super::{acts, contacts, gather, may_idle, solve_system};
+use super::{acts, contacts, gather, may_idle};
+use crate::arrays::Array as A;
 use crate::constants::contact::row;
 use crate::lane::{Cx, Num, Real};
 use crate::step::inverse_dynamics::inverse_dynamics;
-use crate::step::{BlockOf, ConstantsOf};
+use crate::step::{BlockOf, ConstantsOf, Stage};
 use crate::when;
 
+/// Accelerations and constraint forces, corrected where `f32` needs it.
+pub struct Refine;
+
+impl Stage for Refine {
+    const READS: &'static [A] = &[
+        A::JointQ,
+        A::JointQd,
+        A::JointQdd,
+        A::Params,
+        A::Rotation,
+        A::Velocity,
+        A::BiasForce,
+        A::MassMatrix,
+        A::SmoothForce,
+        A::EfcD,
+        A::EfcAref,
+        A::LimitSide,
+        A::EfcForce,
+        A::ConstraintForce,
+        A::ContactRows,
+        A::ContactForces,
+    ];
+    const WRITES: &'static [A] = &[
+        A::JointQdd,
+        A::EfcForce,
+        A::ConstraintForce,
+        A::ContactForces,
+    ];
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        refine(cx, m, b);
+    }
+}
+
+/// Accelerations for output, where the solver left them out.
+pub struct Accelerations;
+
+impl Stage for Accelerations {
+    const READS: &'static [A] = &[
+        A::JointQ,
+        A::JointQd,
+        A::JointQdd,
+        A::Params,
+        A::Rotation,
+        A::Velocity,
+        A::BiasForce,
+        A::MassMatrix,
+        A::SmoothForce,
+        A::EfcD,
+        A::EfcAref,
+        A::LimitSide,
+        A::EfcForce,
+        A::ConstraintForce,
+        A::ContactRows,
+        A::ContactForces,
+    ];
+    const WRITES: &'static [A] = &[
+        A::JointQdd,
+        A::EfcForce,
+        A::ConstraintForce,
+        A::ContactForces,
+    ];
+    // the forces that it writes are 0, as the solver left them
+    const COMPLETES: &'static [A] = &[A::JointQdd];
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        accelerations(cx, m, b);
+    }
+}
+
 #[inline(always)]
-pub(in crate::step) fn refine<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+fn refine<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     if !<<C::F as Num>::Real as Real>::DOUBLE && m.solver.refinements > 0 {
         let acts = acts(cx, m, &b.efc_weight);
         when!(cx, acts, {
@@ -31,9 +105,9 @@ pub(in crate::step) fn refine<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Blo
 
 /// Accelerations of the worlds that the solver passed over: the first correction is of 0.
 #[inline(always)]
-pub(in crate::step) fn accelerations<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+fn accelerations<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     if may_idle::<C>(m) {
-        let idle = C::F::not(acts(cx, m, &b.efc_weight));
+        let idle = !acts(cx, m, &b.efc_weight);
         when!(cx, idle, {
             for qdd in &mut b.joint_qdd {
                 cx.set(qdd, C::F::c(0.0));
@@ -45,43 +119,30 @@ pub(in crate::step) fn accelerations<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &
     }
 }
 
-/// Which of the scratch vectors has what is missing, and then the correction.
-const MISSING: usize = 0;
-
 #[inline(always)]
 fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     inverse_dynamics(cx, m, b);
     let n = m.dofs.len();
     let w = &mut b.work;
-    let [missing, a, rhs, _] = &mut w.vector;
-    let [jar, _, weight, aref] = &mut w.row;
-    gather(cx, &b.efc_weight, weight);
-    gather(cx, &b.efc_aref, aref);
+    gather(cx, &b.efc_weight, &mut w.row_weight);
+    gather(cx, &b.efc_aref, &mut w.row_aref);
     for j in 0..n {
-        a[j] = cx.get(&b.joint_qdd[j]);
+        w.start[j] = cx.get(&b.joint_qdd[j]);
         let applied = w.smooth_force[j] + w.bias_force[j];
-        missing[j] = applied + cx.get(&b.constraint_force[j]) - missing[j];
-        rhs[j] = C::F::c(0.0);
+        w.missing[j] = applied + cx.get(&b.constraint_force[j]) - w.missing[j];
+        // nobody needs the right-hand side that is assembled with the Hessian
+        w.minimum[j] = C::F::c(0.0);
     }
     w.hessian.copy_from_slice(&w.mass_matrix);
-    residual(m, &w.limit_side, aref, a, jar);
-    assemble(
-        m,
-        &b.params,
-        &w.limit_side,
-        weight,
-        aref,
-        jar,
-        &mut w.hessian,
-        rhs,
-        None,
-    );
-    contacts::residual(cx, &m.contacts, a, row::JAR);
+    residual(m, &w.limit_side, &w.row_aref, &w.start, &mut w.jar);
+    assemble(m, &b.params, w, None);
+    contacts::residual(cx, &m.contacts, &w.start, row::JAR);
     let touching = contacts::touching(cx, &m.contacts);
-    solve_system(cx, m, b, MISSING, false, touching);
+    solve_system(cx, m, b, Unknown::Missing, touching);
     let w = &mut b.work;
-    let [missing, a, _, joint] = &mut w.vector;
-    let [jar, force, weight, aref] = &mut w.row;
+    let (missing, a, joint) = (&w.missing, &mut w.start, &mut w.joint_force);
+    let (jar, force) = (&mut w.jar, &mut w.row_force);
+    let (weight, aref) = (&w.row_weight, &w.row_aref);
     for j in 0..n {
         a[j] = a[j] + missing[j];
         cx.set(&mut b.joint_qdd[j], a[j]);

@@ -1,5 +1,6 @@
 //! Laws of the constraint rows, and sums over them.
 
+use crate::arrays::Workspace;
 use crate::constants::params::Param;
 use crate::constants::{Constants, Friction};
 use crate::lane::Num;
@@ -27,7 +28,7 @@ pub(super) fn equality<F: Num>(jar: F, weight: F) -> Law<F> {
 pub(super) fn dry_friction<F: Num>(jar: F, weight: F, zone: F, loss: F) -> Law<F> {
     let (zero, one) = (F::c(0.0), F::c(1.0));
     let (below, above) = (jar.lt(-zone), zone.lt(jar));
-    let slides = F::or(below, above);
+    let slides = below | above;
     let bound = F::select(below, loss, -loss);
     Law {
         force: F::select(slides, bound, -(weight * jar)),
@@ -97,20 +98,16 @@ fn pull<F: Num>(law: &Law<F>, jar: F, aref: F, corrects: Option<F::Mask>) -> F {
     }
 }
 
-/// Adds Jᵀ W J to the Hessian, and to the right-hand side Jᵀ (f + W J a), or Jᵀ f in the worlds where the solver `corrects`.
-#[allow(clippy::too_many_arguments)]
+/// Adds Jᵀ W J to `hessian`, and to the right-hand side in `minimum` Jᵀ (f + W J a), or Jᵀ f in the worlds where the solver `corrects`.
 #[inline(always)]
 pub(super) fn assemble<F: Num>(
     m: &Constants<F::Real>,
     params: &[F],
-    side: &[F],
-    weight: &[F],
-    aref: &[F],
-    jar: &[F],
-    hessian: &mut [F],
-    rhs: &mut [F],
+    w: &mut Workspace<F>,
     corrects: Option<F::Mask>,
 ) {
+    let (hessian, rhs) = (&mut w.hessian, &mut w.minimum);
+    let (side, weight, aref, jar) = (&w.limit_side, &w.row_weight, &w.row_aref, &w.jar);
     let mut r = 0;
     for e in &m.equalities {
         let law = equality(jar[r], weight[r]);

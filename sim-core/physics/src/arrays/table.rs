@@ -1,0 +1,200 @@
+//! THE table of arrays: what a block of worlds holds, and which of it is an output.
+//!
+//! A row is: kind of storage and name of the array, its variant in [`Array`], its entries and how many, who writes it and
+//! its unit; where clients see it, `=>` its public name, group and shape, and a sentence. Below the arrays stand the outputs
+//! that are made of several: what each is made of ([`Source`]) takes the place of the array.
+//!
+//! To add an output, add a row here and the line that computes it in the stage that names it in its `WRITES`.
+
+use super::define::{Flat, arrays};
+use super::element::{self, Element};
+use super::fields::{Axis, F64, FieldDtype, FieldRow, Group, I32, REAL, U32, U64};
+use crate::constants::Constants;
+use crate::lane::{Num, Real};
+
+/// Who writes an array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Writer {
+    /// Stages: what a world resumes from. Snapshots keep it.
+    Motion,
+    /// Clients: held over a control frame. Snapshots keep it.
+    Command,
+    /// The backend, for the frame that it runs.
+    Backend,
+    /// Stages: counted over the substeps of a frame.
+    Counter,
+    /// Stages: left for the stages after them.
+    Stage,
+    /// A stage, for itself alone.
+    Scratch,
+}
+
+/// What an output is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// An array as it is.
+    Array(Array),
+    /// A function of arrays, see `gather` in `sim-engine`.
+    Computed(&'static [Array]),
+    /// Lists of contacts, complete once the stages that write these arrays have run.
+    Contacts(&'static [Array]),
+    /// Kept by the backend for each world.
+    Counter,
+}
+
+arrays! { m;
+    cells {
+        // what a world resumes from: `RECORD` in sim-engine is their order in a snapshot
+        joint_q: JointQ [m.coords] Motion "rad or m"
+            => "joint_q" State [Coords], "Joint positions.";
+        joint_q_rest: JointQRest [m.coords] Motion "rad or m";
+        joint_qd: JointQd [m.dofs.len()] Motion "rad/s or m/s"
+            => "joint_qd" State [Dofs], "Joint velocities.";
+        // the solver's result, and its next start
+        joint_qdd: JointQdd [m.dofs.len()] Motion "rad/s² or m/s²"
+            => "joint_qdd" Derived [Dofs], "Joint accelerations under the commands held, constraints included.";
+        // substeps since the start of the control frame
+        substep: Substep [1] Counter "–";
+        // 1 where the solver used up its iterations since this was cleared
+        unconverged: Unconverged [1] Counter "–";
+        // most contacts that did not fit in a step since this was cleared
+        left_out: LeftOut [1] Counter "–";
+        // constraint rows of joints: D = 1/R, 0 where a row is not active
+        efc_weight: EfcD [m.rows()] Stage "kg·m² or kg"
+            => "efc_D" Derived [Rows], "Regularised stiffness of a constraint row, 1/R; zero in a row that is not active.";
+        efc_aref: EfcAref [m.rows()] Stage "rad/s² or m/s²"
+            => "efc_aref" Derived [Rows], "Reference acceleration of a constraint row.";
+        efc_force: EfcForce [m.rows()] Stage "N·m or N"
+            => "efc_force" Derived [Rows], "Force of a constraint row.";
+        constraint_force: ConstraintForce [m.dofs.len()] Stage "N·m or N"
+            => "constraint_force" Derived [Dofs], "Constraint forces in joint space, Jᵀ f.";
+        // matrices and right-hand sides to which contacts add; packed as `mass_matrix` and `Constants::coupled`
+        system: System [if m.contacts.classes.is_empty() { 0 } else { m.pattern.len() }] Scratch "–";
+        coupled_system: CoupledSystem [m.coupled.pattern.len()] Scratch "–";
+        pull: Pull [if m.contacts.classes.is_empty() { 0 } else { m.dofs.len() }] Scratch "–";
+        solution: Solution [m.dofs.len()] Scratch "–";
+    }
+    values {
+        joint_f: JointF [Scalar; m.dofs.len()] Command "N·m or N"
+            => "joint_f" Command [Dofs], "Joint torques applied, not clamped by the effort limit.";
+        joint_target_q: JointTargetQ [Scalar; m.dofs.len()] Command "rad or m"
+            => "joint_target_q" Command [Dofs], "Position targets of the drives.";
+        joint_target_qd: JointTargetQd [Scalar; m.dofs.len()] Command "rad/s or m/s"
+            => "joint_target_qd" Command [Dofs], "Velocity targets of the drives.";
+        // commands of the frames before, the last one first, each as joint_f, joint_target_q, joint_target_qd
+        command_history: CommandHistory [Scalar; m.delay.frames * 3 * m.dofs.len()] Command "–";
+        // parameters of the model that vary from world to world, see `constants::params::Varying`
+        params: Params [Scalar; m.varying.len()] Command "–";
+        // added to the commands of the frame, `(3, dofs)`; empty where there is no noise
+        command_noise: CommandNoise [Scalar; if m.noisy_commands() { 3 * m.dofs.len() } else { 0 }] Backend "–";
+    }
+    work {
+        // kinematics: positions and moments are about the robot's reference point, in world axes
+        rotation: Rotation [Mat3; m.bodies.len()] Stage "–";
+        origin: Origin [Vec3; m.bodies.len()] Stage "m";
+        // world position of each robot's reference point
+        reference: Reference [Vec3; m.trees.len()] Stage "m";
+        // motion axis of each dof
+        motion: Motion [Spatial; m.dofs.len()] Stage "–";
+        // of each body; the mass matrix makes it that of the subtree
+        inertia: Inertia [Inertia; m.bodies.len()] Stage "kg, kg·m, kg·m²";
+        velocity: Velocity [Spatial; m.bodies.len()] Stage "m/s, rad/s";
+
+        // what acts: commands where they are not what was sent, `(3, dofs)`; forces
+        applied: Applied [Scalar; if m.alters_commands() { 3 * m.dofs.len() } else { 0 }] Stage "–";
+        bias_force: BiasForce [Scalar; m.dofs.len()] Stage "N·m or N"
+            => "bias_force" [Dofs], "Coriolis, centrifugal and gravity forces: what holds the joints at zero acceleration.";
+        smooth_force: SmoothForce [Scalar; m.dofs.len()] Stage "N·m or N"
+            => "smooth_force" [Dofs], "Applied, drive and damping forces less the bias: all but constraint forces.";
+        // packed, see `math::factor::Pattern::at`
+        mass_matrix: MassMatrix [Scalar; m.pattern.len()] Stage "kg·m², kg·m or kg";
+        // +1 where the lower bound is the nearer, -1 where the upper is
+        limit_side: LimitSide [Scalar; m.limits.len()] Stage "–";
+
+        // contacts lie in the tables of `Contacts::memory`; these have no entries and stand for them in `READS` and `WRITES`
+        shape_poses: ShapePoses [Scalar; 0] Stage "–";
+        contact_points: ContactPoints [Scalar; 0] Stage "–";
+        contact_rows: ContactRows [Scalar; 0] Stage "–";
+        contact_forces: ContactForces [Scalar; 0] Stage "–";
+
+        // output only
+        orientation: Orientation [Quat; m.bodies.len()] Stage "–";
+        body_q: BodyQ [Pose; m.frames.len()] Stage "m, –"
+            => "body_q" [Bodies, Size(7)], "Link frames in the world: position, then quaternion (x, y, z, w).";
+        // centre of mass of each link from the reference point
+        link_center: LinkCenter [Vec3; m.frames.len()] Stage "m";
+        body_qd: BodyQd [Spatial; m.frames.len()] Stage "m/s, rad/s"
+            => "body_qd" [Bodies, Size(6)], "Velocity of each link's centre of mass, then its angular velocity, in world axes.";
+        joint_torque: JointTorque [Scalar; m.dofs.len()] Stage "N·m or N"
+            => "joint_torque" [Dofs], "What joint_f and the drive, clamped by its effort limit, give; damping, friction and contacts are not in it.";
+        site_q: SiteQ [Pose; m.sites.len()] Stage "m, –"
+            => "site_q" [Sites, Size(7)], "Sites: position, then quaternion (x, y, z, w), in the world, or in the frame that a site is relative to.";
+        site_qd: SiteQd [Spatial; m.sites.len()] Stage "m/s, rad/s"
+            => "site_qd" [Sites, Size(6)], "Velocity of each site, then its angular velocity, in world axes, or as seen from and in the axes of the frame that it is relative to.";
+        gyro: Gyro [Vec3; m.sites.len()] Stage "rad/s"
+            => "gyro" [Sites, Size(3)], "Angular velocity of each site, in its own axes.";
+        accelerometer: Accelerometer [Vec3; m.sites.len()] Stage "m/s²"
+            => "accelerometer" [Sites, Size(3)], "Acceleration of each site less gravity, in its own axes: 9.81 upwards at rest.";
+        // a row for each dof that moves a site, in the order of `Site::columns`
+        site_inverse: SiteInverse [Row6; m.sites.iter().map(|site| site.columns.len()).sum::<usize>()] Stage "rad or m per m or rad";
+
+        // body by body: acceleration, then force
+        force: Force [Spatial; m.bodies.len()] Scratch "–";
+        // copies that are factored in place
+        hessian: Hessian [Scalar; m.pattern.len()] Scratch "–";
+        coupled_hessian: CoupledHessian [Scalar; m.coupled.pattern.len()] Scratch "–";
+        // dof by dof: accelerations that an iteration starts from, where it goes, the step between; those of the integrator;
+        // M or Jᵀ times a vector; what inverse dynamics leaves unexplained
+        start: Start [Scalar; m.dofs.len()] Scratch "rad/s² or m/s²";
+        minimum: Minimum [Scalar; m.dofs.len()] Scratch "rad/s² or m/s²";
+        step: Step [Scalar; m.dofs.len()] Scratch "rad/s² or m/s²";
+        acceleration: Acceleration [Scalar; m.dofs.len()] Scratch "rad/s² or m/s²";
+        joint_force: JointForce [Scalar; m.dofs.len()] Scratch "N·m or N";
+        missing: Missing [Scalar; m.dofs.len()] Scratch "N·m or N";
+        // row by row: J a - aref at the start, at the minimum (or its change), D, aref, force; distance to each limit
+        jar: Jar [Scalar; m.rows()] Scratch "rad/s² or m/s²";
+        jar_minimum: JarMinimum [Scalar; m.rows()] Scratch "rad/s² or m/s²";
+        row_weight: RowWeight [Scalar; m.rows()] Scratch "kg·m² or kg";
+        row_aref: RowAref [Scalar; m.rows()] Scratch "rad/s² or m/s²";
+        row_force: RowForce [Scalar; m.rows()] Scratch "N·m or N";
+        limit_distance: LimitDistance [Scalar; m.limits.len()] Scratch "rad or m";
+    }
+    outputs {
+        BodyJacobian "body_jacobian" Derived [Bodies, Size(6), Dofs] "m/s or rad/s per rad/s or m/s" REAL, Source::Computed(&[Motion, LinkCenter]),
+            "What takes joint_qd to body_qd.";
+        MassMatrix "mass_matrix" Derived [Dofs, Dofs] "kg·m², kg·m or kg" REAL, Source::Computed(&[MassMatrix]),
+            "Joint-space inertia, armature included.";
+        EfcJ "efc_J" Derived [Rows, Dofs] "–" REAL, Source::Computed(&[EfcD, LimitSide]),
+            "Constraint Jacobian: equalities, frictions, limits; zero in a row that is not active.";
+        ContactCount "contact_count" Derived [] "–" I32, Source::Contacts(&[ContactRows]),
+            "Contacts of the world: how many rows of the other contact fields are in use.";
+        ContactPos "contact_pos" Derived [Contacts, Size(3)] "m" REAL, Source::Contacts(&[ContactRows, Reference]),
+            "Point half-way between the two surfaces, in the world.";
+        ContactNormal "contact_normal" Derived [Contacts, Size(3)] "–" REAL, Source::Contacts(&[ContactRows]),
+            "Unit normal from the first shape of the pair to the second.";
+        ContactDistance "contact_distance" Derived [Contacts] "m" REAL, Source::Contacts(&[ContactRows]),
+            "Distance of the two surfaces, negative in penetration.";
+        ContactForce "contact_force" Derived [Contacts, Size(3)] "N" REAL, Source::Contacts(&[ContactForces]),
+            "Force on the second shape of the pair, in world axes.";
+        ContactPair "contact_pair" Derived [Contacts, Size(2)] "–" I32, Source::Contacts(&[ContactRows]),
+            "The two shapes, as places in shape_names; -1 in a row that is not in use.";
+        BodyContactForce "body_contact_force" Derived [Bodies, Size(3)] "N" REAL, Source::Contacts(&[ContactForces]),
+            "Sum of the contact forces on each link, in world axes.";
+        JointQMeasured "joint_q_measured" Derived [Coords] "rad or m" REAL, Source::Array(JointQ),
+            "Joint positions with the noise that joint_q_noise gives.";
+        JointQdMeasured "joint_qd_measured" Derived [Dofs] "rad/s or m/s" REAL, Source::Array(JointQd),
+            "Joint velocities with the noise that joint_qd_noise gives.";
+        SiteInverseJacobian "site_inverse_jacobian" Derived [Sites, Dofs, Size(6)] "rad or m per m or rad" REAL, Source::Computed(&[SiteInverse]),
+            "What takes a small displacement of each site, of its origin, then of its rotation as a rotation vector, in the axes of site_qd, to one of the joints, as joint_qd has them: Jᵀ (J Jᵀ + λ² I)⁻¹, where J takes joint_qd to site_qd and λ is the site's damping. Zero for dofs that do not move the site.";
+        ContactSensor "contact_sensor" Derived [ContactSensors, Size(3)] "N" REAL, Source::Contacts(&[ContactForces]),
+            "Sum of the contact forces that each contact sensor is about, in world axes.";
+        Time "time" Counter [] "s" F64, Source::Counter,
+            "Simulated time since the world's reset.";
+        Step "step" Counter [] "–" U64, Source::Counter,
+            "Control frames since the world's reset.";
+        Status "status" Counter [] "–" U32, Source::Counter,
+            "Trouble of the world, as bits: 1 = it was no longer finite, or a command of it where the run freezes for that, 8 = it was beyond the bounds of the run: it is frozen at its state before that frame, and `step`, until it is reset; 2 = the solver used up its iterations, 4 = contacts were left out; 0 = none.";
+        ContactsLeftOut "contacts_left_out" Counter [] "–" U32, Source::Counter,
+            "Contacts that did not fit into contacts_max or rows_max: the most of any substep of the last frame, and of the state shown where contact fields are asked for.";
+    }
+}
