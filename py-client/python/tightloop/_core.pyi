@@ -85,6 +85,10 @@ class Frame:
     """Joint positions with the noise of ``params.joint_q_noise`` [rad or m], ``(worlds, coords)``."""
     joint_qd_measured: NDArray[Any]
     """Joint velocities with the noise of ``params.joint_qd_noise`` [rad/s or m/s], ``(worlds, dofs)``."""
+    kinetic_energy: NDArray[Any]
+    """Kinetic energy of the world, ½ q̇ᵀ M q̇ with the armature [J], ``(worlds,)``."""
+    potential_energy: NDArray[Any]
+    """Potential energy in gravity of the bodies that move [J], ``(worlds,)``: 0 at the height of the world's origin."""
     joint_torque: NDArray[Any]
     """What ``joint_f`` and the drive, clamped by its effort limit, give [N·m or N], ``(worlds, dofs)``. Damping,
     friction and contacts are not in it."""

@@ -55,6 +55,12 @@ def test_mass_matrix_is_mujocos(evaluated):
     assert_close("mass_matrix", frame.mass_matrix, judge.mass_matrix, DOUBLE.dynamics)
 
 
+def test_energy_is_mujocos(evaluated):
+    frame, judge = evaluated
+    energy = np.stack([frame.potential_energy, frame.kinetic_energy], axis=1)
+    assert_close("energy", energy, judge.energy, DOUBLE.dynamics)
+
+
 def test_bias_force_is_mujocos(evaluated):
     frame, judge = evaluated
     assert_close("bias_force", frame.bias_force, judge.bias_force, DOUBLE.dynamics)

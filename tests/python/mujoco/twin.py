@@ -50,6 +50,8 @@ class Evaluation:
     body_q: Array
     rows: list[Rows]
     drive: Array
+    energy: Array
+    """Potential, then kinetic, of the bodies that move."""
 
 
 @dataclass
@@ -82,6 +84,7 @@ class Twin:
         option.impratio = 1000.0
         # A start that is far outside its limits is no reason to start again
         option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        option.enableflags = mujoco.mjtEnableBit.mjENBL_ENERGY
         for robot in scene.robots.values():
             text = robot.urdf.read_text()
             head = text.index(">", text.index("<robot")) + 1
@@ -125,6 +128,10 @@ class Twin:
             out["joint_qdd"].append(data.qacc.copy())
             out["body_q"].append(np.hstack([data.xpos[1:], np.roll(data.xquat[1:], -1, axis=1)]))
             out["drive"].append(data.qfrc_actuator.copy())
+            # static bodies, which MuJoCo counts here since they are not fused, have a potential energy that never changes
+            static = np.flatnonzero(model.body_weldid == 0)
+            still = model.body_mass[static] @ (data.xipos[static] @ model.opt.gravity)
+            out["energy"].append(data.energy + [still, 0.0])
             order = np.r_[np.argsort(self.followers), len(self.followers) : data.nefc].astype(int)
             jacobian = data.efc_J.reshape(-1, model.nv) if data.nefc else np.zeros((0, model.nv))
             rows = (jacobian, data.efc_D, data.efc_aref, data.efc_force)

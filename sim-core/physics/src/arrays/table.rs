@@ -125,6 +125,10 @@ arrays! { m;
         link_center: LinkCenter [Vec3; m.frames.len()] Stage "m";
         body_qd: BodyQd [Spatial; m.frames.len()] Stage "m/s, rad/s"
             => "body_qd" [Bodies, Size(6)], "Velocity of each link's centre of mass, then its angular velocity, in world axes.";
+        kinetic_energy: KineticEnergy [Scalar; 1] Stage "J"
+            => "kinetic_energy" [], "Kinetic energy of the world, ½ q̇ᵀ M q̇, armature included.";
+        potential_energy: PotentialEnergy [Scalar; 1] Stage "J"
+            => "potential_energy" [], "Potential energy of the bodies that move, in gravity: 0 at the height of the world's origin.";
         joint_torque: JointTorque [Scalar; m.dofs.len()] Stage "N·m or N"
             => "joint_torque" [Dofs], "What joint_f and the drive, clamped by its effort limit, give; damping, friction and contacts are not in it.";
         site_q: SiteQ [Pose; m.sites.len()] Stage "m, –"

@@ -9,6 +9,7 @@ pub mod collide;
 pub mod command;
 pub mod constraint;
 pub mod contact_rows;
+pub mod energy;
 pub mod integrate;
 mod inverse_dynamics;
 pub mod kinematics;
@@ -66,6 +67,7 @@ macro_rules! every_stage {
             integrate          [integrate::Integrate]        Step;
             // outputs of a state
             accelerations      [solver::Accelerations]       Evaluation;
+            energy             [energy::Energy]              Evaluation;
             joint_torque       [actuation::JointTorque]      Evaluation;
             poses              [poses::Poses]                Evaluation;
             velocities         [velocities::Velocities]      Evaluation;

@@ -1,0 +1,54 @@
+//! Energy of a world, for output (MuJoCo: `mj_energyVel`, `mj_energyPos`).
+//!
+//! ```text
+//! E_kin = ½ q̇ᵀ M q̇          E_pot = - Σ g · m c        c a body's centre of mass in the world
+//! ```
+//!
+//! After the mass matrix, a root's inertia is that of its whole tree: its first moment h = m (c - reference) has all bodies.
+//! What stands still has no part in either, as where MuJoCo fuses static bodies.
+
+use super::{BlockOf, ConstantsOf, Stage, gravity};
+use crate::arrays::Array as A;
+use crate::lane::{Cx, Num};
+use crate::math::factor::multiply;
+use crate::math::vec3::Vec3;
+
+/// Kinetic and potential energy, for output.
+pub struct Energy;
+
+impl Stage for Energy {
+    const READS: &'static [A] = &[
+        A::JointQd,
+        A::MassMatrix,
+        A::Inertia,
+        A::Reference,
+        A::Params,
+    ];
+    const WRITES: &'static [A] = &[A::KineticEnergy, A::PotentialEnergy];
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        let gravity = gravity(m, &b.params);
+        let (w, zero) = (&mut b.work, C::F::c(0.0));
+        for (x, qd) in w.start.iter_mut().zip(&b.joint_qd) {
+            *x = cx.get(qd);
+        }
+        multiply(&m.pattern, &w.mass_matrix, &w.start, &mut w.joint_force);
+        let mut kinetic = zero;
+        for (qd, momentum) in w.start.iter().zip(&w.joint_force) {
+            kinetic = qd.fma(*momentum, kinetic);
+        }
+        w.kinetic_energy[0] = kinetic * C::F::c(0.5);
+
+        let mut potential = zero;
+        for (k, body) in m.bodies.iter().enumerate() {
+            if body.parent.is_none() {
+                let Vec3([x, y, z]) = w.reference[body.tree];
+                let [mass, hx, hy, hz, ..] = w.inertia[k].0;
+                let moment = Vec3([mass.fma(x, hx), mass.fma(y, hy), mass.fma(z, hz)]);
+                potential = potential - gravity.dot(moment);
+            }
+        }
+        w.potential_energy[0] = potential;
+    }
+}
