@@ -274,7 +274,7 @@ fn evaluations_change_nothing() {
         let mut case = Case::new(seed)?;
         let mut ops = case.program(8);
         ops.retain(|op| !matches!(op, Op::Forward));
-        // the counters of a snapshot tell of contacts left out in the state that was evaluated last; so all end alike
+        // the counters of a snapshot count contacts left out in the state that was evaluated last, so all end the same
         ops.push(Op::Forward);
         let between: Vec<Op> = ops
             .iter()

@@ -35,7 +35,7 @@ fn bits(run: &Run, world: usize) -> Vec<u64> {
     fields.map(f64::to_bits).collect()
 }
 
-/// Some frames of the demo, in every world alike.
+/// Some frames of the demo, the same in every world.
 fn play(run: &mut Run, frames: std::ops::Range<usize>) {
     for frame in frames {
         let (field, row) = command(Demo::Target, frame);
@@ -275,7 +275,7 @@ fn a_masked_write_leaves_the_other_worlds_as_they_were() {
             continue;
         }
         let mut numbers = own(&model, param, &(0..20).collect::<Vec<_>>());
-        // rows outside the mask are not looked at
+        // rows outside the mask are ignored
         for world in (0..20).filter(|&world| !mask[world]) {
             numbers[world * columns] = f64::NAN;
         }

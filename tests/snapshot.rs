@@ -376,7 +376,7 @@ fn refusals_name_what_is_wrong() {
         Wrong::Model { .. }
     ));
     let double = of(400.0, Precision::F64, 3);
-    // the model is the same, so it is the precision that is told of
+    // the model is the same, so the error names the precision
     let (got, expected) = (64, 32);
     assert_eq!(
         refused(&mut run, &double, None, None),

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 const LONGEST: usize = 500;
 
 /// Modules of a crate, each of which may import those before it.
-const ORDER: [(&str, &[&str]); 2] = [
+const ORDER: [(&str, &[&str]); 8] = [
     (
         "sim-core/physics/src",
         &[
@@ -22,6 +22,74 @@ const ORDER: [(&str, &[&str]); 2] = [
         ],
     ),
     (
+        "sim-core/device/src",
+        &[
+            "error",
+            "source",
+            "module",
+            "cache",
+            "raw_op",
+            "allocation",
+            "vulkan",
+            "vulkan_absent",
+            "adapter",
+            "device",
+            "portable",
+            "memory",
+            "workers",
+            "program",
+            "batch_op",
+            "staging",
+            "encode",
+            "batch",
+            "run",
+            "software",
+            "compile",
+        ],
+    ),
+    (
+        "sim-core/record/src",
+        &[
+            "error",
+            "tree",
+            "uses",
+            "recording",
+            "vectorize",
+            "wgsl",
+            "evaluate",
+            "split",
+            "loop_fusion",
+            "handles",
+            "known_values",
+            "state",
+            "memory",
+            "fold",
+            "iterations",
+            "loops",
+            "lists",
+            "scalar",
+            "recorder",
+            "dead_code",
+            "record",
+        ],
+    ),
+    (
+        "sim-core/record/src/split",
+        &[
+            "order",
+            "cost",
+            "kernel",
+            "items",
+            "live_out",
+            "live_ranges",
+            "partition",
+            "private",
+            "plan",
+            "emit",
+            "stops_last",
+        ],
+    ),
+    (
         "sim-core/engine/src",
         &[
             "random",
@@ -30,9 +98,57 @@ const ORDER: [(&str, &[&str]); 2] = [
             "snapshot",
             "options",
             "simulation",
+            "checks",
             "params",
+            "write",
             "command",
             "dynamics",
+        ],
+    ),
+    (
+        "sim-core/engine/src/backend",
+        &[
+            "error", "frozen", "state", "input", "noise", "shown", "gather", "cpu", "gpu",
+        ],
+    ),
+    (
+        "sim-core/engine/src/backend/cpu",
+        &[
+            "lane_assignment",
+            "chunk",
+            "delay",
+            "faults",
+            "noise",
+            "records",
+            "regroup",
+            "reset",
+            "transfer",
+            "contacts",
+            "run",
+            "backend",
+            "dispatch",
+        ],
+    ),
+    (
+        "sim-core/engine/src/backend/gpu",
+        &[
+            "words",
+            "workgroups",
+            "mirror",
+            "places",
+            "programs",
+            "show",
+            "bookkeeping",
+            "software",
+            "compiled",
+            "uploads",
+            "sizing",
+            "tile",
+            "imported",
+            "backend",
+            "worlds",
+            "frame",
+            "create",
         ],
     ),
 ];
@@ -64,21 +180,21 @@ const DOORS: [(&str, &str); 20] = [
 /// Where `unsafe` may stand, and why.
 const UNSAFE: [&str; 23] = [
     "py-client/src/frame.rs",                      // NumPy views
-    "sim-core/device/src/device.rs",               // imports pages of the host
-    "sim-core/device/src/leave.rs",                // an end of the process beside the driver's
+    "sim-core/device/src/memory.rs",               // imports pages of the host
     "sim-core/device/src/portable.rs",             // programs without checks at run time
+    "sim-core/device/src/software/exit.rs",        // process exit beside a driver thread
     "sim-core/device/src/vulkan/memory.rs",        // the driver's memory, and the host's
     "sim-core/device/src/vulkan/mod.rs",           // the driver's handles
     "sim-core/device/src/vulkan/pipeline.rs",      // as mod.rs
     "sim-core/device/src/vulkan/recording.rs",     // as mod.rs
     "sim-core/device/src/vulkan_absent.rs",        // the same functions, never called
-    "sim-core/engine/src/backend/cpu/chunk.rs",    // calls the stages of an instruction set
+    "sim-core/engine/src/backend/cpu/backend.rs",  // calls what dispatch chose
     "sim-core/engine/src/backend/cpu/contacts.rs", // rows of a frame, as transfer.rs
     "sim-core/engine/src/backend/cpu/dispatch.rs", // instruction sets
-    "sim-core/engine/src/backend/cpu/mod.rs",      // calls what dispatch chose
+    "sim-core/engine/src/backend/cpu/run.rs",      // calls the stages of an instruction set
     "sim-core/engine/src/backend/cpu/transfer.rs", // rows of a frame, written by several threads
+    "sim-core/engine/src/backend/gpu/backend.rs",  // as imported.rs
     "sim-core/engine/src/backend/gpu/imported.rs", // memory of readers that a device writes to
-    "sim-core/engine/src/backend/gpu/mod.rs",      // as imported.rs
     "sim-core/engine/src/backend/mod.rs",          // as imported.rs
     "sim-core/engine/src/simulation.rs",           // as imported.rs
     "sim-core/physics/src/compiled.rs", // what only a processor with the instructions may run

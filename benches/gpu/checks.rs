@@ -1,7 +1,7 @@
-//! Is it right? Nothing is measured on a device of which it is not.
+//! Checks results before anything is measured.
 
 use crate::common::{distance, numbers};
-use crate::scenes::{Crowd, Plan, Scene};
+use crate::scenes::{Plan, Scene, WorldSet};
 use crate::{Place, options};
 use anyhow::{Context, ensure};
 use sim_engine::backend::Values;
@@ -41,18 +41,18 @@ pub fn check(place: &Place, scenes: &[Scene]) -> anyhow::Result<()> {
         let name = scene.name();
         let plan = Plan::new(scene);
         let last = MANY - 1;
-        let all = bits(place, &plan, &Crowd::all(MANY))?;
+        let all = bits(place, &plan, &WorldSet::all(MANY))?;
         let few = [last, 2, 0, MANY / 2, 1, 5, 3];
         for (id, found) in few
             .iter()
-            .zip(bits(place, &plan, &Crowd::some(&few, MANY))?)
+            .zip(bits(place, &plan, &WorldSet::some(&few, MANY))?)
         {
             ensure!(
                 found == all[*id],
                 "{name}: world {id} of {MANY} has other bits among seven"
             );
         }
-        let alone = bits(place, &plan, &Crowd::some(&[last], MANY))?;
+        let alone = bits(place, &plan, &WorldSet::some(&[last], MANY))?;
         ensure!(
             alone[0] == all[last],
             "{name}: the last of {MANY} worlds has other bits alone"
@@ -72,19 +72,25 @@ fn deviation(place: &Place, scene: Scene, recorded: &str) -> anyhow::Result<[f64
     let rows = numbers(recorded);
     let mut worst = [0.0_f64; 2];
     let coords = plan.model.coords();
-    run(place, &plan, &Crowd::all(1), plan.frames(), |frame, q| {
-        let q: Vec<f64> = q[..coords].iter().map(|x| f64::from(*x)).collect();
-        let row = &rows[frame + 1][1..];
-        worst[0] = worst[0].max(distance(&q[..9], &row[..9]));
-        if q.len() > 9 {
-            worst[1] = worst[1].max(distance(&q[9..12], &row[9..12]));
-        }
-    })?;
+    run(
+        place,
+        &plan,
+        &WorldSet::all(1),
+        plan.frames(),
+        |frame, q| {
+            let q: Vec<f64> = q[..coords].iter().map(|x| f64::from(*x)).collect();
+            let row = &rows[frame + 1][1..];
+            worst[0] = worst[0].max(distance(&q[..9], &row[..9]));
+            if q.len() > 9 {
+                worst[1] = worst[1].max(distance(&q[9..12], &row[9..12]));
+            }
+        },
+    )?;
     Ok(worst)
 }
 
 /// Positions and velocities of each world after some frames.
-fn bits(place: &Place, plan: &Plan, crowd: &Crowd) -> anyhow::Result<Vec<Vec<u32>>> {
+fn bits(place: &Place, plan: &Plan, crowd: &WorldSet) -> anyhow::Result<Vec<Vec<u32>>> {
     let mut found = Vec::new();
     let (coords, dofs) = (plan.model.coords(), plan.model.dofs());
     run(place, plan, crowd, FRAMES, |_, shown| {
@@ -100,9 +106,9 @@ fn bits(place: &Place, plan: &Plan, crowd: &Crowd) -> anyhow::Result<Vec<Vec<u32
 fn run(
     place: &Place,
     plan: &Plan,
-    crowd: &Crowd,
+    crowd: &WorldSet,
     frames: usize,
-    mut look: impl FnMut(usize, &[f32]),
+    mut observe: impl FnMut(usize, &[f32]),
 ) -> anyhow::Result<()> {
     let fields = [Field::JointQ, Field::JointQd];
     let options = options(place, crowd.len(), &fields);
@@ -124,7 +130,7 @@ fn run(
         for slot in (sim.layout().slots.iter()).filter(|slot| fields.contains(&slot.field)) {
             shown.extend_from_slice(&numbers[slot.offset / 4..(slot.offset + slot.bytes) / 4]);
         }
-        look(frame, &shown);
+        observe(frame, &shown);
     }
     Ok(())
 }

@@ -1,10 +1,9 @@
-//! Worlds on a GPU: whether they are right, then how fast they are, beside the processor of the same machine.
+//! Worlds on a GPU: checks their results, then measures their speed beside the CPU of the same computer.
 //!
 //! One binary that needs a Vulkan driver and nothing else; benches/gpu/run.sh builds it, or takes the one that lies beside it.
-//! Where it finds MuJoCo's runs not met, bits that depend on the number of worlds, or a device that is lost, it shows no
-//! numbers and ends with 1.
+//! If a run deviates from MuJoCo's, if bits depend on the number of worlds, or if a device is lost, it prints no results and exits with 1.
 
-mod apart;
+mod build_time;
 mod checks;
 #[path = "../../tests/common/mod.rs"]
 mod common;
@@ -20,7 +19,7 @@ use clap::Parser;
 use measure::Frames;
 use pages::Pages;
 use report::{Report, Row};
-use scenes::{Crowd, Plan, Scene};
+use scenes::{Plan, Scene, WorldSet};
 use sim_engine::options::{Adapter, AdapterInfo, Replay, adapters};
 use sim_engine::simulation::{Device, Options, Simulation};
 use sim_physics::arrays::Field;
@@ -64,7 +63,7 @@ struct Arguments {
     /// What else the head of the file says, as `name: value`.
     #[arg(long)]
     fact: Vec<String>,
-    /// Only builds the first scene, with its programs in this folder, and tells how long it took [s]: what `apart` runs.
+    /// Only builds the first scene, with its programs in this folder, and tells how long it took [s]: run by `build_time`.
     #[arg(long, hide = true)]
     build_in: Option<PathBuf>,
 }
@@ -94,7 +93,7 @@ fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
     let info = chosen(arguments.adapter.as_deref())?;
     if let Some(folder) = &arguments.build_in {
-        return apart::tell(&arguments, &info, folder);
+        return build_time::build_and_print(&arguments, &info, folder);
     }
     let cache = std::env::temp_dir().join(format!("gpu-bench-{}", std::process::id()));
     let place = Place {
@@ -157,7 +156,7 @@ fn build(plan: &Plan, options: &Options) -> anyhow::Result<(Simulation, f64)> {
 /// Processor time of the thread that asks for frames [µs], batches recorded and encoded.
 fn replay(place: &Place, plan: &Plan, arguments: &Arguments) -> anyhow::Result<[f64; 2]> {
     let wanted = Duration::from_secs_f64(arguments.seconds);
-    let crowd = Crowd::all(REPLAY_WORLDS);
+    let crowd = WorldSet::all(REPLAY_WORLDS);
     let mut found = [0.0; 2];
     for (found, replay) in found.iter_mut().zip([Replay::Recorded, Replay::Encoded]) {
         let options = Options {
@@ -179,9 +178,9 @@ fn measure(
     plan: &Plan,
     worlds: usize,
 ) -> anyhow::Result<Row> {
-    let [cold_s, cached_s] = apart::build_twice(info, plan.scene, worlds)?;
+    let [cold_s, cached_s] = build_time::build_twice(info, plan.scene, worlds)?;
     let wanted = Duration::from_secs_f64(arguments.seconds);
-    let crowd = Crowd::all(worlds);
+    let crowd = WorldSet::all(worlds);
     let options = options(place, worlds, &FIELDS);
     let words = Simulation::layout_of(&plan.model, &options).bytes / 8;
     // before the worlds, so that the pages are there until those are gone

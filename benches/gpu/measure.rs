@@ -1,6 +1,6 @@
 //! How fast: frames of whole runs, each timed from its commands to what it shows.
 
-use crate::scenes::{Crowd, Plan};
+use crate::scenes::{Plan, WorldSet};
 use rustix::time::{ClockId, clock_gettime};
 use sim_engine::backend::Values;
 use sim_engine::simulation::Simulation;
@@ -25,7 +25,7 @@ impl Frames {
     pub fn measure(
         sim: &mut Simulation,
         plan: &Plan,
-        crowd: &Crowd,
+        crowd: &WorldSet,
         words: &mut [u64],
         wanted: Duration,
     ) -> anyhow::Result<Frames> {

@@ -1,10 +1,10 @@
-//! Results, for people and as a file.
+//! Results: printed, and written to a file.
 
 use crate::measure::Frames;
 use crate::scenes::Scene;
 use anyhow::Context;
 use sim_engine::options::AdapterInfo;
-use sim_engine::simulation::ProgramFacts;
+use sim_engine::simulation::ProgramInfo;
 use std::path::Path;
 
 /// A scene with so many worlds.
@@ -13,7 +13,7 @@ pub struct Row {
     pub worlds: usize,
     pub dofs: usize,
     pub substeps: usize,
-    pub programs: Vec<ProgramFacts>,
+    pub programs: Vec<ProgramInfo>,
     /// Until worlds have made their first frame, in a process that finds nothing kept, and in one after it [s].
     pub cold_s: f64,
     pub cached_s: f64,
@@ -38,8 +38,8 @@ impl Row {
     fn cells(&self) -> Vec<Cell> {
         let frames = self.frames();
         let steps = self.worlds * self.substeps;
-        let in_step = || self.programs.iter().filter(|p| p.rounds.is_some());
-        let dispatches: usize = self.programs.iter().filter_map(|p| p.rounds).sum();
+        let in_step = || self.programs.iter().filter(|p| p.dispatches.is_some());
+        let dispatches: usize = self.programs.iter().filter_map(|p| p.dispatches).sum();
         let or_dash = |x: Option<f64>, digits: usize| match x {
             Some(x) => format!("{x:.digits$}"),
             None => "–".to_owned(),
@@ -209,11 +209,11 @@ impl Report {
             }
             text += &(values.join(",") + "\n");
         }
-        let said = || format!("{}", path.display());
+        let path_name = || format!("{}", path.display());
         if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder).with_context(said)?;
+            std::fs::create_dir_all(folder).with_context(path_name)?;
         }
-        std::fs::write(path, text).with_context(said)?;
+        std::fs::write(path, text).with_context(path_name)?;
         println!("\nresults: {}", path.display());
         Ok(())
     }

@@ -5,7 +5,7 @@
 #
 # In a checkout it builds the bench. Elsewhere it takes the binary `gpu_bench` that lies beside it, so these two files are all
 # that another machine needs, besides a Vulkan driver. Drivers keep what they have compiled: here in a folder that goes at the end.
-# What is called cold is built in processes with empty folders of their own (apart.rs).
+# "Cold" builds run in separate processes with empty cache folders (build_time.rs).
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 if [ -x "$here/gpu_bench" ]; then

@@ -1,4 +1,4 @@
-//! What moves: four scenes, the commands of their frames, and what each world has of its own.
+//! Four scenes, the commands of their frames, and how worlds differ.
 
 use crate::common::{Demo, FRAMES, command, lesson, lesson_with_table, noise, numbers};
 use crate::robots::{self, Case};
@@ -42,22 +42,22 @@ impl Scene {
 }
 
 /// Worlds of a run: world k of it is number `ids[k]` of `of`, and has that one's start and commands.
-pub struct Crowd {
+pub struct WorldSet {
     ids: Vec<usize>,
     of: usize,
 }
 
-impl Crowd {
+impl WorldSet {
     /// All of them.
-    pub fn all(of: usize) -> Crowd {
+    pub fn all(of: usize) -> WorldSet {
         let ids = (0..of).collect();
-        Crowd { ids, of }
+        WorldSet { ids, of }
     }
 
     /// Some of them.
-    pub fn some(ids: &[usize], of: usize) -> Crowd {
+    pub fn some(ids: &[usize], of: usize) -> WorldSet {
         let ids = ids.to_vec();
-        Crowd { ids, of }
+        WorldSet { ids, of }
     }
 
     /// How many.
@@ -149,7 +149,7 @@ impl Plan {
     }
 
     /// Puts the worlds where they begin.
-    pub fn start(&self, sim: &mut Simulation, crowd: &Crowd) {
+    pub fn start(&self, sim: &mut Simulation, crowd: &WorldSet) {
         sim.reset(None, None).expect("a reset without a mask fits");
         if self.scene != Scene::Grasp {
             return;
@@ -170,7 +170,7 @@ impl Plan {
     }
 
     /// The commands of a frame, `(worlds, dofs)`: of the grasp the recorded ones, otherwise of an amplitude of each world's own.
-    pub fn fill(&self, frame: usize, crowd: &Crowd, values: &mut Vec<f32>) {
+    pub fn fill(&self, frame: usize, crowd: &WorldSet, values: &mut Vec<f32>) {
         values.clear();
         let row = &self.rows[frame];
         if self.scene == Scene::Grasp {

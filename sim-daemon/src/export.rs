@@ -1,6 +1,6 @@
 //! Between physics and wire: the only file that knows both sim-core and sim-protocol.
 
-use sim_engine::backend::{BackendError, Values};
+use sim_engine::backend::{BackendError, Input, Values};
 use sim_engine::simulation::{Options, Precision, Simulation};
 use sim_model::{Description as Scene, Model};
 use sim_physics::arrays::{Dtype, Field, FieldDtype, FieldRow, Group, Layout};
@@ -268,37 +268,17 @@ pub(crate) fn apply(
             // one array is checked as it is set; of several, none may be set before all are checked
             let alone = inbox.arrays().nth(1).is_none();
             for row in inbox.arrays().filter(|_| !alone) {
-                let (target, columns, values) = input(simulation, inbox, row)?;
-                match (target, inbox.op()) {
-                    (Target::Param(param), Op::Step) => {
-                        simulation.check_load(param, &columns, values)?;
-                    }
-                    (Target::Param(param), _) => {
-                        simulation.check_param(param, &columns, values, masked)?;
-                    }
-                    (Target::Field(field), Op::Step) => {
-                        simulation.check(field, Group::Command, &columns, values, masked)?;
-                    }
-                    (Target::Field(field), _) => {
-                        simulation.check(field, Group::State, &columns, values, masked)?;
-                    }
+                let (array, columns, values) = input(simulation, inbox, row)?;
+                match inbox.op() {
+                    Op::Step => simulation.check_command(array, &columns, values)?,
+                    _ => simulation.check_write(array, &columns, values, masked)?,
                 }
             }
             for row in inbox.arrays() {
-                let (target, columns, values) = input(simulation, inbox, row)?;
-                match (target, inbox.op()) {
-                    (Target::Param(param), Op::Step) => {
-                        simulation.load(param, columns, values)?;
-                    }
-                    (Target::Param(param), _) => {
-                        simulation.write_param(param, columns, values, masked)?;
-                    }
-                    (Target::Field(field), Op::Step) => {
-                        simulation.command(field, columns, values)?;
-                    }
-                    (Target::Field(field), _) => {
-                        simulation.write(field, columns, values, masked)?
-                    }
+                let (array, columns, values) = input(simulation, inbox, row)?;
+                match inbox.op() {
+                    Op::Step => simulation.command(array, columns, values)?,
+                    _ => simulation.write(array, columns, values, masked)?,
                 }
             }
         }
@@ -312,23 +292,6 @@ pub(crate) fn apply(
     } else {
         Advance::Forward
     })
-}
-
-/// What an array of a command sets.
-#[derive(Debug, Clone, Copy)]
-enum Target {
-    Field(Field),
-    Param(Param),
-}
-
-impl Target {
-    /// What a name stands for; parameters are written, or loads given with a step.
-    fn named(name: &str, op: Op) -> Option<Target> {
-        let param = Param::named(name).filter(|param| op == Op::Write || param.is_load());
-        param
-            .map(Target::Param)
-            .or_else(|| Field::named(name).map(Target::Field))
-    }
 }
 
 /// The seeds of a reset, which takes no other array.
@@ -353,8 +316,12 @@ fn input<'a>(
     simulation: &Simulation,
     inbox: &'a Inbox,
     row: &Row,
-) -> Result<(Target, std::ops::Range<usize>, Values<'a>), Refusal> {
-    let target = Target::named(&row.name, inbox.op()).ok_or_else(|| {
+) -> Result<(Input, std::ops::Range<usize>, Values<'a>), Refusal> {
+    let named = match inbox.op() {
+        Op::Step => Input::command(&row.name).or_else(|| Field::named(&row.name).map(Input::Field)),
+        _ => Input::named(&row.name),
+    };
+    let array = named.ok_or_else(|| {
         refusal(
             RefusalKind::Field,
             format!("there is no field `{}`", row.name),
@@ -387,7 +354,7 @@ fn input<'a>(
             )));
         }
     };
-    Ok((target, row.start..end, values))
+    Ok((array, row.start..end, values))
 }
 
 pub(crate) fn refusal(kind: RefusalKind, reason: String) -> Refusal {

@@ -4,7 +4,7 @@ use super::{drawn, noise};
 use sim_engine::backend::Values;
 use sim_engine::simulation::{Faults, Options, Simulation};
 use sim_model::{Description, Distribution, Pose, Site};
-use sim_physics::arrays::{Field, Group, status};
+use sim_physics::arrays::{Field, status};
 use sim_physics::constants::params::Param;
 use std::thread;
 
@@ -112,7 +112,7 @@ fn play(mut simulation: Simulation, first: usize) -> Vec<Vec<u8>> {
             };
             let torques: Vec<f64> = numbers.clone().flat_map(torque).collect();
             let (columns, values) = (0..dofs, Values::F64(&torques));
-            let checked = simulation.check(Field::JointF, Group::Command, &columns, values, None);
+            let checked = simulation.check_command(Field::JointF, &columns, values);
             checked
                 .and_then(|()| simulation.command(Field::JointF, columns, values))
                 .unwrap();

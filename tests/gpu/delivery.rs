@@ -28,7 +28,7 @@ fn what_the_device_writes_is_read_through_another_mapping_and_nothing_is_copied(
         map(ProtFlags::READ | ProtFlags::WRITE),
         map(ProtFlags::READ),
     );
-    // SAFETY: both mappings live to the end of the test, and are looked at one after the other.
+    // SAFETY: both mappings live to the end of the test, and are read one after the other.
     let arena: &mut [u64] =
         unsafe { std::slice::from_raw_parts_mut(writer.cast::<u8>().add(HEAD).cast(), bytes / 8) };
     // SAFETY: as above.

@@ -1,7 +1,7 @@
-//! Worlds on a GPU. The software Vulkan of Debian's mesa-vulkan-drivers will do, and some adapter is required.
+//! Worlds on a GPU. An adapter is required; the software driver of Debian's mesa-vulkan-drivers will do.
 
 mod agreement;
-mod books;
+mod bookkeeping;
 #[path = "../common/mod.rs"]
 mod common;
 mod delivery;
@@ -40,7 +40,7 @@ fn run(model: &Arc<Model>, device: Device, worlds: usize, fields: &[Field]) -> c
     common::Run::new(model, options(device, worlds, fields))
 }
 
-/// Nothing went wrong on the device, and on a GPU Vulkan's validation layer would have told.
+/// Fails if the device was lost, or if Vulkan's validation layer is not watching.
 #[track_caller]
 fn assert_alive(run: &common::Run) {
     if run.sim.device().starts_with("gpu") {

@@ -115,7 +115,7 @@ fn bits(run: &Run, world: usize) -> Vec<u64> {
     fields.map(f64::to_bits).collect()
 }
 
-/// Some frames of the demo, in every world alike.
+/// Some frames of the demo, the same in every world.
 fn play(run: &mut Run, frames: usize) {
     for frame in 0..frames {
         let (field, row) = command(Demo::Target, frame);

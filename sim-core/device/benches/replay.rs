@@ -65,7 +65,7 @@ fn batch(device: &Device, programs: &[Program], replay: Replay, dispatches: usiz
     batch.finish().expect("a batch")
 }
 
-/// CPU time of a run [µs]: what the fastest tenth takes at most, where other work on the machine shows least, and the median.
+/// CPU time of a run [µs]: the 10th percentile, where other load shows least, and the median.
 fn measure(device: &Device, batch: &Batch) -> [f64; 2] {
     let mut times = Vec::new();
     for run in 0..2 * RUNS {

@@ -1,22 +1,22 @@
-//! The adapters of this machine, and which of them is meant.
+//! The adapters of this computer, and the choice of one.
 
 use crate::error::DeviceError;
 use std::future::Future;
 use std::pin::pin;
 use std::task::{Context, Poll, Waker};
 
-/// What an adapter is made of.
+/// Kind of an adapter, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum AdapterKind {
-    /// A card with memory of its own.
+    /// A GPU with memory of its own.
     Discrete,
     /// Shares memory with the processor.
     Integrated,
-    /// A share of a card.
+    /// A part of a GPU.
     Virtual,
     /// Unknown.
     Other,
-    /// The processor plays the accelerator.
+    /// A software driver: kernels run on the CPU.
     Software,
 }
 
@@ -27,15 +27,15 @@ pub struct AdapterInfo {
     pub index: usize,
     /// Name given by the driver.
     pub name: String,
-    /// What it is made of.
+    /// Kind of hardware.
     pub kind: AdapterKind,
     /// `vulkan`, `metal` or `dx12`.
     pub backend: String,
     /// Driver and its version.
     pub driver: String,
-    /// Largest heap of device-local memory, where the driver tells [bytes].
+    /// Largest heap of device-local memory, where the driver reports it [bytes].
     pub memory: Option<u64>,
-    /// Largest range that a binding can show [bytes].
+    /// Size of the largest range that can be bound [bytes].
     pub binding_max: u64,
     /// Starts of the ranges of bindings are multiples of this [bytes].
     pub binding_align: u64,
@@ -45,7 +45,7 @@ pub struct AdapterInfo {
     pub workgroup_max: u32,
     /// Most workgroups of a dispatch.
     pub workgroups_max: u32,
-    /// Host memory can be imported. In the list: the driver knows how; of an open device: it was tried with pages of shared memory.
+    /// Whether host memory can be imported. In the list: the driver has the extension. Of an open device: a test import succeeded.
     pub imports: bool,
 }
 
@@ -86,7 +86,7 @@ pub(crate) fn list() -> Vec<(wgpu::Adapter, AdapterInfo)> {
     found
 }
 
-/// The adapter that is meant.
+/// The chosen adapter.
 pub(crate) fn choose(choice: &Choice) -> Result<(wgpu::Adapter, AdapterInfo), DeviceError> {
     let mut found = list();
     let place = match choice {
@@ -122,7 +122,7 @@ pub(crate) fn choose(choice: &Choice) -> Result<(wgpu::Adapter, AdapterInfo), De
 fn describe(adapter: &wgpu::Adapter) -> AdapterInfo {
     let info = adapter.get_info();
     let limits = adapter.limits();
-    let (memory, imports) = crate::vulkan::facts(adapter);
+    let (memory, imports) = crate::vulkan::properties(adapter);
     AdapterInfo {
         index: 0,
         name: info.name,
@@ -149,7 +149,7 @@ fn describe(adapter: &wgpu::Adapter) -> AdapterInfo {
     }
 }
 
-/// Runs a future of wgpu to its end. Natively they are done when they are made.
+/// Blocks on a future of wgpu. Outside of browsers they are ready at once.
 pub(crate) fn ready<F: Future>(future: F) -> F::Output {
     let mut future = pin!(future);
     let mut context = Context::from_waker(Waker::noop());

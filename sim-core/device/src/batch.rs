@@ -1,93 +1,46 @@
-//! Batches: dispatches and copies, checked once, run often.
+//! Batches: dispatches and copies that are checked once and run often.
 
+use crate::batch_op::{BatchOp, Groups, Slot, Staged, staged_buffers};
 use crate::device::{Device, Inner};
+use crate::encode;
 use crate::error::DeviceError;
-use crate::memory::{Buffer, Memory};
-use crate::portable;
-use crate::program::{Compiled, Program};
-use crate::vulkan::{Handle, Recording};
+use crate::memory::Buffer;
+use crate::program::Program;
+use crate::vulkan::Recording;
 use std::ops::Range;
 use std::sync::Arc;
 
 /// How a batch gets to the device at each run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Replay {
-    /// Recorded once, where the route can (Vulkan); else as `Encoded`.
+    /// Recorded once. Only the Vulkan route can; elsewhere as `Encoded`.
     Recorded,
-    /// Encoded anew, through wgpu.
+    /// Encoded through wgpu at every run.
     Encoded,
 }
 
 /// Commands that a device has accepted.
 ///
-/// Each command sees what all commands before it wrote, in this batch and in those before it. It keeps its programs and buffers.
+/// Each command sees the writes of all commands before it, in this batch and in earlier ones. A batch keeps its programs and buffers alive.
 pub struct Batch {
-    /// Goes first: what it names must outlive it.
-    pub(crate) way: Way,
-    pub(crate) commands: Vec<Command>,
+    /// Dropped first: its programs and buffers must outlive it.
+    pub(crate) route: Route,
+    pub(crate) ops: Vec<BatchOp>,
     /// Staging buffers: they are locked while the batch runs.
     pub(crate) staging: Vec<Staged>,
     pub(crate) device: Arc<Inner>,
 }
 
 /// How a batch runs.
-pub(crate) enum Way {
+pub(crate) enum Route {
     Recorded(Box<Recording>),
     Encoded(Vec<wgpu::BindGroup>),
 }
 
-/// A staging buffer in a batch.
-#[derive(Clone)]
-pub(crate) struct Staged {
-    pub memory: Arc<Memory>,
-    pub written: bool,
-}
-
-/// One command, checked.
-pub(crate) enum Command {
-    Dispatch {
-        program: Arc<Compiled>,
-        slots: Vec<Slot>,
-        groups: Groups,
-    },
-    Copy {
-        from: Arc<Memory>,
-        from_at: u64,
-        to: Arc<Memory>,
-        to_at: u64,
-        bytes: u64,
-    },
-}
-
-/// How many workgroups run.
-pub(crate) enum Groups {
-    Given(u32),
-    /// Three numbers, of which the last two are 1, at a byte of a buffer when the command runs.
-    Found {
-        buffer: Arc<Memory>,
-        at: u64,
-    },
-}
-
-/// What a program sees at a binding.
-pub(crate) struct Slot {
-    pub binding: u32,
-    pub read_only: bool,
-    pub buffer: Arc<Memory>,
-    pub range: Range<u64>,
-}
-
-impl Memory {
-    /// Vulkan's name of it.
-    pub fn raw(&self) -> &Handle {
-        self.raw.as_ref().expect("recorded on the Vulkan route")
-    }
-}
-
-/// Gathers the commands of a batch. What is wrong with them is told by `finish`.
+/// Collects the commands of a batch. `finish` reports the first that is wrong.
 pub struct BatchBuilder {
     replay: Replay,
-    commands: Vec<Command>,
+    ops: Vec<BatchOp>,
     failure: Option<DeviceError>,
     device: Arc<Inner>,
 }
@@ -97,7 +50,7 @@ impl Device {
     pub fn batch(&self, replay: Replay) -> BatchBuilder {
         BatchBuilder {
             replay,
-            commands: Vec::new(),
+            ops: Vec::new(),
             failure: None,
             device: self.inner.clone(),
         }
@@ -105,7 +58,7 @@ impl Device {
 }
 
 impl BatchBuilder {
-    /// Runs `workgroups` of a program, with a range [bytes] of a buffer at each binding. Bindings that it does not use are passed over.
+    /// Runs `workgroups` of a program, with a range of a buffer [bytes] at each binding. Bindings that the program does not use are ignored.
     pub fn dispatch(
         &mut self,
         program: &Program,
@@ -123,8 +76,8 @@ impl BatchBuilder {
         }
     }
 
-    /// As `dispatch`, with as many workgroups as an earlier command wrote: three `u32` at a byte of `found`, the last two of them 1, the first no
-    /// more than the adapter has. It may be 0.
+    /// As `dispatch`, with the number of workgroups that an earlier command wrote: three `u32` at a byte of `found`. The last two are 1.
+    /// The first is at most the adapter's limit, and may be 0.
     pub fn dispatch_found(
         &mut self,
         program: &Program,
@@ -164,7 +117,7 @@ impl BatchBuilder {
     }
 
     fn push(&mut self, program: &Program, slots: Vec<Slot>, groups: Groups) {
-        self.commands.push(Command::Dispatch {
+        self.ops.push(BatchOp::Dispatch {
             program: program.0.clone(),
             slots,
             groups,
@@ -176,35 +129,36 @@ impl BatchBuilder {
         self.push(program, slots, Groups::Given(0));
     }
 
-    /// Copies bytes; places and size are multiples of 4.
+    /// Copies bytes; offsets and size are multiples of 4.
     pub fn copy(&mut self, from: &Buffer, from_at: u64, to: &Buffer, to_at: u64, bytes: u64) {
         match self.copied(from, from_at, to, to_at, bytes) {
-            Ok(command) => self.commands.push(command),
+            Ok(op) => self.ops.push(op),
             Err(reason) => self.fail(from.label(), reason),
         }
     }
 
     /// Hands the commands to the driver.
     ///
-    /// Errors: the first command that was wrong; out of memory; for `Encoded`, what compiling for wgpu brings.
+    /// Errors: the first command that is wrong; out of memory; for `Encoded`, errors of compiling for wgpu.
     pub fn finish(self) -> Result<Batch, DeviceError> {
         if let Some(failure) = self.failure {
             return Err(failure);
         }
         self.device.alive()?;
-        let way = match (&self.device.vulkan, self.replay) {
+        let route = match (&self.device.vulkan, self.replay) {
             (Some(vulkan), Replay::Recorded) => {
-                Way::Recorded(vulkan.record(&self.commands).map_err(|e| {
+                let ops: Vec<_> = self.ops.iter().map(BatchOp::raw).collect();
+                Route::Recorded(vulkan.record(&ops).map_err(|e| {
                     let reason = format!("recording: {e}");
                     self.device.failed(&e, DeviceError::Driver { reason })
                 })?)
             }
-            _ => Way::Encoded(portable::groups(&self.commands)?),
+            _ => Route::Encoded(encode::bind_groups(&self.ops)?),
         };
         Ok(Batch {
-            way,
-            staging: staging(&self.commands),
-            commands: self.commands,
+            route,
+            staging: staged_buffers(&self.ops),
+            ops: self.ops,
             device: self.device,
         })
     }
@@ -215,7 +169,7 @@ impl BatchBuilder {
             .get_or_insert(DeviceError::Command { label, reason });
     }
 
-    /// What a program sees.
+    /// The buffers that a program sees, checked.
     fn slots(
         &self,
         program: &Program,
@@ -289,7 +243,7 @@ impl BatchBuilder {
         to: &Buffer,
         to_at: u64,
         bytes: u64,
-    ) -> Result<Command, String> {
+    ) -> Result<BatchOp, String> {
         for (buffer, at) in [(from, from_at), (to, to_at)] {
             let label = buffer.label();
             if !Arc::ptr_eq(&buffer.0.device, &self.device) {
@@ -310,7 +264,7 @@ impl BatchBuilder {
         if Arc::ptr_eq(&from.0, &to.0) {
             return Err("copies within one buffer are not supported".to_owned());
         }
-        Ok(Command::Copy {
+        Ok(BatchOp::Copy {
             from: from.0.clone(),
             from_at,
             to: to.0.clone(),
@@ -318,38 +272,4 @@ impl BatchBuilder {
             bytes,
         })
     }
-}
-
-/// The staging buffers of some commands, each once.
-fn staging(commands: &[Command]) -> Vec<Staged> {
-    let mut found: Vec<Staged> = Vec::new();
-    let mut note = |memory: &Arc<Memory>, written: bool| {
-        if memory.host.is_none() {
-            return;
-        }
-        match found.iter_mut().find(|s| Arc::ptr_eq(&s.memory, memory)) {
-            Some(staged) => staged.written |= written,
-            None => found.push(Staged {
-                memory: memory.clone(),
-                written,
-            }),
-        }
-    };
-    for command in commands {
-        match command {
-            Command::Dispatch { slots, groups, .. } => {
-                for slot in slots {
-                    note(&slot.buffer, !slot.read_only);
-                }
-                if let Groups::Found { buffer, .. } = groups {
-                    note(buffer, false);
-                }
-            }
-            Command::Copy { from, to, .. } => {
-                note(from, false);
-                note(to, true);
-            }
-        }
-    }
-    found
 }

@@ -1,32 +1,32 @@
-//! Compiled programs in a folder: words of SPIR-V by their source, and what the driver made of them, by driver.
+//! A folder of compiled programs: SPIR-V by source, and the driver's pipeline cache by driver version.
 //!
-//! A file is `MAGIC`, the FNV-1a hash of the rest, the rest. It is written under another name first. What is damaged, is
-//! another version's or cannot be written is passed over: the cache saves time and decides nothing.
+//! A file is `MAGIC`, the FNV-1a hash of the rest, then the rest. It is written under another name first and then renamed. Files that
+//! are damaged or of another version are ignored, and so are failures to write: the cache only saves time.
 
 use crate::module::{Binding, Module};
-use crate::program::Source;
+use crate::source::Source;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
-/// Head of every file. Its number goes up with the layout of files, and when words are made in another way.
+/// Head of every file. Increase the number when the file layout or the translation changes.
 const MAGIC: &[u8; 8] = b"tldev 02";
 
-/// What turns a source into words; another version may turn it into others.
+/// Translator of WGSL to SPIR-V; another version may give other SPIR-V.
 const WRITER: &str = "naga 30.0.1";
 
 /// A folder of compiled programs.
 pub(crate) struct Cache {
     folder: PathBuf,
-    /// File of the driver's own data.
+    /// File of the driver's pipeline cache.
     driver: PathBuf,
-    /// Programs whose words were found.
+    /// Programs whose SPIR-V was found.
     pub hits: AtomicUsize,
-    /// Hash of the driver's data as the file has them.
+    /// Hash of the pipeline cache in the file.
     kept: AtomicU64,
 }
 
 impl Cache {
-    /// `driver` names device and driver version, in letters that a file may have.
+    /// `driver` names device and driver version, in characters that a file name may have.
     pub fn new(folder: &Path, driver: &str) -> Cache {
         let _ = std::fs::create_dir_all(folder);
         Cache {
@@ -37,7 +37,7 @@ impl Cache {
         }
     }
 
-    /// A program, if its words are there.
+    /// The program, if its SPIR-V is stored.
     pub fn module(&self, source: &Source) -> Option<Module> {
         let key = key(source);
         let body = load(&self.file(&key))?;
@@ -46,25 +46,25 @@ impl Cache {
         Some(module)
     }
 
-    /// Are the words of a program there?
+    /// Whether the SPIR-V of a program is stored.
     pub fn knows(&self, source: &Source) -> bool {
         self.file(&key(source)).exists()
     }
 
-    /// Keeps a program.
+    /// Stores a program.
     pub fn keep_module(&self, source: &Source, module: &Module) {
         let key = key(source);
         store(&self.file(&key), &print(module, &key));
     }
 
-    /// What the driver said last time; empty if nothing is there.
+    /// The driver's pipeline cache of an earlier run; empty if there is none.
     pub fn pipelines(&self) -> Vec<u8> {
         let body = load(&self.driver).unwrap_or_default();
         self.kept.store(fnv(&body), Ordering::Relaxed);
         body
     }
 
-    /// Keeps what the driver says, if it is news.
+    /// Stores the driver's pipeline cache, if it changed.
     pub fn keep_pipelines(&self, body: &[u8]) {
         if self.kept.swap(fnv(body), Ordering::Relaxed) != fnv(body) {
             store(&self.driver, body);
@@ -76,7 +76,7 @@ impl Cache {
     }
 }
 
-/// All that the words depend on. It stands in the file too, so that equal hashes do no harm.
+/// Everything that the SPIR-V depends on. The file holds it too, so that a hash collision does no harm.
 fn key(source: &Source) -> Vec<u8> {
     let mut key = Vec::new();
     let mut put = |bytes: &[u8]| {
@@ -142,7 +142,7 @@ fn load(path: &Path) -> Option<Vec<u8>> {
     (magic == MAGIC && u64::from_le_bytes(*hash) == fnv(body)).then(|| body.to_vec())
 }
 
-/// Writes a whole file, or none: several processes may share the folder.
+/// Writes a whole file or nothing: several processes may share the folder.
 fn store(path: &Path, body: &[u8]) {
     static NEXT: AtomicUsize = AtomicUsize::new(0);
     let number = NEXT.fetch_add(1, Ordering::Relaxed);
@@ -153,7 +153,7 @@ fn store(path: &Path, body: &[u8]) {
     }
 }
 
-/// FNV-1a of 64 bits: tells damage and names files; nothing here resists malice.
+/// FNV-1a, 64 bits: detects damage and names files. It does not resist attackers.
 fn fnv(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3)

@@ -1,22 +1,22 @@
-//! What can go wrong between this process and an accelerator.
+//! Errors between this process and an accelerator.
 
 use std::time::Duration;
 use thiserror::Error;
 
-/// Errors of this crate: each names what it is about and, where there is one, the cure.
+/// Errors of this crate. Each names the culprit and, where there is one, the cure.
 #[derive(Clone, Debug, Error)]
 pub enum DeviceError {
-    /// No driver shows an adapter.
+    /// No driver offers an adapter.
     #[error(
         "no adapter found: install a Vulkan driver (software: `apt-get install mesa-vulkan-drivers libvulkan1`)"
     )]
     NoAdapter,
-    /// There are adapters, but not the one that was asked for.
+    /// None of the adapters is the requested one.
     #[error("no adapter {wanted}; there are: {present}")]
     UnknownAdapter {
-        /// The choice, in words.
+        /// The choice, as text.
         wanted: String,
-        /// Indices and names of the adapters there are.
+        /// Indices and names of the adapters.
         present: String,
     },
     /// The driver refused to make a device.
@@ -24,7 +24,7 @@ pub enum DeviceError {
     Open {
         /// Name of the adapter.
         adapter: String,
-        /// The driver's words.
+        /// The driver's message.
         reason: String,
     },
     /// A buffer does not fit into memory.
@@ -35,21 +35,21 @@ pub enum DeviceError {
         /// Its size.
         bytes: u64,
     },
-    /// Host memory that this driver does not take.
+    /// The driver refuses to import host memory.
     #[error("host memory cannot be imported: {reason}")]
     Import {
-        /// The driver's words.
+        /// The driver's message.
         reason: String,
     },
-    /// A program is wrong, or asks for more than the adapter has.
+    /// A program is wrong, or needs more than the adapter has.
     #[error("program `{label}` does not compile: {reason}")]
     Compile {
         /// Name of the program.
         label: String,
-        /// Where and why.
+        /// Location and reason.
         reason: String,
     },
-    /// A driver took too long over a program. Its thread is left to itself.
+    /// The driver took too long to compile a program. Its thread is abandoned.
     #[error(
         "program `{label}` did not compile within {limit:?}: the driver may hang; use another adapter"
     )]
@@ -59,7 +59,7 @@ pub enum DeviceError {
         /// The limit that was given.
         limit: Duration,
     },
-    /// A command names ranges, bindings or buffers that do not exist or do not go together.
+    /// A command names ranges, bindings or buffers that do not exist or do not fit together.
     #[error("command on `{label}`: {reason}")]
     Command {
         /// Name of the program or of the buffer.
@@ -67,22 +67,22 @@ pub enum DeviceError {
         /// What is wrong.
         reason: String,
     },
-    /// A staging buffer is looked at, or run by someone else, while a batch needs it.
+    /// A view of a staging buffer is held, or another run uses it, while a batch needs it.
     #[error("staging buffer `{label}` is in use: drop its views before `run`")]
     Busy {
         /// Name of the buffer.
         label: String,
     },
-    /// The device is gone, with all that its memory held.
+    /// The device is lost, with the contents of its memory.
     #[error("device lost: {reason}; open it again")]
     Lost {
-        /// The driver's words.
+        /// The driver's message.
         reason: String,
     },
-    /// The driver or wgpu reports what this crate should have refused.
+    /// The driver or wgpu reports an error that this crate should have prevented.
     #[error("unexpected answer of the driver: {reason}")]
     Driver {
-        /// Its words.
+        /// Its message.
         reason: String,
     },
 }

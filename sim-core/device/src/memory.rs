@@ -1,6 +1,9 @@
 //! Memory of the device, and memory that the host sees too.
 
-use crate::device::Inner;
+use crate::adapter::ready;
+use crate::allocation::{GRAIN, Residence, USAGES};
+use crate::device::{Device, Inner};
+use crate::error::DeviceError;
 use crate::vulkan;
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, RwLock, RwLockReadGuard, RwLockWriteGuard};
@@ -9,32 +12,30 @@ use std::sync::{Arc, RwLock, RwLockReadGuard, RwLockWriteGuard};
 #[derive(Clone)]
 pub struct Buffer(pub(crate) Arc<Memory>);
 
-/// Memory of a buffer. The fields go in this order: what lies in the device goes before the device.
+/// Memory of a buffer. Field order matters: the buffers are dropped before the device.
 pub(crate) struct Memory {
     pub label: String,
     /// Size that was asked for [bytes]; what is allocated is a multiple of `GRAIN`.
     pub bytes: u64,
-    /// Vulkan's name of it, where that is the route.
+    /// Vulkan's handle of the buffer, on that route.
     pub raw: Option<vulkan::Handle>,
     pub wgpu: wgpu::Buffer,
     /// The host's side of a staging buffer.
-    pub host: Option<Host>,
+    pub host: Option<HostSide>,
     pub device: Arc<Inner>,
 }
 
-/// Allocations are multiples of this, so that they can be cleared and copied whole [bytes].
-pub(crate) const GRAIN: u64 = 16;
-
-/// What every buffer may be used for.
-pub(crate) const USAGES: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE
-    .union(wgpu::BufferUsages::INDIRECT)
-    .union(wgpu::BufferUsages::COPY_SRC)
-    .union(wgpu::BufferUsages::COPY_DST);
+impl Memory {
+    /// Vulkan's handle of the buffer.
+    pub fn raw(&self) -> &vulkan::Handle {
+        self.raw.as_ref().expect("allocated on the Vulkan route")
+    }
+}
 
 /// The host's side of a staging buffer.
-pub(crate) struct Host {
+pub(crate) struct HostSide {
     pub bytes: RwLock<HostBytes>,
-    /// Portable route: what the host maps, since it cannot map what a program writes.
+    /// Portable route: a buffer that the host maps, since it cannot map one that a program writes.
     pub mirror: Option<wgpu::Buffer>,
 }
 
@@ -42,7 +43,7 @@ pub(crate) struct Host {
 pub(crate) enum HostBytes {
     /// The device's own memory, mapped.
     Mapped(vulkan::Mapped),
-    /// A copy, which `run` carries there and back. Words, so that floats may be read in place.
+    /// A copy, which `run` sends and receives. Words, so that floats can be read in place.
     Copied(Vec<u64>),
 }
 
@@ -74,9 +75,9 @@ impl Buffer {
     }
 }
 
-/// A buffer that host and device share; it stands for a `Buffer` wherever one is asked for.
+/// A buffer that host and device share. It dereferences to `Buffer`.
 ///
-/// A batch that names it locks it while it runs, so no view may be held then (`DeviceError::Busy`).
+/// A batch locks its staging buffers while it runs. Holding a view then is an error (`DeviceError::Busy`).
 #[derive(Clone)]
 pub struct Staging(pub(crate) Buffer);
 
@@ -107,7 +108,7 @@ impl Staging {
         }
     }
 
-    fn host(&self) -> &Host {
+    fn host(&self) -> &HostSide {
         self.0.0.host.as_ref().expect("staging has a host's side")
     }
 }
@@ -143,5 +144,116 @@ impl Deref for Write<'_> {
 impl DerefMut for Write<'_> {
     fn deref_mut(&mut self) -> &mut [u8] {
         &mut self.guard.slice_mut()[..self.bytes]
+    }
+}
+
+impl Device {
+    /// Memory of the device, zeroed.
+    pub fn buffer(&self, label: &str, bytes: u64) -> Result<Buffer, DeviceError> {
+        self.make(label, bytes, Residence::Device)
+    }
+
+    /// Memory that the host reads and writes between runs, zeroed. `bytes` are less than the adapter's memory.
+    pub fn staging(&self, label: &str, bytes: u64) -> Result<Staging, DeviceError> {
+        Ok(Staging(self.make(label, bytes, Residence::Host)?))
+    }
+
+    fn make(&self, label: &str, bytes: u64, place: Residence) -> Result<Buffer, DeviceError> {
+        self.inner.alive()?;
+        let no_room = || DeviceError::OutOfMemory {
+            label: label.to_owned(),
+            bytes,
+        };
+        let limit = self.inner.buffer_max.min(isize::MAX as u64) - GRAIN;
+        if bytes > limit.min(self.info().memory.unwrap_or(u64::MAX)) {
+            return Err(no_room());
+        }
+        let rounded = bytes.max(1).next_multiple_of(GRAIN);
+        let (wgpu, raw, host) = match &self.inner.vulkan {
+            Some(vulkan) => {
+                let made = vulkan.allocate(&self.inner.wgpu, rounded, place);
+                let (wgpu, handle, mapped) = made.map_err(|e| self.inner.failed(&e, no_room()))?;
+                let host = mapped.map(|mapped| HostSide {
+                    bytes: RwLock::new(HostBytes::Mapped(mapped)),
+                    mirror: None,
+                });
+                (wgpu, Some(handle), host)
+            }
+            None => {
+                let buffer = |usage| {
+                    let scope = self
+                        .inner
+                        .wgpu
+                        .push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+                    let made = self.inner.wgpu.create_buffer(&wgpu::BufferDescriptor {
+                        label: Some(label),
+                        size: rounded,
+                        usage,
+                        mapped_at_creation: false,
+                    });
+                    match ready(scope.pop()) {
+                        Some(_) => Err(no_room()),
+                        None => Ok(made),
+                    }
+                };
+                let host = match place {
+                    Residence::Device => None,
+                    Residence::Host => Some(HostSide {
+                        bytes: RwLock::new(HostBytes::Copied(vec![0; rounded as usize / 8])),
+                        mirror: Some(buffer(
+                            wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                        )?),
+                    }),
+                };
+                (buffer(USAGES)?, None, host)
+            }
+        };
+        // the host clears its own side: it would see a command of the device only after a run
+        if let Some(host) = &host {
+            let mut bytes = host.bytes.write().unwrap_or_else(|e| e.into_inner());
+            bytes.slice_mut().fill(0);
+        } else {
+            let mut encoder = self.inner.encoder();
+            encoder.clear_buffer(&wgpu, 0, None);
+            self.inner.queue.submit([encoder.finish()]);
+        }
+        self.inner.alive()?;
+        Ok(self.named(label, bytes, wgpu, raw, host))
+    }
+
+    /// Imports host pages as a buffer: programs and copies access them in place.
+    ///
+    /// Errors: `DeviceError::Import` if the driver refuses; nothing has changed then.
+    ///
+    /// # Safety
+    /// `at` is mapped for `bytes`, readable and writable, for as long as the buffer or a batch that names it lives, and nobody
+    /// relies on its contents while a batch that writes them runs.
+    pub unsafe fn import(&self, at: *mut u8, bytes: u64) -> Result<Buffer, DeviceError> {
+        self.inner.alive()?;
+        let made = match &self.inner.vulkan {
+            // SAFETY: as promised by the caller.
+            Some(vulkan) => unsafe { vulkan.import(&self.inner.wgpu, at, bytes) },
+            None => Err("only Vulkan can".to_owned()),
+        };
+        let (wgpu, raw, _) = made.map_err(|reason| DeviceError::Import { reason })?;
+        Ok(self.named("imported", bytes, wgpu, Some(raw), None))
+    }
+
+    fn named(
+        &self,
+        label: &str,
+        bytes: u64,
+        wgpu: wgpu::Buffer,
+        raw: Option<vulkan::Handle>,
+        host: Option<HostSide>,
+    ) -> Buffer {
+        Buffer(Arc::new(Memory {
+            label: label.to_owned(),
+            bytes,
+            raw,
+            wgpu,
+            host,
+            device: self.inner.clone(),
+        }))
     }
 }

@@ -1,6 +1,6 @@
-//! WGSL read, checked and written as SPIR-V.
+//! Translates WGSL to SPIR-V: reads and validates it, resolves overrides, and writes it.
 
-use crate::program::Source;
+use crate::source::Source;
 use naga::back::spv;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
@@ -13,20 +13,20 @@ pub(crate) struct Binding {
     pub read_only: bool,
 }
 
-/// What is known of a program before a driver sees it.
+/// A program before the driver compiles it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Module {
-    /// Storage buffers that the entry point uses, by number.
+    /// Storage buffers that the entry point uses, in ascending order.
     pub bindings: Vec<Binding>,
     /// Threads of a workgroup.
     pub workgroup: u32,
-    /// Words of SPIR-V; empty where no one asked for them.
+    /// SPIR-V; empty if it was not requested.
     pub spirv: Vec<u32>,
 }
 
 /// Reads a program, with its overrides resolved.
 ///
-/// `spirv` asks for its words: Vulkan reads them, other drivers get the WGSL through wgpu.
+/// `spirv` requests SPIR-V for Vulkan; the other drivers get the WGSL through wgpu.
 pub(crate) fn read(source: &Source, spirv: bool) -> Result<Module, String> {
     let module =
         naga::front::wgsl::parse_str(&source.wgsl).map_err(|e| e.emit_to_string(&source.wgsl))?;
@@ -88,13 +88,13 @@ pub(crate) fn read(source: &Source, spirv: bool) -> Result<Module, String> {
     })
 }
 
-/// An error and what caused it, in one line.
+/// An error and its causes, in one line.
 fn chain(error: &dyn std::error::Error) -> String {
     let causes = std::iter::successors(error.source(), |cause| cause.source());
     causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }
 
-/// Nothing is checked at run time: indices are the caller's, who compares its programs with another machine.
+/// Writes SPIR-V without run-time checks: the caller guarantees its indices.
 fn words(
     module: &naga::Module,
     info: &naga::valid::ModuleInfo,
@@ -117,11 +117,11 @@ fn words(
     Ok(rounded(&words))
 }
 
-/// SPIR-V's numbers of a sum, a difference, a product and a quotient of floats.
+/// SPIR-V opcodes of the float sum, difference, product and quotient.
 const ARITHMETIC: [u32; 4] = [129, 131, 133, 136];
 
-/// Asks the driver to round every sum, product and quotient as it stands (`NoContraction`). Mesa would else take `a - ((a + b) - b)` for
-/// 0, and a sum would lose the rounding that it keeps for the next one (Kahan 1965).
+/// Decorates every sum, product and quotient with `NoContraction`, so that the driver rounds each as written. Otherwise Mesa simplifies
+/// `a - ((a + b) - b)` to 0, and a compensated sum loses its remainder (Kahan 1965).
 fn rounded(words: &[u32]) -> Vec<u32> {
     const HEAD: usize = 5;
     const DECORATE: u32 = 3 << 16 | 71;

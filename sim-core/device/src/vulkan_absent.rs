@@ -1,27 +1,28 @@
-//! Where this crate has no Vulkan route: types of which there are no values, so that the other route is the only one.
+//! Stands in for `vulkan` on systems without the Vulkan route: types without values, so that only the portable route exists.
 
 #![allow(
     clippy::unused_self,
-    reason = "the functions of the route that is not here"
+    reason = "functions of a route that does not exist here"
 )]
 
-use crate::batch::Command;
+use crate::allocation::Residence;
 use crate::module::Module;
+use crate::raw_op::RawOp;
 use std::convert::Infallible;
 use thiserror::Error;
 
-/// There is none.
+/// Has no values.
 pub(crate) struct Vulkan(Infallible);
-/// There is none.
+/// Has no values.
 pub(crate) struct Handle(pub Infallible);
-/// There is none.
+/// Has no values.
 pub(crate) struct Mapped(Infallible);
-/// There is none.
+/// Has no values.
 pub(crate) struct Pipeline(Infallible);
-/// There is none.
+/// Has no values.
 pub(crate) struct Recording(Infallible);
 
-/// There is none.
+/// Has no values.
 #[derive(Debug, Error)]
 pub(crate) enum Failure {
     #[error("the device is lost")]
@@ -30,18 +31,11 @@ pub(crate) enum Failure {
     Other(Infallible),
 }
 
-/// Where memory shall lie.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Place {
-    Device,
-    Host,
-}
-
-/// What a buffer is made of.
+/// A buffer: wgpu's handle, Vulkan's, and the mapping of host memory.
 pub(crate) type Made = (wgpu::Buffer, Handle, Option<Mapped>);
 
 /// wgpu does not tell.
-pub(crate) fn facts(_: &wgpu::Adapter) -> (Option<u64>, bool) {
+pub(crate) fn properties(_: &wgpu::Adapter) -> (Option<u64>, bool) {
     (None, false)
 }
 
@@ -80,7 +74,7 @@ impl Vulkan {
         match self.0 {}
     }
 
-    pub fn allocate(&self, _: &wgpu::Device, _: u64, _: Place) -> Result<Made, Failure> {
+    pub fn allocate(&self, _: &wgpu::Device, _: u64, _: Residence) -> Result<Made, Failure> {
         match self.0 {}
     }
 
@@ -94,7 +88,7 @@ impl Vulkan {
         match self.0 {}
     }
 
-    pub fn record(&self, _: &[Command]) -> Result<Box<Recording>, Failure> {
+    pub fn record(&self, _: &[RawOp<'_, Pipeline, Handle>]) -> Result<Box<Recording>, Failure> {
         match self.0 {}
     }
 

@@ -1,82 +1,82 @@
-//! Commands and loads of a simulation, which hold until they are set again or the world is reset.
+//! Commands of a simulation: `joint_f`, `joint_target_q`, `joint_target_qd` and, where the run has it, `body_f`.
+//!
+//! All commands take the same road: [`Simulation::command`] checks the array, writes the worlds whose values are finite, and freezes
+//! the others where the run says so. A command holds until it is set again or the world is reset.
+//!
+//! The joint commands act with the world's command delay and carry noise. `body_f` is a load, which is a parameter that acts at once.
 
-use crate::backend::{BackendError, Values};
+use crate::backend::{BackendError, Input, Values};
 use crate::simulation::Simulation;
 use sim_physics::arrays::{Field, Group};
-use sim_physics::constants::params::Param;
 use std::ops::Range;
 
 impl Simulation {
     /// Sets columns of a command in all worlds.
     ///
     /// `values` is `(worlds, columns)`, world-major. Where the run freezes worlds whose commands are NaN or infinite
-    /// ([`crate::backend::Faults::freezes_nan`]), these keep what they had.
+    /// ([`crate::backend::Faults::freezes_nan`]), these worlds keep their earlier command.
     ///
     /// # Errors
-    /// A field that is no command, columns or length that do not fit, a value that is not finite where that is refused;
-    /// nothing is written then.
+    /// An array that is no command, or that does not vary in this run; wrong columns or length; a value that is not finite, where
+    /// the run refuses those. Nothing is written then.
     pub fn command(
         &mut self,
-        field: Field,
+        input: impl Into<Input>,
         columns: Range<usize>,
         values: Values<'_>,
     ) -> Result<(), BackendError> {
-        self.check(field, Group::Command, &columns, values, None)?;
-        let good = self.good_worlds(columns.len(), values);
+        let input = input.into();
+        let finite = self.accept(input, &columns, values)?;
         let backend = self.backend_mut();
-        backend.write(field, columns, values, good.as_deref());
-        if let Some(good) = good {
-            backend.freeze_others(&good);
+        backend.write(input, columns, values, finite.as_deref());
+        if let Some(finite) = finite {
+            backend.freeze_others(&finite);
         }
         Ok(())
     }
 
-    /// Sets columns of a load in all worlds, as [`Simulation::command`] does those of a command.
+    /// Checks as [`Simulation::command`] does, without setting anything: so that of several arrays none is set when one is wrong.
     ///
     /// # Errors
-    /// As [`Simulation::write_param`].
-    pub fn load(
-        &mut self,
-        param: Param,
-        columns: Range<usize>,
-        values: Values<'_>,
-    ) -> Result<(), BackendError> {
-        let good = self.good_load(param, &columns, values)?;
-        self.write_param(param, columns, values, good.as_deref())?;
-        if let Some(good) = good {
-            self.backend_mut().freeze_others(&good);
-        }
-        Ok(())
-    }
-
-    /// Checks what [`Simulation::load`] would, without setting anything.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn check_load(
+    /// As [`Simulation::command`].
+    pub fn check_command(
         &self,
-        param: Param,
+        input: impl Into<Input>,
         columns: &Range<usize>,
         values: Values<'_>,
     ) -> Result<(), BackendError> {
-        let good = self.good_load(param, columns, values)?;
-        self.check_param(param, columns, values, good.as_deref())
-            .map(drop)
+        self.accept(input.into(), columns, values).map(drop)
     }
 
-    fn good_load(
+    /// Checks a command. Returns the worlds to write: none = all.
+    fn accept(
         &self,
-        param: Param,
+        input: Input,
         columns: &Range<usize>,
         values: Values<'_>,
     ) -> Result<Option<Vec<bool>>, BackendError> {
-        let all = param.columns(&self.model().sizes());
-        self.check_shape(param.row().name, all, columns, values.len())?;
-        Ok(self.good_worlds(columns.len(), values))
+        match input {
+            Input::Param(param) if param.is_load() => {
+                let all = param.columns(&self.model().sizes());
+                self.check_shape(param.row().name, all, columns, values.len())?;
+                let finite = self.finite_worlds(columns.len(), values);
+                self.check_param(param, columns, values, finite.as_deref())?;
+                Ok(finite)
+            }
+            Input::Param(param) => Err(BackendError::Group {
+                field: param.row().name,
+                expected: "a command",
+                choices: command_names(),
+            }),
+            Input::Field(field) => {
+                self.check_field(field, Group::Command, columns, values, None)?;
+                Ok(self.finite_worlds(columns.len(), values))
+            }
+        }
     }
 
-    /// The worlds whose values are finite, where the run freezes others and there are some.
-    fn good_worlds(&self, columns: usize, values: Values<'_>) -> Option<Vec<bool>> {
+    /// The worlds whose values are all finite; none if all are, or if the run refuses values that are not finite.
+    fn finite_worlds(&self, columns: usize, values: Values<'_>) -> Option<Vec<bool>> {
         let first_bad = |part| values.first_not_finite(part, self.precision());
         if !self.freezes_nan() || first_bad(0..values.len()).is_none() {
             return None;
@@ -89,4 +89,11 @@ impl Simulation {
                 .collect(),
         )
     }
+}
+
+fn command_names() -> String {
+    let fields = Field::ALL.iter().map(|field| field.row());
+    let commands = fields.filter(|row| row.group == Group::Command);
+    let names: Vec<_> = commands.map(|row| row.name).collect();
+    names.join(", ")
 }

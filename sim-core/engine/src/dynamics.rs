@@ -1,6 +1,6 @@
 //! Kinematics and dynamics of a model at states that a caller gives, apart from any simulation.
 //!
-//! Everything is the text of [`sim_physics::step`] in double precision; a state is evaluated, nothing moves.
+//! It runs the physics code of [`sim_physics::step`] in double precision. States are evaluated; nothing moves.
 
 use crate::backend::{BackendError, Lanes, Precision, Values};
 use crate::simulation::{Options, Simulation};
@@ -8,7 +8,7 @@ use sim_model::Model;
 use sim_physics::arrays::Field;
 use std::sync::Arc;
 
-/// What [`Dynamics`] can evaluate; each depends on positions and velocities only.
+/// Fields that [`Dynamics`] evaluates; each depends on positions and velocities only.
 pub const EVALUATES: [Field; 5] = [
     Field::BodyQ,
     Field::BodyQd,
@@ -20,7 +20,7 @@ pub const EVALUATES: [Field; 5] = [
 /// Evaluates fields of a model at given states.
 pub struct Dynamics {
     model: Arc<Model>,
-    /// A world for each set of fields asked for so far.
+    /// One world per set of fields that was requested.
     worlds: Vec<World>,
 }
 
@@ -48,11 +48,11 @@ impl Dynamics {
 
     /// A field at given states. `(states, …)` as the field table says, in its unit.
     ///
-    /// `joint_q` is `(states, coords)`, `joint_qd` `(states, dofs)`, or empty for standing still. Numbers of
-    /// quaternions are made unit.
+    /// `joint_q` is `(states, coords)`, `joint_qd` `(states, dofs)`, or empty for zero velocities.
+    /// Quaternions are normalized.
     ///
     /// # Errors
-    /// A field that is not in [`EVALUATES`], lengths that do not fit, a number that is not finite, a quaternion of
+    /// A field that is not in [`EVALUATES`], lengths that do not fit, a value that is not finite, a quaternion of
     /// length 0; "world" in the message counts the states.
     pub fn evaluate(
         &mut self,
@@ -134,14 +134,14 @@ impl Dynamics {
 
     /// Number of states in an array of positions.
     fn states(&self, joint_q: &[f64]) -> Result<usize, BackendError> {
-        // what cannot move has one state
+        // a model without joints has one state
         let coords = self.model.coords();
         let states = joint_q.len().checked_div(coords).unwrap_or(1).max(1);
         self.fits(Field::JointQ, joint_q, states, false)?;
         Ok(states)
     }
 
-    /// Refuses an array of another length than `states` rows, and numbers that are not finite.
+    /// Refuses an array of another length than `states` rows, and values that are not finite.
     fn fits(
         &self,
         field: Field,
@@ -209,7 +209,7 @@ impl Dynamics {
 }
 
 impl World {
-    /// Evaluates the fields at a state; without velocities it stands still.
+    /// Evaluates the fields at a state; no velocities mean zero.
     fn place(
         &mut self,
         state: usize,
@@ -239,7 +239,7 @@ impl World {
         Ok(())
     }
 
-    /// The numbers of a field at the state evaluated last.
+    /// Values of a field at the state that was evaluated last.
     fn field(&self, field: Field) -> impl Iterator<Item = f64> {
         let mut slots = self.simulation.layout().slots.iter();
         let slot = slots

@@ -1,10 +1,13 @@
-//! Worlds of a model: a [`simulation::Simulation`] keeps many and steps them on a [`backend`]; [`dynamics::Dynamics`] are
-//! functions of given states.
+//! Keeps and steps many worlds of a model.
 //!
-//! Imports run one way: `random ← start ← backend ← snapshot ← options ← simulation ← params ← command ← dynamics`. The physics is the text of
-//! `sim-core`, which `sim-core/stages` compile for the machine.
+//! [`simulation::Simulation`] keeps the worlds and steps them on a [`backend`]: the CPU or a GPU. [`dynamics::Dynamics`] evaluates
+//! kinematics and dynamics at states that a caller gives. The physics code is `sim_physics`, which the crates under `sim-core/stages`
+//! compile for each instruction set.
+//!
+//! Imports run one way: `random ← start ← backend ← snapshot ← options ← simulation ← checks ← params ← write ← command ← dynamics`.
 
 pub mod backend;
+mod checks;
 mod command;
 pub mod dynamics;
 pub mod options;
@@ -13,3 +16,4 @@ pub mod random;
 pub mod simulation;
 pub mod snapshot;
 pub mod start;
+mod write;

@@ -1,4 +1,4 @@
-//! How a model is run, and what keeps its worlds.
+//! Options of a run, and the choice of its device.
 
 use crate::backend::{
     BackendError, Backends, Faults, Groups, Lanes, Precision, available_memory, cpu, gpu,
@@ -13,34 +13,34 @@ pub use sim_device::{AdapterInfo, AdapterKind, Choice as Adapter, Replay, adapte
 #[doc(hidden)]
 pub use sim_device::{compiling, lose_after};
 
-/// What keeps the worlds.
+/// The device that keeps the worlds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Device {
     /// The processor.
     #[default]
     Cpu,
-    /// An adapter of this machine; `cache` is a folder that keeps its programs from run to run.
+    /// An adapter of this computer; `cache` is a folder that keeps its programs from run to run.
     Gpu {
         /// Which one.
         adapter: Adapter,
         /// Where programs are kept, if anywhere.
         cache: Option<PathBuf>,
     },
-    /// A GPU if there is one that is no software, for single precision and at least [`AUTO_WORLDS`] worlds; else the processor.
+    /// A hardware GPU, if there is one, for single precision and at least [`AUTO_WORLDS`] worlds; otherwise the processor.
     Auto {
         /// Where programs are kept, if anywhere.
         cache: Option<PathBuf>,
-        /// A GPU that software plays will do, too: for tests of what comes after.
+        /// Whether a software driver is accepted too, for tests.
         software: bool,
     },
 }
 
-/// Worlds from which on [`Device::Auto`] looks for a GPU: fewer leave most of it idle.
+/// Least worlds for which [`Device::Auto`] uses a GPU: fewer leave most of it idle. A guess, not measured.
 pub const AUTO_WORLDS: usize = 1024;
 
-/// For each: lavapipe takes up to 4 s over one program of a grasp on a busy machine, and 12 s over all of them where it compiles one after the other.
+/// Limit per program. On a busy computer lavapipe takes up to 4 s for a program of a grasp, and 12 s for all of them in sequence.
 const COMPILE_LIMIT: Duration = Duration::from_secs(180);
-/// Where another limit is said.
+/// Environment variable of another limit.
 const COMPILE_LIMIT_NAME: &str = "TIGHTLOOP_COMPILE_LIMIT";
 
 /// How to run a model.
@@ -48,25 +48,25 @@ const COMPILE_LIMIT_NAME: &str = "TIGHTLOOP_COMPILE_LIMIT";
 pub struct Options {
     /// Number of worlds.
     pub worlds: usize,
-    /// What keeps them.
+    /// The device that keeps them.
     pub device: Device,
-    /// How a GPU gets the batches of a frame: recorded, unless that is what is measured.
+    /// Whether the batches of a GPU are recorded or encoded; benchmarks compare both.
     pub replay: Replay,
-    /// A driver that takes longer over a program of a GPU is given up.
+    /// Limit on the compile time of a GPU program; a driver that exceeds it is abandoned.
     pub compile_limit: Duration,
     /// Precision of state, commands and fields.
     pub precision: Precision,
-    /// Threads of a step; none = one a core.
+    /// Threads of a step; none = one per core.
     pub threads: Option<usize>,
-    /// Worlds a block.
+    /// Worlds per block.
     pub lanes: Lanes,
     /// Fields of a frame; counters come with every frame.
     pub fields: Vec<Field>,
-    /// When a world is frozen, and what becomes of it.
+    /// Bounds of faults, and what happens to a faulted world.
     pub faults: Faults,
     /// What the draws of a world depend on.
     pub draws: Draws,
-    /// The number of the first world in draws: that of a group of worlds which others come before.
+    /// World number of the first world in draws; other groups may come before.
     pub first_world: usize,
 }
 
@@ -88,7 +88,7 @@ impl Default for Options {
     }
 }
 
-/// Where programs of GPUs are kept from run to run, if this user has such a place.
+/// Folder that keeps GPU programs from run to run, if this user has a cache folder.
 pub fn cache_folder() -> Option<PathBuf> {
     let absolute = |name: &str| {
         let path = PathBuf::from(std::env::var_os(name)?);
@@ -98,10 +98,10 @@ pub fn cache_folder() -> Option<PathBuf> {
     Some(caches?.join("tightloop"))
 }
 
-/// How long a driver may take over a program: seconds in `TIGHTLOOP_COMPILE_LIMIT`, or what [`Options::default`] has.
+/// Limit on the compile time of a GPU program: `TIGHTLOOP_COMPILE_LIMIT` in seconds, or that of [`Options::default`].
 ///
 /// # Errors
-/// What stands there is no time.
+/// A value that is no duration.
 pub fn compile_limit() -> Result<Duration, BackendError> {
     let Ok(value) = std::env::var(COMPILE_LIMIT_NAME) else {
         return Ok(COMPILE_LIMIT);
@@ -111,12 +111,12 @@ pub fn compile_limit() -> Result<Duration, BackendError> {
     limit.map_err(|_| BackendError::CompileLimit { value })
 }
 
-/// Whether [`Device::Auto`] takes a GPU that software plays: `TIGHTLOOP_AUTO_SOFTWARE=1`, for tests of daemons.
+/// Whether [`Device::Auto`] accepts a software driver: `TIGHTLOOP_AUTO_SOFTWARE=1`, for tests of daemons.
 pub fn auto_takes_software() -> bool {
     std::env::var_os("TIGHTLOOP_AUTO_SOFTWARE").is_some_and(|value| value == "1")
 }
 
-/// What keeps the worlds of each of so many groups, and why where that was left open.
+/// One backend per group, and why `auto` chose it.
 pub(crate) fn backends(
     model: &Model,
     options: &Options,
@@ -169,7 +169,7 @@ pub(crate) fn backends(
     Ok((made, note))
 }
 
-/// Threads that are asked for: as many as there are cores if none are.
+/// Requested threads; one per core by default.
 fn threads_of(options: &Options) -> usize {
     let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
     options.threads.unwrap_or_else(cores)
@@ -198,14 +198,14 @@ pub(crate) fn memory_of(model: &Model, options: &Options) -> u64 {
         .saturating_add(scratch)
 }
 
-/// Refuses what would not fit in so many groups, before anything is taken.
+/// Refuses worlds that do not fit into memory, before any is allocated.
 pub(crate) fn check_memory(
     model: &Model,
     options: &Options,
     groups: usize,
 ) -> Result<(), BackendError> {
     const MB: u64 = 1 << 20;
-    // a system that does not say how much is free is not asked twice: the allocation itself will tell
+    // where the system does not report free memory, the allocation itself will fail
     let Some(available) = available_memory() else {
         return Ok(());
     };

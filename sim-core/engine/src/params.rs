@@ -1,21 +1,18 @@
-//! Parameters of a simulation: written and read world by world, effective in the next step.
+//! Parameters of a simulation: written and read per world, effective from the next step on.
 
 use crate::backend::{BackendError, Values};
 use crate::simulation::Simulation;
 use sim_physics::constants::params::{Param, Per};
 use std::ops::Range;
 
-/// Numbers of a parameter are written as far below their least as rounding to `f32` takes them [–].
+/// A value may be below the least of its parameter by the rounding to `f32` [–].
 const ROUNDING: f64 = 1e-7;
 
 impl Simulation {
-    /// Sets columns of a parameter in the worlds of the mask (none = all), for the steps to come.
-    ///
-    /// `values` is `(worlds, columns)`, world-major; rows of other worlds are not looked at.
+    /// Sets columns of a parameter in the worlds of the mask (none = all), from the next step on.
     ///
     /// # Errors
-    /// A parameter that does not vary, columns, length or mask that do not fit, a value that is not finite or below the
-    /// parameter's least; nothing is written then.
+    /// As [`Simulation::write`].
     pub fn write_param(
         &mut self,
         param: Param,
@@ -23,10 +20,7 @@ impl Simulation {
         values: Values<'_>,
         mask: Option<&[bool]>,
     ) -> Result<(), BackendError> {
-        let first = self.check_param(param, &columns, values, mask)?;
-        let columns = first + columns.start..first + columns.end;
-        self.backend_mut().write_params(columns, values, mask);
-        Ok(())
+        self.write(param, columns, values, mask)
     }
 
     /// A parameter of every world, `(worlds, columns)`, world-major.
@@ -41,18 +35,15 @@ impl Simulation {
         Ok(numbers)
     }
 
-    /// Checks what [`Simulation::write_param`] would, without setting anything; the place of the parameter's first number.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn check_param(
+    /// Checks an array of a parameter.
+    pub(crate) fn check_param(
         &self,
         param: Param,
         columns: &Range<usize>,
         values: Values<'_>,
         mask: Option<&[bool]>,
-    ) -> Result<usize, BackendError> {
-        let first = self.first_of(param)?;
+    ) -> Result<(), BackendError> {
+        self.first_of(param)?;
         self.check_mask(mask)?;
         self.check_shape(
             param.row().name,
@@ -101,7 +92,7 @@ impl Simulation {
                 }
             }
         }
-        Ok(first)
+        Ok(())
     }
 
     fn first_of(&self, param: Param) -> Result<usize, BackendError> {
@@ -118,7 +109,7 @@ impl Simulation {
         })
     }
 
-    /// What a column of a parameter is of.
+    /// Name of the joint, body, shape or axis that a column belongs to.
     fn param_name(&self, param: Param, column: usize) -> String {
         let model = self.model();
         match param.row().per {

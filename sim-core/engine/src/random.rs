@@ -1,5 +1,5 @@
-//! Random numbers by counting: each is a function of what it is for, so it is the same on every backend, in every order of
-//! asking, and whatever other worlds there are.
+//! Counter-based random numbers: each is a function of its purpose. So it is the same on every backend, in every order of calls, and for
+//! any number of worlds.
 //!
 //! Philox4x32-10 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC 2011): ten rounds of
 //! multiplications turn a counter into 128 random bits under a key. The key is a seed, the counter (world, episode, stream,
@@ -11,7 +11,7 @@ use sim_physics::constants::params::Param;
 /// How many streams a task has, [`Stream::Task`].
 pub const TASK_STREAMS: u8 = 32;
 
-/// What numbers are for; those of different streams have nothing to do with each other.
+/// Purpose of random numbers; different streams are independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stream {
     /// Positions after a reset; the index is a dof.
@@ -20,7 +20,7 @@ pub enum Stream {
     StartVelocity,
     /// A parameter after a reset; the index is a column of it.
     Param(Param),
-    /// What a task draws for itself, such as goals; it has 32 streams, from 0, and says what the index is.
+    /// Draws of a task, such as goals. It has 32 streams, from 0, and defines the index.
     Task(u8),
     /// Of `joint_f` in a frame; the index is a dof. Streams of frames begin here.
     ForceNoise,
@@ -82,10 +82,10 @@ impl Stream {
 /// Whether the world's number is part of what a draw depends on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Draws {
-    /// It is: worlds of one seed draw different numbers.
+    /// It is: worlds with one seed draw different numbers.
     #[default]
     World,
-    /// 0 stands for it: worlds of one seed draw the same numbers, wherever they are.
+    /// It is not: worlds with one seed draw the same numbers.
     Seed,
 }
 
@@ -106,17 +106,17 @@ impl Draws {
     }
 }
 
-/// What stands for each world in its draws.
+/// World numbers in draws.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Numbering {
-    /// Whether its number does.
+    /// Whether draws depend on the world's number.
     pub draws: Draws,
-    /// The number of the first world: that of a group which others come before.
+    /// World number of the first world; other groups may come before.
     pub first_world: usize,
 }
 
 impl Numbering {
-    /// What stands for the world that comes so many places after the first.
+    /// The number of the world at an offset from the first.
     pub fn number(self, world: usize) -> u32 {
         match self.draws {
             Draws::World => (self.first_world + world) as u32,
@@ -124,7 +124,7 @@ impl Numbering {
         }
     }
 
-    /// That of worlds which begin so many places later.
+    /// The numbering of worlds that begin at an offset.
     pub fn after(self, worlds: usize) -> Numbering {
         Numbering {
             first_world: self.first_world + worlds,
@@ -163,14 +163,14 @@ impl Draw {
         }
     }
 
-    /// A number in [low, high], every one as likely as any other.
+    /// A number in [low, high], uniformly distributed.
     pub fn uniform(&self, index: u32, low: f64, high: f64) -> f64 {
         let [unit, _] = self.units(index);
         // rounding of the sum may reach the end, not pass it
         (low + (high - low) * unit).min(high)
     }
 
-    /// A number of a normal distribution (Box and Muller 1958); no further than 8.6 `std` from the mean.
+    /// A number of a normal distribution (Box and Muller 1958), at most 8.6 `std` from the mean.
     pub fn normal(&self, index: u32, mean: f64, std: f64) -> f64 {
         let [a, b] = self.units(index);
         // 1 - a is above 0, and its logarithm finite

@@ -1,18 +1,24 @@
 //! Snapshots: all worlds as bytes, from which a run resumes bit for bit, whatever its lanes and threads.
 //!
 //! ```text
-//! head     magic 8 · version u32 · checksum u32 · model u64 · worlds u64 · numbers u32 · bytes of a number u32
-//! record   steps u64 · status u32 · contacts left out u32 · seed u64 · episode u32 · numbers         one a world, in order
+//! head     magic 8 · version u32 · checksum u32 · model u64 · worlds u64 · scalars u32 · bytes of a scalar u32
+//! record   steps u64 · status u32 · contacts left out u32 · seed u64 · episode u32 · scalars         per world, in order
 //! ```
-//! Numbers are little endian, those of a record f32 or f64. The checksum is the CRC-32 (IEEE 802.3) of all that follows it. A record's numbers are the whole
-//! state vector of a backend: positions with what rounding has left out of them, velocities, warm start, commands held, and
-//! the parameters that vary.
+//! Everything is little endian. The scalars of a record are f32 or f64. The checksum is the CRC-32 (IEEE 802.3) of all that follows it.
+//!
+//! A record holds the world's counters and its whole state vector: positions and their rounding remainders, velocities, warm start, held
+//! commands, and the parameters that vary. A value that joins the state vector is therefore part of snapshots without further
+//! code. Records are world-major and know no lanes: a snapshot taken with 16 lanes and restored in a scalar run gives the same
+//! bits. Everything is checked before a world changes.
+//!
+//! Snapshot and restore travel as commands that name a file. The daemon writes it under another name first and renames it. Bytes that
+//! Python holds pass through a file in `/dev/shm`.
 
 use crate::backend::{COUNTERS, Precision};
 
-/// How a snapshot begins; the line end shows a transfer that took it for text.
+/// First bytes of a snapshot; the line end reveals a transfer in text mode.
 const MAGIC: [u8; 8] = *b"tlsnap\r\n";
-/// Version of the format; another where the numbers of a world mean something else while they are as many.
+/// Version of the format. Increase it when the scalars of a world change their meaning but not their number.
 const VERSION: u32 = 1;
 /// Where what the checksum covers begins.
 const COVERED: usize = 16;
@@ -38,7 +44,7 @@ pub enum SnapshotError {
     CutShort {
         /// Bytes given.
         got: usize,
-        /// Bytes that its head tells of.
+        /// Bytes according to its head.
         expected: u128,
     },
     /// Changed since it was taken.
@@ -69,9 +75,9 @@ pub enum SnapshotError {
         "a world of the snapshot has {got} numbers, one of the simulation {expected}; take it again with this release"
     )]
     Numbers {
-        /// Numbers of a world in it.
+        /// Scalars per world in the snapshot.
         got: usize,
-        /// Numbers of a world here.
+        /// Scalars per world of the simulation.
         expected: usize,
     },
     /// Of more or fewer worlds.
@@ -115,7 +121,7 @@ pub enum SnapshotError {
 pub(crate) struct Head {
     pub model: u64,
     pub worlds: usize,
-    /// Numbers of a world.
+    /// Scalars per world.
     pub numbers: usize,
     pub precision: Precision,
 }
@@ -139,7 +145,7 @@ impl Head {
     }
 }
 
-/// A snapshot, as long as its head says, whose records `fill` writes.
+/// Writes a snapshot, as long as its head requires; `fill` writes the records.
 pub(crate) fn write(head: &Head, bytes: &mut [u8], fill: impl FnOnce(&mut [u8])) {
     fill(&mut bytes[HEAD..]);
     bytes[..8].copy_from_slice(&MAGIC);
@@ -198,7 +204,7 @@ pub(crate) fn check<'a>(
 }
 
 /// Records of a snapshot of as many worlds as a simulation, or more, and which of the simulation's worlds are finite there. For
-/// those who look on: it comes out of memory, so that its checksum is passed over.
+/// observers: it never left memory, so its checksum is not compared.
 ///
 /// # Errors
 /// The first thing that is wrong.
@@ -216,7 +222,7 @@ pub(crate) fn first<'a>(
     Ok((records, are_finite.collect()))
 }
 
-/// Worlds of a snapshot of the model that `here` describes; its checksum is compared if asked for.
+/// Worlds of a snapshot that fits the model and precision of `here`; `is_summed` compares the checksum.
 fn fit(bytes: &[u8], here: &Head, is_summed: bool) -> Result<usize, SnapshotError> {
     let (model, worlds, numbers, real) = read_head(bytes)?;
     if is_summed && crc32fast::hash(&bytes[COVERED..]) != word(bytes, 12) {
@@ -240,7 +246,7 @@ fn fit(bytes: &[u8], here: &Head, is_summed: bool) -> Result<usize, SnapshotErro
     Ok(worlds)
 }
 
-/// Model, worlds, numbers of a world and bytes of a number, of a snapshot that is as long as these say.
+/// Model, worlds, scalars per world and bytes of a scalar, of a snapshot with the length that follows from them.
 fn read_head(bytes: &[u8]) -> Result<(u64, usize, usize, usize), SnapshotError> {
     if !bytes.starts_with(&MAGIC) {
         return Err(SnapshotError::NotASnapshot);
@@ -277,7 +283,7 @@ fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }
 
-/// Are all numbers finite? Without a way out in between, so that it takes many at once.
+/// Whether all scalars are finite. Without an early exit, so that it vectorizes.
 fn is_finite(numbers: &[u8], precision: Precision) -> bool {
     match precision {
         Precision::F32 => (numbers.as_chunks().0.iter())

@@ -1,4 +1,4 @@
-//! What a world starts from, where that is drawn: its state, around the scene's, and its parameters.
+//! Random starts of worlds: state offsets around the scene's start, and parameters.
 
 use crate::random::{Draw, Stream};
 use sim_model::{Distribution, Model, Pose};
@@ -6,36 +6,36 @@ use sim_physics::arrays::Field;
 use sim_physics::constants::Motion;
 use sim_physics::constants::params::Param;
 
-/// What of the start is drawn.
+/// The random part of a start.
 #[derive(Clone, Debug)]
 pub struct StartDraw {
     joints: Vec<DrawnJoint>,
     params: Vec<DrawnParam>,
 }
 
-/// A parameter of which something is drawn.
+/// A parameter with drawn columns.
 #[derive(Clone, Debug)]
 struct DrawnParam {
     param: Param,
-    /// Where its numbers begin among those of all parameters that vary.
+    /// Its first column among all parameters that vary.
     first: usize,
-    /// The least and the most that a number may be.
+    /// Least and largest allowed value.
     bounds: [f64; 2],
-    /// Its columns that are drawn.
+    /// Its drawn columns.
     columns: Vec<(usize, Distribution)>,
 }
 
-/// A joint of which something is drawn.
+/// A joint with a drawn start.
 #[derive(Clone, Debug)]
 struct DrawnJoint {
     motion: Motion,
     dof: usize,
     coord: usize,
-    /// Where the scene starts it, one a coordinate [rad or m].
+    /// The scene's start, per coordinate [rad or m].
     q: Vec<f64>,
-    /// One a dof.
+    /// Per dof.
     q_offset: Vec<Option<Distribution>>,
-    /// One a dof.
+    /// Per dof.
     qd_offset: Vec<Option<Distribution>>,
     /// [rad or m]
     range: [f64; 2],
@@ -48,12 +48,12 @@ struct Follower {
     dof: usize,
     coord: usize,
     multiplier: f64,
-    /// Where the scene starts it [rad or m].
+    /// The scene's start [rad or m].
     q: f64,
 }
 
 impl StartDraw {
-    /// What a model says of it.
+    /// The random part of a model's start.
     pub fn new(model: &Model) -> StartDraw {
         let (m, start) = (model.constants(), model.start());
         let drawn = m.bodies.iter().filter(|body| {
@@ -113,8 +113,7 @@ impl StartDraw {
         }
     }
 
-    /// Draws the start of a world's episode: gives `put` the numbers of `joint_q` and `joint_qd` that are not the scene's, each
-    /// with its column.
+    /// Draws the start of a world's episode. Calls `put` with each drawn value of `joint_q` and `joint_qd` and its column.
     pub fn draw(
         &self,
         seed: u64,
@@ -130,7 +129,7 @@ impl StartDraw {
         }
     }
 
-    /// Draws the parameters of a world's episode: gives `put` each number with its place among those of all that vary.
+    /// Draws the parameters of a world's episode. Calls `put` with each value and its column among all parameters that vary.
     pub fn draw_params(
         &self,
         seed: u64,

@@ -1,20 +1,23 @@
-//! What a text must not do if it is to become a program.
+//! What physics code must not do if it is to be recorded.
 
 use sim_physics::lane::{Fixed, Table};
 use std::panic::Location;
 
-/// Where in the text something was done.
+/// The deepest nesting of loops: each body is recorded twice, so recording takes time in 2^depth.
+pub const MAX_NESTING: usize = 4;
+
+/// Location in the physics code.
 pub(super) type Place = &'static Location<'static>;
 
-/// A text that cannot be recorded, and where it went wrong first.
+/// Physics code that cannot be recorded, and the location of the first mistake.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{file}:{line}: {misuse}")]
 pub struct RecordError {
-    /// Source file of the text.
+    /// Source file.
     pub file: &'static str,
     /// Line in it, from 1.
     pub line: u32,
-    /// What is wrong there.
+    /// The mistake.
     pub misuse: Misuse,
 }
 
@@ -28,7 +31,7 @@ impl RecordError {
     }
 }
 
-/// Ways to write a text that would mean something else on another machine.
+/// Ways to write physics code that would mean something else on a GPU.
 ///
 /// `block` is the macro that opened the block in question.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -42,34 +45,34 @@ pub enum Misuse {
         /// The block that it left.
         block: &'static str,
     },
-    /// A value is used in the round after the one in which it was made.
+    /// A value is used in the iteration after the one in which it was made.
     #[error(
-        "a value made in one round of a `{block}` is used in the next; carry it over in a \
+        "a value made in one iteration of a `{block}` is used in the next; carry it over in a \
          variable: `cx.var` before the loop, `cx.set` and `cx.get` inside"
     )]
-    NextRound {
+    NextIteration {
         /// The loop.
         block: &'static str,
     },
-    /// A constant differs between the first two rounds of a loop.
+    /// A constant differs between the first two iterations of a loop.
     #[error(
-        "a constant changes from one round of a `{block}` to the next: {first:?}, then {second:?}; \
+        "a constant changes from one iteration of a `{block}` to the next: {first:?}, then {second:?}; \
          make it a variable: `cx.var` before the loop, `cx.set` and `cx.get` inside"
     )]
     ConstantChanges {
         /// The loop.
         block: &'static str,
-        /// The constant in the first round.
+        /// The constant in the first iteration.
         first: f32,
-        /// The constant in the second round.
+        /// The constant in the second iteration.
         second: f32,
     },
-    /// The first two rounds of a loop do different things.
+    /// The first two iterations of a loop do different things.
     #[error(
-        "the first two rounds of a `{block}` do different things; no native variable that changes \
-         from round to round may decide or enter what its body does"
+        "the first two iterations of a `{block}` do different things; no native variable that changes \
+         from one to the next may decide or enter what its body does"
     )]
-    RoundsDiffer {
+    IterationsDiffer {
         /// The loop.
         block: &'static str,
     },
@@ -111,35 +114,35 @@ pub enum Misuse {
     /// Too many loops inside one another.
     #[error(
         "loops are nested deeper than {}, the limit, since every body is recorded twice; \
-         unroll one or split the text into two stages",
-        super::MAX_NESTING
+         unroll one or split the code into two stages",
+        MAX_NESTING
     )]
     TooDeep,
-    /// A number outside its table.
+    /// A cell outside of its table.
     #[error("row {row}, number {number} lies outside of {table:?}; enlarge the table")]
     OutsideTable {
         /// The table.
         table: Table,
         /// The largest row reached.
         row: usize,
-        /// Number in the row.
+        /// Column.
         number: usize,
     },
-    /// A number outside its table of the model.
+    /// An entry outside of its table of the model.
     #[error("row {row}, number {number} lies outside of {table:?} of the model")]
     OutsideFixed {
         /// The table.
         table: Fixed,
         /// The largest row reached.
         row: usize,
-        /// Number in the row.
+        /// Column.
         number: usize,
     },
     /// A constant that a program cannot hold.
     #[error("a constant here is not a number (0/0, ∞ - ∞ or the like); mend the model's constants")]
     NotANumber,
-    /// A value, variable, list or row that was made while another text was recorded.
-    #[error("a {what} of another recording is used; make it inside the text that uses it")]
+    /// A value, variable, list or row of another recording.
+    #[error("a {what} of another recording is used; make it inside the code that uses it")]
     OtherRecording {
         /// Value, variable, list, index or row.
         what: &'static str,

@@ -1,8 +1,8 @@
-//! Runs a recording on the CPU, one world at a time: the check on the program where no GPU is.
+//! Runs a recording on the CPU, one world at a time: the check on the program where there is no GPU.
 
-use super::Recording;
-use super::pack::WIDTH;
-use super::tree::{Binary, Cell, Entry, Op, Operand, Quad, Rounds, Row, Statement, Unary};
+use super::recording::Recording;
+use super::tree::{Binary, Bounds, Cell, Entry, Op, Operand, Quad, Row, Statement, Unary};
+use super::vectorize::WIDTH;
 use sim_physics::lane::{Num, Real, Tables};
 use std::collections::HashMap;
 
@@ -13,7 +13,7 @@ enum Flow {
     LoopEnds,
 }
 
-struct Machine<'a> {
+struct Interpreter<'a> {
     recording: &'a Recording,
     inputs: &'a [f32],
     scratch: &'a mut [f32],
@@ -32,12 +32,12 @@ struct Machine<'a> {
 impl Recording {
     /// The outputs for these inputs and the tables of a model, in `f32` with fused `fma`, for one world.
     ///
-    /// Equal to what the text gives in scalar `f32`, bit for bit up to the sign of zeros, as long
-    /// as the numbers are finite: folding keeps every rounding.
+    /// Equal to a scalar `f32` run of the code, bit for bit up to the sign of zeros, as long as values are finite: folding keeps every
+    /// rounding.
     ///
     /// # Panics
-    /// If there are not as many inputs as were recorded, fewer numbers of scratch memory than
-    /// [`Recording::scratch`] says, or an index of the tables is not below the end that the text gave it.
+    /// If there are not as many inputs as were recorded, less scratch memory than [`Recording::scratch`], or if an
+    /// index of the tables is not below its end.
     pub fn evaluate(&self, inputs: &[f32], scratch: &mut [f32], tables: &Tables<f32>) -> Vec<f32> {
         assert_eq!(
             inputs.len(),
@@ -48,7 +48,7 @@ impl Recording {
             scratch.len() >= self.scratch(),
             "scratch memory for every table"
         );
-        let mut machine = Machine {
+        let mut interpreter = Interpreter {
             recording: self,
             inputs,
             scratch,
@@ -59,13 +59,16 @@ impl Recording {
             variables: vec![0.0; self.names],
             counts: vec![0; self.names],
         };
-        machine.values[..inputs.len()].copy_from_slice(inputs);
-        machine.run(&self.body);
-        self.outputs.iter().map(|x| machine.operand(*x)).collect()
+        interpreter.values[..inputs.len()].copy_from_slice(inputs);
+        interpreter.run(&self.body);
+        self.outputs
+            .iter()
+            .map(|x| interpreter.operand(*x))
+            .collect()
     }
 }
 
-impl Machine<'_> {
+impl Interpreter<'_> {
     fn run(&mut self, body: &[Statement]) -> Flow {
         for statement in body {
             match statement {
@@ -133,12 +136,12 @@ impl Machine<'_> {
                 }
                 Statement::Loop {
                     index,
-                    rounds,
+                    bounds,
                     body,
                 } => {
-                    let (first, end) = match *rounds {
-                        Rounds::Span { first, end } => (self.row(first), self.row(end)),
-                        Rounds::Rows { list, capacity } => {
+                    let (first, end) = match *bounds {
+                        Bounds::Span { first, end } => (self.row(first), self.row(end)),
+                        Bounds::Rows { list, capacity } => {
                             (0, self.counts[list as usize].min(capacity))
                         }
                     };
@@ -221,7 +224,7 @@ impl Machine<'_> {
         cell.table.base + self.row(cell.row) * cell.table.stride + cell.number
     }
 
-    /// Where the numbers of a vector begin.
+    /// Index of the first scalar of a vector.
     fn first(&self, quad: &Quad) -> usize {
         WIDTH * (self.row(quad.row) * quad.stride + quad.first)
     }

@@ -1,6 +1,6 @@
-//! Algebra on recorded values: constants are folded, negation is carried outwards.
+//! Algebra on recorded values: folds constants and moves negations outwards.
 //!
-//! Every rule keeps the result bit for bit where the numbers are finite, up to the sign of a zero.
+//! Every rule keeps the result bit for bit where values are finite, up to the sign of a zero.
 //! Operands that commute are put in one order, constants last, so that equal values are shared and
 //! the two recordings of a loop's body agree.
 
@@ -26,7 +26,7 @@ fn ordered(a: Operand, b: Operand) -> (Operand, Operand) {
     }
 }
 
-/// `1 / x` where multiplying by it rounds as dividing by `x` does: powers of two.
+/// `1 / x` where multiplying by it bounds as dividing by `x` does: powers of two.
 fn exact_inverse(x: f32) -> Option<f32> {
     let inverse = 1.0 / x;
     let is_power_of_two = x.is_normal() && x.to_bits() << 9 == 0;
@@ -193,7 +193,7 @@ impl State {
         }
     }
 
-    /// Operands keep their order: where one is not a number, the second counts.
+    /// Operands keep their order: if one is NaN, the second counts.
     pub(super) fn min(&mut self, a: Operand, b: Operand) -> Operand {
         match (a.constant(), b.constant()) {
             (Some(x), Some(y)) => number(Num::min(x, y)),
@@ -203,7 +203,7 @@ impl State {
         }
     }
 
-    /// Operands keep their order: where one is not a number, the second counts.
+    /// Operands keep their order: if one is NaN, the second counts.
     pub(super) fn max(&mut self, a: Operand, b: Operand) -> Operand {
         match (a.constant(), b.constant()) {
             (Some(x), Some(y)) => number(Num::max(x, y)),

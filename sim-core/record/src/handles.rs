@@ -1,9 +1,35 @@
-//! What the recording machine hands to a text: variables, indices, rows, lists, blocks and loops.
+//! Handles that the recorder gives to physics code: scalars, masks, variables, indices, rows, lists, blocks and loops.
 
-use super::loops::OpenLoop;
-use super::state::Home;
-use super::tree::{Cell, Operand, Row};
+use super::error::Place;
+use super::tree::{Bounds, Cell, Operand, Row, Statement};
 use sim_physics::lane::Table;
+
+/// Where a value, variable, list, index or row was made: a block of a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Home {
+    /// 0: a constant made while nothing was recorded, good everywhere.
+    pub(super) recording: u32,
+    pub(super) block: u32,
+}
+
+/// The home of constants that were made outside of any recording.
+pub(super) const NOWHERE: Home = Home {
+    recording: 0,
+    block: 0,
+};
+
+/// A scalar of a world, recorded instead of computed.
+///
+/// It may be used while the block in which it was made is open, on the thread that records.
+#[derive(Clone, Copy, Debug)]
+pub struct Recorded {
+    pub(super) operand: Operand,
+    pub(super) home: Home,
+}
+
+/// A mask of a world, recorded instead of computed.
+#[derive(Clone, Copy, Debug)]
+pub struct RecordedMask(pub(super) Recorded);
 
 /// A variable of a recording.
 #[derive(Clone, Copy, Debug)]
@@ -74,7 +100,7 @@ pub(super) struct Kept {
     pub end: usize,
 }
 
-/// An open block, to be closed by [`sim_physics::lane::Cx::leave`]; nothing if the text skips its body.
+/// An open block, to be closed by [`sim_physics::lane::Cx::leave`]; nothing if the body is skipped.
 #[derive(Debug)]
 pub struct RecordedBlock(pub(super) Option<OpenBlock>);
 
@@ -104,3 +130,39 @@ pub(super) enum Opened {
 /// An open loop; nothing once it has ended.
 #[derive(Debug)]
 pub struct RecordedLoop(pub(super) Option<OpenLoop>);
+
+/// How many values and names there were at some point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Counters {
+    pub values: u32,
+    pub names: u32,
+}
+
+/// A loop that is being recorded.
+#[derive(Debug)]
+pub(super) struct OpenLoop {
+    pub block: &'static str,
+    pub index: u32,
+    pub bounds: Bounds,
+    /// Past the largest index.
+    pub end: usize,
+    /// Whose rows the loop runs over.
+    pub owner: Option<Owner>,
+    pub depth: usize,
+    pub opened: Place,
+    pub progress: Progress,
+}
+
+/// Iterations of a loop that were recorded.
+#[derive(Debug)]
+pub(super) enum Progress {
+    Start,
+    First {
+        before: Counters,
+    },
+    Second {
+        before: Counters,
+        first: Vec<Statement>,
+        between: Counters,
+    },
+}

@@ -1,10 +1,10 @@
-//! Lists of rows. Those of a text count by name; a kept list is a number in scratch memory, read
-//! whenever it is used, so that two handles on one list agree.
+//! Lists of rows. An ordinary list is counted in a variable. A kept list is counted in scratch memory, which is read at every use, so
+//! that two handles on one list agree.
 
 use super::handles::{Extent, Kept, OpenBlock, Opened, Owner, RecordedLoop};
 use super::handles::{RecordedBlock, RecordedIndex, RecordedList, RecordedRow};
 use super::state::{Kind, State};
-use super::tree::{Op, Operand, Rounds, Row, Statement};
+use super::tree::{Bounds, Op, Operand, Row, Statement};
 use sim_physics::lane::{Real, Table};
 
 impl State {
@@ -145,11 +145,11 @@ impl State {
     pub(super) fn rows(&mut self, list: &RecordedList) -> RecordedLoop {
         match list.extent {
             Extent::Own { capacity } => {
-                let rounds = Rounds::Rows {
+                let bounds = Bounds::Rows {
                     list: list.name,
                     capacity,
                 };
-                self.open_loop("each!", rounds, capacity, Some(Owner::List(list.name)))
+                self.open_loop("each!", bounds, capacity, Some(Owner::List(list.name)))
             }
             Extent::Kept(Kept {
                 capacity_max: 0, ..
@@ -158,17 +158,17 @@ impl State {
                 let count = self.load(kept.count);
                 let capacity = self.number(kept.capacity);
                 let held = self.min(count, capacity);
-                let rounds = Rounds::Span {
+                let bounds = Bounds::Span {
                     first: kept.first,
                     end: self.after(kept.first, held),
                 };
                 let owner = Owner::Kept(kept.count.table);
-                self.open_loop("each!", rounds, kept.end, Some(owner))
+                self.open_loop("each!", bounds, kept.end, Some(owner))
             }
         }
     }
 
-    /// An index as a number.
+    /// An index as a scalar.
     pub(super) fn number(&mut self, row: Row) -> Operand {
         match row {
             Row::At(i) => Operand::number(i as f32),

@@ -1,58 +1,30 @@
 //! Loops of a recording.
 //!
-//! A loop's body is recorded twice. The first round shows what the second may not rely on: a value
-//! of the first is closed by then, and if the two rounds differ in anything but the numbers of
-//! their values, something native went from one to the next. The second is kept.
+//! A loop's body is recorded twice. Values of the first iteration are closed when the second begins, so that using one is detected. If
+//! the two iterations differ in anything but the numbering of their values, a native variable was carried from one to the next. The
+//! second recording is kept.
 
-use super::MAX_NESTING;
-use super::error::{Misuse, Place};
-use super::handles::{Owner, RecordedLoop};
-use super::rounds::{Difference, Pair};
-use super::state::{Counters, Kind, State};
-use super::tree::{Rounds, Row, Statement};
-
-#[derive(Debug)]
-pub(super) struct OpenLoop {
-    block: &'static str,
-    pub index: u32,
-    rounds: Rounds,
-    /// Past the largest index.
-    pub end: usize,
-    /// Whose rows the loop runs over.
-    pub owner: Option<Owner>,
-    depth: usize,
-    opened: Place,
-    progress: Progress,
-}
-
-#[derive(Debug)]
-enum Progress {
-    Start,
-    First {
-        before: Counters,
-    },
-    Second {
-        before: Counters,
-        first: Vec<Statement>,
-        between: Counters,
-    },
-}
+use super::error::{MAX_NESTING, Misuse};
+use super::handles::{OpenLoop, Owner, Progress, RecordedLoop};
+use super::iterations::{Difference, Pair};
+use super::state::{Kind, State};
+use super::tree::{Bounds, Row, Statement};
 
 impl State {
     /// Opens a loop whose indices lie below `end`; it has not started.
     pub(super) fn open_loop(
         &mut self,
         block: &'static str,
-        rounds: Rounds,
+        bounds: Bounds,
         end: usize,
         owner: Option<Owner>,
     ) -> RecordedLoop {
         if self.loops_open() >= MAX_NESTING {
             self.refuse(Misuse::TooDeep);
         }
-        let is_empty = match rounds {
-            Rounds::Span { first, end } if first == end => true,
-            Rounds::Span {
+        let is_empty = match bounds {
+            Bounds::Span { first, end } if first == end => true,
+            Bounds::Span {
                 first: Row::At(first),
                 ..
             } => first >= end,
@@ -64,7 +36,7 @@ impl State {
         RecordedLoop(Some(OpenLoop {
             block,
             index: self.name(),
-            rounds,
+            bounds,
             end,
             owner,
             depth: self.depth(),
@@ -73,9 +45,9 @@ impl State {
         }))
     }
 
-    /// Starts the first or the second round, or closes the loop; true while there is a round.
-    pub(super) fn next_round(&mut self, l: &mut OpenLoop) -> bool {
-        let kind = Kind::Round {
+    /// Starts the first or the second iteration, or closes the loop; true while there is an iteration.
+    pub(super) fn next_iteration(&mut self, l: &mut OpenLoop) -> bool {
+        let kind = Kind::Iteration {
             name: l.block,
             index: l.index,
         };
@@ -110,10 +82,10 @@ impl State {
                 };
                 match pair.compare(&first, &body) {
                     Ok(()) => {
-                        let (index, rounds) = (l.index, l.rounds);
+                        let (index, bounds) = (l.index, l.bounds);
                         self.emit(Statement::Loop {
                             index,
-                            rounds,
+                            bounds,
                             body,
                         });
                     }
@@ -125,7 +97,7 @@ impl State {
                                 first,
                                 second,
                             },
-                            None => Misuse::RoundsDiffer { block },
+                            None => Misuse::IterationsDiffer { block },
                         };
                         self.refuse_at(misuse, place.unwrap_or(l.opened));
                     }

@@ -1,18 +1,17 @@
-//! The recording machine: blocks and loops of the text become statements.
+//! The recorder: blocks and loops of physics code become statements.
 
 use super::error::Misuse;
 use super::handles::{
-    OpenBlock, Opened, RecordedBlock, RecordedIndex, RecordedList, RecordedLoop, RecordedRow,
-    RecordedVariable,
+    NOWHERE, OpenBlock, Opened, Recorded, RecordedBlock, RecordedIndex, RecordedList, RecordedLoop,
+    RecordedMask, RecordedRow, RecordedVariable,
 };
-use super::state::{Kind, NOWHERE, with};
-use super::tree::{Cell, Op, Operand, Rounds, Row, Statement};
-use super::{Recorded, RecordedMask};
+use super::state::{Kind, with};
+use super::tree::{Bounds, Cell, Op, Operand, Row, Statement};
 use sim_physics::lane::{Cx, Fixed, Table};
 use std::marker::PhantomData;
 use std::panic::Location;
 
-/// The machine that [`super::record`] hands to a text. It stays on its thread.
+/// The execution context that [`super::record`] gives to physics code. It stays on its thread.
 pub struct Recorder {
     thread: PhantomData<*const ()>,
 }
@@ -285,11 +284,11 @@ impl Cx for Recorder {
     #[track_caller]
     fn times(&mut self, n: usize) -> RecordedLoop {
         with(Location::caller(), |s| {
-            let rounds = Rounds::Span {
+            let bounds = Bounds::Span {
                 first: Row::At(0),
                 end: Row::At(n),
             };
-            s.open_loop("times!", rounds, n, None)
+            s.open_loop("times!", bounds, n, None)
         })
     }
 
@@ -298,11 +297,11 @@ impl Cx for Recorder {
         with(Location::caller(), |s| {
             s.check(first.home, "index");
             s.check(end.home, "index");
-            let rounds = Rounds::Span {
+            let bounds = Bounds::Span {
                 first: first.row,
                 end: end.row,
             };
-            s.open_loop("span!", rounds, end.max, None)
+            s.open_loop("span!", bounds, end.max, None)
         })
     }
 
@@ -310,7 +309,7 @@ impl Cx for Recorder {
     fn next(&mut self, l: &mut RecordedLoop) -> Option<RecordedIndex> {
         with(Location::caller(), |s| {
             let open = l.0.as_mut()?;
-            let goes_on = !s.failed() && s.next_round(open);
+            let goes_on = !s.failed() && s.next_iteration(open);
             if !goes_on || s.failed() {
                 l.0 = None;
                 return None;
@@ -329,8 +328,8 @@ impl Cx for Recorder {
         with(Location::caller(), |s| {
             let mask = s.see(mask.0);
             match s.kind_here() {
-                Kind::Round { .. } if mask == Operand::Truth(false) => {}
-                Kind::Round { .. } => s.emit(Statement::Stop(mask)),
+                Kind::Iteration { .. } if mask == Operand::Truth(false) => {}
+                Kind::Iteration { .. } => s.emit(Statement::Stop(mask)),
                 kind => s.refuse(Misuse::BreakInBlock { block: kind.name() }),
             }
         });

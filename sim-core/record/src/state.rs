@@ -1,37 +1,23 @@
-//! The recording under way on this thread: open blocks, values, and the first misuse.
+//! The recording in progress on this thread: open blocks, values, and the first misuse.
 //!
-//! A misuse does not panic. It is kept, loops then end at once, and [`super::record`] returns it:
-//! no native loop of a text waits for a recorded value, so the text still comes to its end.
+//! A misuse does not panic. It is stored, loops end at once, and [`super::record`] returns it. No native loop waits for a recorded
+//! value, so the code still reaches its end.
 
-use super::Recorded;
 use super::error::{Misuse, Place, RecordError};
-use super::facts::Facts;
-use super::handles::Owner;
+use super::handles::{Counters, Home, NOWHERE, Owner, Recorded};
+use super::known_values::KnownValues;
 use super::tree::{Op, Operand, Statement};
 use sim_physics::lane::Table;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Where a value, variable, list, index or row was made: a block of a recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Home {
-    /// 0: a constant made while nothing was recorded, good everywhere.
-    recording: u32,
-    block: u32,
-}
-
-/// The home of constants that were made outside of any recording.
-pub(super) const NOWHERE: Home = Home {
-    recording: 0,
-    block: 0,
-};
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    Text,
-    /// One round of the loop with this index.
-    Round {
+    /// The whole recording.
+    Whole,
+    /// One iteration of the loop with this index.
+    Iteration {
         name: &'static str,
         index: u32,
     },
@@ -45,21 +31,21 @@ pub(super) enum Kind {
 impl Kind {
     pub(super) fn name(self) -> &'static str {
         match self {
-            Kind::Text => "record",
-            Kind::Round { name, .. } => name,
+            Kind::Whole => "record",
+            Kind::Iteration { name, .. } => name,
             Kind::When => "when!",
             Kind::Push { .. } => "push!",
         }
     }
 }
 
-pub(super) struct Block {
+pub(super) struct Scope {
     number: u32,
     pub kind: Kind,
     opened: Place,
     statements: Vec<Statement>,
     values: HashMap<Op, u32>,
-    pub facts: Facts,
+    pub known: KnownValues,
 }
 
 pub(super) struct Value {
@@ -67,25 +53,18 @@ pub(super) struct Value {
     pub place: Place,
 }
 
-/// How many values and names there were at some point.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Counters {
-    pub values: u32,
-    pub names: u32,
-}
-
 pub(super) struct State {
     recording: u32,
     pub values: Vec<Value>,
     names: u32,
-    pub open: Vec<Block>,
-    /// Of every block ever opened, by number.
+    pub open: Vec<Scope>,
+    /// Kinds of all blocks ever opened, by number.
     kinds: Vec<Kind>,
     pub tables: Vec<Table>,
     /// Whose rows a table holds.
     pub owners: HashMap<Table, Owner>,
     error: Option<RecordError>,
-    /// Where in the text the present operation is.
+    /// Location of the present operation in the code.
     place: Place,
 }
 
@@ -93,7 +72,7 @@ thread_local! {
     static STATE: RefCell<Option<State>> = const { RefCell::new(None) };
 }
 
-/// Starts a recording; dropped, it restores what was under way before, even if the text panics.
+/// A recording in progress. Dropping it restores the one before, even if the code panics.
 pub(super) struct Session(Option<State>);
 
 impl Session {
@@ -110,7 +89,7 @@ impl Session {
             error: None,
             place,
         };
-        state.enter(Kind::Text);
+        state.enter(Kind::Whole);
         Session(STATE.with(|s| s.replace(Some(state))))
     }
 
@@ -128,12 +107,12 @@ impl Drop for Session {
     }
 }
 
-/// Works on the recording under way, for the operation of the text at `place`.
+/// Calls `f` with the recording in progress, for the operation at `place` in the code.
 pub(super) fn with<R>(place: Place, f: impl FnOnce(&mut State) -> R) -> R {
     STATE.with(|s| {
         let mut state = s.borrow_mut();
         let state = state.as_mut().unwrap_or_else(|| {
-            panic!("{place}: recorded numbers can be used only inside `sim_record::record`")
+            panic!("{place}: recorded scalars can be used only inside `sim_record::record`")
         });
         state.place = place;
         f(state)
@@ -157,16 +136,16 @@ impl State {
         self.innermost().kind
     }
 
-    fn innermost(&self) -> &Block {
+    fn innermost(&self) -> &Scope {
         self.open
             .last()
-            .expect("the text's own block is open while it is recorded")
+            .expect("the outermost block is open during a recording")
     }
 
-    pub(super) fn innermost_mut(&mut self) -> &mut Block {
+    pub(super) fn innermost_mut(&mut self) -> &mut Scope {
         self.open
             .last_mut()
-            .expect("the text's own block is open while it is recorded")
+            .expect("the outermost block is open during a recording")
     }
 
     pub(super) fn place(&self) -> Place {
@@ -201,10 +180,10 @@ impl State {
         } else if !self.is_open(home) {
             let kind = self.kinds[home.block as usize];
             let block = kind.name();
-            let is_next_round =
-                matches!(kind, Kind::Round { .. }) && self.open.iter().any(|b| b.kind == kind);
+            let is_next_iteration =
+                matches!(kind, Kind::Iteration { .. }) && self.open.iter().any(|b| b.kind == kind);
             self.refuse(match what {
-                "value" if is_next_round => Misuse::NextRound { block },
+                "value" if is_next_iteration => Misuse::NextIteration { block },
                 "value" => Misuse::ValueLeaves { block },
                 "row" => Misuse::RowAfterBlock,
                 _ => Misuse::Closed { what, block },
@@ -216,7 +195,7 @@ impl State {
         self.open.iter().any(|b| b.number == home.block)
     }
 
-    /// What a recorded number or mask stands for. After a misuse 0 does for everything: its
+    /// The operand of a recorded scalar or mask. After a misuse it is always 0: its
     /// operand may be of another recording.
     pub(super) fn see(&mut self, x: Recorded) -> Operand {
         self.check(x.home, "value");
@@ -299,7 +278,7 @@ impl State {
     pub(super) fn loops_open(&self) -> usize {
         self.open
             .iter()
-            .filter(|b| matches!(b.kind, Kind::Round { .. }))
+            .filter(|b| matches!(b.kind, Kind::Iteration { .. }))
             .count()
     }
 
@@ -314,13 +293,13 @@ impl State {
     pub(super) fn enter(&mut self, kind: Kind) {
         let number = self.kinds.len() as u32;
         self.kinds.push(kind);
-        self.open.push(Block {
+        self.open.push(Scope {
             number,
             kind,
             opened: self.place,
             statements: Vec::new(),
             values: HashMap::new(),
-            facts: Facts::default(),
+            known: KnownValues::default(),
         });
     }
 

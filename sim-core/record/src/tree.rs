@@ -1,4 +1,4 @@
-//! What a recording is made of: values in the order they were computed, statements in blocks.
+//! The intermediate representation: values in the order of computation, and statements in blocks.
 
 use sim_physics::lane::{Fixed, Table};
 
@@ -55,7 +55,7 @@ pub(crate) enum Op {
     Input(u32),
     /// A variable's value at this point.
     Get(u32),
-    /// A number in scratch memory at this point.
+    /// A scalar in scratch memory at this point.
     Load(Cell),
     /// Rows pushed to a list up to this point.
     Count(u32),
@@ -65,11 +65,11 @@ pub(crate) enum Op {
     Fma(Operand, Operand, Operand),
     /// Mask, value where it holds, value where it does not.
     Select(Operand, Operand, Operand),
-    /// An index as a number.
+    /// An index as a scalar.
     Number(Row),
-    /// A number of a table of the model.
+    /// An entry of a table of the model.
     Constant(Entry),
-    /// A number of a table of the model, in a row that is whole and lies inside.
+    /// An entry of a table of the model, in a row that is an integer and in range.
     Pick {
         table: Fixed,
         row: Operand,
@@ -80,11 +80,11 @@ pub(crate) enum Op {
         entry: Entry,
         end: usize,
     },
-    /// The index that lies a whole number after another. The value is an index.
+    /// An index plus an integer. The value is an index.
     After(Row, Operand),
-    /// Four numbers in scratch memory at this point. The value is a vector.
+    /// Four scalars in scratch memory at this point. The value is a vector.
     Quad(Quad),
-    /// A number of the vector that a value is.
+    /// A component of a vector.
     Part(u32, usize),
 }
 
@@ -124,7 +124,7 @@ impl Op {
     }
 }
 
-/// An index: of a row of a table, or of a round.
+/// An index: of a row of a table, or of an iteration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Row {
     At(usize),
@@ -143,7 +143,7 @@ impl Row {
     }
 }
 
-/// Number `number` of a row of a table of the model.
+/// Column `number` of a row of a table of the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Entry {
     pub table: Fixed,
@@ -151,7 +151,7 @@ pub(crate) struct Entry {
     pub number: usize,
 }
 
-/// Number `number` of a row of a table in scratch memory.
+/// Column `number` of a row of a table in scratch memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Cell {
     pub table: Table,
@@ -159,7 +159,7 @@ pub(crate) struct Cell {
     pub number: usize,
 }
 
-/// Four numbers side by side in scratch memory: vector `row * stride + first`, counted in vectors.
+/// Four neighbouring scalars in scratch memory: vector `row * stride + first`, counted in vectors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Quad {
     pub row: Row,
@@ -167,9 +167,9 @@ pub(crate) struct Quad {
     pub first: usize,
 }
 
-/// Which rounds a loop runs, at most.
+/// Which bounds a loop runs, at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Rounds {
+pub(crate) enum Bounds {
     /// From the first index to before the end.
     Span { first: Row, end: Row },
     /// The rows that a list holds when the loop starts.
@@ -192,7 +192,7 @@ pub(crate) enum Statement {
         cell: Cell,
         value: Operand,
     },
-    /// Writes those numbers of a vector that are given.
+    /// Writes the given components of a vector.
     StoreQuad {
         quad: Quad,
         numbers: [Option<Operand>; 4],
@@ -216,7 +216,7 @@ pub(crate) enum Statement {
     },
     Loop {
         index: u32,
-        rounds: Rounds,
+        bounds: Bounds,
         body: Vec<Statement>,
     },
     /// Leaves the innermost loop where the mask holds.

@@ -107,7 +107,7 @@ pub fn touches(m: &Constants<f32>, kinds: (Kind, Kind), left: &Left) -> bool {
     rows(m, &left.memory).any(|row| (group.first..group.end).contains(&pair(row)))
 }
 
-/// How far what a machine leaves is from the reference, in one part.
+/// Deviation of a backend's output from the reference, in one part.
 pub struct Errors {
     pub part: String,
     /// Largest number of the part in the reference.

@@ -8,7 +8,7 @@ use sim_record::Recording;
 use sim_record::wgsl::{ProgramOptions, wgsl};
 use std::time::Duration;
 
-/// Longer than any program here takes on a busy machine.
+/// Longer than any program here takes on a busy computer.
 const PATIENCE: Duration = Duration::from_secs(300);
 const WORKGROUP: u32 = 32;
 /// Numbers of a vector.

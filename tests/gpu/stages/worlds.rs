@@ -7,7 +7,7 @@ use sim_physics::constants::Constants;
 use sim_physics::math::factor::multiply;
 use sim_physics::step::StageId;
 
-/// What a stage is given in a world: the numbers of what it reads, and the memory of the machine.
+/// Input of a stage in a world: the values that it reads, and scratch memory.
 pub struct Given {
     pub numbers: Vec<f64>,
     pub memory: Vec<f64>,
@@ -20,7 +20,7 @@ pub struct Left {
     pub memory: Vec<f64>,
 }
 
-/// Numbers of some worlds, whatever machine they came from.
+/// Values of some worlds, from any backend.
 pub struct Worlds {
     blocks: Vec<Block<f64, f64>>,
     memory: Vec<Vec<f64>>,

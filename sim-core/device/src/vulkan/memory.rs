@@ -1,24 +1,15 @@
-//! Memory that is allocated from the driver, or made of pages of the host.
+//! Memory: allocated by the driver, or imported from the host.
 
 use super::{Api, Failure, Vulkan};
-use crate::memory::{GRAIN, USAGES};
+use crate::allocation::{GRAIN, Residence, USAGES};
 use ash::vk;
 use rustix::fs::{MemfdFlags, ftruncate, memfd_create};
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 
-/// Vulkan's name of a buffer.
+/// Vulkan's handle of a buffer.
 pub(crate) struct Handle(pub vk::Buffer);
 
-/// Where memory shall lie.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Place {
-    /// Beside the processors of the device.
-    Device,
-    /// Where the host can read and write it at any time.
-    Host,
-}
-
-/// A buffer's memory, mapped for as long as it lives.
+/// Mapped memory of a buffer, for as long as the buffer lives.
 pub(crate) struct Mapped {
     at: *mut u8,
     bytes: usize,
@@ -41,7 +32,7 @@ impl Mapped {
     }
 }
 
-/// What a buffer is made of.
+/// A buffer: wgpu's handle, Vulkan's, and the mapping of host memory.
 pub(crate) type Made = (wgpu::Buffer, Handle, Option<Mapped>);
 
 impl Vulkan {
@@ -50,7 +41,7 @@ impl Vulkan {
         &self,
         device: &wgpu::Device,
         bytes: u64,
-        place: Place,
+        residence: Residence,
     ) -> Result<Made, Failure> {
         assert_eq!(bytes % GRAIN, 0, "sizes are rounded up");
         // SAFETY: the memory is of a type that the buffer takes and large enough; on failure nothing is left behind.
@@ -58,8 +49,8 @@ impl Vulkan {
             let buffer = self.device.create_buffer(&describe(bytes), None)?;
             let needs = self.device.get_buffer_memory_requirements(buffer);
             let made = self
-                .allocate_one_of(&needs, place)
-                .and_then(|memory| self.bind(buffer, memory, bytes, place));
+                .allocate_one_of(&needs, residence)
+                .and_then(|memory| self.bind(buffer, memory, bytes, residence));
             match made {
                 Ok((memory, mapped)) => Ok(wrap(device, buffer, memory, bytes, mapped)),
                 Err(e) => {
@@ -77,13 +68,13 @@ impl Vulkan {
     unsafe fn allocate_one_of(
         &self,
         needs: &vk::MemoryRequirements,
-        place: Place,
+        residence: Residence,
     ) -> Result<vk::DeviceMemory, vk::Result> {
         use vk::MemoryPropertyFlags as Flags;
         let shared = Flags::HOST_VISIBLE | Flags::HOST_COHERENT;
-        let wanted: &[Flags] = match place {
-            Place::Device => &[Flags::DEVICE_LOCAL, Flags::empty()],
-            Place::Host => &[shared | Flags::HOST_CACHED, shared],
+        let wanted: &[Flags] = match residence {
+            Residence::Device => &[Flags::DEVICE_LOCAL, Flags::empty()],
+            Residence::Host => &[shared | Flags::HOST_CACHED, shared],
         };
         let mut failure = vk::Result::ERROR_OUT_OF_DEVICE_MEMORY;
         for flags in wanted {
@@ -103,31 +94,31 @@ impl Vulkan {
     }
 
     /// # Safety
-    /// `memory` is of a type and size for `buffer`, and mappable if `place` is the host; it is freed on failure.
+    /// `memory` is of a type and size for `buffer`, and mappable if `residence` is the host; it is freed on failure.
     unsafe fn bind(
         &self,
         buffer: vk::Buffer,
         memory: vk::DeviceMemory,
         bytes: u64,
-        place: Place,
+        residence: Residence,
     ) -> Result<(vk::DeviceMemory, Option<Mapped>), vk::Result> {
         // SAFETY: as promised by the caller.
         unsafe {
-            let mapped =
-                self.device
-                    .bind_buffer_memory(buffer, memory, 0)
-                    .and_then(|()| match place {
-                        Place::Device => Ok(None),
-                        Place::Host => self
-                            .device
-                            .map_memory(memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty())
-                            .map(|at| {
-                                Some(Mapped {
-                                    at: at.cast(),
-                                    bytes: bytes as usize,
-                                })
-                            }),
-                    });
+            let mapped = self
+                .device
+                .bind_buffer_memory(buffer, memory, 0)
+                .and_then(|()| match residence {
+                    Residence::Device => Ok(None),
+                    Residence::Host => self
+                        .device
+                        .map_memory(memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty())
+                        .map(|at| {
+                            Some(Mapped {
+                                at: at.cast(),
+                                bytes: bytes as usize,
+                            })
+                        }),
+                });
             match mapped {
                 Ok(mapped) => Ok((memory, mapped)),
                 Err(e) => {
@@ -203,7 +194,7 @@ impl Vulkan {
                         .push_next(&mut pages);
                     let memory = self.device.allocate_memory(&request, None);
                     memory
-                        .and_then(|memory| self.bind(buffer, memory, bytes, Place::Device))
+                        .and_then(|memory| self.bind(buffer, memory, bytes, Residence::Device))
                         .map_err(|e| e.to_string())
                 });
             match made {
@@ -216,7 +207,7 @@ impl Vulkan {
         }
     }
 
-    /// Whether pages of shared memory can be imported, found out by doing it.
+    /// Whether pages of shared memory can be imported, found by importing some.
     pub fn probe(&self, device: &wgpu::Device) -> bool {
         let bytes = self.host_align.max(65536) as usize;
         let Ok(file) = memfd_create("tightloop-probe", MemfdFlags::CLOEXEC) else {

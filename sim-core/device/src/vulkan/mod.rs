@@ -1,12 +1,12 @@
-//! The Vulkan route: memory, pipelines and recorded commands of the driver itself, beside what wgpu keeps.
+//! The Vulkan route: memory, pipelines and recorded commands of the driver itself, beside those of wgpu.
 //!
-//! wgpu opens the device, submits and waits, and tracks nothing of what is recorded here.
+//! wgpu opens the device, submits and waits. It tracks nothing that is recorded here.
 
 mod memory;
 mod pipeline;
 mod recording;
 
-pub(crate) use memory::{Handle, Mapped, Place};
+pub(crate) use memory::{Handle, Mapped};
 pub(crate) use pipeline::Pipeline;
 pub(crate) use recording::Recording;
 
@@ -14,7 +14,7 @@ use ash::vk;
 use thiserror::Error;
 use wgpu::hal::api::Vulkan as Api;
 
-/// What the driver answers instead of doing it.
+/// Why the driver did not do what it was asked.
 #[derive(Debug, Error)]
 pub(crate) enum Failure {
     /// The device is gone.
@@ -42,14 +42,14 @@ pub(crate) struct Vulkan {
     host: Option<ash::ext::external_memory_host::Device>,
     /// Addresses and sizes of imported memory are multiples of this [bytes].
     host_align: u64,
-    /// What the driver compiled; it locks it itself.
+    /// The driver's pipeline cache, which locks itself.
     cache: vk::PipelineCache,
     driver: String,
 }
 
 /// Largest device-local heap [bytes], and whether the driver knows how to import host memory.
-pub(crate) fn facts(adapter: &wgpu::Adapter) -> (Option<u64>, bool) {
-    // SAFETY: the handles are asked questions that change nothing, while `adapter` is borrowed.
+pub(crate) fn properties(adapter: &wgpu::Adapter) -> (Option<u64>, bool) {
+    // SAFETY: the handles are only queried, while `adapter` is borrowed.
     unsafe {
         let Some(hal) = adapter.as_hal::<Api>() else {
             return (None, false);
@@ -71,7 +71,7 @@ pub(crate) fn facts(adapter: &wgpu::Adapter) -> (Option<u64>, bool) {
     }
 }
 
-/// Opens a device on this route; `None` where the adapter is another backend's.
+/// Opens a device on this route; `None` if the adapter is not Vulkan's.
 pub(crate) fn open(
     adapter: &wgpu::Adapter,
     wanted: &wgpu::DeviceDescriptor,
@@ -149,7 +149,7 @@ impl Vulkan {
         &self.driver
     }
 
-    /// Starts from what the driver compiled in an earlier run; data of another driver are passed over by it.
+    /// Starts from the pipeline cache of an earlier run. A driver ignores the data of another one.
     pub fn remember(&mut self, earlier: &[u8]) {
         let data = vk::PipelineCacheCreateInfo::default().initial_data(earlier);
         // SAFETY: the data are whole, since the cache compared their hash, and this driver's, since the file has its name.
@@ -157,7 +157,7 @@ impl Vulkan {
         self.cache = made.unwrap_or_default();
     }
 
-    /// What `remember` takes next time.
+    /// The pipeline cache, for `remember` in the next run.
     pub fn remembered(&self) -> Vec<u8> {
         // SAFETY: the cache is this device's; without one there is nothing to ask.
         unsafe {

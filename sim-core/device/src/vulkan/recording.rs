@@ -1,7 +1,9 @@
-//! Commands recorded once, as a secondary command buffer that runs as often as one likes.
+//! Commands recorded once, as a secondary command buffer that runs any number of times.
+//!
+//! wgpu tracks nothing of a recording, so a full barrier stands before each command, and one for the host at the end of a run.
 
-use super::{Api, Failure, Vulkan};
-use crate::batch::{Command, Groups};
+use super::{Api, Failure, Handle, Pipeline, Vulkan};
+use crate::raw_op::{RawGroups, RawOp};
 use ash::vk;
 
 /// A recorded batch.
@@ -13,8 +15,8 @@ pub(crate) struct Recording {
 }
 
 impl Vulkan {
-    /// Records commands that `batch` has checked. They, and so their buffers and programs, live longer than the recording.
-    pub fn record(&self, commands: &[Command]) -> Result<Box<Recording>, Failure> {
+    /// Records commands that were checked. Their buffers and pipelines outlive the recording.
+    pub fn record(&self, ops: &[RawOp<'_, Pipeline, Handle>]) -> Result<Box<Recording>, Failure> {
         let device = &self.device;
         let mut made = Box::new(Recording {
             commands: vk::CommandBuffer::null(),
@@ -28,7 +30,7 @@ impl Vulkan {
                 &vk::CommandPoolCreateInfo::default().queue_family_index(self.family),
                 None,
             )?;
-            let sets = self.sets(&mut made, commands)?;
+            let sets = self.sets(&mut made, ops)?;
             made.commands = device.allocate_command_buffers(
                 &vk::CommandBufferAllocateInfo::default()
                     .command_pool(made.pool)
@@ -43,16 +45,15 @@ impl Vulkan {
                     .inheritance_info(&inherited),
             )?;
             let mut sets = sets.into_iter();
-            for command in commands {
-                // before each command: so that the first waits for batches of before, and for what wgpu did
+            for op in ops {
+                // also before the first: it waits for earlier batches and for wgpu's own commands
                 barrier(device, made.commands, false);
-                match command {
-                    Command::Dispatch {
-                        program, groups, ..
+                match op {
+                    RawOp::Dispatch {
+                        pipeline, groups, ..
                     } => {
-                        let pipeline = program.pipeline();
                         let compute = vk::PipelineBindPoint::COMPUTE;
-                        let set = [sets.next().expect("a set a dispatch")];
+                        let set = [sets.next().expect("one set per dispatch")];
                         device.cmd_bind_pipeline(made.commands, compute, pipeline.pipeline);
                         device.cmd_bind_descriptor_sets(
                             made.commands,
@@ -63,16 +64,15 @@ impl Vulkan {
                             &[],
                         );
                         match groups {
-                            Groups::Given(groups) => {
+                            RawGroups::Given(groups) => {
                                 device.cmd_dispatch(made.commands, *groups, 1, 1);
                             }
-                            Groups::Found { buffer, at } => {
-                                let buffer = buffer.raw().0;
-                                device.cmd_dispatch_indirect(made.commands, buffer, *at);
+                            RawGroups::Found(buffer, at) => {
+                                device.cmd_dispatch_indirect(made.commands, buffer.0, *at);
                             }
                         }
                     }
-                    Command::Copy {
+                    RawOp::Copy {
                         from,
                         from_at,
                         to,
@@ -84,7 +84,7 @@ impl Vulkan {
                             dst_offset: *to_at,
                             size: *bytes,
                         }];
-                        device.cmd_copy_buffer(made.commands, from.raw().0, to.raw().0, &region);
+                        device.cmd_copy_buffer(made.commands, from.0, to.0, &region);
                     }
                 }
             }
@@ -93,20 +93,22 @@ impl Vulkan {
         Ok(made)
     }
 
-    /// Descriptor sets, one a dispatch.
+    /// Descriptor sets, one per dispatch.
     ///
     /// # Safety
-    /// None but that handles in `commands` are alive.
+    /// The handles in `ops` are alive.
     unsafe fn sets(
         &self,
         made: &mut Recording,
-        commands: &[Command],
+        ops: &[RawOp<'_, Pipeline, Handle>],
     ) -> Result<Vec<vk::DescriptorSet>, vk::Result> {
-        let dispatches: Vec<_> = commands
+        let dispatches: Vec<_> = ops
             .iter()
-            .filter_map(|command| match command {
-                Command::Dispatch { program, slots, .. } => Some((program, slots)),
-                Command::Copy { .. } => None,
+            .filter_map(|op| match op {
+                RawOp::Dispatch {
+                    pipeline, slots, ..
+                } => Some((pipeline, slots)),
+                RawOp::Copy { .. } => None,
             })
             .collect();
         if dispatches.is_empty() {
@@ -117,7 +119,7 @@ impl Vulkan {
             ty: vk::DescriptorType::STORAGE_BUFFER,
             descriptor_count: buffers as u32,
         }];
-        let layouts: Vec<_> = dispatches.iter().map(|(p, _)| p.pipeline().set).collect();
+        let layouts: Vec<_> = dispatches.iter().map(|(p, _)| p.set).collect();
         // SAFETY: the pool has room for exactly these sets; each binding of a layout is written once.
         unsafe {
             made.descriptors = self.device.create_descriptor_pool(
@@ -132,15 +134,15 @@ impl Vulkan {
                     .set_layouts(&layouts),
             )?;
             for (set, (_, slots)) in sets.iter().zip(dispatches) {
-                for slot in slots {
+                for (binding, buffer, range) in slots {
                     let range = [vk::DescriptorBufferInfo {
-                        buffer: slot.buffer.raw().0,
-                        offset: slot.range.start,
-                        range: slot.range.end - slot.range.start,
+                        buffer: buffer.0,
+                        offset: range.start,
+                        range: range.end - range.start,
                     }];
                     let write = vk::WriteDescriptorSet::default()
                         .dst_set(*set)
-                        .dst_binding(slot.binding)
+                        .dst_binding(*binding)
                         .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
                         .buffer_info(&range);
                     self.device.update_descriptor_sets(&[write], &[]);
@@ -185,7 +187,7 @@ unsafe fn barrier(device: &ash::Device, commands: vk::CommandBuffer, host: bool)
     let (to, reads) = if host {
         (work | Stage::HOST, used | Access::HOST_READ)
     } else {
-        // numbers of workgroups, too, may have been written by a program
+        // a program may have written the number of workgroups
         (
             work | Stage::DRAW_INDIRECT,
             used | Access::INDIRECT_COMMAND_READ,

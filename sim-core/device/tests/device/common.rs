@@ -3,7 +3,7 @@
 use sim_device::{Batch, Buffer, Choice, Device, Program, Replay, Source, Staging};
 use std::time::Duration;
 
-/// Long enough for any program here on a busy machine.
+/// Long enough for any program here on a busy computer.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The ways that a batch may go, of each route and replay: each with a device of its own.

@@ -157,7 +157,7 @@ fn what_a_driver_puts_off_until_a_first_run_is_within_the_limit() {
         eprintln!("skipped: who else puts it off is not known");
         return;
     }
-    // a text that no run before has left in the driver's folder: a pipeline of it takes 50 ms, its first run seconds
+    // kernel source that the driver's cache does not know: its pipeline takes 50 ms, its first run seconds
     let mut source = monster(4000);
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     let salt = format!("a[id.x] + {}.0", now.unwrap().subsec_nanos());

@@ -1,4 +1,4 @@
-//! Vulkan's validation layer watches all tests of a program that has this module: what it says ends the program as a failure.
+//! Runs all tests of a program under Vulkan's validation layer: any message of it ends the program as a failure.
 //!
 //! The layer is asked for by the environment, before `main`, while there is one thread. It begins a file of messages anew with each
 //! instance of Vulkan, so they go into a pipe, which is read when the program ends. Under nextest a program is one test.

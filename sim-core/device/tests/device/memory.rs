@@ -28,7 +28,7 @@ impl Mapping {
     }
 
     fn numbers(&self) -> &[f32] {
-        // SAFETY: mapped until drop, and no batch runs while it is looked at.
+        // SAFETY: mapped until drop, and no batch runs while it is viewed.
         unsafe { std::slice::from_raw_parts(self.0.cast(), PAGES / 4) }
     }
 }

@@ -1,4 +1,4 @@
-//! What is asked wrongly is refused by name, and a lost device says so.
+//! Invalid requests are refused by name, and a lost device is reported.
 
 use crate::common::{copy, device, fetch, numbers, program, scale_add, staged, ways};
 use sim_device::{AdapterKind, BatchBuilder, Choice, Device, DeviceError, Replay, adapters};

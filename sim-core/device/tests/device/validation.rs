@@ -27,7 +27,7 @@ fn the_validation_layer_watches() {
 }
 
 /// What the layer must not overlook, and lavapipe takes without a word: a buffer of no size, and two writes without a barrier.
-/// Instances of before and after show that none hides what another's layer says.
+/// Instances made before and after show that none hides messages of another's layer.
 #[test]
 #[ignore = "run by what_the_validation_layer_says_fails_the_test"]
 fn something_forbidden() {

@@ -1,6 +1,6 @@
-//! What can go wrong at the door of a backend.
+//! Errors of backends and their arguments.
 
-/// An argument or a machine that does not fit.
+/// An invalid argument, or one that this computer cannot meet.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BackendError {
     /// No worlds.
@@ -9,7 +9,7 @@ pub enum BackendError {
     /// No threads.
     #[error("threads is 0; ask for at least 1, or leave it out")]
     NoThreads,
-    /// More memory than the machine has left.
+    /// More memory than is available.
     #[error(
         "{worlds} worlds need {needed_mb} MB of memory and {available_mb} MB are available; ask for fewer worlds or fields"
     )]
@@ -21,7 +21,7 @@ pub enum BackendError {
         /// [MB]
         available_mb: u64,
     },
-    /// A block width that this processor does not have.
+    /// A block width that this processor does not support.
     #[error(
         "this processor has no {instructions}, which {lanes} worlds a block need; use lanes = auto"
     )]
@@ -31,12 +31,12 @@ pub enum BackendError {
         /// Instruction set.
         instructions: &'static str,
     },
-    /// Threads that the system does not start.
+    /// The system does not start so many threads.
     #[error("cannot start {threads} threads: {reason}; ask for fewer")]
     Threads {
         /// Threads asked for.
         threads: usize,
-        /// What the system says.
+        /// The system's message.
         reason: String,
     },
     /// A field of another group.
@@ -139,7 +139,7 @@ pub enum BackendError {
         /// The value.
         value: f64,
     },
-    /// A parameter that is a constant of the program.
+    /// A parameter that does not vary in this run.
     #[error(
         "`{param}` is the same constant in all worlds of this run; to write it, name it at launch: params=(\"{param}\",) (of this run vary: {varying})"
     )]
@@ -165,7 +165,7 @@ pub enum BackendError {
         /// The least that it may be.
         least: f64,
     },
-    /// A delay of commands for which there is no room.
+    /// A command delay beyond the scene's `command_delay_max`.
     #[error(
         "command_delay is {value} in world {world}; nothing was written, give at most {most}, or more room with the scene's command_delay_max"
     )]
@@ -187,7 +187,7 @@ pub enum BackendError {
         /// The gain.
         value: f64,
     },
-    /// A bound that every world is beyond.
+    /// A bound that every world exceeds.
     #[error("the bound of {bound} is {value}; give a number above 0, or infinity for none")]
     Bound {
         /// What it bounds.
@@ -195,13 +195,13 @@ pub enum BackendError {
         /// The bound.
         value: f64,
     },
-    /// What an accelerator, or its driver, refused.
+    /// An error of an accelerator or its driver.
     #[error("{reason}")]
     Device {
-        /// Its words.
+        /// The message.
         reason: String,
     },
-    /// A driver that takes too long over a program.
+    /// A driver takes too long to compile a program.
     #[error(
         "{reason}, or use device = cpu, or give the driver longer: TIGHTLOOP_COMPILE_LIMIT=600 [s]"
     )]
@@ -209,22 +209,22 @@ pub enum BackendError {
         /// Which program, and the limit.
         reason: String,
     },
-    /// A limit on a driver that is no time.
+    /// A compile limit that is no duration.
     #[error("TIGHTLOOP_COMPILE_LIMIT is {value:?}; give seconds, such as 600, or leave it out")]
     CompileLimit {
-        /// What stands there.
+        /// The value.
         value: String,
     },
-    /// An accelerator that is not there.
+    /// An adapter that does not exist.
     #[error("{reason}")]
     Adapter {
-        /// Those that are.
+        /// The adapters that exist.
         reason: String,
     },
-    /// Memory that an accelerator has not, or not any more.
+    /// An accelerator has too little memory.
     #[error("{reason}")]
     DeviceMemory {
-        /// Its words.
+        /// The message.
         reason: String,
     },
     /// A model whose stages cannot be recorded.

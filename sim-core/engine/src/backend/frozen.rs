@@ -1,28 +1,28 @@
-//! How many worlds were frozen, for people.
+//! Counts of frozen worlds, for people.
 
-/// Worlds that were frozen since somebody asked.
+/// Worlds that were frozen since the last report.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Frozen {
-    /// Those that were no longer finite.
+    /// Worlds that were not finite.
     pub not_finite: u64,
-    /// Those that were beyond the bounds of the run.
+    /// Worlds beyond the bounds of the run.
     pub out_of_bounds: u64,
     /// The first of them.
     pub first: Option<FirstFrozen>,
-    /// Worlds that are frozen now, where any was since.
+    /// Worlds that are frozen now, if any was frozen since the last report.
     pub now: usize,
 }
 
-/// A world as it was frozen; the first is that of the least frame, then of the least world.
+/// A world that was frozen. The first one has the lowest frame, then the lowest world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct FirstFrozen {
     /// Control frame of the run.
     pub frame: u64,
     /// The world.
     pub world: usize,
-    /// Its control frames since its reset, all of which went well.
+    /// Its control frames since its reset, all without a fault.
     pub steps: u64,
-    /// Was it finite, but beyond the bounds?
+    /// Whether it was finite, but beyond the bounds.
     pub is_finite: bool,
 }
 
@@ -36,7 +36,7 @@ impl Frozen {
         self.keep_first(world);
     }
 
-    /// Adds those of other worlds.
+    /// Adds the counts of other worlds.
     pub(super) fn join(&mut self, others: Frozen) {
         self.not_finite += others.not_finite;
         self.out_of_bounds += others.out_of_bounds;

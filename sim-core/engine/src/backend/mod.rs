@@ -1,65 +1,24 @@
-//! Machines that keep worlds: where the text runs, and how fields come and go.
+//! Backends: they keep the worlds, run the physics code, and move fields in and out.
 
 pub mod cpu;
 mod error;
 mod frozen;
 mod gather;
 pub mod gpu;
+mod input;
 mod noise;
 mod state;
 
 pub use error::BackendError;
 pub use frozen::{FirstFrozen, Frozen};
+pub use input::{Input, Values};
 
 use crate::random::Numbering;
-use sim_physics::arrays::Field;
 use std::ops::Range;
 
 /// Bytes of a world's counters in a record: steps `u64`, status `u32`, contacts left out `u32`, seed `u64`, episode `u32`,
 /// little endian.
 pub const COUNTERS: usize = 28;
-
-/// World-major numbers from outside, in either precision.
-#[derive(Clone, Copy, Debug)]
-pub enum Values<'a> {
-    /// Single precision.
-    F32(&'a [f32]),
-    /// Double precision.
-    F64(&'a [f64]),
-}
-
-impl Values<'_> {
-    /// Number of values.
-    pub fn len(&self) -> usize {
-        match self {
-            Values::F32(v) => v.len(),
-            Values::F64(v) => v.len(),
-        }
-    }
-
-    /// No values?
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The value at a place.
-    pub fn at(&self, place: usize) -> f64 {
-        match self {
-            Values::F32(v) => f64::from(v[place]),
-            Values::F64(v) => v[place],
-        }
-    }
-
-    /// The first of a part that is not finite in a precision, counted from the first of all.
-    pub fn first_not_finite(&self, part: Range<usize>, precision: Precision) -> Option<usize> {
-        let first = part.start;
-        let place = match self {
-            Values::F32(v) => v[part].iter().position(|x| !x.is_finite()),
-            Values::F64(v) => (v[part].iter()).position(|&x| !precision.round(x).is_finite()),
-        };
-        place.map(|place| first + place)
-    }
-}
 
 /// Precision of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -72,7 +31,7 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// A number as a run of this precision keeps it.
+    /// A value as a run of this precision keeps it.
     pub fn round(self, x: f64) -> f64 {
         match self {
             Precision::F32 => f64::from(x as f32),
@@ -81,10 +40,10 @@ impl Precision {
     }
 }
 
-/// Worlds a block on the CPU.
+/// Worlds per block on the CPU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Lanes {
-    /// As many as the processor can; one in `f64`, and for one world.
+    /// As many as the processor supports; one in `f64`, and for a single world.
     #[default]
     Auto,
     /// One.
@@ -95,39 +54,39 @@ pub enum Lanes {
     Sixteen,
 }
 
-/// Worlds in groups, each with a backend of its own; they share threads.
+/// Groups of worlds, each with a backend of its own. They share threads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Groups {
-    /// How many there are.
+    /// Number of groups.
     pub count: usize,
-    /// Worlds of each.
+    /// Worlds per group.
     pub worlds: usize,
-    /// That of the first group; the worlds of the next ones follow.
+    /// Numbering of the first group; the worlds of the other groups follow.
     pub numbering: Numbering,
 }
 
 impl Groups {
-    /// The numbering of each.
+    /// The numbering of each group.
     pub fn numberings(self) -> impl Iterator<Item = Numbering> {
         (0..self.count).map(move |group| self.numbering.after(group * self.worlds))
     }
 
-    /// Worlds of all.
+    /// Worlds of all groups.
     pub fn all(self) -> usize {
         self.count * self.worlds
     }
 }
 
-/// When a world is frozen, besides where it is no longer finite, and what becomes of it.
+/// Bounds beyond which a world faults, and what happens to a faulted world. A world that is not finite always faults.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Faults {
     /// Largest |joint_q| [rad or m].
     pub joint_q_max: f64,
     /// Largest |joint_qd| [rad/s or m/s].
     pub joint_qd_max: f64,
-    /// Is it reset before its next step, or frozen until somebody resets it?
+    /// Whether a faulted world is reset before its next step; otherwise it is frozen until a client resets it.
     pub resets: bool,
-    /// Is a world frozen whose command is NaN or infinite? Otherwise such a command is refused for all worlds.
+    /// Whether a world with a NaN or infinite command is frozen; otherwise such a command is refused for all worlds.
     pub freezes_nan: bool,
 }
 
@@ -142,73 +101,70 @@ impl Default for Faults {
     }
 }
 
-/// A program of an accelerator, for people.
+/// A program of a GPU, for people.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ProgramFacts {
-    /// What it does.
+pub struct ProgramInfo {
+    /// Its name.
     pub label: String,
-    /// Statements of its text.
+    /// Statements of its source.
     pub statements: usize,
-    /// Of one that steps: how often a frame runs it.
-    pub rounds: Option<usize>,
+    /// Dispatches per frame, of a program that steps.
+    pub dispatches: Option<usize>,
 }
 
 /// One for each group.
 pub type Backends = Vec<Box<dyn Backend>>;
 
-/// What keeps the worlds. Arguments were checked by [`crate::simulation::Simulation`].
+/// Keeps and steps the worlds of a group. [`crate::simulation::Simulation`] has checked all arguments.
 pub trait Backend: Send {
-    /// What it runs on, for people.
+    /// Name of the processor or GPU, for people.
     fn device(&self) -> &str;
-    /// The programs that it consists of: none on the CPU.
-    fn programs(&self) -> &[ProgramFacts] {
+    /// The programs of a GPU; none on the CPU.
+    fn programs(&self) -> &[ProgramInfo] {
         &[]
     }
     /// Threads that a step may use.
     fn threads(&self) -> usize;
-    /// When worlds are frozen from now on, and what becomes of them.
+    /// Sets the bounds of faults, and what happens to faulted worlds.
     fn set_faults(&mut self, faults: Faults);
-    /// Freezes the worlds that are not marked, at their present state, as no longer finite.
+    /// Freezes the worlds that are not marked, in their present state, as not finite.
     fn freeze_others(&mut self, good: &[bool]);
-    /// Sets columns of a state or command field in the worlds of the mask (none = all);
-    /// a written state clears the warm start of its worlds.
+    /// Sets columns of an array in the worlds of the mask (none = all). Writing a state clears the warm start of its worlds.
     fn write(
         &mut self,
-        field: Field,
+        input: Input,
         columns: Range<usize>,
         values: Values<'_>,
         mask: Option<&[bool]>,
     );
-    /// Sets columns of the parameters that vary in the worlds of the mask (none = all).
-    fn write_params(&mut self, columns: Range<usize>, values: Values<'_>, mask: Option<&[bool]>);
     /// Reads columns of the parameters that vary, `(worlds, columns)`, world-major.
     fn params(&self, columns: Range<usize>, to: &mut [f64]);
-    /// Numbers of a world's state and commands: all that a step begins from.
+    /// Scalars of a world's state and commands: everything that a step starts from.
     fn numbers(&self) -> usize;
-    /// Writes the records of the first worlds, as many as there is room for, in order: [`COUNTERS`] bytes, then [`Backend::numbers`] numbers of the run's precision. They are
-    /// worthless if a device is lost after it.
+    /// Writes the records of the first worlds, as many as fit, in order: [`COUNTERS`] bytes, then [`Backend::numbers`] scalars of the
+    /// run's precision. They are invalid if [`Backend::lost`] reports an error afterwards.
     fn save(&self, records: &mut [u8]);
     /// Sets the worlds of the mask (none = all) to their records, or all of them to that of `from_world`.
     fn restore(&mut self, records: &[u8], mask: Option<&[bool]>, from_world: Option<usize>);
-    /// Back to the start, in the worlds of the mask (none = all): of their next episode, or of the first one of new seeds, one
-    /// for all or one a world. What is drawn is [`crate::start::StartDraw`]'s.
+    /// Resets the worlds of the mask (none = all): to the start of their next episode, or of the first episode of new seeds (one for
+    /// all worlds, or one per world). [`crate::start::StartDraw`] draws the start.
     fn reset(&mut self, mask: Option<&[bool]>, seeds: Option<&[u64]>);
-    /// The worlds that were frozen since this was asked last.
+    /// The worlds that were frozen since the last call.
     fn take_frozen(&mut self) -> Frozen;
     /// Runs `substeps` substeps (none = evaluates only), then writes every field of the layout
     /// into the arena, 8-byte words. No allocation, no error: see [`Backend::lost`].
     fn run(&mut self, substeps: usize, arena: &mut [u64]);
-    /// What made this backend useless: a device that is gone. Nothing is computed after it.
+    /// The error that lost the device. Nothing is computed after it.
     fn lost(&self) -> Option<&BackendError> {
         None
     }
-    /// Loses a device, as a driver might. For tests of what comes after.
+    /// Loses the device, as a driver may. For tests of the error path.
     fn lose(&mut self) {}
     /// Name of the GPU, empty on the CPU.
     fn adapter(&self) -> &str {
         ""
     }
-    /// How frames reach the memory of their readers: `direct`, or of a GPU `imported` or `copied`.
+    /// How frames reach the memory of their readers: `direct` on the CPU, `imported` or `copied` on a GPU.
     fn delivery(&self) -> &'static str {
         "direct"
     }
@@ -216,7 +172,7 @@ pub trait Backend: Send {
     fn copied(&self) -> u64 {
         0
     }
-    /// Lets a device write into this arena whenever it is given to [`Backend::run`]; false where it cannot.
+    /// Lets the device write into this arena whenever [`Backend::run`] gets it; false if it cannot.
     ///
     /// # Safety
     /// Its memory stays mapped where it is, to the same pages, until [`Backend::forget`] or the end of the backend, and nothing
@@ -228,7 +184,7 @@ pub trait Backend: Send {
     fn forget(&mut self) {}
 }
 
-/// Memory that can be taken without swapping [bytes].
+/// Memory that can be allocated without swapping [bytes].
 pub(crate) fn available_memory() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text

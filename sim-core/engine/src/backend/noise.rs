@@ -1,7 +1,9 @@
 //! Noise of commands and sensors.
 //!
-//! A number of it is a function of seed, world, episode, `step`, stream and column, so that it is the same in every width and
-//! precision (rounded). Two frames of the same state show the same noise.
+//! Noise is drawn on the host in `f64`, as a function of (seed, world, episode, `step`, stream, column). So it does not depend on the lanes,
+//! only rounding depends on the precision, and two frames of one state show the same noise. Command noise is drawn before a frame. Field
+//! noise is added after the fields were written into the arena. A value with a standard deviation of 0 keeps its bits, and
+//! nothing is drawn for it.
 
 use crate::random::{Draw, Stream};
 use sim_model::Model;
@@ -85,7 +87,7 @@ impl Noise {
     }
 }
 
-/// A number of noise; 0 where its standard deviation is 0.
+/// A sample of noise; 0 if its standard deviation is 0.
 pub(super) fn sample(draw: &Draw, index: usize, deviation: f64) -> f64 {
     if deviation > 0.0 {
         draw.normal(index as u32, 0.0, deviation)
@@ -119,7 +121,7 @@ impl Noise {
                 }
             }
             _ => {
-                // numbers of a column, and columns that share a deviation
+                // columns that share a standard deviation
                 let shared = match field {
                     Field::JointQdMeasured | Field::JointTorque => 1,
                     _ => 3,
@@ -132,7 +134,7 @@ impl Noise {
     }
 }
 
-/// Adds noise, one a dof, to the coordinates of a joint.
+/// Adds noise, one sample per dof, to the coordinates of a joint.
 fn add_to_joint<R: Real>(motion: Motion, q: &mut [R], noise: impl Fn(usize) -> f64) {
     match motion {
         Motion::Revolute | Motion::Prismatic => add(&mut q[0], noise(0)),
@@ -151,7 +153,7 @@ fn add<R: Real>(x: &mut R, noise: f64) {
     }
 }
 
-/// Turns a quaternion by a rotation vector, in world axes or in its own.
+/// Rotates a quaternion by a rotation vector, in world axes or in its own.
 fn turn<R: Real>(quat: &mut [R], vector: [f64; 3], in_world: bool) {
     if vector == [0.0; 3] {
         return;

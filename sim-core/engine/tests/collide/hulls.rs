@@ -37,7 +37,7 @@ struct Found {
     off: usize,
     /// Normals off by more than 1e-5 where apart or shallow.
     tilted: usize,
-    /// The distance that is told against that along the normal that is told.
+    /// The reported distance, against the distance along the reported normal.
     untrue: f64,
 }
 
@@ -73,7 +73,7 @@ fn closest(a: &Polytope, b: &Polytope) -> Option<(f64, Vector)> {
     }
 }
 
-/// Random pairs, apart, shallow and deep alike.
+/// Random pairs: separated, in shallow and in deep contact.
 fn cases(a: Kind, b: Kind, count: usize) -> (Vec<Hull>, Vec<Pair>) {
     let mut random = Random(7 + a as u64 + 10 * b as u64);
     let hulls: Vec<Hull> = (0..40).map(|i| random.hull(8 + (56 * i) / 39)).collect();
@@ -90,7 +90,7 @@ fn cases(a: Kind, b: Kind, count: usize) -> (Vec<Hull>, Vec<Pair>) {
         let still = random.rotation();
         for _ in 0..OF_A_MODEL {
             let axes = [still, random.rotation()];
-            // apart, shallow and deep alike: first so that they touch, then a share of the smaller one in or out
+            // separated, shallow and deep: placed so that they touch, then moved by a share of the smaller one
             let way = random.direction();
             let [first, second] =
                 [0, 1].map(|i| Polytope::of(shapes[i], &axes[i], [0.0; 3], &hulls));
@@ -193,7 +193,7 @@ impl Found {
         // and those are another minimum, not another place
         assert!(self.touching[0] < 1e-3 && self.worst < 0.25, "{self:?}");
         assert!(self.separated > 1000 && self.deep > 900, "{self:?}");
-        // what is told is the distance along the normal that is told
+        // the reported distance is that along the reported normal
         assert!(self.untrue < 1e-5, "{self:?}");
     }
 }

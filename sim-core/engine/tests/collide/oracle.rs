@@ -13,7 +13,7 @@ pub struct Polytope {
     pub radius: f64,
     /// Axis and radius of discs about the points: of a cylinder.
     pub discs: Option<(Vector, f64)>,
-    /// Directions of edges that are not told apart by faces: of a box or segment.
+    /// Directions of edges that faces do not distinguish: of a box or segment.
     pub directions: Vec<Vector>,
 }
 

@@ -1,4 +1,4 @@
-//! Primitives: their extents, and what parry3d says of two of them.
+//! Primitives: their extents, and parry3d's result for two of them.
 
 use super::shapes::*;
 use parry3d_f64::math::{Pose, Rotation, Vector as Place};

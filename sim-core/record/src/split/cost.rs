@@ -1,19 +1,18 @@
-//! How long a driver takes to compile statements: the unit is a simple statement.
+//! Compile time of statements: the unit is a simple statement.
 //!
-//! Measured on a software Vulkan (llvmpipe of Mesa 22.3), which makes a loop over the lanes with blocks of
-//! its own of every access to memory: a unit is 0.05 to 0.1 ms of a core, and the accesses of a kernel
-//! cost as much again where there are eighty of them.
+//! Measured on the software driver (llvmpipe of Mesa 22.3), which compiles every memory access to a loop over the lanes: a unit is
+//! 0.05 to 0.1 ms of a core, and eighty accesses in a kernel cost twice as much as alone.
 
-use crate::Recording;
+use crate::recording::Recording;
 use crate::tree::{Op, Statement};
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Mul};
 
-/// Of some statements.
+/// Cost of some statements.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Cost {
     pub work: usize,
-    /// Accesses to memory, which cost the more the more there are.
+    /// Accesses to memory; their cost grows with the square.
     pub access: usize,
     /// Loops, which cost as their cube: one of them little, twenty half a second.
     pub loops: usize,
@@ -21,21 +20,21 @@ pub(super) struct Cost {
 
 /// A vector of four that is read.
 pub(super) const QUAD: Cost = access(16);
-/// A number that is read by itself.
+/// A scalar that is read by itself.
 const NUMBER: Cost = access(12);
 /// A vector that is written.
 pub(super) const WRITTEN_QUAD: Cost = access(12);
-/// A number that is written by itself.
+/// A scalar that is written by itself.
 const WRITTEN_NUMBER: Cost = access(10);
-/// A loop, beside its statements.
+/// A loop, without its statements.
 const LOOP: Cost = Cost {
     work: 100,
     access: 0,
     loops: 1,
 };
-/// A kernel, beside its statements.
+/// A kernel, without its statements.
 pub(super) const KERNEL: usize = 80;
-/// Accesses that cost twice what they would by themselves.
+/// Accesses at which the cost per access has doubled.
 const MANY: usize = 1300;
 
 const fn work(work: usize) -> Cost {
@@ -60,7 +59,7 @@ impl Cost {
         self.work + self.access + self.access * self.access / MANY + self.loops.pow(3)
     }
 
-    /// Of numbers that share vectors, in the mean.
+    /// Cost of scalars that share vectors, on average.
     pub(super) fn of_numbers(self, numbers: usize) -> Cost {
         Cost {
             work: self.work * numbers / 4,
@@ -104,16 +103,16 @@ impl Sum for Cost {
     }
 }
 
-/// Of a kernel that was packed, with its inputs and outputs.
+/// Cost of a vectorized kernel, with its inputs and outputs.
 pub(super) fn of_kernel(packed: &Recording) -> usize {
     let fields = QUAD.of_numbers(packed.live_inputs().len());
     let outputs = WRITTEN_QUAD.of_numbers(packed.outputs());
-    let body = of_packed(&packed.body, &packed.values);
+    let body = of_vectorized(&packed.body, &packed.values);
     KERNEL + (fields + outputs + body).total()
 }
 
-/// Of statements that were packed.
-pub(super) fn of_packed(body: &[Statement], values: &[Op]) -> Cost {
+/// Cost of vectorized statements.
+pub(super) fn of_vectorized(body: &[Statement], values: &[Op]) -> Cost {
     let cost = |statement: &Statement| match statement {
         Statement::Let(number) => of_op(&values[*number as usize]),
         Statement::StoreQuad { numbers, .. } => match numbers.iter().flatten().count() {
@@ -122,9 +121,9 @@ pub(super) fn of_packed(body: &[Statement], values: &[Op]) -> Cost {
         },
         Statement::Store { .. } => WRITTEN_NUMBER,
         Statement::When { body, .. } | Statement::Push { body, .. } => {
-            work(20) + of_packed(body, values)
+            work(20) + of_vectorized(body, values)
         }
-        Statement::Loop { body, .. } => LOOP + of_packed(body, values),
+        Statement::Loop { body, .. } => LOOP + of_vectorized(body, values),
         _ => work(2),
     };
     body.iter().map(cost).sum()
@@ -139,7 +138,7 @@ fn of_op(op: &Op) -> Cost {
     }
 }
 
-/// Of a statement between cuts, before neighbours share accesses: a number is part of a vector.
+/// Cost of a statement between cuts, before accesses are vectorized: a scalar is part of a vector.
 pub(super) fn of_simple(statement: &Statement, values: &[Op]) -> Cost {
     match statement {
         Statement::Let(number) => match &values[*number as usize] {

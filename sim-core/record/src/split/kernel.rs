@@ -1,367 +1,50 @@
-//! Kernels from pieces: what each is given, what it keeps for others, and in which fields.
+//! A kernel: a part of a recording that reads and writes fields.
 
-use super::Kernel;
-use super::cut::{FRAME, Item, Piece, Pieces, bases, is_computed_again, uses_of};
-use super::lasting::{Names, lasting};
-use super::private::private;
-use super::uses::{Use, computed, of_op};
-use super::write::Writer;
-use crate::Recording;
-use crate::tree::{Op, Operand, Statement};
-use crate::wgsl::ProgramOptions;
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use super::cost;
+use crate::recording::Recording;
+use crate::wgsl::{ProgramOptions, wgsl};
+use sim_physics::lane::Tables;
 
-/// What a piece is given and what it changes.
-#[derive(Default)]
-pub(super) struct Needs {
-    /// Inputs of the text, and values that earlier pieces computed.
-    values: BTreeSet<u32>,
-    /// Variables and lists that go on.
-    loaded: BTreeSet<u32>,
-    changed: BTreeSet<u32>,
-    /// Variables that start anew by an assignment.
-    pub assigned: HashSet<u32>,
-    pub made: HashSet<u32>,
-    counts: bool,
-    /// Variables that start anew, whatever they held.
-    private: BTreeSet<u32>,
+/// A part of a recording, from fields to fields.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Kernel {
+    pub(super) recording: Recording,
+    pub(super) options: ProgramOptions,
 }
 
-impl Needs {
-    fn names(&self) -> Names<'_> {
-        Names {
-            loaded: &self.loaded,
-            changed: &self.changed,
-        }
-    }
-}
-
-/// The kernels, and how many fields they use from `spare` on.
-pub(super) fn kernels(
-    recording: &Recording,
-    options: &ProgramOptions,
-    pieces: &Pieces,
-    spare: u32,
-) -> (Vec<Kernel>, usize) {
-    let (inputs, outputs) = options.fields(recording);
-    let mut plan = Plan::new(recording, pieces, &inputs, &outputs);
-    plan.place(spare);
-    let kernels = (0..pieces.pieces.len())
-        .map(|p| plan.kernel(p, options))
-        .collect();
-    (kernels, (plan.end - spare) as usize)
-}
-
-pub(super) struct Plan<'a> {
-    pub recording: &'a Recording,
-    pub pieces: &'a Pieces,
-    inputs: &'a [u32],
-    pub needs: Vec<Needs>,
-    pub lists: HashSet<u32>,
-    /// Indices of frames that are cut inside, and which.
-    pub indices: HashMap<u32, usize>,
-    /// Outputs that each piece writes, with their fields.
-    pub outputs: Vec<Vec<(Operand, u32)>>,
-    pub value_fields: HashMap<u32, u32>,
-    pub name_fields: HashMap<u32, u32>,
-    /// Variables and lists that each piece leaves for others.
-    pub kept: Vec<BTreeSet<u32>>,
-    /// Fields that complete a vector which each piece writes.
-    pub padding: Vec<Vec<u32>>,
-    pub frame_fields: Vec<u32>,
-    end: u32,
-}
-
-impl<'a> Plan<'a> {
-    fn new(
-        recording: &'a Recording,
-        pieces: &'a Pieces,
-        inputs: &'a [u32],
-        outputs: &[u32],
-    ) -> Plan<'a> {
-        let mut lists = HashSet::new();
-        recording.each_statement(&mut |statement| {
-            if let Statement::List { name, .. } = statement {
-                lists.insert(*name);
-            }
-        });
-        let frames = pieces.frames.iter().enumerate();
-        let indices: HashMap<u32, usize> = frames
-            .filter_map(|(k, frame)| frame.index.map(|(name, _)| (name, k)))
-            .collect();
-        let mut plan = Plan {
-            recording,
-            pieces,
-            inputs,
-            needs: Vec::new(),
-            lists,
-            indices,
-            outputs: vec![Vec::new(); pieces.pieces.len()],
-            value_fields: HashMap::new(),
-            name_fields: HashMap::new(),
-            kept: Vec::new(),
-            padding: vec![Vec::new(); pieces.pieces.len()],
-            frame_fields: Vec::new(),
-            end: 0,
-        };
-        plan.needs = pieces
-            .pieces
-            .iter()
-            .zip(private(&pieces.pieces, &recording.values))
-            .map(|(piece, private)| plan.needs_of(piece, private))
-            .collect();
-        plan.place_outputs(outputs);
-        let names: Vec<Names> = plan.needs.iter().map(Needs::names).collect();
-        plan.kept = lasting(pieces, &names);
-        plan
+impl Kernel {
+    /// The kernel as WGSL.
+    pub fn wgsl(&self) -> String {
+        wgsl(&self.recording, &self.options)
     }
 
-    fn needs_of(&self, piece: &Piece, private: BTreeSet<u32>) -> Needs {
-        let values = &self.recording.values;
-        let mut needs = Needs::default();
-        let mut met: HashSet<u32> = HashSet::new();
-        for item in &piece.items {
-            if let Item::Run(statement) = item {
-                computed(std::slice::from_ref(statement), &mut |x| {
-                    needs.made.insert(x);
-                });
-            }
-        }
-        for item in &piece.items {
-            if let Item::Run(Statement::Set { name, .. }) = item
-                && met.insert(*name)
-            {
-                needs.assigned.insert(*name);
-            }
-            uses_of(item, values, &mut |used| match used {
-                Use::Value(number) => self.need(number, &mut needs),
-                Use::Read(name) => {
-                    if met.insert(name) {
-                        needs.loaded.insert(name);
-                    }
-                }
-                Use::Change(name) => {
-                    if met.insert(name) {
-                        needs.loaded.insert(name);
-                    }
-                    needs.changed.insert(name);
-                }
-                Use::Start(name) => {
-                    met.insert(name);
-                    needs.changed.insert(name);
-                }
-                Use::Index(name) => needs.counts |= self.indices.contains_key(&name),
-            });
-        }
-        needs.loaded = &needs.loaded - &private;
-        needs.changed = &needs.changed - &private;
-        needs.private = private;
-        needs
+    /// What it computes, from the fields `options().inputs` to `options().outputs`.
+    pub fn recording(&self) -> &Recording {
+        &self.recording
     }
 
-    fn need(&self, number: u32, needs: &mut Needs) {
-        if needs.made.contains(&number) {
+    /// Fields of its inputs and outputs.
+    pub fn options(&self) -> &ProgramOptions {
+        &self.options
+    }
+
+    /// How long a driver will take to compile it, in units of a simple statement.
+    pub fn cost(&self) -> usize {
+        cost::of_kernel(&self.recording.vectorized())
+    }
+
+    pub(super) fn run(&self, fields: &mut [f32], scratch: &mut [f32], tables: &Tables<f32>) {
+        let options = &self.options;
+        if options.unless.iter().any(|f| fields[*f as usize] != 0.0) {
             return;
         }
-        let values = &self.recording.values;
-        // operands of a value that is computed again may be computed here
-        if is_computed_again(&values[number as usize], values)
-            && !matches!(values[number as usize], Op::Input(_))
-        {
-            let mut operands = Vec::new();
-            of_op(&values[number as usize], &mut |used| {
-                if let Use::Value(x) = used {
-                    operands.push(x);
-                }
-            });
-            return operands.iter().for_each(|x| self.need(*x, needs));
-        }
-        needs.values.insert(number);
-    }
-
-    /// An output is written where it is computed, unless an input is still to be read from its field.
-    fn place_outputs(&mut self, fields: &[u32]) {
-        let last = self.outputs.len() - 1;
-        let mut home = HashMap::new();
-        for (p, needs) in self.needs.iter().enumerate() {
-            if self.pieces.pieces[p].frames.is_empty() {
-                home.extend(needs.made.iter().map(|x| (*x, p)));
-            }
-        }
-        let mut late = Vec::new();
-        let mut read_by: HashMap<u32, usize> = HashMap::new();
-        let values = &self.recording.values;
-        for (p, needs) in self.needs.iter().enumerate() {
-            for x in &needs.values {
-                if (*x as usize) < self.recording.inputs {
-                    read_by.insert(self.inputs[*x as usize], p);
-                }
-            }
-        }
-        for (x, field) in self.recording.outputs.iter().zip(fields) {
-            let Operand::Value(number) = *x else {
-                late.push((*x, *field));
-                continue;
-            };
-            if self.inputs.get(number as usize) == Some(field) {
-                continue;
-            }
-            match home.get(&number) {
-                Some(p) if read_by.get(field).is_none_or(|q| q <= p) => {
-                    self.outputs[*p].push((*x, *field));
-                    self.value_fields.entry(number).or_insert(*field);
-                }
-                _ => {
-                    bases(number, values, &mut |base| {
-                        if (base as usize) < self.recording.inputs {
-                            read_by.insert(self.inputs[base as usize], last);
-                        }
-                    });
-                    late.push((*x, *field));
-                }
-            }
-        }
-        for (x, field) in late {
-            if let Operand::Value(number) = x {
-                let mut needs = std::mem::take(&mut self.needs[last]);
-                self.need(number, &mut needs);
-                self.needs[last] = needs;
-            }
-            self.outputs[last].push((x, field));
-        }
-    }
-
-    /// Gives a field to all that crosses a cut: what the same pieces write lies side by side.
-    fn place(&mut self, spare: u32) {
-        self.end = spare;
-        for _ in &self.pieces.frames {
-            self.frame_fields.push(self.end);
-            self.end += FRAME;
-        }
-        let mut readers: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-        for (p, needs) in self.needs.iter().enumerate() {
-            for x in &needs.values {
-                if *x as usize >= self.recording.inputs && !self.value_fields.contains_key(x) {
-                    readers.entry(*x).or_default().push(p);
-                }
-            }
-        }
-        for p in 0..self.needs.len() {
-            let made = &self.needs[p].made;
-            let mut crossing: Vec<(&Vec<usize>, u32)> = readers
-                .iter()
-                .filter(|(x, _)| made.contains(x))
-                .map(|(x, readers)| (readers, *x))
-                .collect();
-            // what is read together lies together
-            crossing.sort();
-            let crossing: Vec<u32> = crossing.into_iter().map(|(_, x)| x).collect();
-            for x in crossing {
-                self.value_fields.insert(x, self.end);
-                self.end += 1;
-            }
-            self.pad(&[p]);
-        }
-        let mut writers: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-        for (p, names) in self.kept.iter().enumerate() {
-            for name in names {
-                writers.entry(*name).or_default().push(p);
-            }
-        }
-        let mut groups: BTreeMap<Vec<usize>, Vec<u32>> = BTreeMap::new();
-        for (name, pieces) in writers {
-            groups.entry(pieces).or_default().push(name);
-        }
-        for (pieces, names) in groups {
-            for name in names {
-                self.name_fields.insert(name, self.end);
-                self.end += 1;
-            }
-            self.pad(&pieces);
-        }
-    }
-
-    /// Ends a vector: the pieces that write in it write all of it.
-    fn pad(&mut self, pieces: &[usize]) {
-        while !self.end.is_multiple_of(4) {
-            for p in pieces {
-                self.padding[*p].push(self.end);
-            }
-            self.end += 1;
-        }
-    }
-
-    fn kernel(&self, p: usize, options: &ProgramOptions) -> Kernel {
-        let (piece, needs) = (&self.pieces.pieces[p], &self.needs[p]);
-        let mut inputs = Vec::new();
-        // in order: equal recordings have equal texts, by which they are kept
-        let mut given: BTreeMap<u32, u32> = BTreeMap::new();
-        for x in &needs.values {
-            given.insert(*x, inputs.len() as u32);
-            inputs.push(match self.inputs.get(*x as usize) {
-                Some(field) => *field,
-                None => self.value_fields[x],
-            });
-        }
-        let mut names = Vec::new();
-        for name in &needs.loaded {
-            names.push((*name, inputs.len() as u32));
-            inputs.push(self.name_fields[name]);
-        }
-        let mut rounds = HashMap::new();
-        let counts = |item: &Item| matches!(item, Item::Next(_));
-        if needs.counts || piece.items.iter().any(counts) {
-            for frame in &piece.frames {
-                rounds.insert(*frame, inputs.len() as u32);
-                inputs.push(self.frame_fields[*frame] + 1);
-            }
-        }
-        let mut writer = Writer {
-            plan: self,
-            values: (0..inputs.len() as u32).map(Op::Input).collect(),
-            body: Vec::new(),
-            known: HashMap::new(),
-            rounds,
-            indices: HashMap::new(),
+        let (Some(inputs), Some(outputs)) = (&options.inputs, &options.outputs) else {
+            unreachable!("a kernel's fields are given");
         };
-        for (x, input) in given {
-            writer.given(x, input);
+        let given: Vec<f32> = inputs.iter().map(|f| fields[*f as usize]).collect();
+        let results = self.recording.evaluate(&given, scratch, tables);
+        for (field, x) in outputs.iter().zip(results) {
+            fields[*field as usize] = x;
         }
-        for (name, input) in names {
-            let value = Operand::Value(input);
-            writer.body.push(match self.lists.contains(&name) {
-                true => Statement::List { name, rows: value },
-                false => Statement::Var { name, value },
-            });
-        }
-        for name in &needs.private {
-            let value = Operand::number(0.0);
-            writer.body.push(Statement::Var { name: *name, value });
-        }
-        let (results, fields): (Vec<Operand>, Vec<u32>) = writer.run(p).into_iter().unzip();
-        let recording = Recording {
-            inputs: inputs.len(),
-            outputs: results,
-            values: writer.values,
-            names: self.recording.names,
-            scratch: 0,
-            body: writer.body,
-        };
-        let recording = Recording {
-            scratch: recording.reach(),
-            ..recording
-        };
-        let unless = piece.frames.iter().map(|frame| self.frame_fields[*frame]);
-        let options = ProgramOptions {
-            inputs: Some(inputs),
-            outputs: Some(fields),
-            unless: options.unless.iter().copied().chain(unless).collect(),
-            is_listed: piece
-                .frames
-                .iter()
-                .any(|frame| self.pieces.frames[*frame].rounds > 1),
-            ..options.clone()
-        };
-        Kernel { recording, options }
     }
 }

@@ -1,32 +1,34 @@
-//! A recording as several kernels, none of which takes a driver long to compile.
+//! Splits a recording into kernels, none of which takes a driver long to compile.
 //!
-//! A driver's compile time grows faster than linearly with the length of a kernel. [`split`] cuts a text between
-//! its statements; a loop or a block that is itself too long is cut inside, and then dispatched once a round
-//! ([`Part::Repeat`]). What is used past a cut goes through fields that the caller sets aside, in vectors
-//! of four; the cuts lie where little crosses them.
+//! A driver's compile time grows faster than linearly with the length of a kernel. [`split`] cuts a recording between its statements. A
+//! loop or a block that is itself too long is cut inside, and then dispatched once per iteration ([`Part::Repeat`]). Values that are
+//! used past a cut go through fields that the caller reserves, in vectors of four. The cuts lie where few values cross.
 
 mod cost;
-mod cut;
-mod flow;
+mod emit;
+mod items;
 mod kernel;
-mod lasting;
+mod live_out;
+mod live_ranges;
+mod order;
+mod partition;
+mod plan;
 mod private;
-mod tail;
-mod uses;
-mod write;
+mod stops_last;
 
-pub(crate) use uses::Rename;
+pub use kernel::Kernel;
+pub use order::{Limits, Part};
 
-use crate::Recording;
-use crate::wgsl::{ProgramOptions, wgsl};
+use crate::recording::Recording;
+use crate::wgsl::ProgramOptions;
 use sim_physics::lane::Tables;
 
 /// Kernels that do what a recording does, and their order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Split {
-    /// Each printed by itself, for all worlds.
+    /// Each is printed by itself, for all worlds.
     pub kernels: Vec<Kernel>,
-    /// What is dispatched, one after another; each sees what those before it wrote.
+    /// Dispatches in order; each sees what those before it wrote.
     pub order: Vec<Part>,
     /// Fields used beyond the first that was spare, a multiple of four.
     pub spare: usize,
@@ -34,90 +36,18 @@ pub struct Split {
     outputs: Vec<u32>,
 }
 
-/// What kernels may cost, in units of a simple statement.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Limits {
-    /// A kernel is cut where it costs more, if its statements allow it.
-    pub kernel: usize,
-    /// A loop is cut inside where it costs more: each of its kernels is then dispatched in each of its rounds, for a list of
-    /// the worlds that are left in the loop.
-    pub repeated: usize,
-    /// What a kernel more is worth inside such a loop, where it is dispatched so often.
-    pub dispatch: usize,
-}
-
-/// One dispatch or several.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// The kernel of this number.
-    Kernel(usize),
-    /// The parts, so many times. A world that left the loop does nothing in what is left of it.
-    Repeat {
-        /// How many times, at most.
-        rounds: usize,
-        /// What is dispatched in a round.
-        parts: Vec<Part>,
-        /// A field that is 0 in the worlds that are in the loop.
-        out: Option<u32>,
-    },
-}
-
-/// A part of a recording, between fields.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Kernel {
-    recording: Recording,
-    options: ProgramOptions,
-}
-
-impl Kernel {
-    /// The kernel as WGSL.
-    pub fn wgsl(&self) -> String {
-        wgsl(&self.recording, &self.options)
-    }
-
-    /// What it computes, from the fields `options().inputs` to `options().outputs`.
-    pub fn recording(&self) -> &Recording {
-        &self.recording
-    }
-
-    /// Where it finds its numbers.
-    pub fn options(&self) -> &ProgramOptions {
-        &self.options
-    }
-
-    /// How long a driver will take to compile it, in units of a simple statement.
-    pub fn cost(&self) -> usize {
-        cost::of_kernel(&self.recording.packed())
-    }
-
-    fn run(&self, fields: &mut [f32], scratch: &mut [f32], tables: &Tables<f32>) {
-        let options = &self.options;
-        if options.unless.iter().any(|f| fields[*f as usize] != 0.0) {
-            return;
-        }
-        let (Some(inputs), Some(outputs)) = (&options.inputs, &options.outputs) else {
-            unreachable!("a kernel's fields are given");
-        };
-        let given: Vec<f32> = inputs.iter().map(|f| fields[*f as usize]).collect();
-        let results = self.recording.evaluate(&given, scratch, tables);
-        for (field, x) in outputs.iter().zip(results) {
-            fields[*field as usize] = x;
-        }
-    }
-}
-
-/// Cuts a recording into kernels within limits, where its statements allow it. What crosses a cut stands in the fields from `spare` on, which no input or output
-/// may have; it is rounded up to a whole vector.
+/// Cuts a recording into kernels within limits, where its statements allow it. Values that cross a cut go through the fields from `spare`
+/// on, rounded up to a whole vector. No input or output may use these fields.
 ///
 /// # Panics
 /// As [`wgsl`] does.
 pub fn split(recording: &Recording, options: &ProgramOptions, limits: Limits, spare: u32) -> Split {
     let (inputs, outputs) = options.fields(recording);
     let spare = spare.next_multiple_of(4);
-    let recording = &tail::with_stops_last(recording);
-    let pieces = cut::pieces(recording, limits, spare);
-    let (mut kernels, used) = kernel::kernels(recording, options, &pieces, spare);
-    // what ends a text need not do anything
+    let recording = &stops_last::with_stops_last(recording);
+    let pieces = partition::pieces(recording, limits, spare);
+    let (mut kernels, used) = emit::kernels(recording, options, &pieces, spare);
+    // the last kernel may have no effect
     let mut numbers = Vec::new();
     let mut kept = 0;
     for kernel in &kernels {
@@ -134,14 +64,18 @@ pub fn split(recording: &Recording, options: &ProgramOptions, limits: Limits, sp
     }
 }
 
-/// The order with other numbers of kernels, without those that have none.
+/// The order with kernels renumbered, without those that were dropped.
 fn renumbered(order: &[Part], numbers: &[Option<usize>]) -> Vec<Part> {
     let part = |part: &Part| match part {
         Part::Kernel(k) => numbers[*k].map(Part::Kernel),
-        Part::Repeat { rounds, parts, out } => Some(Part::Repeat {
-            rounds: *rounds,
+        Part::Repeat {
+            iterations,
+            parts,
+            exited,
+        } => Some(Part::Repeat {
+            iterations: *iterations,
             parts: renumbered(parts, numbers),
-            out: *out,
+            exited: *exited,
         }),
     };
     order.iter().filter_map(part).collect()
@@ -158,7 +92,7 @@ impl Split {
             lists.into_iter().flatten().flatten()
         });
         let last = kernels.chain(&self.inputs).chain(&self.outputs).max();
-        // what nobody wrote is not to be used
+        // a field that nobody wrote must not be used
         let mut fields = vec![f32::NAN; last.map_or(0, |field| *field as usize + 1)];
         for (field, x) in self.inputs.iter().zip(inputs) {
             fields[*field as usize] = *x;
@@ -172,8 +106,10 @@ impl Split {
         for part in parts {
             match part {
                 Part::Kernel(k) => self.kernels[*k].run(fields, scratch, tables),
-                Part::Repeat { rounds, parts, .. } => {
-                    for _ in 0..*rounds {
+                Part::Repeat {
+                    iterations, parts, ..
+                } => {
+                    for _ in 0..*iterations {
                         self.run(parts, fields, scratch, tables);
                     }
                 }

@@ -1,11 +1,12 @@
-//! Variables that no one reads but where they were set: what they were before a round does not matter, so they need not cross from round to round.
+//! Private variables: they are read only where they were set. Their value before an iteration does not matter, so they need not cross
+//! from one iteration to the next.
 //!
-//! A text sets such a variable under a mask, adds to it in loops, and reads it under the same mask: in the other worlds it goes on with what it
-//! held, which nobody sees. The larger system of the solver is of this kind.
+//! Physics code sets such a variable under a mask, adds to it in loops, and reads it under the same mask. The other worlds keep an old
+//! value, which nothing reads. The solver's coupled system is of this kind.
 
-use super::cut::{Item, Piece};
-use super::uses::{Use, of_op, of_statement};
+use super::items::{Item, Piece};
 use crate::tree::{Op, Operand, Statement};
+use crate::uses::{Use, of_op, of_statement};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 /// The variables of each piece that are its own in this sense.
@@ -27,7 +28,7 @@ pub(super) fn private(pieces: &[Piece], values: &[Op]) -> Vec<BTreeSet<u32>> {
     for (name, of) in mentions {
         let mut of = of.into_iter();
         if let (Some(p), None) = (of.next(), of.next())
-            && !pieces[p].frames.is_empty()
+            && !pieces[p].regions.is_empty()
             && is_private(name, &pieces[p], values)
         {
             own[p].insert(name);
@@ -103,7 +104,7 @@ fn feeds_itself(name: u32, body: &[Statement], values: &[Op], held: &mut HashSet
         Statement::When { mask, body } => {
             !is_held(mask, held) && feeds_itself(name, body, values, held)
         }
-        // what else there may be is not looked into: nothing of it may name a value of the variable
+        // other statements are not analysed: none of them may name a value of the variable
         other => {
             let mut fits = true;
             of_statement(other, values, &mut |used| match used {

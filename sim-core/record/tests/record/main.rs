@@ -1,15 +1,15 @@
 //! The recorder: what it refuses, what it folds, and that its programs are right.
 
 mod algebra;
-mod joined;
-mod kept;
-mod packed;
+mod kept_lists;
+mod loop_fusion;
 mod programs;
 mod refusals;
 mod refused_blocks;
 mod split;
 #[path = "../toy/mod.rs"]
 mod toy;
+mod vectorized;
 
 use sim_physics::lane::{Num, Table, Tables};
 use sim_record::wgsl::{ProgramOptions, wgsl};
@@ -25,18 +25,18 @@ fn c(x: f64) -> Recorded {
     Num::c(x)
 }
 
-/// The recording of a text with two inputs that should be accepted; its program is valid.
+/// The recording of code with two inputs that must be accepted; its program is valid.
 #[track_caller]
-fn accepted(text: impl FnOnce(&mut Recorder, &[Recorded]) -> Vec<Recorded>) -> Recording {
-    let recording = record(2, text).unwrap_or_else(|e| panic!("refused: {e}"));
+fn accepted(code: impl FnOnce(&mut Recorder, &[Recorded]) -> Vec<Recorded>) -> Recording {
+    let recording = record(2, code).unwrap_or_else(|e| panic!("refused: {e}"));
     toy::validated(&wgsl(&recording, &ProgramOptions::default()));
     recording
 }
 
-/// Why a text with two inputs is refused. The error names this file, and the text still ends.
+/// Why code with two inputs is refused. The error names this file, and the code still reaches its end.
 #[track_caller]
-fn refused(text: impl FnOnce(&mut Recorder, &[Recorded]) -> Vec<Recorded>) -> Misuse {
-    let error = record(2, text).expect_err("a bad text is refused");
+fn refused(code: impl FnOnce(&mut Recorder, &[Recorded]) -> Vec<Recorded>) -> Misuse {
+    let error = record(2, code).expect_err("bad code is refused");
     assert!(
         error.file.contains("tests/record/") && error.line > 0,
         "{error}"

@@ -1,4 +1,4 @@
-//! Whole programs: their text, and their results against the scalar machine.
+//! Whole programs: their source, and their results against the scalar backend.
 
 use crate::{TABLE, accepted, c, toy};
 use sim_physics::lane::{Cx, Num};
@@ -143,7 +143,7 @@ fn five_thousand_statements_are_recorded_in_milliseconds() {
         assert!(recording.expect("a sum is recorded").statements().total() >= 5000);
         taken
     };
-    // the fastest of several, so that a busy machine does not count; 1 ms is usual
+    // the fastest of several, so that a busy computer does not count; 1 ms is usual
     let fastest = (0..10).map(|_| once()).min().expect("it was recorded");
     assert!(fastest.as_millis() < 20, "{fastest:?}");
 }

@@ -1,4 +1,4 @@
-//! Refused: values that leave their block, rounds that differ, constants. Each beside a good twin.
+//! Refused: values that leave their block, iterations that differ, constants. Each beside a good twin.
 
 use crate::{TABLE, accepted, c, evaluated, refused};
 use sim_physics::lane::{Cx, Num};
@@ -57,7 +57,7 @@ fn value_used_only_in_the_next_round_is_refused() {
         });
         vec![cx.get(&sum)]
     });
-    assert_eq!(misuse, Misuse::NextRound { block: "times!" });
+    assert_eq!(misuse, Misuse::NextIteration { block: "times!" });
 
     let good = accepted(|cx, x| {
         let mut sum = cx.var(c(0.0));
@@ -192,7 +192,7 @@ fn constant_that_changes_per_round_is_refused() {
 }
 
 #[test]
-fn rounds_that_differ_are_refused() {
+fn iterations_that_differ_are_refused() {
     // an older value that changes
     let misuse = refused(|cx, x| {
         let mut sum = cx.var(c(0.0));
@@ -204,7 +204,7 @@ fn rounds_that_differ_are_refused() {
         });
         vec![cx.get(&sum)]
     });
-    assert_eq!(misuse, Misuse::RoundsDiffer { block: "times!" });
+    assert_eq!(misuse, Misuse::IterationsDiffer { block: "times!" });
     // a native branch that changes
     let misuse = refused(|cx, x| {
         let mut sum = cx.var(c(0.0));
@@ -217,7 +217,7 @@ fn rounds_that_differ_are_refused() {
         });
         vec![cx.get(&sum)]
     });
-    assert_eq!(misuse, Misuse::RoundsDiffer { block: "times!" });
+    assert_eq!(misuse, Misuse::IterationsDiffer { block: "times!" });
     // an index that changes
     let misuse = refused(|cx, x| {
         let mut row = cx.at(0);
@@ -228,9 +228,9 @@ fn rounds_that_differ_are_refused() {
         });
         vec![x[0]]
     });
-    assert_eq!(misuse, Misuse::RoundsDiffer { block: "times!" });
+    assert_eq!(misuse, Misuse::IterationsDiffer { block: "times!" });
 
-    // native branches and loops on constants of the model are the same in every round
+    // native branches and loops on constants of the model are the same in every iteration
     let good = accepted(|cx, x| {
         let mut sum = cx.var(c(0.0));
         times!(cx, 3, {

@@ -160,7 +160,7 @@ fn variable_list_and_index_of_a_closed_block_are_refused() {
         }
     );
 
-    // each round may have variables and lists of its own
+    // each iteration may have variables and lists of its own
     let good = accepted(|cx, x| {
         let mut sum = cx.var(c(0.0));
         times!(cx, 2, {
@@ -182,7 +182,7 @@ fn variable_list_and_index_of_a_closed_block_are_refused() {
     assert_eq!(evaluated(&good, [5.0, 3.0]), [2.0]);
 }
 
-/// Loops inside one another, counting the rounds of the innermost.
+/// Loops inside one another, counting the iterations of the innermost.
 fn nested<C: Cx>(cx: &mut C, count: &mut C::V, depth: usize) {
     if depth == 0 {
         let more = cx.get(count) + C::F::c(1.0);

@@ -7,7 +7,7 @@ use sim_record::Recording;
 use sim_record::split::{Limits, Part, split};
 use sim_record::wgsl::ProgramOptions;
 
-/// Longer than any text here.
+/// Longer than any recording here.
 const WHOLE: usize = 1_000_000;
 
 fn bits(x: &[f32]) -> Vec<u32> {
@@ -86,7 +86,9 @@ fn loops_that_are_cut_inside_are_repeated_and_left_by_each_world() {
         let depth_of = |part: &Part| match part {
             Part::Kernel(_) => 0,
             // blocks that are cut run once
-            Part::Repeat { rounds, parts, .. } => usize::from(*rounds > 1) + depth(parts),
+            Part::Repeat {
+                iterations, parts, ..
+            } => usize::from(*iterations > 1) + depth(parts),
         };
         parts.iter().map(depth_of).max().unwrap_or(0)
     }

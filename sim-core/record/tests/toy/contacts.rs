@@ -13,7 +13,7 @@ const COUNTS: Table = Table {
     stride: 2,
     rows: KINDS,
 };
-/// Distance, number of the pair, and what the second text makes of them.
+/// Distance, number of the pair, and what the second program makes of them.
 const CONTACTS: Table = Table {
     base: 6,
     stride: 3,

@@ -12,7 +12,7 @@ use sim_record::Recording;
 use sim_record::split::{Limits, Split, split};
 use sim_record::wgsl::ProgramOptions;
 
-/// SplitMix64 (Steele, Lea and Flood 2014): the same numbers from a seed on every machine.
+/// SplitMix64 (Steele, Lea and Flood 2014): the same numbers from a seed on every computer.
 pub struct Random(pub u64);
 
 impl Random {
@@ -32,7 +32,7 @@ impl Random {
     }
 }
 
-/// Runs any text on the CPU, `F::WIDTH` worlds at a time, with scratch memory full of zeros.
+/// Runs any code on the CPU, `F::WIDTH` worlds at a time, with scratch memory full of zeros.
 #[inline(always)]
 pub fn on_cpu_with<F: Lane, const N: usize>(
     worlds: &[[F::Real; N]],
@@ -78,7 +78,7 @@ pub fn bits(x: f32) -> u32 {
     (x + 0.0).to_bits()
 }
 
-/// Parses and validates a shader with no optional capability; panics with the shader's text.
+/// Parses and validates a shader without optional capabilities; panics with its source.
 pub fn validated(wgsl: &str) -> naga::Module {
     use naga::valid::{Capabilities, ValidationFlags, Validator};
     let module = naga::front::wgsl::parse_str(wgsl)

@@ -1,4 +1,4 @@
-//! Random texts: programs over the machine, made from a seed.
+//! Random programs over the execution context, made from a seed.
 
 use super::{Random, on_cpu_with};
 use sim_physics::lane::memory::Cpu;
@@ -429,7 +429,7 @@ fn sum_of_rows<C: Cx>(cx: &mut C, list: &C::List, table: Table) -> C::F {
     cx.get(&sum)
 }
 
-/// Runs a program on a machine; the variables, the lengths of the lists and the rows come out.
+/// Runs a program in an execution context; the variables, the lengths of the lists and the rows come out.
 pub fn run<C: Cx>(cx: &mut C, steps: &[Step], inputs: &[C::F]) -> Vec<C::F> {
     for row in 0..WORK.rows {
         for k in 0..WORK.stride {

@@ -1,15 +1,13 @@
-//! A run of blocks that one thread works on: their state in lane order, and one workspace.
+//! A chunk: blocks of worlds that one thread works on, with their state in lane order and one workspace.
 
-use super::contacts;
-use super::seats::Seats;
-use super::transfer::{self, Arena};
+use super::lane_assignment::LaneAssignment;
 use crate::backend::noise::Noise;
 use crate::backend::state::{self, RECORD, Shape};
 use crate::backend::{Faults, Frozen, Values};
 use crate::random::Numbering;
 use crate::start::StartDraw;
 use sim_model::{Model, SensedShapes};
-use sim_physics::arrays::{Array, Block, Field, Flat, Layout, Slot, Source};
+use sim_physics::arrays::{Array, Block, Flat, Layout};
 use sim_physics::compiled::Stages;
 use sim_physics::constants::Constants;
 use sim_physics::lane::{Lane, Real};
@@ -17,33 +15,33 @@ use sim_physics::schedule::{evaluation_stages, step_stages};
 use sim_physics::step::StageId;
 use std::ops::Range;
 
-/// What all chunks share.
+/// Data that all chunks share.
 pub(super) struct Job<F: Lane> {
     pub constants: Constants<F::Real>,
     /// Every stage, by [`StageId::index`].
-    stages: Stages<F>,
+    pub stages: Stages<F>,
     /// How the scalars of a world lie.
     pub shape: Shape,
     pub layout: Layout,
     /// Stages of a step that the model needs, by their places.
-    step: Vec<usize>,
+    pub step: Vec<usize>,
     /// Stages that evaluate the fields of the layout.
-    evaluate: Vec<usize>,
-    /// Are contacts among what they evaluate?
-    finds_contacts: bool,
+    pub evaluate: Vec<usize>,
+    /// Whether they detect contacts.
+    pub finds_contacts: bool,
     /// Duration of a control frame [s].
     pub frame_s: f64,
-    /// When a world is frozen.
+    /// Bounds of faults.
     pub faults: Faults,
     /// State and commands of a world after a reset, in the order of [`RECORD`].
     pub start: Vec<F::Real>,
-    /// What is drawn over it.
+    /// Random part of the start.
     pub draw: StartDraw,
-    /// What stands for each world in its draws.
+    /// World numbers in draws.
     pub numbering: Numbering,
-    /// What is added to commands and sensors.
+    /// Noise of commands and sensors.
     pub noise: Noise,
-    /// What the contact sensors add up.
+    /// Shapes of the contact sensors.
     pub contact_sensors: Vec<SensedShapes>,
 }
 
@@ -72,21 +70,16 @@ impl<F: Lane> Job<F> {
     }
 }
 
-/// Is it a number that a chunk keeps of each world, and not of its state?
-fn is_counter(field: Field) -> bool {
-    field.row().source == Source::Counter
-}
-
 pub(super) struct Chunk<F: Lane> {
     pub(super) worlds: Range<usize>,
     /// `(blocks, numbers of a world, WIDTH)`
     pub(super) state: Vec<F::Real>,
-    /// Where the worlds are in it.
-    pub(super) seats: Seats,
-    /// Control frames since the reset of each world; those of a frozen one are as many as it was well.
+    /// The lane of each world.
+    pub(super) assignment: LaneAssignment,
+    /// Control frames since the reset of each world; a frozen world does not count.
     pub(super) steps: Vec<u64>,
     pub(super) status: Vec<u32>,
-    /// Most contacts that did not fit in a substep of the last frame, or in the state that is shown.
+    /// Most contacts that did not fit in a substep of the last frame, or in the evaluated state.
     pub(super) left_out: Vec<u32>,
     /// Seeds of what is drawn for each world.
     pub(super) seeds: Vec<u64>,
@@ -94,16 +87,16 @@ pub(super) struct Chunk<F: Lane> {
     pub(super) episodes: Vec<u32>,
     /// Control frames so far.
     pub(super) frames: u64,
-    /// Worlds that were frozen since somebody asked.
+    /// Worlds that were frozen since the last report.
     pub(super) frozen: Frozen,
     pub block: Block<F, F>,
-    /// Scratch memory of the machine.
+    /// Scratch memory of the execution context.
     pub memory: Vec<F>,
-    /// Room for one field of one block.
+    /// Scratch: one field of one block.
     pub staging: Vec<F>,
-    /// The same, number by number.
+    /// Scratch: the same, per element.
     pub lanes: Vec<F::Real>,
-    /// The same, world by world.
+    /// Scratch: the same, per world.
     pub rows: Vec<F::Real>,
 }
 
@@ -130,18 +123,18 @@ impl<F: Lane> Chunk<F> {
             staging: vec![F::default(); elements],
             lanes: vec![F::Real::default(); elements * F::WIDTH],
             rows: vec![F::Real::default(); elements * F::WIDTH],
-            seats: Seats::new(worlds.len(), blocks * F::WIDTH),
+            assignment: LaneAssignment::new(worlds.len(), blocks * F::WIDTH),
             worlds,
         };
         chunk.start(job);
         chunk
     }
 
-    /// Place of a number of a world (counted from the chunk's first) in `state`.
-    pub(super) fn place(&self, shape: Shape, world: usize, array: Array, k: usize) -> usize {
-        let seat = self.seats.of(world);
-        let (block, lane) = (seat / F::WIDTH, seat % F::WIDTH);
-        (block * shape.total() + shape.start(array) + k) * F::WIDTH + lane
+    /// Index in `state` of a value of a world, which is counted from the chunk's first.
+    pub(super) fn place(&self, shape: Shape, world: usize, field: Array, k: usize) -> usize {
+        let lane = self.assignment.lane(world);
+        let (block, lane) = (lane / F::WIDTH, lane % F::WIDTH);
+        (block * shape.total() + shape.start(field) + k) * F::WIDTH + lane
     }
 
     pub fn write(
@@ -152,7 +145,7 @@ impl<F: Lane> Chunk<F> {
         values: Values<'_>,
         mask: Option<&[bool]>,
     ) {
-        // of a robot that stands still; its place may lie behind the last number
+        // of a robot without joints; its place may lie past the end
         if columns.is_empty() {
             return;
         }
@@ -214,7 +207,7 @@ impl<F: Lane> Chunk<F> {
             let place = self.place(shape, world, Array::JointQ, first);
             let at = |i: usize| place + i * F::WIDTH;
             let square: f64 = (0..4).map(|i| self.state[at(i)].to_f64().powi(2)).sum();
-            // one that is unit to the last bits stays as it was written
+            // a quaternion of length 1, up to rounding, keeps its bits
             if (square - 1.0).abs() > 4.0 * F::Real::EPSILON {
                 for i in 0..4 {
                     self.state[at(i)] = F::Real::of(self.state[at(i)].to_f64() / square.sqrt());
@@ -223,116 +216,16 @@ impl<F: Lane> Chunk<F> {
         }
     }
 
-    /// All substeps and the output of every block.
-    ///
-    /// # Safety
-    /// The processor has the instructions of `F`; the arena holds the job's layout.
+    /// The lanes of a block that hold a world.
     #[inline(always)]
-    pub unsafe fn run(&mut self, job: &Job<F>, substeps: usize, arena: Arena) {
-        let shape = job.shape;
-        let stride = shape.total() * F::WIDTH;
-        self.frames += u64::from(substeps > 0);
-        for block in 0..self.worlds.len().div_ceil(F::WIDTH) {
-            let state = block * stride..(block + 1) * stride;
-            self.load(state.clone());
-            if substeps > 0 {
-                self.draw_command_noise(job, block);
-            }
-            for pass in 0..=substeps {
-                let evaluates = pass == substeps;
-                if evaluates {
-                    if substeps > 0 {
-                        self.note(job, block, state.clone());
-                        self.age_commands(job, block, state.clone());
-                        // what is evaluated is a function of the state: the noise of the next frame is not drawn yet
-                        self.block.command_noise.fill(F::c(0.0));
-                    }
-                    // before the evaluation, which moves the warm start: what is read must not change the run
-                    self.store(shape, state.clone());
-                }
-                let stages = if evaluates {
-                    &job.evaluate[..]
-                } else {
-                    &job.step[..]
-                };
-                for stage in stages {
-                    // SAFETY: by contract the processor has the instructions of the job's stages.
-                    unsafe {
-                        job.stages[*stage](&job.constants, &mut self.block, &mut self.memory);
-                    }
-                }
-            }
-            if substeps > 0 || job.finds_contacts {
-                self.count_left_out(block);
-            }
-            if substeps > 0 {
-                self.note_touches(&job.constants, block);
-            }
-            for slot in job
-                .layout
-                .slots
-                .iter()
-                .filter(|slot| !is_counter(slot.field))
-            {
-                // SAFETY: the arena holds the layout, and these worlds are this chunk's alone.
-                unsafe {
-                    if let Source::Contacts(_) = slot.field.row().source {
-                        contacts::export(self, job, slot, block, arena);
-                    } else {
-                        transfer::export(self, &job.constants, slot, block, arena);
-                    }
-                    if let Some(noise) = job.noise.of(slot.field) {
-                        for seat in self.seats_of(block) {
-                            let world = self.seats.world(seat);
-                            self.add_noise(
-                                job,
-                                noise,
-                                world,
-                                arena.row(slot, self.worlds.start + world),
-                            );
-                        }
-                    }
-                }
-            }
-        }
-        for slot in job
-            .layout
-            .slots
-            .iter()
-            .filter(|slot| is_counter(slot.field))
-        {
-            // SAFETY: as above.
-            unsafe { self.put_counter(job, slot, arena) };
-        }
-        if substeps > 0 {
-            // now that its trouble was shown, and before the commands of its first step come
-            if job.faults.resets {
-                self.reset_frozen(job);
-            }
-            self.group_worlds(job);
-        }
-    }
-
-    /// Writes a counter of every world.
-    ///
-    /// # Safety
-    /// The arena holds the slot.
-    unsafe fn put_counter(&self, job: &Job<F>, slot: &Slot, arena: Arena) {
-        let (first, all) = (self.worlds.start, self.worlds.clone());
-        // SAFETY: these worlds are this chunk's alone; the rest by contract.
-        unsafe {
-            match slot.field {
-                Field::Time => arena.put(slot, all, |w| self.steps[w - first] as f64 * job.frame_s),
-                Field::Step => arena.put(slot, all, |w| self.steps[w - first]),
-                Field::Status => arena.put(slot, all, |w| self.status[w - first]),
-                _ => arena.put(slot, all, |w| self.left_out[w - first]),
-            }
-        }
+    pub(super) fn lanes_of(&self, block: usize) -> Range<usize> {
+        let first = block * F::WIDTH;
+        first..(first + F::WIDTH).min(self.worlds.len())
     }
 
     /// State and commands of a block into its workspace.
     #[inline(always)]
-    fn load(&mut self, state: Range<usize>) {
+    pub(super) fn load(&mut self, state: Range<usize>) {
         let b = &mut self.block;
         let mut from = self.state[state].chunks_exact(F::WIDTH);
         for array in RECORD {
@@ -349,7 +242,7 @@ impl<F: Lane> Chunk<F> {
 
     /// The state of a block out of its workspace; commands did not change.
     #[inline(always)]
-    fn store(&mut self, shape: Shape, range: Range<usize>) {
+    pub(super) fn store(&mut self, shape: Shape, range: Range<usize>) {
         for array in RECORD.into_iter().filter(state::is_motion) {
             let first = range.start + shape.start(array) * F::WIDTH;
             let to = self.state[first..].chunks_exact_mut(F::WIDTH);

@@ -1,4 +1,4 @@
-//! Contacts out of a block: lists of each world by itself, one class after the other.
+//! Contact fields of a block: the lists of each world, one class after the other.
 
 use super::chunk::{Chunk, Job};
 use super::transfer::Arena;
@@ -74,13 +74,13 @@ pub(super) unsafe fn export<F: Lane>(
     arena: Arena,
 ) {
     let m = &job.constants;
-    for (lane, seat) in chunk.seats_of(block).enumerate() {
+    for (lane, place) in chunk.lanes_of(block).enumerate() {
         let world = World {
             memory: &m.contacts.memory,
             cells: &chunk.memory,
             lane,
         };
-        let outside = chunk.worlds.start + chunk.seats.world(seat);
+        let outside = chunk.worlds.start + chunk.assignment.world(place);
         if slot.dtype == Dtype::I32 {
             // SAFETY: by contract.
             let to = unsafe { arena.row::<i32>(slot, outside) };
@@ -93,7 +93,7 @@ pub(super) unsafe fn export<F: Lane>(
     }
 }
 
-/// A field of whole numbers of a world.
+/// An integer field of a world.
 #[inline(always)]
 fn put_whole<F: Lane>(world: &World<'_, F>, m: &Constants<F::Real>, field: Field, to: &mut [i32]) {
     let contacts = world.contacts(&m.contacts.classes);
@@ -108,7 +108,7 @@ fn put_whole<F: Lane>(world: &World<'_, F>, m: &Constants<F::Real>, field: Field
     }
 }
 
-/// A field of numbers of a world.
+/// A floating-point field of a world.
 #[inline(always)]
 fn put_real<F: Lane>(
     world: &World<'_, F>,

@@ -1,4 +1,7 @@
-//! Commands that act late: those of the frames before are kept.
+//! Command delay: the commands of earlier frames are part of the state.
+//!
+//! A command acts after its delay, which is a parameter of each world [substeps]. `Stage::Command` selects per dof the newest command that
+//! is old enough. The state, and so a snapshot, holds as many earlier frames of commands as `command_delay_max` needs.
 
 use super::chunk::{Chunk, Job};
 use sim_physics::arrays::Array;
@@ -7,9 +10,9 @@ use sim_physics::lane::Lane;
 use std::ops::Range;
 
 impl<F: Lane> Chunk<F> {
-    /// Makes the commands of this frame those of the frame before, in the worlds that are not frozen; `state` is the block's.
+    /// Moves the commands of this frame into the history, in the worlds that are not frozen; `state` is the block's.
     ///
-    /// What is then evaluated shows what acts next if nothing else is sent.
+    /// The evaluation that follows shows what acts next if no command is sent.
     #[inline(always)]
     pub(super) fn age_commands(&mut self, job: &Job<F>, block: usize, state: Range<usize>) {
         let shape = job.shape;
@@ -22,14 +25,14 @@ impl<F: Lane> Chunk<F> {
         let frame = 3 * shape.dofs * F::WIDTH;
         let end = first + shape.len(Array::CommandHistory) * F::WIDTH;
         let status = &self.status;
-        let seats = &self.seats;
+        let assignment = &self.assignment;
         let stays = |lane: usize| {
             status
-                .get(seats.world(block * F::WIDTH + lane))
+                .get(assignment.world(block * F::WIDTH + lane))
                 .is_some_and(|&status| status & FROZEN != 0)
         };
         if (0..F::WIDTH).any(stays) {
-            // from the oldest on, since each takes the place of the one before
+            // from the oldest on, since each value moves to the place of an older one
             for place in (first..end).rev().filter(|place| !stays(place % F::WIDTH)) {
                 let from = if place < first + frame {
                     place - first + sent

@@ -1,25 +1,13 @@
-//! One compiled text per instruction set, chosen once at start.
+//! Chooses the instruction set once, at start: one compiled version of the physics code for each.
 
+use super::backend::{CompiledStages, Cpu, Workers};
 use super::chunk::{Chunk, Job};
 use super::transfer::Arena;
-use super::{Backend, BackendError, Backends, Cpu, Groups, Lanes, Layout, Precision, Workers};
+use crate::backend::{Backend, BackendError, Backends, Groups, Lanes, Precision};
 use sim_model::Model;
+use sim_physics::arrays::Layout;
 use sim_physics::compiled::Stages;
 use sim_physics::lane::Lane;
-
-/// A chunk, compiled for an instruction set.
-///
-/// # Safety
-/// As [`Chunk::run`].
-pub(super) type RunChunk<F> = unsafe fn(&mut Chunk<F>, &Job<F>, usize, Arena);
-
-/// The text, compiled for an instruction set.
-pub(super) struct Program<F: Lane> {
-    /// For people.
-    pub instructions: &'static str,
-    pub stages: Stages<F>,
-    pub chunk: RunChunk<F>,
-}
 
 macro_rules! compiled {
     ($(#[$attribute:meta])* $name:ident $($features:literal)?) => {
@@ -45,7 +33,7 @@ compiled!(
     portable
 );
 
-/// Does this processor run blocks of this width?
+/// Whether this processor runs blocks of this width.
 pub fn available(lanes: Lanes) -> bool {
     #[cfg(target_arch = "x86_64")]
     let (avx2, avx512) = (
@@ -67,10 +55,10 @@ pub fn available(lanes: Lanes) -> bool {
     }
 }
 
-/// A backend for each group: the fastest that the processor has, or the one asked for.
+/// One backend per group: of the fastest instruction set that the processor has, or the requested one.
 ///
 /// # Errors
-/// [`BackendError::Lanes`] for a width that it has not, [`BackendError::Threads`].
+/// [`BackendError::Lanes`] for a width that the processor does not support, [`BackendError::Threads`].
 pub fn create(
     model: &Model,
     groups: Groups,
@@ -80,7 +68,7 @@ pub fn create(
     threads: usize,
 ) -> Result<Backends, BackendError> {
     let lanes = match lanes {
-        // a register that holds one world takes longer than a scalar, for the same bits
+        // one world in a SIMD register is slower than a scalar, with the same bits
         Lanes::Auto if groups.worlds == 1 => Lanes::Scalar,
         Lanes::Auto if available(Lanes::Sixteen) => Lanes::Sixteen,
         Lanes::Auto if available(Lanes::Eight) => Lanes::Eight,
@@ -100,37 +88,37 @@ pub fn create(
     }
     match (precision, lanes) {
         (Precision::F64, _) => {
-            let program = least("f64 scalar, FMA", stages_f64::STAGES);
-            boxed(model, groups, layout, threads, program)
+            let compiled = baseline("f64 scalar, FMA", stages_f64::STAGES);
+            boxed(model, groups, layout, threads, compiled)
         }
         #[cfg(target_arch = "x86_64")]
         (Precision::F32, Lanes::Sixteen) => {
-            let program = Program {
+            let compiled = CompiledStages {
                 instructions: "AVX-512",
                 stages: stages_f32x16::STAGES,
                 chunk: avx512,
             };
-            boxed(model, groups, layout, threads, program)
+            boxed(model, groups, layout, threads, compiled)
         }
         #[cfg(target_arch = "x86_64")]
         (Precision::F32, Lanes::Eight) => {
-            let program = least("AVX2", stages_f32x8::STAGES);
-            boxed(model, groups, layout, threads, program)
+            let compiled = baseline("AVX2", stages_f32x8::STAGES);
+            boxed(model, groups, layout, threads, compiled)
         }
         (Precision::F32, _) => {
-            let program = least("f32 scalar, FMA", stages_f32::STAGES);
-            boxed(model, groups, layout, threads, program)
+            let compiled = baseline("f32 scalar, FMA", stages_f32::STAGES);
+            boxed(model, groups, layout, threads, compiled)
         }
     }
 }
 
-/// What runs wherever the text does.
-fn least<F: Lane>(instructions: &'static str, stages: Stages<F>) -> Program<F> {
+/// A version for the baseline instruction set.
+fn baseline<F: Lane>(instructions: &'static str, stages: Stages<F>) -> CompiledStages<F> {
     #[cfg(target_arch = "x86_64")]
     let chunk = avx2;
     #[cfg(not(target_arch = "x86_64"))]
     let chunk = portable;
-    Program {
+    CompiledStages {
         instructions,
         stages,
         chunk,
@@ -142,14 +130,14 @@ fn boxed<F: Lane>(
     groups: Groups,
     layout: &Layout,
     threads: usize,
-    program: Program<F>,
+    compiled: CompiledStages<F>,
 ) -> Result<Backends, BackendError> {
-    // a thread for each block is enough
+    // one thread per block is enough
     let threads = threads.min(groups.count * groups.worlds.div_ceil(F::WIDTH));
     let workers = Workers::new(threads, groups.count)?;
     let made = groups.numberings().map(|numbering| {
-        let job = Job::new(model, layout.clone(), program.stages, numbering);
-        let cpu = Cpu::new(job, groups.worlds, threads, workers.clone(), &program);
+        let job = Job::new(model, layout.clone(), compiled.stages, numbering);
+        let cpu = Cpu::new(job, groups.worlds, threads, workers.clone(), &compiled);
         Box::new(cpu) as Box<dyn Backend>
     });
     Ok(made.collect())

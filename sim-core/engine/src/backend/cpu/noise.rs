@@ -15,8 +15,8 @@ impl<F: Lane> Chunk<F> {
             let Some(first) = first else { continue };
             for dof in 0..shape.dofs {
                 self.lanes[..F::WIDTH].fill(F::Real::default());
-                for (lane, seat) in self.seats_of(block).enumerate() {
-                    let world = self.seats.world(seat);
+                for (lane, place) in self.lanes_of(block).enumerate() {
+                    let world = self.assignment.world(place);
                     let std = self.deviation(shape, world, first + dof);
                     if std > 0.0 {
                         let noise = sample(&self.draw(job, world, stream), dof, std);

@@ -1,4 +1,4 @@
-//! Worlds out of lanes and back: records of a snapshot, which are the same whatever the lanes and threads.
+//! Records of a snapshot: worlds out of lanes and back. They do not depend on lanes or threads.
 
 use super::chunk::{Chunk, Job};
 use crate::backend::COUNTERS;
@@ -7,7 +7,7 @@ use sim_physics::lane::{Lane, Real};
 use std::array;
 
 impl<F: Lane> Job<F> {
-    /// Numbers of a world's state and commands.
+    /// Scalars of a world's state and commands.
     pub fn numbers(&self) -> usize {
         self.shape.total()
     }

@@ -1,11 +1,11 @@
-//! Worlds go back to their start.
+//! Resets of worlds.
 
 use super::chunk::{Chunk, Job};
 use sim_physics::arrays::Array;
 use sim_physics::lane::{Lane, Real};
 
 impl<F: Lane> Chunk<F> {
-    /// Puts every lane at its start; those past the last world run along from the scene's.
+    /// Sets every lane to its start. Lanes past the last world run along from the scene's start.
     pub(super) fn start(&mut self, job: &Job<F>) {
         let lanes = self.worlds.len().next_multiple_of(F::WIDTH);
         for lane in 0..lanes {
@@ -60,7 +60,7 @@ impl<F: Lane> Chunk<F> {
         self.start_lane(job, lane, |k| k < params || starts[k - params].0.is_load());
     }
 
-    /// The numbers of a lane that are chosen, as the scene starts them.
+    /// Sets the chosen values of a lane to the scene's start.
     fn start_lane(&mut self, job: &Job<F>, lane: usize, chosen: impl Fn(usize) -> bool) {
         let first = self.place(job.shape, lane, Array::JointQd, 0);
         for (k, &x) in job.start.iter().enumerate().filter(|(k, _)| chosen(*k)) {
@@ -68,7 +68,7 @@ impl<F: Lane> Chunk<F> {
         }
     }
 
-    /// What is drawn of the state and of the parameters.
+    /// Draws the random part of state and parameters.
     fn draw_start(&mut self, job: &Job<F>, world: usize) {
         let shape = job.shape;
         let (seed, episode) = (self.seeds[world], self.episodes[world]);

@@ -93,19 +93,19 @@ pub(super) unsafe fn export<F: Lane>(
     let n: usize = slot.shape[1..].iter().product();
     let cx = &mut Cpu::new(&mut chunk.memory, &m.contacts.tables);
     gather(cx, m, &chunk.block, slot.field, &mut chunk.staging[..n]);
-    let (seats, first) = (chunk.seats_of(block), chunk.worlds.start);
-    if let Some(worlds) = chunk.seats.side_by_side(seats.clone()) {
+    let (lanes, first) = (chunk.lanes_of(block), chunk.worlds.start);
+    if let Some(worlds) = chunk.assignment.consecutive(lanes.clone()) {
         let worlds = first + worlds.start..first + worlds.end;
         // SAFETY: by contract.
         let rows = unsafe { arena.rows::<F::Real>(slot, &worlds) };
         unstage(&chunk.staging[..n], &mut chunk.lanes, rows);
         return;
     }
-    let numbers = &mut chunk.rows[..n * seats.len()];
+    let numbers = &mut chunk.rows[..n * lanes.len()];
     unstage(&chunk.staging[..n], &mut chunk.lanes, numbers);
-    for (seat, row) in seats.zip(numbers.chunks_exact(n.max(1))) {
+    for (place, row) in lanes.zip(numbers.chunks_exact(n.max(1))) {
         // SAFETY: by contract.
-        let to = unsafe { arena.row::<F::Real>(slot, first + chunk.seats.world(seat)) };
+        let to = unsafe { arena.row::<F::Real>(slot, first + chunk.assignment.world(place)) };
         to.copy_from_slice(row);
     }
 }

@@ -1,21 +1,19 @@
 //! The programs of a run, compiled, and the tables of the model.
 
-use super::left::{self, Enlisting};
+use super::bookkeeping;
 use super::places::Places;
-use super::programs::{self, Programs};
+use super::programs::{KernelSequence, Programs};
 use super::show;
-use super::upkeep::{self, WORKGROUP};
-use crate::backend::{BackendError, ProgramFacts};
+use super::software::{self, Compaction};
+use super::workgroups::{BOOKKEEPING, PHYSICS};
+use crate::backend::{BackendError, ProgramInfo};
 use sim_device::{Buffer, Device, DeviceError, Program, Replay, Source};
 use sim_physics::constants::Constants;
 use sim_record::split::Part;
 use std::time::Duration;
 
-/// Threads of a workgroup of physics: registers are what it needs.
-pub(super) const PHYSICS: u32 = 32;
-
-/// Texts that depend on what a frame shows.
-pub(super) struct Books {
+/// Kernel sources that depend on the output fields.
+pub(super) struct OutputSources {
     pub counters: String,
     pub contacts: Option<String>,
 }
@@ -30,34 +28,34 @@ pub(super) struct Kernels {
 pub(super) struct Compiled {
     /// All substeps of a frame.
     pub step: Kernels,
-    /// What is shown.
+    /// The evaluation of output fields.
     pub evaluate: Kernels,
     pub begin: Program,
     pub begin_evaluation: Program,
-    pub note: Program,
-    pub left_out: Program,
+    pub check_faults: Program,
+    pub count_left_out: Program,
     pub rows: Program,
     pub show: Program,
     pub counters: Program,
     pub contacts: Option<Program>,
-    /// What lists worlds that are left in a loop.
-    pub enlisting: Enlisting,
+    /// Lists of active worlds.
+    pub compaction: Compaction,
     pub numbers: Buffer,
     pub indices: Buffer,
-    /// All of them, for people.
-    pub facts: Vec<ProgramFacts>,
-    /// How the batches of a frame get to the device.
+    /// Descriptions of all programs, for people.
+    pub info: Vec<ProgramInfo>,
+    /// Whether the batches of a frame are recorded or encoded.
     pub replay: Replay,
 }
 
 impl Compiled {
-    /// Compiles what a model needs for tiles of `width` worlds.
+    /// Compiles all programs of a model, for tiles of `width` worlds.
     pub fn new(
         device: &Device,
         m: &Constants<f32>,
         places: &Places,
         programs: &Programs,
-        books: Books,
+        outputs: OutputSources,
         width: u32,
         limit: Duration,
     ) -> Result<Compiled, BackendError> {
@@ -70,38 +68,50 @@ impl Compiled {
                 ("workgroup".to_owned(), f64::from(workgroup)),
             ],
         };
-        let physics = |label: &'static str, program: &programs::Program| {
+        let physics = |label: &'static str, program: &KernelSequence| {
             let kernels = program.kernels.iter().enumerate();
             let kernels =
-                kernels.map(|(k, text)| source(&format!("{label} {k}"), text.clone(), PHYSICS));
+                kernels.map(|(k, wgsl)| source(&format!("{label} {k}"), wgsl.clone(), PHYSICS));
             kernels.collect::<Vec<_>>()
         };
         let mut sources: Vec<Source> = vec![
-            source("begin", upkeep::begin(places, true), WORKGROUP),
-            source("begin evaluation", upkeep::begin(places, false), WORKGROUP),
-            source("note", upkeep::note(places, m), WORKGROUP),
-            source("count left out", upkeep::count_left_out(places), WORKGROUP),
-            source("rows", upkeep::ROWS.to_owned(), WORKGROUP),
-            source("show", show::SHOW.to_owned(), WORKGROUP),
-            source("counters", books.counters, WORKGROUP),
+            source("begin", bookkeeping::begin(places, true), BOOKKEEPING),
+            source(
+                "begin evaluation",
+                bookkeeping::begin(places, false),
+                BOOKKEEPING,
+            ),
+            source(
+                "check faults",
+                bookkeeping::check_faults(places, m),
+                BOOKKEEPING,
+            ),
+            source(
+                "count left out",
+                bookkeeping::count_left_out(places),
+                BOOKKEEPING,
+            ),
+            source("rows", bookkeeping::ROWS.to_owned(), BOOKKEEPING),
+            source("show", show::SHOW.to_owned(), BOOKKEEPING),
+            source("counters", outputs.counters, BOOKKEEPING),
         ];
         let steps = sources.len()..sources.len() + programs.step.kernels.len();
         sources.extend(physics("step", &programs.step));
         sources.extend(physics("evaluate", &programs.evaluate));
-        let loops = left::loops([&programs.step.order, &programs.evaluate.order]);
-        sources.extend(left::sources(device, &loops, width));
-        let has_contacts = books.contacts.is_some();
+        let loops = software::loops([&programs.step.order, &programs.evaluate.order]);
+        sources.extend(software::sources(device, &loops, width));
+        let has_contacts = outputs.contacts.is_some();
         sources.extend(
-            books
+            outputs
                 .contacts
-                .map(|text| source("contacts", text, WORKGROUP)),
+                .map(|wgsl| source("contacts", wgsl, BOOKKEEPING)),
         );
-        let facts = (sources.iter().enumerate())
-            .map(|(k, source)| ProgramFacts {
+        let info = (sources.iter().enumerate())
+            .map(|(k, source)| ProgramInfo {
                 label: source.label.clone(),
                 statements: source.wgsl.matches(';').count(),
-                rounds: (steps.contains(&k))
-                    .then(|| rounds_of(k - steps.start, &programs.step.order)),
+                dispatches: (steps.contains(&k))
+                    .then(|| dispatches_of(k - steps.start, &programs.step.order)),
             })
             .collect();
         let mut compiled = device.programs(&sources, limit)?.into_iter();
@@ -109,18 +119,18 @@ impl Compiled {
         let [
             begin,
             begin_evaluation,
-            note,
-            left_out,
+            check_faults,
+            count_left_out,
             rows,
             show,
             counters,
         ] = std::array::from_fn(|_| next());
-        let mut kernels = |program: &programs::Program| Kernels {
+        let mut kernels = |program: &KernelSequence| Kernels {
             kernels: program.kernels.iter().map(|_| next()).collect(),
             order: program.order.clone(),
         };
         let (step, evaluate) = (kernels(&programs.step), kernels(&programs.evaluate));
-        let enlisting = Enlisting::new(loops, &mut next);
+        let compaction = Compaction::new(loops, &mut next);
         let contacts = has_contacts.then(&mut next);
         let tables = &m.contacts.tables;
         let numbers: Vec<u32> = tables.numbers.iter().map(|x| x.to_bits()).collect();
@@ -129,31 +139,33 @@ impl Compiled {
             evaluate,
             begin,
             begin_evaluation,
-            note,
-            left_out,
+            check_faults,
+            count_left_out,
             rows,
             show,
             counters,
             contacts,
-            enlisting,
+            compaction,
             numbers: constant(device, "numbers", &numbers)?,
             indices: constant(device, "indices", &tables.indices)?,
-            facts,
+            info,
             replay: Replay::Recorded,
         })
     }
 }
 
 /// How often a kernel is dispatched.
-fn rounds_of(kernel: usize, order: &[Part]) -> usize {
-    let rounds = order.iter().map(|part| match part {
+fn dispatches_of(kernel: usize, order: &[Part]) -> usize {
+    let dispatches = order.iter().map(|part| match part {
         Part::Kernel(k) => usize::from(*k == kernel),
-        Part::Repeat { rounds, parts, .. } => rounds * rounds_of(kernel, parts),
+        Part::Repeat {
+            iterations, parts, ..
+        } => iterations * dispatches_of(kernel, parts),
     });
-    rounds.sum()
+    dispatches.sum()
 }
 
-/// A buffer of words that do not change.
+/// A buffer of constant words.
 pub(super) fn constant(device: &Device, label: &str, words: &[u32]) -> Result<Buffer, DeviceError> {
     let bytes = 4 * words.len().max(4) as u64;
     let (staging, buffer) = (device.staging(label, bytes)?, device.buffer(label, bytes)?);

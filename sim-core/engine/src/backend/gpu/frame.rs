@@ -1,20 +1,22 @@
-//! A control frame: commands go in, the recorded batches run, and what the host keeps of a frame is taken from it.
+//! A control frame: commands are sent, the recorded batches run, and the mirror is updated from the counters.
 
-use super::tile::{Rows, Tile};
-use super::{Gpu, host};
+use super::backend::Gpu;
+use super::tile::Tile;
+use super::uploads::Rows;
+use super::words;
 use crate::backend::noise::sample;
 use crate::backend::{BackendError, FirstFrozen};
 use crate::random::{Draw, Stream};
 use sim_physics::arrays::{Array, Dtype, Field, status};
 
 impl Gpu {
-    /// Draws what is added to the commands of the frame.
+    /// Draws the noise of the commands of this frame.
     fn send_command_noise(&mut self) -> Result<(), BackendError> {
         if self.noise.commands.iter().all(|(_, first)| first.is_none()) {
             return Ok(());
         }
         let dofs = self.shape().dofs;
-        let worlds = self.meant(None);
+        let worlds = self.selected(None);
         let rows: Vec<Vec<u32>> = (worlds.iter())
             .map(|&world| {
                 let mut row = vec![0; 3 * dofs];
@@ -22,7 +24,7 @@ impl Gpu {
                     let Some(first) = first else { continue };
                     let draw = self.draw_of(world, stream);
                     for dof in 0..dofs {
-                        let std = f64::from(self.host.params(world)[first + dof]);
+                        let std = f64::from(self.mirror.params(world)[first + dof]);
                         row[k * dofs + dof] = (sample(&draw, dof, std) as f32).to_bits();
                     }
                 }
@@ -43,11 +45,11 @@ impl Gpu {
 
     fn draw_of(&self, world: usize, stream: Stream) -> Draw {
         let number = self.numbering.number(world);
-        let (seed, episode) = (self.host.seeds[world], self.host.episodes[world]);
-        Draw::at_step(seed, number, episode, self.host.steps[world], stream)
+        let (seed, episode) = (self.mirror.seeds[world], self.mirror.episodes[world]);
+        Draw::at_step(seed, number, episode, self.mirror.steps[world], stream)
     }
 
-    /// Adds noise to fields that have some: it is drawn on the host.
+    /// Adds noise to the fields that have some; it is drawn on the host.
     fn add_noise(&self, arena: &mut [u64]) {
         for slot in &self.layout.slots {
             let Some(noise) = self.noise.of(slot.field) else {
@@ -57,19 +59,19 @@ impl Gpu {
             if columns == 0 || slot.dtype != Dtype::F32 {
                 continue;
             }
-            let rows: &mut [f32] = host::array(arena, slot.offset, slot.bytes);
+            let rows: &mut [f32] = words::array(arena, slot.offset, slot.bytes);
             for (world, row) in rows.chunks_exact_mut(columns).enumerate() {
                 let draw = self.draw_of(world, noise.1);
-                let deviation = |number: usize| f64::from(self.host.params(world)[number]);
+                let deviation = |number: usize| f64::from(self.mirror.params(world)[number]);
                 self.noise.add_to(noise, row, &draw, deviation);
             }
         }
     }
 
-    /// A frame of a device that is gone: every world shows that it is no longer finite.
+    /// The frame of a lost device: every world reports that it is not finite.
     pub(super) fn show_lost(&self, arena: &mut [u64]) {
-        let worlds = self.host.seeds.len();
-        let found: &mut [u32] = host::array(arena, self.offset(Field::Status), 4 * worlds);
+        let worlds = self.mirror.seeds.len();
+        let found: &mut [u32] = words::array(arena, self.offset(Field::Status), 4 * worlds);
         found.fill(status::NOT_FINITE);
     }
 
@@ -78,31 +80,31 @@ impl Gpu {
         slot.expect("counters are part of every frame").offset
     }
 
-    /// Reads the counters of a frame: which worlds were frozen in it.
-    fn look(&mut self, arena: &mut [u64], counts: bool) {
-        let worlds = self.host.seeds.len();
+    /// Reads the counters of a frame and counts the worlds that were frozen in it.
+    fn read_counters(&mut self, arena: &mut [u64], counts: bool) {
+        let worlds = self.mirror.seeds.len();
         let (at_status, at_step) = (self.offset(Field::Status), self.offset(Field::Step));
-        self.host
+        self.mirror
             .steps
-            .copy_from_slice(host::array::<u64>(arena, at_step, 8 * worlds));
-        let found: &mut [u32] = host::array(arena, at_status, 4 * worlds);
+            .copy_from_slice(words::array::<u64>(arena, at_step, 8 * worlds));
+        let found: &mut [u32] = words::array(arena, at_status, 4 * worlds);
         for (world, &now) in found.iter().enumerate() {
-            let before = self.host.status[world];
+            let before = self.mirror.status[world];
             if counts && now & status::FROZEN != 0 && before & status::FROZEN == 0 {
-                self.host.frozen.count(FirstFrozen {
-                    frame: self.host.frames,
+                self.mirror.frozen.count(FirstFrozen {
+                    frame: self.mirror.frames,
                     world,
-                    steps: self.host.steps[world],
+                    steps: self.mirror.steps[world],
                     is_finite: now & status::NOT_FINITE == 0,
                 });
             }
-            self.host.status[world] = now;
+            self.mirror.status[world] = now;
         }
     }
 
     pub(super) fn run_frame(&mut self, steps: bool, arena: &mut [u64]) -> Result<(), BackendError> {
         if steps {
-            self.host.frames += 1;
+            self.mirror.frames += 1;
             self.send_command_noise()?;
         }
         let place = arena.as_ptr() as usize;
@@ -124,18 +126,18 @@ impl Gpu {
         }
         if is_staged {
             let bytes = self.layout.bytes;
-            host::bytes(arena)[..bytes].copy_from_slice(&self.frame.read()[..bytes]);
+            words::bytes(arena)[..bytes].copy_from_slice(&self.frame.read()[..bytes]);
             self.copied += bytes as u64;
         }
-        self.look(arena, steps);
+        self.read_counters(arena, steps);
         self.add_noise(arena);
         if steps && self.faults.resets {
-            let frozen = |world: &usize| self.host.status[*world] & status::FROZEN != 0;
-            let again: Vec<usize> = (0..self.host.seeds.len()).filter(frozen).collect();
+            let frozen = |world: &usize| self.mirror.status[*world] & status::FROZEN != 0;
+            let again: Vec<usize> = (0..self.mirror.seeds.len()).filter(frozen).collect();
             if !again.is_empty() {
                 for &world in &again {
-                    self.host.episodes[world] = self.host.episodes[world].wrapping_add(1);
-                    self.host.steps[world] = 0;
+                    self.mirror.episodes[world] = self.mirror.episodes[world].wrapping_add(1);
+                    self.mirror.steps[world] = 0;
                 }
                 self.begin(&again)?;
             }

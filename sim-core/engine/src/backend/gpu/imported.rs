@@ -1,19 +1,19 @@
 //! Memory of readers that a device writes frames to.
 
 use super::compiled::Compiled;
-use super::host;
 use super::tile::Tile;
+use super::words;
 use crate::backend::BackendError;
 use sim_device::{Batch, Buffer, Device};
 
-/// Memory of a reader that frames are written to.
+/// Reader memory that frames are written to.
 pub(super) struct Imported {
-    /// A batch a tile.
+    /// One batch per tile.
     pub shown: Vec<Batch>,
 }
 
 impl Imported {
-    /// Takes the pages in which an arena lies.
+    /// Imports the pages of an arena.
     ///
     /// # Safety
     /// The pages stay mapped where they are, to the same memory, until the backend is dropped.
@@ -29,7 +29,7 @@ impl Imported {
         let place = arena.as_mut_ptr() as usize;
         let (first, end) = (place / PAGE * PAGE, (place + bytes).next_multiple_of(PAGE));
         let before = place - first;
-        let at = host::bytes(arena).as_mut_ptr().wrapping_sub(before);
+        let at = words::bytes(arena).as_mut_ptr().wrapping_sub(before);
         // SAFETY: whole pages, mapped by contract.
         let pages = unsafe { device.import(at, (end - first) as u64)? };
         let mut shown = Vec::new();

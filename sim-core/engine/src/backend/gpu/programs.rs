@@ -1,4 +1,4 @@
-//! Programs of a model: the text of a step and of an evaluation, recorded, in kernels that a driver compiles in good time.
+//! Records the physics code of a step and of an evaluation, and partitions it into kernels that a driver compiles in good time.
 
 use super::places::Places;
 use crate::backend::gather::gather;
@@ -20,8 +20,8 @@ fn kept() -> Vec<Array> {
 }
 
 /// Kernels, and the order in which they are dispatched.
-pub(super) struct Program {
-    /// Text of each.
+pub(super) struct KernelSequence {
+    /// Source of each kernel, in WGSL.
     pub kernels: Vec<String>,
     pub order: Vec<Part>,
 }
@@ -29,19 +29,19 @@ pub(super) struct Program {
 /// What a frame dispatches.
 pub(super) struct Programs {
     /// All substeps.
-    pub step: Program,
-    /// What is shown of a state.
-    pub evaluate: Program,
-    /// Numbers of a world that lie behind the places, for what crosses from kernel to kernel.
+    pub step: KernelSequence,
+    /// The evaluation of output fields.
+    pub evaluate: KernelSequence,
+    /// Values per world, behind the places, for what crosses from kernel to kernel.
     pub spare: u32,
 }
 
 impl Programs {
-    /// Records the programs of a model: `shown` evaluates, for the slots `wanted` and for fields that are computed. Kernels are cut
-    /// within limits, where the text allows it.
+    /// Records the programs of a model. The stages `shown` evaluate the slots `wanted` and the fields that are computed. Kernels stay
+    /// within the limits, where the code allows it.
     ///
     /// # Errors
-    /// A text that cannot be recorded, which tests of the recorder rule out.
+    /// Physics code that cannot be recorded; tests of the recorder rule that out.
     pub fn new(
         m: &Constants<f32>,
         places: &Places,
@@ -51,22 +51,22 @@ impl Programs {
         wanted: &[Array],
         limits: Limits,
     ) -> Result<Programs, RecordError> {
-        // the searches of hulls are loops as deep as a text may have them: no loop of substeps goes around them
+        // searches on hulls nest loops as deep as a recording may: a loop over substeps does not fit around them
         let (inside, outside) = match m.contacts.groups.is_empty() {
             true => (substeps, 1),
             false => (1, substeps),
         };
         let (recording, options) = step(m, places, &step_stages(m), inside)?;
-        let (mut step, step_spare) = cut(&recording, &options, limits, places.len);
+        let (mut step, step_spare) = partition(&recording, &options, limits, places.len);
         if outside > 1 {
             step.order = vec![Part::Repeat {
-                rounds: outside,
+                iterations: outside,
                 parts: step.order,
-                out: None,
+                exited: None,
             }];
         }
         let (recording, options) = evaluation(m, places, shown, computed, wanted)?;
-        let (evaluate, evaluate_spare) = cut(&recording, &options, limits, places.len);
+        let (evaluate, evaluate_spare) = partition(&recording, &options, limits, places.len);
         Ok(Programs {
             step,
             evaluate,
@@ -75,19 +75,19 @@ impl Programs {
     }
 }
 
-fn cut(
+fn partition(
     recording: &Recording,
     options: &ProgramOptions,
     limits: Limits,
     spare: u32,
-) -> (Program, u32) {
+) -> (KernelSequence, u32) {
     let split = split(recording, options, limits, spare);
     let kernels = split.kernels.iter().map(|kernel| kernel.wgsl()).collect();
-    let program = Program {
+    let sequence = KernelSequence {
         kernels,
         order: split.order,
     };
-    (program, split.spare as u32)
+    (sequence, split.spare as u32)
 }
 
 /// What a run of stages reads from before it, and what it writes.

@@ -1,104 +1,33 @@
-//! Worlds that lie in one set of buffers, and the batches that move them.
+//! A tile: worlds that lie in one set of buffers, and the batches that step them.
+//!
+//! A tile has as many worlds as a buffer can bind. A frame of it is recorded once: the commands that wait, the substeps, the checks for
+//! faults, the evaluation, then a batch that writes the output fields.
 
-use super::compiled::{Compiled, Kernels, PHYSICS, constant};
-use super::left::Left;
+use super::compiled::{Compiled, Kernels, constant};
 use super::places::Places;
 use super::show::Run;
-use super::upkeep::WORKGROUP;
-use crate::backend::BackendError;
+use super::software::ActiveWorlds;
+use super::uploads::{RowUpload, Rows, StagedCommand};
+use super::workgroups::{BOOKKEEPING, PHYSICS};
+use crate::backend::{BackendError, Input};
 use sim_device::{Batch, BatchBuilder, Buffer, Device, Program, Replay, Staging};
-use sim_model::SensedShapes;
-use sim_physics::arrays::Array;
-use sim_physics::arrays::Field;
 use sim_physics::constants::Constants;
 use sim_record::split::Part;
 use std::ops::Range;
 
-/// Words before the list of what [`upkeep::ROWS`] reads.
-const ROWS_HEAD: usize = 4;
-
-/// Worlds of a tile: as many as its largest buffer may show at once, and all if they fit.
-pub(super) fn widest(device: &Device, m: &Constants<f32>, places: &Places, worlds: usize) -> u32 {
-    let numbers = (places.len as u64).max(m.contacts.memory.len as u64).max(4);
-    let fit = (device.info().binding_max.min(u64::from(u32::MAX)) / (4 * numbers)).max(1);
-    let tiles = (worlds as u64).div_ceil(fit);
-    let width = (worlds as u64).div_ceil(tiles);
-    width
-        .next_multiple_of(u64::from(WORKGROUP))
-        .min(u64::from(u32::MAX)) as u32
-}
-
-/// Memory that a tile takes, what the host sees of it included [bytes].
-pub(super) fn memory(m: &Constants<f32>, places: &Places, width: u32) -> u64 {
-    let state = u64::from(places.state);
-    // fields, contacts and counters; state and counters for the host, rows from it with their worlds, commands
-    let numbers = u64::from(places.len) + m.contacts.memory.len as u64 + 4;
-    let host = (state + 4) + (state + 1) + 3 * m.dofs.len() as u64;
-    4 * (numbers + host) * u64::from(width)
-}
-
-/// Of each pair its shapes and links, then of each sensor and shape what [`show::contacts`] reads.
-pub(super) fn pairs(m: &Constants<f32>, sensors: &[SensedShapes]) -> Vec<[i32; 4]> {
-    let link = |link: Option<usize>| link.map_or(-1, |link| link as i32);
-    let pairs = m.contacts.pairs.iter().map(|pair| {
-        let [a, b] = pair.shapes;
-        [a as i32, b as i32, link(pair.links[0]), link(pair.links[1])]
-    });
-    let sensed = sensors.iter().flat_map(|sensor| {
-        let both = sensor.of.iter().zip(&sensor.against);
-        both.map(|(of, against)| [i32::from(*of) | i32::from(*against) << 1, 0, 0, 0])
-    });
-    pairs.chain(sensed).collect()
-}
-
-/// Which buffer rows of the host go to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Rows {
-    Fields,
-    Counters,
-}
-
-/// A command that frames bring.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Command(usize);
-
-const COMMANDS: [Array; 3] = [Array::JointF, Array::JointTargetQ, Array::JointTargetQd];
-
-/// The command that a field is.
-pub(super) fn command(field: Field) -> Option<Command> {
-    [Field::JointF, Field::JointTargetQ, Field::JointTargetQd]
-        .iter()
-        .position(|known| *known == field)
-        .map(Command)
-}
-
-/// A command of all worlds that waits for the next frame.
-struct Inbox {
-    // the batch goes before what it names
-    batch: Option<Batch>,
-    rows: Staging,
-    waits: bool,
-}
-
-/// Rows from the host to some worlds, at once.
-struct Door {
-    to_fields: Batch,
-    to_counters: Batch,
-    rows: Staging,
-    what: Staging,
-}
-
+/// Buffers and batches of some worlds. Field order matters: batches are dropped before what they name.
 pub(super) struct Tile {
     step: Option<Batch>,
     forward: Option<Batch>,
     show: Option<Batch>,
     copy_out: Option<Batch>,
-    keep: Batch,
-    inboxes: Vec<Inbox>,
-    door: Door,
-    /// Worlds of it, by their numbers.
+    /// Copies state and counters to the host.
+    read_state: Batch,
+    commands: Vec<StagedCommand>,
+    rows: RowUpload,
+    /// Its worlds, by number.
     pub worlds: Range<usize>,
-    /// Lanes: the worlds and those that run along.
+    /// Lanes: its worlds, and padding that runs along.
     pub width: u32,
     fields: Buffer,
     scratch: Buffer,
@@ -106,14 +35,14 @@ pub(super) struct Tile {
     bounds: Staging,
     runs: Buffer,
     pairs: Buffer,
-    /// Worlds that are left in a loop.
-    left: Option<Left>,
-    /// State and counters, for the host.
-    kept: Staging,
+    /// Lists of the worlds that are active in a split loop.
+    active: Option<ActiveWorlds>,
+    /// State and counters, as the host sees them.
+    state_copy: Staging,
 }
 
 impl Tile {
-    #[expect(clippy::too_many_arguments)] // what a tile is made of
+    #[expect(clippy::too_many_arguments)] // the parts of a tile
     pub fn new(
         device: &Device,
         m: &Constants<f32>,
@@ -147,48 +76,22 @@ impl Tile {
             .collect();
         let pairs = constant(device, "pairs", &pairs)?;
         let state = 4 * u64::from(places.state) * lanes;
-        let kept = device.staging("kept", state + 16 * lanes)?;
-        let mut keep = device.batch(Replay::Recorded);
+        let state_copy = device.staging("state", state + 16 * lanes)?;
+        let mut read_state = device.batch(Replay::Recorded);
         if state > 0 {
-            keep.copy(&fields, 0, &kept, 0, state);
+            read_state.copy(&fields, 0, &state_copy, 0, state);
         }
-        keep.copy(&counters, 0, &kept, state, 16 * lanes);
-        let rows = device.staging("rows", bytes(u64::from(places.state)))?;
-        let list = device.staging("worlds of rows", 4 * (ROWS_HEAD as u64 + lanes))?;
-        let to = |target: &Buffer| {
-            let mut batch = device.batch(Replay::Recorded);
-            placed(&mut batch, &compiled.rows, target, &rows, &list, width);
-            batch.finish()
-        };
-        let door = Door {
-            to_fields: to(&fields)?,
-            to_counters: to(&counters)?,
-            rows,
-            what: list,
-        };
-        let mut inboxes = Vec::new();
-        for group in COMMANDS {
-            let dofs = m.dofs.len() as u64;
-            let rows = device.staging("commands", bytes(dofs))?;
-            let what = device.staging("what commands are", 16)?;
-            let head = [worlds.len() as u32, dofs as u32, places.of(group).start, 0];
-            what.write().copy_from_slice(bytemuck::cast_slice(&head));
-            let mut batch = device.batch(compiled.replay);
-            placed(&mut batch, &compiled.rows, &fields, &rows, &what, width);
-            inboxes.push(Inbox {
-                batch: Some(batch.finish()?),
-                rows,
-                waits: false,
-            });
-        }
+        read_state.copy(&counters, 0, &state_copy, state, 16 * lanes);
+        let commands = StagedCommand::all(device, m, places, compiled, &fields, &worlds, width)?;
+        let rows = RowUpload::new(device, compiled, &fields, &counters, places.state, width)?;
         Ok(Tile {
             step: None,
             forward: None,
             show: None,
             copy_out: None,
-            keep: keep.finish()?,
-            inboxes,
-            door,
+            read_state: read_state.finish()?,
+            commands,
+            rows,
             worlds,
             width,
             fields,
@@ -197,12 +100,12 @@ impl Tile {
             bounds: device.staging("bounds", 16)?,
             runs,
             pairs,
-            left: compiled.enlisting.room(device, width)?,
-            kept,
+            active: compiled.compaction.allocate(device, width)?,
+            state_copy,
         })
     }
 
-    /// Records what a frame does.
+    /// Records the batches of a frame.
     pub fn record(
         &mut self,
         device: &Device,
@@ -211,7 +114,7 @@ impl Tile {
         frame: &Buffer,
     ) -> Result<(), BackendError> {
         let mut step = device.batch(compiled.replay);
-        self.book(&mut step, &compiled.begin);
+        self.bookkeep(&mut step, &compiled.begin);
         self.physics(
             &mut step,
             &compiled.step,
@@ -219,15 +122,15 @@ impl Tile {
             compiled,
             None,
         );
-        self.book(&mut step, &compiled.note);
+        self.bookkeep(&mut step, &compiled.check_faults);
         self.evaluate(&mut step, compiled);
-        self.book(&mut step, &compiled.left_out);
+        self.bookkeep(&mut step, &compiled.count_left_out);
         self.step = Some(step.finish()?);
         let mut forward = device.batch(compiled.replay);
-        self.book(&mut forward, &compiled.begin_evaluation);
+        self.bookkeep(&mut forward, &compiled.begin_evaluation);
         self.evaluate(&mut forward, compiled);
         if finds_contacts {
-            self.book(&mut forward, &compiled.left_out);
+            self.bookkeep(&mut forward, &compiled.count_left_out);
         }
         self.forward = Some(forward.finish()?);
         let mut show = device.batch(compiled.replay);
@@ -247,7 +150,7 @@ impl Tile {
         program: &Kernels,
         order: &[Part],
         compiled: &Compiled,
-        round: Option<usize>,
+        iteration: Option<usize>,
     ) {
         let mut buffers = vec![
             (0, &self.fields, 0..self.fields.bytes()),
@@ -255,55 +158,61 @@ impl Tile {
             (2, &compiled.numbers, 0..compiled.numbers.bytes()),
             (3, &compiled.indices, 0..compiled.indices.bytes()),
         ];
-        let left = self.left.as_ref();
+        let active = self.active.as_ref();
         let groups = self.width.div_ceil(PHYSICS);
         for part in order {
-            match (part, round.zip(left)) {
+            match (part, iteration.zip(active)) {
                 (Part::Kernel(k), None) => {
                     batch.dispatch(&program.kernels[*k], &buffers, groups);
                 }
-                (Part::Kernel(k), Some((round, left))) => {
+                (Part::Kernel(k), Some((iteration, active))) => {
                     buffers.truncate(4);
-                    buffers.extend(left.seen(round));
-                    let (found, at) = left.groups(round);
+                    buffers.extend(active.bindings(iteration));
+                    let (found, at) = active.groups(iteration);
                     batch.dispatch_found(&program.kernels[*k], &buffers, found, at);
                 }
                 (
                     Part::Repeat {
-                        rounds: rounds @ 2..,
+                        iterations: iterations @ 2..,
                         parts,
-                        out: Some(out),
+                        exited: Some(exited),
                     },
                     None,
                 ) => {
-                    let left = left.expect("a list for every loop");
-                    left.begin(batch, &compiled.enlisting, *out, &self.fields, groups);
-                    for round in 0..*rounds {
-                        self.physics(batch, program, parts, compiled, Some(round));
-                        if round + 1 < *rounds {
-                            left.go_on(batch, &compiled.enlisting, *out, &self.fields, round);
+                    let active = active.expect("a list for every loop");
+                    let compaction = &compiled.compaction;
+                    active.begin(batch, compaction, *exited, &self.fields, groups);
+                    for iteration in 0..*iterations {
+                        self.physics(batch, program, parts, compiled, Some(iteration));
+                        if iteration + 1 < *iterations {
+                            active.compact(batch, compaction, *exited, &self.fields, iteration);
                         }
                     }
                 }
-                (Part::Repeat { rounds, parts, .. }, _) => {
-                    for _ in 0..*rounds {
-                        self.physics(batch, program, parts, compiled, round);
+                (
+                    Part::Repeat {
+                        iterations, parts, ..
+                    },
+                    _,
+                ) => {
+                    for _ in 0..*iterations {
+                        self.physics(batch, program, parts, compiled, iteration);
                     }
                 }
             }
         }
     }
 
-    fn book(&self, batch: &mut BatchBuilder, program: &Program) {
+    fn bookkeep(&self, batch: &mut BatchBuilder, program: &Program) {
         let buffers = [
             (0, &self.fields, 0..self.fields.bytes()),
             (1, &self.counters, 0..self.counters.bytes()),
             (2, &*self.bounds, 0..self.bounds.bytes()),
         ];
-        batch.dispatch(program, &buffers, self.width.div_ceil(WORKGROUP));
+        batch.dispatch(program, &buffers, self.width.div_ceil(BOOKKEEPING));
     }
 
-    /// Writes its worlds' rows of a frame.
+    /// Writes the output rows of its worlds into a frame.
     pub fn show(
         &self,
         batch: &mut BatchBuilder,
@@ -311,7 +220,7 @@ impl Tile {
         frame: &Buffer,
         part: Range<u64>,
     ) {
-        let groups = self.width.div_ceil(WORKGROUP);
+        let groups = self.width.div_ceil(BOOKKEEPING);
         let whole = |buffer: &Buffer| 0..buffer.bytes();
         let (fields, runs, pairs) = (&self.fields, &self.runs, &self.pairs);
         let (scratch, counters) = (&self.scratch, &self.counters);
@@ -348,7 +257,7 @@ impl Tile {
         }
     }
 
-    /// After all tiles: the frame out of the memory of the device.
+    /// Records the copy of the whole frame out of device memory, for the last tile.
     pub fn copy_out(
         &mut self,
         device: &Device,
@@ -362,52 +271,48 @@ impl Tile {
         Ok(())
     }
 
-    /// What computes a frame, or evaluates.
+    /// The batch that steps and evaluates, or only evaluates.
     pub fn computes(&self, steps: bool) -> &Batch {
         let batch = if steps { &self.step } else { &self.forward };
         batch.as_ref().expect("recorded at the start")
     }
 
-    /// What shows it.
+    /// The batch that writes the output rows.
     pub fn shows(&self) -> &Batch {
         self.show.as_ref().expect("recorded at the start")
     }
 
-    /// What takes the frame of all tiles out of the device's memory.
+    /// The batch that copies the whole frame out of device memory.
     pub fn copies_out(&self) -> Option<&Batch> {
         self.copy_out.as_ref()
     }
 
-    /// Bounds of the run, as bits.
+    /// Sets the bounds of the run, as bits.
     pub fn set_bounds(&self, bounds: [u32; 2]) {
         self.bounds.write()[..8].copy_from_slice(bytemuck::cast_slice(&bounds));
     }
 
-    /// Takes a command of all worlds, to be sent with the next frame.
-    pub fn stage(&mut self, command: Command, values: &[f32], columns: usize) {
-        let own = self.worlds.start * columns..self.worlds.end * columns;
-        let inbox = &mut self.inboxes[command.0];
-        let bytes: &[u8] = bytemuck::cast_slice(&values[own]);
-        inbox.rows.write()[..bytes.len()].copy_from_slice(bytes);
-        inbox.waits = !bytes.is_empty();
+    /// Takes a command of all worlds, to be sent with the next frame; false if these columns are no whole command.
+    pub fn stage(&mut self, input: Input, columns: &Range<usize>, values: &[f32]) -> bool {
+        let found = self.commands.iter_mut().find(|c| c.is(input, columns));
+        let Some(command) = found else { return false };
+        command.stage(values, &self.worlds);
+        true
     }
 
     /// Commands that wait.
     pub fn pending(&self) -> impl Iterator<Item = &Batch> {
-        let waiting = self.inboxes.iter().filter(|inbox| inbox.waits);
-        waiting.filter_map(|inbox| inbox.batch.as_ref())
+        self.commands.iter().filter_map(StagedCommand::pending)
     }
 
-    /// They were sent.
+    /// The commands that waited were sent.
     pub fn sent(&mut self) {
-        self.inboxes
-            .iter_mut()
-            .for_each(|inbox| inbox.waits = false);
+        self.commands.iter_mut().for_each(StagedCommand::sent);
     }
 
-    /// Writes neighbouring numbers of some of its worlds.
+    /// Writes neighbouring values of some of its worlds.
     pub fn send(
-        &mut self,
+        &self,
         device: &Device,
         target: Rows,
         first: u32,
@@ -415,61 +320,24 @@ impl Tile {
         worlds: &[usize],
         row: impl Fn(usize, &mut [u32]),
     ) -> Result<(), BackendError> {
-        {
-            let (mut rows, mut what) = (self.door.rows.write(), self.door.what.write());
-            let rows: &mut [u32] = bytemuck::cast_slice_mut(&mut rows);
-            let what: &mut [u32] = bytemuck::cast_slice_mut(&mut what);
-            what[..ROWS_HEAD].copy_from_slice(&[worlds.len() as u32, columns, first, 1]);
-            for (j, &world) in worlds.iter().enumerate() {
-                what[ROWS_HEAD + j] = (world - self.worlds.start) as u32;
-                let n = columns as usize;
-                row(j, &mut rows[j * n..(j + 1) * n]);
-            }
-        }
-        let batch = match target {
-            Rows::Fields => &self.door.to_fields,
-            Rows::Counters => &self.door.to_counters,
-        };
-        Ok(device.run(&[batch])?)
+        let lanes = worlds.iter().map(|world| world - self.worlds.start);
+        self.rows.send(device, target, first, columns, lanes, row)
     }
 
     /// Gives every lane the same state.
-    pub fn fill(&mut self, device: &Device, state: &[u32]) -> Result<(), BackendError> {
-        let first = self.worlds.start;
-        let lanes: Vec<usize> = (0..self.width as usize).map(|lane| first + lane).collect();
-        self.send(
-            device,
-            Rows::Fields,
-            0,
-            state.len() as u32,
-            &lanes,
-            |_, to| {
+    pub fn fill(&self, device: &Device, state: &[u32]) -> Result<(), BackendError> {
+        let (lanes, columns) = (0..self.width as usize, state.len() as u32);
+        self.rows
+            .send(device, Rows::Fields, 0, columns, lanes, |_, to| {
                 to.copy_from_slice(state);
-            },
-        )
+            })
     }
 
-    /// State and counters, four numbers of every lane after each other. Commands that wait are among them, and wait on: they are
-    /// sent again with the frame.
+    /// State and counters, four values of every lane after each other. Commands that wait are included and go on waiting: the frame
+    /// sends them again.
     pub fn fetch(&self, device: &Device) -> Result<&Staging, BackendError> {
-        let batches: Vec<_> = self.pending().chain([&self.keep]).collect();
+        let batches: Vec<_> = self.pending().chain([&self.read_state]).collect();
         device.run(&batches)?;
-        Ok(&self.kept)
+        Ok(&self.state_copy)
     }
-}
-
-fn placed(
-    batch: &mut BatchBuilder,
-    program: &Program,
-    target: &Buffer,
-    rows: &Buffer,
-    what: &Buffer,
-    width: u32,
-) {
-    let buffers = [
-        (0, target, 0..target.bytes()),
-        (1, rows, 0..rows.bytes()),
-        (2, what, 0..what.bytes()),
-    ];
-    batch.dispatch(program, &buffers, width.div_ceil(WORKGROUP));
 }

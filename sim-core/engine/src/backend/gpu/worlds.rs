@@ -1,7 +1,8 @@
-//! Numbers of worlds between host and device: starts, records, and columns that are written.
+//! Values of worlds between host and device: starts, records, and columns that are written.
 
-use super::tile::Rows;
-use super::{Gpu, host};
+use super::backend::Gpu;
+use super::uploads::Rows;
+use super::words;
 use crate::backend::state::{Shape, array_of};
 use crate::backend::{BackendError, COUNTERS, Values};
 use sim_physics::arrays::Array;
@@ -12,28 +13,28 @@ impl Gpu {
         Shape::of(&self.constants)
     }
 
-    /// Every lane at the scene's start, those past the last world included.
+    /// Sets every lane to the scene's start, padding included.
     pub(super) fn pad(&mut self, start: &[f32]) -> Result<(), BackendError> {
         let mut row = vec![0; self.places.state as usize];
         place(&self.record, start, &mut row);
-        for tile in &mut self.tiles {
+        for tile in &self.tiles {
             tile.fill(&self.device, &row)?;
         }
         Ok(())
     }
 
-    /// Begins the episodes of these worlds, which the host has counted already.
+    /// Begins episodes of these worlds, which the mirror has counted already.
     pub(super) fn begin(&mut self, worlds: &[usize]) -> Result<(), BackendError> {
         let params = self.shape().start(Array::Params);
         let starts = self.constants.varying.starts().to_vec();
         let mut records = Vec::with_capacity(worlds.len());
         for &world in worlds {
             let mut record = self.start.clone();
-            let (seed, episode) = (self.host.seeds[world], self.host.episodes[world]);
+            let (seed, episode) = (self.mirror.seeds[world], self.mirror.episodes[world]);
             let number = self.numbering.number(world);
             let shape = self.shape();
             // parameters stay as they are, but for loads and what is drawn
-            for (k, x) in self.host.params_mut(world).iter_mut().enumerate() {
+            for (k, x) in self.mirror.params_mut(world).iter_mut().enumerate() {
                 match starts[k].0.is_load() {
                     true => *x = record[params + k],
                     false => record[params + k] = *x,
@@ -43,7 +44,7 @@ impl Gpu {
                 .draw(seed, number, episode, |field, column, value| {
                     record[shape.start(array_of(field)) + column] = value as f32;
                 });
-            let own = self.host.params_mut(world);
+            let own = self.mirror.params_mut(world);
             self.draw.draw_params(seed, number, episode, |k, value| {
                 record[params + k] = value as f32;
                 own[k] = value as f32;
@@ -65,14 +66,14 @@ impl Gpu {
             place(&places, &records[k], to);
         })?;
         for (k, &world) in worlds.iter().enumerate() {
-            self.host.status[world] = counters(k)[2];
+            self.mirror.status[world] = counters(k)[2];
         }
         self.send(worlds, Rows::Counters, 0, 4, |k, to| {
             to.copy_from_slice(&counters(k))
         })
     }
 
-    /// Writes neighbouring numbers of some worlds, in rising order.
+    /// Writes neighbouring values of some worlds, which are in ascending order.
     pub(super) fn send(
         &mut self,
         worlds: &[usize],
@@ -82,7 +83,7 @@ impl Gpu {
         row: impl Fn(usize, &mut [u32]),
     ) -> Result<(), BackendError> {
         let mut from = 0;
-        for tile in &mut self.tiles {
+        for tile in &self.tiles {
             let end = worlds.partition_point(|&world| world < tile.worlds.end);
             if from < end && columns > 0 {
                 tile.send(
@@ -102,8 +103,8 @@ impl Gpu {
     }
 
     /// The worlds of a mask; none = all.
-    pub(super) fn meant(&self, mask: Option<&[bool]>) -> Vec<usize> {
-        let worlds = 0..self.host.seeds.len();
+    pub(super) fn selected(&self, mask: Option<&[bool]>) -> Vec<usize> {
+        let worlds = 0..self.mirror.seeds.len();
         worlds
             .filter(|&world| mask.is_none_or(|mask| mask[world]))
             .collect()
@@ -120,7 +121,7 @@ impl Gpu {
         if n == 0 {
             return Ok(());
         }
-        let worlds = self.meant(mask);
+        let worlds = self.selected(mask);
         let quaternions: Vec<usize> = match target {
             Array::JointQ => self
                 .constants
@@ -137,7 +138,7 @@ impl Gpu {
         self.send(&worlds, Rows::Fields, first, n as u32, |j, to| {
             let mut row: Vec<f32> = (0..n).map(|k| value(worlds[j], k)).collect();
             for quaternion in &quaternions {
-                host::normalize(&mut row[quaternion - columns.start..][..4]);
+                normalize(&mut row[quaternion - columns.start..][..4]);
             }
             for (to, x) in to.iter_mut().zip(row) {
                 *to = x.to_bits();
@@ -147,7 +148,7 @@ impl Gpu {
             Array::Params => {
                 for &world in &worlds {
                     for k in 0..n {
-                        self.host.params_mut(world)[columns.start + k] = value(world, k);
+                        self.mirror.params_mut(world)[columns.start + k] = value(world, k);
                     }
                 }
             }
@@ -170,9 +171,9 @@ impl Gpu {
         let size = COUNTERS + 4 * self.shape().total();
         let asked = records.len() / size;
         for tile in self.tiles.iter().filter(|tile| tile.worlds.start < asked) {
-            let kept = tile.fetch(&self.device)?;
-            let read = kept.read();
-            let words: &[u32] = host::words(&read);
+            let state = tile.fetch(&self.device)?;
+            let read = state.read();
+            let words: &[u32] = words::words(&read);
             let at = |i: usize, w: usize| words[((i / 4) * tile.width as usize + w) * 4 + i % 4];
             let counters = self.places.state as usize;
             for (w, world) in (tile.worlds.start..tile.worlds.end.min(asked)).enumerate() {
@@ -181,8 +182,8 @@ impl Gpu {
                 for k in 0..4 {
                     head[4 * k..4 * k + 4].copy_from_slice(&at(counters + k, w).to_le_bytes());
                 }
-                head[16..24].copy_from_slice(&self.host.seeds[world].to_le_bytes());
-                head[24..].copy_from_slice(&self.host.episodes[world].to_le_bytes());
+                head[16..24].copy_from_slice(&self.mirror.seeds[world].to_le_bytes());
+                head[24..].copy_from_slice(&self.mirror.episodes[world].to_le_bytes());
                 for (to, place) in numbers.chunks_exact_mut(4).zip(&self.record) {
                     to.copy_from_slice(&at(*place as usize, w).to_le_bytes());
                 }
@@ -201,7 +202,7 @@ impl Gpu {
         self.flush()?;
         let size = COUNTERS + 4 * self.shape().total();
         let params = self.shape().start(Array::Params);
-        let worlds = self.meant(mask);
+        let worlds = self.selected(mask);
         let mut states = Vec::with_capacity(worlds.len());
         let mut counts = Vec::with_capacity(worlds.len());
         for &world in &worlds {
@@ -209,13 +210,13 @@ impl Gpu {
             let (head, numbers) = records[first..first + size].split_at(COUNTERS);
             let word = |k: usize| u32::from_le_bytes(std::array::from_fn(|i| head[4 * k + i]));
             counts.push([word(0), word(1), word(2), word(3)]);
-            self.host.steps[world] = u64::from(word(0)) | u64::from(word(1)) << 32;
-            self.host.seeds[world] = u64::from(word(4)) | u64::from(word(5)) << 32;
-            self.host.episodes[world] = word(6);
+            self.mirror.steps[world] = u64::from(word(0)) | u64::from(word(1)) << 32;
+            self.mirror.seeds[world] = u64::from(word(4)) | u64::from(word(5)) << 32;
+            self.mirror.episodes[world] = word(6);
             let record: Vec<f32> = (numbers.chunks_exact(4))
                 .map(|x| f32::from_le_bytes(std::array::from_fn(|i| x[i])))
                 .collect();
-            self.host
+            self.mirror
                 .params_mut(world)
                 .copy_from_slice(&record[params..]);
             states.push(record);
@@ -224,10 +225,20 @@ impl Gpu {
     }
 }
 
-/// Puts a world's record where its numbers lie in device memory; what lies between them is 0.
+/// Puts a world's record at its places in device memory, and 0 between them.
 fn place(places: &[u32], record: &[f32], to: &mut [u32]) {
     to.fill(0);
     for (place, x) in places.iter().zip(record) {
         to[*place as usize] = x.to_bits();
+    }
+}
+
+/// Normalizes a quaternion. One of length 1, up to rounding, keeps its bits.
+fn normalize(quaternion: &mut [f32]) {
+    let square: f64 = quaternion.iter().map(|x| f64::from(*x).powi(2)).sum();
+    if (square - 1.0).abs() > 4.0 * f64::from(f32::EPSILON) {
+        for x in quaternion {
+            *x = (f64::from(*x) / square.sqrt()) as f32;
+        }
     }
 }

@@ -1,0 +1,213 @@
+//! The backend itself: chunks of worlds and the threads that step them.
+
+use super::chunk::{Chunk, Job};
+use super::transfer;
+use crate::backend::{Backend, BackendError, Faults, Frozen, Input, Values};
+use rayon::prelude::*;
+use sim_physics::compiled::Stages;
+use sim_physics::lane::Lane;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// [`Chunk::run`], compiled for an instruction set.
+///
+/// # Safety
+/// As [`Chunk::run`].
+pub(super) type RunChunk<F> = unsafe fn(&mut Chunk<F>, &Job<F>, usize, transfer::Arena);
+
+/// The physics code, compiled for an instruction set.
+pub(super) struct CompiledStages<F: Lane> {
+    /// Name of the instruction set, for people.
+    pub instructions: &'static str,
+    pub stages: Stages<F>,
+    pub chunk: RunChunk<F>,
+}
+
+/// Chunks per thread: enough that one slow block does not leave the other threads idle.
+pub(crate) const CHUNKS_PER_THREAD: usize = 4;
+
+/// The backend of one group of worlds.
+pub(super) struct Cpu<F: Lane> {
+    chunks: Vec<Chunk<F>>,
+    job: Job<F>,
+    workers: Workers,
+    threads: usize,
+    device: String,
+    arena_words: usize,
+    run: RunChunk<F>,
+}
+
+/// The threads that step the chunks.
+#[derive(Clone)]
+pub(super) enum Workers {
+    /// The caller's thread.
+    Caller,
+    /// A pool for one group.
+    Own(Arc<rayon::ThreadPool>),
+    /// A pool for all groups: threads that one leaves idle work for another.
+    Shared(Arc<rayon::ThreadPool>),
+}
+
+impl Workers {
+    pub fn new(threads: usize, groups: usize) -> Result<Workers, BackendError> {
+        if threads == 1 && groups == 1 {
+            return Ok(Workers::Caller);
+        }
+        let builder = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(|i| format!("step-{i}"));
+        let failed = |e: rayon::ThreadPoolBuildError| BackendError::Threads {
+            threads,
+            reason: e.to_string(),
+        };
+        let pool = Arc::new(builder.build().map_err(failed)?);
+        Ok(match groups {
+            1 => Workers::Own(pool),
+            _ => Workers::Shared(pool),
+        })
+    }
+}
+
+impl<F: Lane> Cpu<F> {
+    pub fn new(
+        job: Job<F>,
+        worlds: usize,
+        threads: usize,
+        workers: Workers,
+        compiled: &CompiledStages<F>,
+    ) -> Self {
+        let blocks = worlds.div_ceil(F::WIDTH);
+        let parts = if threads == 1 {
+            1
+        } else {
+            (threads * CHUNKS_PER_THREAD).min(blocks)
+        };
+        let chunks = (0..parts)
+            .map(|part| {
+                let first = part * blocks / parts * F::WIDTH;
+                let end = ((part + 1) * blocks / parts * F::WIDTH).min(worlds);
+                Chunk::new(&job, first..end)
+            })
+            .collect();
+        let plural = if threads == 1 { "" } else { "s" };
+        Cpu {
+            arena_words: job.layout.bytes / 8,
+            chunks,
+            job,
+            workers,
+            threads,
+            device: format!(
+                "cpu ({}, {} world{} a block, {threads} thread{plural})",
+                compiled.instructions,
+                F::WIDTH,
+                if F::WIDTH == 1 { "" } else { "s" },
+            ),
+            run: compiled.chunk,
+        }
+    }
+}
+
+impl<F: Lane> Cpu<F> {
+    /// Applies `work` to every chunk, on all threads.
+    fn for_each(&mut self, work: impl Fn(&mut Chunk<F>, &Job<F>) + Send + Sync) {
+        let job = &self.job;
+        let work = |chunk: &mut Chunk<F>| work(chunk, job);
+        match &self.workers {
+            Workers::Caller => self.chunks.iter_mut().for_each(work),
+            Workers::Own(pool) => pool.install(|| self.chunks.par_iter_mut().for_each(work)),
+            // one job per chunk, in order of arrival: a thread that waits inside a job, as those of an iterator do, would start
+            // another group's job and delay its own
+            Workers::Shared(pool) => pool.in_place_scope(|scope| {
+                let work = &work;
+                for chunk in &mut self.chunks {
+                    scope.spawn(move |_| work(chunk));
+                }
+            }),
+        }
+    }
+}
+
+impl<F: Lane> Backend for Cpu<F> {
+    fn device(&self) -> &str {
+        &self.device
+    }
+
+    fn threads(&self) -> usize {
+        self.threads
+    }
+
+    fn set_faults(&mut self, faults: Faults) {
+        self.job.faults = faults;
+    }
+
+    fn freeze_others(&mut self, good: &[bool]) {
+        for chunk in &mut self.chunks {
+            chunk.freeze_others(good);
+        }
+    }
+
+    fn write(
+        &mut self,
+        input: Input,
+        columns: Range<usize>,
+        values: Values<'_>,
+        mask: Option<&[bool]>,
+    ) {
+        let (group, columns) = input.place(&self.job.constants, columns);
+        for chunk in &mut self.chunks {
+            chunk.write(&self.job, group, &columns, values, mask);
+        }
+    }
+
+    fn params(&self, columns: Range<usize>, to: &mut [f64]) {
+        for chunk in &self.chunks {
+            chunk.params(&self.job, &columns, to);
+        }
+    }
+
+    fn reset(&mut self, mask: Option<&[bool]>, seeds: Option<&[u64]>) {
+        self.for_each(|chunk, job| chunk.reset(job, mask, seeds));
+    }
+
+    fn take_frozen(&mut self) -> Frozen {
+        let mut all = Frozen::default();
+        for chunk in &mut self.chunks {
+            all.join(chunk.take_frozen());
+        }
+        // counted only if there is something to report
+        if all.first.is_some() {
+            all.now = self.chunks.iter().map(Chunk::frozen_now).sum();
+        }
+        all
+    }
+
+    fn numbers(&self) -> usize {
+        self.job.numbers()
+    }
+
+    fn save(&self, records: &mut [u8]) {
+        for chunk in &self.chunks {
+            chunk.save(&self.job, records);
+        }
+    }
+
+    fn restore(&mut self, records: &[u8], mask: Option<&[bool]>, from_world: Option<usize>) {
+        for chunk in &mut self.chunks {
+            chunk.restore(&self.job, records, mask, from_world);
+        }
+    }
+
+    fn run(&mut self, substeps: usize, arena: &mut [u64]) {
+        assert!(
+            arena.len() >= self.arena_words,
+            "the arena is smaller than the layout"
+        );
+        let arena = transfer::Arena::new(arena);
+        let run = self.run;
+        self.for_each(|chunk, job| {
+            // SAFETY: `dispatch` chose `run` for instructions that this processor has; the arena holds
+            // the layout (asserted) and outlives the call; each chunk writes its own worlds' rows only.
+            unsafe { run(chunk, job, substeps, arena) }
+        });
+    }
+}

@@ -1,0 +1,103 @@
+//! Lane assignment: which lane of which block holds a world.
+//!
+//! A block takes as long as its slowest world, and visits every contact that any of its worlds has. So worlds with the same kinds of
+//! contacts share a block: after each frame a chunk sorts its worlds by the contact classes of the last substep (`regroup`).
+//! No value of a world depends on its lane or its neighbours.
+
+use std::ops::Range;
+
+/// One bit per contact class that a world has, modulo the number of bits.
+pub(super) type Touches = u8;
+pub(super) const BITS: usize = Touches::BITS as usize;
+/// Number of different values.
+const KINDS: usize = 1 << BITS;
+
+/// Lanes of a chunk, counted from its first block.
+pub(super) struct LaneAssignment {
+    /// The lane of each world. Lanes past the last world map to themselves.
+    lane: Vec<usize>,
+    /// The world in each lane.
+    world: Vec<usize>,
+    /// Contact classes of each world.
+    touches: Vec<Touches>,
+    /// Whether the contact classes of a world changed since the last assignment.
+    changed: bool,
+}
+
+impl LaneAssignment {
+    /// World k in lane k.
+    pub fn new(worlds: usize, lanes: usize) -> LaneAssignment {
+        LaneAssignment {
+            lane: (0..lanes).collect(),
+            world: (0..lanes).collect(),
+            touches: vec![0; worlds],
+            changed: false,
+        }
+    }
+
+    /// The lane of a world, which is counted from the chunk's first.
+    #[inline(always)]
+    pub fn lane(&self, world: usize) -> usize {
+        self.lane[world]
+    }
+
+    /// The world in a lane.
+    #[inline(always)]
+    pub fn world(&self, lane: usize) -> usize {
+        self.world[lane]
+    }
+
+    /// The worlds of some lanes, if they are consecutive.
+    pub fn consecutive(&self, lanes: Range<usize>) -> Option<Range<usize>> {
+        let worlds = &self.world[lanes];
+        let &first = worlds.first()?;
+        let follows = worlds.iter().zip(first..).all(|(&world, k)| world == k);
+        follows.then(|| first..first + worlds.len())
+    }
+
+    /// Sets the contact classes of a world.
+    pub fn note(&mut self, world: usize, touches: Touches) {
+        self.changed |= self.touches[world] != touches;
+        self.touches[world] = touches;
+    }
+
+    /// Assigns neighbouring lanes to worlds with the same contact classes. Calls `swap` for each pair of lanes that exchange worlds.
+    ///
+    /// A world that is in the range of its kind already stays there.
+    pub fn group(&mut self, mut swap: impl FnMut(usize, usize)) {
+        if !std::mem::take(&mut self.changed) {
+            return;
+        }
+        let mut ends = [0; KINDS];
+        for &touches in &self.touches {
+            ends[usize::from(touches)] += 1;
+        }
+        // the next lane of each kind to examine
+        let mut next = [0; KINDS];
+        let mut lanes = 0;
+        for (next, end) in next.iter_mut().zip(&mut ends) {
+            *next = lanes;
+            lanes += *end;
+            *end = lanes;
+        }
+        for kind in 0..KINDS {
+            while next[kind] < ends[kind] {
+                let lane = next[kind];
+                let own = usize::from(self.touches[self.world[lane]]);
+                if own == kind {
+                    next[kind] += 1;
+                    continue;
+                }
+                // there is one, since each kind has as many lanes as worlds
+                while usize::from(self.touches[self.world[next[own]]]) == own {
+                    next[own] += 1;
+                }
+                let other = next[own];
+                self.world.swap(lane, other);
+                self.lane[self.world[lane]] = lane;
+                self.lane[self.world[other]] = other;
+                swap(lane, other);
+            }
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! A control frame of a chunk: all substeps of a block in cache, then its outputs.
+
+use super::chunk::{Chunk, Job};
+use super::contacts;
+use super::transfer::{self, Arena};
+use sim_physics::arrays::{Field, Slot, Source};
+use sim_physics::lane::Lane;
+
+/// Whether the field is a counter that a chunk keeps per world, outside of the state.
+fn is_counter(field: Field) -> bool {
+    field.row().source == Source::Counter
+}
+
+impl<F: Lane> Chunk<F> {
+    /// Runs all substeps of every block and writes its outputs.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `F`; the arena holds the job's layout.
+    #[inline(always)]
+    pub unsafe fn run(&mut self, job: &Job<F>, substeps: usize, arena: Arena) {
+        let shape = job.shape;
+        let stride = shape.total() * F::WIDTH;
+        self.frames += u64::from(substeps > 0);
+        for block in 0..self.worlds.len().div_ceil(F::WIDTH) {
+            let state = block * stride..(block + 1) * stride;
+            self.load(state.clone());
+            if substeps > 0 {
+                self.draw_command_noise(job, block);
+            }
+            for pass in 0..=substeps {
+                let evaluates = pass == substeps;
+                if evaluates {
+                    if substeps > 0 {
+                        self.note_faults(job, block, state.clone());
+                        self.age_commands(job, block, state.clone());
+                        // outputs are a function of the state: the noise of the next frame is not drawn yet
+                        self.block.command_noise.fill(F::c(0.0));
+                    }
+                    // before the evaluation, which changes the warm start: reading outputs must not change the run
+                    self.store(shape, state.clone());
+                }
+                let stages = if evaluates {
+                    &job.evaluate[..]
+                } else {
+                    &job.step[..]
+                };
+                for stage in stages {
+                    // SAFETY: by contract the processor has the instructions of the job's stages.
+                    unsafe {
+                        job.stages[*stage](&job.constants, &mut self.block, &mut self.memory);
+                    }
+                }
+            }
+            if substeps > 0 || job.finds_contacts {
+                self.count_left_out(block);
+            }
+            if substeps > 0 {
+                self.note_contact_classes(&job.constants, block);
+            }
+            for slot in job
+                .layout
+                .slots
+                .iter()
+                .filter(|slot| !is_counter(slot.field))
+            {
+                // SAFETY: the arena holds the layout, and these worlds are this chunk's alone.
+                unsafe {
+                    if let Source::Contacts(_) = slot.field.row().source {
+                        contacts::export(self, job, slot, block, arena);
+                    } else {
+                        transfer::export(self, &job.constants, slot, block, arena);
+                    }
+                    if let Some(noise) = job.noise.of(slot.field) {
+                        for lane in self.lanes_of(block) {
+                            let world = self.assignment.world(lane);
+                            self.add_noise(
+                                job,
+                                noise,
+                                world,
+                                arena.row(slot, self.worlds.start + world),
+                            );
+                        }
+                    }
+                }
+            }
+        }
+        for slot in job
+            .layout
+            .slots
+            .iter()
+            .filter(|slot| is_counter(slot.field))
+        {
+            // SAFETY: as above.
+            unsafe { self.put_counter(job, slot, arena) };
+        }
+        if substeps > 0 {
+            // after the fault was shown, before the commands of the next frame arrive
+            if job.faults.resets {
+                self.reset_frozen(job);
+            }
+            self.regroup(job);
+        }
+    }
+
+    /// Writes a counter of every world.
+    ///
+    /// # Safety
+    /// The arena holds the slot.
+    unsafe fn put_counter(&self, job: &Job<F>, slot: &Slot, arena: Arena) {
+        let (first, all) = (self.worlds.start, self.worlds.clone());
+        // SAFETY: these worlds are this chunk's alone; the rest by contract.
+        unsafe {
+            match slot.field {
+                Field::Time => arena.put(slot, all, |w| self.steps[w - first] as f64 * job.frame_s),
+                Field::Step => arena.put(slot, all, |w| self.steps[w - first]),
+                Field::Status => arena.put(slot, all, |w| self.status[w - first]),
+                _ => arena.put(slot, all, |w| self.left_out[w - first]),
+            }
+        }
+    }
+}

@@ -1,0 +1,258 @@
+//! The backend itself: what a group of worlds keeps on a GPU, and how each request is carried out.
+
+use super::compiled::Compiled;
+use super::imported::Imported;
+use super::mirror::HostMirror;
+use super::places::Places;
+use super::tile::Tile;
+use super::uploads::Rows;
+use crate::backend::noise::Noise;
+use crate::backend::{
+    Backend, BackendError, Faults, FirstFrozen, Frozen, Input, ProgramInfo, Values,
+};
+use crate::random::Numbering;
+use crate::start::StartDraw;
+use sim_device::{Buffer, Device, Staging};
+use sim_physics::arrays::Array;
+use sim_physics::arrays::{Layout, status};
+use sim_physics::constants::Constants;
+use std::ops::Range;
+use std::sync::OnceLock;
+
+/// The backend of one group of worlds. Field order matters: batches are dropped before buffers and programs, and those before the device.
+pub(super) struct Gpu {
+    pub tiles: Vec<Tile>,
+    pub compiled: Compiled,
+    /// The frame in host memory.
+    pub frame: Staging,
+    /// The frame in device memory, where that is separate.
+    pub drawn: Option<Buffer>,
+    /// Whether the driver imports the memory of readers.
+    pub imports: bool,
+    /// Imported memory, by address.
+    pub imported: Vec<(usize, Imported)>,
+    pub device: Device,
+    pub constants: Constants<f32>,
+    pub layout: Layout,
+    pub places: Places,
+    /// The place of each value of a world's record.
+    pub record: Vec<u32>,
+    pub start: Vec<f32>,
+    pub draw: StartDraw,
+    pub numbering: Numbering,
+    pub noise: Noise,
+    pub faults: Faults,
+    pub mirror: HostMirror,
+    pub name: String,
+    pub lost: OnceLock<BackendError>,
+    pub copied: u64,
+}
+
+impl Gpu {
+    /// Keeps the first error: nothing is computed after it.
+    fn check(&self, result: Result<(), BackendError>) {
+        if let Err(error) = result {
+            self.lost.get_or_init(|| error);
+        }
+    }
+
+    /// Stages a command of all worlds for the next frame; false if these columns are no whole command.
+    fn stage(&mut self, input: Input, columns: &Range<usize>, values: &[f32]) -> bool {
+        let mut staged = true;
+        for tile in &mut self.tiles {
+            staged &= tile.stage(input, columns, values);
+        }
+        staged
+    }
+}
+
+impl Backend for Gpu {
+    fn device(&self) -> &str {
+        &self.name
+    }
+
+    fn threads(&self) -> usize {
+        1
+    }
+
+    fn programs(&self) -> &[ProgramInfo] {
+        &self.compiled.info
+    }
+
+    fn set_faults(&mut self, faults: Faults) {
+        self.faults = faults;
+        let bounds = [faults.joint_q_max, faults.joint_qd_max].map(|x| (x as f32).to_bits());
+        for tile in &self.tiles {
+            tile.set_bounds(bounds);
+        }
+    }
+
+    fn freeze_others(&mut self, good: &[bool]) {
+        let is_well = |world: &usize| self.mirror.status[*world] & status::FROZEN == 0;
+        let bad: Vec<usize> = (0..good.len())
+            .filter(|&w| !good[w])
+            .filter(is_well)
+            .collect();
+        for &world in &bad {
+            self.mirror.frozen.count(FirstFrozen {
+                frame: self.mirror.frames,
+                world,
+                steps: self.mirror.steps[world],
+                is_finite: false,
+            });
+            self.mirror.status[world] = status::NOT_FINITE;
+        }
+        let sent = self.send(&bad, Rows::Counters, 2, 1, |_, to| {
+            to[0] = status::NOT_FINITE
+        });
+        self.check(sent);
+    }
+
+    fn write(
+        &mut self,
+        input: Input,
+        columns: Range<usize>,
+        values: Values<'_>,
+        mask: Option<&[bool]>,
+    ) {
+        let (group, columns_of_group) = input.place(&self.constants, columns.clone());
+        if let (None, Values::F32(values)) = (mask, values)
+            && self.stage(input, &columns, values)
+        {
+            if group == Array::Params {
+                self.mirror.set_params(&columns_of_group, values);
+            }
+            return;
+        }
+        // commands that wait must not arrive after this array
+        let sent = self.flush();
+        self.check(sent);
+        let written = self.write_columns(group, &columns_of_group, values, mask);
+        self.check(written);
+    }
+
+    fn params(&self, columns: Range<usize>, to: &mut [f64]) {
+        let n = columns.len();
+        for (world, row) in to.chunks_exact_mut(n.max(1)).enumerate() {
+            for (x, from) in row
+                .iter_mut()
+                .zip(&self.mirror.params(world)[columns.clone()])
+            {
+                *x = f64::from(*from);
+            }
+        }
+    }
+
+    fn numbers(&self) -> usize {
+        self.shape().total()
+    }
+
+    fn save(&self, records: &mut [u8]) {
+        self.check(self.save_records(records));
+    }
+
+    fn restore(&mut self, records: &[u8], mask: Option<&[bool]>, from_world: Option<usize>) {
+        let restored = self.restore_records(records, mask, from_world);
+        self.check(restored);
+    }
+
+    fn reset(&mut self, mask: Option<&[bool]>, seeds: Option<&[u64]>) {
+        let sent = self.flush();
+        self.check(sent);
+        let worlds = self.selected(mask);
+        for &world in &worlds {
+            self.mirror.steps[world] = 0;
+            match seeds {
+                Some(seeds) => {
+                    self.mirror.seeds[world] = if let [seed] = seeds {
+                        *seed
+                    } else {
+                        seeds[world]
+                    };
+                    self.mirror.episodes[world] = 0;
+                }
+                None => self.mirror.episodes[world] = self.mirror.episodes[world].wrapping_add(1),
+            }
+        }
+        let begun = self.begin(&worlds);
+        self.check(begun);
+    }
+
+    fn take_frozen(&mut self) -> Frozen {
+        let mut all = std::mem::take(&mut self.mirror.frozen);
+        if all.first.is_some() {
+            let frozen = |status: &&u32| **status & status::FROZEN != 0;
+            all.now = self.mirror.status.iter().filter(frozen).count();
+        }
+        all
+    }
+
+    fn run(&mut self, substeps: usize, arena: &mut [u64]) {
+        assert!(
+            arena.len() * 8 >= self.layout.bytes,
+            "the arena is smaller than the layout"
+        );
+        if self.lost.get().is_none() {
+            let run = self.run_frame(substeps > 0, arena);
+            self.check(run);
+        }
+        if self.lost.get().is_some() {
+            self.show_lost(arena);
+        }
+    }
+
+    fn lost(&self) -> Option<&BackendError> {
+        self.lost.get()
+    }
+
+    fn lose(&mut self) {
+        self.device.lose();
+    }
+
+    fn adapter(&self) -> &str {
+        &self.device.info().name
+    }
+
+    fn delivery(&self) -> &'static str {
+        if self.imports { "imported" } else { "copied" }
+    }
+
+    fn copied(&self) -> u64 {
+        self.copied
+    }
+
+    fn forget(&mut self) {
+        self.imported.clear();
+    }
+
+    unsafe fn import(&mut self, arena: &mut [u64]) -> bool {
+        let place = arena.as_mut_ptr() as usize;
+        if self.imported.iter().any(|(known, _)| *known == place) {
+            return true;
+        }
+        if !self.imports {
+            return false;
+        }
+        // SAFETY: by contract.
+        let imported = unsafe {
+            Imported::new(
+                &self.device,
+                &self.compiled,
+                &self.tiles,
+                arena,
+                self.layout.bytes,
+                self.drawn.as_ref(),
+            )
+        };
+        match imported {
+            Ok(imported) => {
+                self.imported.push((place, imported));
+                true
+            }
+            Err(_) => {
+                self.imports = false;
+                false
+            }
+        }
+    }
+}

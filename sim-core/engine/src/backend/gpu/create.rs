@@ -1,0 +1,180 @@
+//! Creates the backend of each group: records and compiles the programs, allocates the tiles, and starts the worlds.
+
+use super::backend::Gpu;
+use super::compiled::{Compiled, OutputSources};
+use super::mirror::HostMirror;
+use super::places::Places;
+use super::programs::Programs;
+use super::show;
+use super::sizing::{self, check_frame, check_memory};
+use super::software;
+use super::tile::Tile;
+use crate::backend::noise::Noise;
+use crate::backend::state::{Shape, finds_contacts, start};
+use crate::backend::{Backend, BackendError, Backends, Faults, Groups};
+use crate::random::Numbering;
+use crate::start::StartDraw;
+use sim_device::{AdapterKind, Choice, Device, Replay};
+use sim_model::Model;
+use sim_physics::arrays::Array;
+use sim_physics::arrays::{Field, Layout};
+use sim_physics::constants::Constants;
+use sim_physics::schedule::evaluation_stages;
+use sim_record::split::Limits;
+use std::path::Path;
+use std::sync::OnceLock;
+use std::time::Duration;
+
+/// Limits of kernels for hardware GPUs: few kernels, so that values stay in registers. A guess, not measured.
+const HARDWARE: Limits = Limits {
+    kernel: 40_000,
+    repeated: usize::MAX,
+    dispatch: 0,
+};
+
+/// What a caller asks of a GPU, besides a model and its worlds.
+pub struct Wanted<'a> {
+    /// The adapter.
+    pub adapter: &'a Choice,
+    /// Folder of compiled programs, if any.
+    pub cache: Option<&'a Path>,
+    /// Whether the batches of a frame are recorded or encoded.
+    pub replay: Replay,
+    /// Limit on the compile time of a program.
+    pub compile_limit: Duration,
+}
+
+/// Worlds of a group.
+#[derive(Clone, Copy)]
+struct Part {
+    worlds: usize,
+    numbering: Numbering,
+    /// Groups that are still to be created, this one included: there must be memory for all.
+    coming: usize,
+}
+
+/// One backend per group on the chosen adapter, each with a device of its own, so that none waits for another's batch.
+///
+/// # Errors
+/// No such adapter, out of memory, a driver that cannot compile the programs.
+pub fn create(
+    model: &Model,
+    groups: Groups,
+    layout: &Layout,
+    wanted: &Wanted<'_>,
+) -> Result<Backends, BackendError> {
+    let parts = groups.numberings().zip((1..=groups.count).rev());
+    let made = parts.map(
+        |(numbering, coming)| -> Result<Box<dyn Backend>, BackendError> {
+            let part = Part {
+                worlds: groups.worlds,
+                numbering,
+                coming,
+            };
+            Ok(Box::new(Gpu::new(model, part, layout, wanted)?))
+        },
+    );
+    made.collect()
+}
+
+impl Gpu {
+    fn new(
+        model: &Model,
+        part: Part,
+        layout: &Layout,
+        asked: &Wanted<'_>,
+    ) -> Result<Gpu, BackendError> {
+        let Part {
+            worlds,
+            numbering,
+            coming,
+        } = part;
+        let limit = asked.compile_limit;
+        let device = Device::open(asked.adapter, asked.cache)?;
+        check_frame(&device, layout.bytes as u64)?;
+        let constants: Constants<f32> = model.constants().cast();
+        let m = &constants;
+        let computed: Vec<(Field, usize)> = (layout.slots.iter())
+            .filter(|slot| show::is_computed(slot.field) && slot.bytes > 0)
+            .map(|slot| (slot.field, slot.shape[1..].iter().product()))
+            .collect();
+        let mut places = Places::new(m, &computed);
+        let fields = layout.slots.iter().map(|slot| slot.field);
+        let shown = evaluation_stages(m, fields.clone());
+        let wanted: Vec<Array> = fields.flat_map(show::copied).collect();
+        let limits = software::limits(device.info()).unwrap_or(HARDWARE);
+        let substeps = model.substeps();
+        let programs = Programs::new(m, &places, substeps, &shown, &computed, &wanted, limits)
+            .map_err(|e| BackendError::Program {
+                reason: e.to_string(),
+            })?;
+        places.len += programs.spare;
+        let sensors = model.contact_sensors();
+        let shapes = sensors.first().map_or(0, |sensor| sensor.of.len());
+        let frame_s = model.substeps() as f64 * model.dt();
+        let outputs = OutputSources {
+            counters: show::counters(layout, frame_s),
+            contacts: show::contacts(m, &places, layout, shapes),
+        };
+        let widest = sizing::widest(&device, m, &places, worlds);
+        let tiles = (worlds as u64).div_ceil(u64::from(widest));
+        let needed = tiles * sizing::memory(m, &places, widest) + 2 * layout.bytes as u64;
+        check_memory(&device, coming * worlds, coming as u64 * needed)?;
+        let mut compiled = Compiled::new(&device, m, &places, &programs, outputs, widest, limit)?;
+        compiled.replay = asked.replay;
+        let frame = device.staging("frame", layout.bytes.max(64) as u64)?;
+        let drawn = match device.info().kind {
+            AdapterKind::Discrete => Some(device.buffer("frame", layout.bytes.max(64) as u64)?),
+            _ => None,
+        };
+        let pairs = sizing::pairs(m, sensors);
+        let runs = show::runs(m, &places, layout);
+        let finds_contacts = finds_contacts(&shown);
+        let target = drawn.as_ref().unwrap_or(&frame);
+        let mut tiles = Vec::new();
+        for first in (0..worlds).step_by(widest as usize) {
+            let part = first..(first + widest as usize).min(worlds);
+            let tile = Tile::new(&device, m, &places, &compiled, part, widest, &runs, &pairs)?;
+            tiles.push(tile);
+        }
+        for tile in &mut tiles {
+            tile.record(&device, &compiled, finds_contacts, target)?;
+        }
+        if let Some(last) = tiles.last_mut()
+            && let Some(drawn) = &drawn
+        {
+            last.copy_out(&device, drawn, &frame, layout.bytes as u64)?;
+        }
+        let shape = Shape::of(m);
+        let mut gpu = Gpu {
+            tiles,
+            compiled,
+            frame,
+            drawn,
+            imports: device.info().imports,
+            imported: Vec::new(),
+            name: format!("gpu ({}, {})", device.info().name, device.info().driver),
+            device,
+            record: places.record(shape),
+            start: start(model),
+            draw: StartDraw::new(model),
+            numbering,
+            noise: Noise::new(model),
+            faults: Faults::default(),
+            mirror: HostMirror::new(worlds, m.varying.len()),
+            layout: layout.clone(),
+            places,
+            constants,
+            lost: OnceLock::new(),
+            copied: 0,
+        };
+        // padding lanes run along from the scene's start
+        let all: Vec<usize> = (0..worlds).collect();
+        gpu.mirror
+            .fill_params(&gpu.start[shape.start(Array::Params)..]);
+        let padding = gpu.start.clone();
+        gpu.pad(&padding)?;
+        gpu.begin(&all)?;
+        Ok(gpu)
+    }
+}

@@ -1,0 +1,90 @@
+//! Sizes: worlds of a tile, memory of a tile, and what an adapter cannot hold.
+
+use super::places::Places;
+use super::software;
+use super::uploads;
+use super::workgroups::BOOKKEEPING;
+use crate::backend::{BackendError, available_memory};
+use sim_device::{AdapterKind, Device};
+use sim_model::SensedShapes;
+use sim_physics::constants::Constants;
+
+const MB: u64 = 1 << 20;
+
+/// Worlds of a tile: as many as its largest buffer can bind, at most all. Tiles are equally wide.
+pub(super) fn widest(device: &Device, m: &Constants<f32>, places: &Places, worlds: usize) -> u32 {
+    let numbers = (places.len as u64).max(m.contacts.memory.len as u64).max(4);
+    let fit = (device.info().binding_max.min(u64::from(u32::MAX)) / (4 * numbers)).max(1);
+    let tiles = (worlds as u64).div_ceil(fit);
+    let width = (worlds as u64).div_ceil(tiles);
+    width
+        .next_multiple_of(u64::from(BOOKKEEPING))
+        .min(u64::from(u32::MAX)) as u32
+}
+
+/// Memory of a tile, staging buffers included [bytes].
+pub(super) fn memory(m: &Constants<f32>, places: &Places, width: u32) -> u64 {
+    let state = u64::from(places.state);
+    // fields, contacts and counters; state and counters for the host, rows from it with their worlds, commands
+    let numbers = u64::from(places.len) + m.contacts.memory.len as u64 + 4;
+    let host = (state + 4)
+        + (state + 1)
+        + uploads::commands(m)
+            .map(|(_, columns)| columns as u64)
+            .sum::<u64>();
+    4 * (numbers + host) * u64::from(width)
+}
+
+/// Shapes and links of each pair, then the flags of each sensor and shape, as `show::contacts` reads them.
+pub(super) fn pairs(m: &Constants<f32>, sensors: &[SensedShapes]) -> Vec<[i32; 4]> {
+    let link = |link: Option<usize>| link.map_or(-1, |link| link as i32);
+    let pairs = m.contacts.pairs.iter().map(|pair| {
+        let [a, b] = pair.shapes;
+        [a as i32, b as i32, link(pair.links[0]), link(pair.links[1])]
+    });
+    let sensed = sensors.iter().flat_map(|sensor| {
+        let both = sensor.of.iter().zip(&sensor.against);
+        both.map(|(of, against)| [i32::from(*of) | i32::from(*against) << 1, 0, 0, 0])
+    });
+    pairs.chain(sensed).collect()
+}
+
+/// Refuses a frame that no program can bind as a whole.
+pub(super) fn check_frame(device: &Device, bytes: u64) -> Result<(), BackendError> {
+    let most = device.info().binding_max;
+    if bytes > most {
+        let (bytes, most) = (bytes.div_ceil(MB), most / MB);
+        return Err(BackendError::DeviceMemory {
+            reason: format!(
+                "a frame is {bytes} MB, and this adapter shows a program {most} MB of it; ask for fewer worlds or fields"
+            ),
+        });
+    }
+    Ok(())
+}
+
+/// Refuses worlds that do not fit into the adapter's memory, before any is allocated. Where the adapter shares the computer's memory,
+/// the free part of it counts.
+pub(super) fn check_memory(
+    device: &Device,
+    worlds: usize,
+    needed: u64,
+) -> Result<(), BackendError> {
+    let info = device.info();
+    let available = match info.kind {
+        _ if software::is_software(info) => software::memory(),
+        AdapterKind::Integrated => info.memory.into_iter().chain(available_memory()).min(),
+        _ => info.memory,
+    };
+    let Some(available) = available else {
+        return Ok(());
+    };
+    match needed > available {
+        true => Err(BackendError::Memory {
+            worlds,
+            needed_mb: needed / MB,
+            available_mb: available / MB,
+        }),
+        false => Ok(()),
+    }
+}

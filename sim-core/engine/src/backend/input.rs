@@ -1,0 +1,120 @@
+//! Arrays that a caller sets: the one road of states, commands and parameters into a backend.
+
+use super::Precision;
+use super::state::array_of;
+use sim_physics::arrays::Array;
+use sim_physics::arrays::{Field, Group};
+use sim_physics::constants::Constants;
+use sim_physics::constants::params::Param;
+use sim_physics::lane::Real;
+use std::ops::Range;
+
+/// An array that a caller sets: part of the state, a command, or a parameter that varies between worlds.
+///
+/// Commands are `joint_f`, `joint_target_q`, `joint_target_qd` and, where the run has it, `body_f`. The first three act with the
+/// world's command delay. `body_f` is a load: a parameter that acts at once and that a reset clears.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Input {
+    /// A field of the group [`Group::State`] or [`Group::Command`].
+    Field(Field),
+    /// A parameter.
+    Param(Param),
+}
+
+impl From<Field> for Input {
+    fn from(field: Field) -> Input {
+        Input::Field(field)
+    }
+}
+
+impl From<Param> for Input {
+    fn from(param: Param) -> Input {
+        Input::Param(param)
+    }
+}
+
+impl Input {
+    /// The command of a name.
+    pub fn command(name: &str) -> Option<Input> {
+        Input::named(name).filter(|input| input.is_command())
+    }
+
+    /// The array of a name; it may be an output field.
+    pub fn named(name: &str) -> Option<Input> {
+        let param = Param::named(name).map(Input::Param);
+        param.or_else(|| Field::named(name).map(Input::Field))
+    }
+
+    /// Name of the array.
+    pub fn name(self) -> &'static str {
+        match self {
+            Input::Field(field) => field.row().name,
+            Input::Param(param) => param.row().name,
+        }
+    }
+
+    /// Whether it is a command: it holds until it is set again or the world is reset.
+    pub fn is_command(self) -> bool {
+        match self {
+            Input::Field(field) => field.row().group == Group::Command,
+            Input::Param(param) => param.is_load(),
+        }
+    }
+
+    /// The group of the state vector that holds the array, and the columns in it.
+    pub(in crate::backend) fn place<R: Real>(
+        self,
+        m: &Constants<R>,
+        columns: Range<usize>,
+    ) -> (Array, Range<usize>) {
+        match self {
+            Input::Field(field) => (array_of(field), columns),
+            Input::Param(param) => {
+                let first = m.varying.first(param).expect("a parameter that varies");
+                (Array::Params, first + columns.start..first + columns.end)
+            }
+        }
+    }
+}
+
+/// World-major values from a caller, in either precision.
+#[derive(Clone, Copy, Debug)]
+pub enum Values<'a> {
+    /// Single precision.
+    F32(&'a [f32]),
+    /// Double precision.
+    F64(&'a [f64]),
+}
+
+impl Values<'_> {
+    /// Number of values.
+    pub fn len(&self) -> usize {
+        match self {
+            Values::F32(v) => v.len(),
+            Values::F64(v) => v.len(),
+        }
+    }
+
+    /// Whether there are no values.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The value at a place.
+    pub fn at(&self, place: usize) -> f64 {
+        match self {
+            Values::F32(v) => f64::from(v[place]),
+            Values::F64(v) => v[place],
+        }
+    }
+
+    /// The first of a part that is not finite in a precision, counted from the first of all.
+    pub fn first_not_finite(&self, part: Range<usize>, precision: Precision) -> Option<usize> {
+        let first = part.start;
+        let place = match self {
+            Values::F32(v) => v[part].iter().position(|x| !x.is_finite()),
+            Values::F64(v) => (v[part].iter()).position(|&x| !precision.round(x).is_finite()),
+        };
+        place.map(|place| first + place)
+    }
+}

@@ -1,0 +1,53 @@
+//! Records physics code.
+
+use crate::error::RecordError;
+use crate::handles::Recorded;
+use crate::recorder::Recorder;
+use crate::recording::Recording;
+use crate::tree::Operand;
+use crate::{dead_code, loop_fusion, state};
+use std::panic::Location;
+
+/// Records physics code with so many scalar inputs. What the code returns are the outputs, in order.
+///
+/// # Errors
+/// The first [`Misuse`], with its location in the code.
+#[track_caller]
+pub fn record(
+    inputs: usize,
+    text: impl FnOnce(&mut Recorder, &[Recorded]) -> Vec<Recorded>,
+) -> Result<Recording, RecordError> {
+    let place = Location::caller();
+    let session = state::Session::start(place);
+    let given: Vec<Recorded> = state::with(place, |s| {
+        (0..inputs)
+            .map(|i| {
+                let input = s.input(i as u32);
+                s.handle(input)
+            })
+            .collect()
+    });
+    let results = text(&mut Recorder::new(), &given);
+    let (outputs, mut body) = state::with(place, |s| {
+        let outputs: Vec<Operand> = results.iter().map(|x| s.see(*x)).collect();
+        (outputs, s.leave(0))
+    });
+    let mut state = session.finish();
+    if let Some(error) = state.take_error() {
+        return Err(error);
+    }
+    dead_code::prune(&state.values, &mut body, &outputs, place)?;
+    let mut values = state.values.iter().map(|v| v.op).collect();
+    let mut names = state.counters().names as usize;
+    loop_fusion::fuse(&mut body, &mut values, &mut names);
+    let mut recording = Recording {
+        inputs,
+        outputs,
+        names,
+        values,
+        scratch: 0,
+        body,
+    };
+    recording.scratch = recording.reach();
+    Ok(recording)
+}

@@ -1,0 +1,212 @@
+//! Live ranges of values and variables, and the cheapest cuts between statements for them.
+
+use super::cost::{self, Cost};
+use super::items::{Item, Piece, bases, cost_of, uses_of};
+use crate::recording::Recording;
+use crate::tree::{Operand, Statement};
+use crate::uses::{Use, computed};
+use std::ops::Range;
+
+/// Live ranges, in the order of all items.
+pub(super) struct LiveRanges<'a> {
+    recording: &'a Recording,
+    runs: &'a [Piece],
+    /// Index of each run's first item.
+    first: Vec<usize>,
+    /// The item that computes a value, and the last one that uses it.
+    made: Vec<usize>,
+    last: Vec<usize>,
+    /// The items that name a variable or a list, in order.
+    named: Vec<Vec<Named>>,
+}
+
+/// An item names a variable or a list.
+#[derive(Clone, Copy)]
+struct Named {
+    at: usize,
+    /// Does what it was before not matter?
+    starts: bool,
+    changes: bool,
+}
+
+/// What the choice of cuts needs of an item.
+struct ItemSummary {
+    cost: Cost,
+    /// Values that it uses, and those that it computes for later ones.
+    uses: Vec<u32>,
+    lasting: Vec<u32>,
+    names: Vec<(u32, Named)>,
+}
+
+const NEVER: usize = usize::MAX;
+
+/// Everything that an item names.
+fn names_of(item: &Item, at: usize, recording: &Recording) -> Vec<(u32, Named)> {
+    let assigns = matches!(item, Item::Run(Statement::Set { .. }));
+    let mut names: Vec<(u32, Named)> = Vec::new();
+    uses_of(item, &recording.values, &mut |used| {
+        let (name, starts, changes) = match used {
+            Use::Read(name) => (name, false, false),
+            Use::Change(name) => (name, assigns, true),
+            Use::Start(name) => (name, true, true),
+            Use::Value(_) | Use::Index(_) => return,
+        };
+        match names.iter_mut().find(|(other, _)| *other == name) {
+            Some((_, named)) => named.changes |= changes,
+            None => names.push((
+                name,
+                Named {
+                    at,
+                    starts,
+                    changes,
+                },
+            )),
+        }
+    });
+    names
+}
+
+impl<'a> LiveRanges<'a> {
+    pub(super) fn new(recording: &'a Recording, runs: &'a [Piece]) -> LiveRanges<'a> {
+        let values = &recording.values;
+        let mut ranges = LiveRanges {
+            recording,
+            runs,
+            first: Vec::new(),
+            made: vec![0; values.len()],
+            last: vec![0; values.len()],
+            named: vec![Vec::new(); recording.names],
+        };
+        let mut at = 1;
+        for run in runs {
+            ranges.first.push(at);
+            for item in &run.items {
+                if let Item::Run(statement) = item {
+                    computed(std::slice::from_ref(statement), &mut |number| {
+                        ranges.made[number as usize] = at;
+                    });
+                }
+                let last = &mut ranges.last;
+                uses_of(item, values, &mut |used| {
+                    if let Use::Value(number) = used {
+                        bases(number, values, &mut |base| last[base as usize] = at);
+                    }
+                });
+                for (name, named) in names_of(item, at, recording) {
+                    ranges.named[name as usize].push(named);
+                }
+                at += 1;
+            }
+        }
+        for x in &recording.outputs {
+            if let Operand::Value(number) = x {
+                let last = &mut ranges.last;
+                bases(*number, values, &mut |base| last[base as usize] = NEVER);
+            }
+        }
+        ranges
+    }
+
+    /// Is a variable or a list used after an item of a run, before it starts anew?
+    fn is_used_after(&self, name: u32, at: usize, run: &Piece) -> bool {
+        let named = &self.named[name as usize];
+        match named.get(named.partition_point(|n| n.at <= at)) {
+            Some(next) => !next.starts,
+            // perhaps in the next iteration
+            None => !run.regions.is_empty() && named.iter().any(|n| !n.starts),
+        }
+    }
+
+    fn summary(&self, item: &Item, at: usize) -> ItemSummary {
+        let values = &self.recording.values;
+        let (mut uses, mut lasting) = (Vec::new(), Vec::new());
+        // entering or leaving a region writes a scalar
+        let mut cost = cost::WRITTEN_QUAD;
+        if let Item::Run(statement) = item {
+            cost = cost_of(statement, values);
+            computed(std::slice::from_ref(statement), &mut |x| {
+                if self.last[x as usize] > at {
+                    lasting.push(x);
+                }
+            });
+        }
+        uses_of(item, values, &mut |used| {
+            if let Use::Value(x) = used {
+                bases(x, values, &mut |base| uses.push(base));
+            }
+        });
+        uses.sort_unstable();
+        uses.dedup();
+        ItemSummary {
+            cost,
+            uses,
+            lasting,
+            names: names_of(item, at, self.recording),
+        }
+    }
+
+    /// The cheapest cuts of a run into pieces of at most `most`, each of which costs `price` beside its statements.
+    pub(super) fn partition(&self, run: usize, most: usize, price: usize) -> Vec<Range<usize>> {
+        let (first, run) = (self.first[run], &self.runs[run]);
+        let n = run.items.len();
+        if n == 0 {
+            return std::iter::once(0..0).collect();
+        }
+        let items = run.items.iter().zip(first..);
+        let summaries: Vec<ItemSummary> = items.map(|(item, at)| self.summary(item, at)).collect();
+        // cheapest[j]: of the first j items, with where the last of their pieces starts
+        let mut cheapest = vec![(usize::MAX, 0); n + 1];
+        cheapest[0].0 = 0;
+        let mut is_read = vec![NEVER; self.recording.values.len()];
+        // the piece that met a name last; whether it changed it; whether it is used after the piece
+        let mut met = vec![(NEVER, false, false); self.recording.names];
+        for i in 0..n {
+            let mut body = Cost::default();
+            let (mut reads, mut lasting, mut kept) = (0, 0, 0);
+            for (j, item) in summaries.iter().enumerate().skip(i) {
+                let at = first + j;
+                body += item.cost;
+                for x in &item.uses {
+                    let x = *x as usize;
+                    if self.made[x] < first + i {
+                        reads += usize::from(is_read[x] != i);
+                        is_read[x] = i;
+                    } else if self.last[x] == at && self.made[x] < at {
+                        lasting -= 1;
+                    }
+                }
+                lasting += item.lasting.len();
+                for (name, named) in &item.names {
+                    let met = &mut met[*name as usize];
+                    if met.0 != i {
+                        *met = (i, false, false);
+                        reads += usize::from(!named.starts);
+                    }
+                    kept -= usize::from(met.2);
+                    met.1 |= named.changes;
+                    met.2 = met.1 && self.is_used_after(*name, at, run);
+                    kept += usize::from(met.2);
+                }
+                let given = body + cost::QUAD.of_numbers(reads);
+                let left = cost::WRITTEN_QUAD.of_numbers(lasting + kept);
+                if cost::KERNEL + given.total() > most && j > i {
+                    break;
+                }
+                let size = cost::KERNEL + (given + left).total();
+                let cost = cheapest[i].0.saturating_add(size + price);
+                if (size <= most || j == i) && cost < cheapest[j + 1].0 {
+                    cheapest[j + 1] = (cost, i);
+                }
+            }
+        }
+        let mut ranges = Vec::new();
+        let mut end = n;
+        while end > 0 {
+            let start = cheapest[end].1;
+            ranges.push(start..end);
+            end = start;
+        }
+        ranges.reverse();
+        ranges
+    }
+}

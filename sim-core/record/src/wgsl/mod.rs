@@ -1,0 +1,369 @@
+//! Prints a recording as a WGSL compute shader: one world per thread, one `let` per value.
+//!
+//! Memory is a structure of arrays with the world innermost, so that neighbouring threads touch
+//! neighbouring scalars. The number of worlds and the size of a workgroup are constants of the
+//! pipeline (`worlds`, `workgroup`): the source depends on neither.
+//!
+//! Memory comes in vectors of four scalars, since a driver's compile time grows with the accesses: scalar n of a world is component n % 4
+//! of vector `(n / 4) * worlds + world`. The last vector is read and written whole, but a scalar that the kernel does not write keeps
+//! its bits. A binding is declared only where it is used:
+//!
+//! | binding | content |
+//! |---|---|
+//! | 0 | fields: input i is scalar `inputs[i]` |
+//! | 1 | rows in scratch memory: scalar k of row r of a table is scalar `base + r * stride + k` |
+//! | 2 | scalars of the model's tables, the same for every world: `numbers[base + r * stride + k]` |
+//! | 3 | indices of the model's tables |
+//!
+//! Tables are buffers, not constants, so that a program does not grow with its model's tables.
+//!
+//! WGSL lets an implementation fuse a product with a sum, flush values below 2^-126 to 0, and assume that nothing is infinite or NaN. An
+//! infinite constant is therefore printed as the largest finite one of its sign. The recorder refuses NaN constants.
+
+mod expression;
+
+use crate::recording::Recording;
+use crate::tree::{Bounds, Op, Operand, Statement};
+use crate::vectorize::WIDTH;
+use expression::{COMPONENTS, Expressions, index, scratch, vector};
+use std::collections::BTreeMap;
+use std::fmt::{self, Write};
+
+/// Name of a program, and the fields of its inputs and outputs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ProgramOptions {
+    /// Name of the entry point.
+    pub entry: String,
+    /// Threads of a workgroup, unless the pipeline overrides `workgroup`.
+    pub workgroup: u32,
+    /// Field of each input; none: 0, 1, 2, …
+    pub inputs: Option<Vec<u32>>,
+    /// Field of each output; none: the fields after the inputs'. It may be that of an input: all
+    /// inputs are read before any output is written.
+    pub outputs: Option<Vec<u32>>,
+    /// Fields: a world for which one of them is not 0 is skipped.
+    pub unless: Vec<u32>,
+    /// Whether a thread takes its world from a list. Binding 4 holds workgroups, 1, 1 and the number of worlds, binding 5 the list.
+    pub is_listed: bool,
+}
+
+impl ProgramOptions {
+    /// The field of each input and of each output.
+    ///
+    /// # Panics
+    /// If `inputs` or `outputs` does not give a field for each of the recording's.
+    pub fn fields(&self, recording: &Recording) -> (Vec<u32>, Vec<u32>) {
+        let n = recording.inputs() as u32;
+        let fields = |given: &Option<Vec<u32>>, first: u32, count: usize| {
+            let fields = given
+                .clone()
+                .unwrap_or_else(|| (first..first + count as u32).collect());
+            assert_eq!(
+                fields.len(),
+                count,
+                "a field for each input and output of the recording"
+            );
+            fields
+        };
+        (
+            fields(&self.inputs, 0, recording.inputs()),
+            fields(&self.outputs, n, recording.outputs()),
+        )
+    }
+}
+
+impl Default for ProgramOptions {
+    fn default() -> ProgramOptions {
+        ProgramOptions {
+            entry: "main".to_owned(),
+            workgroup: 32,
+            inputs: None,
+            outputs: None,
+            unless: Vec::new(),
+            is_listed: false,
+        }
+    }
+}
+
+/// The recording as WGSL.
+///
+/// # Panics
+/// If `inputs` or `outputs` does not give a field for each of the recording's.
+pub fn wgsl(recording: &Recording, options: &ProgramOptions) -> String {
+    let (inputs, outputs) = options.fields(recording);
+    let recording = &recording.vectorized();
+    let mut printer = Printer {
+        recording,
+        expressions: Expressions {
+            recording,
+            single: recording.single_parts(),
+        },
+        text: String::new(),
+        indent: 1,
+    };
+    printer
+        .program(options, &inputs, &outputs)
+        .expect("writing to a string does not fail");
+    printer.text
+}
+
+struct Printer<'a> {
+    recording: &'a Recording,
+    expressions: Expressions<'a>,
+    text: String,
+    indent: usize,
+}
+
+/// Writes one line, indented.
+macro_rules! line {
+    ($printer:ident, $($arg:tt)*) => {{
+        for _ in 0..$printer.indent {
+            $printer.text.push_str("    ");
+        }
+        writeln!($printer.text, $($arg)*)
+    }};
+}
+
+impl Printer<'_> {
+    fn program(
+        &mut self,
+        options: &ProgramOptions,
+        inputs: &[u32],
+        outputs: &[u32],
+    ) -> fmt::Result {
+        writeln!(self.text, "override worlds: u32;")?;
+        writeln!(
+            self.text,
+            "override workgroup: u32 = {}u;",
+            options.workgroup
+        )?;
+        writeln!(
+            self.text,
+            "@group(0) @binding(0) var<storage, read_write> fields: array<vec4<f32>>;"
+        )?;
+        if self.recording.scratch() > 0 {
+            writeln!(
+                self.text,
+                "@group(0) @binding(1) var<storage, read_write> scratch: array<vec4<f32>>;"
+            )?;
+        }
+        let (numbers, indices) = self.recording.reads_tables();
+        if numbers {
+            writeln!(
+                self.text,
+                "@group(0) @binding(2) var<storage, read> numbers: array<f32>;"
+            )?;
+        }
+        if indices {
+            writeln!(
+                self.text,
+                "@group(0) @binding(3) var<storage, read> indices: array<u32>;"
+            )?;
+        }
+        if options.is_listed {
+            writeln!(
+                self.text,
+                "@group(0) @binding(4) var<storage, read> left: array<u32>;\n\
+                 @group(0) @binding(5) var<storage, read> list: array<u32>;"
+            )?;
+        }
+        writeln!(self.text, "\n@compute @workgroup_size(workgroup)")?;
+        writeln!(
+            self.text,
+            "fn {}(@builtin(global_invocation_id) thread: vec3<u32>) {{",
+            options.entry
+        )?;
+        if options.is_listed {
+            line!(self, "if (thread.x >= left[3]) {{ return; }}")?;
+            line!(self, "let world = list[thread.x];")?;
+        } else {
+            line!(self, "let world = thread.x;")?;
+            line!(self, "if (world >= worlds) {{ return; }}")?;
+        }
+        for field in &options.unless {
+            let (quad, part) = place_of_field(*field);
+            line!(
+                self,
+                "if (fields[{quad}u * worlds + world].{part} != 0.0f) {{ return; }}"
+            )?;
+        }
+        let read = self.inputs(inputs)?;
+        self.block(&self.recording.body)?;
+        self.outputs(inputs, outputs, &read)?;
+        writeln!(self.text, "}}")
+    }
+
+    /// Reads the live inputs, vector by vector; returns the vectors that are read whole.
+    fn inputs(&mut self, inputs: &[u32]) -> Result<Vec<u32>, fmt::Error> {
+        let mut quads: BTreeMap<u32, Vec<(u32, char)>> = BTreeMap::new();
+        for i in self.recording.live_inputs() {
+            let (quad, part) = place_of_field(inputs[i as usize]);
+            quads.entry(quad).or_default().push((i, part));
+        }
+        let mut whole = Vec::new();
+        for (quad, numbers) in quads {
+            if let [(i, part)] = numbers[..] {
+                line!(self, "let x{i} = fields[{quad}u * worlds + world].{part};")?;
+                continue;
+            }
+            line!(self, "let q{quad} = fields[{quad}u * worlds + world];")?;
+            for (i, part) in numbers {
+                line!(self, "let x{i} = q{quad}.{part};")?;
+            }
+            whole.push(quad);
+        }
+        Ok(whole)
+    }
+
+    /// Writes the outputs, vector by vector; one that is an input in its own field is there already.
+    fn outputs(&mut self, inputs: &[u32], outputs: &[u32], read: &[u32]) -> fmt::Result {
+        let mut quads: BTreeMap<u32, [Option<String>; WIDTH]> = BTreeMap::new();
+        for (x, field) in self.recording.outputs.iter().zip(outputs) {
+            let stays = match *x {
+                Operand::Value(number) => inputs.get(number as usize) == Some(field),
+                _ => false,
+            };
+            if !stays {
+                let place = *field as usize % WIDTH;
+                quads.entry(field / WIDTH as u32).or_default()[place] =
+                    Some(self.expressions.operand(*x));
+            }
+        }
+        for (quad, mut numbers) in quads {
+            let place = format!("fields[{quad}u * worlds + world]");
+            let count = numbers.iter().flatten().count();
+            let mut is_read = read.contains(&quad);
+            if count + 1 == WIDTH && !is_read {
+                line!(self, "let q{quad} = {place};")?;
+                is_read = true;
+            }
+            if count > 1 && is_read {
+                for (number, part) in numbers.iter_mut().zip(COMPONENTS) {
+                    number.get_or_insert_with(|| format!("q{quad}.{part}"));
+                }
+            }
+            self.write(&place, &numbers)?;
+        }
+        Ok(())
+    }
+
+    /// Writes the given components of a vector.
+    fn write(&mut self, place: &str, numbers: &[Option<String>; WIDTH]) -> fmt::Result {
+        if let [Some(x), Some(y), Some(z), Some(w)] = numbers {
+            return line!(self, "{place} = vec4<f32>({x}, {y}, {z}, {w});");
+        }
+        for (number, part) in numbers.iter().zip(COMPONENTS) {
+            if let Some(x) = number {
+                line!(self, "{place}.{part} = {x};")?;
+            }
+        }
+        Ok(())
+    }
+
+    fn block(&mut self, body: &[Statement]) -> fmt::Result {
+        for statement in body {
+            self.statement(statement)?;
+        }
+        Ok(())
+    }
+
+    fn nested(&mut self, body: &[Statement]) -> fmt::Result {
+        self.indent += 1;
+        self.block(body)?;
+        self.indent -= 1;
+        line!(self, "}}")
+    }
+
+    /// v: variable, n: rows of a list, i: index of a loop or fresh row, t: value, x: input.
+    fn statement(&mut self, statement: &Statement) -> fmt::Result {
+        match statement {
+            Statement::Let(number) => {
+                let op = self.recording.values[*number as usize];
+                if op.is_inline() {
+                    return Ok(());
+                }
+                if let (Op::Quad(quad), Some(part)) = (op, self.expressions.single.get(number)) {
+                    let part = COMPONENTS[*part];
+                    return line!(self, "let t{number} = {}.{part};", vector(&quad));
+                }
+                line!(self, "let t{number} = {};", self.expressions.op(op))
+            }
+            Statement::Var { name, value } => {
+                line!(self, "var v{name} = {};", self.expressions.operand(*value))
+            }
+            Statement::Set { name, value } => {
+                line!(self, "v{name} = {};", self.expressions.operand(*value))
+            }
+            Statement::Store { cell, value } => {
+                line!(
+                    self,
+                    "{} = {};",
+                    scratch(cell),
+                    self.expressions.operand(*value)
+                )
+            }
+            Statement::StoreQuad { quad, numbers } => {
+                let numbers = numbers.map(|x| x.map(|x| self.expressions.operand(x)));
+                self.write(&vector(quad), &numbers)
+            }
+            Statement::List { name, rows } => match rows.constant() {
+                Some(rows) => line!(self, "var n{name} = {}u;", rows as u32),
+                None => line!(
+                    self,
+                    "var n{name} = u32({});",
+                    self.expressions.operand(*rows)
+                ),
+            },
+            Statement::When { mask, body } => {
+                line!(self, "if ({}) {{", self.expressions.operand(*mask))?;
+                self.nested(body)
+            }
+            Statement::Push {
+                list,
+                capacity,
+                row,
+                mask,
+                body,
+            } => {
+                line!(self, "if ({}) {{", self.expressions.operand(*mask))?;
+                self.indent += 1;
+                if !body.is_empty() {
+                    line!(self, "let i{row} = n{list};")?;
+                }
+                line!(self, "n{list} = n{list} + 1u;")?;
+                if !body.is_empty() {
+                    line!(self, "if (i{row} < {capacity}u) {{")?;
+                    self.nested(body)?;
+                }
+                self.indent -= 1;
+                line!(self, "}}")
+            }
+            Statement::Loop {
+                index: i,
+                bounds,
+                body,
+            } => {
+                let (first, end) = match *bounds {
+                    Bounds::Span { first, end } => (index(first), index(end)),
+                    Bounds::Rows { list, capacity } => {
+                        line!(self, "let end{i} = min(n{list}, {capacity}u);")?;
+                        ("0u".to_owned(), format!("end{i}"))
+                    }
+                };
+                line!(self, "for (var i{i} = {first}; i{i} < {end}; i{i}++) {{")?;
+                self.nested(body)
+            }
+            Statement::Stop(mask) => line!(
+                self,
+                "if ({}) {{ break; }}",
+                self.expressions.operand(*mask)
+            ),
+        }
+    }
+}
+
+/// The vector that a field lies in, and its component.
+fn place_of_field(field: u32) -> (u32, char) {
+    let width = WIDTH as u32;
+    (field / width, COMPONENTS[(field % width) as usize])
+}

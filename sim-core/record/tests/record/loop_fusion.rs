@@ -1,0 +1,171 @@
+//! Loops that become one, and variables that stay with a kernel: the same bits.
+
+use crate::{accepted, c, toy};
+use sim_physics::lane::{Cx, Num, Table, Tables};
+use sim_physics::{each, times, when};
+use sim_record::split::{Limits, split};
+use sim_record::wgsl::{ProgramOptions, wgsl};
+use sim_record::{Recorded, Recorder, Recording, record};
+
+/// Rows of three lists, then how many each has.
+const ROWS: Table = Table {
+    base: 0,
+    stride: 2,
+    rows: 9,
+};
+const COUNTS: Table = Table {
+    base: 20,
+    stride: 1,
+    rows: 3,
+};
+const NUMBERS: usize = 23;
+
+fn list(cx: &mut Recorder, k: usize) -> <Recorder as Cx>::List {
+    let (at, first, capacity) = (cx.at(k), cx.at(3 * k), cx.at(3));
+    cx.kept(COUNTS, at, first, capacity)
+}
+
+/// Goes over three lists; `own` is what the body of one has of its own.
+fn over_lists(own: impl Fn(usize) -> f64) -> Recording {
+    accepted(|cx, x| {
+        let mut sum = cx.var(x[0]);
+        for k in 0..3 {
+            let rows = list(cx, k);
+            each!(cx, r in rows, {
+                let (a, b) = (cx.load(ROWS, r, 0), cx.load(ROWS, r, 1));
+                cx.fill(ROWS, r, 1, a * b + x[1]);
+                // no sum of three that is rounded alike in any order
+                let more = (cx.get(&sum) * c(1.1) + a).sqrt() + c(own(k));
+                cx.set(&mut sum, more);
+            });
+        }
+        vec![cx.get(&sum)]
+    })
+}
+
+fn loops(recording: &Recording) -> usize {
+    let text = wgsl(recording, &ProgramOptions::default());
+    toy::validated(&text);
+    text.matches("for (").count()
+}
+
+#[test]
+fn loops_of_one_body_over_several_lists_are_one_loop() {
+    let (joined, apart) = (over_lists(|_| 0.5), over_lists(|k| 0.5 + k as f64));
+    assert_eq!((loops(&joined), loops(&apart)), (1, 3));
+    let memory = |counts: [f32; 3]| -> Vec<f32> {
+        let mut numbers: Vec<f32> = (0..NUMBERS).map(|i| 0.3 + i as f32).collect();
+        numbers[COUNTS.base..].copy_from_slice(&counts);
+        numbers
+    };
+    for counts in [
+        [0.0, 0.0, 0.0],
+        [2.0, 0.0, 3.0],
+        [0.0, 1.0, 0.0],
+        [3.0, 3.0, 3.0],
+        [9.0, 1.0, 2.0],
+    ] {
+        // by hand, in the order of the code
+        let mut expected = memory(counts);
+        let mut sum = 0.7f32;
+        for (k, count) in counts.into_iter().enumerate() {
+            for r in 3 * k..3 * k + count.min(3.0) as usize {
+                let (a, b) = (expected[2 * r], expected[2 * r + 1]);
+                expected[2 * r + 1] = a * b + 0.2;
+                sum = (sum * 1.1 + a).sqrt() + 0.5;
+            }
+        }
+        let mut got = memory(counts);
+        let result = joined.evaluate(&[0.7, 0.2], &mut got, &Tables::default());
+        assert_eq!(result[0].to_bits(), sum.to_bits(), "{counts:?}");
+        assert_eq!(got, expected, "{counts:?}");
+    }
+}
+
+/// Rounds in which a variable is set and read under one mask, and added to in between.
+fn masked(reads_always: bool) -> Recording {
+    let text = |cx: &mut Recorder, x: &[Recorded]| {
+        let mut own = cx.var(x[0]);
+        let mut sum = cx.var(x[1]);
+        let rows = list(cx, 0);
+        times!(cx, round in 4, {
+            let at = cx.number(round);
+            let mask = at.lt(x[2]);
+            when!(cx, mask, { cx.set(&mut own, at) });
+            each!(cx, r in rows, {
+                let more = cx.get(&own) + cx.load(ROWS, r, 0);
+                cx.set(&mut own, more);
+            });
+            let read = |cx: &mut Recorder, sum: &mut _| {
+                let more: Recorded = cx.get(&own) * c(0.5) + cx.get(sum);
+                cx.set(sum, more);
+            };
+            if reads_always {
+                read(cx, &mut sum);
+            } else {
+                when!(cx, mask, { read(cx, &mut sum) });
+            }
+        });
+        vec![cx.get(&sum)]
+    };
+    record(3, text).expect("a correct text is recorded")
+}
+
+#[test]
+fn a_variable_that_is_read_only_where_it_was_set_does_not_cross_iterations() {
+    let options = ProgramOptions::default();
+    let limits = Limits {
+        kernel: 10_000,
+        repeated: 1,
+        dispatch: 0,
+    };
+    let mut read = Vec::new();
+    for reads_always in [false, true] {
+        let recording = masked(reads_always);
+        let parts = split(&recording, &options, limits, 4);
+        let inputs = parts
+            .kernels
+            .iter()
+            .flat_map(|kernel| &kernel.options().inputs);
+        read.push(inputs.map(Vec::len).sum::<usize>());
+        for masked in [0.0, 1.0, 2.0, 5.0] {
+            let mut memory: Vec<f32> = (0..NUMBERS).map(|i| 0.3 + i as f32).collect();
+            memory[COUNTS.base] = 2.0;
+            let inputs = [0.1, 0.2, masked];
+            let expected = recording.evaluate(&inputs, &mut memory.clone(), &Tables::default());
+            let got = parts.evaluate(&inputs, &mut memory, &Tables::default());
+            assert_eq!(
+                got[0].to_bits(),
+                expected[0].to_bits(),
+                "{reads_always}, {masked}"
+            );
+        }
+    }
+    assert!(read[0] < read[1], "{read:?}");
+}
+
+#[test]
+fn equal_texts_are_equal_kernels_and_those_of_a_loop_find_their_worlds_in_a_list() {
+    let cut = || {
+        let limits = Limits {
+            kernel: 300,
+            repeated: 1,
+            dispatch: 0,
+        };
+        let parts = split(&masked(true), &ProgramOptions::default(), limits, 4);
+        let texts: Vec<String> = parts.kernels.iter().map(|kernel| kernel.wgsl()).collect();
+        texts
+    };
+    let first = cut();
+    first.iter().for_each(|text| {
+        toy::validated(text);
+    });
+    assert!(
+        first
+            .iter()
+            .any(|text| text.contains("let world = list[thread.x];"))
+    );
+    for _ in 0..5 {
+        assert_eq!(cut(), first);
+    }
+}
