@@ -1,7 +1,10 @@
-//! How a number of a scene varies from world to world, and from reset to reset.
+//! Distributions that a reset draws values from.
 
-use super::checks::{not_negative, within};
-use super::error::ModelError;
+use std::collections::BTreeMap;
+
+use crate::error::ModelError;
+use crate::value_checks::{not_negative, within};
+use sim_physics::constants::params::Param;
 
 /// Largest offset [rad, m, rad/s or m/s]: a draw of it stays within f32, and within what a scene can hold.
 const OFFSET_MAX: f64 = 1e6;
@@ -16,7 +19,7 @@ pub enum Distribution {
         /// Upper end.
         high: f64,
     },
-    /// Gauss's.
+    /// The normal distribution.
     Normal {
         /// Its mean.
         mean: f64,
@@ -26,8 +29,8 @@ pub enum Distribution {
 }
 
 impl Distribution {
-    /// Are all its draws 0?
-    pub(super) fn is_always_0(&self) -> bool {
+    /// Whether all its draws are 0.
+    pub(crate) fn is_always_0(&self) -> bool {
         let numbers = match *self {
             Distribution::Uniform { low, high } => [low, high],
             Distribution::Normal { mean, std } => [mean, std],
@@ -62,3 +65,10 @@ impl Distribution {
         }
     }
 }
+
+/// What the numbers of parameters are drawn from, by the names of what they are of.
+///
+/// A name is a robot's or body's for all that it has, `robot/joint`, `robot/joint.part`, `robot/link`, or a shape's as
+/// [`crate::Description::shape_names`] has it; of gravity `x`, `y`, `z`; empty where a parameter has one number. Of several names of
+/// a number the most special one holds.
+pub type ParamRanges = BTreeMap<Param, BTreeMap<String, Distribution>>;

@@ -318,7 +318,7 @@ pub enum ModelError {
     )]
     SingularMass,
 
-    /// A joint made by hand whose lists do not fit its kind.
+    /// A joint built by code, with lists that do not fit its kind.
     #[error(
         "{what}: a {kind:?} joint has {coords} positions in `q` and {dofs} dofs in `dofs`; make it with Joint::new"
     )]
@@ -326,7 +326,7 @@ pub enum ModelError {
         /// The joint.
         what: String,
         /// Its kind.
-        kind: super::JointKind,
+        kind: crate::joint_kind::JointKind,
         /// Positions that it has.
         coords: usize,
         /// Dofs that it has.
@@ -449,7 +449,7 @@ pub enum ModelError {
 const LISTED_MAX: usize = 8;
 
 /// The first few names in quotes, joined by commas; `none` where there are none.
-pub(super) fn first_few(names: &[impl AsRef<str>]) -> String {
+pub(crate) fn first_few(names: &[impl AsRef<str>]) -> String {
     if names.is_empty() {
         return "none".to_owned();
     }

@@ -1,6 +1,6 @@
 //! Convex hulls as the narrow phase reads them: rows of the model's tables.
 
-use super::geometry::{Face, Hull};
+use crate::geometry::{Face, Hull};
 use sim_physics::constants::hull::{CORNERS_MAX, HullTables};
 use sim_physics::lane::{Fixed, Tables};
 

@@ -1,12 +1,22 @@
-//! Principal moments of inertia: their signs, and the triangle inequality that every body's obey.
+//! Mass properties: principal moments, the triangle inequality that every body obeys, and bodies merged into one.
 
-use super::description::{Inertial, Robot};
-use super::pose::Pose;
+use crate::pose::Pose;
 
 /// Roundings of an eigenvalue, relative to the largest; published figures err by more than this or not at all.
 const ROUNDING: f64 = 1e-12;
 /// What is smaller is zero [kg·m²]: exporters leave such dust in tensors that should be 0. MuJoCo's mjMINVAL.
 const DUST: f64 = 1e-15;
+
+/// Mass properties of a link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inertial {
+    /// Mass [kg].
+    pub mass: f64,
+    /// Centre of mass in the link frame [m].
+    pub pos: [f64; 3],
+    /// Inertia about the centre of mass, in link axes. `(3, 3)` [kg·m²]
+    pub inertia: [[f64; 3]; 3],
+}
 
 /// Eigenvalues of a symmetric tensor `(3, 3)`, ascending, by cyclic Jacobi rotations [as the tensor].
 ///
@@ -41,19 +51,19 @@ pub fn principal_moments(tensor: [[f64; 3]; 3]) -> [f64; 3] {
 }
 
 /// The lowest principal moment if it is negative beyond rounding.
-pub(super) fn negative_moment(inertia: [[f64; 3]; 3]) -> Option<f64> {
+pub(crate) fn negative_moment(inertia: [[f64; 3]; 3]) -> Option<f64> {
     let [low, _, high] = principal_moments(inertia);
     (low < -(ROUNDING * high.abs()).max(DUST)).then_some(low)
 }
 
 /// Largest principal moment over the sum of the others, if above 1 beyond rounding.
-pub(super) fn triangle_excess(inertia: [[f64; 3]; 3]) -> Option<f64> {
+pub(crate) fn triangle_excess(inertia: [[f64; 3]; 3]) -> Option<f64> {
     let [a, b, c] = principal_moments(inertia);
     (c - (a + b) > (ROUNDING * c).max(DUST)).then(|| c / (a + b))
 }
 
 /// Two bodies that are fixed to each other as one; `other` is given in the frame `pose` of the first.
-pub(super) fn merge(body: &Inertial, pose: &Pose, other: &Inertial) -> Inertial {
+pub(crate) fn merge(body: &Inertial, pose: &Pose, other: &Inertial) -> Inertial {
     let mass = body.mass + other.mass;
     let other_pos = pose.transform(other.pos);
     let pos: [f64; 3] = if mass > 0.0 {
@@ -78,37 +88,4 @@ pub(super) fn merge(body: &Inertial, pose: &Pose, other: &Inertial) -> Inertial 
         }
     }
     Inertial { mass, pos, inertia }
-}
-
-impl Robot {
-    /// Replaces each inertia whose principal moments break A + B >= C by a sphere's of the same trace, as MuJoCo's
-    /// `balanceinertia` does, notes link and ratio, and warns of all of them together.
-    pub fn balance_inertias(&mut self) {
-        let mut balanced = Vec::new();
-        for link in &mut self.links {
-            let Some(inertial) = &mut link.inertial else {
-                continue;
-            };
-            if negative_moment(inertial.inertia).is_some() {
-                continue; // an error, which validate() reports
-            }
-            if let Some(ratio) = triangle_excess(inertial.inertia) {
-                let mean = (0..3).map(|i| inertial.inertia[i][i]).sum::<f64>() / 3.0;
-                inertial.inertia = [[mean, 0.0, 0.0], [0.0, mean, 0.0], [0.0, 0.0, mean]];
-                self.notes.push(format!(
-                    "link `{}`: its largest principal moment of inertia was {ratio:.4} times the sum of the other two, which no body \
-                     can have; all three are now their mean, {mean:e} kg·m²",
-                    link.name
-                ));
-                balanced.push(format!("`{}` ({ratio:.4})", link.name));
-            }
-        }
-        if !balanced.is_empty() {
-            self.warnings.push(format!(
-                "principal moments of inertia break A + B >= C and were balanced, as MuJoCo does, at the links (largest over the \
-                 sum of the others): {}; mend <inertia> there, or refuse such files by strict=True",
-                balanced.join(", ")
-            ));
-        }
-    }
 }

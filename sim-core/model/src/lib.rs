@@ -1,43 +1,49 @@
-//! From a robot description to a frozen model.
+//! From a robot description to a model that is ready to run.
 //!
-//! `Description` is named, f64 and editable; it is checked, then compiled.
+//! A [`Description`] is named, f64 and editable. It is checked, then compiled to a [`Model`], which is sorted and immutable.
+//!
+//! Modules import only those before them (`tests/tidy.rs` checks it):
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | `joint_kind`, `error`, `pose` | motions of joints, what can be wrong, frames |
+//! | `value_checks` | checks of one name or one value |
+//! | `inertia`, `geometry` | mass properties; shapes, meshes, convex hulls |
+//! | `distribution`, `surface` | what values are drawn from; how shapes touch |
+//! | `description` | scene, robots, joints, and what is named in them |
+//! | `validate` | checks of a description |
+//! | `urdf`, `rigid_body` | robots from files; bodies of one link |
+//! | `hull_tables`, `model` | the kernel source's tables of hulls; the result |
+//! | `compile` | from a description to a model |
 
-mod body;
-mod checks;
 mod compile;
 mod description;
 mod distribution;
 mod error;
-mod frozen;
 pub mod geometry;
 pub mod hull_tables;
 mod inertia;
-mod inverse_weight;
-mod pairs;
-mod paths;
+mod joint_kind;
+mod model;
 mod pose;
-mod ranges;
-mod robot;
-mod rows;
-mod shapes;
-mod sites;
+mod rigid_body;
 mod surface;
-mod touching;
-mod tree;
 mod urdf;
 mod validate;
+mod value_checks;
 
-pub use body::Body;
 pub use description::{
-    Collision, ContactSensor, Description, Inertial, Joint, JointDof, JointKind, Link, Mimic,
-    Robot, Shape, Site, Solver, StaticShape, TargetMode,
+    Collision, ContactSensor, Description, Joint, JointDof, Link, Mimic, ParamDraw, Robot, Site,
+    Solver, StaticShape, TargetMode,
 };
-pub use distribution::Distribution;
+pub use distribution::{Distribution, ParamRanges};
 pub use error::ModelError;
-pub use frozen::{Model, RobotRange, SensedShapes, Start};
-pub use inertia::principal_moments;
+pub use geometry::Shape;
+pub use inertia::{Inertial, principal_moments};
+pub use joint_kind::JointKind;
+pub use model::{Model, RobotRange, SensedShapes, Start};
 pub use pose::Pose;
-pub use ranges::{ParamDraw, ParamRanges};
+pub use rigid_body::Body;
 pub use sim_physics::constants::contact::Cone;
 pub use surface::Surface;
 pub use urdf::{Look, UrdfOptions, Visual, Visuals};

@@ -1,7 +1,7 @@
 //! Position and orientation of a frame, in f64.
 
 /// How far a quaternion's length may be from 1: figures rounded to two digits, such as 0.7 or 0.71, pass.
-pub(super) const QUAT_SLACK: f64 = 0.02;
+pub(crate) const QUAT_SLACK: f64 = 0.02;
 
 /// A frame in its parent's frame: `x_parent = R x + pos`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -153,8 +153,8 @@ impl Pose {
 
     /// The same pose with a quaternion of length 1.
     ///
-    /// One whose length is off by more than [`QUAT_SLACK`] stays as it is: it is no rounding but a slip, which
-    /// `validate` refuses.
+    /// A quaternion with a larger length error than [`QUAT_SLACK`] stays as it is: that is a mistake, not rounding, and
+    /// `validate` refuses it.
     pub fn normalized(&self) -> Pose {
         let length = self.quat_length();
         let error = (length - 1.0).abs();

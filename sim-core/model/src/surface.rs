@@ -1,15 +1,14 @@
 //! How a shape touches: its surface, and which groups of shapes touch each other.
 
-use super::checks::{in_range, not_negative, positive, within};
-use super::error::ModelError;
+use crate::error::ModelError;
+use crate::value_checks::{in_range, not_negative, positive, within};
 
 /// Largest stiffness, damping and friction, each in its unit: products of three stay within f32.
 const FACTOR_MAX: f64 = 1e12;
 /// Largest margin and gap [m]: f32 keeps a tenth of a metre there.
 const LENGTH_MAX: f64 = 1e6;
 
-/// What a shape is like where it touches another; of two shapes, margins and gaps are added and the other values combined
-/// as MuJoCo does.
+/// Contact parameters of a shape. Margins and gaps of two shapes are added; the other values are combined as MuJoCo does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
     /// Coefficient of sliding friction; the larger of two shapes counts [–].
@@ -22,7 +21,7 @@ pub struct Surface {
     pub kf: f64,
     /// How near another shape must be for a force to act, at most [m].
     pub margin: f64,
-    /// How much farther out contacts are listed, without a force [m].
+    /// Extra distance at which contacts are listed without a force [m].
     pub gap: f64,
     /// Directions in which a contact acts: 1 along the normal alone, 3 with sliding friction; the larger of two shapes counts.
     pub condim: usize,
@@ -56,8 +55,8 @@ impl Surface {
         }
     }
 
-    /// Refuses what no contact can have; `what` is the shape.
-    pub(super) fn validate(&self, what: &str) -> Result<(), ModelError> {
+    /// Refuses values that no contact can have; `what` names the shape.
+    pub(crate) fn validate(&self, what: &str) -> Result<(), ModelError> {
         let rule = "give at most 1e12";
         let mu = format!("{what}: mu");
         not_negative(&mu, self.mu)?;

@@ -1,19 +1,20 @@
-//! Mass, centre and inertia of shapes of one density, in f64.
+//! Mass, centre of mass and inertia of shapes with uniform density, in f64.
 //!
 //! Primitives by their closed forms. Meshes by the exact integrals over the tetrahedra between their triangles and a point,
 //!
 //!     ∫ dV = v = a·(b × c) / 6      ∫ x dV = v s / 4,  s = a + b + c      ∫ x xᵀ dV = v (a aᵀ + b bᵀ + c cᵀ + s sᵀ) / 20
 //!
-//! signed, so that cavities count as what they are.
+//! signed, so that cavities subtract.
 
 use std::f64::consts::PI;
 
+use super::shape::Shape;
 use super::trimesh::TriMesh;
 use super::vector::{add, cross, dot, scale, sub};
-use crate::description::{Inertial, Shape};
 use crate::error::ModelError;
+use crate::inertia::Inertial;
 
-/// Density of a link whose file gives no mass, water's, as in MuJoCo and Newton [kg/m³].
+/// Density of a link without a mass in its file [kg/m³]: that of water, as in MuJoCo and Newton.
 pub const DENSITY: f64 = 1000.0;
 
 /// Mass properties of a shape of this density [kg/m³], in the shape's frame.

@@ -1,4 +1,4 @@
-//! A mesh of a scene: what a file holds, scaled, and what bodies are made of it.
+//! A mesh of a scene: the triangles of a file, scaled, and the convex hulls that contacts use.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use super::trimesh::TriMesh;
 use super::vector::size;
 use crate::error::ModelError;
 
-/// Smallest size of a mesh [m]: below a micrometre a scale is wrong.
+/// Smallest size of a mesh [m]: a scale is wrong below a micrometre.
 const SIZE_MIN: f64 = 1e-6;
 /// Largest size of a mesh [m]: above it a unit is wrong, and inertias lose their meaning.
 const SIZE_MAX: f64 = 1e6;
@@ -23,10 +23,10 @@ const CONVEX: f64 = 1e-3;
 const NOTED_ERROR: f64 = 1e-3;
 /// The same, relative to the size [–].
 const NOTED_SHARE: f64 = 0.01;
-/// Bounds of `max_hull_vertices`: a box needs 8; contacts of more than some hundred cost more than they tell.
+/// Bounds of `max_hull_vertices`: a box needs 8; more than a few hundred slow contacts down for little accuracy.
 const HULL_VERTICES: std::ops::RangeInclusive<usize> = 8..=1024;
 
-/// How meshes become shapes that contacts can be found with.
+/// How meshes become convex hulls for contacts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshOptions {
     /// Most vertices of a convex hull, 8 to 1024.

@@ -1,6 +1,6 @@
-//! What shapes are made of: mesh files, mass properties, convex hulls, triangles for a picture.
+//! Shapes and what derives from them: mesh files, mass properties, convex hulls, triangles for a picture.
 //!
-//! Everything is f64 and happens when a description is made; `step/` knows nothing of it.
+//! Everything is f64 and happens when a description is made, never in a step.
 
 mod hull;
 mod load;
@@ -8,6 +8,7 @@ mod mass;
 mod mesh;
 mod parry;
 mod polytope;
+mod shape;
 mod tessellate;
 mod trimesh;
 mod vector;
@@ -17,5 +18,6 @@ pub use load::{FILE_MAX, TRIANGLES_MAX};
 pub use mass::{DENSITY, mass_properties};
 pub use mesh::{Mesh, MeshOptions};
 pub use polytope::NoHull;
+pub use shape::Shape;
 pub use tessellate::triangles;
 pub use trimesh::TriMesh;

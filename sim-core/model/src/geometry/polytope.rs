@@ -1,21 +1,21 @@
-//! Triangles around points: parry3d's hull of all, or of the few that stand out most.
+//! Triangles around points: parry3d's hull of all of them, or of the few farthest out.
 
 use super::parry;
 use super::vector::{
     Vector, add, area_vector, cross, dot, extent, longest, norm, scale, size, sub, unit,
 };
 
-/// Extent across the others below which points count as one place, a line or a flat sheet, relative to the largest.
+/// Points with less extent than this, relative to the largest extent, count as one point, a line or a flat sheet.
 const FLAT: f64 = 1e-7;
-/// Work that is spent on finding points that a thinned cloud lacks [points times triangles]: a second.
+/// Most work on points that a thinned cloud lacks [points times triangles]: a second.
 const REFINE_MAX: usize = 1 << 28;
-/// Rounds of that: each leaves a small share of the error.
+/// Most iterations of that search; each leaves a small share of the error.
 const ROUNDS: usize = 8;
-/// Most points whose hull is taken: its time can grow with their square, 0.1 s here.
+/// Most points of a hull: its time can grow with their square, 0.1 s here.
 const POINTS_MAX: usize = 4096;
-/// Directions along an edge of a cube around larger clouds: the farthest point in each of 6 times its square is kept.
+/// Directions along each edge of a cube around larger clouds; the farthest point in each of the 6 × 22² directions is kept.
 const DIRECTIONS: usize = 22;
-/// How near to the hull a point is left out where vertices are counted, relative to the size.
+/// Points nearer to the hull than this are left out where the number of vertices is limited, relative to the size.
 const TOLERANCE: f64 = 1e-6;
 
 /// Why points have no hull.

@@ -2,16 +2,16 @@
 
 use std::f64::consts::{PI, TAU};
 
+use super::shape::Shape;
 use super::trimesh::TriMesh;
-use crate::description::Shape;
 
 /// Corners of a circle: the picture of a ball is within 0.3% of its radius.
 const AROUND: usize = 48;
 
 /// The surface of a shape in its own frame, counter-clockwise from outside [m].
 ///
-/// Round shapes are inscribed polyhedra with 48 corners a turn; a mesh is as its file has it; of a plane it is a square of
-/// 2 m around the origin.
+/// Round shapes are inscribed polyhedra with 48 corners per circle. A mesh keeps the triangles of its file. A plane is a
+/// square of 2 m around the origin.
 pub fn triangles(shape: &Shape) -> TriMesh {
     match shape {
         Shape::Plane => TriMesh {

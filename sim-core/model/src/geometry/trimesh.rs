@@ -1,10 +1,10 @@
-//! Triangles with shared vertices: joined, turned outward, and told apart into solids and mere surfaces.
+//! Triangles with shared vertices: joined, oriented outward, and sorted into solids and open surfaces.
 
 use std::collections::HashMap;
 
 use super::vector::{Vector, area_vector, cross, dot, norm, sub};
 
-/// Work spent on finding which shells are cavities [triangles looked at]: a second or two.
+/// Most work on finding which shells are cavities [triangles visited]: a second or two.
 const CAVITY_WORK_MAX: usize = 1 << 27;
 
 /// Triangles with shared vertices, counter-clockwise from outside where they have one.
@@ -96,9 +96,9 @@ impl TriMesh {
 
     /// Turns the shells of a closed mesh outward, cavities inward.
     ///
-    /// A file whose solid is inside out as a whole is turned over. After that a shell that is inside out is a cavity if
-    /// the others enclose it, and a part that was written the wrong way round if not. Returns false where the shells are
-    /// too many to tell.
+    /// A solid that is inside out as a whole is turned over. Then a shell that is inside out is a cavity if the others
+    /// enclose it; if not, its triangles were written in the wrong order. Returns false if there are too many shells to
+    /// decide.
     pub(super) fn turn_outward(&mut self) -> bool {
         if self.signed_volume() < 0.0 {
             self.turn_over();

@@ -1,4 +1,4 @@
-//! Arithmetic of points in f64, without fused operations: a result is the same on every machine, and fast on those
+//! Arithmetic of points in f64, without fused operations: results are the same on every processor, and fast on those
 //! where a fused operation would be a library call.
 
 /// A point or direction.

@@ -1,16 +1,16 @@
-//! Joints of a URDF file: axes, limits, dynamics and who follows whom.
+//! Joints of a URDF file: axes, limits, dynamics, and which joint follows which.
 
 use std::collections::HashMap;
 
 use roxmltree::Node;
 use urdf_rs::JointType;
 
-use super::reader::{Reader, pose};
+use super::reader::Reader;
 use super::scan::{children, has};
 use crate::description::{Joint, JointKind, Mimic};
 use crate::error::{ModelError, first_few};
 
-/// A range that goes this far both ways is another way to write that there is none, such as 1e16 in SDFormat [rad or m].
+/// A range this wide on both sides means no range, such as 1e16 in SDFormat [rad or m].
 const RANGE_FAR: f64 = 1e9;
 
 impl<'a, 'input> Reader<'a, 'input> {
@@ -53,7 +53,7 @@ impl<'a, 'input> Reader<'a, 'input> {
             let parent = find("parent", &joint.parent.link)?;
             let child = find("child", &joint.child.link)?;
             let mut made = Joint::new(kind, &joint.name, Some(parent), child);
-            made.origin = pose(&joint.origin);
+            made.origin = self.pose(node, &joint.origin);
             if made.moves() {
                 if !matches!(kind, JointKind::Ball | JointKind::Free) {
                     made.axis = self.axis(joint, node)?;
@@ -82,6 +82,23 @@ impl<'a, 'input> Reader<'a, 'input> {
         }
         self.mimics(urdf, &mut joints)?;
         Ok(joints)
+    }
+
+    /// urdf-rs names neither the joint nor the line of a kind it does not know.
+    pub(super) fn refuse_joint_kinds(&self) -> Result<(), ModelError> {
+        for &node in &self.scan.joints {
+            match node.attribute("type").unwrap_or_default() {
+                "revolute" | "continuous" | "prismatic" | "fixed" | "planar" | "floating"
+                | "spherical" => {}
+                kind => {
+                    let reason = format!(
+                        "type `{kind}` is unknown; use revolute, continuous, prismatic, spherical, planar, floating or fixed"
+                    );
+                    return Err(self.scan.fault(node, reason));
+                }
+            }
+        }
+        Ok(())
     }
 
     fn axis(
@@ -178,7 +195,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         Ok(())
     }
 
-    /// Followers of followers come to follow the first leader: q = o₁ + m₁ (o₂ + m₂ q_leader).
+    /// A follower of a follower gets the first leader: q = o₁ + m₁ (o₂ + m₂ q_leader).
     fn mimics(&self, urdf: &urdf_rs::Robot, joints: &mut [Joint]) -> Result<(), ModelError> {
         let index: HashMap<&str, usize> = urdf
             .joints
@@ -224,7 +241,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         }
         let mut on_chain = vec![false; joints.len()];
         for start in 0..joints.len() {
-            // down to a joint that follows none, or whose leader is known already
+            // down to a joint that follows none, or one with a known leader
             let mut chain: Vec<(usize, Mimic)> = Vec::new();
             let mut joint = start;
             while let Some(mimic) = direct[joint].filter(|_| joints[joint].mimic.is_none()) {

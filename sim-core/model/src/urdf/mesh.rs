@@ -1,4 +1,4 @@
-//! Where a mesh named in a URDF file lies.
+//! Paths of meshes in a URDF file, resolved to files.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -69,7 +69,7 @@ fn any_file(candidates: &[PathBuf]) -> bool {
     candidates.iter().any(|candidate| candidate.is_file())
 }
 
-/// A file of a package whose folder bears another name, or of a path without a package, such as `package://wheel.obj`.
+/// A file of a package in a folder with another name, or of a path without a package, such as `package://wheel.obj`.
 fn renamed(package: &str, rest: &str, folder: &Path) -> Option<Found> {
     let inside = if rest.is_empty() { package } else { rest };
     let folder = absolute(folder);
@@ -103,7 +103,7 @@ fn leaves_robot(path: &Path, folder: &Path, package_dirs: &[PathBuf]) -> bool {
     !homes.any(|home| target.starts_with(home))
 }
 
-/// The path from the root, `.` and `..` taken out as text.
+/// The absolute path, with `.` and `..` resolved as text.
 fn absolute(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
     for part in std::path::absolute(path)

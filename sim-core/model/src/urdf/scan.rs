@@ -1,25 +1,24 @@
-//! What a URDF file says and what it leaves out, before urdf-rs reads the values.
+//! One walk over the XML of a URDF file, along the table of what URDF knows.
 //!
-//! urdf-rs gives 0 for an absent `effort` and passes over unknown tags. So the XML is walked along a table of what URDF
-//! knows: presence is kept, the unknown is noted, a bad value is refused with its line, and only what the table knows is
-//! handed on as text. The walk is as deep as the table, however deep a file nests.
+//! urdf-rs reads values: it gives 0 for an absent `effort` and ignores unknown tags. So the walk keeps which attributes are
+//! present, notes what is unknown, refuses a bad value with its line, and hands on only what the table knows. It goes as
+//! deep as the table, however deep a file nests.
 
-use std::collections::{BTreeSet, HashMap};
-use std::fmt::Write as _;
+use std::borrow::Cow;
+use std::collections::HashMap;
 use std::path::Path;
 
-use roxmltree::{Document, Node};
+use roxmltree::{Document, Node, NodeId};
 
-use super::table::{Attribute, Count, GEOMETRY, Need, ORIGIN, PLACES, ROBOT, Tag};
+use super::element::Element;
+use super::ignored::Ignored;
+use super::table::{Count, GEOMETRY, Need, PLACES, ROBOT, Tag};
 use super::value;
+use super::xacro::{Xacro, is_xacro};
 pub(super) use super::xml::{children, has};
-use super::xml::{describe, escape, name_of, prefix_of, same, short};
+use super::xml::{describe, name_of, same, short};
 use crate::error::ModelError;
 
-/// Notes on ignored things: more than a person reads.
-const IGNORED_MAX: usize = 200;
-/// Most elements in a warning.
-const LISTED_MAX: usize = 8;
 /// Most links and most joints of a robot: reading them stays below a second.
 const LINKS_MAX: usize = 4096;
 /// Most collisions and most visuals of a robot, for the same reason.
@@ -37,27 +36,14 @@ pub(super) struct Scan<'a, 'input> {
     collisions: usize,
     /// Number of `<visual>` elements.
     visuals: usize,
-    /// The elements and attributes that URDF knows, as XML for urdf-rs.
-    pub text: String,
+    /// The `<robot>` with the elements and attributes that URDF knows.
+    pub robot: Element<'a>,
     /// Whether `quat_xyzw` counts: from URDF 1.1 on.
     has_quaternions: bool,
-    /// Names of the macros of xacro that the file defines.
-    macros: BTreeSet<&'a str>,
-    /// Whether there are elements of xacro.
-    has_xacro: bool,
-    /// Elements that call a macro that is not defined.
-    undefined: BTreeSet<String>,
-    ignored: Vec<Ignored>,
-    ignored_at: HashMap<String, usize>,
-    /// How often something was ignored that no longer got a note of its own.
-    ignored_more: usize,
-}
-
-struct Ignored {
-    what: String,
-    count: usize,
-    /// From the start of the text [bytes].
-    at: usize,
+    /// Roll, pitch and yaw [rad] of each `<origin>` that gives a quaternion instead.
+    angles: HashMap<NodeId, [f64; 3]>,
+    xacro: Xacro<'a>,
+    ignored: Ignored,
 }
 
 impl<'a, 'input> Scan<'a, 'input> {
@@ -74,14 +60,11 @@ impl<'a, 'input> Scan<'a, 'input> {
             joints: Vec::new(),
             collisions: 0,
             visuals: 0,
-            text: String::new(),
+            robot: Element::empty(&ROBOT),
             has_quaternions: false,
-            macros: macros(document),
-            has_xacro: false,
-            undefined: BTreeSet::new(),
-            ignored: Vec::new(),
-            ignored_at: HashMap::new(),
-            ignored_more: 0,
+            angles: HashMap::new(),
+            xacro: Xacro::new(document),
+            ignored: Ignored::default(),
         };
         if root.tag_name().name() != ROBOT.name {
             let cure = match root.tag_name().name() {
@@ -99,15 +82,15 @@ impl<'a, 'input> Scan<'a, 'input> {
             return Err(scan.fault(root, cure.to_owned()));
         }
         scan.version(root);
-        scan.walk(root, &ROBOT)?;
-        if scan.links.is_empty() && scan.has_xacro {
+        scan.robot = scan.walk(root, &ROBOT)?;
+        if scan.links.is_empty() && scan.xacro.is_used() {
             let reason = "holds elements of xacro and no links; run `xacro` on the file that uses them and load what it prints";
             return Err(scan.fault(root, reason.to_owned()));
         }
         Ok(scan)
     }
 
-    /// URDF 1.1 and 1.2 add to 1.0, which stands where no version is given.
+    /// URDF 1.1 and 1.2 add to 1.0, which holds where no version is given.
     fn version(&mut self, root: Node<'a, 'input>) {
         let Some(version) = root.attribute("version").map(str::trim) else {
             return;
@@ -119,34 +102,17 @@ impl<'a, 'input> Scan<'a, 'input> {
         }
     }
 
-    fn walk(&mut self, node: Node<'a, 'input>, tag: &'static Tag) -> Result<(), ModelError> {
-        match tag.name {
-            "link" => self.links.push(node),
-            "joint" => self.joints.push(node),
-            "collision" => self.collisions += 1,
-            "visual" => self.visuals += 1,
-            _ => {}
-        }
-        let limits = [
-            ("the number of links", self.links.len(), LINKS_MAX),
-            ("the number of joints", self.joints.len(), LINKS_MAX),
-            ("the number of collisions", self.collisions, SHAPES_MAX),
-            ("the number of visuals", self.visuals, SHAPES_MAX),
-        ];
-        if let Some((what, _, most)) = limits.iter().find(|(_, found, most)| found > most) {
-            return Err(ModelError::TooLarge {
-                path: self.path.to_owned(),
-                what,
-                limit: most.to_string(),
-            });
-        }
+    fn walk(
+        &mut self,
+        node: Node<'a, 'input>,
+        tag: &'static Tag,
+    ) -> Result<Element<'a>, ModelError> {
+        self.count(node, tag)?;
+        let mut element = Element::empty(tag);
         if tag.opaque {
-            return Ok(());
+            return Ok(element);
         }
-        self.text.push('<');
-        self.text.push_str(tag.name);
-        self.attributes(node, tag)?;
-        self.text.push('>');
+        self.attributes(node, tag, &mut element)?;
         let mut first: Vec<Option<Node>> = vec![None; tag.children.len()];
         for child in node.children().filter(Node::is_element) {
             // a prefix makes it another vocabulary's element, such as xacro's
@@ -172,7 +138,10 @@ impl<'a, 'input> Scan<'a, 'input> {
                 }
                 _ => {
                     first[place] = Some(child);
-                    self.walk(child, known)?;
+                    let child = self.walk(child, known)?;
+                    if !known.opaque {
+                        element.children.push(child);
+                    }
                 }
             }
         }
@@ -185,8 +154,32 @@ impl<'a, 'input> Scan<'a, 'input> {
         if tag.name == GEOMETRY.name {
             self.shapes(node, first.iter().flatten().count())?;
         }
-        let _ = write!(self.text, "</{}>", tag.name);
-        Ok(())
+        Ok(element)
+    }
+
+    /// Keeps links and joints, and refuses a robot with too many parts.
+    fn count(&mut self, node: Node<'a, 'input>, tag: &'static Tag) -> Result<(), ModelError> {
+        match tag.name {
+            "link" => self.links.push(node),
+            "joint" => self.joints.push(node),
+            "collision" => self.collisions += 1,
+            "visual" => self.visuals += 1,
+            _ => {}
+        }
+        let limits = [
+            ("the number of links", self.links.len(), LINKS_MAX),
+            ("the number of joints", self.joints.len(), LINKS_MAX),
+            ("the number of collisions", self.collisions, SHAPES_MAX),
+            ("the number of visuals", self.visuals, SHAPES_MAX),
+        ];
+        match limits.iter().find(|(_, found, most)| found > most) {
+            Some((what, _, most)) => Err(ModelError::TooLarge {
+                path: self.path.to_owned(),
+                what,
+                limit: most.to_string(),
+            }),
+            None => Ok(()),
+        }
     }
 
     /// Refuses a geometry that is not one shape.
@@ -212,7 +205,10 @@ impl<'a, 'input> Scan<'a, 'input> {
     ) -> Result<(), ModelError> {
         let name = child.tag_name().name();
         if !own && is_xacro(child) {
-            return self.leftover(child);
+            let left = self.xacro.leftover(child);
+            let what = left.map_err(|reason| self.fault(child, reason))?;
+            self.ignore(child, what);
+            return Ok(());
         }
         let place = PLACES
             .iter()
@@ -231,52 +227,12 @@ impl<'a, 'input> Scan<'a, 'input> {
         ))
     }
 
-    /// Notes an element of xacro that does nothing, or refuses one in whose place xacro would have put something.
-    fn leftover(&mut self, node: Node<'a, 'input>) -> Result<(), ModelError> {
-        self.has_xacro = true;
-        let name = node.tag_name().name();
-        let is_definition = matches!(name, "property" | "macro" | "arg");
-        let is_builtin = [
-            "include",
-            "if",
-            "unless",
-            "call",
-            "insert_block",
-            "element",
-            "attribute",
-        ]
-        .contains(&name);
-        if is_builtin || self.macros.contains(name) {
-            let reason = "is left from xacro; run `xacro` on the file and load what it prints";
-            return Err(self.fault(node, reason.to_owned()));
-        }
-        let called = name_of(node);
-        self.ignore(node, format!("<{called}>"));
-        // xacro itself could make nothing of it
-        if !is_definition && self.undefined.len() < LISTED_MAX {
-            self.undefined.insert(called);
-        }
-        Ok(())
-    }
-
-    /// One warning of all macros that are called but nowhere defined.
-    pub fn warnings(&self) -> Vec<String> {
-        if self.undefined.is_empty() {
-            return Vec::new();
-        }
-        let names: Vec<String> = self
-            .undefined
-            .iter()
-            .map(|name| format!("<{name}>"))
-            .collect();
-        vec![format!(
-            "macros of xacro are called but nowhere defined, so what they would make is missing: {}; delete the calls, or \
-             expand the file with xacro where their definitions are",
-            names.join(", ")
-        )]
-    }
-
-    fn attributes(&mut self, node: Node<'a, 'input>, tag: &'static Tag) -> Result<(), ModelError> {
+    fn attributes(
+        &mut self,
+        node: Node<'a, 'input>,
+        tag: &'static Tag,
+        element: &mut Element<'a>,
+    ) -> Result<(), ModelError> {
         for attribute in node.attributes() {
             let known = attribute.namespace().is_none()
                 && tag
@@ -300,9 +256,13 @@ impl<'a, 'input> Scan<'a, 'input> {
                             format!("comma in attribute `{name}` of <{}>", tag.name),
                         );
                     }
+                    if known.name == "quat_xyzw" {
+                        self.quaternion(node, value.numbers)?;
+                        continue;
+                    }
                     value.text
                 }
-                (None, Need::Otherwise(value)) => value.to_owned(),
+                (None, Need::Otherwise(value)) => Cow::Borrowed(value),
                 (None, Need::Optional) => continue,
                 (None, Need::Required) => {
                     let end = if tag.children.is_empty() { "/" } else { "" };
@@ -312,24 +272,13 @@ impl<'a, 'input> Scan<'a, 'input> {
                     return Err(self.fault(node, reason));
                 }
             };
-            match known.name {
-                // the reader knows all versions that urdf-rs would tell apart
-                "version" => {}
-                "quat_xyzw" => self.quaternion(node, &text)?,
-                _ => self.write(known, &text),
-            }
+            element.attributes.push((known.name, text));
         }
         Ok(())
     }
 
-    fn write(&mut self, attribute: &Attribute, value: &str) {
-        let _ = write!(self.text, " {}=\"", attribute.name);
-        escape(value, &mut self.text);
-        self.text.push('"');
-    }
-
-    /// Hands an origin's quaternion on as angles, right to rounding; urdf-rs' own are not near a pitch of 90°.
-    fn quaternion(&mut self, node: Node<'a, 'input>, text: &str) -> Result<(), ModelError> {
+    /// Keeps the angles of an origin's quaternion; urdf-rs knows angles only.
+    fn quaternion(&mut self, node: Node<'a, 'input>, quat: [f64; 4]) -> Result<(), ModelError> {
         if !self.has_quaternions {
             let what = "attribute `quat_xyzw` of <origin>, without version=\"1.1\" of <robot>,";
             self.ignore(node, what.to_owned());
@@ -339,64 +288,36 @@ impl<'a, 'input> Scan<'a, 'input> {
             let reason = "attributes `rpy` and `quat_xyzw` are both given; leave one";
             return Err(self.fault(node, reason.to_owned()));
         }
-        let mut numbers = text.split(' ').filter_map(|part| part.parse::<f64>().ok());
-        let quat = std::array::from_fn(|_| numbers.next().unwrap_or(0.0));
-        let Some([roll, pitch, yaw]) = value::rpy_of_quat(quat) else {
+        let Some(angles) = value::rpy_of_quat(quat) else {
             let reason = "attribute `quat_xyzw` is zero; give x, y, z, w of length 1";
             return Err(self.fault(node, reason.to_owned()));
         };
-        let rpy = ORIGIN.attributes.iter().find(|known| known.name == "rpy");
-        let rpy = rpy.expect("an origin has rpy");
-        self.write(rpy, &format!("{roll} {pitch} {yaw}"));
+        self.angles.insert(node.id(), angles);
         Ok(())
+    }
+
+    /// Roll, pitch and yaw [rad] of the quaternion in an element's origin, if it gives one.
+    pub fn angles(&self, node: Node) -> Option<[f64; 3]> {
+        if self.angles.is_empty() {
+            return None;
+        }
+        let origin = children(node, "origin").next()?;
+        self.angles.get(&origin.id()).copied()
     }
 
     /// Notes that something of this element has no effect; the same thing again is only counted.
     pub fn ignore(&mut self, node: Node<'a, 'input>, what: String) {
-        if let Some(&index) = self.ignored_at.get(&what) {
-            self.ignored[index].count += 1;
-        } else if self.ignored.len() < IGNORED_MAX {
-            self.ignored_at.insert(what.clone(), self.ignored.len());
-            let at = node.range().start;
-            self.ignored.push(Ignored { what, count: 1, at });
-        } else {
-            self.ignored_more += 1;
-        }
+        self.ignored.add(what, node.range().start);
     }
 
     /// One sentence for each thing that was ignored, in the order in which it was met.
     pub fn notes(&self) -> Vec<String> {
-        let mut notes: Vec<String> = Vec::new();
-        let lines = self.lines(self.ignored.iter().map(|ignored| ignored.at).collect());
-        for (Ignored { what, count, .. }, line) in self.ignored.iter().zip(lines) {
-            notes.push(match count {
-                1 => format!("{what} is ignored (line {line})"),
-                _ => format!("{what} is ignored ({count} times, first in line {line})"),
-            });
-        }
-        if self.ignored_more > 0 {
-            notes.push(format!(
-                "{} further unknown elements and attributes are ignored",
-                self.ignored_more
-            ));
-        }
-        notes
+        self.ignored.notes(self.document.input_text())
     }
 
-    /// The lines of these places, in one pass over the text.
-    fn lines(&self, places: Vec<usize>) -> Vec<usize> {
-        let text = self.document.input_text().as_bytes();
-        let mut order: Vec<usize> = (0..places.len()).collect();
-        order.sort_by_key(|&index| places[index]);
-        let mut lines = vec![0; places.len()];
-        let (mut line, mut from) = (1, 0);
-        for index in order {
-            let passed = &text[from..places[index]];
-            line += passed.iter().filter(|&&byte| byte == b'\n').count();
-            from = places[index];
-            lines[index] = line;
-        }
-        lines
+    /// What of xacro changes the robot.
+    pub fn warnings(&self) -> Vec<String> {
+        self.xacro.warnings()
     }
 
     /// An error about one element.
@@ -434,18 +355,4 @@ impl<'a, 'input> Scan<'a, 'input> {
     fn line(&self, node: Node) -> u32 {
         self.document.text_pos_at(node.range().start).row
     }
-}
-
-fn is_xacro(node: Node) -> bool {
-    let namespace = node.tag_name().namespace().unwrap_or_default();
-    prefix_of(node) == Some("xacro") || namespace.contains("xacro")
-}
-
-/// Names of the macros that a document defines.
-fn macros<'a>(document: &'a Document) -> BTreeSet<&'a str> {
-    let nodes = document.descendants();
-    nodes
-        .filter(|node| node.tag_name().name() == "macro" && is_xacro(*node))
-        .filter_map(|node| node.attribute("name"))
-        .collect()
 }

@@ -1,11 +1,11 @@
 //! The elements and attributes of URDF that take part in the physics.
 
-/// An element URDF knows.
+/// An element of URDF.
 pub(super) struct Tag {
     pub name: &'static str,
     pub attributes: &'static [Attribute],
     pub children: &'static [(&'static Tag, Count)],
-    /// Known, but without a part in the physics: neither looked into nor handed on.
+    /// Known, but without a part in the physics: the walk does not enter it.
     pub opaque: bool,
 }
 

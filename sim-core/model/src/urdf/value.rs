@@ -1,8 +1,10 @@
-//! Values of attributes: numbers as text, and what else they may not be.
+//! Values of attributes: read as what the table asks for, or refused with the cure.
+
+use std::borrow::Cow;
 
 use super::table::{Attribute, Kind, Need, Sign};
 use super::xml::short;
-use crate::checks::NAME_MAX;
+use crate::value_checks::NAME_MAX;
 
 /// Longest path [bytes], as on Linux.
 const PATH_MAX: usize = 4096;
@@ -10,18 +12,20 @@ const PATH_MAX: usize = 4096;
 const ANGLE_MAX: f64 = 1e6;
 
 /// A value that its attribute may have.
-pub(super) struct Value {
-    /// What to read, numbers separated by one space each.
-    pub text: String,
-    /// Whether commas between its numbers were passed over.
+pub(super) struct Value<'a> {
+    /// The value as it is written, with one space between numbers.
+    pub text: Cow<'a, str>,
+    /// The numbers, as many as the attribute has; then zeros.
+    pub numbers: [f64; 4],
+    /// Whether commas between the numbers were ignored.
     pub commas: bool,
 }
 
-/// Takes a value as what its attribute asks for.
+/// Reads a value as what its attribute asks for.
 ///
 /// # Errors
 /// What is wrong with it, and the cure.
-pub(super) fn read(attribute: &Attribute, value: &str) -> Result<Value, String> {
+pub(super) fn read<'a>(attribute: &Attribute, value: &'a str) -> Result<Value<'a>, String> {
     let name = attribute.name;
     if value.contains("${") || value.contains("$(") {
         let value = short(value);
@@ -46,7 +50,8 @@ pub(super) fn read(attribute: &Attribute, value: &str) -> Result<Value, String> 
             ));
         }
         Ok(Value {
-            text: value.to_owned(),
+            text: Cow::Borrowed(value),
+            numbers: [0.0; 4],
             commas: false,
         })
     };
@@ -61,7 +66,12 @@ pub(super) fn read(attribute: &Attribute, value: &str) -> Result<Value, String> 
     }
 }
 
-fn numbers(attribute: &Attribute, value: &str, count: usize, shape: &str) -> Result<Value, String> {
+fn numbers<'a>(
+    attribute: &Attribute,
+    value: &'a str,
+    count: usize,
+    shape: &str,
+) -> Result<Value<'a>, String> {
     let refuse = |what: &str, cure: &str| {
         let value = short(value);
         Err(format!(
@@ -146,13 +156,21 @@ fn numbers(attribute: &Attribute, value: &str, count: usize, shape: &str) -> Res
     if attribute.kind == Kind::Angles && parsed.iter().any(|angle| angle.abs() > ANGLE_MAX) {
         return refuse("more than 1e6 rad", "give angles within a turn or two");
     }
+    let mut numbers = [0.0; 4];
+    numbers[..count].copy_from_slice(&parsed);
+    let text = match parts[..] {
+        [only] => Cow::Borrowed(only),
+        _ => Cow::Owned(parts.join(" ")),
+    };
     Ok(Value {
-        text: parts.join(" "),
+        text,
+        numbers,
         commas,
     })
 }
 
-/// Roll, pitch and yaw [rad] of a quaternion (x, y, z, w) of any length but 0, right to rounding at every pitch.
+/// Roll, pitch and yaw [rad] of a quaternion (x, y, z, w) of any length but 0, exact to rounding at every pitch.
+/// urdf-rs' own conversion is not, near a pitch of 90°.
 ///
 /// With half angles φ, θ, ψ of q = q_z(2ψ) q_y(2θ) q_x(2φ):
 ///

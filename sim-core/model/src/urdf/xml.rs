@@ -1,4 +1,4 @@
-//! XML as URDF uses it: faults in plain words, children by name, and how messages name an element.
+//! XML as URDF uses it: syntax errors in plain words, children by name, and how messages name an element.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::error::ModelError;
 /// Longest name or value that a message quotes whole [characters].
 const QUOTED_MAX: usize = 80;
 
-/// A text that went through [`super::source::prepare`] as XML.
+/// Parses a text that went through [`super::source::prepare`].
 ///
 /// # Errors
 /// Broken XML with line and column.
@@ -162,7 +162,7 @@ pub(super) fn prefix_of<'a>(node: Node<'a, '_>) -> Option<&'a str> {
         .and_then(|namespace| node.lookup_prefix(namespace))
 }
 
-/// A text from outside, printable and cut to what a message can hold.
+/// A text from a file, made printable and cut to what a message can hold.
 pub(super) fn short(text: &str) -> String {
     let (shown, more) = match text.char_indices().nth(QUOTED_MAX) {
         Some((end, _)) => (&text[..end], "…"),
@@ -173,18 +173,4 @@ pub(super) fn short(text: &str) -> String {
         false => c.to_string(),
     };
     shown.chars().map(printable).collect::<String>() + more
-}
-
-/// Appends a text as the value of an attribute.
-pub(super) fn escape(value: &str, text: &mut String) {
-    for character in value.chars() {
-        match character {
-            '&' => text.push_str("&amp;"),
-            '<' => text.push_str("&lt;"),
-            '>' => text.push_str("&gt;"),
-            '"' => text.push_str("&quot;"),
-            '\'' => text.push_str("&apos;"),
-            character => text.push(character),
-        }
-    }
 }

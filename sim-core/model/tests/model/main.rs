@@ -3,6 +3,7 @@
 mod build;
 mod conventions;
 mod fr3;
+mod hash;
 mod meshes;
 mod mimic;
 mod oddities;

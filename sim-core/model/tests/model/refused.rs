@@ -1,4 +1,4 @@
-//! Refusals that depend on the options; files that are refused whatever the options lie in `tests/malformed`.
+//! Refusals that depend on the options; `tests/malformed` has the files that are refused whatever the options.
 
 use sim_model::{ModelError, Robot, UrdfOptions};
 

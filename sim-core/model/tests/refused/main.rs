@@ -1,6 +1,7 @@
 //! Descriptions that are refused: by name, in time and in little memory.
 
-mod folder;
+mod cases;
 mod generated;
+mod malformed;
 mod measure;
 mod mutated;

@@ -1,0 +1,312 @@
+//! Bodies, dofs and frames of a model, from the links and joints of robots.
+
+use super::carrier::Carrier;
+use super::constraint_rows::DofJoint;
+use crate::description::{Joint, Robot, TargetMode};
+use crate::inertia::{Inertial, merge};
+use crate::joint_kind::JointKind;
+use crate::model::{RobotRange, Start};
+use crate::pose::Pose;
+use sim_physics::constants::{Body, Dof, Frame, MassEntry, Motion, Tree};
+use sim_physics::math::factor::Pattern;
+
+#[derive(Default)]
+pub(super) struct BodyBuilder {
+    pub bodies: Vec<Body<f64>>,
+    pub dofs: Vec<Dof<f64>>,
+    pub trees: Vec<Tree<f64>>,
+    pub frames: Vec<Frame<f64>>,
+    pub joints: Vec<DofJoint>,
+    pub robots: Vec<RobotRange>,
+    pub dof_names: Vec<String>,
+    pub coord_names: Vec<String>,
+    pub body_names: Vec<String>,
+    pub start: Start,
+    couplings: Vec<(usize, usize)>,
+    /// How each link of each robot is carried.
+    pub carriers: Vec<Vec<Carrier>>,
+}
+
+impl BodyBuilder {
+    pub fn add(&mut self, robot: &Robot) {
+        let (first_dof, first_coord) = (self.dofs.len(), self.coord_names.len());
+        let (first_frame, first_body) = (self.frames.len(), self.bodies.len());
+        let named = |name: String| format!("{}/{name}", robot.name);
+        self.dof_names
+            .extend(robot.dof_names().into_iter().map(named));
+        self.coord_names
+            .extend(robot.coord_names().into_iter().map(named));
+        self.trees.push(Tree {
+            base: robot.pose.pos,
+            free: None,
+        });
+        // the base stands still: its frame has the world's axes and its origin as reference point
+        let base = Carrier {
+            body: None,
+            tree: self.trees.len() - 1,
+            pose: Pose {
+                pos: [0.0; 3],
+                quat: robot.pose.quat,
+            },
+        };
+        let mut carriers = vec![base; robot.links.len()];
+        let mut dof_of = vec![0; robot.joints.len()];
+        for link in robot.link_order() {
+            let above = robot.joints.iter().position(|joint| joint.child == link);
+            if let Some(index) = above {
+                let joint = &robot.joints[index];
+                let parent = joint.parent.map_or(base, |parent| carriers[parent]);
+                let at = Carrier {
+                    pose: parent.pose.mul(&joint.origin),
+                    ..parent
+                };
+                dof_of[index] = self.dofs.len();
+                carriers[link] = self.add_joint(joint, at);
+            }
+            let carrier = carriers[link];
+            self.body_names.push(named(robot.links[link].name.clone()));
+            self.frames.push(Frame {
+                body: carrier.body,
+                tree: carrier.tree,
+                position: carrier.pose.pos,
+                quat: carrier.pose.quat,
+                center: match &robot.links[link].inertial {
+                    Some(inertial) => carrier.pose.transform(inertial.pos),
+                    None => carrier.pose.pos,
+                },
+            });
+        }
+        self.add_masses(robot, &carriers, first_body);
+        for joint in robot.moving_joints() {
+            self.add_followers(robot, joint, &dof_of);
+        }
+        self.carriers.push(carriers);
+        self.robots.push(RobotRange {
+            name: robot.name.clone(),
+            dofs: first_dof..self.dofs.len(),
+            coords: first_coord..self.coord_names.len(),
+            bodies: first_frame..self.frames.len(),
+        });
+    }
+
+    /// The bodies of a joint whose frame is `at`; returns where they carry its link.
+    fn add_joint(&mut self, joint: &Joint, at: Carrier) -> Carrier {
+        let turn = z_to(joint.axis);
+        let back = turn.inverse();
+        let axis = Carrier {
+            pose: at.pose.mul(&turn),
+            ..at
+        };
+        match joint.kind {
+            JointKind::Fixed => at,
+            JointKind::Revolute => self.add_body(joint, 0, Motion::Revolute, axis, back),
+            JointKind::Prismatic => self.add_body(joint, 0, Motion::Prismatic, axis, back),
+            JointKind::Ball => self.add_body(joint, 0, Motion::Ball, at, Pose::identity()),
+            JointKind::Planar => {
+                // z to x, to y, and back to the normal
+                let (x, y) = (z_to([1.0, 0.0, 0.0]), z_to([0.0, 1.0, 0.0]));
+                let first = Carrier {
+                    pose: axis.pose.mul(&x),
+                    ..axis
+                };
+                let slid = self.add_body(joint, 0, Motion::Prismatic, first, x.inverse().mul(&y));
+                let slid = self.add_body(joint, 1, Motion::Prismatic, slid, y.inverse());
+                self.add_body(joint, 2, Motion::Revolute, slid, back)
+            }
+            JointKind::Free => {
+                self.trees.push(Tree {
+                    base: [0.0; 3],
+                    free: Some(self.bodies.len()),
+                });
+                let world = Carrier {
+                    body: None,
+                    tree: self.trees.len() - 1,
+                    pose: Pose::identity(),
+                };
+                self.add_body(joint, 0, Motion::Free, world, Pose::identity())
+            }
+        }
+    }
+
+    /// A body that is carried at `at` and moves by the dofs of a joint from `first` on; `pose` is what it carries.
+    fn add_body(
+        &mut self,
+        joint: &Joint,
+        first: usize,
+        motion: Motion,
+        at: Carrier,
+        pose: Pose,
+    ) -> Carrier {
+        let (body, coord) = (self.bodies.len(), self.start.joint_q.len());
+        self.bodies.push(Body {
+            motion,
+            parent: at.body,
+            tree: at.tree,
+            dof: self.dofs.len(),
+            coord,
+            rotation: columns(at.pose.rotation()),
+            exchange: exchange(columns(at.pose.rotation())),
+            quat: at.pose.quat,
+            position: at.pose.pos,
+            mass: 0.0,
+            center: [0.0; 3],
+            inertia: [0.0; 6],
+            parts: Vec::new(),
+        });
+        let coords = &joint.q[first..first + motion.coords()];
+        self.start.joint_q.extend(coords);
+        for (k, dof) in joint.dofs[first..first + motion.dofs()].iter().enumerate() {
+            let drives_position = dof.target_mode != TargetMode::Velocity;
+            self.dofs.push(Dof {
+                body,
+                coord,
+                entries: (0, 0),
+                armature: dof.armature,
+                damping: dof.damping,
+                ke: if drives_position { dof.target_ke } else { 0.0 },
+                kd: dof.target_kd,
+                follows_position: drives_position,
+                follows_velocity: dof.target_mode != TargetMode::Position,
+                effort_limit: dof.effort_limit.filter(|limit| limit.is_finite()),
+            });
+            // a target is where the joint starts; a ball's is a rotation vector, a free body has none
+            let start = match motion {
+                Motion::Revolute | Motion::Prismatic => coords[0],
+                Motion::Ball => rotation_vector(coords)[k],
+                Motion::Free => 0.0,
+            };
+            self.start
+                .joint_target_q
+                .push(dof.target_q.unwrap_or(start));
+            self.start.joint_target_qd.push(dof.target_qd);
+            self.start.joint_q_offset.push(dof.offset_q);
+            self.start.joint_qd_offset.push(dof.offset_qd);
+            self.joints.push(DofJoint {
+                range: joint.range,
+                friction: dof.friction,
+                mimic: None,
+            });
+        }
+        Carrier {
+            body: Some(body),
+            tree: at.tree,
+            pose,
+        }
+    }
+
+    fn add_followers(&mut self, robot: &Robot, index: usize, dof_of: &[usize]) {
+        if let Some(mimic) = &robot.joints[index].mimic {
+            let (dof, leader) = (dof_of[index], dof_of[mimic.joint]);
+            self.couplings.push((dof, leader));
+            self.joints[dof].mimic = Some((leader, mimic.multiplier, mimic.offset));
+        }
+    }
+
+    /// Mass, centre and inertia of all links that move with each body of a robot.
+    fn add_masses(&mut self, robot: &Robot, carriers: &[Carrier], first_body: usize) {
+        let nothing = Inertial {
+            mass: 0.0,
+            pos: [0.0; 3],
+            inertia: [[0.0; 3]; 3],
+        };
+        for (index, body) in self.bodies.iter_mut().enumerate().skip(first_body) {
+            let carried = carriers.iter().zip(&robot.links);
+            let whole = carried
+                .filter(|(carrier, _)| carrier.body == Some(index))
+                .filter_map(|(carrier, link)| Some((&carrier.pose, link.inertial.as_ref()?)))
+                .fold(nothing, |whole, (pose, part)| merge(&whole, pose, part));
+            let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = whole.inertia;
+            (body.mass, body.center) = (whole.mass, whole.pos);
+            body.inertia = [xx, yy, zz, xy, xz, yz];
+        }
+    }
+
+    /// A dof meets all dofs on its path to the root, and those it is coupled with.
+    pub fn pattern(&self) -> Pattern {
+        let mut entries = self.couplings.clone();
+        for k in 0..self.dofs.len() {
+            entries.extend(self.path(k).into_iter().map(|i| (k, i)));
+        }
+        Pattern::new(self.dofs.len(), entries)
+    }
+
+    /// The dofs that a dof meets in the mass matrix: those before it on its path to the root, and itself, rising.
+    fn path(&self, dof: usize) -> Vec<usize> {
+        let mut path = Vec::new();
+        let mut body = Some(self.dofs[dof].body);
+        while let Some(b) = body {
+            path.extend(self.bodies[b].dofs().rev().filter(|&i| i <= dof));
+            body = self.bodies[b].parent;
+        }
+        path.reverse();
+        path
+    }
+
+    pub fn mass_entries(&mut self, pattern: &Pattern) -> Vec<MassEntry> {
+        let mut entries = Vec::new();
+        for k in 0..self.dofs.len() {
+            let first = entries.len();
+            entries.extend(self.path(k).into_iter().map(|other| MassEntry {
+                other,
+                place: pattern.at(k, other),
+            }));
+            self.dofs[k].entries = (first, entries.len());
+        }
+        entries
+    }
+}
+
+/// Axis times angle of a unit quaternion (x, y, z, w) [rad].
+fn rotation_vector(quat: &[f64]) -> [f64; 3] {
+    let [x, y, z, w] = [quat[0], quat[1], quat[2], quat[3]];
+    let sin = (x * x + y * y + z * z).sqrt();
+    let scale = if sin > 0.0 {
+        2.0 * sin.atan2(w) / sin
+    } else {
+        0.0
+    };
+    [x * scale, y * scale, z * scale]
+}
+
+fn columns(rows: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    std::array::from_fn(|c| std::array::from_fn(|r| rows[r][c]))
+}
+
+/// The axes that a rotation exchanges, if that is all it does (to the rounding of angles such as π/2).
+fn exchange(columns: [[f64; 3]; 3]) -> Option<[(usize, bool); 3]> {
+    let axis = |column: [f64; 3]| {
+        let along = |i: usize| (column[i].abs() - 1.0).abs() < 4.0 * f64::EPSILON;
+        let rest = |i: usize| (0..3).all(|j| j == i || column[j].abs() < 4.0 * f64::EPSILON);
+        let i = (0..3).find(|&i| along(i) && rest(i))?;
+        Some((i, column[i] < 0.0))
+    };
+    Some([axis(columns[0])?, axis(columns[1])?, axis(columns[2])?])
+}
+
+/// A rotation that takes z to the given unit vector; none where the axis is z already.
+fn z_to(axis: [f64; 3]) -> Pose {
+    if axis == [0.0, 0.0, 1.0] {
+        return Pose::identity();
+    }
+    if axis[2] < -0.5 {
+        // half a turn about x, then the short way from -z
+        return z_to([axis[0], -axis[1], -axis[2]]).flipped();
+    }
+    let quat = [-axis[1], axis[0], 0.0, 1.0 + axis[2]];
+    let norm = quat.iter().map(|x| x * x).sum::<f64>().sqrt();
+    Pose {
+        pos: [0.0; 3],
+        quat: quat.map(|x| x / norm),
+    }
+}
+
+impl Pose {
+    /// Half a turn about the parent's x axis, applied after this rotation.
+    fn flipped(&self) -> Pose {
+        Pose {
+            pos: [0.0; 3],
+            quat: [1.0, 0.0, 0.0, 0.0],
+        }
+        .mul(self)
+    }
+}

@@ -1,0 +1,95 @@
+//! Constraint rows of a model: equalities, dry friction and limits, with softness from the mass at the reference pose.
+
+use sim_physics::constants::{Constants, Equality, Friction, Impedance, Limit, Motion, Soft};
+
+/// MuJoCo's default `solimp` (0.9, 0.95, 0.001, 0.5, 2).
+pub(super) const IMPEDANCE: Impedance<f64> = Impedance {
+    d_min: 0.9,
+    d_max: 0.95,
+    inverse_width: 1.0 / 0.001,
+    midpoint: 0.5,
+};
+/// MuJoCo's default `solref`: time constant [s], damping ratio.
+const SOLREF: [f64; 2] = [0.02, 1.0];
+/// Stiffness and damping of joint limits in force space, Newton's `limit_ke`, `limit_kd`.
+const LIMIT_KE: f64 = 1.0e4;
+const LIMIT_KD: f64 = 10.0;
+
+/// What the rows need of a dof's joint; mimic leaders already as dof numbers.
+#[derive(Clone, Copy, Default)]
+pub(super) struct DofJoint {
+    pub range: Option<[f64; 2]>,
+    pub friction: f64,
+    pub mimic: Option<(usize, f64, f64)>,
+}
+
+/// Constraint rows in MuJoCo's order.
+pub(super) fn add_rows(
+    constants: &mut Constants<f64>,
+    joints: &[DofJoint],
+    inverse_weight: &[f64],
+    friction_varies: bool,
+) {
+    let dt = constants.dt;
+    for (dof, joint) in joints.iter().enumerate() {
+        let weight = inverse_weight[dof];
+        if let Some((leader, multiplier, offset)) = joint.mimic {
+            let soft = soft(SOLREF, weight + inverse_weight[leader], dt);
+            constants.equalities.push(Equality {
+                follower: dof,
+                leader,
+                multiplier,
+                offset,
+                soft,
+            });
+        }
+        let moves_freely = constants.bodies[constants.dofs[dof].body].motion == Motion::Free;
+        if joint.friction > 0.0 || friction_varies && !moves_freely {
+            let soft = soft(SOLREF, weight, dt);
+            // a friction row has no position: its impedance is d_min, its reference -b v
+            let regularizer = (1.0 - IMPEDANCE.d_min) / IMPEDANCE.d_min * weight;
+            constants.frictions.push(Friction {
+                dof,
+                loss: joint.friction,
+                damping: soft.damping,
+                weight: 1.0 / regularizer,
+                regularizer,
+                zone: regularizer * joint.friction,
+            });
+        }
+        if let Some([lower, upper]) = joint.range {
+            let f = weight * (1.0 - IMPEDANCE.d_max);
+            let solref = [
+                2.0 / (LIMIT_KD * f),
+                0.5 * LIMIT_KD * f * (1.0 / (LIMIT_KE * f)).sqrt(),
+            ];
+            constants.limits.push(Limit {
+                dof,
+                lower,
+                upper,
+                soft: soft(solref, weight, dt),
+            });
+        }
+    }
+}
+
+/// MuJoCo's stiffness and damping from (time constant, damping ratio), `refsafe` on.
+fn soft(solref: [f64; 2], inverse_weight: f64, dt: f64) -> Soft<f64> {
+    let d_max = IMPEDANCE.d_max;
+    let time_constant = solref[0].max(2.0 * dt);
+    let natural = time_constant * solref[1] * d_max;
+    Soft {
+        stiffness: 1.0 / (natural * natural),
+        damping: 2.0 / (d_max * time_constant),
+        inverse_weight,
+        impedance: IMPEDANCE,
+    }
+}
+
+/// Damping of a contact's friction rows from Newton's `kf`, for bodies of this inverse weight: MuJoCo's from
+/// `solreffriction` = (2 / (kf w ((1 - dmax)/impratio + dmax)), 1), as Newton's exporter sets it.
+pub(super) fn contact_damping(kf: f64, inverse_weight: f64, impratio: f64, dt: f64) -> f64 {
+    let d_max = IMPEDANCE.d_max;
+    let rate = kf * inverse_weight * ((1.0 - d_max) / impratio + d_max);
+    2.0 / (d_max * (2.0 / rate).max(2.0 * dt))
+}

@@ -1,0 +1,172 @@
+//! Pairs of convex pieces as table rows: what the narrow phase and the contact constraints read of each pair.
+
+use super::clusters::Cluster;
+use super::constraint_rows::{IMPEDANCE, contact_damping};
+use super::contact_pieces::{Piece, PlacedShape, Rules};
+use crate::description::Description;
+use crate::surface::Surface;
+use sim_physics::constants::Constants;
+use sim_physics::constants::contact::{Cone, Kind, MU_MIN, Pair, pair};
+
+/// What the tables of contacts are built from.
+pub(super) struct ContactBuilder<'a> {
+    pub constants: &'a Constants<f64>,
+    pub scene: &'a Description,
+    pub shapes: &'a [PlacedShape<'a>],
+    pub pieces: &'a [Piece],
+    pub rules: &'a Rules<'a>,
+    pub clusters: Vec<Cluster>,
+}
+
+/// The two sides of a pair: bodies, and whether the first side is the pair's second shape.
+pub(super) struct Sides {
+    pub first: Option<usize>,
+    pub second: usize,
+    pub flipped: bool,
+}
+
+impl ContactBuilder<'_> {
+    pub(super) fn body(&self, piece: usize) -> Option<usize> {
+        self.pieces[piece].solid.body
+    }
+
+    pub(super) fn cluster(&self, body: usize) -> usize {
+        self.clusters
+            .iter()
+            .position(|cluster| cluster.bodies.contains(&body))
+            .expect("every body with a shape is in a cluster")
+    }
+
+    /// A static shape is the first side. Of two bodies, the earlier one is.
+    pub(super) fn sides(&self, (a, b): (usize, usize)) -> Sides {
+        match (self.body(a), self.body(b)) {
+            (first, Some(second)) if first.is_none_or(|first| first < second) => Sides {
+                first,
+                second,
+                flipped: false,
+            },
+            (Some(second), first) => Sides {
+                first,
+                second,
+                flipped: true,
+            },
+            _ => unreachable!("two shapes that stand still are no pair"),
+        }
+    }
+
+    pub(super) fn numbers(
+        &self,
+        (a, b): (usize, usize),
+        sides: &Sides,
+        columns: &[(usize, bool)],
+        row: &mut [f64],
+    ) {
+        let (a, b) = (&self.pieces[a], &self.pieces[b]);
+        let (x, y) = (&self.shapes[a.shape], &self.shapes[b.shape]);
+        let (s, t) = (&x.surface, &y.surface);
+        let margin = s.margin + t.margin;
+        let reach = margin + s.gap + t.gap;
+        row[pair::REACH] = reach;
+        row[pair::RADIUS] = a.radius + b.radius + reach;
+        row[pair::RADIUS_A] = a.radius + reach;
+        row[pair::RADIUS_B] = b.radius + reach;
+        row[pair::SMALLER] = match a.solid.kind {
+            Kind::Plane => b.radius,
+            _ => a.radius.min(b.radius),
+        };
+        row[pair::SIZE_A..][..3].copy_from_slice(&a.size);
+        row[pair::SIZE_B..][..3].copy_from_slice(&b.size);
+        row[pair::FLIP] = if sides.flipped { -1.0 } else { 1.0 };
+        row[pair::MARGIN] = margin;
+        row[pair::MU] = s.mu.max(t.mu).max(MU_MIN);
+        let condim = s.condim.max(t.condim);
+        row[pair::RUBS] = if condim == 1 { 0.0 } else { 1.0 };
+        row[pair::ROWS] = rows_of(self.scene.solver.cone, condim) as f64;
+        let weight = |shape: &PlacedShape<'_>| {
+            shape
+                .link
+                .map_or(0.0, |link| self.rules.link_inverse_weight[link])
+        };
+        let weight = weight(x) + weight(y);
+        row[pair::WEIGHT] = weight;
+        // MuJoCo mixes the parameters of two geoms half and half
+        let mean = |f: fn(&Surface) -> f64| 0.5 * (f(s) + f(t));
+        let time_constant = mean(|s| 2.0 / s.kd).max(2.0 * self.scene.dt);
+        let damping_ratio = mean(|s| 0.5 * s.kd / s.ke.sqrt());
+        let natural = time_constant * damping_ratio * IMPEDANCE.d_max;
+        row[pair::STIFFNESS] = 1.0 / (natural * natural);
+        row[pair::DAMPING] = 2.0 / (IMPEDANCE.d_max * time_constant);
+        row[pair::SLIDING] = contact_damping(
+            mean(|s| s.kf),
+            weight,
+            self.scene.solver.impratio,
+            self.scene.dt,
+        );
+        for (c, &(dof, _)) in columns.iter().enumerate() {
+            let moves = |body: usize| f64::from(u8::from(self.moves(dof, body)));
+            let lever = moves(sides.second) - sides.first.map_or(0.0, moves);
+            row[pair::LEVERS + c] = lever;
+        }
+    }
+
+    /// Whether a dof moves a body.
+    pub(super) fn moves(&self, dof: usize, body: usize) -> bool {
+        let mut next = Some(body);
+        while let Some(b) = next {
+            if self.constants.bodies[b].dofs().contains(&dof) {
+                return true;
+            }
+            next = self.constants.bodies[b].parent;
+        }
+        false
+    }
+
+    pub(super) fn indices(
+        &self,
+        (a, b): (usize, usize),
+        sides: &Sides,
+        class: usize,
+        row: &mut [u32],
+    ) {
+        let world = self.constants.trees.len();
+        let origin = |piece: usize| {
+            self.body(piece)
+                .map_or(world, |body| self.constants.bodies[body].tree)
+        };
+        let second = self.constants.bodies[sides.second].tree;
+        for (place, value) in [
+            (pair::SOLID_A, a),
+            (pair::SOLID_B, b),
+            (pair::ORIGIN_A, origin(a)),
+            (pair::ORIGIN_B, origin(b)),
+            (pair::ORIGIN, second),
+            (pair::CLASS, class),
+            (pair::HULL_A, self.pieces[a].hull),
+            (pair::HULL_B, self.pieces[b].hull),
+        ] {
+            row[place] = u32::try_from(value).expect("scenes have fewer shapes than that");
+        }
+    }
+
+    pub(super) fn names(&self, (a, b): (usize, usize), sides: &Sides, class: usize) -> Pair {
+        let (a, b) = match sides.flipped {
+            false => (a, b),
+            true => (b, a),
+        };
+        let shape = |piece: usize| &self.shapes[self.pieces[piece].shape];
+        Pair {
+            shapes: [shape(a).number, shape(b).number],
+            links: [shape(a).link, shape(b).link],
+            class,
+        }
+    }
+}
+
+/// Constraint rows of a contact.
+pub(super) fn rows_of(cone: Cone, condim: usize) -> usize {
+    match (cone, condim) {
+        (_, 1) => 1,
+        (Cone::Elliptic, dimensions) => dimensions,
+        (Cone::Pyramidal, dimensions) => 2 * (dimensions - 1),
+    }
+}

@@ -1,0 +1,261 @@
+//! Convex pieces of the shapes of a scene, and the pairs of pieces that may touch.
+
+use super::carrier::Carrier;
+use crate::description::Description;
+use crate::geometry::{Hull, Shape};
+use crate::hull_tables;
+use crate::pose::Pose;
+use crate::surface::Surface;
+use sim_physics::constants::Constants;
+use sim_physics::constants::contact::{Contacts, Kind, Solid};
+use std::collections::BTreeSet;
+
+/// A shape of the scene, with what carries it.
+pub(super) struct PlacedShape<'a> {
+    /// Its number among the scene's.
+    pub number: usize,
+    /// Its geometry and surface; its pose is that in the link.
+    pub shape: &'a Shape,
+    /// How it touches.
+    pub surface: Surface,
+    /// Its robot, if it is not static.
+    pub robot: Option<usize>,
+    /// Its link, as a frame.
+    pub link: Option<usize>,
+    /// The body that it moves with.
+    pub body: Option<usize>,
+    /// A number that it shares with the links it is fixed to.
+    pub group: usize,
+    /// Its frame in the body's, or in the world.
+    pub pose: Pose,
+}
+
+/// What decides, besides the shapes, which pairs touch.
+pub(super) struct Rules<'a> {
+    /// Groups of links that a joint connects.
+    pub connected: Vec<(usize, usize)>,
+    /// Robots whose links touch each other.
+    pub self_collisions: Vec<bool>,
+    /// Translational inverse weight of each link.
+    pub link_inverse_weight: &'a [f64],
+}
+
+/// A convex piece of a shape.
+pub(super) struct Piece {
+    /// Its shape, as a place among those that are placed.
+    pub shape: usize,
+    /// What the kernel source reads of it.
+    pub solid: Solid<f64>,
+    /// As its kind has it [m].
+    pub size: [f64; 3],
+    /// Of the ball around its centre [m].
+    pub radius: f64,
+    /// Its row in the table of hulls, if it is one.
+    pub hull: usize,
+}
+
+/// Most contacts of two shapes: end points and the nearest point between them, or corners of the area that two faces
+/// share, for boxes with the nearest vertex.
+pub(super) fn contacts_of(kinds: (Kind, Kind)) -> usize {
+    match kinds {
+        (Kind::Sphere, _) | (Kind::Plane, Kind::Sphere) => 1,
+        (Kind::Plane, Kind::Capsule) => 2,
+        (Kind::Capsule, _) => 3,
+        (Kind::Plane, Kind::Cylinder) => 5,
+        (Kind::Box, Kind::Box) => 9,
+        _ => 4,
+    }
+}
+
+/// Group of a link: the number of its body, or one number for all static links of a robot.
+fn group(constants: &Constants<f64>, robot: usize, carrier: &Carrier) -> usize {
+    carrier.body.unwrap_or(constants.bodies.len() + robot)
+}
+
+/// All shapes of a scene, in the order of their names.
+pub(super) fn placed_shapes<'a>(
+    scene: &'a Description,
+    carriers: &[Vec<Carrier>],
+    constants: &Constants<f64>,
+) -> Vec<PlacedShape<'a>> {
+    let mut all: Vec<PlacedShape<'a>> = Vec::new();
+    for shape in &scene.shapes {
+        all.push(PlacedShape {
+            number: all.len(),
+            shape: &shape.shape,
+            surface: shape.surface,
+            robot: None,
+            link: None,
+            body: None,
+            group: constants.bodies.len() + scene.robots.len(),
+            pose: shape.pose,
+        });
+    }
+    let mut frame = 0;
+    for (index, robot) in scene.robots.iter().enumerate() {
+        for link in robot.link_order() {
+            let carrier = &carriers[index][link];
+            for collision in &robot.links[link].collisions {
+                let mut pose = carrier.pose.mul(&collision.pose);
+                if carrier.body.is_none() {
+                    for (x, base) in pose.pos.iter_mut().zip(constants.trees[carrier.tree].base) {
+                        *x += base;
+                    }
+                }
+                all.push(PlacedShape {
+                    number: all.len(),
+                    shape: &collision.shape,
+                    surface: collision.surface,
+                    robot: Some(index),
+                    link: Some(frame),
+                    body: carrier.body,
+                    group: group(constants, index, carrier),
+                    pose,
+                });
+            }
+            frame += 1;
+        }
+    }
+    all
+}
+
+/// Groups of links that a joint connects.
+pub(super) fn connected(
+    scene: &Description,
+    carriers: &[Vec<Carrier>],
+    constants: &Constants<f64>,
+) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    for (index, robot) in scene.robots.iter().enumerate() {
+        let of = |link: usize| group(constants, index, &carriers[index][link]);
+        for joint in robot.joints.iter().filter(|joint| joint.moves()) {
+            if let Some(parent) = joint.parent {
+                pairs.push((of(parent), of(joint.child)));
+            }
+        }
+    }
+    pairs
+}
+
+/// The pieces of all shapes; their hulls go to the tables.
+pub(super) fn pieces(shapes: &[PlacedShape<'_>], contacts: &mut Contacts<f64>) -> Vec<Piece> {
+    let mut pieces = Vec::new();
+    let mut hulls: Vec<Hull> = Vec::new();
+    for (index, b) in shapes.iter().enumerate() {
+        let (kind, size, radius) = match b.shape {
+            Shape::Plane => (Kind::Plane, [0.0; 3], 0.0),
+            Shape::Sphere { radius } => (Kind::Sphere, [*radius, 0.0, 0.0], *radius),
+            Shape::Capsule {
+                radius,
+                half_height,
+            } => (
+                Kind::Capsule,
+                [*radius, *half_height, 0.0],
+                radius + half_height,
+            ),
+            Shape::Box { half_extents } => {
+                let square: f64 = half_extents.iter().map(|h| h * h).sum();
+                (Kind::Box, *half_extents, square.sqrt())
+            }
+            Shape::Cylinder {
+                radius,
+                half_height,
+            } => (
+                Kind::Cylinder,
+                [*radius, *half_height, 0.0],
+                radius.hypot(*half_height),
+            ),
+            Shape::Mesh(mesh) => {
+                for hull in &mesh.hulls {
+                    pieces.push(piece(
+                        index,
+                        b,
+                        Kind::Hull,
+                        b.pose,
+                        [0.0; 3],
+                        0.0,
+                        hulls.len(),
+                    ));
+                    hulls.push(hull.clone());
+                }
+                continue;
+            }
+        };
+        pieces.push(piece(index, b, kind, b.pose, size, radius, 0));
+    }
+    let (tables, frames) = hull_tables::append(&hulls, &mut contacts.tables);
+    contacts.hulls = tables;
+    for piece in pieces
+        .iter_mut()
+        .filter(|piece| piece.solid.kind == Kind::Hull)
+    {
+        let frame = &frames[piece.hull];
+        piece.solid.center = shapes[piece.shape].pose.transform(frame.center);
+        piece.size = frame.half_extents;
+        piece.radius = frame.radius;
+    }
+    pieces
+}
+
+fn piece(
+    shape: usize,
+    b: &PlacedShape<'_>,
+    kind: Kind,
+    pose: Pose,
+    size: [f64; 3],
+    radius: f64,
+    hull: usize,
+) -> Piece {
+    let rows = pose.rotation();
+    let axes = std::array::from_fn(|c| std::array::from_fn(|r| rows[r][c]));
+    Piece {
+        shape,
+        solid: Solid {
+            kind,
+            shape: b.number,
+            body: b.body,
+            axes,
+            is_upright: axes == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            center: pose.pos,
+        },
+        size,
+        radius,
+        hull,
+    }
+}
+
+/// Pairs of pieces that may touch, the lower kind first.
+pub(super) fn pairs(
+    shapes: &[PlacedShape<'_>],
+    pieces: &[Piece],
+    rules: &Rules<'_>,
+    filtered: &BTreeSet<[usize; 2]>,
+) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    for (j, second) in pieces.iter().enumerate() {
+        for (i, first) in pieces[..j].iter().enumerate() {
+            let (a, b) = (&shapes[first.shape], &shapes[second.shape]);
+            let numbers = [a.number.min(b.number), a.number.max(b.number)];
+            if filtered.contains(&numbers) || !may_touch(a, b, rules) {
+                continue;
+            }
+            pairs.push(match first.solid.kind <= second.solid.kind {
+                true => (i, j),
+                false => (j, i),
+            });
+        }
+    }
+    pairs
+}
+
+fn may_touch(a: &PlacedShape<'_>, b: &PlacedShape<'_>, rules: &Rules<'_>) -> bool {
+    let moves = a.body.is_some() || b.body.is_some();
+    let is_one = a.group == b.group;
+    let of_one_robot = a.robot.is_some() && a.robot == b.robot;
+    let may_self = a.robot.is_some_and(|robot| rules.self_collisions[robot]);
+    let neighbours = [(a.group, b.group), (b.group, a.group)];
+    let connected = neighbours
+        .iter()
+        .any(|groups| rules.connected.contains(groups));
+    moves && !is_one && (!of_one_robot || may_self) && !connected && a.surface.meets(&b.surface)
+}

@@ -1,0 +1,238 @@
+//! Contacts of a scene: pairs of shapes, sorted into classes whose contacts depend on the same dofs.
+
+use super::clusters::clusters;
+use super::contact_pairs::ContactBuilder;
+use super::contact_pieces::{PlacedShape, Rules, contacts_of, pairs, pieces};
+use crate::description::Description;
+use crate::error::ModelError;
+use sim_physics::constants::contact::{Class, Column, Contacts, Group, Pair, Run, pair};
+use sim_physics::constants::{Constants, Coupled};
+use sim_physics::math::factor::Pattern;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Finds the pairs and sorts them into classes.
+pub(super) fn add_contacts(
+    constants: &mut Constants<f64>,
+    scene: &Description,
+    shapes: &[PlacedShape<'_>],
+    rules: &Rules<'_>,
+) -> Result<(), ModelError> {
+    let mut contacts = Contacts::none(scene.solver.cone, scene.solver.impratio);
+    let pieces = pieces(shapes, &mut contacts);
+    let filtered = scene.filtered_pairs()?;
+    let mut pairs = pairs(shapes, &pieces, rules, &filtered);
+    // by kind, then in scene order
+    pairs.sort_by_key(|&(a, b)| (pieces[a].solid.kind, pieces[b].solid.kind, a, b));
+    if pairs.is_empty() {
+        constants.contacts = contacts;
+        return Ok(());
+    }
+    let builder = ContactBuilder {
+        constants,
+        scene,
+        shapes,
+        pieces: &pieces,
+        rules,
+        clusters: clusters(constants, shapes.iter().filter_map(|shape| shape.body)),
+    };
+    let coupled = builder.fill(&mut contacts, &pairs);
+    contacts.solids = pieces.iter().map(|piece| piece.solid.clone()).collect();
+    constants.coupled = coupled;
+    constants.contacts = contacts;
+    Ok(())
+}
+
+impl ContactBuilder<'_> {
+    fn fill(&self, contacts: &mut Contacts<f64>, pairs: &[(usize, usize)]) -> Coupled {
+        let mut members: BTreeMap<(Option<usize>, usize), Vec<usize>> = BTreeMap::new();
+        for (p, &pair) in pairs.iter().enumerate() {
+            let sides = self.sides(pair);
+            let key = (
+                sides.first.map(|body| self.cluster(body)),
+                self.cluster(sides.second),
+            );
+            members.entry(key).or_default().push(p);
+        }
+        let keys: Vec<_> = members.keys().copied().collect();
+        let columns: Vec<Vec<(usize, bool)>> = keys.iter().map(|&key| self.columns(key)).collect();
+        let widest = columns.iter().map(Vec::len).max().unwrap_or(0);
+        let stride = pair::LEVERS + widest;
+        let mut numbers = vec![0.0; pairs.len() * stride];
+        let mut indices = vec![0; pairs.len() * pair::INDICES];
+        contacts.pairs = vec![
+            Pair {
+                shapes: [0; 2],
+                links: [None; 2],
+                class: 0
+            };
+            pairs.len()
+        ];
+        for (k, members) in members.values().enumerate() {
+            for &p in members {
+                let sides = self.sides(pairs[p]);
+                let row = &mut numbers[p * stride..(p + 1) * stride];
+                self.numbers(pairs[p], &sides, &columns[k], row);
+                let row = &mut indices[p * pair::INDICES..(p + 1) * pair::INDICES];
+                self.indices(pairs[p], &sides, k, row);
+                contacts.pairs[p] = self.names(pairs[p], &sides, k);
+            }
+        }
+        contacts.groups = self.groups(pairs);
+        let bounds: Vec<usize> = members
+            .values()
+            .map(|members| members.iter().map(|&p| self.bound(pairs[p])).sum())
+            .collect();
+        self.capacities(contacts, &bounds);
+        let mut first = 0;
+        for (k, members) in members.values().enumerate() {
+            let class = self.class(&columns[k], members, &numbers, stride, keys[k]);
+            let capacity = bounds[k].min(contacts.contacts_max);
+            contacts.classes.push(Class {
+                first,
+                capacity,
+                ..class
+            });
+            first += capacity;
+        }
+        // a backend that knows only the largest size of each class must provide this many rows
+        let [first_end, capacity_end] = contacts.row_ends();
+        let rows = first_end + capacity_end - 2;
+        self.lay_out(contacts, numbers, indices, stride, widest, rows);
+        let coupled = self.coupled(contacts);
+        for class in &mut contacts.classes {
+            let pattern = match class.couples {
+                true => &coupled.pattern,
+                false => &self.constants.pattern,
+            };
+            let columns = &class.columns;
+            for (row, entries) in columns.iter().zip(&mut class.entries) {
+                let place = |column: usize| (column, pattern.at(row.dof, columns[column].dof));
+                *entries = Run::of(entries.iter().flat_map(Run::columns).map(place));
+            }
+        }
+        coupled
+    }
+
+    /// Dofs of a class, rising, and whether they are of the first side's tree.
+    fn columns(&self, (first, second): (Option<usize>, usize)) -> Vec<(usize, bool)> {
+        let second = &self.clusters[second];
+        let mut columns: Vec<(usize, bool)> = second.dofs.iter().map(|&d| (d, false)).collect();
+        if let Some(first) = first.map(|first| &self.clusters[first]) {
+            let is_first = first.tree != second.tree;
+            let more = first.dofs.iter().filter(|d| !second.dofs.contains(d));
+            columns.extend(more.map(|&d| (d, is_first)));
+        }
+        columns.sort_unstable();
+        columns
+    }
+
+    fn bound(&self, (a, b): (usize, usize)) -> usize {
+        contacts_of((self.pieces[a].solid.kind, self.pieces[b].solid.kind))
+    }
+
+    fn groups(&self, pairs: &[(usize, usize)]) -> Vec<Group> {
+        let mut groups: Vec<Group> = Vec::new();
+        for (p, &(a, b)) in pairs.iter().enumerate() {
+            let kinds = (self.pieces[a].solid.kind, self.pieces[b].solid.kind);
+            match groups.last_mut() {
+                Some(group) if group.kinds == kinds => group.end = p + 1,
+                _ => groups.push(Group {
+                    kinds,
+                    first: p,
+                    end: p + 1,
+                }),
+            }
+        }
+        groups
+    }
+
+    fn class(
+        &self,
+        columns: &[(usize, bool)],
+        members: &[usize],
+        numbers: &[f64],
+        stride: usize,
+        (first, second): (Option<usize>, usize),
+    ) -> Class<f64> {
+        let number = |p: usize, k: usize| numbers[p * stride + k];
+        let shared = (0..pair::LEVERS + columns.len())
+            .map(|k| {
+                let x = number(members[0], k);
+                members
+                    .iter()
+                    .all(|&p| number(p, k).to_bits() == x.to_bits())
+                    .then_some(x)
+            })
+            .collect();
+        let mut entries = vec![Vec::new(); columns.len()];
+        let mut couples = false;
+        for (c, &(row, _)) in columns.iter().enumerate() {
+            for (o, &(column, _)) in columns[..=c].iter().enumerate() {
+                let both = |&p: &usize| {
+                    number(p, pair::LEVERS + c) != 0.0 && number(p, pair::LEVERS + o) != 0.0
+                };
+                if members.iter().any(both) {
+                    // the place is known when all classes are
+                    entries[c].push(Run {
+                        column: o,
+                        place: 0,
+                        len: 1,
+                    });
+                    couples |= self.constants.pattern.find(row, column).is_none();
+                }
+            }
+        }
+        let part = |&(dof, _): &(usize, bool)| self.constants.pattern.part_of(dof);
+        let parts: BTreeSet<usize> = columns.iter().map(part).collect();
+        Class {
+            trees: (
+                first.map(|first| self.clusters[first].tree),
+                self.clusters[second].tree,
+            ),
+            columns: columns
+                .iter()
+                .enumerate()
+                .map(|(c, &(dof, is_first))| Column {
+                    dof,
+                    is_first,
+                    lever: pair::LEVERS + c,
+                })
+                .collect(),
+            runs: Run::of(columns.iter().enumerate().map(|(c, &(dof, _))| (c, dof))),
+            entries,
+            couples,
+            parts: parts.into_iter().collect(),
+            shared,
+            first: 0,
+            capacity: 0,
+        }
+    }
+
+    /// The mass matrix's pattern with the couplings of contacts; empty if it has them all.
+    fn coupled(&self, contacts: &Contacts<f64>) -> Coupled {
+        if !contacts.couples() {
+            return Coupled::default();
+        }
+        let pattern = &self.constants.pattern;
+        let n = self.constants.dofs.len();
+        let own = (0..n).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        let own: Vec<_> = own.filter(|&(i, j)| pattern.find(i, j).is_some()).collect();
+        let more = contacts.classes.iter().flat_map(|class| {
+            let dof = |c: usize| class.columns[c].dof;
+            let pairs = class.entries.iter().enumerate();
+            pairs.flat_map(move |(c, entries)| {
+                let others = entries.iter().flat_map(Run::columns);
+                others.map(move |other| (dof(c), dof(other)))
+            })
+        });
+        let coupled = Pattern::new(n, own.iter().copied().chain(more));
+        let mut places = vec![0; pattern.len()];
+        for &(i, j) in &own {
+            places[pattern.at(i, j)] = coupled.at(i, j);
+        }
+        Coupled {
+            pattern: coupled,
+            places,
+        }
+    }
+}

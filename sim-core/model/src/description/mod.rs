@@ -1,0 +1,21 @@
+//! What users name and edit: a scene, its robots, their joints, and what is named in them.
+
+mod balance;
+mod dofs;
+mod frames;
+mod joint;
+mod param_draws;
+mod robot;
+mod scene;
+mod shapes;
+
+pub(crate) use crate::geometry::Shape;
+pub(crate) use crate::inertia::Inertial;
+pub(crate) use crate::joint_kind::JointKind;
+pub(crate) use frames::Bearer;
+pub use joint::{Joint, JointDof, Mimic, TargetMode};
+pub use param_draws::ParamDraw;
+pub(crate) use robot::BODY_LINK;
+pub use robot::{Collision, Link, Robot};
+pub use scene::{ContactSensor, Description, Site, Solver, StaticShape};
+pub(crate) use shapes::named;

@@ -1,0 +1,181 @@
+//! The model: what a simulation runs on.
+
+use crate::description::ParamDraw;
+use crate::distribution::Distribution;
+use sim_physics::constants::Constants;
+use sim_physics::constants::Sizes;
+use std::ops::Range;
+
+/// Where a robot's rows lie in the arrays of the scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RobotRange {
+    /// Name of the robot.
+    pub name: String,
+    /// Its columns of `(worlds, dofs)` arrays.
+    pub dofs: Range<usize>,
+    /// Its columns of `(worlds, coords)` arrays.
+    pub coords: Range<usize>,
+    /// Its columns of `(worlds, bodies, …)` arrays.
+    pub bodies: Range<usize>,
+}
+
+/// A scene that is ready to run: immutable, sorted, hashed.
+#[derive(Clone, Debug)]
+pub struct Model {
+    pub(crate) constants: Constants<f64>,
+    pub(crate) dt: f64,
+    pub(crate) substeps: usize,
+    pub(crate) dof_names: Vec<String>,
+    pub(crate) coord_names: Vec<String>,
+    pub(crate) body_names: Vec<String>,
+    pub(crate) shape_names: Vec<String>,
+    pub(crate) site_names: Vec<String>,
+    pub(crate) contact_sensors: Vec<SensedShapes>,
+    pub(crate) command_delay_max: usize,
+    pub(crate) robots: Vec<RobotRange>,
+    pub(crate) start: Start,
+    pub(crate) dof_inverse_weight: Vec<f64>,
+    pub(crate) hash: u64,
+}
+
+/// What a contact sensor adds up: forces on some shapes, from some.
+#[derive(Clone, Debug)]
+pub struct SensedShapes {
+    /// Its name.
+    pub name: String,
+    /// Per shape: whether forces on it count.
+    pub of: Vec<bool>,
+    /// Per shape: whether forces from it count.
+    pub against: Vec<bool>,
+}
+
+/// State and commands after a reset: positions per coordinate, the rest per dof.
+#[derive(Clone, Debug, Default)]
+pub struct Start {
+    /// [rad or m]
+    pub joint_q: Vec<f64>,
+    /// [rad or m]
+    pub joint_target_q: Vec<f64>,
+    /// [rad/s or m/s]
+    pub joint_target_qd: Vec<f64>,
+    /// What a reset draws and adds to the positions, as [`crate::JointDof::offset_q`] has it.
+    pub joint_q_offset: Vec<Option<Distribution>>,
+    /// What a reset draws and adds to the velocities, which are 0.
+    pub joint_qd_offset: Vec<Option<Distribution>>,
+    /// What a reset draws of the parameters.
+    pub params: Vec<ParamDraw>,
+}
+
+impl Model {
+    /// Constants that the kernel source reads, in f64.
+    pub fn constants(&self) -> &Constants<f64> {
+        &self.constants
+    }
+    /// Duration of one substep [s].
+    pub fn dt(&self) -> f64 {
+        self.dt
+    }
+    /// Substeps in a control frame.
+    pub fn substeps(&self) -> usize {
+        self.substeps
+    }
+    /// Names of the dofs, `robot/joint` or `robot/joint.part`.
+    pub fn dof_names(&self) -> &[String] {
+        &self.dof_names
+    }
+    /// Names of the position coordinates, `robot/joint` or `robot/joint.part`.
+    pub fn coord_names(&self) -> &[String] {
+        &self.coord_names
+    }
+    /// Names of the bodies, `robot/link`.
+    pub fn body_names(&self) -> &[String] {
+        &self.body_names
+    }
+    /// Names of the shapes, as [`crate::Description::shape_names`] has them.
+    pub fn shape_names(&self) -> &[String] {
+        &self.shape_names
+    }
+    /// Names of the sites.
+    pub fn site_names(&self) -> &[String] {
+        &self.site_names
+    }
+    /// What each contact sensor adds up.
+    pub fn contact_sensors(&self) -> &[SensedShapes] {
+        &self.contact_sensors
+    }
+    /// Largest delay of commands that a world may have [substeps].
+    pub fn command_delay_max(&self) -> usize {
+        self.command_delay_max
+    }
+    /// Each robot's part of the arrays.
+    pub fn robots(&self) -> &[RobotRange] {
+        &self.robots
+    }
+    /// Number of degrees of freedom.
+    pub fn dofs(&self) -> usize {
+        self.constants.dofs.len()
+    }
+    /// Number of position coordinates.
+    pub fn coords(&self) -> usize {
+        self.constants.coords
+    }
+    /// Number of bodies: links of all robots, fixed ones included.
+    pub fn bodies(&self) -> usize {
+        self.constants.frames.len()
+    }
+    /// Number of constraint rows: equalities, frictions, limits.
+    pub fn rows(&self) -> usize {
+        self.constants.rows()
+    }
+    /// Contacts that a world has room for.
+    pub fn contacts_max(&self) -> usize {
+        self.constants.contacts.contacts_max
+    }
+    /// How many of everything it has.
+    pub fn sizes(&self) -> Sizes {
+        Sizes {
+            dofs: self.dofs(),
+            coords: self.coords(),
+            bodies: self.bodies(),
+            rows: self.rows(),
+            contacts: self.contacts_max(),
+            shapes: self.shape_names.len(),
+            sites: self.site_names.len(),
+            contact_sensors: self.contact_sensors.len(),
+        }
+    }
+    /// State and commands after a reset.
+    pub fn start(&self) -> &Start {
+        &self.start
+    }
+    /// Diagonal of M⁻¹ at q = 0, MuJoCo's `dof_invweight0`. `(dofs)` [1/(kg·m²) or 1/kg]
+    pub fn dof_inverse_weight(&self) -> &[f64] {
+        &self.dof_inverse_weight
+    }
+    /// A number that differs between models that behave differently. Recordings store it.
+    pub fn hash(&self) -> u64 {
+        self.hash
+    }
+
+    /// FNV-1a over everything that a run depends on.
+    ///
+    /// It covers the `Debug` text, so names of types and fields in it are part of every recording.
+    pub(crate) fn own_hash(&self) -> u64 {
+        let text = format!(
+            "{:?} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {}",
+            self.constants,
+            self.dt,
+            self.substeps,
+            self.dof_names,
+            self.body_names,
+            self.start,
+            self.shape_names,
+            self.site_names,
+            self.contact_sensors,
+            self.command_delay_max
+        );
+        text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| {
+            (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
+        })
+    }
+}

@@ -1,0 +1,35 @@
+//! How a URDF file joins a scene.
+
+use std::path::PathBuf;
+
+use crate::geometry::MeshOptions;
+use crate::pose::Pose;
+
+/// How a URDF file joins a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct UrdfOptions {
+    /// Name of the robot in the scene; `None` takes the file's.
+    pub name: Option<String>,
+    /// Frame of the root link in the world.
+    pub pose: Pose,
+    /// Whether the root link moves freely.
+    pub floating: bool,
+    /// Whether its own links touch each other.
+    pub self_collisions: bool,
+    /// Whether an inertia that no body can have is refused; otherwise it is balanced, with a warning.
+    pub strict: bool,
+    /// How collision meshes become convex hulls.
+    pub meshes: MeshOptions,
+    /// Folders that hold the packages of `package://` paths.
+    pub package_dirs: Vec<PathBuf>,
+}
+
+impl UrdfOptions {
+    /// The defaults, under this name.
+    pub fn named(name: &str) -> UrdfOptions {
+        UrdfOptions {
+            name: Some(name.to_owned()),
+            ..UrdfOptions::default()
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! Checks of sites, contact sensors and the delay of commands.
+
+use super::shape::pose;
+use crate::description::{Description, named};
+use crate::error::ModelError;
+use crate::value_checks::{count, in_range, name, unique};
+
+/// Largest delay of commands [control frames].
+const DELAY_FRAMES_MAX: usize = 1000;
+/// Least and most damping of an inverse Jacobian [m and rad alike]: its square stays within `f32`, and so does what it is added to.
+const DAMPING: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
+
+impl Description {
+    pub(super) fn validate_sensors(&self) -> Result<(), ModelError> {
+        let sites = self.sites.iter().map(|site| site.name.as_str());
+        unique("scene", "site", sites).map_err(|(_, error)| error)?;
+        for site in &self.sites {
+            name("site", &site.name)?;
+            let what = format!("site `{}`", site.name);
+            pose(&what, &site.pose)?;
+            self.bearer(&what, site.body.as_deref())?;
+            self.frame(&what, site.relative_to.as_deref())?;
+            in_range(
+                &format!("{what}: damping"),
+                site.damping,
+                DAMPING.contains(&site.damping),
+                "it must be between 1e-6 and 1e6",
+            )?;
+        }
+        let sensors = self.contact_sensors.iter();
+        let names = sensors.clone().map(|sensor| sensor.name.as_str());
+        unique("scene", "contact sensor", names).map_err(|(_, error)| error)?;
+        let shapes = self.shape_names();
+        for sensor in sensors {
+            name("contact sensor", &sensor.name)?;
+            let what = format!("contact sensor `{}`", sensor.name);
+            named(&what, &sensor.of, &shapes)?;
+            if let Some(against) = &sensor.against {
+                named(&what, against, &shapes)?;
+            }
+        }
+        if let Some(most) = self.command_delay_max {
+            let rule = "it must be between 1 and 1000 control frames of substeps";
+            count(
+                "command_delay_max",
+                most,
+                DELAY_FRAMES_MAX * self.substeps,
+                rule,
+            )?;
+        }
+        Ok(())
+    }
+}
