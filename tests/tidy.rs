@@ -171,6 +171,76 @@ const ORDER: &[(&str, &[&str])] = &[
             "create",
         ],
     ),
+    (
+        "sim-daemon/picture/src",
+        &[
+            "vector", "view", "normals", "mesh", "clip", "cover", "threads", "project", "tile",
+            "rays", "outlines", "shadow", "shade", "marks", "renderer",
+        ],
+    ),
+    (
+        "sim-daemon/protocol/src",
+        &[
+            "header",
+            "journal_header",
+            "error",
+            "hash",
+            "description",
+            "control",
+            "hook",
+            "paths",
+            "daemon_lock",
+            "liveness",
+            "discovery",
+            "table",
+            "digest",
+            "transport",
+            "connection",
+            "heartbeat",
+            "affinity",
+            "waiter",
+            "command",
+            "memory",
+            "loaned",
+            "frame",
+            "controller",
+            "observer",
+            "journal",
+            "client",
+            "host",
+        ],
+    ),
+    (
+        "sim-daemon/src",
+        &[
+            "config",
+            "error",
+            "cli",
+            "environment",
+            "devices",
+            "inspect",
+            "refusal",
+            "snapshot",
+            "export",
+            "arrays",
+            "recording",
+            "observe",
+            "groups",
+            "log",
+            "fault_log",
+            "server",
+            "watchdog",
+            "session",
+            "commands",
+        ],
+    ),
+    (
+        "py-client/src",
+        &[
+            "errors", "parts", "input", "frame", "client", "scene", "dynamics", "arrays",
+            "picture", "observe", "random",
+        ],
+    ),
 ];
 
 /// The only door of each heavy package.
@@ -198,7 +268,7 @@ const DOORS: [(&str, &str); 20] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-const UNSAFE: [&str; 23] = [
+const UNSAFE: [&str; 24] = [
     "py-client/src/frame.rs",                      // NumPy views
     "sim-core/device/src/memory.rs",               // imports pages of the host
     "sim-core/device/src/portable.rs",             // programs without checks at run time
@@ -220,7 +290,8 @@ const UNSAFE: [&str; 23] = [
     "sim-core/physics/src/compiled.rs", // what only a processor with the instructions may run
     "sim-core/physics/src/lane/simd.rs", // intrinsics
     "sim-daemon/protocol/src/frame.rs", // views of a sample
-    "sim-daemon/protocol/src/loan.rs",  // loaned samples
+    "sim-daemon/protocol/src/loaned.rs", // loaned samples
+    "sim-daemon/src/environment.rs",    // a variable, set while there is one thread
     "sim-daemon/src/server.rs",         // samples that a device writes to
 ];
 

@@ -90,6 +90,7 @@ pub fn options(place: &Place, worlds: usize, fields: &[Field]) -> Options {
 }
 
 fn main() -> anyhow::Result<()> {
+    sim_daemon::environment::complete();
     let arguments = Arguments::parse();
     let info = chosen(arguments.adapter.as_deref())?;
     if let Some(folder) = &arguments.build_in {

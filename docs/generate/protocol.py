@@ -14,7 +14,7 @@ STRUCTS = (
     ("Header of a frame", HEADERS, "FrameHeader"),
     ("Reasons for a refusal", HEADERS, "RefusalKind"),
     ("Row of a field table", HEADERS, "Row"),
-    ("Header of a journal entry", "sim-daemon/protocol/src/journal.rs", "JournalHeader"),
+    ("Header of a journal entry", "sim-daemon/protocol/src/journal_header.rs", "JournalHeader"),
 )
 
 

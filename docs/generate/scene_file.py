@@ -35,7 +35,7 @@ class Table:
 TABLES = (
     Table(
         "The file itself",
-        "mod.rs",
+        "scene.rs",
         "SceneFile",
         (),
         "",
@@ -44,7 +44,7 @@ TABLES = (
     ),
     Table(
         "[solver]",
-        "mod.rs",
+        "scene.rs",
         "SolverTable",
         ("solver",),
         "[solver]\n",
@@ -117,7 +117,7 @@ TABLES = (
 )
 # Words that a key may be, and which key of which table.
 WORDS = (
-    ("mod.rs", "ConeName", "[solver]", "cone"),
+    ("scene.rs", "ConeName", "[solver]", "cone"),
     ("robots.rs", "ModeName", "[[robot]]", "joint_target_mode"),
     ("shapes.rs", "ShapeName", "[[shape]]", "type"),
     ("randomize.rs", "DistributionTable", "[randomize]", "distributions"),

@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 use sim_protocol::{AttachOptions, Client as Connection, Description, Hook, ProtocolError};
 
 use crate::errors::{protocol, raise};
-use crate::frame::Frame;
+use crate::frame::PyFrame;
 use crate::input::{Axis, Inputs, Mask, Seed};
 
 /// A connection to a daemon. `tightloop.Sim` wraps it, and documents its methods.
@@ -53,7 +53,7 @@ impl Client {
         joint_target_q: Option<&Bound<'_, PyAny>>,
         joint_target_qd: Option<&Bound<'_, PyAny>>,
         body_f: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Frame> {
+    ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
         let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], body_f)?;
         let commands = inputs.commands()?;
@@ -74,7 +74,7 @@ impl Client {
         waiting(py, |hook| connection.send(&commands, hook))
     }
 
-    fn recv(&self, py: Python<'_>) -> PyResult<Frame> {
+    fn recv(&self, py: Python<'_>) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
         frame(py, |hook| connection.recv(hook))
     }
@@ -85,7 +85,7 @@ impl Client {
         joint_q: Option<&Bound<'_, PyAny>>,
         joint_qd: Option<&Bound<'_, PyAny>>,
         mask: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Frame> {
+    ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
         let mut inputs = Inputs::new(&self.description);
         inputs.add("joint_q", Axis::Coords, joint_q)?;
@@ -101,7 +101,7 @@ impl Client {
         py: Python<'_>,
         params: &Bound<'_, PyDict>,
         mask: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Frame> {
+    ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
         let mut inputs = Inputs::new(&self.description);
         for (name, value) in params {
@@ -117,7 +117,7 @@ impl Client {
         py: Python<'_>,
         mask: Option<&Bound<'_, PyAny>>,
         seed: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Frame> {
+    ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
         let mask = Mask::new("mask", mask, self.description.worlds)?;
         let seed = Seed::new(seed, self.description.worlds)?;
@@ -125,12 +125,12 @@ impl Client {
         frame(py, |hook| connection.reset(mask, seed, hook))
     }
 
-    fn forward(&self, py: Python<'_>) -> PyResult<Frame> {
+    fn forward(&self, py: Python<'_>) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
         frame(py, |hook| connection.forward(hook))
     }
 
-    fn snapshot(&self, py: Python<'_>, path: &str) -> PyResult<Frame> {
+    fn snapshot(&self, py: Python<'_>, path: &str) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
         frame(py, |hook| connection.snapshot(path, hook))
     }
@@ -141,7 +141,7 @@ impl Client {
         path: &str,
         mask: Option<&Bound<'_, PyAny>>,
         from_world: Option<u64>,
-    ) -> PyResult<Frame> {
+    ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
         let mask = Mask::new("worlds", mask, self.description.worlds)?;
         let mask = mask.as_slice()?;
@@ -149,19 +149,19 @@ impl Client {
     }
 
     /// The newest frame that observers see and this client has not, or None.
-    fn latest(&self, py: Python<'_>) -> PyResult<Option<Frame>> {
+    fn latest(&self, py: Python<'_>) -> PyResult<Option<PyFrame>> {
         let connection = self.connection(py)?;
         let latest = py.detach(|| connection.latest());
         let latest = latest.map_err(|error| protocol(py, &error))?;
-        latest.map(|frame| Frame::new(py, frame)).transpose()
+        latest.map(|frame| PyFrame::new(py, frame)).transpose()
     }
 
     /// The same; waits for it as long as ``timeout`` [s].
-    fn wait_newer(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<Frame>> {
+    fn wait_newer(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<PyFrame>> {
         let connection = self.connection(py)?;
         let timeout = Duration::try_from_secs_f64(timeout).ok();
         let newer = waiting(py, |hook| connection.wait_newer(timeout, hook))?;
-        newer.map(|frame| Frame::new(py, frame)).transpose()
+        newer.map(|frame| PyFrame::new(py, frame)).transpose()
     }
 
     /// Process in control, if any.
@@ -230,11 +230,11 @@ impl Client {
     }
 }
 
-fn frame<F>(py: Python<'_>, call: F) -> PyResult<Frame>
+fn frame<F>(py: Python<'_>, call: F) -> PyResult<PyFrame>
 where
     F: FnOnce(Hook<'_>) -> Result<sim_protocol::Frame, ProtocolError> + Send,
 {
-    Frame::new(py, waiting(py, call)?)
+    PyFrame::new(py, waiting(py, call)?)
 }
 
 /// Runs a call that may wait, without the interpreter lock; Ctrl-C ends it with its exception.

@@ -27,15 +27,15 @@ pub(crate) struct Sample(sim_protocol::Frame);
 /// ``torch.from_dlpack`` and ``jax.device_put`` copy nothing, and what they return keeps the frame alive. torch knows no
 /// read-only memory: writing to such a tensor ends the process, so ``clone()`` it first. JAX copies 64-bit arrays unless
 /// it runs with ``jax_enable_x64``, and its ``from_dlpack`` refuses arrays that are read-only.
-#[pyclass(frozen, module = "tightloop")]
-pub(crate) struct Frame {
+#[pyclass(frozen, name = "Frame", module = "tightloop")]
+pub(crate) struct PyFrame {
     // not the frame itself, which keeps the arrays made so far: that would be a circle
     sample: Py<Sample>,
     arrays: Mutex<Made>,
 }
 
 #[pymethods]
-impl Frame {
+impl PyFrame {
     fn __getattr__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let sample = self.sample.bind(py);
         let view = sample
@@ -100,9 +100,9 @@ impl Frame {
     }
 }
 
-impl Frame {
-    pub(crate) fn new(py: Python<'_>, frame: sim_protocol::Frame) -> PyResult<Frame> {
-        Ok(Frame {
+impl PyFrame {
+    pub(crate) fn new(py: Python<'_>, frame: sim_protocol::Frame) -> PyResult<PyFrame> {
+        Ok(PyFrame {
             sample: Py::new(py, Sample(frame))?,
             arrays: Mutex::default(),
         })

@@ -9,7 +9,7 @@ mod dynamics;
 mod errors;
 mod frame;
 mod input;
-mod look;
+mod observe;
 mod parts;
 mod picture;
 mod random;
@@ -19,10 +19,16 @@ use std::ffi::OsString;
 
 use pyo3::prelude::*;
 
-/// Run the command line, such as ``["tightloop", "serve", "scene.toml"]``; returns its exit code.
+/// Run the command line of this process, such as ``["tightloop", "serve", "scene.toml"]``; returns its exit code.
+///
+/// Completes the environment of the process for graphics drivers.
 #[pyfunction]
-fn command_line(py: Python<'_>, arguments: Vec<OsString>) -> i32 {
-    py.detach(|| sim_daemon::serve(arguments))
+fn command_line(py: Python<'_>, arguments: Vec<OsString>) -> PyResult<i32> {
+    if let Some((name, value)) = sim_daemon::environment::missing() {
+        let environment = py.import("os")?.getattr("environ")?;
+        environment.set_item(name, value.as_os_str())?;
+    }
+    Ok(py.detach(|| sim_daemon::serve(arguments)))
 }
 
 #[pymodule(name = "_core")]
@@ -38,9 +44,9 @@ mod core {
     #[pymodule_export]
     use super::dynamics::Dynamics;
     #[pymodule_export]
-    use super::frame::{Frame, Sample};
+    use super::frame::{PyFrame, Sample};
     #[pymodule_export]
-    use super::look::{Evaluation, Playback};
+    use super::observe::{Evaluation, Playback};
     #[pymodule_export]
     use super::parts::parts;
     #[pymodule_export]

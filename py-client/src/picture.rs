@@ -133,6 +133,8 @@ impl Renderer {
             instances: &instances,
             lines: &lines,
             floor,
+            backdrop: None,
+            outlines: false,
             middle: [around[0], around[1], around[2]],
             reach: around[3],
         };

@@ -4,26 +4,23 @@ mod pages;
 mod python;
 
 use std::ffi::OsString;
-use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
-use sim_protocol::{AttachOptions, Client, keep_waiting};
 
 use crate::config::MeshOptions;
 use crate::error::DaemonError;
-use crate::{devices, inspect, recording, session};
 
 /// Step many robot worlds at once, and serve them over shared memory.
 #[derive(Debug, Parser)]
 #[command(name = "tightloop", version, propagate_version = true)]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: CliCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+pub(crate) enum CliCommand {
     /// Run the worlds of a scene and serve them to clients until stopped.
     ///
     /// Prints one line of JSON when clients can attach: {"ready": {…}}, or {"error": {"kind": …, "message": …}}.
@@ -263,60 +260,26 @@ pub(crate) struct Inspect {
     pub(crate) no_png: bool,
 }
 
-/// Runs a command line. Exit codes: 0 for success, 1 for failure, 2 for wrong usage.
-pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
-    let cli = match Cli::try_parse_from(args) {
-        Ok(cli) => cli,
+/// Parses a command line; where there is nothing to run, prints help or the mistake and returns the exit code.
+pub(crate) fn parse(args: impl IntoIterator<Item = OsString>) -> Result<CliCommand, i32> {
+    match Cli::try_parse_from(args) {
+        Ok(cli) => Ok(cli.command),
         Err(error) => {
             // help and version go to stdout with code 0, mistakes to stderr with code 2: clap knows
             let _ = error.print();
-            return error.exit_code();
-        }
-    };
-    let result = match &cli.command {
-        Command::Serve(serve) => session::run(serve),
-        Command::Inspect(args) => inspect::run(args),
-        Command::Record(args) => recording::record(args),
-        Command::Replay(args) => recording::replay(args),
-        Command::Devices => devices::run(),
-        Command::List => list(),
-        Command::Stop { name } => stop(name),
-        Command::Python(command) => command.run(),
-        Command::Completions { shell } => pages::completions(Cli::command(), *shell),
-        Command::Man { folder } => pages::man(Cli::command(), folder.as_deref()),
-    };
-    match result {
-        Ok(()) => 0,
-        Err(error) => {
-            // whoever launched us reads it from our line on stdout
-            if !matches!(&cli.command, Command::Serve(serve) if serve.parent.is_some()) {
-                let _ = writeln!(std::io::stderr(), "tightloop: {error}");
-            }
-            error.exit_code()
+            Err(error.exit_code())
         }
     }
 }
 
-fn list() -> Result<(), DaemonError> {
-    for name in sim_protocol::running(None)? {
-        // whoever reads our list may stop reading
-        if writeln!(std::io::stdout(), "{name}").is_err() {
-            break;
-        }
-    }
-    Ok(())
+/// Prints the completions of a shell.
+pub(crate) fn completions(shell: pages::Shell) -> Result<(), DaemonError> {
+    pages::completions(Cli::command(), shell)
 }
 
-fn stop(name: &str) -> Result<(), DaemonError> {
-    let options = AttachOptions::default();
-    // any of its groups ends a daemon
-    let name = match sim_protocol::find(name, &options, &mut keep_waiting())?.groups {
-        1 => name.to_owned(),
-        _ => format!("{name}.0"),
-    };
-    let client = Client::attach(&name, &options, &mut keep_waiting())?;
-    client.shutdown(&mut keep_waiting())?;
-    Ok(())
+/// Prints the manual page, or writes the pages of all commands into a folder.
+pub(crate) fn man(folder: Option<&Path>) -> Result<(), DaemonError> {
+    pages::man(Cli::command(), folder)
 }
 
 #[cfg(test)]
@@ -331,18 +294,16 @@ mod tests {
     #[test]
     fn without_python_its_commands_say_what_is_missing() {
         let line = ["tightloop", "film", "run.tlrec", "run.mp4"];
-        let Ok(Cli {
-            command: Command::Python(python),
-        }) = Cli::try_parse_from(line)
-        else {
+        let Ok(CliCommand::Python(python)) = parse(line.map(OsString::from)) else {
             panic!("film is a command of Python");
         };
-        let said = python.run().unwrap_err().to_string();
+        let error = python.run().unwrap_err();
+        let said = error.to_string();
         assert!(
             said.contains("`film`") && said.contains("pip install"),
             "{said}"
         );
-        assert_eq!(run(line.map(OsString::from)), 1);
+        assert_eq!(error.exit_code(), 1);
     }
 
     #[test]

@@ -36,7 +36,7 @@ pub enum DaemonError {
     /// The simulation cannot be built.
     #[error(transparent)]
     Backend(#[from] BackendError),
-    /// The wire fails.
+    /// The protocol fails.
     #[error(transparent)]
     Protocol(#[from] ProtocolError),
     /// The log file cannot be written.

@@ -1,21 +1,17 @@
-//! Between physics and wire: the only file that knows both sim-core and sim-protocol.
+//! Between physics and protocol: the only file that knows both sim-core and sim-protocol.
 
-use sim_engine::backend::{BackendError, Input, Values};
+use sim_engine::backend::{Input, Values};
 use sim_engine::simulation::{Options, Precision, Simulation};
 use sim_model::{Description as Scene, Model};
 use sim_physics::arrays::{Dtype, Field, FieldDtype, FieldRow, Group, Layout};
 use sim_physics::constants::params::Param;
 use sim_protocol::host::{Inbox, Numbers};
-use sim_protocol::{self as wire, InputInfo, Op, ParamInfo, RefusalKind, RobotRange, Row, Table};
+use sim_protocol::{
+    self as protocol, InputInfo, Op, ParamInfo, RefusalKind, RobotRange, Row, Table,
+};
 
+use crate::refusal::{Refusal, refusal};
 use crate::snapshot;
-
-/// Why a command is not carried out; nothing was changed.
-#[derive(Debug)]
-pub(crate) struct Refusal {
-    pub(crate) kind: RefusalKind,
-    pub(crate) reason: String,
-}
 
 /// What remains to be done for a frame once the inputs are set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,8 +20,8 @@ pub(crate) enum Advance {
     Forward,
 }
 
-/// What there is to say about a run besides its model.
-pub(crate) struct Facts<'a> {
+/// Facts about a run besides its model.
+pub(crate) struct RunInfo<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) scene_text: String,
     pub(crate) scene_folder: String,
@@ -45,13 +41,13 @@ pub(crate) fn frame_table(layout: &Layout) -> Table {
     Table::over_arena(slots, layout.bytes)
 }
 
-/// What clients are told; the host adds who it is.
+/// The description for clients; the host adds name, session and process.
 pub(crate) fn description(
     model: &Model,
     options: &Options,
     layout: &Layout,
-    facts: Facts<'_>,
-) -> wire::Description {
+    info: RunInfo<'_>,
+) -> protocol::Description {
     let real = real(options.precision);
     let input = |group| {
         let rows = Field::ALL
@@ -65,7 +61,7 @@ pub(crate) fn description(
         })
         .collect()
     };
-    wire::Description {
+    protocol::Description {
         protocol: 0,
         release: String::new(),
         name: String::new(),
@@ -75,14 +71,14 @@ pub(crate) fn description(
         group: 0,
         groups: 1,
         first_world: options.first_world,
-        device: facts.device,
+        device: info.device,
         adapter: String::new(),
         delivery: "direct".to_owned(),
         precision: precision_name(options.precision).to_owned(),
-        threads: facts.threads,
+        threads: info.threads,
         dt: model.dt(),
         substeps: model.substeps(),
-        gravity: facts.scene.gravity,
+        gravity: info.scene.gravity,
         dof_names: model.dof_names().to_vec(),
         coord_names: model.coord_names().to_vec(),
         body_names: model.body_names().to_vec(),
@@ -137,12 +133,12 @@ pub(crate) fn description(
                 info: param_info(model, param),
             })
             .to_vec(),
-        scene: facts.scene_text,
-        scene_folder: facts.scene_folder,
+        scene: info.scene_text,
+        scene_folder: info.scene_folder,
         model_hash: model.hash(),
-        notes: notes(facts.scene),
-        frames_held: facts.frames_held,
-        watch_worlds: facts.watch_worlds.min(options.worlds),
+        notes: notes(info.scene),
+        frames_held: info.frames_held,
+        watch_worlds: info.watch_worlds.min(options.worlds),
         watch_state_bytes: 0,
         joint_q_max: bound(options.faults.joint_q_max),
         joint_qd_max: bound(options.faults.joint_qd_max),
@@ -194,13 +190,13 @@ fn notes(scene: &Scene) -> Vec<String> {
     notes
 }
 
-fn field_info(row: &FieldRow, dtype: wire::Dtype, shape: Vec<usize>) -> wire::FieldInfo {
+fn field_info(row: &FieldRow, dtype: protocol::Dtype, shape: Vec<usize>) -> protocol::FieldInfo {
     let axes = row
         .shape
         .iter()
         .map(|axis| format!(", {}", axis.name()))
         .collect::<String>();
-    wire::FieldInfo {
+    protocol::FieldInfo {
         name: row.name.to_owned(),
         dtype,
         shape,
@@ -222,21 +218,21 @@ pub(crate) fn precision_name(precision: Precision) -> &'static str {
     }
 }
 
-fn real(precision: Precision) -> wire::Dtype {
+fn real(precision: Precision) -> protocol::Dtype {
     match precision {
-        Precision::F32 => wire::Dtype::F32,
-        Precision::F64 => wire::Dtype::F64,
+        Precision::F32 => protocol::Dtype::F32,
+        Precision::F64 => protocol::Dtype::F64,
     }
 }
 
-fn dtype(dtype: Dtype) -> wire::Dtype {
+fn dtype(dtype: Dtype) -> protocol::Dtype {
     match dtype {
-        Dtype::F32 => wire::Dtype::F32,
-        Dtype::F64 => wire::Dtype::F64,
-        Dtype::I32 => wire::Dtype::I32,
-        Dtype::U32 => wire::Dtype::U32,
-        Dtype::U64 => wire::Dtype::U64,
-        Dtype::U8 => wire::Dtype::U8,
+        Dtype::F32 => protocol::Dtype::F32,
+        Dtype::F64 => protocol::Dtype::F64,
+        Dtype::I32 => protocol::Dtype::I32,
+        Dtype::U32 => protocol::Dtype::U32,
+        Dtype::U64 => protocol::Dtype::U64,
+        Dtype::U8 => protocol::Dtype::U8,
     }
 }
 
@@ -355,23 +351,4 @@ fn input<'a>(
         }
     };
     Ok((array, row.start..end, values))
-}
-
-pub(crate) fn refusal(kind: RefusalKind, reason: String) -> Refusal {
-    Refusal { kind, reason }
-}
-
-impl From<BackendError> for Refusal {
-    fn from(error: BackendError) -> Refusal {
-        let kind = match error {
-            BackendError::NotFinite { .. } => RefusalKind::NotFinite,
-            BackendError::Columns { .. }
-            | BackendError::Length { .. }
-            | BackendError::Mask { .. }
-            | BackendError::Seeds { .. } => RefusalKind::Shape,
-            BackendError::Group { .. } | BackendError::Constant { .. } => RefusalKind::Field,
-            _ => RefusalKind::Backend,
-        };
-        refusal(kind, error.to_string())
-    }
 }

@@ -1,19 +1,23 @@
-//! The process that keeps the worlds: it reads a scene, builds a simulation, and serves it to clients until stopped. It also tells what a
-//! robot file means.
+//! The process that keeps the worlds: it reads a scene, builds a simulation, and serves it to clients until stopped. It also reports
+//! what a robot file means.
 //!
 //! [`serve`] is the whole command line as one function, so that a Python wheel can carry it.
 
+mod arrays;
 mod cli;
+mod commands;
 pub mod config;
 mod devices;
+pub mod environment;
 mod error;
 mod export;
-mod faults;
+mod fault_log;
 mod groups;
 mod inspect;
-pub mod look;
-mod news;
+mod log;
+pub mod observe;
 mod recording;
+mod refusal;
 mod server;
 mod session;
 mod snapshot;
@@ -25,9 +29,9 @@ pub use error::DaemonError;
 
 /// Runs the command line `args` (the program's name first) and returns its exit code: 0 done, 1 failed, 2 misused.
 ///
-/// Where a driver was given up and compiles yet, it ends the process with that code itself.
+/// If a driver thread is still compiling then, it ends the process with that code itself.
 pub fn serve(args: impl IntoIterator<Item = OsString>) -> i32 {
-    let code = cli::run(args);
+    let code = commands::run(args);
     sim_engine::options::leave(code);
     code
 }

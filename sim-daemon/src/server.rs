@@ -7,9 +7,10 @@ use sim_protocol::host::{Host, Next, Worlds};
 use sim_protocol::{Op, RefusalKind};
 
 use crate::error::DaemonError;
-use crate::export::{self, Advance, Refusal, refusal};
-use crate::faults::FaultNews;
-use crate::news::News;
+use crate::export::{self, Advance};
+use crate::fault_log::FaultLog;
+use crate::log::Log;
+use crate::refusal::{Refusal, refusal};
 
 #[cfg(test)]
 mod tests;
@@ -18,24 +19,24 @@ mod tests;
 pub(crate) fn run(
     mut simulation: Simulation,
     host: &mut Host,
-    news: &mut News,
+    log: &mut Log,
 ) -> Result<(), DaemonError> {
-    let mut faults = FaultNews::default();
-    let result = serve(&mut simulation, host, news, &mut faults);
-    faults.end(&mut simulation, news);
+    let mut faults = FaultLog::default();
+    let result = serve(&mut simulation, host, log, &mut faults);
+    faults.end(&mut simulation, log);
     result
 }
 
 fn serve(
     simulation: &mut Simulation,
     host: &mut Host,
-    news: &mut News,
-    faults: &mut FaultNews,
+    log: &mut Log,
+    faults: &mut FaultLog,
 ) -> Result<(), DaemonError> {
     let mut mask = Vec::with_capacity(simulation.worlds());
     let mut scratch = Vec::new();
     let mut lease = 0;
-    let mut is_told = false;
+    let mut is_reported = false;
     let watched = host.description().watch_worlds;
     loop {
         let next = host.wait()?;
@@ -70,9 +71,9 @@ fn serve(
                     }
                     Err(refusal) => host.refuse(refusal.kind, &refusal.reason),
                 }
-                faults.tell(simulation, news, started);
+                faults.report(simulation, log, started);
             }
-            Next::Watch => {
+            Next::Observe => {
                 // nobody steps now, so there is time to evaluate what observers have not seen
                 scratch.resize(simulation.layout().bytes.div_ceil(8), 0);
                 let mut shown = Shown {
@@ -82,18 +83,18 @@ fn serve(
                     watched,
                 };
                 host.show(&mut scratch, &mut shown);
-                faults.tell(simulation, news, Instant::now());
+                faults.report(simulation, log, Instant::now());
             }
             Next::Record => record_state(simulation, host, false),
             Next::End => return Ok(()),
         }
         // whoever waited has a frame, and need not wait for this
-        if !is_told && let Some(lost) = simulation.lost() {
-            news.tell(&format!(
+        if !is_reported && let Some(lost) = simulation.lost() {
+            log.write(&format!(
                 "all worlds are lost, and commands are refused from now on: {lost}"
             ));
             host.end_records(&format!("all worlds are lost: {lost}"));
-            is_told = true;
+            is_reported = true;
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A daemon from start to end: check the arguments, read the scene, build the simulation, open the wire, serve, clean up.
+//! A daemon from start to end: check the arguments, read the scene, build the simulation, open its services, serve, clean up.
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -9,17 +9,17 @@ use serde_json::json;
 use sim_engine::options::{self, Adapter};
 use sim_engine::simulation::{Device, Draws, Faults, Lanes, Options, Precision, Simulation};
 use sim_physics::arrays::Field;
+use sim_protocol::daemon_lock::DaemonLock;
 use sim_protocol::host::{Host, check_memory};
-use sim_protocol::place::Place;
-use sim_protocol::tenancy::Tenancy;
+use sim_protocol::paths::DaemonPaths;
 use sim_protocol::{Description, ProtocolError, Table};
 
 use crate::cli::Serve;
 use crate::config::{self, SceneFile};
 use crate::error::DaemonError;
-use crate::export::{self, Facts};
+use crate::export::{self, RunInfo};
 use crate::groups;
-use crate::news::News;
+use crate::log::Log;
 use crate::server;
 use crate::watchdog::Watchdog;
 
@@ -30,8 +30,8 @@ const GROUPS_MAX: u64 = 64;
 
 /// Runs `tightloop serve`: from the arguments to the last cleaning. Prints one line to stdout when ready or failed.
 pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
-    let mut news =
-        News::open(serve.log.as_deref(), serve.parent.is_some()).inspect_err(announce_error)?;
+    let mut log =
+        Log::open(serve.log.as_deref(), serve.parent.is_some()).inspect_err(announce_error)?;
     // from here on, a request to stop is carried out as soon as that is clean
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [
@@ -53,20 +53,25 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
         is_ready: false,
         bytes: 0,
         session: 0,
-        news: news.clone(),
+        log: log.clone(),
     });
     let result = groups::serve_all(groups, &stop, |number, group: Group| {
-        let mut news = match group.told.groups {
-            1 => news.clone(),
-            _ => news.of_group(number),
+        let mut log = match group.announced.groups {
+            1 => log.clone(),
+            _ => log.for_group(number),
         };
-        let mut host = Host::open(group.tenancy, group.told, group.table, Arc::clone(&stop))?;
-        let watchdog = Watchdog::start(Arc::clone(&stop), serve.parent, host.janitor())?;
+        let mut host = Host::open(
+            group.daemon_lock,
+            group.announced,
+            group.table,
+            Arc::clone(&stop),
+        )?;
+        let watchdog = Watchdog::start(Arc::clone(&stop), serve.parent, host.client_cleanup())?;
         door.lock()
             .unwrap_or_else(PoisonError::into_inner)
             .open(&host)?;
-        let result = server::run(group.simulation, &mut host, &mut news);
-        // its janitor must not look at the shared folder while the host takes that away
+        let result = server::run(group.simulation, &mut host, &mut log);
+        // its cleanup must not read the shared folder while the host removes it
         drop(watchdog);
         result
     });
@@ -75,8 +80,8 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
     // the daemon's name goes after those of its groups
     drop(door);
     match &result {
-        Ok(()) => news.tell("ended"),
-        Err(error) => news.tell(&format!("failed: {error}")),
+        Ok(()) => log.write("ended"),
+        Err(error) => log.write(&format!("failed: {error}")),
     }
     if let Err(error) = &result {
         if !was_ready {
@@ -92,34 +97,34 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
 /// A daemon before its first client may come.
 struct Opened {
     /// Of the daemon's name, where its groups have names of their own.
-    daemon: Option<Tenancy>,
+    daemon: Option<DaemonLock>,
     groups: Vec<Group>,
 }
 
 /// A group of worlds before it is served.
 struct Group {
-    tenancy: Tenancy,
+    daemon_lock: DaemonLock,
     simulation: Simulation,
-    told: Description,
+    announced: Description,
     table: Table,
 }
 
 /// What is said when the last group is open.
 struct Door {
-    daemon: Option<Tenancy>,
+    daemon: Option<DaemonLock>,
     /// Groups that are not open yet.
     closed: usize,
-    /// All were told.
+    /// The line for clients was printed.
     is_ready: bool,
     /// Shared memory of those that are.
     bytes: u64,
     /// Of the first group's run.
     session: u64,
-    news: News,
+    log: Log,
 }
 
 impl Door {
-    /// A group is open. After the last one, all who wait for the daemon are told.
+    /// A group is open. After the last one, the daemon announces that it is ready.
     fn open(&mut self, host: &Host) -> Result<(), DaemonError> {
         let description = host.description();
         self.closed -= 1;
@@ -135,7 +140,7 @@ impl Door {
             None => &description.name,
             Some(daemon) => {
                 daemon.announce(self.session, groups)?;
-                daemon.place().name()
+                daemon.paths().name()
             }
         };
         let worlds = description.worlds * groups;
@@ -143,7 +148,7 @@ impl Door {
             1 => String::new(),
             _ => format!(" in {groups} groups"),
         };
-        self.news.tell(&format!(
+        self.log.write(&format!(
             "{name}: {worlds} worlds{among} on {}, {} threads, {:.0} MB of shared memory; pid {}",
             description.device,
             description.threads,
@@ -153,7 +158,7 @@ impl Door {
         description
             .notes
             .iter()
-            .for_each(|note| self.news.tell(note));
+            .for_each(|note| self.log.write(note));
         announce(&json!({ "ready": {
             "name": name,
             "pid": description.pid,
@@ -164,31 +169,31 @@ impl Door {
             "device": description.device,
             "precision": description.precision,
             "threads": description.threads,
-            "root": host.tenancy().place().root(),
+            "root": host.daemon_lock().paths().root(),
         }}));
         self.is_ready = true;
         Ok(())
     }
 }
 
-/// Everything before the first client may come, but for the wire.
+/// Everything before the first client may come, except the services.
 fn open(serve: &Serve) -> Result<Opened, DaemonError> {
     // of each group
     let options = check(serve)?;
     let count = serve.groups as usize;
-    let place = Place::new(None, &serve.name)?;
-    if place.is_group() {
+    let paths = DaemonPaths::new(None, &serve.name)?;
+    if paths.is_group() {
         let name = serve.name.clone();
         let problem = "a name with a number after a dot is that of a group";
         return Err(ProtocolError::BadName { name, problem }.into());
     }
     sim_protocol::sweep(None)?;
-    let tenancy = Tenancy::take(&place)?;
-    let (daemon, tenancies) = match count {
-        1 => (None, vec![tenancy]),
+    let daemon_lock = DaemonLock::take(&paths)?;
+    let (daemon, locks) = match count {
+        1 => (None, vec![daemon_lock]),
         _ => {
-            let taken = (0..count).map(|group| Tenancy::take(&place.group(group)?));
-            (Some(tenancy), taken.collect::<Result<Vec<_>, _>>()?)
+            let taken = (0..count).map(|group| DaemonLock::take(&paths.group(group)?));
+            (Some(daemon_lock), taken.collect::<Result<Vec<_>, _>>()?)
         }
     };
 
@@ -200,7 +205,7 @@ fn open(serve: &Serve) -> Result<Opened, DaemonError> {
     let layout = Simulation::layout_of(&model, &options);
     let table = export::frame_table(&layout);
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    let facts = Facts {
+    let info = RunInfo {
         scene: &description,
         scene_text: scene.to_toml(),
         scene_folder: folder.to_string_lossy().into_owned(),
@@ -209,32 +214,33 @@ fn open(serve: &Serve) -> Result<Opened, DaemonError> {
         frames_held: serve.frames_held,
         watch_worlds: serve.watch_worlds,
     };
-    let mut told = export::description(&model, &options, &layout, facts);
-    told.groups = count;
+    let mut announced = export::description(&model, &options, &layout, info);
+    announced.groups = count;
     // before anything large is taken: memory that is missing kills instead of failing
-    check_memory(&told, &table, Simulation::memory_of(&model, &options))?;
+    check_memory(&announced, &table, Simulation::memory_of(&model, &options))?;
     let simulations = Simulation::groups(model, &options, count)?;
-    told.state_bytes = simulations[0].snapshot_bytes(told.worlds) as u64;
-    told.watch_state_bytes = simulations[0].snapshot_bytes(told.watch_worlds) as u64;
+    announced.state_bytes = simulations[0].snapshot_bytes(announced.worlds) as u64;
+    announced.watch_state_bytes = simulations[0].snapshot_bytes(announced.watch_worlds) as u64;
     // again with what observers see, of all groups before the first one opens; the worlds have their memory
-    check_memory(&told, &table, 0)?;
-    let group = |(number, (tenancy, simulation)): (usize, (Tenancy, Simulation))| {
-        let mut told = told.clone();
-        (told.group, told.first_world) = (number, number * options.worlds);
-        (told.device, told.threads) = (simulation.device().to_owned(), simulation.threads());
-        told.adapter = simulation.adapter().to_owned();
-        told.delivery = simulation.delivery().to_owned();
+    check_memory(&announced, &table, 0)?;
+    let group = |(number, (daemon_lock, simulation)): (usize, (DaemonLock, Simulation))| {
+        let mut announced = announced.clone();
+        (announced.group, announced.first_world) = (number, number * options.worlds);
+        (announced.device, announced.threads) =
+            (simulation.device().to_owned(), simulation.threads());
+        announced.adapter = simulation.adapter().to_owned();
+        announced.delivery = simulation.delivery().to_owned();
         if let (Some(why), true) = (simulation.device_note(), serve.device == "auto") {
-            told.notes.push(format!("device auto is {why}"));
+            announced.notes.push(format!("device auto is {why}"));
         }
         Group {
-            tenancy,
+            daemon_lock,
             simulation,
-            told,
+            announced,
             table: table.clone(),
         }
     };
-    let groups = tenancies.into_iter().zip(simulations);
+    let groups = locks.into_iter().zip(simulations);
     Ok(Opened {
         daemon,
         groups: groups.enumerate().map(group).collect(),

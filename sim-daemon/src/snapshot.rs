@@ -8,7 +8,7 @@ use sim_engine::simulation::Simulation;
 use sim_protocol::RefusalKind;
 use sim_protocol::host::{Inbox, free_memory};
 
-use crate::export::{Refusal, refusal};
+use crate::refusal::{Refusal, refusal};
 
 const MB: u64 = 1 << 20;
 

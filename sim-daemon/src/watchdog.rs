@@ -5,7 +5,7 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use sim_protocol::host::Janitor;
+use sim_protocol::host::ClientCleanup;
 
 use crate::error::DaemonError;
 
@@ -26,7 +26,7 @@ impl Watchdog {
     pub(crate) fn start(
         stop: Arc<AtomicBool>,
         parent: Option<u32>,
-        janitor: Janitor,
+        cleanup: ClientCleanup,
     ) -> Result<Watchdog, DaemonError> {
         let end = Arc::new((Mutex::new(false), Condvar::new()));
         let theirs = Arc::clone(&end);
@@ -39,7 +39,7 @@ impl Watchdog {
                     stop.store(true, Ordering::Relaxed);
                 }
                 if cleaned.elapsed() >= CLEAN_PERIOD {
-                    janitor.clean();
+                    cleanup.clean();
                     cleaned = Instant::now();
                 }
                 let period = if parent.is_some() {
@@ -72,7 +72,7 @@ impl Drop for Watchdog {
         *self.end.0.lock().unwrap_or_else(PoisonError::into_inner) = true;
         self.end.1.notify_all();
         if let Some(thread) = self.thread.take() {
-            // a panic there has been told on stderr already
+            // a panic there has been printed on stderr already
             let _ = thread.join();
         }
     }

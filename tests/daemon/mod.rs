@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
 use sim_protocol::{
-    AttachOptions, Client, ProtocolError, cleanup_after_death, keep_waiting, place,
+    AttachOptions, Client, ProtocolError, cleanup_after_death, keep_waiting, paths,
 };
 
 /// Holds the command line of a daemon, separated by line breaks, in the process that is to be one.
@@ -164,17 +164,17 @@ pub fn unique(name: &str) -> String {
 
 /// Files of a name: its lock, and what begins with its stem in shared memory.
 pub fn leftovers(name: &str) -> Vec<String> {
-    let place = place::Place::new(None, name).unwrap();
-    let mut found: Vec<String> = std::fs::read_dir(place::SHARED_MEMORY)
+    let daemon = paths::DaemonPaths::new(None, name).unwrap();
+    let mut found: Vec<String> = std::fs::read_dir(paths::SHARED_MEMORY)
         .unwrap()
         .filter_map(|entry| entry.unwrap().file_name().into_string().ok())
-        .filter(|file| file.starts_with(place.stem()))
+        .filter(|file| file.starts_with(daemon.stem()))
         .collect();
     found.extend(
-        place
+        daemon
             .lock_path()
             .exists()
-            .then(|| place.lock_path().display().to_string()),
+            .then(|| daemon.lock_path().display().to_string()),
     );
     found
 }

@@ -191,9 +191,9 @@ fn a_name_is_used_once_and_an_unknown_one_is_answered_with_the_known() {
 #[test]
 fn another_protocol_version_is_refused_with_both_named() {
     let name = unique("version");
-    let place = sim_protocol::place::Place::new(None, &name).unwrap();
-    std::fs::write(place.lock_path(), "tightloop 99 4711 00000000000000aa\n").unwrap();
-    let file = std::fs::File::open(place.lock_path()).unwrap();
+    let daemon = sim_protocol::paths::DaemonPaths::new(None, &name).unwrap();
+    std::fs::write(daemon.lock_path(), "tightloop 99 4711 00000000000000aa\n").unwrap();
+    let file = std::fs::File::open(daemon.lock_path()).unwrap();
     file.lock().unwrap();
     let error = attach(&name).unwrap_err();
     assert!(

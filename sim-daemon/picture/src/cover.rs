@@ -18,7 +18,7 @@ pub(crate) fn floor(x: f32) -> i32 {
 /// x, y, which samples are inside, and three times the weight of each corner at each sample: numbers that add up to
 /// twice the triangle's area, which comes last.
 #[inline(always)]
-pub fn cover<const SAMPLES: usize>(
+pub(crate) fn cover<const SAMPLES: usize>(
     [a, b, c]: &[[i64; 2]; 3],
     samples: &[[i64; 2]; SAMPLES],
     columns: Range<i64>,

@@ -5,14 +5,15 @@
 //!
 //! mesh (what is drawn) → project (where its triangles fall, tile by tile) → tile (who is seen) → shade (in what light),
 //! with shadows from a second, smaller picture as the light sees it, and marks (lines and dots) on top.
-//! `tightloop inspect` draws its page with the same view, normals and cover.
 
 mod clip;
 mod cover;
 mod marks;
 mod mesh;
 mod normals;
+mod outlines;
 mod project;
+mod rays;
 mod renderer;
 mod shade;
 mod shadow;
@@ -23,10 +24,8 @@ mod tile;
 pub mod vector;
 mod view;
 
-pub use cover::cover;
 pub use marks::Line;
 pub use mesh::{Mesh, MeshError};
-pub use normals::corner_normals;
 pub use renderer::{Instance, Renderer, Shot};
 pub use view::View;
 

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use crate::normals::corner_normals;
+use crate::vector::{cross, dot};
 
 /// Cells along the longest side of a mesh in its coarser copies.
 const COARSER: [f32; 4] = [128.0, 64.0, 32.0, 16.0];
@@ -37,7 +38,7 @@ impl std::error::Error for MeshError {}
 pub struct Mesh {
     /// From fine to coarse.
     pub(crate) levels: Vec<Level>,
-    /// Whether it has an inside, so that no triangle is seen from behind.
+    /// Whether it has an inside and faces outwards, so that no triangle is seen from behind.
     pub(crate) closed: bool,
     /// A ball around it, its frame.
     pub(crate) centre: [f32; 3],
@@ -98,7 +99,7 @@ impl Mesh {
         let (welded, corners) = merged(vertices, triangles, |v| {
             v.map(|part| (part + 0.0).to_bits())
         });
-        let closed = is_closed(&corners);
+        let closed = is_closed(&corners) && volume(&welded, &corners) > 0.0;
         let finest = Level::new(0.0, welded, &corners, colours);
         let side = (0..3)
             .map(|axis| high[axis] - low[axis])
@@ -215,6 +216,22 @@ fn merged(
         .map(|corners| corners.map(|vertex| number[vertex as usize]))
         .collect();
     (means, corners)
+}
+
+/// What closed triangles that face outwards enclose, as tetrahedra from the first vertex; negative where they face inwards.
+fn volume(vertices: &[[f32; 3]], corners: &[[u32; 3]]) -> f64 {
+    let Some(origin) = vertices.first() else {
+        return 0.0;
+    };
+    let from_origin = |vertex: u32| {
+        let vertex = vertices[vertex as usize];
+        std::array::from_fn(|axis| f64::from(vertex[axis]) - f64::from(origin[axis]))
+    };
+    let tetrahedra = corners.iter().map(|corners| {
+        let [a, b, c] = corners.map(from_origin);
+        dot(a, cross(b, c)) / 6.0
+    });
+    tetrahedra.sum()
 }
 
 /// Whether each edge belongs to two triangles, which run along it in opposite directions.

@@ -9,7 +9,7 @@ const FAN_MAX: usize = 128;
 
 /// Normal at each corner of each triangle: the mean of the facets around that vertex that form one smooth surface with
 /// this one, weighted by area; parts in 32767ths.
-pub fn corner_normals(vertices: &[Vector], triangles: &[[u32; 3]]) -> Vec<[[i16; 3]; 3]> {
+pub(crate) fn corner_normals(vertices: &[Vector], triangles: &[[u32; 3]]) -> Vec<[[i16; 3]; 3]> {
     // twice the area along the normal
     let areas: Vec<Vector> = triangles
         .iter()

@@ -4,7 +4,9 @@ use crate::clip::NEAREST;
 use crate::cover::SUB;
 use crate::marks::{Line, Mark};
 use crate::mesh::Mesh;
+use crate::outlines::{self, Surface};
 use crate::project::{Chunk, Lens, Placed, TILE, find, project};
+use crate::rays::{Ray, Rays};
 use crate::shade::{FILL, Ground, KEY, Light, Lights, Look, colour, light, mix};
 use crate::shadow::Shadow;
 use crate::tile::{FLOOR, NOBODY, SAMPLES, Seen, seen};
@@ -31,7 +33,7 @@ pub struct Instance {
 /// What a picture shows, and from where.
 #[derive(Clone, Debug)]
 pub struct Shot<'a> {
-    /// The camera; it has perspective, and the size of the picture.
+    /// The camera, with the size of the picture. Lines and the floor need perspective.
     pub view: View,
     /// Meshes at their places.
     pub instances: &'a [Instance],
@@ -39,6 +41,10 @@ pub struct Shot<'a> {
     pub lines: &'a [Line],
     /// Height of the floor and the distance of the lines on it [m].
     pub floor: Option<[f64; 2]>,
+    /// What is behind everything, row by row from the top, and what the floor fades into; the sky if left out.
+    pub backdrop: Option<&'a [Rgb]>,
+    /// Whether dark lines part the meshes from each other and from what is behind.
+    pub outlines: bool,
     /// What matters lies around here [m]: the floor fades beyond, and there are no shadows.
     pub middle: Vector,
     /// Within this distance [m].
@@ -75,7 +81,7 @@ impl Renderer {
     /// A picture, row by row from the top.
     ///
     /// # Panics
-    /// An instance names a mesh that is not there.
+    /// An instance names a mesh that is not there, or the backdrop has fewer pixels than the picture.
     pub fn render(&self, shot: &Shot) -> Vec<Rgb> {
         let view = &shot.view;
         let (width, height) = (view.width as usize, view.height as usize);
@@ -83,7 +89,7 @@ impl Renderer {
             width,
             height,
             half: 0.5 * width.max(height) as f32,
-            perspective: true,
+            perspective: view.perspective,
             nearest: (f64::from(NEAREST) * shot.reach) as f32,
         };
         // what a pixel-wide step is per metre ahead, over half the longer side
@@ -100,25 +106,43 @@ impl Renderer {
             let corner = [tile % columns * TILE, tile / columns * TILE];
             stage.tile(&chunks, tile, corner)
         });
-        let mut pixels = vec![[0; 3]; width * height];
-        for (tile, colours) in tiles.iter().enumerate() {
-            let (left, top) = (tile % columns * TILE, tile / columns * TILE);
-            let wide = TILE.min(width - left);
-            for (row, colours) in colours.chunks_exact(TILE).enumerate() {
-                let Some(start) = (top + row < height).then(|| (top + row) * width + left) else {
-                    break;
-                };
-                pixels[start..start + wide].copy_from_slice(&colours[..wide]);
-            }
+        let size = [width, height];
+        let mut pixels = joined(size, [0; 3], tiles.iter().map(|(colours, _)| &colours[..]));
+        if shot.outlines {
+            let tiles = tiles.iter().map(|(_, surfaces)| &surfaces[..]);
+            let surfaces = joined(size, [Surface::NONE; 4], tiles);
+            outlines::draw(&mut pixels, &surfaces, width);
         }
         pixels
     }
 }
 
+/// The pixels of a picture out of those of its tiles.
+fn joined<'a, T: Copy + 'a>(
+    [width, height]: [usize; 2],
+    empty: T,
+    tiles: impl Iterator<Item = &'a [T]>,
+) -> Vec<T> {
+    let columns = width.div_ceil(TILE);
+    let mut pixels = vec![empty; width * height];
+    for (tile, part) in tiles.enumerate() {
+        let (left, top) = (tile % columns * TILE, tile / columns * TILE);
+        let wide = TILE.min(width - left);
+        for (row, part) in part.chunks_exact(TILE).enumerate().take(height - top) {
+            let start = (top + row) * width + left;
+            pixels[start..start + wide].copy_from_slice(&part[..wide]);
+        }
+    }
+    pixels
+}
+
 /// All that the pixels of a picture are made of.
 struct Stage<'a> {
-    /// Line of sight of the first pixel's corner, 1 m into the picture, and how it changes to the right and down, a pixel.
-    rays: [[f32; 3]; 3],
+    rays: Rays,
+    width: usize,
+    height: usize,
+    backdrop: Option<&'a [Rgb]>,
+    outlines: bool,
     placed: Vec<Placed<'a>>,
     looks: Vec<Look>,
     lights: Lights,
@@ -128,7 +152,7 @@ struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    fn new(renderer: &'a Renderer, shot: &Shot, lens: &Lens, camera: [Vector; 3]) -> Stage<'a> {
+    fn new(renderer: &'a Renderer, shot: &Shot<'a>, lens: &Lens, camera: [Vector; 3]) -> Stage<'a> {
         let view = shot.view;
         let key = unit(KEY);
         // the light's picture: a square around what matters, as seen along the light
@@ -152,7 +176,11 @@ impl<'a> Stage<'a> {
             let translucent = instance.opacity < 1.0 || mesh.translucent;
             let ahead = dot(ball, view.into);
             // the nearest of it decides how coarse it may be
-            let pixel = (ahead - radius).max(f64::from(lens.nearest)) / view.scale;
+            let nearest = match view.perspective {
+                true => (ahead - radius).max(f64::from(lens.nearest)),
+                false => 1.0,
+            };
+            let pixel = nearest / view.scale;
             if !translucent && is_shading(&light_world, ball, radius) {
                 let texel = (2.0 * shot.reach / crate::shadow::SIDE as f64) as f32;
                 casters.push(Placed {
@@ -196,7 +224,11 @@ impl<'a> Stage<'a> {
             ends.map(|end| camera.map(|axis| dot(axis, sub(end, view.eye)) as f32))
         };
         Stage {
-            rays: rays(&view),
+            rays: Rays::new(&view),
+            width: lens.width,
+            height: lens.height,
+            backdrop: shot.backdrop,
+            outlines: shot.outlines,
             placed,
             looks,
             floor: ground.as_ref().map(|ground| floor_near(&view, ground)),
@@ -214,8 +246,13 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// The colours of a tile, row by row.
-    fn tile(&self, chunks: &[Chunk], tile: usize, corner: [usize; 2]) -> Vec<Rgb> {
+    /// The colours of a tile, row by row, and its surfaces where these are outlined.
+    fn tile(
+        &self,
+        chunks: &[Chunk],
+        tile: usize,
+        corner: [usize; 2],
+    ) -> (Vec<Rgb>, Vec<[Surface; 4]>) {
         let mut empty = Seen::new();
         if let Some([first, right, down]) = self.floor {
             for (pixel, near) in empty.near.iter_mut().enumerate() {
@@ -263,19 +300,24 @@ impl<'a> Stage<'a> {
         for mark in &self.marks {
             mark.draw(&mut lights, &opaque.near, corner);
         }
-        lights.into_iter().map(colour).collect()
+        let surfaces = match self.outlines {
+            true => outlines::surfaces(&opaque, chunks),
+            false => Vec::new(),
+        };
+        (lights.into_iter().map(colour).collect(), surfaces)
     }
 
     /// Light from what is seen at a place of a pixel, and its opacity.
     fn light(&self, chunks: &[Chunk], who: u32, at: [usize; 2], within: [f32; 2]) -> (Light, f32) {
         let [x, y] = [at[0] as f32 + within[0], at[1] as f32 + within[1]];
-        let [first, right, down] = &self.rays;
-        let ray = |x: f32, y: f32| std::array::from_fn(|k| first[k] + x * right[k] + y * down[k]);
         match who {
-            NOBODY => (self.lights.sky(ray(x, y)), 1.0),
+            NOBODY => (self.behind(&self.rays.at(x, y), at), 1.0),
             FLOOR => {
-                let beside = [ray(x + 1.0, y), ray(x, y + 1.0)];
-                (self.lights.floor(ray(x, y), beside), 1.0)
+                let ray = self.rays.at(x, y);
+                let beside = [self.rays.at(x + 1.0, y), self.rays.at(x, y + 1.0)];
+                let behind = self.behind(&ray, at);
+                let towards = beside.map(|ray| ray.towards);
+                (self.lights.floor(ray.towards, towards, behind), 1.0)
             }
             number => {
                 let triangle = find(chunks, number);
@@ -284,8 +326,18 @@ impl<'a> Stage<'a> {
                 let face = &level.faces[triangle.face as usize];
                 let vertices = face.corners.map(|vertex| level.vertices[vertex as usize]);
                 let look = &self.looks[placed];
-                self.lights.surface(look, face, vertices, ray(x, y))
+                self.lights
+                    .surface(look, face, vertices, self.rays.at(x, y))
             }
+        }
+    }
+
+    /// Light from behind everything at a pixel.
+    fn behind(&self, ray: &Ray, [x, y]: [usize; 2]) -> Light {
+        match self.backdrop {
+            // tiles reach beyond the picture's lower right edges
+            Some(pixels) if x < self.width && y < self.height => light(pixels[y * self.width + x]),
+            _ => self.lights.sky(ray.towards),
         }
     }
 }
@@ -367,11 +419,16 @@ fn is_shading(rows: &[[f64; 4]; 3], ball: Vector, radius: f64) -> bool {
 fn is_ahead(view: &View, ball: Vector, radius: f64) -> bool {
     let ahead = dot(ball, view.into);
     let within = |axis: Vector, half: f64| {
+        let aside = dot(ball, axis).abs();
+        if !view.perspective {
+            return aside <= half / view.scale + radius;
+        }
         // the edge of the picture is a plane through the eye
         let tangent = half / view.scale;
-        dot(ball, axis).abs() - tangent * ahead <= radius * (1.0 + tangent * tangent).sqrt()
+        aside - tangent * ahead <= radius * (1.0 + tangent * tangent).sqrt()
     };
-    ahead > -radius && within(view.right, 0.5 * view.width) && within(view.up, 0.5 * view.height)
+    let is_before = !view.perspective || ahead > -radius;
+    is_before && within(view.right, 0.5 * view.width) && within(view.up, 0.5 * view.height)
 }
 
 fn ground(shot: &Shot, [height, spacing]: [f64; 2]) -> Option<Ground> {
@@ -386,17 +443,6 @@ fn ground(shot: &Shot, [height, spacing]: [f64; 2]) -> Option<Ground> {
         middle: std::array::from_fn(|axis| (shot.middle[axis] - eye[axis]) as f32),
         reach: shot.reach as f32,
     })
-}
-
-fn rays(view: &View) -> [[f32; 3]; 3] {
-    let right = view.right.map(|part| part / view.scale);
-    let down = view.up.map(|part| -part / view.scale);
-    let first = along(
-        along(view.into, -0.5 * view.width, right),
-        -0.5 * view.height,
-        down,
-    );
-    [first, right, down].map(|ray| ray.map(|part| part as f32))
 }
 
 /// 1 over the distance ahead is z of the ray over the floor's height, and a ray grows evenly over the picture.

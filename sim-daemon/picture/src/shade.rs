@@ -6,6 +6,7 @@
 use crate::Rgb;
 use crate::cover::floor;
 use crate::mesh::Face;
+use crate::rays::Ray;
 use crate::shadow::Shadow;
 
 pub(crate) type Light = [f32; 3];
@@ -116,28 +117,28 @@ pub(crate) struct Lights {
 }
 
 impl Lights {
-    /// Light from a face on a ray from the eye, and its opacity.
+    /// Light from a face on a line of sight, and its opacity.
     pub fn surface(
         &self,
         look: &Look,
         face: &Face,
         vertices: [[f32; 3]; 3],
-        ray: [f32; 3],
+        Ray { from, towards: ray }: Ray,
     ) -> (Light, f32) {
         // where the ray meets the plane of the triangle (Möller and Trumbore 1997), in the mesh's frame
         let towards = look.local(ray);
-        let eye = look.local(look.origin).map(|part| -part);
+        let eye = look.local(sub(from, look.origin));
         let [a, b, c] = vertices;
         let (first, second) = (sub(b, a), sub(c, a));
         let aside = cross(towards, second);
         let scale = dot(first, aside);
-        let from = sub(eye, a);
-        let over = cross(from, first);
+        let start = sub(eye, a);
+        let over = cross(start, first);
         // at its rim a sample may be beside the triangle by a rounding
         let (u, v) = if scale == 0.0 {
             (0.0, 0.0)
         } else {
-            let u = (dot(from, aside) / scale).clamp(0.0, 1.0);
+            let u = (dot(start, aside) / scale).clamp(0.0, 1.0);
             (u, (dot(towards, over) / scale).clamp(0.0, 1.0 - u))
         };
         let at = along(along(a, u, first), v, second);
@@ -198,13 +199,14 @@ impl Lights {
         mix(HORIZON, SKY, rise)
     }
 
-    /// Light from the floor on a ray; the other two are those of the next pixels.
-    pub fn floor(&self, ray: [f32; 3], beside: [[f32; 3]; 2]) -> Light {
+    /// Light from the floor on a ray from the eye, which fades into the light `behind`; the other two rays are those of the
+    /// next pixels.
+    pub fn floor(&self, ray: [f32; 3], beside: [[f32; 3]; 2], behind: Light) -> Light {
         let Some(ground) = &self.ground else {
-            return self.sky(ray);
+            return behind;
         };
         if ray[2] >= 0.0 {
-            return self.sky(ray);
+            return behind;
         }
         let on = |ray: [f32; 3]| {
             let time = ground.height / ray[2].min(-1e-6);
@@ -215,7 +217,7 @@ impl Lights {
         let away = length(point[0] - ground.middle[0], point[1] - ground.middle[1]);
         let fade = smooth_step(1.2, 3.2, away / ground.reach);
         if fade >= 1.0 {
-            return self.sky(ray);
+            return behind;
         }
         let mut own = FLOOR;
         for axis in 0..2 {
@@ -241,7 +243,7 @@ impl Lights {
         let shadow = self.shadow.light(at, self.shadow.texel);
         let lit = own.map(|part| part * (0.52 + 0.48 * shadow));
         if fade > 0.0 {
-            mix(lit, self.sky(ray), fade)
+            mix(lit, behind, fade)
         } else {
             lit
         }

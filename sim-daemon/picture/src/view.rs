@@ -166,29 +166,4 @@ impl View {
             near,
         ]
     }
-
-    /// What a step in `near` of [`View::project`] is worth in depth, where `near` has this value.
-    pub fn depth_of_near(&self, near: f64) -> f64 {
-        if self.perspective {
-            1.0 / (near * near)
-        } else {
-            1.0
-        }
-    }
-
-    /// Where the line of sight through a place of the panel [pixels] meets the horizontal plane at `z` [m], if ahead.
-    pub fn on_plane(&self, x: f64, y: f64, z: f64) -> Option<[f64; 2]> {
-        let right = (x - 0.5 * self.width) / self.scale;
-        let up = (0.5 * self.height - y) / self.scale;
-        let (from, ray) = if self.perspective {
-            (self.eye, self.world([right, up, 1.0]))
-        } else {
-            let aside = self.world([right, up, 0.0]);
-            (along(self.eye, 1.0, aside), self.into)
-        };
-        let time = (z - from[2]) / ray[2];
-        let point = along(from, time, ray);
-        // a plane that is seen edge-on has no place, and one behind the eye is not seen
-        (time.is_finite() && (time > 0.0 || !self.perspective)).then_some([point[0], point[1]])
-    }
 }

@@ -1,39 +1,21 @@
 //! A client: attaches to a running daemon, observes it, and controls it when it holds the lease.
 
-use std::ops::ControlFlow;
-use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::command::{Call, Command};
+use crate::connection::{ANSWER_MAX, Connection, S, lock, malformed};
 use crate::control::{Request, Response};
 use crate::controller::Controller;
-use crate::find::find;
+use crate::discovery::{AttachOptions, find};
 use crate::frame::Alive;
+use crate::hook::Hook;
 use crate::journal::Journal;
-use crate::link::{ANSWER_MAX, Link, S, lock, malformed};
 use crate::liveness::Peer;
 use crate::observer::Observer;
-use crate::place::{Place, Presence};
-use crate::transport::{self, facts};
+use crate::paths::{DaemonPaths, Presence};
+use crate::transport::{self, handshake};
 use crate::{Description, Frame, Op, PROTOCOL_VERSION, ProtocolError};
-
-/// Called at least every 50 ms while a call waits; `Break` ends the call with [`ProtocolError::Interrupted`].
-pub type Hook<'a> = &'a mut dyn FnMut() -> ControlFlow<()>;
-
-/// A [`Hook`] that never interrupts.
-pub fn keep_waiting() -> impl FnMut() -> ControlFlow<()> {
-    || ControlFlow::Continue(())
-}
-
-/// How to attach.
-#[derive(Debug, Clone, Default)]
-pub struct AttachOptions {
-    /// Root folder; [`crate::place::default_root`] when `None`.
-    pub root: Option<PathBuf>,
-    /// How long to wait for a daemon that does not run yet.
-    pub wait: Duration,
-}
 
 /// A connection to a daemon. All methods take `&self`, from any thread; calls that step wait for each other.
 #[derive(Debug)]
@@ -42,7 +24,7 @@ pub struct Client {
     controller: Mutex<Option<Controller>>,
     observer: Mutex<Option<Observer>>,
     frames: Arc<Alive>,
-    link: Arc<Link>,
+    connection: Arc<Connection>,
     process: u32,
 }
 
@@ -62,8 +44,8 @@ impl Client {
             let (name, groups) = (name.to_owned(), beacon.groups);
             return Err(ProtocolError::Grouped { name, groups });
         }
-        let place = Place::new(options.root.as_deref(), name)?;
-        let peer = Peer { place, beacon };
+        let paths = DaemonPaths::new(options.root.as_deref(), name)?;
+        let peer = Peer { paths, beacon };
         let client = Client::handshake(peer.clone(), hook);
         // a daemon that ended meanwhile explains any failure better than the failure does
         if client.is_err() {
@@ -74,10 +56,10 @@ impl Client {
 
     fn handshake(peer: Peer, hook: Hook<'_>) -> Result<Client, ProtocolError> {
         let node =
-            transport::node::<S>(&peer.place.transport_config(peer.beacon.session), "client")?;
-        let name = peer.place.name().to_owned();
+            transport::node::<S>(&peer.paths.transport_config(peer.beacon.session), "client")?;
+        let name = peer.paths.name().to_owned();
         let wake = transport::open_wake(&node, &name)?;
-        let announced = transport::attribute(&wake, facts::PROTOCOL);
+        let announced = transport::attribute(&wake, handshake::PROTOCOL);
         if announced != PROTOCOL_VERSION.to_string() {
             let described = PROTOCOL_VERSION.to_string();
             return Err(ProtocolError::Handshake {
@@ -87,29 +69,29 @@ impl Client {
                 described,
             });
         }
-        let link = Link {
+        let connection = Connection {
             peer,
             wake: transport::notifier(&wake)?,
             requester: Mutex::new(transport::requester(&node)?),
             node: Mutex::new(node),
         };
-        let Response::Description(description) = link.ask(&Request::Describe, hook)? else {
+        let Response::Description(description) = connection.ask(&Request::Describe, hook)? else {
             return Err(malformed("the answer to describe"));
         };
         for (fact, key, described) in [
             (
                 "schema hash",
-                facts::SCHEMA,
+                handshake::SCHEMA,
                 format!("{:016x}", description.schema_hash()),
             ),
             (
                 "number of worlds",
-                facts::WORLDS,
+                handshake::WORLDS,
                 description.worlds.to_string(),
             ),
             (
                 "number of dofs",
-                facts::DOFS,
+                handshake::DOFS,
                 description.dof_names.len().to_string(),
             ),
         ] {
@@ -128,7 +110,7 @@ impl Client {
             controller: Mutex::new(None),
             observer: Mutex::new(None),
             frames: Alive::new(),
-            link: Arc::new(link),
+            connection: Arc::new(connection),
             process: std::process::id(),
         })
     }
@@ -143,7 +125,7 @@ impl Client {
     /// # Errors
     /// [`ProtocolError::DaemonLost`] and its kin.
     pub fn controller(&self, hook: Hook<'_>) -> Result<Option<u32>, ProtocolError> {
-        match self.link.ask(&Request::Controller, hook)? {
+        match self.connection.ask(&Request::Controller, hook)? {
             Response::Controller { pid } => Ok(pid),
             _ => Err(malformed("the answer to controller")),
         }
@@ -179,7 +161,7 @@ impl Client {
     }
 
     fn take_lease(&self, hook: Hook<'_>) -> Result<Controller, ProtocolError> {
-        Controller::acquire(&self.link, &self.description, &self.frames, hook)
+        Controller::acquire(&self.connection, &self.description, &self.frames, hook)
     }
 
     /// Gives the lease back, so that another client can take it. Does nothing without one. Frames stay valid.
@@ -353,12 +335,12 @@ impl Client {
         let mut observer = lock(&self.observer);
         let observer = match &mut *observer {
             Some(observer) => observer,
-            empty => empty.insert(Observer::open(&self.link, &self.description)?),
+            empty => empty.insert(Observer::open(&self.connection, &self.description)?),
         };
         call(observer)
     }
 
-    /// Subscribes to every command that the daemon carries out from now on, by whomever it is given, with digests of its
+    /// Subscribes to every command that the daemon carries out from now on, from any client, with digests of its
     /// frame and the arrays of `fields`.
     ///
     /// # Errors
@@ -366,7 +348,7 @@ impl Client {
     /// when there are as many recorders as a daemon serves; [`ProtocolError::DaemonLost`] and its kin.
     pub fn journal(&self, fields: &[String], hook: Hook<'_>) -> Result<Journal, ProtocolError> {
         self.check_process()?;
-        Journal::open(&self.link, &self.description, fields, hook)
+        Journal::open(&self.connection, &self.description, fields, hook)
     }
 
     /// Lets a test send what it likes through the ports of the lease, and reads the answer.
@@ -386,7 +368,7 @@ impl Client {
     /// # Errors
     /// [`ProtocolError::DaemonLost`], [`ProtocolError::DaemonRestarted`].
     pub fn check_alive(&self) -> Result<(), ProtocolError> {
-        self.link.peer.check()
+        self.connection.peer.check()
     }
 
     /// Ends the daemon, with all of its groups, and returns when it is gone and has left nothing behind.
@@ -396,21 +378,21 @@ impl Client {
     pub fn shutdown(&self, hook: Hook<'_>) -> Result<(), ProtocolError> {
         self.release();
         lock(&self.observer).take();
-        match self.link.ask(&Request::Shutdown, hook) {
+        match self.connection.ask(&Request::Shutdown, hook) {
             Ok(_)
             | Err(ProtocolError::DaemonLost { .. } | ProtocolError::DaemonRestarted { .. }) => {}
             Err(error) => return Err(error),
         }
         let start = Instant::now();
         // the daemon goes after its groups
-        let (peer, daemon) = (&self.link.peer, self.link.peer.place.daemon()?);
-        let runs = |place: &Place| match place.presence() {
+        let (peer, daemon) = (&self.connection.peer, self.connection.peer.paths.daemon()?);
+        let runs = |paths: &DaemonPaths| match paths.presence() {
             Presence::Running(beacon) => beacon.pid == peer.beacon.pid,
             _ => false,
         };
         while self.check_alive().is_ok() || runs(&daemon) {
             if start.elapsed() > ANSWER_MAX {
-                return Err(self.link.peer.timeout(ANSWER_MAX));
+                return Err(self.connection.peer.timeout(ANSWER_MAX));
             }
             if hook().is_break() {
                 return Err(ProtocolError::Interrupted);
@@ -445,7 +427,7 @@ impl Drop for Client {
                     .unwrap_or_else(PoisonError::into_inner)
                     .take(),
             );
-            std::mem::forget(Arc::clone(&self.link));
+            std::mem::forget(Arc::clone(&self.connection));
         }
     }
 }

@@ -6,18 +6,18 @@ use std::time::{Duration, Instant};
 use iceoryx2::port::listener::Listener;
 use iceoryx2::prelude::PortFactory;
 
-use crate::apart::Apart;
-use crate::client::Hook;
+use crate::affinity::CoreAffinity;
 use crate::command::{Call, command_bytes};
+use crate::connection::{Connection, S, malformed};
 use crate::control::{Request, Response};
 use crate::frame::{Alive, FrameSample};
-use crate::heart::Heart;
-use crate::host::memory::reserve;
-use crate::link::{Link, S, malformed};
+use crate::heartbeat::HeartbeatThread;
+use crate::hook::Hook;
 use crate::liveness::Peer;
-use crate::loan;
-use crate::pace::{Pace, Waiting, cores};
+use crate::loaned;
+use crate::memory::reserve;
 use crate::transport::{self, CommandPublisher, FrameService, FrameSubscriber};
+use crate::waiter::{Awaited, Waiter, cores};
 use crate::{ALIGNMENT, CommandHeader, Description, Frame, Op, ProtocolError, RefusalKind, Table};
 
 /// A step that takes longer than this is taken for a daemon that stands.
@@ -37,14 +37,14 @@ enum Flight {
 /// A held lease.
 #[derive(Debug)]
 pub(crate) struct Controller {
-    link: Arc<Link>,
+    connection: Arc<Connection>,
     description: Arc<Description>,
     epoch: u64,
     seq: u64,
     flight: Flight,
     /// One an operation, and the last for steps of which the caller did something else meanwhile.
-    paces: [Pace; Op::ALL.len() + 1],
-    apart: Apart,
+    waiters: [Waiter; Op::ALL.len() + 1],
+    affinity: CoreAffinity,
     table: Option<Arc<Table>>,
     frames: Arc<Alive>,
     publisher: CommandPublisher<S>,
@@ -52,18 +52,18 @@ pub(crate) struct Controller {
     listener: Listener<S>,
     service: FrameService<S>,
     /// Last, so that it ends last: the daemon must not think us gone before the ports are.
-    _heart: Heart,
+    _heartbeat: HeartbeatThread,
 }
 
 impl Controller {
     pub(crate) fn acquire(
-        link: &Arc<Link>,
+        connection: &Arc<Connection>,
         description: &Arc<Description>,
         frames: &Arc<Alive>,
         hook: Hook<'_>,
     ) -> Result<Controller, ProtocolError> {
-        let name = || link.peer.place.name().to_owned();
-        let epoch = match link.ask(
+        let name = || connection.peer.paths.name().to_owned();
+        let epoch = match connection.ask(
             &Request::Acquire {
                 pid: std::process::id(),
             },
@@ -73,7 +73,7 @@ impl Controller {
             Response::Held { pid } => return Err(ProtocolError::LeaseHeld { name: name(), pid }),
             Response::NoMemory { free, needed } => {
                 let (path, what) = (
-                    crate::place::SHARED_MEMORY.to_owned(),
+                    crate::paths::SHARED_MEMORY.to_owned(),
                     "the frames of a new lease".to_owned(),
                 );
                 return Err(ProtocolError::SharedMemory {
@@ -90,7 +90,7 @@ impl Controller {
             _ => return Err(malformed("the answer to acquire")),
         };
         let bytes = command_bytes(description);
-        let ports = link.with_node(|node| {
+        let ports = connection.with_node(|node| {
             let service = transport::open_frames(node, epoch)?;
             let event = transport::open_event(node, &format!("obs/{epoch}"))?;
             let subscriber = transport::frame_subscriber(&service, 0)?;
@@ -105,28 +105,28 @@ impl Controller {
         let (service, subscriber, listener, publisher) = match ports {
             Ok(ports) => ports,
             Err(error) => {
-                link.tell(&Request::Release { epoch });
-                link.peer.check()?;
+                connection.post(&Request::Release { epoch });
+                connection.peer.check()?;
                 return Err(error);
             }
         };
         // the daemon's step needs its threads, and we spin on one more
         let free_core = cores() > description.busy_threads();
         Ok(Controller {
-            link: Arc::clone(link),
+            connection: Arc::clone(connection),
             description: Arc::clone(description),
             epoch,
             seq: 0,
             flight: Flight::Landed,
-            paces: std::array::from_fn(|_| Pace::new(free_core)),
-            apart: Apart::new(),
+            waiters: std::array::from_fn(|_| Waiter::new(free_core)),
+            affinity: CoreAffinity::new(),
             table: None,
             frames: Arc::clone(frames),
             publisher,
             subscriber,
             listener,
             service,
-            _heart: Heart::start(link, epoch),
+            _heartbeat: HeartbeatThread::start(connection, epoch),
         })
     }
 
@@ -150,7 +150,7 @@ impl Controller {
     /// Waits for the frame of the step that was sent.
     pub(crate) fn recv(&mut self, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
         if self.flight != Flight::Sent {
-            self.link.peer.check()?;
+            self.connection.peer.check()?;
             return Err(ProtocolError::NothingSent);
         }
         let sample = self.answer(Op::ALL.len(), hook)?;
@@ -164,7 +164,7 @@ impl Controller {
             Flight::Landed => {}
             Flight::Sent => {
                 // that the daemon is lost explains more
-                self.link.peer.check()?;
+                self.connection.peer.check()?;
                 return Err(ProtocolError::StepInFlight);
             }
             Flight::Abandoned(op) => drop(self.answer(op as usize - 1, hook)?),
@@ -180,8 +180,8 @@ impl Controller {
     ) -> Result<Frame, ProtocolError> {
         self.seq += 1;
         send(&self.publisher, self.seq);
-        self.link.notify();
-        let sample = self.answer(Op::Step as usize - 1, &mut crate::keep_waiting())?;
+        self.connection.notify();
+        let sample = self.answer(Op::Step as usize - 1, &mut crate::hook::keep_waiting())?;
         self.open(sample)
     }
 
@@ -194,37 +194,39 @@ impl Controller {
             .map_err(|error| failed(&error))?;
         self.seq += 1;
         *loan.user_header_mut() = CommandHeader {
-            session: self.link.peer.beacon.session,
+            session: self.connection.peer.beacon.session,
             epoch: self.epoch,
             seq: self.seq,
             op: call.op as u32,
             rows: call.rows() as u32,
-            core: self.apart.core(),
+            core: self.affinity.core(),
         };
-        call.write(&self.description, loan::words(loan.payload_mut()));
-        if loan::send(loan).map_err(|error| failed(&error))? == 0 {
-            self.link.peer.check()?;
-            return Err(self.link.peer.lease_lost());
+        call.write(&self.description, loaned::words(loan.payload_mut()));
+        if loaned::send(loan).map_err(|error| failed(&error))? == 0 {
+            self.connection.peer.check()?;
+            return Err(self.connection.peer.lease_lost());
         }
-        self.link.notify();
+        self.connection.notify();
         Ok(())
     }
 
     /// Waits for the answer to the command sent last, at a pace.
-    fn answer(&mut self, pace: usize, hook: Hook<'_>) -> Result<FrameSample, ProtocolError> {
-        let mut waiting = Answer {
+    fn answer(&mut self, waiter: usize, hook: Hook<'_>) -> Result<FrameSample, ProtocolError> {
+        let mut awaited = Answer {
             seq: self.seq,
             epoch: self.epoch,
             subscriber: &self.subscriber,
             service: &self.service,
-            peer: &self.link.peer,
+            peer: &self.connection.peer,
             hook,
             since: Instant::now(),
         };
-        let sample = self.paces[pace].wait(&self.listener, &mut waiting)?;
+        let sample = self.waiters[waiter].wait(&self.listener, &mut awaited)?;
         self.flight = Flight::Landed;
-        let shared = sample.user_header().core == self.apart.core();
-        self.paces.iter_mut().for_each(|pace| pace.share(shared));
+        let shared = sample.user_header().core == self.affinity.core();
+        self.waiters
+            .iter_mut()
+            .for_each(|waiter| waiter.share(shared));
         Ok(sample)
     }
 
@@ -235,7 +237,7 @@ impl Controller {
         if header.outcome != 0 {
             return Err(refusal(header.outcome, header.rows, payload));
         }
-        if header.session != self.link.peer.beacon.session
+        if header.session != self.connection.peer.beacon.session
             || header.schema != self.description.schema
         {
             return Err(malformed("the head of a frame: another session or schema"));
@@ -247,8 +249,9 @@ impl Controller {
 
 impl Drop for Controller {
     fn drop(&mut self) {
-        self.link.tell(&Request::Release { epoch: self.epoch });
-        self.link.notify();
+        self.connection
+            .post(&Request::Release { epoch: self.epoch });
+        self.connection.notify();
     }
 }
 
@@ -263,8 +266,8 @@ struct Answer<'a> {
     since: Instant,
 }
 
-impl Waiting<FrameSample> for Answer<'_> {
-    fn look(&mut self) -> Result<Option<FrameSample>, ProtocolError> {
+impl Awaited<FrameSample> for Answer<'_> {
+    fn poll(&mut self) -> Result<Option<FrameSample>, ProtocolError> {
         loop {
             match self.subscriber.receive() {
                 Ok(None) => return Ok(None),
@@ -279,7 +282,7 @@ impl Waiting<FrameSample> for Answer<'_> {
         }
     }
 
-    fn around(&mut self) -> Result<Option<FrameSample>, ProtocolError> {
+    fn poll_rest(&mut self) -> Result<Option<FrameSample>, ProtocolError> {
         if (self.hook)().is_break() {
             return Err(ProtocolError::Interrupted);
         }
@@ -328,7 +331,7 @@ fn refusal(outcome: u32, rows: u32, payload: &[u64]) -> ProtocolError {
     };
     match read() {
         Ok(reason) => ProtocolError::CommandRefused {
-            kind: RefusalKind::from_wire(outcome),
+            kind: RefusalKind::from_code(outcome),
             reason,
         },
         Err(problem) => ProtocolError::Malformed {

@@ -1,4 +1,4 @@
-//! What a daemon tells about itself, so that a client that attaches knows as much as the one that launched.
+//! What a daemon reports about itself, so that a client that attaches knows as much as the one that launched.
 
 use serde::{Deserialize, Serialize};
 
@@ -48,9 +48,9 @@ pub struct Description {
     pub dof_names: Vec<String>,
     /// `robot/joint` of each coordinate.
     pub coord_names: Vec<String>,
-    /// `robot/link` of each body.
+    /// `robot/connection` of each body.
     pub body_names: Vec<String>,
-    /// Collision shapes: `shape`, `body/shape` or `robot/link/shape`.
+    /// Collision shapes: `shape`, `body/shape` or `robot/connection/shape`.
     pub shape_names: Vec<String>,
     /// Sites.
     pub site_names: Vec<String>,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// Everything a client can be told. The daemon's refusals arrive as [`ProtocolError::CommandRefused`].
+/// Everything that can go wrong for a client. The daemon's refusals arrive as [`ProtocolError::CommandRefused`].
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProtocolError {

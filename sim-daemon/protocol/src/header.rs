@@ -105,7 +105,7 @@ impl Op {
     ];
 
     /// The inverse of `op as u32`.
-    pub fn from_wire(op: u32) -> Option<Op> {
+    pub fn from_code(op: u32) -> Option<Op> {
         Op::ALL.into_iter().find(|&known| known as u32 == op)
     }
 }
@@ -132,7 +132,7 @@ pub enum RefusalKind {
 
 impl RefusalKind {
     /// The inverse of `kind as u32`; what a newer daemon may add reads as [`RefusalKind::Backend`].
-    pub fn from_wire(kind: u32) -> RefusalKind {
+    pub fn from_code(kind: u32) -> RefusalKind {
         use RefusalKind::*;
         [NotFinite, Shape, Field, Malformed, Stale, Snapshot]
             .into_iter()
@@ -182,7 +182,7 @@ impl Dtype {
         }
     }
 
-    fn from_wire(dtype: u64) -> Option<Dtype> {
+    fn from_code(dtype: u64) -> Option<Dtype> {
         use Dtype::*;
         [F32, F64, I32, U32, U64, U8]
             .into_iter()
@@ -215,7 +215,7 @@ impl Row {
     /// Axes that an array may have.
     pub const AXES: usize = 4;
 
-    /// Writes the row as the wire has it.
+    /// Writes the row as the protocol has it.
     pub(crate) fn encode(&self, words: &mut [u64; Row::WORDS]) {
         encode_row(
             words,
@@ -240,7 +240,7 @@ impl Row {
         if name.is_empty() {
             return Err("a name is empty".to_owned());
         }
-        let dtype = Dtype::from_wire(words[4] & 0xffff_ffff)
+        let dtype = Dtype::from_code(words[4] & 0xffff_ffff)
             .ok_or_else(|| format!("{name}: unknown dtype {}", words[4] & 0xffff_ffff))?;
         let axes = (words[4] >> 32) as usize;
         if !(1..=Row::AXES).contains(&axes) {
@@ -274,7 +274,7 @@ impl Row {
     }
 }
 
-/// Writes a row as the wire has it; a client does so for every command without allocating.
+/// Writes a row as the protocol has it; a client does this for every command without allocating.
 ///
 /// # Panics
 /// When the name is longer than [`Row::NAME`] or the shape has more than [`Row::AXES`] axes: our own tables never do.

@@ -1,4 +1,4 @@
-//! The wire between a daemon and its clients, on one screen.
+//! The protocol between a daemon and its clients, on one screen.
 //!
 //! ```text
 //!            wake (event)  ◄───────────────── notify ──────────────────┐
@@ -18,48 +18,53 @@
 //!   what a slow recorder loses shows.
 //! - A daemon may have its worlds in groups, each with all of this for itself under a name of its own (`NAME.0`, `NAME.1`, …), in
 //!   lock-step with its own controller; the daemon's own name then only says how many there are.
-//! - A daemon's presence is a lock on `ROOT/NAME.lock` ([`place`], [`tenancy`]); its run is a random `session`.
+//! - A daemon's presence is a lock on `ROOT/NAME.lock` ([`paths`], [`daemon_lock`]); its run is a random `session`.
 //! - Clients know no physics: the [`Description`] names what can be sent and what frames carry.
 //! - Every process here belongs to one user. A hostile process of that user is outside what shared memory can stop; against
 //!   mistakes, the daemon copies a command once and checks the copy, and the client checks each table before reading by it.
 //!
 //! [`Client`] is one end, [`host::Host`] the other. This crate alone uses iceoryx2.
 
-mod apart;
+mod affinity;
 mod client;
 mod command;
+mod connection;
 mod control;
 mod controller;
+pub mod daemon_lock;
 mod description;
 pub mod digest;
+mod discovery;
 mod error;
-mod find;
 mod frame;
 pub mod hash;
 pub mod header;
-mod heart;
+mod heartbeat;
+mod hook;
 pub mod host;
 pub mod journal;
-mod link;
+mod journal_header;
 mod liveness;
-mod loan;
+mod loaned;
+mod memory;
 mod observer;
-mod pace;
-pub mod place;
+pub mod paths;
 pub mod table;
-pub mod tenancy;
 mod transport;
+mod waiter;
 
-pub use client::{AttachOptions, Client, Hook, keep_waiting};
+pub use client::Client;
 pub use command::{Command, Values};
+pub use daemon_lock::{cleanup_after_death, sweep};
 pub use description::{Description, FieldInfo, InputInfo, ParamInfo, RobotRange};
+pub use discovery::{AttachOptions, find};
 pub use error::ProtocolError;
-pub use find::find;
 pub use frame::{Entry, Frame, View};
 pub use header::{
     ALIGNMENT, CommandHeader, Dtype, FrameHeader, Line, Op, PROTOCOL_VERSION, RefusalKind, Row,
 };
-pub use journal::{Entry as JournalEntry, Journal, JournalHeader};
-pub use place::{Beacon, running};
+pub use hook::{Hook, keep_waiting};
+pub use journal::{Entry as JournalEntry, Journal};
+pub use journal_header::JournalHeader;
+pub use paths::{Beacon, running};
 pub use table::{ROWS_MAX, Table};
-pub use tenancy::{cleanup_after_death, sweep};

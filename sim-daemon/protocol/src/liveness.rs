@@ -3,44 +3,44 @@
 use std::time::Duration;
 
 use crate::ProtocolError;
-use crate::place::{Beacon, Place, Presence};
+use crate::paths::{Beacon, DaemonPaths, Presence};
 
 /// The daemon that a client attached to.
 #[derive(Debug, Clone)]
 pub(crate) struct Peer {
-    pub(crate) place: Place,
+    pub(crate) paths: DaemonPaths,
     pub(crate) beacon: Beacon,
 }
 
 impl Peer {
     /// Errors when the daemon ended, was killed, or is another one than it was. A few microseconds.
     pub(crate) fn check(&self) -> Result<(), ProtocolError> {
-        match self.place.presence() {
+        match self.paths.presence() {
             Presence::Running(beacon) if beacon.session == self.beacon.session => Ok(()),
             Presence::Running(_) => Err(ProtocolError::DaemonRestarted {
-                name: self.place.name().to_owned(),
+                name: self.paths.name().to_owned(),
             }),
-            // ours has announced itself: whoever is starting, or cleaning up, is another
+            // ours has announced itself: one that is starting, or cleaning up, is another
             Presence::Absent | Presence::Starting => Err(self.lost()),
         }
     }
 
     pub(crate) fn lost(&self) -> ProtocolError {
         ProtocolError::DaemonLost {
-            name: self.place.name().to_owned(),
+            name: self.paths.name().to_owned(),
             pid: self.beacon.pid,
         }
     }
 
     pub(crate) fn lease_lost(&self) -> ProtocolError {
         ProtocolError::LeaseLost {
-            name: self.place.name().to_owned(),
+            name: self.paths.name().to_owned(),
         }
     }
 
     pub(crate) fn timeout(&self, waited: Duration) -> ProtocolError {
         ProtocolError::Timeout {
-            name: self.place.name().to_owned(),
+            name: self.paths.name().to_owned(),
             pid: self.beacon.pid,
             seconds: waited.as_secs_f64(),
         }

@@ -6,17 +6,17 @@ use std::time::{Duration, Instant};
 
 use iceoryx2::port::listener::Listener;
 
-use crate::client::Hook;
+use crate::connection::{Connection, S, malformed};
 use crate::controller::check_table;
 use crate::frame::{Alive, FrameSample};
-use crate::link::{Link, S, malformed};
+use crate::hook::Hook;
 use crate::transport::{self, FrameSubscriber, SLICE};
 use crate::{Description, Frame, ProtocolError, Table};
 
 /// A subscription to the observers' service.
 #[derive(Debug)]
 pub(crate) struct Observer {
-    link: Arc<Link>,
+    connection: Arc<Connection>,
     description: Arc<Description>,
     table: Option<Arc<Table>>,
     frames: Arc<Alive>,
@@ -26,10 +26,10 @@ pub(crate) struct Observer {
 
 impl Observer {
     pub(crate) fn open(
-        link: &Arc<Link>,
+        connection: &Arc<Connection>,
         description: &Arc<Description>,
     ) -> Result<Observer, ProtocolError> {
-        let ports = link.with_node(|node| {
+        let ports = connection.with_node(|node| {
             let listener = transport::listener(&transport::open_event(node, "watch")?)?;
             Ok((
                 transport::frame_subscriber(&transport::open_watch(node)?, 1)?,
@@ -39,14 +39,14 @@ impl Observer {
         let (subscriber, listener) = match ports {
             Ok(ports) => ports,
             Err(error) => {
-                link.peer.check()?;
+                connection.peer.check()?;
                 return Err(error);
             }
         };
         // a daemon that sleeps shows a new observer its present state when it looks around
-        link.notify();
+        connection.notify();
         Ok(Observer {
-            link: Arc::clone(link),
+            connection: Arc::clone(connection),
             description: Arc::clone(description),
             table: None,
             frames: Alive::new(),
@@ -58,11 +58,11 @@ impl Observer {
     pub(crate) fn latest(&mut self) -> Result<Option<Frame>, ProtocolError> {
         self.frames.check(self.description.frames_held)?;
         let Some(sample) = self.receive()? else {
-            self.link.peer.check()?;
+            self.connection.peer.check()?;
             return Ok(None);
         };
         let header = *sample.user_header();
-        if header.session != self.link.peer.beacon.session
+        if header.session != self.connection.peer.beacon.session
             || header.schema != self.description.schema
         {
             return Err(malformed("the head of a frame: another session or schema"));

@@ -138,7 +138,7 @@ impl Table {
         self.rows.iter().find(|row| row.name == name)
     }
 
-    /// The table as the wire has it.
+    /// The table as the protocol has it.
     pub fn words(&self) -> &[u64] {
         &self.words
     }

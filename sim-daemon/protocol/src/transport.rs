@@ -68,7 +68,7 @@ fn service_name(name: &str) -> Result<ServiceName, ProtocolError> {
 }
 
 /// Facts that the handshake compares, as attributes of the wake-up service: it has no types that could differ.
-pub(crate) mod facts {
+pub(crate) mod handshake {
     pub(crate) const PROTOCOL: &str = "protocol";
     pub(crate) const SCHEMA: &str = "schema";
     pub(crate) const WORLDS: &str = "worlds";

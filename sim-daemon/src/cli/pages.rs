@@ -9,7 +9,7 @@ use crate::error::DaemonError;
 
 /// A shell that completes command lines.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub(super) enum Shell {
+pub(crate) enum Shell {
     Bash,
     Zsh,
     Fish,

@@ -10,7 +10,7 @@ use crate::error::DaemonError;
 
 /// A command of the Python package.
 #[derive(Debug, Subcommand)]
-pub(super) enum Python {
+pub(crate) enum Python {
     /// Show the worlds of a daemon or a recording in the browser.
     ///
     /// Example: tightloop view franka --worlds 64
@@ -26,7 +26,7 @@ pub(super) enum Python {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct View {
+pub(crate) struct View {
     /// Name of a daemon, or a recording.
     #[arg(value_name = "NAME|FILE.tlrec")]
     target: PathBuf,
@@ -49,7 +49,7 @@ pub(super) struct View {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Film {
+pub(crate) struct Film {
     /// Name of a daemon, or a recording.
     #[arg(value_name = "NAME|FILE.tlrec")]
     source: PathBuf,
@@ -99,7 +99,7 @@ pub(super) struct Film {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Demo {
+pub(crate) struct Demo {
     /// Show only this stop, such as grasp; can be repeated.
     #[arg(long = "stop", value_name = "NAME")]
     stops: Vec<String>,
@@ -135,7 +135,7 @@ pub(super) struct Demo {
 
 impl Python {
     /// Says what is missing.
-    pub(super) fn run(&self) -> Result<(), DaemonError> {
+    pub(crate) fn run(&self) -> Result<(), DaemonError> {
         let command = match self {
             Python::View(_) => "view",
             Python::Film(_) => "film",

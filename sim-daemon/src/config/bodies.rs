@@ -6,7 +6,10 @@ use serde::{Deserialize, Serialize};
 use sim_model::Body;
 use sim_model::geometry::DENSITY;
 
-use super::{ConfigError, Number, ShapeTable, no_rotation, pose};
+use super::error::ConfigError;
+use super::number::Number;
+use super::pose::{no_rotation, pose};
+use super::shapes::ShapeTable;
 
 /// A rigid body, free in the world or fixed in it; what is left out comes from its shapes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -7,8 +7,9 @@ use serde_json::{Value, json};
 use sim_model::geometry::{Hull, TriMesh, triangles};
 use sim_model::{Description, Link, Look, Pose, Robot, Shape, Visual};
 
-use super::bones::bones;
-use super::{ConfigError, SceneFile};
+use super::error::ConfigError;
+use super::scene::SceneFile;
+use super::skeleton::skeleton;
 
 /// What there is to draw.
 pub struct Parts {
@@ -96,7 +97,7 @@ impl SceneFile {
                 .iter()
                 .all(|link| self.own_shapes(robot, link) == 0)
             {
-                drawing.bones(robot);
+                drawing.skeleton(robot);
             }
         }
     }
@@ -136,8 +137,8 @@ impl Drawing {
     }
 
     /// Adds what stands for a robot that nothing else of its file shows.
-    fn bones(&mut self, robot: &Robot) {
-        for (place, (link, pose, shape)) in bones(robot).into_iter().enumerate() {
+    fn skeleton(&mut self, robot: &Robot) {
+        for (place, (link, pose, shape)) in skeleton(robot).into_iter().enumerate() {
             let body = format!("{}/{}", robot.name, robot.links[link].name);
             let mesh = self.place(&shape, false);
             self.parts.push(json!({

@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use sim_model::{Description, Distribution, Joint, JointDof, JointKind, Robot};
+use sim_model::{Description, Distribution, Joint, JointDof, JointKind, ModelError, Robot};
+use sim_physics::constants::params::Param;
 
-use super::{ConfigError, Number, param};
+use super::error::ConfigError;
+use super::number::Number;
 
 /// Distributions by the names of what they are of; of a robot and of one of its joints, the joint's holds.
 type Named<T> = BTreeMap<String, T>;
@@ -264,4 +266,14 @@ fn some<'a>(names: impl Iterator<Item = &'a String>) -> String {
         1..=MOST => names.join(", "),
         _ => format!("{}, …", names[..MOST].join(", ")),
     }
+}
+
+/// The parameter of a name.
+pub(super) fn param(name: &str) -> Result<Param, ModelError> {
+    Param::named(name).ok_or_else(|| ModelError::UnknownName {
+        owner: "scene".to_owned(),
+        what: "parameter",
+        name: name.to_owned(),
+        known: Param::ALL.map(|param| param.row().name).join(", "),
+    })
 }

@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 use sim_model::geometry::MeshOptions;
 use sim_model::{ModelError, Robot, TargetMode, UrdfOptions};
 
+use super::number::{Number, PerDof};
+use super::pose::{no_rotation, pose};
 use super::summary::driven;
 use super::surface::given;
-use super::{Number, PerDof, no_rotation, pose};
 
 fn hull_vertices() -> usize {
     MeshOptions::default().max_hull_vertices

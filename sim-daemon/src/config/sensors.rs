@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 use sim_model::{ContactSensor, Site};
 
-use super::{Number, no_rotation, pose};
+use super::number::Number;
+use super::pose::{no_rotation, pose};
 
 /// A frame of interest, in the world or on a body or link.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

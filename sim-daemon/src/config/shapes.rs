@@ -6,8 +6,10 @@ use serde::{Deserialize, Serialize};
 use sim_model::geometry::MeshOptions;
 use sim_model::{Collision, Pose, Shape, Surface};
 
+use super::error::ConfigError;
+use super::number::Number;
+use super::pose::{no_rotation, pose};
 use super::surface::given;
-use super::{BodyTable, ConfigError, Number, no_rotation, pose};
 
 /// A shape, static or of a body or link; which sizes it has depends on its type.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -108,8 +110,8 @@ impl ShapeTable {
         self.body.as_deref().and_then(|body| body.split_once('/'))
     }
 
-    /// Refuses a bearer that is not there, what a plane cannot be part of, and the density of what bears no mass.
-    pub(super) fn check_body(&self, index: usize, bodies: &[BodyTable]) -> Result<(), ConfigError> {
+    /// Refuses a bearer that is none of these `bodies` nor a link, what a plane cannot be part of, and the density of what bears no mass.
+    pub(super) fn check_body(&self, index: usize, bodies: &[&str]) -> Result<(), ConfigError> {
         let reason = match (&self.body, self.density) {
             (None, Some(_)) => {
                 "a static shape has no density; leave it out, or name its body".to_owned()
@@ -121,7 +123,7 @@ impl ShapeTable {
                 "a link has the mass that its robot's file gives it, so its shape has no density; leave it out".to_owned()
             }
             (Some(body), _)
-                if self.link().is_none() && bodies.iter().all(|table| table.name != *body) =>
+                if self.link().is_none() && !bodies.contains(&body.as_str()) =>
             {
                 format!(
                     "its body `{body}` is none of the scene's [[body]] tables; a robot's link is `robot/link`"

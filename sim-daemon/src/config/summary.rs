@@ -6,7 +6,8 @@ use serde_json::{Value, json};
 use sim_model::geometry::{Mesh, MeshOptions};
 use sim_model::{Joint, JointDof, JointKind, Robot, UrdfOptions};
 
-use super::{ConfigError, Number};
+use super::error::ConfigError;
+use super::number::Number;
 
 /// Names, defaults and notes of a URDF file; no limit is `null` for ranges, `"inf"` otherwise.
 ///
@@ -82,13 +83,13 @@ pub fn mesh_summary(
     options: &MeshOptions,
 ) -> Result<Value, ConfigError> {
     let mesh = Mesh::load(path, scale, options)?;
-    let mut summary = mesh_facts(&mesh);
+    let mut summary = mesh_properties(&mesh);
     summary["notes"] = json!(mesh.notes);
     Ok(summary)
 }
 
 /// What a mesh is, as [`mesh_summary`] has it, without its notes.
-pub(crate) fn mesh_facts(mesh: &Mesh) -> Value {
+pub(crate) fn mesh_properties(mesh: &Mesh) -> Value {
     json!({
         "file": mesh.path.to_string_lossy(),
         "scale": mesh.scale,

@@ -2,7 +2,7 @@
 
 use sim_model::Surface;
 
-use super::Number;
+use super::number::Number;
 
 /// What is given of a surface; what is left out stays as it is.
 pub(super) struct Given {

@@ -5,24 +5,28 @@ use std::path::Path;
 use serde_json::{Value, json};
 use sim_model::{Collision, Pose, Shape, principal_moments};
 
-use super::facts::Facts;
-use crate::config::{joint_type, mesh_facts, robot_summary};
+use super::properties::Properties;
+use crate::config::{joint_type, mesh_properties, robot_summary};
 
 /// All there is to say of a robot: what [`crate::config::urdf_summary`] has, and `file`, `floating`, `mass`, `links`,
 /// `picture`.
 ///
 /// A link, in body order: `name`, `parent`, `merged_into`, `joint` (`name`, `type`, `axis`, `pos`, `quat`), `mass`, `center`,
 /// `inertia`, `principal_moments`, `collisions` (`type`, sizes, `pos`, `quat`). What is absent is `null`; SI units.
-pub(super) fn document(facts: &Facts, picture: Option<&Path>) -> Value {
-    let robot = facts.robot;
+pub(super) fn document(properties: &Properties, picture: Option<&Path>) -> Value {
+    let robot = properties.robot;
     let mut document = robot_summary(robot);
     let mut add = |key: &str, value: Value| document[key] = value;
     add("file", path(robot.urdf.as_deref()));
     add("floating", json!(robot.floating));
-    add("mass", json!(facts.mass()));
+    add("mass", json!(properties.mass()));
     add(
         "links",
-        facts.order.iter().map(|&l| link(facts, l)).collect(),
+        properties
+            .order
+            .iter()
+            .map(|&l| link(properties, l))
+            .collect(),
     );
     add("picture", path(picture));
     document
@@ -32,16 +36,16 @@ fn path(path: Option<&Path>) -> Value {
     path.map_or(Value::Null, |path| json!(path.to_string_lossy()))
 }
 
-fn link(facts: &Facts, index: usize) -> Value {
-    let robot = facts.robot;
+fn link(properties: &Properties, index: usize) -> Value {
+    let robot = properties.robot;
     let link = &robot.links[index];
-    let joint = facts.joint(index);
+    let joint = properties.joint(index);
     let parent = joint.and_then(|joint| joint.parent);
     let inertial = link.inertial.as_ref();
     json!({
         "name": link.name,
         "parent": parent.map(|parent| &robot.links[parent].name),
-        "merged_into": facts.merged_into(index),
+        "merged_into": properties.merged_into(index),
         "joint": joint.map(|joint| placed(&joint.origin, json!({
             "name": joint.name,
             "type": joint_type(joint),
@@ -68,7 +72,7 @@ fn collision(collision: &Collision) -> Value {
             radius,
             half_height,
         } => json!({ "radius": radius, "half_height": half_height }),
-        Shape::Mesh(mesh) => mesh_facts(mesh),
+        Shape::Mesh(mesh) => mesh_properties(mesh),
     };
     value["name"] = json!(collision.name);
     value["type"] = json!(collision.shape.kind());

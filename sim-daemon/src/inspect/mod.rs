@@ -1,11 +1,12 @@
 //! `tightloop inspect`: what a URDF file means, as text, as JSON, and as a picture of its collision shapes.
 
-mod facts;
 mod json;
 mod picture;
+mod properties;
 mod table;
 mod text;
 mod tree;
+mod wrap;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -17,8 +18,8 @@ use sim_model::{Description, ModelError, Pose, Robot, Shape, UrdfOptions};
 use crate::cli::Inspect;
 use crate::config::hull_sides;
 use crate::error::DaemonError;
-use facts::Facts;
 use picture::Drawing;
+use properties::Properties;
 
 /// Runs the command.
 pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
@@ -55,30 +56,30 @@ pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
     let model = scene.compile()?;
     let start = model.start().joint_q.clone();
     let frames = Dynamics::new(model).forward_kinematics(&start)?;
-    let facts = Facts::new(&scene.robots[0]);
-    let path = destination(args, facts.robot);
+    let properties = Properties::new(&scene.robots[0]);
+    let path = destination(args, properties.robot);
     let drawn = path.as_deref().map_or(Ok(()), |path| {
         // a name that we chose must not cost somebody a file
         if args.png.is_none() && path.exists() && !picture::is_ours(path) {
             let problem = "it is there already and no picture of ours; say with --png FILE where to write, or --no-png";
             return Err(failed(path, problem.to_owned()));
         }
-        let drawing = drawing(&facts, &frames, args);
+        let drawing = drawing(&properties, &frames, args);
         picture::write(&drawing.render(), path).map_err(|error| {
             failed(path, format!("{error}; say with --png FILE where to write, or --no-png"))
         })
     });
     let said = match (args.json, &drawn, &path) {
         (true, Err(_), _) => String::new(),
-        (true, Ok(()), _) => format!("{:#}\n", json::document(&facts, path.as_deref())),
+        (true, Ok(()), _) => format!("{:#}\n", json::document(&properties, path.as_deref())),
         (false, Ok(()), Some(path)) => {
             let picture = path.display();
             format!(
                 "{}\nPicture    {picture}\n",
-                text::document(&facts, args.long)
+                text::document(&properties, args.long)
             )
         }
-        (false, _, _) => text::document(&facts, args.long),
+        (false, _, _) => text::document(&properties, args.long),
     };
     // whoever reads us may stop reading
     let _ = std::io::stdout().write_all(said.as_bytes());
@@ -113,15 +114,15 @@ fn destination(args: &Inspect, robot: &Robot) -> Option<PathBuf> {
 }
 
 /// What the picture shows. `frames` are position and quaternion of each link, in body order. `(bodies, 7)` [m, –]
-fn drawing(facts: &Facts, frames: &[f64], args: &Inspect) -> Drawing {
-    let robot = facts.robot;
+fn drawing(properties: &Properties, frames: &[f64], args: &Inspect) -> Drawing {
+    let robot = properties.robot;
     let pose = |frame: &[f64]| Pose {
         pos: std::array::from_fn(|axis| frame[axis]),
         quat: std::array::from_fn(|part| frame[3 + part]),
     };
     let poses: Vec<Pose> = frames.chunks_exact(7).map(pose).collect();
     let mut shapes = Vec::new();
-    for (place, (&link, pose)) in facts.order.iter().zip(&poses).enumerate() {
+    for (place, (&link, pose)) in properties.order.iter().zip(&poses).enumerate() {
         for collision in &robot.links[link].collisions {
             let frame = pose.mul(&collision.pose);
             let mut draw = |surface| shapes.push((place as u32, frame, surface));
@@ -131,7 +132,7 @@ fn drawing(facts: &Facts, frames: &[f64], args: &Inspect) -> Drawing {
             }
         }
     }
-    let outside = facts.outside_range();
+    let outside = properties.outside_range();
     let mut caption = match &args.joint_q {
         Some(joint_q) => format!("joint_q = {}", commas(joint_q)),
         None => "joint_q = 0".to_owned(),
@@ -143,7 +144,11 @@ fn drawing(facts: &Facts, frames: &[f64], args: &Inspect) -> Drawing {
             caption += &format!(", outside the ranges of {one} and {} more", rest.len());
         }
     }
-    let meshes = facts.robot.links.iter().flat_map(|link| &link.collisions);
+    let meshes = properties
+        .robot
+        .links
+        .iter()
+        .flat_map(|link| &link.collisions);
     if meshes
         .into_iter()
         .any(|c| matches!(c.shape, Shape::Mesh(_)))
@@ -155,10 +160,10 @@ fn drawing(facts: &Facts, frames: &[f64], args: &Inspect) -> Drawing {
     }
     Drawing {
         title: robot.name.clone(),
-        facts: facts.in_a_line(),
+        summary: properties.in_a_line(),
         caption,
-        links: facts.names(),
-        frames: poses.into_iter().zip(facts.parent_places()).collect(),
+        links: properties.names(),
+        frames: poses.into_iter().zip(properties.parent_places()).collect(),
         shapes,
     }
 }

@@ -2,8 +2,8 @@
 
 use sim_model::{Joint, JointDof, JointKind, Robot};
 
-use super::facts::{Facts, short, unit};
-use super::text::wrapped;
+use super::properties::{Properties, short, unit};
+use super::wrap::wrapped;
 
 /// What stands where a limit is not given.
 const NONE: &str = "-";
@@ -24,8 +24,8 @@ fn some(value: f64) -> Option<f64> {
 }
 
 /// Dofs in order, with the names that a simulation has for them; below, what follows what.
-pub(super) fn dofs(facts: &Facts) -> String {
-    let robot = facts.robot;
+pub(super) fn dofs(properties: &Properties) -> String {
+    let robot = properties.robot;
     let names = robot.dof_names();
     if names.is_empty() {
         return "Dofs\n  none: nothing moves\n".to_owned();

@@ -2,29 +2,27 @@
 
 use std::fmt::Write as _;
 
-use sim_model::{JointKind, Shape};
+use sim_model::Shape;
 
-use super::facts::{Facts, count, short};
+use super::properties::{Properties, count, short};
+use super::wrap::wrapped;
 use super::{table, tree};
 use crate::config::joint_type;
 
-/// Columns of a line that need not be longer.
-pub(super) const COLUMNS: usize = 100;
-
 /// All there is to say of a robot.
-pub(super) fn document(facts: &Facts, long: bool) -> String {
-    let mut text = head(facts);
+pub(super) fn document(properties: &Properties, long: bool) -> String {
+    let mut text = head(properties);
     text += "\nTree (● moves by itself, ○ is part of the link it is fixed to)\n";
-    text += &tree::tree(facts, long);
+    text += &tree::tree(properties, long);
     text += "\n";
-    text += &table::dofs(facts);
+    text += &table::dofs(properties);
     text += "\n";
-    text += &notes(facts);
+    text += &notes(properties);
     text
 }
 
-fn head(facts: &Facts) -> String {
-    let robot = facts.robot;
+fn head(properties: &Properties) -> String {
+    let robot = properties.robot;
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
         let _ = writeln!(text, "{name:<10} {value}");
@@ -40,7 +38,7 @@ fn head(facts: &Facts) -> String {
     };
     line("Base", base.to_owned());
     let merged = (0..robot.links.len())
-        .filter(|&link| facts.merged_into(link).is_some())
+        .filter(|&link| properties.merged_into(link).is_some())
         .count();
     let mut links = robot.links.len().to_string();
     links += &match merged {
@@ -52,9 +50,9 @@ fn head(facts: &Facts) -> String {
     let kinds = tally(robot.joints.iter().map(joint_type));
     let kinds = kinds.iter().map(|(kind, n)| format!("{n} {kind}"));
     line("Joints", with_kinds(robot.joints.len(), kinds));
-    let coords = count(facts.coords(), "coordinate");
-    line("Dofs", format!("{}, {coords}", facts.dofs()));
-    line("Mass", format!("{} kg", short(facts.mass())));
+    let coords = count(properties.coords(), "coordinate");
+    line("Dofs", format!("{}, {coords}", properties.dofs()));
+    line("Mass", format!("{} kg", short(properties.mass())));
     let shapes = robot.links.iter().flat_map(|link| &link.collisions);
     let kinds = tally(shapes.map(|collision| Shape::kind(&collision.shape)));
     let all = kinds.iter().map(|(_, count)| count).sum();
@@ -91,8 +89,8 @@ fn with_kinds(all: usize, kinds: impl Iterator<Item = String>) -> String {
 }
 
 /// What was ignored or mended, warnings first.
-fn notes(facts: &Facts) -> String {
-    let robot = facts.robot;
+fn notes(properties: &Properties) -> String {
+    let robot = properties.robot;
     let mut text = "Ignored or mended\n".to_owned();
     let rest = robot
         .notes
@@ -108,48 +106,4 @@ fn notes(facts: &Facts) -> String {
         text += &wrapped(&format!("  {mark} "), "    ", note);
     }
     text
-}
-
-/// Least room for text beside what stands before it, however wide that is.
-const ROOM: usize = 40;
-
-/// A space that a line is not broken at; it is printed as any other.
-pub(super) const NO_BREAK: &str = "\u{a0}";
-
-/// A text in lines of at most [`COLUMNS`], broken at spaces; the first begins with `first`, others with `next`.
-pub(super) fn wrapped(first: &str, next: &str, text: &str) -> String {
-    let mut lines = String::new();
-    let columns = COLUMNS.max(next.chars().count() + ROOM);
-    let mut line = first.to_owned();
-    let mut empty = true;
-    for word in text.split(' ') {
-        let fits = line.chars().count() + 1 + word.chars().count() <= columns;
-        if !empty && !fits {
-            lines += line.trim_end();
-            lines.push('\n');
-            line = next.to_owned();
-            empty = true;
-        }
-        if !empty {
-            line.push(' ');
-        }
-        line += word;
-        empty = false;
-    }
-    lines += line.trim_end();
-    lines.push('\n');
-    lines.replace(NO_BREAK, " ")
-}
-
-/// What a joint lets its link do.
-pub(super) fn motion(kind: JointKind, axis: &str, limited: bool) -> String {
-    match kind {
-        JointKind::Fixed => "fixed".to_owned(),
-        JointKind::Revolute if limited => format!("revolute about {axis}"),
-        JointKind::Revolute => format!("continuous about {axis}"),
-        JointKind::Prismatic => format!("prismatic along {axis}"),
-        JointKind::Ball => "spherical".to_owned(),
-        JointKind::Planar => format!("planar across {axis}"),
-        JointKind::Free => "floating".to_owned(),
-    }
 }

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use sim_model::{Collision, Joint, JointKind, Link, Pose, Shape, principal_moments};
 
-use super::facts::{Facts, axis, count, rounded, short, triple, unit};
-use super::text::{COLUMNS, NO_BREAK, motion, wrapped};
+use super::properties::{Properties, axis, count, rounded, short, triple, unit};
+use super::wrap::{COLUMNS, NO_BREAK, wrapped};
 use crate::config::paths::relative_to;
 
 /// Widest column of names; longer ones push what follows to the right.
@@ -18,13 +18,13 @@ const BRANCH_MAX: usize = 120;
 const TENTH: f64 = 1e-4;
 
 /// The tree of a robot.
-pub(super) fn tree(facts: &Facts, long: bool) -> String {
-    let rows = rows(facts);
-    let names = rows.iter().map(|row| row.width(facts));
+pub(super) fn tree(properties: &Properties, long: bool) -> String {
+    let rows = rows(properties);
+    let names = rows.iter().map(|row| row.width(properties));
     let column = names.filter(|&width| width <= NAMES_MAX).max().unwrap_or(0) + 3;
     let mut text = String::new();
     for row in &rows {
-        text += &link(facts, row, column, long);
+        text += &link(properties, row, column, long);
     }
     text
 }
@@ -39,21 +39,21 @@ struct Row {
 
 impl Row {
     /// Letters of the branch and the name.
-    fn width(&self, facts: &Facts) -> usize {
-        self.first.chars().count() + 2 + facts.robot.links[self.link].name.chars().count()
+    fn width(&self, properties: &Properties) -> usize {
+        self.first.chars().count() + 2 + properties.robot.links[self.link].name.chars().count()
     }
 }
 
 /// Links in body order. Without recursion: a chain may be longer than a stack is deep.
-fn rows(facts: &Facts) -> Vec<Row> {
+fn rows(properties: &Properties) -> Vec<Row> {
     let mut rows = Vec::new();
     // link, what stands before it, and what stands before what follows its subtree
-    let mut stack: Vec<(usize, String, String)> = (facts.order.first())
+    let mut stack: Vec<(usize, String, String)> = (properties.order.first())
         .map(|&root| (root, String::new(), String::new()))
         .into_iter()
         .collect();
     while let Some((link, first, below)) = stack.pop() {
-        let children = &facts.children[link];
+        let children = &properties.children[link];
         let next = match children.len() {
             0 => format!("{below} "),
             _ => format!("{below}│"),
@@ -77,11 +77,11 @@ fn rows(facts: &Facts) -> Vec<Row> {
     rows
 }
 
-fn link(facts: &Facts, row: &Row, column: usize, long: bool) -> String {
-    let link = &facts.robot.links[row.link];
-    let merged = facts.merged_into(row.link);
+fn link(properties: &Properties, row: &Row, column: usize, long: bool) -> String {
+    let link = &properties.robot.links[row.link];
+    let merged = properties.merged_into(row.link);
     let dot = if merged.is_some() { '○' } else { '●' };
-    let joint = match facts.joint(row.link) {
+    let joint = match properties.joint(row.link) {
         None => "fixed to the world".to_owned(),
         Some(joint) => above(joint, merged),
     };
@@ -94,7 +94,7 @@ fn link(facts: &Facts, row: &Row, column: usize, long: bool) -> String {
         format!("{name}\n") + &wrapped(&format!("{next}  "), &format!("{next}    "), &joint)
     };
     let next = format!("{}   ", row.next);
-    for detail in details(facts, link, facts.joint(row.link), long) {
+    for detail in details(properties, link, properties.joint(row.link), long) {
         text += &wrapped(&next, &format!("{next}  "), &detail);
     }
     text
@@ -122,7 +122,7 @@ fn above(joint: &Joint, merged: Option<&str>) -> String {
     text
 }
 
-fn details(facts: &Facts, link: &Link, joint: Option<&Joint>, long: bool) -> Vec<String> {
+fn details(properties: &Properties, link: &Link, joint: Option<&Joint>, long: bool) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(joint) = joint.filter(|joint| long && joint.parent.is_some()) {
         lines.push(format!("joint frame {}", place(&joint.origin)));
@@ -150,7 +150,7 @@ fn details(facts: &Facts, link: &Link, joint: Option<&Joint>, long: bool) -> Vec
         }
     }
     for collision in &link.collisions {
-        let mut line = shape(facts, collision);
+        let mut line = shape(properties, collision);
         if long {
             line += &format!(", {}", place(&collision.pose));
         }
@@ -170,7 +170,7 @@ fn place(pose: &Pose) -> String {
 }
 
 /// A collision shape and its sizes.
-fn shape(facts: &Facts, collision: &Collision) -> String {
+fn shape(properties: &Properties, collision: &Collision) -> String {
     // a size stays in one line
     let edges = |edges: [f64; 3]| {
         let edges = edges.map(|edge| rounded(edge, 4));
@@ -199,7 +199,11 @@ fn shape(facts: &Facts, collision: &Collision) -> String {
             short(2.0 * half_height)
         ),
         Shape::Mesh(mesh) => {
-            let folder = facts.robot.urdf.as_deref().and_then(|urdf| urdf.parent());
+            let folder = properties
+                .robot
+                .urdf
+                .as_deref()
+                .and_then(|urdf| urdf.parent());
             let file = relative_to(folder.unwrap_or(Path::new("")), &mesh.path);
             let [low, high] = mesh.triangles.extent();
             let size = edges([0, 1, 2].map(|axis| high[axis] - low[axis]));
@@ -223,4 +227,17 @@ fn shape(facts: &Facts, collision: &Collision) -> String {
         text += &format!(", `{name}`");
     }
     text
+}
+
+/// What a joint lets its link do.
+fn motion(kind: JointKind, axis: &str, limited: bool) -> String {
+    match kind {
+        JointKind::Fixed => "fixed".to_owned(),
+        JointKind::Revolute if limited => format!("revolute about {axis}"),
+        JointKind::Revolute => format!("continuous about {axis}"),
+        JointKind::Prismatic => format!("prismatic along {axis}"),
+        JointKind::Ball => "spherical".to_owned(),
+        JointKind::Planar => format!("planar across {axis}"),
+        JointKind::Free => "floating".to_owned(),
+    }
 }

@@ -51,7 +51,7 @@ impl fmt::Display for Difference {
 /// The recorded frame is not as large as ours: one sentence.
 pub(super) fn first_difference(
     seen: &Seen<'_>,
-    recorded: &Command<'_>,
+    recorded: &RecordedCommand<'_>,
 ) -> Result<Option<Difference>, String> {
     let padded: usize = seen.observed.iter().map(padded_words).sum();
     if recorded.digests.len() != seen.digests.len() || recorded.observed.len() != padded {
@@ -85,7 +85,7 @@ impl<'a> Seen<'a> {
     /// Each array that was recorded whole: its row, here, and as recorded.
     fn arrays(
         &self,
-        recorded: &Command<'a>,
+        recorded: &RecordedCommand<'a>,
     ) -> impl Iterator<Item = (&'a Row, &'a [u8], &'a [u8])> + use<'a> {
         let arena: &'a [u8] = bytemuck::cast_slice(self.arena);
         let head = Table::head_bytes(self.table.rows().len());
@@ -101,7 +101,7 @@ impl<'a> Seen<'a> {
     /// The first entry of a world's part of a field that differs, as recorded and here.
     fn entry(
         &self,
-        recorded: &Command<'a>,
+        recorded: &RecordedCommand<'a>,
         row: &Row,
         world: usize,
     ) -> Option<(usize, String, String)> {

@@ -5,8 +5,8 @@ use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use super::blocks::{Blocks, Next};
+use super::failure::unreadable;
 use super::records::{self, Record};
-use super::unreadable;
 use crate::error::DaemonError;
 
 /// What comes next in a recording.

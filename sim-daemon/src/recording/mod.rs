@@ -8,12 +8,13 @@
 //! ```
 //! Numbers are little endian. Checksums are the lower halves of XXH3. A block ends after 256 kB of records
 //! or 0.1 s, so that a recorder that is killed loses no more; each holds whole records, hence whole frames. The first record
-//! is the head (JSON: what the daemon tells of itself), the second the state of all worlds; then come the commands in order,
+//! is the head (JSON: the daemon's description), the second the state of all worlds; then come the commands in order,
 //! each with the digests of its frame, gaps where entries were lost, the state after each restore, and why the recording ended.
 
 mod blocks;
 mod compare;
 mod entries;
+mod failure;
 mod playback;
 mod record;
 mod records;
@@ -23,28 +24,8 @@ mod run;
 mod tests;
 mod writer;
 
-use std::path::Path;
-
 pub use playback::Playback;
 #[cfg(test)]
 pub(crate) use record::follow;
 pub(crate) use record::run as record;
 pub(crate) use replay::run as replay;
-
-use crate::error::DaemonError;
-
-/// The recording cannot be made, or not go on.
-fn failed(path: &Path, problem: impl Into<String>) -> DaemonError {
-    DaemonError::Recording {
-        path: path.to_owned(),
-        problem: problem.into(),
-    }
-}
-
-/// The recording cannot be replayed, or not further.
-fn unreadable(path: &Path, problem: impl Into<String>) -> DaemonError {
-    DaemonError::Replay {
-        path: path.to_owned(),
-        problem: problem.into(),
-    }
-}

@@ -1,4 +1,4 @@
-//! A recording as those who look on want it: frames of whatever fields they ask for, one after the other.
+//! A recording for observers: frames of any fields, one after the other.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -10,11 +10,11 @@ use sim_physics::arrays::Field;
 use sim_protocol::Description;
 
 use super::entries::{Entries, Entry};
+use super::failure::unreadable;
 use super::records::Record;
 use super::run::{Head, Run};
-use super::unreadable;
+use crate::arrays::Arrays;
 use crate::error::DaemonError;
-use crate::look::Arrays;
 
 /// A recording that is run again, frame after frame, without comparing them.
 pub struct Playback {
@@ -72,7 +72,7 @@ impl Playback {
         })
     }
 
-    /// What the daemon told about itself.
+    /// The daemon's description.
     pub fn description(&self) -> &Description {
         &self.description
     }

@@ -14,8 +14,8 @@ use sim_protocol::{
 };
 
 use super::blocks::BLOCK_MAX;
-use super::failed;
-use super::records::{Command, Record};
+use super::failure::failed;
+use super::records::{Record, RecordedCommand};
 use super::writer::{Stopped, Writer};
 use crate::cli;
 use crate::error::DaemonError;
@@ -24,8 +24,8 @@ use crate::error::DaemonError;
 const LOOK: Duration = Duration::from_millis(20);
 /// At the end, the last entry may be under way for so long.
 const LATE: Duration = Duration::from_millis(20);
-/// A terminal is told this often how far it is.
-const TELL_PERIOD: Duration = Duration::from_millis(500);
+/// A terminal shows the progress this often.
+const PROGRESS_PERIOD: Duration = Duration::from_millis(500);
 
 /// What became of a recording.
 #[derive(Debug, Default)]
@@ -60,7 +60,7 @@ pub(crate) fn run(args: &cli::Record) -> Result<(), DaemonError> {
     for signal in [SIGTERM, SIGINT, SIGHUP] {
         catch(signal, &stop)?;
     }
-    // a file that may not grow is an error to be told, no reason to be killed
+    // a file that may not grow is an error to report, no reason to be killed
     catch(SIGXFSZ, &Arc::new(AtomicBool::new(false)))?;
     let mut hook = || match stop.load(Ordering::Relaxed) {
         true => ControlFlow::Break(()),
@@ -105,7 +105,7 @@ pub(crate) fn follow(
         tally: Tally::default(),
         has_begun: false,
         started: Instant::now(),
-        told: Instant::now(),
+        reported: Instant::now(),
     };
     let end = recorder.run(description, &fields);
     recorder.close(end)
@@ -192,7 +192,7 @@ struct Recorder<'a> {
     tally: Tally,
     has_begun: bool,
     started: Instant,
-    told: Instant,
+    reported: Instant,
 }
 
 impl Recorder<'_> {
@@ -236,7 +236,7 @@ impl Recorder<'_> {
                 Err(error) => return Err(End::Failed(error.into())),
             }
             self.writer.flush_old()?;
-            self.tell();
+            self.report_progress();
         }
     }
 
@@ -263,7 +263,7 @@ impl Recorder<'_> {
             }
             self.tally.gaps += 1;
             self.tally.lost += entry.lost;
-            self.news(&format!(
+            self.log(&format!(
                 "after frame {} a gap: {} entries were lost, the recorder was too slow",
                 self.tally.frames, entry.lost
             ));
@@ -279,7 +279,7 @@ impl Recorder<'_> {
                 false => End::Failed(failed(&self.args.out, reason)),
             });
         }
-        self.writer.put(&Record::Command(Command {
+        self.writer.put(&Record::Command(RecordedCommand {
             op: header.op,
             rows: header.rows,
             words: entry.command(),
@@ -311,7 +311,7 @@ impl Recorder<'_> {
             self.state.clear();
             if !self.has_begun {
                 self.has_begun = true;
-                self.news(&format!(
+                self.log(&format!(
                     "recording {} into {}",
                     self.args.name,
                     self.args.out.display()
@@ -321,14 +321,14 @@ impl Recorder<'_> {
         Ok(())
     }
 
-    /// Ends the file, and tells what is in it.
+    /// Ends the file, and reports what is in it.
     fn close(mut self, end: End) -> Result<(), DaemonError> {
         let why = match &end {
             End::Done(why) => why.clone(),
             End::Failed(error) => error.to_string(),
             End::Stopped => String::new(),
         };
-        // what stops it meanwhile is what `close` tells
+        // what stops it meanwhile is what `close` reports
         let _ = self
             .writer
             .put(&Record::End(&why))
@@ -368,14 +368,14 @@ impl Recorder<'_> {
         Ok(())
     }
 
-    fn news(&self, line: &str) {
+    fn log(&self, line: &str) {
         let _ = writeln!(std::io::stderr(), "tightloop: {line}");
     }
 
     /// On a terminal, how far it is.
-    fn tell(&mut self) {
-        if self.told.elapsed() > TELL_PERIOD && std::io::stderr().is_terminal() {
-            self.told = Instant::now();
+    fn report_progress(&mut self) {
+        if self.reported.elapsed() > PROGRESS_PERIOD && std::io::stderr().is_terminal() {
+            self.reported = Instant::now();
             let _ = write!(std::io::stderr(), "\r{} frames ", self.tally.frames);
         }
     }

@@ -8,7 +8,7 @@ pub(super) enum Record<'a> {
     /// All worlds at this place, as a snapshot.
     State(&'a [u8]),
     /// Something that was carried out.
-    Command(Command<'a>),
+    Command(RecordedCommand<'a>),
     /// So many entries were lost here.
     Gap(u64),
     /// Why the recording ended: one sentence.
@@ -17,7 +17,7 @@ pub(super) enum Record<'a> {
 
 /// A command that was carried out, and what came of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Command<'a> {
+pub(super) struct RecordedCommand<'a> {
     /// A [`sim_protocol::Op`].
     pub(super) op: u32,
     /// Rows of its field table.
@@ -118,13 +118,13 @@ fn read_bytes(body: &[u64]) -> Option<&[u8]> {
     bytemuck::cast_slice(bytes).get(..usize::try_from(count).ok()?)
 }
 
-fn read_command(body: &[u64]) -> Option<Command<'_>> {
+fn read_command(body: &[u64]) -> Option<RecordedCommand<'_>> {
     let (&[op, words, digests, observed], rest) = body.split_first_chunk()?;
     let count = |number: u64| usize::try_from(number).ok();
     let (words, rest) = rest.split_at_checked(count(words)?)?;
     let digests = count(digests)?;
     let (padded, observed_words) = rest.split_at_checked(digests.div_ceil(2))?;
-    (observed_words.len() == count(observed)?).then_some(Command {
+    (observed_words.len() == count(observed)?).then_some(RecordedCommand {
         op: op as u32,
         rows: (op >> 32) as u32,
         words,

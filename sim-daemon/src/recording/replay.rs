@@ -12,15 +12,15 @@ use sim_protocol::{Row, Table};
 
 use super::compare::{Seen, first_difference};
 use super::entries::{Entries, Entry};
-use super::records::{Command, Record};
+use super::failure::unreadable;
+use super::records::{Record, RecordedCommand};
 use super::run::{Head, Run};
-use super::unreadable;
 use crate::cli;
 use crate::error::DaemonError;
 use crate::export;
 
-/// A terminal is told this often how far it is.
-const TELL_PERIOD: Duration = Duration::from_millis(500);
+/// A terminal shows the progress this often.
+const PROGRESS_PERIOD: Duration = Duration::from_millis(500);
 
 /// Why a replay ends before anything differs.
 #[derive(Debug, PartialEq, Eq)]
@@ -69,7 +69,7 @@ pub(super) fn open(args: &cli::Replay) -> Result<Replay<'_, BufReader<File>>, Da
         entries: Entries::open(path)?,
         compared: None,
         frames: 0,
-        told: Instant::now(),
+        reported: Instant::now(),
     })
 }
 
@@ -80,7 +80,7 @@ pub(super) struct Replay<'a, R> {
     compared: Option<Compared>,
     /// Frames that were equal.
     pub(super) frames: u64,
-    told: Instant,
+    reported: Instant,
 }
 
 impl<R: Read> Replay<'_, R> {
@@ -112,7 +112,7 @@ impl<R: Read> Replay<'_, R> {
                 }
                 _ => return Err(self.entries.damaged("its records are out of order")),
             }
-            self.tell();
+            self.report_progress();
         }
     }
 
@@ -163,9 +163,9 @@ impl<R: Read> Replay<'_, R> {
     }
 
     /// On a terminal, how far it is.
-    fn tell(&mut self) {
-        if self.told.elapsed() > TELL_PERIOD {
-            self.told = Instant::now();
+    fn report_progress(&mut self) {
+        if self.reported.elapsed() > PROGRESS_PERIOD {
+            self.reported = Instant::now();
             if std::io::stderr().is_terminal() {
                 let _ = write!(std::io::stderr(), "\r{} frames ", self.frames);
             }
@@ -212,7 +212,7 @@ impl Compared {
     fn command(
         &mut self,
         path: &Path,
-        command: &Command<'_>,
+        command: &RecordedCommand<'_>,
         frame: u64,
     ) -> Result<bool, DaemonError> {
         let Some(advance) = self.run.command(path, command, frame)? else {

@@ -9,8 +9,8 @@ use sim_physics::arrays::Field;
 use sim_protocol::host::{Inbox, free_memory};
 use sim_protocol::{CommandHeader, Description, Op};
 
+use super::failure::unreadable;
 use super::records::Command;
-use super::unreadable;
 use crate::config;
 use crate::error::DaemonError;
 use crate::export::{self, Advance};
@@ -75,10 +75,10 @@ impl Run {
         threads: Option<usize>,
     ) -> Result<Run, DaemonError> {
         let failed = |problem: String| unreadable(path, problem);
-        let told = &head.daemon;
-        let scene = config::parse(&told.scene, "of the recording");
+        let daemon = &head.daemon;
+        let scene = config::parse(&daemon.scene, "of the recording");
         let scene = scene.map_err(|error| failed(error.to_string()))?;
-        let description = scene.describe(Path::new(&told.scene_folder));
+        let description = scene.describe(Path::new(&daemon.scene_folder));
         let model = description
             .map_err(|error| {
                 failed(format!(
@@ -87,10 +87,10 @@ impl Run {
             })?
             .compile()
             .map_err(|error| failed(error.to_string()))?;
-        if model.hash() != told.model_hash {
-            let (then, now) = (told.model_hash, model.hash());
+        if model.hash() != daemon.model_hash {
+            let (then, now) = (daemon.model_hash, model.hash());
             let ours = env!("CARGO_PKG_VERSION");
-            let cause = match told.release == ours {
+            let cause = match daemon.release == ours {
                 true => {
                     "a robot file or a mesh of its scene has changed since; put back what it was"
                         .to_owned()
@@ -98,7 +98,7 @@ impl Run {
                 false => format!(
                     "a robot file or a mesh of its scene has changed since, or release {} makes another of it than \
                      ours, {ours}; replay it with that one",
-                    told.release
+                    daemon.release
                 ),
             };
             return Err(failed(format!(
@@ -108,9 +108,9 @@ impl Run {
         let options = Options {
             device,
             compile_limit: compile_limit()?,
-            worlds: told.worlds,
-            first_world: told.first_world,
-            precision: match told.precision.as_str() {
+            worlds: daemon.worlds,
+            first_world: daemon.first_world,
+            precision: match daemon.precision.as_str() {
                 "f64" => Precision::F64,
                 _ => Precision::F32,
             },
@@ -118,13 +118,13 @@ impl Run {
             lanes: Lanes::Auto,
             fields,
             faults: Faults {
-                joint_q_max: told.joint_q_max.unwrap_or(f64::INFINITY),
-                joint_qd_max: told.joint_qd_max.unwrap_or(f64::INFINITY),
-                resets: told.on_fault == "reset",
-                freezes_nan: told.on_nan == "freeze",
+                joint_q_max: daemon.joint_q_max.unwrap_or(f64::INFINITY),
+                joint_qd_max: daemon.joint_qd_max.unwrap_or(f64::INFINITY),
+                resets: daemon.on_fault == "reset",
+                freezes_nan: daemon.on_nan == "freeze",
             },
-            draws: Draws::named(&told.draws)
-                .ok_or_else(|| failed(format!("draws by `{}`, unknown here", told.draws)))?,
+            draws: Draws::named(&daemon.draws)
+                .ok_or_else(|| failed(format!("draws by `{}`, unknown here", daemon.draws)))?,
             ..Options::default()
         };
         let simulation =
@@ -136,8 +136,8 @@ impl Run {
             )));
         }
         Ok(Run {
-            inbox: Inbox::for_commands_of(told),
-            mask: Vec::with_capacity(told.worlds),
+            inbox: Inbox::for_commands_of(daemon),
+            mask: Vec::with_capacity(daemon.worlds),
             simulation,
             has_state: false,
         })
@@ -151,11 +151,11 @@ impl Run {
         Ok(())
     }
 
-    /// Sets the inputs of command number `frame` and tells how to go on; nothing if it made no frame.
+    /// Sets the inputs of command number `frame` and returns how to go on; nothing if it made no frame.
     pub(super) fn command(
         &mut self,
         path: &Path,
-        command: &Command<'_>,
+        command: &RecordedCommand<'_>,
         frame: u64,
     ) -> Result<Option<Advance>, DaemonError> {
         let refused = |problem: String| {

@@ -9,12 +9,12 @@ use sim_protocol::digest::{digest, digests_of};
 use sim_protocol::{Dtype, Op, Table};
 
 use super::blocks::{self, Blocks, Next};
-use super::records::{self, Command, Record};
+use super::records::{self, Record, RecordedCommand};
 use super::replay::{End, open};
 use crate::cli::Replay;
 use crate::config;
 use crate::error::DaemonError;
-use crate::export::{self, Facts};
+use crate::export::{self, RunInfo};
 
 const WORLDS: usize = 3;
 const DOFS: usize = 9;
@@ -46,7 +46,7 @@ fn record() -> Recording {
         ..Options::default()
     };
     let mut simulation = Simulation::new(model, &options).unwrap();
-    let facts = Facts {
+    let info = RunInfo {
         scene: &description,
         scene_text: scene.to_toml(),
         scene_folder: assets.to_str().unwrap().to_owned(),
@@ -55,8 +55,8 @@ fn record() -> Recording {
         frames_held: 1,
         watch_worlds: 1,
     };
-    let told = export::description(simulation.model(), &options, simulation.layout(), facts);
-    let head = serde_json::json!({ "daemon": told, "observed": ["joint_q"] }).to_string();
+    let announced = export::description(simulation.model(), &options, simulation.layout(), info);
+    let head = serde_json::json!({ "daemon": announced, "observed": ["joint_q"] }).to_string();
     let (mut first, mut state) = (Vec::new(), Vec::new());
     Record::Head(head.as_bytes()).write(&mut first);
     Record::State(&simulation.snapshot()).write(&mut state);
@@ -81,7 +81,7 @@ fn record() -> Recording {
         let row = frame.row("joint_q").unwrap();
         let from = (row.offset - Table::head_bytes(frame.rows().len())) / 8;
         let mut block = Vec::new();
-        Record::Command(Command {
+        Record::Command(RecordedCommand {
             op: Op::Step as u32,
             rows: 1,
             words: &words,
@@ -244,14 +244,14 @@ fn a_forged_command_is_told_by_frame_world_and_field() {
     let numbers: &mut [f32] = bytemuck::cast_slice_mut(recording.frame(5));
     numbers[place] += 0.25;
     let error = recording.replay("forged").unwrap_err();
-    let told = error.to_string();
+    let message = error.to_string();
     assert!(
-        told.contains("frame 5, of a step: world 1: `joint_q`["),
-        "{told}"
+        message.contains("frame 5, of a step: world 1: `joint_q`["),
+        "{message}"
     );
     assert!(
-        told.contains("recorded is") && !told.contains("worlds differ"),
-        "{told}"
+        message.contains("recorded is") && !message.contains("worlds differ"),
+        "{message}"
     );
     assert_eq!(error.exit_code(), 1);
 }
@@ -263,10 +263,10 @@ fn a_forged_frame_is_told_by_frame_world_and_field() {
     // one digest a world of joint_q, then of joint_qd
     let numbers: &mut [u32] = bytemuck::cast_slice_mut(&mut recording.frame(3)[digests..]);
     numbers[WORLDS + 2] ^= 1;
-    let told = recording.replay("digest").unwrap_err().to_string();
+    let message = recording.replay("digest").unwrap_err().to_string();
     assert!(
-        told.contains("frame 3, of a step: world 2: `joint_qd` differs;"),
-        "{told}"
+        message.contains("frame 3, of a step: world 2: `joint_qd` differs;"),
+        "{message}"
     );
     // the last of the numbers of joint_q
     let mut recording = record();
@@ -275,10 +275,10 @@ fn a_forged_frame_is_told_by_frame_world_and_field() {
     let first = 8 * frame.len() - padded;
     let bytes: &mut [u8] = bytemuck::cast_slice_mut(frame);
     bytes[first + WORLDS * DOFS * 4 - 1] ^= 0x80;
-    let told = recording.replay("observed").unwrap_err().to_string();
+    let message = recording.replay("observed").unwrap_err().to_string();
     assert!(
-        told.contains("frame 4, of a step: world 2: `joint_q`[8] is "),
-        "{told}"
+        message.contains("frame 4, of a step: world 2: `joint_q`[8] is "),
+        "{message}"
     );
 }
 

@@ -28,7 +28,7 @@ pub(super) struct Writer {
     thread: Option<JoinHandle<io::Result<u64>>>,
 }
 
-/// The file can no longer be written; [`Writer::close`] tells why.
+/// The file can no longer be written; [`Writer::close`] reports why.
 #[derive(Debug)]
 pub(super) struct Stopped;
 

@@ -1,4 +1,4 @@
-//! A daemon whose device is lost: it tells why, refuses commands, and ends when it is asked to.
+//! A daemon whose device is lost: it reports why, refuses commands, and ends when it is asked to.
 
 #[path = "../../../sim-core/device/tests/device/layer.rs"]
 mod layer;
@@ -13,19 +13,19 @@ use std::time::{Duration, Instant};
 use sim_engine::options::{Adapter, lose_after};
 use sim_engine::simulation::{Device, Options, Simulation};
 use sim_physics::arrays::{Field, status};
+use sim_protocol::daemon_lock::DaemonLock;
 use sim_protocol::host::Host;
-use sim_protocol::place::Place;
-use sim_protocol::tenancy::Tenancy;
+use sim_protocol::paths::DaemonPaths;
 use sim_protocol::{AttachOptions, Client, Frame, JournalEntry, ProtocolError, keep_waiting};
 
 use crate::cli::{Record, Replay};
 use crate::config;
-use crate::export::{self, Facts};
-use crate::news::News;
+use crate::export::{self, RunInfo};
+use crate::log::Log;
 use crate::recording::{follow, replay};
 
 /// Serves worlds of an arm on the first GPU, which is lost after so many runs.
-fn serve(place: &Place, log: &Path, runs: u64, ready: impl FnOnce()) {
+fn serve(paths: &DaemonPaths, log: &Path, runs: u64, ready: impl FnOnce()) {
     let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/assets");
     let text = "dt = 0.002\nsubsteps = 2\n[[robot]]\nname = \"arm\"\nurdf = \"fr3/fr3_franka_hand.urdf\"\n";
     let scene = config::parse(text, "of the test").unwrap();
@@ -41,7 +41,7 @@ fn serve(place: &Place, log: &Path, runs: u64, ready: impl FnOnce()) {
     };
     let simulation = Simulation::new(description.compile().unwrap(), &options).unwrap();
     layer::assert_watched();
-    let facts = Facts {
+    let info = RunInfo {
         scene: &description,
         scene_text: scene.to_toml(),
         scene_folder: assets.to_str().unwrap().to_owned(),
@@ -50,18 +50,25 @@ fn serve(place: &Place, log: &Path, runs: u64, ready: impl FnOnce()) {
         frames_held: 2,
         watch_worlds: 1,
     };
-    let mut told = export::description(simulation.model(), &options, simulation.layout(), facts);
-    told.adapter = simulation.adapter().to_owned();
-    told.state_bytes = simulation.snapshot_bytes(3) as u64;
-    told.watch_state_bytes = simulation.snapshot_bytes(1) as u64;
+    let mut announced =
+        export::description(simulation.model(), &options, simulation.layout(), info);
+    announced.adapter = simulation.adapter().to_owned();
+    announced.state_bytes = simulation.snapshot_bytes(3) as u64;
+    announced.watch_state_bytes = simulation.snapshot_bytes(1) as u64;
     let table = export::frame_table(simulation.layout());
-    let tenancy = Tenancy::take(place).unwrap();
-    let mut host = Host::open(tenancy, told, table, Arc::new(AtomicBool::new(false))).unwrap();
-    let mut news = News::open(Some(log), true).unwrap();
+    let daemon_lock = DaemonLock::take(paths).unwrap();
+    let mut host = Host::open(
+        daemon_lock,
+        announced,
+        table,
+        Arc::new(AtomicBool::new(false)),
+    )
+    .unwrap();
+    let mut log = Log::open(Some(log), true).unwrap();
     lose_after(runs);
     ready();
-    super::run(simulation, &mut host, &mut news).unwrap();
-    host.janitor().clean();
+    super::run(simulation, &mut host, &mut log).unwrap();
+    host.client_cleanup().clean();
 }
 
 /// A daemon in a thread, and a client of it.
@@ -74,12 +81,12 @@ struct Served {
 
 fn start(test: &str, runs: u64) -> Served {
     let root = std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()));
-    let place = Place::new(Some(&root), "lost").unwrap();
-    let log = root.join("news.log");
+    let paths = DaemonPaths::new(Some(&root), "lost").unwrap();
+    let log = root.join("daemon.log");
     let (ready, wait) = channel();
     let thread = {
         let log = log.clone();
-        std::thread::spawn(move || serve(&place, &log, runs, || ready.send(()).unwrap()))
+        std::thread::spawn(move || serve(&paths, &log, runs, || ready.send(()).unwrap()))
     };
     wait.recv().unwrap();
     Served {
@@ -99,14 +106,14 @@ fn attach(root: &Path) -> Client {
 }
 
 impl Served {
-    /// Ends the daemon; returns its news.
+    /// Ends the daemon; returns its log.
     fn end(self) -> String {
         self.client.shutdown(&mut keep_waiting()).unwrap();
         drop(self.client);
         self.thread.join().unwrap();
-        let told = std::fs::read_to_string(&self.log).unwrap();
+        let log = std::fs::read_to_string(&self.log).unwrap();
         std::fs::remove_dir_all(&self.root).unwrap();
-        told
+        log
     }
 }
 
@@ -163,8 +170,8 @@ fn a_daemon_whose_device_is_lost_refuses_commands_with_the_reason_and_goes_on() 
         "{refused}"
     );
     assert!(!out.exists());
-    let told = served.end();
-    assert_eq!(told.matches("all worlds are lost").count(), 1, "{told}");
+    let log = served.end();
+    assert_eq!(log.matches("all worlds are lost").count(), 1, "{log}");
 }
 
 #[test]

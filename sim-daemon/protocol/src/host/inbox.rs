@@ -48,7 +48,7 @@ impl Inbox {
         self.header = header;
         self.used = 0;
         self.op =
-            Op::from_wire(header.op).ok_or_else(|| format!("unknown operation {}", header.op))?;
+            Op::from_code(header.op).ok_or_else(|| format!("unknown operation {}", header.op))?;
         let Some(words) = self.words.get_mut(..payload.len()) else {
             return Err(format!(
                 "a command of {} bytes, at most {} fit",

@@ -5,10 +5,12 @@ use std::time::{Duration, Instant};
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{Node, PortFactory};
 
-use super::{Inbox, S, memory};
+use super::Inbox;
+use super::worlds::S;
 use crate::digest::{digest, digests_of};
-use crate::journal::{ENDED, JournalHeader};
-use crate::loan;
+use crate::journal_header::{ENDED, JournalHeader};
+use crate::loaned;
+use crate::memory;
 use crate::transport::{self, JournalPublisher, JournalService, journal_slots};
 use crate::{ALIGNMENT, Description, ProtocolError, Row, Table};
 
@@ -44,7 +46,7 @@ struct Journal {
     joined: bool,
     /// It has the state from which it goes on.
     begun: bool,
-    /// It was told that nothing comes any more.
+    /// It was notified that nothing comes any more.
     ended: bool,
     entries: u64,
 }
@@ -115,7 +117,7 @@ impl Journals {
             let _ = journal.publisher.update_connections();
             recorders > 0 || (!journal.joined && journal.since.elapsed() < JOIN_MAX)
         });
-        self.tell_end(session);
+        self.send_end(session);
         let waits = |journal: &Journal| journal.joined && !journal.begun;
         self.ended.is_none() && self.open.iter().any(waits)
     }
@@ -133,15 +135,15 @@ impl Journals {
     /// Ends all journals, those included that are still to be joined.
     pub(super) fn end(&mut self, session: u64, reason: &str) {
         self.ended = Some(reason.to_owned());
-        self.tell_end(session);
+        self.send_end(session);
     }
 
-    fn tell_end(&mut self, session: u64) {
+    fn send_end(&mut self, session: u64) {
         let Some(reason) = &self.ended else {
             return;
         };
-        let told = |journal: &&mut Journal| journal.joined && !journal.ended;
-        for journal in self.open.iter_mut().filter(told) {
+        let is_open = |journal: &&mut Journal| journal.joined && !journal.ended;
+        for journal in self.open.iter_mut().filter(is_open) {
             journal.ended = true;
             journal.end(session, reason);
         }
@@ -157,7 +159,7 @@ impl Journals {
         }
     }
 
-    /// Leaves out an entry that cannot be told, so that a gap shows.
+    /// Leaves out an entry that cannot be sent, so that a gap shows.
     pub(super) fn skip(&mut self) {
         let begun = self.open.iter_mut().filter(|journal| journal.begun);
         begun.for_each(|journal| journal.entries += 1);
@@ -249,10 +251,10 @@ impl Journal {
         let Ok(mut loan) = self.publisher.loan_slice_uninit(bytes.div_ceil(ALIGNMENT)) else {
             return;
         };
-        fill(bytemuck::cast_slice_mut(loan::words(loan.payload_mut())));
+        fill(bytemuck::cast_slice_mut(loaned::words(loan.payload_mut())));
         *loan.user_header_mut() = JournalHeader { entry, ..header };
         // a recorder that cannot be reached is one that went: the next look tells
-        let _ = loan::send(loan);
+        let _ = loaned::send(loan);
     }
 }
 

@@ -1,72 +1,51 @@
-//! The daemon's end of the wire: it receives commands one at a time, loans frames, and looks after leases and observers.
+//! The daemon's end of the protocol: it receives commands one at a time, loans frames, and keeps leases and observers.
 //! It knows no physics.
 
+mod cleanup;
 mod inbox;
-mod janitor;
 mod journal;
-mod lane;
-pub(crate) mod memory;
+mod lease;
+mod observers;
 mod state;
 #[cfg(test)]
 mod tests;
-mod watch;
+mod worlds;
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::listener::Listener;
-use iceoryx2::prelude::ipc;
 
+pub use cleanup::ClientCleanup;
 pub use inbox::{Inbox, Numbers};
-pub use janitor::Janitor;
+pub use worlds::{Next, Worlds};
 
 use self::journal::Journals;
-use self::lane::Lane;
+use self::lease::Lease;
+use self::observers::Observers;
 use self::state::{State, header};
-use self::watch::Watch;
-use crate::apart::Apart;
+use self::worlds::S;
+use crate::affinity::CoreAffinity;
 use crate::control::Response;
-use crate::pace::{Pace, cores};
-use crate::tenancy::Tenancy;
-use crate::transport::{self, facts};
+use crate::daemon_lock::DaemonLock;
+use crate::memory;
+use crate::transport::{self, handshake};
+use crate::waiter::{Waiter, cores};
 use crate::{Description, ProtocolError, RefusalKind, Table};
-
-type S = ipc::Service;
 
 /// While commands come without a pause, control requests are looked at this often.
 const AROUND_PERIOD: Duration = Duration::from_millis(20);
 /// Room for answers other than the description [bytes].
 const RESPONSE_MIN: usize = 1024;
 
-/// What a host asks for: frames, and for those who look on the state behind them.
-pub trait Worlds {
-    /// Writes the arena of a frame; returns whether there is something to be seen and recorded in it.
-    fn frame(&mut self, arena: &mut [u64]) -> bool;
-    /// Writes the state of the worlds that observers see, [`Description::watch_state_bytes`] of it; returns whether there is one.
-    fn state(&mut self, to: &mut [u8]) -> bool;
-}
-
-/// The wire of one daemon.
+/// The services of one daemon.
 pub struct Host {
     state: State,
-    pace: Pace,
+    waiter: Waiter,
     listener: Listener<S>,
     /// Last, so that its files go after everything that uses them.
-    tenancy: Tenancy,
-}
-
-/// What [`Host::wait`] has found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Next {
-    /// A command, in [`Host::inbox`]; it wants [`Host::answer`] or [`Host::refuse`].
-    Command,
-    /// An observer wants to see the present state: [`Host::show`].
-    Watch,
-    /// A recorder wants the state of all worlds to begin with: [`Host::record_state`].
-    Record,
-    /// Somebody asked the daemon to end.
-    End,
+    daemon_lock: DaemonLock,
 }
 
 impl Host {
@@ -79,7 +58,7 @@ impl Host {
     /// [`ProtocolError::SharedMemory`] and [`ProtocolError::Memory`] before anything is taken;
     /// [`ProtocolError::Transport`].
     pub fn open(
-        mut tenancy: Tenancy,
+        mut daemon_lock: DaemonLock,
         mut description: Description,
         frame: Table,
         stop: Arc<AtomicBool>,
@@ -87,28 +66,28 @@ impl Host {
         let session = random();
         description.protocol = crate::PROTOCOL_VERSION;
         description.release = env!("CARGO_PKG_VERSION").to_owned();
-        description.name = tenancy.place().name().to_owned();
+        description.name = daemon_lock.paths().name().to_owned();
         description.session = session;
         description.pid = std::process::id();
         description.schema = description.schema_hash();
         check(&description, &frame, 0, 1)?;
 
-        let node = transport::node::<S>(&tenancy.place().transport_config(session), "daemon")?;
+        let node = transport::node::<S>(&daemon_lock.paths().transport_config(session), "daemon")?;
         let attributes = [
-            (facts::PROTOCOL, description.protocol.to_string()),
-            (facts::SCHEMA, format!("{:016x}", description.schema)),
-            (facts::WORLDS, description.worlds.to_string()),
-            (facts::DOFS, description.dof_names.len().to_string()),
+            (handshake::PROTOCOL, description.protocol.to_string()),
+            (handshake::SCHEMA, format!("{:016x}", description.schema)),
+            (handshake::WORLDS, description.worlds.to_string()),
+            (handshake::DOFS, description.dof_names.len().to_string()),
         ];
         let listener = transport::listener(&transport::create_event(&node, "wake", &attributes)?)?;
         let description_json =
             serde_json::to_vec(&Response::Description(Box::new(description.clone())))
                 .expect("descriptions are plain data");
         let responder = transport::responder(&node, description_json.len().max(RESPONSE_MIN))?;
-        let watch = Watch::open(&node, &description, &frame)?;
-        let lane = Lane::open(&node, 1, &frame, description.frames_held)?;
+        let observers = Observers::open(&node, &description, &frame)?;
+        let lease = Lease::open(&node, 1, &frame, description.frames_held)?;
         // last: from here on clients may come
-        tenancy.announce(session, 1)?;
+        daemon_lock.announce(session, 1)?;
 
         // the daemon only waits while nobody steps: its own threads are idle then, the client needs one core. Other groups may step
         let others = match description.groups {
@@ -121,43 +100,43 @@ impl Host {
             description,
             description_json,
             frame,
-            lane: Some(lane),
+            lease: Some(lease),
             journals: Journals::default(),
             epochs: 1,
             responder,
-            watch,
-            looked: Instant::now(),
+            observers,
+            polled: Instant::now(),
             frames: 0,
             inbox,
             stop,
-            apart: Apart::new(),
+            affinity: CoreAffinity::new(),
         };
         Ok(Host {
             state,
-            pace: Pace::new(cores() > 1 + others),
+            waiter: Waiter::new(cores() > 1 + others),
             listener,
-            tenancy,
+            daemon_lock,
         })
     }
 
-    /// What clients are told.
+    /// The description that clients get.
     pub fn description(&self) -> &Description {
         &self.state.description
     }
 
     /// Where the daemon lives.
-    pub fn tenancy(&self) -> &Tenancy {
-        &self.tenancy
+    pub fn daemon_lock(&self) -> &DaemonLock {
+        &self.daemon_lock
     }
 
     /// Shared memory taken so far [bytes].
     pub fn shared_bytes(&self) -> u64 {
-        memory::used(self.tenancy.place().stem())
+        memory::used(self.daemon_lock.paths().stem())
     }
 
     /// Something that cleans up after killed clients, to be run now and then on a thread of its own.
-    pub fn janitor(&self) -> Janitor {
-        Janitor {
+    pub fn client_cleanup(&self) -> ClientCleanup {
+        ClientCleanup {
             config: self.state.node.config().clone(),
         }
     }
@@ -167,16 +146,16 @@ impl Host {
     /// # Errors
     /// [`ProtocolError::Transport`].
     pub fn wait(&mut self) -> Result<Next, ProtocolError> {
-        if self.state.looked.elapsed() > AROUND_PERIOD
-            && let Some(next) = self.state.look_around()
+        if self.state.polled.elapsed() > AROUND_PERIOD
+            && let Some(next) = self.state.poll_services()
         {
             return Ok(next);
         }
-        let next = self.pace.wait(&self.listener, &mut self.state)?;
+        let next = self.waiter.wait(&self.listener, &mut self.state)?;
         if next == Next::Command {
-            let (theirs, apart) = (self.state.inbox.header().core, &mut self.state.apart);
-            let shared = apart.core() == theirs;
-            self.pace.share(shared && !apart.leave(theirs));
+            let (theirs, affinity) = (self.state.inbox.header().core, &mut self.state.affinity);
+            let shared = affinity.core() == theirs;
+            self.waiter.share(shared && !affinity.leave(theirs));
         }
         Ok(next)
     }
@@ -195,10 +174,10 @@ impl Host {
 
     /// The number of the present lease: its frames lie in memory of its own. 0 if there is none.
     pub fn lease(&self) -> u64 {
-        self.state.lane.as_ref().map_or(0, |lane| lane.epoch)
+        self.state.lease.as_ref().map_or(0, |lease| lease.epoch)
     }
 
-    /// Whether somebody records what is done.
+    /// Whether a recorder is attached.
     pub fn is_recorded(&self) -> bool {
         self.state.journals.are_read()
     }
@@ -227,9 +206,11 @@ impl Host {
         state.frames += 1;
         if worlds.frame(arena) {
             let head = header(&state.description, &state.frame, state.frames);
-            state.watch.show(began, head, &state.frame, arena, worlds);
+            state
+                .observers
+                .show(began, head, &state.frame, arena, worlds);
         } else {
-            state.watch.unchanged();
+            state.observers.unchanged();
         }
     }
 }

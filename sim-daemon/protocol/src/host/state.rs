@@ -7,14 +7,16 @@ use std::time::{Duration, Instant};
 use iceoryx2::prelude::Node;
 
 use super::journal::{Journals, Occasion, RECORDERS_MAX};
-use super::lane::Lane;
-use super::watch::Watch;
-use super::{Inbox, Janitor, Next, S, Worlds, memory};
-use crate::apart::Apart;
+use super::lease::Lease;
+use super::observers::Observers;
+use super::worlds::{Next, S, Worlds};
+use super::{ClientCleanup, Inbox};
+use crate::affinity::CoreAffinity;
 use crate::control::{Request, Response};
-use crate::loan;
-use crate::pace::Waiting;
+use crate::loaned;
+use crate::memory;
 use crate::transport::Responder;
+use crate::waiter::Awaited;
 use crate::{ALIGNMENT, Description, Dtype, FrameHeader, ProtocolError, RefusalKind, Table};
 
 /// A look around that comes later than this was held up by ourselves, and heartbeats with it.
@@ -25,26 +27,26 @@ pub(super) struct State {
     pub(super) description: Description,
     pub(super) description_json: Vec<u8>,
     pub(super) frame: Table,
-    pub(super) lane: Option<Lane>,
+    pub(super) lease: Option<Lease>,
     pub(super) journals: Journals,
     pub(super) epochs: u64,
     pub(super) responder: Responder<S>,
-    pub(super) watch: Watch,
-    pub(super) looked: Instant,
+    pub(super) observers: Observers,
+    pub(super) polled: Instant,
     pub(super) frames: u64,
     pub(super) inbox: Inbox,
     pub(super) stop: Arc<AtomicBool>,
-    pub(super) apart: Apart,
+    pub(super) affinity: CoreAffinity,
 }
 
 impl State {
     /// Ends a lease that is over, makes the next one ready.
     fn renew(&mut self) {
         // the old slots go first: there may not be room for both
-        self.lane = None;
+        self.lease = None;
         self.epochs += 1;
-        // without room now, the next request for a lease tries again and tells why
-        self.lane = Lane::open(
+        // without room now, the next request for a lease tries again and reports why
+        self.lease = Lease::open(
             &self.node,
             self.epochs,
             &self.frame,
@@ -54,18 +56,18 @@ impl State {
     }
 
     fn acquire(&mut self, pid: u32) -> Response {
-        if let Some(lane) = &mut self.lane
-            && lane.holder.is_some()
+        if let Some(lease) = &mut self.lease
+            && lease.holder.is_some()
         {
-            Janitor {
+            ClientCleanup {
                 config: self.node.config().clone(),
             }
             .clean();
-            if lane.is_over() || lane.is_silent() {
+            if lease.is_over() || lease.is_silent() {
                 self.renew();
             }
         }
-        if self.lane.is_none() {
+        if self.lease.is_none() {
             let needed = memory::lease_bytes(&self.description, &self.frame);
             match memory::check(memory::free(), needed, 0, "a lease") {
                 Err(
@@ -82,17 +84,17 @@ impl State {
                 Ok(()) => self.renew(),
             }
         }
-        match &mut self.lane {
+        match &mut self.lease {
             None => Response::Refused {
                 reason: "the services of a new lease could not be created".to_owned(),
             },
-            Some(Lane {
+            Some(Lease {
                 holder: Some(holder),
                 ..
             }) => Response::Held { pid: holder.pid },
-            Some(lane) => {
-                lane.grant(pid);
-                Response::Granted { epoch: lane.epoch }
+            Some(lease) => {
+                lease.grant(pid);
+                Response::Granted { epoch: lease.epoch }
             }
         }
     }
@@ -138,16 +140,16 @@ impl State {
                 Ok(Request::Describe) => None,
                 Ok(Request::Controller) => Some(Response::Controller {
                     pid: self
-                        .lane
+                        .lease
                         .as_ref()
-                        .and_then(|lane| Some(lane.holder.as_ref()?.pid)),
+                        .and_then(|lease| Some(lease.holder.as_ref()?.pid)),
                 }),
                 Ok(Request::Acquire { pid }) => Some(self.acquire(pid)),
                 Ok(Request::Heartbeat { epoch }) => {
-                    if let Some(Lane {
+                    if let Some(Lease {
                         holder: Some(holder),
                         ..
-                    }) = self.lane.as_mut().filter(|lane| lane.epoch == epoch)
+                    }) = self.lease.as_mut().filter(|lease| lease.epoch == epoch)
                     {
                         holder.beat = Instant::now();
                     }
@@ -155,8 +157,8 @@ impl State {
                 }
                 // the ports of the holder go right after this: `is_over` sees that
                 Ok(Request::Release { epoch }) => {
-                    let lane = self.lane.as_mut().filter(|lane| lane.epoch == epoch);
-                    lane.into_iter().for_each(Lane::joined);
+                    let lease = self.lease.as_mut().filter(|lease| lease.epoch == epoch);
+                    lease.into_iter().for_each(Lease::joined);
                     continue;
                 }
                 Ok(Request::Journal { observed }) => Some(self.journal(observed)),
@@ -180,10 +182,10 @@ impl State {
     }
 
     pub(super) fn answer(&mut self, started: Instant, worlds: &mut impl Worlds) {
-        let Some(lane) = &mut self.lane else {
+        let Some(lease) = &mut self.lease else {
             return self.record_inputs();
         };
-        let Ok(mut loan) = lane
+        let Ok(mut loan) = lease
             .publisher
             .loan_slice_uninit(self.frame.total_bytes() / ALIGNMENT)
         else {
@@ -191,35 +193,35 @@ impl State {
             self.record_inputs();
             return self.renew();
         };
-        let words = loan::words(loan.payload_mut());
+        let words = loaned::words(loan.payload_mut());
         let (head, arena) = words.split_at_mut(Table::head_bytes(self.frame.rows().len()) / 8);
         head[..self.frame.words().len()].copy_from_slice(self.frame.words());
         let is_good = worlds.frame(arena);
         self.frames += 1;
-        self.watch.changed();
+        self.observers.changed();
         let now = Instant::now();
         let common = header(&self.description, &self.frame, self.frames);
         let busy_ns = now.duration_since(started).as_nanos() as u64;
         *loan.user_header_mut() = FrameHeader {
-            epoch: lane.epoch,
+            epoch: lease.epoch,
             ack_seq: self.inbox.header().seq,
             busy_ns,
-            core: self.apart.core(),
+            core: self.affinity.core(),
             ..common
         };
-        if let Some(holder) = &mut lane.holder {
+        if let Some(holder) = &mut lease.holder {
             holder.beat = now;
         }
-        let Ok(sent) = loan::send_kept(&mut lane.publisher, loan) else {
+        let Ok(sent) = loaned::send_kept(&mut lease.publisher, loan) else {
             self.journals.skip();
             return self.renew(); // the holder cannot be reached: it is told that its lease is lost
         };
         // a holder that cannot be notified looks by itself after 50 ms
-        let _ = lane.notifier.notify();
+        let _ = lease.notifier.notify();
         // last: nobody waits for it
         let head = Table::head_bytes(self.frame.rows().len()) / 8;
-        if is_good && self.watch.is_due() {
-            self.watch
+        if is_good && self.observers.is_due() {
+            self.observers
                 .show(Instant::now(), common, &self.frame, &sent[head..], worlds);
         }
         if is_good && self.journals.are_read() {
@@ -232,7 +234,7 @@ impl State {
         }
     }
 
-    /// Tells recorders that the inputs of a command were set, and nobody is left to get a frame.
+    /// Sends recorders a command whose inputs were set, but that has no client left to get a frame.
     fn record_inputs(&mut self) {
         let occasion = Occasion {
             description: &self.description,
@@ -243,46 +245,46 @@ impl State {
     }
 
     pub(super) fn refuse(&mut self, kind: RefusalKind, reason: &str) {
-        let Some(lane) = &mut self.lane else {
+        let Some(lease) = &mut self.lease else {
             return;
         };
         let room = memory::slot_bytes(&self.frame) - Table::head_bytes(1);
         let end = reason.floor_char_boundary(room);
         let reason = &reason.as_bytes()[..end];
         let table = Table::lay_out([("reason".to_owned(), Dtype::U8, vec![reason.len()], 0)]);
-        let Ok(mut loan) = lane
+        let Ok(mut loan) = lease
             .publisher
             .loan_slice_uninit(table.total_bytes() / ALIGNMENT)
         else {
             return self.renew();
         };
-        let words = loan::words(loan.payload_mut());
+        let words = loaned::words(loan.payload_mut());
         words[..table.words().len()].copy_from_slice(table.words());
         let offset = table.rows()[0].offset;
         bytemuck::cast_slice_mut::<u64, u8>(words)[offset..offset + reason.len()]
             .copy_from_slice(reason);
         *loan.user_header_mut() = FrameHeader {
-            epoch: lane.epoch,
+            epoch: lease.epoch,
             ack_seq: self.inbox.header().seq,
             outcome: kind as u32,
-            core: self.apart.core(),
+            core: self.affinity.core(),
             ..header(&self.description, &table, self.frames)
         };
-        if loan::send(loan).is_err() {
+        if loaned::send(loan).is_err() {
             return self.renew();
         }
-        let _ = lane.notifier.notify();
+        let _ = lease.notifier.notify();
     }
 
     /// Looks at control requests, leases, observers and recorders.
-    pub(super) fn look_around(&mut self) -> Option<Next> {
-        let gap = self.looked.elapsed();
-        self.looked = Instant::now();
+    pub(super) fn poll_services(&mut self) -> Option<Next> {
+        let gap = self.polled.elapsed();
+        self.polled = Instant::now();
         if gap > HELD_UP
-            && let Some(Lane {
+            && let Some(Lease {
                 holder: Some(holder),
                 ..
-            }) = &mut self.lane
+            }) = &mut self.lease
         {
             holder.beat += gap; // the heartbeats of that time wait unread
         }
@@ -290,24 +292,24 @@ impl State {
             return Some(Next::End);
         }
         let next = self.control();
-        if self.lane.as_mut().is_some_and(Lane::is_over) {
+        if self.lease.as_mut().is_some_and(Lease::is_over) {
             self.renew();
         }
-        self.lane.iter().for_each(Lane::refresh);
+        self.lease.iter().for_each(Lease::refresh);
         // new observers get the frame shown last, dead ones give their slots back
-        self.watch.refresh();
+        self.observers.refresh();
         let waits = self.journals.refresh(self.description.session);
         next.or(waits.then_some(Next::Record))
     }
 }
 
-impl Waiting<Next> for State {
-    fn look(&mut self) -> Result<Option<Next>, ProtocolError> {
-        let Some(lane) = &mut self.lane else {
+impl Awaited<Next> for State {
+    fn poll(&mut self) -> Result<Option<Next>, ProtocolError> {
+        let Some(lease) = &mut self.lease else {
             return Ok(None);
         };
         // a client that was killed while it connected is an error until it is cleaned up: then as if it were not there
-        let Ok(Some(sample)) = lane.subscriber.receive() else {
+        let Ok(Some(sample)) = lease.subscriber.receive() else {
             return Ok(None);
         };
         let header = *sample.user_header();
@@ -316,8 +318,8 @@ impl Waiting<Next> for State {
             .take(header, bytemuck::cast_slice(sample.payload()));
         drop(sample);
         if header.session != self.description.session
-            || header.epoch != lane.epoch
-            || header.seq <= lane.last_seq
+            || header.epoch != lease.epoch
+            || header.seq <= lease.last_seq
         {
             let reason = format!(
                 "command {} of session {:016x}, lease {} is stale: session {:016x}, lease {} is at command {}",
@@ -325,14 +327,14 @@ impl Waiting<Next> for State {
                 header.session,
                 header.epoch,
                 self.description.session,
-                lane.epoch,
-                lane.last_seq
+                lease.epoch,
+                lease.last_seq
             );
             self.refuse(RefusalKind::Stale, &reason);
             return Ok(None);
         }
-        lane.last_seq = header.seq;
-        lane.joined();
+        lease.last_seq = header.seq;
+        lease.joined();
         if let Err(problem) = taken {
             self.refuse(
                 RefusalKind::Malformed,
@@ -343,9 +345,9 @@ impl Waiting<Next> for State {
         Ok(Some(Next::Command))
     }
 
-    fn around(&mut self) -> Result<Option<Next>, ProtocolError> {
-        let next = self.look_around();
-        Ok(next.or(self.watch.is_due().then_some(Next::Watch)))
+    fn poll_rest(&mut self) -> Result<Option<Next>, ProtocolError> {
+        let next = self.poll_services();
+        Ok(next.or(self.observers.is_due().then_some(Next::Observe)))
     }
 }
 

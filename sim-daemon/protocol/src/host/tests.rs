@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 
 use super::*;
 use crate::PROTOCOL_VERSION;
-use crate::place::Place;
+use crate::paths::DaemonPaths;
 use crate::transport::CommandPublisher;
 use crate::{
     AttachOptions, Client, CommandHeader, Dtype, Frame, Hook, InputInfo, Op, keep_waiting,
@@ -98,11 +98,11 @@ impl Worlds for Counted {
 }
 
 /// Serves until told to stop; sends word when clients may come.
-fn serve(place: &Place, stop: Arc<AtomicBool>, ready: Sender<()>, takes: Duration) {
+fn serve(paths: &DaemonPaths, stop: Arc<AtomicBool>, ready: Sender<()>, takes: Duration) {
     let table = Table::over_arena([("count".to_owned(), Dtype::U64, vec![2], 0)], 64);
-    let tenancy = Tenancy::take(place).unwrap();
-    let mut host = Host::open(tenancy, description(), table, stop).unwrap();
-    let janitor = host.janitor();
+    let daemon_lock = DaemonLock::take(paths).unwrap();
+    let mut host = Host::open(daemon_lock, description(), table, stop).unwrap();
+    let cleanup = host.client_cleanup();
     ready.send(()).unwrap();
     let mut count = 0;
     loop {
@@ -111,12 +111,12 @@ fn serve(place: &Place, stop: Arc<AtomicBool>, ready: Sender<()>, takes: Duratio
                 count += 1;
                 host.answer(Instant::now(), &mut Counted(count, takes));
             }
-            Next::Watch => host.show(&mut [0; 8], &mut Counted(count, takes)),
+            Next::Observe => host.show(&mut [0; 8], &mut Counted(count, takes)),
             Next::Record => host.record_state(&[count as u8; STATE], false),
             Next::End => break,
         }
     }
-    janitor.clean();
+    cleanup.clean();
 }
 
 impl Fake {
@@ -127,10 +127,10 @@ impl Fake {
     /// One whose state takes a time to give.
     fn slow(test: &str, takes: Duration) -> Fake {
         let root = std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()));
-        let place = Place::new(Some(&root), "fake").unwrap();
+        let paths = DaemonPaths::new(Some(&root), "fake").unwrap();
         let (stop, (ready, wait)) = (Arc::new(AtomicBool::new(false)), channel());
         let theirs = Arc::clone(&stop);
-        let thread = std::thread::spawn(move || serve(&place, theirs, ready, takes));
+        let thread = std::thread::spawn(move || serve(&paths, theirs, ready, takes));
         wait.recv().unwrap();
         Fake {
             name: "fake".to_owned(),
@@ -167,8 +167,8 @@ fn send(publisher: &CommandPublisher<Clients>, header: CommandHeader, payload: &
         .loan_slice_uninit(payload.len().div_ceil(crate::Line::WORDS))
         .unwrap();
     *loan.user_header_mut() = header;
-    crate::loan::words(loan.payload_mut())[..payload.len()].copy_from_slice(payload);
-    crate::loan::send(loan).unwrap();
+    crate::loaned::words(loan.payload_mut())[..payload.len()].copy_from_slice(payload);
+    crate::loaned::send(loan).unwrap();
 }
 
 #[test]
@@ -418,22 +418,22 @@ fn shown(fake: &Fake) -> (u32, Duration) {
 fn observers_see_fewer_frames_where_it_takes_long_to_show_one() {
     // of both, the first is the one shown last, the second needs no wait, and one more lies on the edge
     let (frames, time) = shown(&Fake::start("shown"));
-    let most = time.div_duration_f64(watch::PERIOD) as u32 + 3;
+    let most = time.div_duration_f64(observers::PERIOD) as u32 + 3;
     assert!((5..=most).contains(&frames), "{frames} frames in {time:?}");
     let (frames, time) = shown(&Fake::slow("slow", Duration::from_millis(5)));
-    let most = time.div_duration_f64(watch::SLOWEST) as u32 + 3;
+    let most = time.div_duration_f64(observers::SLOWEST) as u32 + 3;
     assert!((1..=most).contains(&frames), "{frames} frames in {time:?}");
 }
 
 #[test]
 fn facts_that_differ_are_refused_with_both_named() {
     let root = std::env::temp_dir().join(format!("tightloop-facts-{}", std::process::id()));
-    let place = Place::new(Some(&root), "facts").unwrap();
-    let mut tenancy = Tenancy::take(&place).unwrap();
-    let node = transport::node::<S>(&place.transport_config(5), "daemon").unwrap();
-    let attributes = [(facts::PROTOCOL, "7".to_owned())];
+    let paths = DaemonPaths::new(Some(&root), "facts").unwrap();
+    let mut daemon_lock = DaemonLock::take(&paths).unwrap();
+    let node = transport::node::<S>(&paths.transport_config(5), "daemon").unwrap();
+    let attributes = [(handshake::PROTOCOL, "7".to_owned())];
     let wake = transport::create_event(&node, "wake", &attributes).unwrap();
-    tenancy.announce(5, 1).unwrap();
+    daemon_lock.announce(5, 1).unwrap();
     let options = AttachOptions {
         root: Some(root.clone()),
         ..AttachOptions::default()
@@ -447,6 +447,6 @@ fn facts_that_differ_are_refused_with_both_named() {
         )),
         "{error}"
     );
-    drop((wake, node, tenancy));
+    drop((wake, node, daemon_lock));
     std::fs::remove_dir(root).expect("nothing is left in the root folder");
 }

@@ -1,16 +1,14 @@
 //! A picture of a robot's collision shapes: three-quarter view, side, front and top on one page.
 //!
-//! A renderer of our own: the page needs no window, no graphics driver and no font file, and the same robot gives the
-//! same bytes. surface (triangles) → raster (pixels) over backdrop, then marks on a canvas; cameras, normals and which
-//! samples a triangle covers are those of the crate sim-picture.
+//! The page needs no window, no graphics driver and no font file, and the same robot gives the same bytes. The crate
+//! sim-picture draws the shapes (`solids`) of each view; the rest of the page is drawn on a canvas.
 
-mod backdrop;
 mod canvas;
 mod file;
 mod legend;
 mod page;
-mod raster;
-mod surface;
+mod paper;
+mod solids;
 #[cfg(test)]
 mod tests;
 
@@ -26,7 +24,7 @@ pub(super) struct Drawing {
     /// Name of the robot.
     pub title: String,
     /// What it is, in a line.
-    pub facts: String,
+    pub summary: String,
     /// At which joint positions it is drawn.
     pub caption: String,
     /// Names of the links, in body order.

@@ -3,11 +3,10 @@
 use sim_model::Pose;
 
 use super::Drawing;
-use super::backdrop::{AXES, Backdrop, Shadow, round_spacing};
-use super::canvas::{Canvas, PAPER, Rgb, Size};
+use super::canvas::{Canvas, PAPER, Size};
 use super::legend::{BONE, Legend, QUIET, RULE, TEXT, clipped, colours};
-use super::raster::render as rasterise;
-use super::surface::Surface;
+use super::paper::{AXES, graph_paper, round_spacing};
+use super::solids::Solids;
 use sim_picture::View;
 use sim_picture::vector::{Vector, extent};
 
@@ -48,7 +47,7 @@ pub(super) fn render(drawing: &Drawing) -> Canvas {
     // its letters are nearly twice as wide
     let title = clipped(&drawing.title, MAIN / 2);
     page.text(24, 12, &title, Size::Large, TEXT);
-    page.text(24, 42, &drawing.facts, Size::Small, QUIET);
+    page.text(24, 42, &drawing.summary, Size::Small, QUIET);
     legend.draw(&mut page, (TITLE + main[1]) as i64);
     page
 }
@@ -56,11 +55,7 @@ pub(super) fn render(drawing: &Drawing) -> Canvas {
 /// What all views show.
 struct Scene<'a> {
     drawing: &'a Drawing,
-    surface: Surface,
-    /// A colour a link, also for those without shapes.
-    colours: Vec<Rgb>,
-    /// All that must be seen [m].
-    points: Vec<Vector>,
+    solids: Solids,
     /// Height of the lowest point or frame [m].
     lowest: f64,
     /// Length of the axes of a frame that is drawn [m].
@@ -69,28 +64,23 @@ struct Scene<'a> {
 
 impl<'a> Scene<'a> {
     fn new(drawing: &'a Drawing) -> Scene<'a> {
-        let mut surface = Surface::new(&drawing.shapes);
+        let mut solids = Solids::new(&drawing.shapes, &colours(drawing));
         if drawing.shapes.is_empty() {
-            surface.extent = extent(drawing.frames.iter().map(|(frame, _)| frame.pos));
+            solids.extent = extent(drawing.frames.iter().map(|(frame, _)| frame.pos));
         }
-        let arm = 0.16 * surface.size();
-        let lowest = surface.extent[0][2];
-        let points = if drawing.shapes.is_empty() {
+        let arm = 0.16 * solids.size();
+        let lowest = solids.extent[0][2];
+        if drawing.shapes.is_empty() {
             // the frames' axes belong to what is seen
-            let [low, high] = surface.extent;
-            surface.extent = [low.map(|part| part - arm), high.map(|part| part + arm)];
+            let [low, high] = solids.extent;
+            solids.extent = [low.map(|part| part - arm), high.map(|part| part + arm)];
             let frames = drawing.frames.iter().map(|(frame, _)| frame);
-            frames
-                .flat_map(|frame| [frame.pos].into_iter().chain(tips(frame, arm)))
-                .collect()
-        } else {
-            surface.points().collect()
-        };
+            let ends = frames.flat_map(|frame| [frame.pos].into_iter().chain(tips(frame, arm)));
+            solids.points = ends.collect();
+        }
         Scene {
             drawing,
-            surface,
-            colours: colours(drawing),
-            points,
+            solids,
             lowest,
             arm,
         }
@@ -105,9 +95,10 @@ impl<'a> Scene<'a> {
             true,
             size,
             [90.0; 2],
-            self.points.iter().copied(),
+            self.solids.points.iter().copied(),
         );
-        let size = self.surface.size();
+        let paper = Canvas::new(size[0], size[1], PAPER);
+        let size = self.solids.size();
         // a robot that stands at 0, to a rounding of its shapes, stands on 0
         let floor = if self.lowest.abs() < 0.02 * size {
             0.0
@@ -115,9 +106,7 @@ impl<'a> Scene<'a> {
             self.lowest
         };
         let spacing = round_spacing(size, 12.0);
-        let shadow = Shadow::new(&self.surface, floor);
-        let backdrop = Backdrop::Floor { spacing, shadow };
-        let mut canvas = rasterise(&self.surface, &view, &self.colours, &backdrop);
+        let mut canvas = self.solids.render(&view, Some([floor, spacing]), &paper);
         self.marks(&mut canvas, &view);
         let floor = format!(
             "floor at z = {} m, lines every {} m",
@@ -142,14 +131,11 @@ impl<'a> Scene<'a> {
             false,
             size,
             [84.0, 44.0],
-            self.points.iter().copied(),
+            self.solids.points.iter().copied(),
         );
         let spacing = round_spacing(view.width / view.scale, 9.0);
-        let backdrop = Backdrop::Paper {
-            spacing,
-            axes: *axes,
-        };
-        let mut canvas = rasterise(&self.surface, &view, &self.colours, &backdrop);
+        let paper = graph_paper(&view, spacing, *axes);
+        let mut canvas = self.solids.render(&view, None, &paper);
         if self.drawing.shapes.is_empty() {
             self.marks(&mut canvas, &view);
         }

@@ -20,17 +20,17 @@ const FORESEEN_MAX: Duration = Duration::from_millis(20);
 const REST_MAX: u32 = 64;
 
 /// What is waited for.
-pub(crate) trait Waiting<T> {
+pub(crate) trait Awaited<T> {
     /// Looks for it; called over and over.
-    fn look(&mut self) -> Result<Option<T>, ProtocolError>;
+    fn poll(&mut self) -> Result<Option<T>, ProtocolError>;
 
     /// Looks at everything else; called after each sleep, hence at least every 50 ms, never while spinning.
-    fn around(&mut self) -> Result<Option<T>, ProtocolError>;
+    fn poll_rest(&mut self) -> Result<Option<T>, ProtocolError>;
 }
 
 /// What was learnt about one kind of wait.
 #[derive(Debug, Clone)]
-pub(crate) struct Pace {
+pub(crate) struct Waiter {
     /// Moving average of recent waits.
     typical: Duration,
     free_core: bool,
@@ -41,10 +41,10 @@ pub(crate) struct Pace {
     shared: bool,
 }
 
-impl Pace {
+impl Waiter {
     /// `free_core`: whether a spinning thread takes a core from nobody, other programs aside.
-    pub(crate) fn new(free_core: bool) -> Pace {
-        Pace {
+    pub(crate) fn new(free_core: bool) -> Waiter {
+        Waiter {
             typical: SPIN_MAX / 2,
             free_core,
             resting: 0,
@@ -57,9 +57,9 @@ impl Pace {
     pub(crate) fn wait<S: Service, T>(
         &mut self,
         listener: &Listener<S>,
-        waiting: &mut impl Waiting<T>,
+        awaited: &mut impl Awaited<T>,
     ) -> Result<T, ProtocolError> {
-        if let Some(found) = waiting.look()? {
+        if let Some(found) = awaited.poll()? {
             self.learn(Duration::ZERO);
             return Ok(found);
         }
@@ -68,7 +68,7 @@ impl Pace {
             if self.typical > SPIN_MAX {
                 park(listener, self.typical - WAKE_MARGIN)?;
             }
-            if let Some(found) = self.spin(waiting)? {
+            if let Some(found) = self.spin(awaited)? {
                 self.learn(start.elapsed());
                 return Ok(found);
             }
@@ -79,18 +79,18 @@ impl Pace {
         loop {
             park(listener, SLICE)?;
             // a notification may be an old one: only looking tells
-            if let Some(found) = waiting.look()? {
+            if let Some(found) = awaited.poll()? {
                 self.learn(start.elapsed());
                 return Ok(found);
             }
-            if let Some(found) = waiting.around()? {
+            if let Some(found) = awaited.poll_rest()? {
                 return Ok(found);
             }
         }
     }
 
     /// Spins for as long as is worth it.
-    fn spin<T>(&mut self, waiting: &mut impl Waiting<T>) -> Result<Option<T>, ProtocolError> {
+    fn spin<T>(&mut self, awaited: &mut impl Awaited<T>) -> Result<Option<T>, ProtocolError> {
         let start = Instant::now();
         // while spinning pays, an interrupt of the other side is waited out as well
         let (times, least) = if self.rest == 0 {
@@ -100,7 +100,7 @@ impl Pace {
         };
         let worthwhile = (times * self.typical).clamp(least, SPIN_MAX);
         loop {
-            if let Some(found) = waiting.look()? {
+            if let Some(found) = awaited.poll()? {
                 self.rest /= 2;
                 return Ok(Some(found));
             }

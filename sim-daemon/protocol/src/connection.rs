@@ -1,4 +1,4 @@
-//! How every part of a client reaches the daemon: node, control requests, wake-up.
+//! How each part of a client reaches the daemon: node, control requests, wake-up.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -7,8 +7,8 @@ use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::{Node, ipc_threadsafe};
 
 use crate::ProtocolError;
-use crate::client::Hook;
 use crate::control::{Request, Response};
+use crate::hook::Hook;
 use crate::liveness::Peer;
 use crate::transport::{Requester, SLICE};
 
@@ -20,14 +20,14 @@ pub(crate) const ANSWER_MAX: Duration = Duration::from_secs(30);
 
 /// What every part of a client uses to reach the daemon.
 #[derive(Debug)]
-pub(crate) struct Link {
+pub(crate) struct Connection {
     pub(crate) peer: Peer,
     pub(crate) wake: Notifier<S>,
     pub(crate) requester: Mutex<Requester<S>>,
     pub(crate) node: Mutex<Node<S>>,
 }
 
-impl Link {
+impl Connection {
     /// Asks and waits for the answer; control requests are rare, so waiting is by sleeping.
     pub(crate) fn ask(&self, request: &Request, hook: Hook<'_>) -> Result<Response, ProtocolError> {
         let requester = lock(&self.requester);
@@ -43,7 +43,7 @@ impl Link {
             .send()
             .map_err(|error| failed(&error))?;
         self.notify();
-        let (start, mut nap, mut looked) =
+        let (start, mut nap, mut polled) =
             (Instant::now(), Duration::from_micros(20), Instant::now());
         loop {
             if let Some(response) = pending.receive().map_err(|error| failed(&error))? {
@@ -54,7 +54,7 @@ impl Link {
                     }
                 });
             }
-            if looked.elapsed() > SLICE {
+            if polled.elapsed() > SLICE {
                 self.peer.check()?;
                 if hook().is_break() {
                     return Err(ProtocolError::Interrupted);
@@ -62,7 +62,7 @@ impl Link {
                 if start.elapsed() > ANSWER_MAX {
                     return Err(self.peer.timeout(ANSWER_MAX));
                 }
-                looked = Instant::now();
+                polled = Instant::now();
             }
             std::thread::sleep(nap);
             nap = (nap * 3 / 2).min(Duration::from_millis(1));
@@ -70,7 +70,7 @@ impl Link {
     }
 
     /// Sends without waiting for an answer; a failure shows at the next step.
-    pub(crate) fn tell(&self, request: &Request) {
+    pub(crate) fn post(&self, request: &Request) {
         let requester = lock(&self.requester);
         let text = serde_json::to_vec(request).expect("requests are plain data");
         if let Ok(loan) = requester.loan_slice_uninit(text.len()) {

@@ -6,8 +6,8 @@ use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{Node, PortFactory};
 
-use super::S;
-use super::memory::{reserve, slot_bytes};
+use super::worlds::S;
+use crate::memory::{reserve, slot_bytes};
 use crate::transport::{self, CommandService, CommandSubscriber, FramePublisher};
 use crate::{ProtocolError, Table};
 
@@ -18,7 +18,7 @@ const JOIN_MAX: Duration = Duration::from_millis(800);
 
 /// One lease: free until somebody is granted it.
 #[derive(Debug)]
-pub(super) struct Lane {
+pub(super) struct Lease {
     pub(super) epoch: u64,
     pub(super) holder: Option<Holder>,
     pub(super) last_seq: u64,
@@ -37,14 +37,14 @@ pub(super) struct Holder {
     joined: bool,
 }
 
-impl Lane {
+impl Lease {
     /// Creates the services of lease `epoch` and takes the memory of its frames.
     pub(super) fn open(
         node: &Node<S>,
         epoch: u64,
         frame: &Table,
         frames_held: usize,
-    ) -> Result<Lane, ProtocolError> {
+    ) -> Result<Lease, ProtocolError> {
         let frames = transport::create_frames(node, epoch, frames_held)?;
         let publisher = transport::frame_publisher(&frames, slot_bytes(frame))?;
         reserve(
@@ -59,7 +59,7 @@ impl Lane {
         )?)?;
         let commands = transport::create_commands(node, epoch)?;
         let subscriber = transport::command_subscriber(&commands)?;
-        Ok(Lane {
+        Ok(Lease {
             epoch,
             holder: None,
             last_seq: 0,

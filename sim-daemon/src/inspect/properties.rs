@@ -3,7 +3,7 @@
 use sim_model::{Joint, JointKind, Robot};
 
 /// A robot and its links in body order.
-pub(super) struct Facts<'a> {
+pub(super) struct Properties<'a> {
     pub robot: &'a Robot,
     /// Links, parents before children.
     pub order: Vec<usize>,
@@ -15,8 +15,8 @@ pub(super) struct Facts<'a> {
     pub body: Vec<usize>,
 }
 
-impl<'a> Facts<'a> {
-    pub fn new(robot: &'a Robot) -> Facts<'a> {
+impl<'a> Properties<'a> {
+    pub fn new(robot: &'a Robot) -> Properties<'a> {
         let order = robot.link_order();
         let mut joint_above = vec![None; robot.links.len()];
         let mut children = vec![Vec::new(); robot.links.len()];
@@ -33,7 +33,7 @@ impl<'a> Facts<'a> {
                 body[link] = body[parent];
             }
         }
-        Facts {
+        Properties {
             robot,
             order,
             joint_above,

@@ -1,4 +1,4 @@
-//! Being the daemon of a name, and cleaning up after one that died.
+//! The lock of a daemon's name, and cleaning up after a daemon that died.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{Seek, Write};
@@ -7,7 +7,9 @@ use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use crate::place::{Place, Presence, SHARED_MEMORY, default_root, names_with_lock, private_folder};
+use crate::paths::{
+    DaemonPaths, Presence, SHARED_MEMORY, default_root, names_with_lock, private_folder,
+};
 use crate::{PROTOCOL_VERSION, ProtocolError};
 
 /// Clients and sweepers hold a lock for microseconds; whoever finds it held that long finds a daemon.
@@ -17,27 +19,27 @@ const PLACE: &str = "place";
 
 /// The lock of a name. Holding it is being the daemon; dropping it removes what is left of the daemon's files.
 #[derive(Debug)]
-pub struct Tenancy {
-    place: Place,
+pub struct DaemonLock {
+    paths: DaemonPaths,
     file: File,
     /// The lock that a sweeper finds when our root folder is gone.
     _mark: Option<File>,
 }
 
-impl Tenancy {
+impl DaemonLock {
     /// Takes the lock and removes what a killed predecessor left.
     ///
     /// # Errors
     /// [`ProtocolError::NameTaken`] when a daemon runs under the name; [`ProtocolError::Root`].
-    pub fn take(place: &Place) -> Result<Tenancy, ProtocolError> {
+    pub fn take(paths: &DaemonPaths) -> Result<DaemonLock, ProtocolError> {
         let start = Instant::now();
         loop {
-            if let Some(mut tenancy) = Tenancy::try_take(place)? {
-                place.remove_shared_files();
-                tenancy._mark = Some(mark(place)?);
-                return Ok(tenancy);
+            if let Some(mut daemon_lock) = DaemonLock::try_take(paths)? {
+                paths.remove_shared_files();
+                daemon_lock._mark = Some(mark(paths)?);
+                return Ok(daemon_lock);
             }
-            let pid = match place.presence() {
+            let pid = match paths.presence() {
                 Presence::Running(beacon) => beacon.pid,
                 _ if start.elapsed() > LOOK_MAX => 0,
                 _ => {
@@ -45,14 +47,14 @@ impl Tenancy {
                     continue;
                 }
             };
-            let name = place.name().to_owned();
+            let name = paths.name().to_owned();
             return Err(ProtocolError::NameTaken { name, pid });
         }
     }
 
     /// Takes the lock if nobody has it.
-    fn try_take(place: &Place) -> Result<Option<Tenancy>, ProtocolError> {
-        let path = place.lock_path();
+    fn try_take(paths: &DaemonPaths) -> Result<Option<DaemonLock>, ProtocolError> {
+        let path = paths.lock_path();
         let root_error = |error: std::io::Error| root_error(&path, &error);
         let opened = OpenOptions::new()
             .read(true)
@@ -64,7 +66,7 @@ impl Tenancy {
         let file = match opened {
             // the last daemon there took the folder with it
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                private_folder(place.root())?;
+                private_folder(paths.root())?;
                 return Ok(None);
             }
             opened => opened.map_err(root_error)?,
@@ -81,14 +83,14 @@ impl Tenancy {
         }
         // clients of a dead predecessor see that it is gone as soon as the line is
         file.set_len(0).map_err(root_error)?;
-        Ok(Some(Tenancy {
-            place: place.clone(),
+        Ok(Some(DaemonLock {
+            paths: paths.clone(),
             file,
             _mark: None,
         }))
     }
 
-    /// Tells clients who we are; until then they see [`Presence::Starting`]. A daemon of several `groups` has a tenancy for
+    /// Tells clients who we are; until then they see [`Presence::Starting`]. A daemon of several `groups` has a lock for
     /// each besides its own.
     ///
     /// # Errors
@@ -103,22 +105,22 @@ impl Tenancy {
         self.file
             .rewind()
             .and_then(|()| self.file.write_all(line.as_bytes()))
-            .map_err(|error| root_error(&self.place.lock_path(), &error))
+            .map_err(|error| root_error(&self.paths.lock_path(), &error))
     }
 
     /// Where this is.
-    pub fn place(&self) -> &Place {
-        &self.place
+    pub fn paths(&self) -> &DaemonPaths {
+        &self.paths
     }
 }
 
-impl Drop for Tenancy {
+impl Drop for DaemonLock {
     fn drop(&mut self) {
-        self.place.remove_shared_files();
+        self.paths.remove_shared_files();
         // the file goes before the lock does, so nobody can lock a file that is about to go
-        let _ = fs::remove_file(self.place.lock_path());
+        let _ = fs::remove_file(self.paths.lock_path());
         // our own folder in shared memory goes with the last daemon; any other is the user's
-        let root = self.place.root();
+        let root = self.paths.root();
         if root.starts_with(SHARED_MEMORY) && root == default_root() {
             let _ = fs::remove_dir(root);
         }
@@ -133,14 +135,14 @@ fn root_error(path: &Path, error: &std::io::Error) -> ProtocolError {
 }
 
 /// Makes the transport's folder with its mark.
-fn mark(place: &Place) -> Result<File, ProtocolError> {
-    let folder = private_folder(&place.shared_folder())?;
+fn mark(paths: &DaemonPaths) -> Result<File, ProtocolError> {
+    let folder = private_folder(&paths.shared_folder())?;
     let (new, path) = (folder.join("place.new"), folder.join(PLACE));
     let write = || {
         let mut file = File::create(&new)?;
-        file.write_all(place.root().as_os_str().as_bytes())?;
+        file.write_all(paths.root().as_os_str().as_bytes())?;
         file.write_all(b"\n")?;
-        file.write_all(place.name().as_bytes())?;
+        file.write_all(paths.name().as_bytes())?;
         file.lock()?;
         // nobody sees it before it is locked
         fs::rename(&new, &path)?;
@@ -154,20 +156,20 @@ fn mark(place: &Place) -> Result<File, ProtocolError> {
 /// # Errors
 /// [`ProtocolError::BadName`], [`ProtocolError::Root`].
 pub fn cleanup_after_death(root: Option<&Path>, name: &str) -> Result<bool, ProtocolError> {
-    let place = Place::new(root, name)?;
+    let paths = DaemonPaths::new(root, name)?;
     let start = Instant::now();
     loop {
-        if let Some(tenancy) = Tenancy::try_take(&place)? {
+        if let Some(daemon_lock) = DaemonLock::try_take(&paths)? {
             for group in names_with_lock(root)? {
-                if group.is_group() && group.daemon()? == place {
-                    drop(Tenancy::try_take(&group)?);
+                if group.is_group() && group.daemon()? == paths {
+                    drop(DaemonLock::try_take(&group)?);
                 }
             }
-            drop(tenancy); // which has cleaned
+            drop(daemon_lock); // which has cleaned
             return Ok(true);
         }
         // a client's look at the lock is no daemon, nor is somebody else's sweep: that one we wait for
-        let runs = matches!(place.presence(), Presence::Running(_));
+        let runs = matches!(paths.presence(), Presence::Running(_));
         if runs || start.elapsed() > LOOK_MAX {
             return Ok(false);
         }
@@ -181,9 +183,9 @@ pub fn cleanup_after_death(root: Option<&Path>, name: &str) -> Result<bool, Prot
 /// # Errors
 /// [`ProtocolError::Root`].
 pub fn sweep(root: Option<&Path>) -> Result<(), ProtocolError> {
-    for place in names_with_lock(root)? {
-        if place.presence() == Presence::Absent {
-            drop(Tenancy::try_take(&place)?);
+    for paths in names_with_lock(root)? {
+        if paths.presence() == Presence::Absent {
+            drop(DaemonLock::try_take(&paths)?);
         }
     }
     let Ok(entries) = fs::read_dir(SHARED_MEMORY) else {
@@ -220,11 +222,11 @@ fn sweep_folder(folder: &Path) {
         return;
     }
     let had_root = root.exists();
-    let Ok(place) = Place::new(Some(&root), name) else {
+    let Ok(paths) = DaemonPaths::new(Some(&root), name) else {
         return;
     };
-    if place.shared_folder() == folder {
-        drop(Tenancy::try_take(&place));
+    if paths.shared_folder() == folder {
+        drop(DaemonLock::try_take(&paths));
     }
     if !had_root {
         let _ = fs::remove_dir(&root);
@@ -234,7 +236,7 @@ fn sweep_folder(folder: &Path) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::place::{Beacon, running};
+    use crate::paths::{Beacon, running};
 
     fn root(test: &str) -> PathBuf {
         std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()))
@@ -243,9 +245,9 @@ mod tests {
     #[test]
     fn a_name_is_taken_once_and_leaves_nothing() {
         let root = root("place");
-        let place = Place::new(Some(&root), "one").unwrap();
-        let mut first = Tenancy::take(&place).unwrap();
-        assert_eq!(place.presence(), Presence::Starting);
+        let paths = DaemonPaths::new(Some(&root), "one").unwrap();
+        let mut first = DaemonLock::take(&paths).unwrap();
+        assert_eq!(paths.presence(), Presence::Starting);
         first.announce(7, 1).unwrap();
         let beacon = Beacon {
             protocol: PROTOCOL_VERSION,
@@ -253,14 +255,14 @@ mod tests {
             session: 7,
             groups: 1,
         };
-        assert_eq!(place.presence(), Presence::Running(beacon));
+        assert_eq!(paths.presence(), Presence::Running(beacon));
         assert_eq!(running(Some(&root)).unwrap(), ["one"]);
-        let error = Tenancy::take(&place).unwrap_err().to_string();
+        let error = DaemonLock::take(&paths).unwrap_err().to_string();
         assert!(error.contains(&std::process::id().to_string()), "{error}");
         assert!(!cleanup_after_death(Some(&root), "one").unwrap());
         drop(first);
-        assert_eq!(place.presence(), Presence::Absent);
-        assert!(!Path::new(SHARED_MEMORY).join(place.stem()).exists());
+        assert_eq!(paths.presence(), Presence::Absent);
+        assert!(!Path::new(SHARED_MEMORY).join(paths.stem()).exists());
         assert_eq!(fs::read_dir(&root).unwrap().count(), 0);
         fs::remove_dir(&root).unwrap();
     }
@@ -268,23 +270,23 @@ mod tests {
     #[test]
     fn a_daemon_with_groups_is_one_name_and_what_its_groups_left_goes_with_it() {
         let root = root("grouped");
-        let place = Place::new(Some(&root), "many").unwrap();
-        let groups = [0, 1].map(|group| place.group(group).unwrap());
+        let paths = DaemonPaths::new(Some(&root), "many").unwrap();
+        let groups = [0, 1].map(|group| paths.group(group).unwrap());
         assert_eq!((groups[1].name(), groups[1].is_group()), ("many.1", true));
-        assert_eq!(groups[1].daemon().unwrap(), place);
-        let mut daemon = Tenancy::take(&place).unwrap();
+        assert_eq!(groups[1].daemon().unwrap(), paths);
+        let mut daemon = DaemonLock::take(&paths).unwrap();
         let held = groups.each_ref().map(|group| {
-            let mut tenancy = Tenancy::take(group).unwrap();
-            tenancy.announce(7, 1).unwrap();
-            tenancy
+            let mut daemon_lock = DaemonLock::take(group).unwrap();
+            daemon_lock.announce(7, 1).unwrap();
+            daemon_lock
         });
         assert!(running(Some(&root)).unwrap().is_empty());
         daemon.announce(7, 2).unwrap();
         assert_eq!(running(Some(&root)).unwrap(), ["many"]);
         assert!(
-            matches!(place.presence(), Presence::Running(beacon) if beacon.groups == 2),
+            matches!(paths.presence(), Presence::Running(beacon) if beacon.groups == 2),
             "{:?}",
-            place.presence()
+            paths.presence()
         );
         drop((daemon, held));
         for group in &groups {
@@ -298,19 +300,19 @@ mod tests {
     #[test]
     fn what_a_killed_daemon_left_is_swept() {
         let root = root("sweep");
-        let place = Place::new(Some(&root), "dead").unwrap();
-        fs::write(place.lock_path(), "tightloop 1 1 0000000000000001\n").unwrap();
-        let shared = Path::new(SHARED_MEMORY).join(format!("{}_00000001_5.data", place.stem()));
+        let paths = DaemonPaths::new(Some(&root), "dead").unwrap();
+        fs::write(paths.lock_path(), "tightloop 1 1 0000000000000001\n").unwrap();
+        let shared = Path::new(SHARED_MEMORY).join(format!("{}_00000001_5.data", paths.stem()));
         fs::write(&shared, "x").unwrap();
         sweep(Some(&root)).unwrap();
-        assert!(!shared.exists() && !place.lock_path().exists());
+        assert!(!shared.exists() && !paths.lock_path().exists());
         fs::remove_dir(&root).unwrap();
     }
 
     #[test]
     fn what_is_left_of_a_root_folder_that_is_gone_is_swept_and_the_living_are_spared() {
         let (gone, living) = (root("gone"), root("living"));
-        let dead = Place::new(Some(&gone), "dead").unwrap();
+        let dead = DaemonPaths::new(Some(&gone), "dead").unwrap();
         private_folder(&dead.shared_folder()).unwrap();
         fs::write(
             dead.shared_folder().join(PLACE),
@@ -320,14 +322,14 @@ mod tests {
         let shared = Path::new(SHARED_MEMORY).join(format!("{}_00000001_5.data", dead.stem()));
         fs::write(&shared, "x").unwrap();
         fs::remove_dir(&gone).unwrap();
-        let place = Place::new(Some(&living), "living").unwrap();
-        let tenancy = Tenancy::take(&place).unwrap();
+        let paths = DaemonPaths::new(Some(&living), "living").unwrap();
+        let daemon_lock = DaemonLock::take(&paths).unwrap();
         fs::remove_dir_all(&living).unwrap();
         sweep(Some(&root("other"))).unwrap();
         assert!(!shared.exists() && !dead.shared_folder().exists() && !gone.exists());
-        assert!(place.shared_folder().exists());
-        drop(tenancy);
-        assert!(!place.shared_folder().exists());
+        assert!(paths.shared_folder().exists());
+        drop(daemon_lock);
+        assert!(!paths.shared_folder().exists());
         fs::remove_dir(root("other")).unwrap();
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use sim_engine::simulation::{Options, Precision, Simulation};
 use sim_physics::arrays::Field;
 
-use super::Arrays;
+use crate::arrays::Arrays;
 use crate::config;
 use crate::error::DaemonError;
 
@@ -42,7 +42,7 @@ impl Evaluation {
         })
     }
 
-    /// Hash of the scene's model, as a daemon tells its own.
+    /// Hash of the scene's model, as in a daemon's description.
     pub fn model_hash(&self) -> u64 {
         self.simulation.model().hash()
     }

@@ -1,24 +1,34 @@
 //! Looking for a daemon by its name.
 
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use crate::client::{AttachOptions, Hook};
-use crate::place::{Beacon, Place, Presence, running};
+use crate::hook::Hook;
+use crate::paths::{Beacon, DaemonPaths, Presence, running};
 use crate::{PROTOCOL_VERSION, ProtocolError};
 
-/// Looks for the daemon, or group, `name`, as [`Client::attach`] does, and tells what it says of itself.
+/// How to attach.
+#[derive(Debug, Clone, Default)]
+pub struct AttachOptions {
+    /// Root folder; [`crate::paths::default_root`] when `None`.
+    pub root: Option<PathBuf>,
+    /// How long to wait for a daemon that does not run yet.
+    pub wait: Duration,
+}
+
+/// Looks for the daemon, or group, `name`, as [`crate::Client::attach`] does, and returns its beacon.
 ///
 /// # Errors
 /// [`ProtocolError::NoDaemon`], [`ProtocolError::ProtocolVersion`], [`ProtocolError::BadName`],
 /// [`ProtocolError::Interrupted`].
 pub fn find(name: &str, options: &AttachOptions, hook: Hook<'_>) -> Result<Beacon, ProtocolError> {
-    let place = Place::new(options.root.as_deref(), name)?;
+    let paths = DaemonPaths::new(options.root.as_deref(), name)?;
     let deadline = Instant::now() + options.wait;
     let beacon = loop {
-        match place.presence() {
+        match paths.presence() {
             Presence::Running(beacon) => break beacon,
             Presence::Absent if Instant::now() >= deadline => {
-                let names = running(Some(place.root()))?;
+                let names = running(Some(paths.root()))?;
                 let running = if names.is_empty() {
                     "none".to_owned()
                 } else {
@@ -26,7 +36,7 @@ pub fn find(name: &str, options: &AttachOptions, hook: Hook<'_>) -> Result<Beaco
                 };
                 return Err(ProtocolError::NoDaemon {
                     name: name.to_owned(),
-                    root: place.root().into(),
+                    root: paths.root().into(),
                     running,
                 });
             }

@@ -1,10 +1,9 @@
-//! For those who look on: any field of worlds whose state they are given, and recordings, frame after frame. Neither needs
-//! anything of a daemon but what it tells and shows.
+//! For observers: any field of worlds at a given state, and recordings, frame after frame. Neither asks a daemon for more than
+//! its description and its frames for observers.
 
-mod arrays;
 mod evaluation;
 
-pub use arrays::{Array, Arrays};
+pub use crate::arrays::{Array, Arrays};
 pub use evaluation::Evaluation;
 pub use sim_engine::simulation::Precision;
 pub use sim_physics::arrays::Field;

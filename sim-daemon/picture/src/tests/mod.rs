@@ -1,5 +1,9 @@
 //! Pictures against geometry that can be worked out by hand.
 
+mod cover;
+mod normals;
+mod view;
+
 use crate::vector::Vector;
 use crate::{Instance, Line, Mesh, MeshError, Renderer, Rgb, Shot, View};
 
@@ -8,8 +12,8 @@ const BLUE: [u8; 4] = [30, 30, 210, 255];
 const WIDTH: usize = 200;
 const HEIGHT: usize = 150;
 
-/// A ball at the origin, with so many triangles from pole to pole.
-fn ball(radius: f32, count: u32, colour: [u8; 4]) -> Mesh {
+/// Vertices and triangles of a ball at the origin, with so many triangles from pole to pole.
+fn ball_triangles(radius: f32, count: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     let mut vertices = Vec::new();
     for i in 0..=count {
         for j in 0..2 * count {
@@ -26,6 +30,11 @@ fn ball(radius: f32, count: u32, colour: [u8; 4]) -> Mesh {
             faces.push([corner(i, j + 1), corner(i + 1, j), corner(i + 1, j + 1)]);
         }
     }
+    (vertices, faces)
+}
+
+fn ball(radius: f32, count: u32, colour: [u8; 4]) -> Mesh {
+    let (vertices, faces) = ball_triangles(radius, count);
     Mesh::new(&vertices, &faces, &vec![colour; faces.len()]).unwrap()
 }
 
@@ -57,6 +66,8 @@ fn shot(instances: &[Instance]) -> Shot<'_> {
         instances,
         lines: &[],
         floor: None,
+        backdrop: None,
+        outlines: false,
         middle: [0.0; 3],
         reach: 1.5,
     }
@@ -297,6 +308,127 @@ fn an_open_surface_is_seen_from_both_sides_and_a_quaternion_turns_it() {
         }
         assert!(!is_red(corner(0.33, 0.33)) && !is_red(corner(-0.33, 0.0)));
     }
+}
+
+#[test]
+fn without_perspective_near_and_far_are_as_large() {
+    let size = [WIDTH, HEIGHT];
+    let corners = [[-1.0, -1.0, 0.0], [1.0, 1.0, 0.0]];
+    let view = View::fitted(
+        [0.0, 0.0, -1.0],
+        [0.0, 1.0, 0.0],
+        false,
+        size,
+        [0.0; 2],
+        corners.into_iter(),
+    );
+    // also behind the point that the view calls its eye
+    for height in [-40.0, 0.0, 40.0] {
+        let place = [0.3, 0.2, height];
+        let instances = [at(0, place)];
+        let shot = Shot {
+            view,
+            ..shot(&instances)
+        };
+        let pixels = drawn(vec![ball(0.2, 24, RED)], &shot);
+        let (area, middle) = spot(&pixels, is_red);
+        let [x, y, _] = view.project(place);
+        assert!((middle[0] - x).abs() < 0.5 && (middle[1] - y).abs() < 0.5);
+        let seen = 0.2 * view.scale;
+        let round = std::f64::consts::PI * seen * seen;
+        let rim = 0.5 * std::f64::consts::TAU * seen;
+        assert!((area - round).abs() < rim, "{area} of {round}");
+    }
+    // the higher one hides the lower one
+    let instances = [at(0, [0.3, 0.2, -1.0]), at(1, [0.3, 0.2, 1.0])];
+    let shot = Shot {
+        view,
+        ..shot(&instances)
+    };
+    let meshes = vec![ball(0.2, 24, RED), ball(0.25, 24, BLUE)];
+    let pixels = drawn(meshes, &shot);
+    assert!(spot(&pixels, is_red).0 == 0.0 && spot(&pixels, is_blue).0 > 100.0);
+}
+
+#[test]
+fn a_backdrop_is_seen_where_nothing_else_is() {
+    let backdrop: Vec<Rgb> = (0..WIDTH * HEIGHT)
+        .map(|pixel| [(pixel % 251) as u8, (pixel % 241) as u8, 7])
+        .collect();
+    let instances = [at(0, [0.0; 3])];
+    let shot = Shot {
+        backdrop: Some(&backdrop),
+        ..shot(&instances)
+    };
+    let pixels = drawn(vec![ball(0.2, 24, RED)], &shot);
+    let [x, y, near] = view().project([0.0; 3]);
+    let radius = 0.2 * view().scale * near;
+    for (index, (pixel, behind)) in pixels.iter().zip(&backdrop).enumerate() {
+        let [column, row] = [index % WIDTH, index / WIDTH].map(|k| k as f64 + 0.5);
+        let away = (column - x).hypot(row - y);
+        // pixels at the rim are mixed
+        if away > radius + 2.0 {
+            // light is the square of a byte, and back: the same byte
+            assert_eq!(pixel, behind, "{index}");
+        } else if away < radius - 2.0 {
+            assert!(is_red(*pixel), "{index}");
+        }
+    }
+}
+
+#[test]
+fn outlines_part_meshes_of_one_colour_and_lie_on_the_nearer_one() {
+    let near = at(0, [0.4, -0.3, 0.2]);
+    let instances = [near, at(1, [0.0, 0.1, 0.0])];
+    let meshes = || vec![ball(0.1, 24, RED), ball(0.4, 24, RED)];
+    let plain = shot(&instances);
+    let outlined = Shot {
+        outlines: true,
+        ..plain.clone()
+    };
+    let (plain, outlined) = (drawn(meshes(), &plain), drawn(meshes(), &outlined));
+    let place = |instance: &Instance| {
+        let [x, y, z, ..] = instance.pose;
+        view().project([x, y, z])
+    };
+    let [x, y, depth] = place(&near);
+    let radius = 0.1 * view().scale * depth;
+    let mut dark = 0;
+    for (index, (plain, outlined)) in plain.iter().zip(&outlined).enumerate() {
+        let [column, row] = [index % WIDTH, index / WIDTH].map(|k| k as f64 + 0.5);
+        let away = (column - x).hypot(row - y);
+        if away < radius - 2.5 {
+            assert_eq!(plain, outlined, "inside: {index}");
+        } else if away < radius + 0.5 && outlined[0] < plain[0] / 2 {
+            dark += 1;
+        } else if away > radius + 1.5 && away < radius + 4.0 {
+            assert_eq!(plain, outlined, "on the ball behind: {index}");
+        }
+    }
+    // a line around it, a pixel wide
+    assert!(
+        f64::from(dark) > 0.6 * std::f64::consts::TAU * radius,
+        "{dark}"
+    );
+}
+
+#[test]
+fn a_closed_mesh_that_faces_inwards_looks_the_same() {
+    let vertices = [
+        [0.3, 0.0, 0.0],
+        [-0.2, 0.2, 0.0],
+        [-0.2, -0.2, 0.0],
+        [0.0, 0.0, 0.3],
+    ];
+    let faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    let inwards = faces.map(|[a, b, c]| [a, c, b]);
+    let [out, inside] = [faces, inwards].map(|faces| {
+        let mesh = Mesh::new(&vertices, &faces, &[RED; 4]).unwrap();
+        drawn(vec![mesh], &shot(&[at(0, [0.0; 3])]))
+    });
+    let differ = out.iter().zip(&inside).filter(|(a, b)| a != b).count();
+    // where samples lie on an edge of two triangles, either may be seen
+    assert!(spot(&out, is_red).0 > 500.0 && differ < 20, "{differ}");
 }
 
 #[test]

@@ -3,15 +3,15 @@
 use iceoryx2::config::Config;
 use iceoryx2::prelude::{CallbackProgression, Node, NodeState};
 
-use super::S;
+use super::worlds::S;
 
 /// Finds dead clients and removes their ports, so that their slots and leases come back. May run on any thread.
 #[derive(Debug, Clone)]
-pub struct Janitor {
+pub struct ClientCleanup {
     pub(super) config: Config,
 }
 
-impl Janitor {
+impl ClientCleanup {
     /// Looks for dead clients and cleans up after them; returns how many. About 0.3 ms.
     pub fn clean(&self) -> usize {
         let mut cleaned = 0;

@@ -5,7 +5,7 @@ use std::fs::{self, OpenOptions};
 use rustix::fs::{FallocateFlags, fallocate, statvfs};
 
 use crate::command::command_bytes;
-use crate::place::SHARED_MEMORY;
+use crate::paths::SHARED_MEMORY;
 use crate::transport::{COMMAND_SLOTS, frame_slots, watch_slots};
 use crate::{Description, Dtype, ProtocolError, Table};
 
@@ -62,7 +62,7 @@ pub(crate) struct Free {
     /// Of the file system that holds shared memory.
     shared: u64,
     /// Of the machine and of our control group, whichever has less; shared memory counts there, too.
-    pub(super) memory: u64,
+    pub(crate) memory: u64,
 }
 
 /// Refuses when `shared` bytes, and 5 % for what is not counted, do not fit, or not together with `own` bytes of the
@@ -142,7 +142,7 @@ pub(crate) fn reserve(prefix: &str, port: u128, what: &str) -> Result<(), Protoc
     }
 }
 
-/// Size of all files whose name begins with `stem` [bytes]; for tests and news.
+/// Size of all files whose name begins with `stem` [bytes]; for tests and the log.
 pub(crate) fn used(stem: &str) -> u64 {
     let Ok(entries) = fs::read_dir(SHARED_MEMORY) else {
         return 0;

@@ -7,13 +7,13 @@ use numpy::{Element, PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
-use sim_daemon::look::{self, Array, Arrays, DaemonError, Dtype, Field, Precision};
+use sim_daemon::observe::{self, Array, Arrays, DaemonError, Dtype, Field, Precision};
 
 use crate::errors::raise;
 
 /// Worlds of a scene, in this process, at states that a daemon shows.
 #[pyclass(frozen, module = "tightloop._core")]
-pub(crate) struct Evaluation(Mutex<look::Evaluation>);
+pub(crate) struct Evaluation(Mutex<observe::Evaluation>);
 
 #[pymethods]
 impl Evaluation {
@@ -32,7 +32,8 @@ impl Evaluation {
             "f64" => Precision::F64,
             _ => Precision::F32,
         };
-        let made = py.detach(|| look::Evaluation::new(scene, &folder, worlds, precision, &fields));
+        let made =
+            py.detach(|| observe::Evaluation::new(scene, &folder, worlds, precision, &fields));
         let made = made.map_err(|error| raised(py, &error))?;
         Ok(Evaluation(Mutex::new(made)))
     }
@@ -60,7 +61,7 @@ impl Evaluation {
 /// A recording, frame after frame.
 #[pyclass(frozen, module = "tightloop._core")]
 pub(crate) struct Playback {
-    inner: Mutex<look::Playback>,
+    inner: Mutex<observe::Playback>,
     worlds: usize,
 }
 
@@ -75,7 +76,7 @@ impl Playback {
         fields: Vec<String>,
     ) -> PyResult<Playback> {
         let fields = named(py, &fields)?;
-        let opened = py.detach(|| look::Playback::open(&path, &fields, None));
+        let opened = py.detach(|| observe::Playback::open(&path, &fields, None));
         Ok(Playback {
             inner: Mutex::new(opened.map_err(|error| raised(py, &error))?),
             worlds,

@@ -1,9 +1,9 @@
-//! Where a daemon lives in the file system: lock file, transport folder, prefix of its shared memory.
+//! Paths of a daemon: lock file, transport folder, prefix of its shared memory.
 //!
 //! ```text
 //! ROOT/NAME.lock            held by flock for the daemon's life; one line: protocol version, pid, session, how many groups if any
 //! ROOT/NAME.0.lock          of a daemon with groups: likewise for each of them, which has the rest below, too
-//! /dev/shm/tl<hash>/        nodes, services and sockets; `place`, locked too, names ROOT and NAME; hash is over both
+//! /dev/shm/tl<hash>/        nodes, services and sockets; `paths`, locked too, names ROOT and NAME; hash is over both
 //! /dev/shm/tl<hash>_*       shared memory; each session has a prefix of its own
 //! ```
 //! All of it is for one user only. Under systemd, `RemoveIPC=no` keeps a daemon's files when its user logs out.
@@ -14,6 +14,7 @@ use std::fs::{self, DirBuilder, File, Metadata, TryLockError};
 use std::io::{ErrorKind, Read};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use iceoryx2::config::Config;
 use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString};
@@ -23,12 +24,16 @@ use crate::hash::Fnv;
 
 /// Where POSIX shared memory is on Linux.
 pub const SHARED_MEMORY: &str = "/dev/shm";
+/// The variable that names the folder of a login session.
+pub const RUNTIME_FOLDER: &str = "XDG_RUNTIME_DIR";
+/// What this process uses as the value of [`RUNTIME_FOLDER`] where that is unset.
+static STAND_IN: OnceLock<PathBuf> = OnceLock::new();
 /// How often a folder is made again that others remove meanwhile.
 const TRIES: usize = 1000;
 
 /// A name and the root folder it is looked up in.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Place {
+pub struct DaemonPaths {
     root: PathBuf,
     name: String,
     stem: String,
@@ -43,7 +48,7 @@ pub struct Beacon {
     pub pid: u32,
     /// Random number of the run.
     pub session: u64,
-    /// Groups of worlds that clients attach to, each under a name of its own ([`Place::group`]); 1 = there is only the daemon.
+    /// Groups of worlds that clients attach to, each under a name of its own ([`DaemonPaths::group`]); 1 = there is only the daemon.
     pub groups: usize,
 }
 
@@ -60,13 +65,10 @@ pub enum Presence {
 
 /// The root folder: `$TIGHTLOOP_ROOT`, else `$XDG_RUNTIME_DIR/tightloop`, else `/dev/shm/tightloop-<uid>`.
 pub fn default_root() -> PathBuf {
-    let variable = |name| {
-        std::env::var_os(name)
-            .filter(|value| !value.is_empty())
-            .map(PathBuf::from)
-    };
+    // the stand-in is the root folder itself, which was found without it
+    let session = variable(RUNTIME_FOLDER).filter(|folder| Some(folder) != STAND_IN.get());
     variable("TIGHTLOOP_ROOT")
-        .or_else(|| variable("XDG_RUNTIME_DIR").map(|folder| folder.join("tightloop")))
+        .or_else(|| session.map(|folder| folder.join("tightloop")))
         .unwrap_or_else(|| {
             format!(
                 "{SHARED_MEMORY}/tightloop-{}",
@@ -76,12 +78,28 @@ pub fn default_root() -> PathBuf {
         })
 }
 
-impl Place {
+/// A value of [`RUNTIME_FOLDER`] for this process, where the variable is unset: the absolute path of the root folder. A
+/// process that sets it keeps its [`default_root`].
+pub fn stand_in_runtime_folder() -> Option<&'static Path> {
+    if variable(RUNTIME_FOLDER).is_some() {
+        return None;
+    }
+    let root = default_root();
+    let absolute = std::path::absolute(&root).unwrap_or(root);
+    Some(STAND_IN.get_or_init(|| absolute))
+}
+
+fn variable(name: &str) -> Option<PathBuf> {
+    let value = std::env::var_os(name).filter(|value| !value.is_empty());
+    value.map(PathBuf::from)
+}
+
+impl DaemonPaths {
     /// The place of `name` under `root`, or under [`default_root`]; `NAME.0` is that of a group.
     ///
     /// # Errors
     /// [`ProtocolError::BadName`]; [`ProtocolError::Root`] when the folder cannot be made or belongs to somebody else.
-    pub fn new(root: Option<&Path>, name: &str) -> Result<Place, ProtocolError> {
+    pub fn new(root: Option<&Path>, name: &str) -> Result<DaemonPaths, ProtocolError> {
         let bad = |problem| ProtocolError::BadName {
             name: name.to_owned(),
             problem,
@@ -103,7 +121,7 @@ impl Place {
         let mut hash = Fnv::new();
         hash.text(&root.to_string_lossy());
         hash.text(name);
-        Ok(Place {
+        Ok(DaemonPaths {
             root,
             name: name.to_owned(),
             stem: format!("tl{:016x}", hash.value()),
@@ -123,17 +141,17 @@ impl Place {
     /// The place of a group of this daemon.
     ///
     /// # Errors
-    /// As of [`Place::new`].
-    pub fn group(&self, number: usize) -> Result<Place, ProtocolError> {
-        Place::new(Some(&self.root), &format!("{}.{number}", self.name))
+    /// As of [`DaemonPaths::new`].
+    pub fn group(&self, number: usize) -> Result<DaemonPaths, ProtocolError> {
+        DaemonPaths::new(Some(&self.root), &format!("{}.{number}", self.name))
     }
 
     /// The place of the daemon whose group this is; itself if it is none.
     ///
     /// # Errors
-    /// As of [`Place::new`].
-    pub fn daemon(&self) -> Result<Place, ProtocolError> {
-        Place::new(Some(&self.root), parts(&self.name).0)
+    /// As of [`DaemonPaths::new`].
+    pub fn daemon(&self) -> Result<DaemonPaths, ProtocolError> {
+        DaemonPaths::new(Some(&self.root), parts(&self.name).0)
     }
 
     /// The root folder, absolute.
@@ -213,8 +231,8 @@ impl Place {
 /// [`ProtocolError::Root`].
 pub fn running(root: Option<&Path>) -> Result<Vec<String>, ProtocolError> {
     let mut names = names_with_lock(root)?;
-    names.retain(|place| !place.is_group() && matches!(place.presence(), Presence::Running(_)));
-    Ok(names.into_iter().map(|place| place.name).collect())
+    names.retain(|paths| !paths.is_group() && matches!(paths.presence(), Presence::Running(_)));
+    Ok(names.into_iter().map(|paths| paths.name).collect())
 }
 
 /// The name of a daemon, and the number of its group where that has one.
@@ -227,7 +245,7 @@ fn parts(name: &str) -> (&str, Option<usize>) {
     group.unwrap_or((name, None))
 }
 
-pub(crate) fn names_with_lock(root: Option<&Path>) -> Result<Vec<Place>, ProtocolError> {
+pub(crate) fn names_with_lock(root: Option<&Path>) -> Result<Vec<DaemonPaths>, ProtocolError> {
     let root = private_folder(&root.map_or_else(default_root, Path::to_owned))?;
     let entries = match fs::read_dir(&root) {
         Ok(entries) => entries,
@@ -240,10 +258,10 @@ pub(crate) fn names_with_lock(root: Option<&Path>) -> Result<Vec<Place>, Protoco
             });
         }
     };
-    let mut places: Vec<Place> = entries
+    let mut places: Vec<DaemonPaths> = entries
         .flatten()
         .filter_map(|entry| {
-            Place::new(
+            DaemonPaths::new(
                 Some(&root),
                 entry.file_name().to_str()?.strip_suffix(".lock")?,
             )
@@ -315,7 +333,10 @@ mod tests {
         let names = ["", "a/b", "..", "a.lock", "ä", &"x".repeat(65)];
         for name in [&names[..], &[".0", "a.", "a.-1", "a.01", "a.0.0", "a/b.0"]].concat() {
             assert!(
-                matches!(Place::new(None, name), Err(ProtocolError::BadName { .. })),
+                matches!(
+                    DaemonPaths::new(None, name),
+                    Err(ProtocolError::BadName { .. })
+                ),
                 "{name:?}"
             );
         }

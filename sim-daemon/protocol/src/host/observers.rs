@@ -1,4 +1,4 @@
-//! Observers: now and then they are shown the first worlds of a frame, with the state from which these could go on.
+//! Observers: at a limited rate they get the first worlds of a frame, with the state from which these could go on.
 
 use std::time::{Duration, Instant};
 
@@ -6,9 +6,10 @@ use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{Node, PortFactory};
 
-use super::{S, Worlds, memory};
+use super::worlds::{S, Worlds};
+use crate::memory;
 use crate::transport::{self, FramePublisher, FrameService};
-use crate::{ALIGNMENT, Description, FrameHeader, ProtocolError, Table, loan};
+use crate::{ALIGNMENT, Description, FrameHeader, ProtocolError, Table, loaned};
 
 /// Observers see a frame that comes this long after the one before, so that of 60 a second they see all, early ones too ...
 pub(super) const PERIOD: Duration = Duration::from_millis(15);
@@ -20,13 +21,13 @@ const PARTS: u32 = 100;
 pub(super) const SLOWEST: Duration = Duration::from_millis(250);
 
 /// The observers' service.
-pub(super) struct Watch {
+pub(super) struct Observers {
     table: Table,
     publisher: FramePublisher<S>,
     service: FrameService<S>,
     notifier: Notifier<S>,
     period: Duration,
-    observers: usize,
+    count: usize,
     /// The state has changed since they were shown one.
     unseen: bool,
     shown: Instant,
@@ -34,20 +35,20 @@ pub(super) struct Watch {
     cost: Option<Duration>,
 }
 
-impl Watch {
+impl Observers {
     /// Opens the service and takes its memory.
     pub fn open(
         node: &Node<S>,
         description: &Description,
         frame: &Table,
-    ) -> Result<Watch, ProtocolError> {
+    ) -> Result<Observers, ProtocolError> {
         let table = memory::watch_table(description, frame);
         let service = transport::create_watch(node, description.frames_held)?;
         let publisher = transport::frame_publisher(&service, table.total_bytes())?;
         let prefix = node.config().global.prefix.to_string();
         memory::reserve(&prefix, publisher.id().value(), "the frames of observers")?;
         let notifier = transport::notifier(&transport::create_event(node, "watch", &[])?)?;
-        Ok(Watch {
+        Ok(Observers {
             table,
             publisher,
             service,
@@ -56,7 +57,7 @@ impl Watch {
                 ..=MANY => PERIOD,
                 _ => 2 * PERIOD,
             },
-            observers: 0,
+            count: 0,
             unseen: true,
             shown: Instant::now(),
             cost: None,
@@ -73,19 +74,19 @@ impl Watch {
         self.unseen = false;
     }
 
-    /// Somebody looks on, and has not seen the present state, nor any within the last period?
+    /// Whether there are observers who have not seen the present state, nor any within the last period.
     pub fn is_due(&self) -> bool {
         let period = self
             .period
             .max(SLOWEST.min(PARTS * self.cost.unwrap_or_default()));
-        self.unseen && self.observers > 0 && self.shown.elapsed() > period
+        self.unseen && self.count > 0 && self.shown.elapsed() > period
     }
 
     /// Sees who is there; a new observer gets the last sample.
     pub fn refresh(&mut self) {
         // an observer that cannot be connected looks again by itself
         let _ = self.publisher.update_connections();
-        self.observers = self.service.dynamic_config().number_of_subscribers();
+        self.count = self.service.dynamic_config().number_of_subscribers();
     }
 
     /// Shows the first worlds of an arena, which `frame` describes, and their state; what that takes counts from `began` on.
@@ -102,7 +103,7 @@ impl Watch {
         let Ok(mut loan) = self.publisher.loan_slice_uninit(lines) else {
             return; // observers keep every slot: they miss a frame
         };
-        let words = loan::words(loan.payload_mut());
+        let words = loaned::words(loan.payload_mut());
         words[..self.table.words().len()].copy_from_slice(self.table.words());
         let from: &[u8] = bytemuck::cast_slice(arena);
         let before = Table::head_bytes(frame.rows().len());
@@ -122,7 +123,7 @@ impl Watch {
             ..head
         };
         // an observer that cannot be reached misses a frame; one that cannot be notified looks by itself after 50 ms
-        let _ = loan::send(loan);
+        let _ = loaned::send(loan);
         let _ = self.notifier.notify();
         // one that took far longer waited for the processor
         let took = began.elapsed();

@@ -1,35 +1,35 @@
-//! The sign of life of a controller.
+//! Heartbeats of a controller: they confirm its lease.
 
 use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use crate::connection::{Connection, lock};
 use crate::control::Request;
-use crate::link::{Link, lock};
 
 /// How often the lease is confirmed.
-const HEARTBEAT: Duration = Duration::from_millis(250);
+const PERIOD: Duration = Duration::from_millis(250);
 
 /// The thread that confirms the lease; a stopped process has no heartbeat.
 #[derive(Debug)]
-pub(crate) struct Heart {
+pub(crate) struct HeartbeatThread {
     stop: Arc<(Mutex<bool>, Condvar)>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Heart {
-    pub(crate) fn start(link: &Arc<Link>, epoch: u64) -> Heart {
+impl HeartbeatThread {
+    pub(crate) fn start(connection: &Arc<Connection>, epoch: u64) -> HeartbeatThread {
         let stop = Arc::new((Mutex::new(false), Condvar::new()));
-        let (link, theirs) = (Arc::clone(link), Arc::clone(&stop));
+        let (connection, theirs) = (Arc::clone(connection), Arc::clone(&stop));
         let beat = move || {
             let (stopped, signal) = &*theirs;
             let mut guard = lock(stopped);
             while !*guard {
                 guard = signal
-                    .wait_timeout(guard, HEARTBEAT)
+                    .wait_timeout(guard, PERIOD)
                     .map_or_else(|poison| poison.into_inner().0, |(guard, _)| guard);
                 if !*guard {
-                    link.tell(&Request::Heartbeat { epoch });
+                    connection.post(&Request::Heartbeat { epoch });
                 }
             }
         };
@@ -38,11 +38,11 @@ impl Heart {
             .name("tightloop-heart".to_owned())
             .spawn(beat)
             .ok();
-        Heart { stop, thread }
+        HeartbeatThread { stop, thread }
     }
 }
 
-impl Drop for Heart {
+impl Drop for HeartbeatThread {
     fn drop(&mut self) {
         *lock(&self.stop.0) = true;
         self.stop.1.notify_all();

@@ -1,44 +1,44 @@
-//! News of worlds that were frozen: a count now and then, not a line each.
+//! Log lines about faulted worlds: a count now and then, not a line each.
 
 use std::time::{Duration, Instant};
 
 use sim_engine::simulation::{Frozen, Simulation};
 
-use crate::news::News;
+use crate::log::Log;
 
 /// Time between two lines, at least.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// Tells of frozen worlds.
+/// Reports faulted worlds.
 #[derive(Debug, Default)]
-pub(crate) struct FaultNews {
-    told: Option<Instant>,
+pub(crate) struct FaultLog {
+    reported: Option<Instant>,
 }
 
-impl FaultNews {
-    /// Tells of the worlds that were frozen since the last line, unless that was just said: then the next command or the end
-    /// tells them.
-    pub(crate) fn tell(&mut self, simulation: &mut Simulation, news: &mut News, now: Instant) {
+impl FaultLog {
+    /// Reports the worlds that were frozen since the last line, unless a line was just written: then the next command or the
+    /// end reports them.
+    pub(crate) fn report(&mut self, simulation: &mut Simulation, log: &mut Log, now: Instant) {
         if self
-            .told
-            .is_some_and(|told| now.duration_since(told) < PERIOD)
+            .reported
+            .is_some_and(|reported| now.duration_since(reported) < PERIOD)
         {
             return;
         }
         if let Some(line) = line(&simulation.take_frozen(), simulation.worlds()) {
-            news.tell(&line);
-            self.told = Some(now);
+            log.write(&line);
+            self.reported = Some(now);
         }
     }
 
-    /// Tells what is left to tell.
-    pub(crate) fn end(mut self, simulation: &mut Simulation, news: &mut News) {
-        self.told = None;
-        self.tell(simulation, news, Instant::now());
+    /// Reports what is left.
+    pub(crate) fn end(mut self, simulation: &mut Simulation, log: &mut Log) {
+        self.reported = None;
+        self.report(simulation, log, Instant::now());
     }
 }
 
-/// What there is to say, if anything.
+/// The line, if there is anything to report.
 fn line(frozen: &Frozen, worlds: usize) -> Option<String> {
     let first = frozen.first?;
     let count = frozen.not_finite + frozen.out_of_bounds;

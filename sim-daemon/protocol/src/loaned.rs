@@ -1,4 +1,4 @@
-//! Loaned shared memory: as plain words, and on its way.
+//! Loaned samples: their payload as plain words, and how they are sent.
 
 use std::fmt::Debug;
 use std::mem::MaybeUninit;

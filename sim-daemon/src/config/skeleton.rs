@@ -9,7 +9,7 @@ const THIN: f64 = 0.05;
 const THIN_ALONE: f64 = 0.02;
 
 /// Links, by their places, each with shapes in its frame.
-pub(super) fn bones(robot: &Robot) -> Vec<(usize, Pose, Shape)> {
+pub(super) fn skeleton(robot: &Robot) -> Vec<(usize, Pose, Shape)> {
     let mut lines: Vec<(usize, [f64; 3])> = Vec::new();
     for joint in &robot.joints {
         lines.extend(joint.parent.map(|parent| (parent, joint.origin.pos)));

@@ -1,0 +1,27 @@
+//! What a host and the daemon's loop ask of each other.
+
+use iceoryx2::prelude::ipc;
+
+/// The daemon uses its services from one thread.
+pub(super) type S = ipc::Service;
+
+/// What a host asks for: frames, and for observers the state behind them.
+pub trait Worlds {
+    /// Writes the arena of a frame; returns whether there is something to be seen and recorded in it.
+    fn frame(&mut self, arena: &mut [u64]) -> bool;
+    /// Writes the state of the worlds that observers see, [`crate::Description::watch_state_bytes`] of it; returns whether there is one.
+    fn state(&mut self, to: &mut [u8]) -> bool;
+}
+
+/// What [`super::Host::wait`] has found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Next {
+    /// A command, in [`super::Host::inbox`]; it wants [`super::Host::answer`] or [`super::Host::refuse`].
+    Command,
+    /// An observer wants to see the present state: [`super::Host::show`].
+    Observe,
+    /// A recorder wants the state of all worlds to begin with: [`super::Host::record_state`].
+    Record,
+    /// Somebody asked the daemon to end.
+    End,
+}

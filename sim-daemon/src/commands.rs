@@ -1,0 +1,62 @@
+//! Runs a command line: each command is in a module of its own.
+
+use std::ffi::OsString;
+use std::io::Write;
+
+use sim_protocol::{AttachOptions, Client, keep_waiting};
+
+use crate::cli::{self, CliCommand};
+use crate::error::DaemonError;
+use crate::{devices, inspect, recording, session};
+
+/// Runs a command line; the exit code is 0 done, 1 failed, 2 misused.
+pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
+    let command = match cli::parse(args) {
+        Ok(command) => command,
+        Err(code) => return code,
+    };
+    let result = match &command {
+        CliCommand::Serve(serve) => session::run(serve),
+        CliCommand::Inspect(args) => inspect::run(args),
+        CliCommand::Record(args) => recording::record(args),
+        CliCommand::Replay(args) => recording::replay(args),
+        CliCommand::Devices => devices::run(),
+        CliCommand::List => list(),
+        CliCommand::Stop { name } => stop(name),
+        CliCommand::Python(command) => command.run(),
+        CliCommand::Completions { shell } => cli::completions(*shell),
+        CliCommand::Man { folder } => cli::man(folder.as_deref()),
+    };
+    match result {
+        Ok(()) => 0,
+        Err(error) => {
+            // whoever launched us reads it from our line on stdout
+            if !matches!(&command, CliCommand::Serve(serve) if serve.parent.is_some()) {
+                let _ = writeln!(std::io::stderr(), "tightloop: {error}");
+            }
+            error.exit_code()
+        }
+    }
+}
+
+fn list() -> Result<(), DaemonError> {
+    for name in sim_protocol::running(None)? {
+        // whoever reads our list may stop reading
+        if writeln!(std::io::stdout(), "{name}").is_err() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+fn stop(name: &str) -> Result<(), DaemonError> {
+    let options = AttachOptions::default();
+    // any of its groups ends a daemon
+    let name = match sim_protocol::find(name, &options, &mut keep_waiting())?.groups {
+        1 => name.to_owned(),
+        _ => format!("{name}.0"),
+    };
+    let client = Client::attach(&name, &options, &mut keep_waiting())?;
+    client.shutdown(&mut keep_waiting())?;
+    Ok(())
+}

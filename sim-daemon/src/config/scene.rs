@@ -1,0 +1,260 @@
+//! Scene files: what they hold, and the description that this stands for.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use sim_engine::dynamics::Dynamics;
+use sim_model::{Cone, Description, Solver};
+
+use super::bodies::BodyTable;
+use super::error::ConfigError;
+use super::number::Number;
+use super::paths;
+use super::randomize::{RandomizeTable, param};
+use super::robots::RobotTable;
+use super::sensors::{ContactSensorTable, SiteTable};
+use super::shapes::ShapeTable;
+
+/// A scene as a file holds it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFile {
+    /// Length of one physics step [s].
+    pub dt: Number,
+    /// Physics steps in a control frame.
+    pub substeps: usize,
+    /// Gravity in world axes [m/s²].
+    #[serde(default = "gravity")]
+    pub gravity: [Number; 3],
+    /// Parameters that vary from world to world, by their names.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub params: Vec<String>,
+    /// Largest delay of commands that a world may have, where that varies [substeps]; left out, four control frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command_delay_max: Option<usize>,
+    /// Most contacts that a world has room for; left out, as many as its shapes suggest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contacts_max: Option<usize>,
+    /// Most constraint rows of contacts that a world has room for; left out, as many as its contacts need.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rows_max: Option<usize>,
+    /// Pairs that never touch: `shape`, `body/shape` or `robot/link/shape`, or a robot, body or link for all its shapes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub contact_filters: Vec<[String; 2]>,
+    /// Options of the constraint solver.
+    #[serde(default)]
+    pub solver: SolverTable,
+    /// What a reset draws of the start state and of parameters.
+    #[serde(default, skip_serializing_if = "RandomizeTable::is_empty")]
+    pub randomize: RandomizeTable,
+    /// Shapes: static ones, and those of bodies and links.
+    #[serde(default, rename = "shape", skip_serializing_if = "Vec::is_empty")]
+    pub shapes: Vec<ShapeTable>,
+    /// Robots, in the order of their dofs.
+    #[serde(default, rename = "robot", skip_serializing_if = "Vec::is_empty")]
+    pub robots: Vec<RobotTable>,
+    /// Rigid bodies, in the order of their dofs, after all robots.
+    #[serde(default, rename = "body", skip_serializing_if = "Vec::is_empty")]
+    pub bodies: Vec<BodyTable>,
+    /// Frames of interest.
+    #[serde(default, rename = "site", skip_serializing_if = "Vec::is_empty")]
+    pub sites: Vec<SiteTable>,
+    /// Sums of contact forces.
+    #[serde(
+        default,
+        rename = "contact_sensor",
+        skip_serializing_if = "Vec::is_empty"
+    )]
+    pub contact_sensors: Vec<ContactSensorTable>,
+}
+
+fn gravity() -> [Number; 3] {
+    Description::new(1.0, 1).gravity.map(Number)
+}
+
+/// Options of the constraint solver; what is left out has its default.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SolverTable {
+    /// Most Newton iterations of a step.
+    pub iterations: usize,
+    /// Most line-search iterations of a Newton iteration.
+    pub ls_iterations: usize,
+    /// Scaled improvement below which the solver stops [–].
+    pub tolerance: Number,
+    /// Shape of the friction cone.
+    pub cone: ConeName,
+    /// Friction impedance over normal impedance [–].
+    pub impratio: Number,
+}
+
+impl Default for SolverTable {
+    fn default() -> SolverTable {
+        let solver = Solver::default();
+        SolverTable {
+            iterations: solver.iterations,
+            ls_iterations: solver.ls_iterations,
+            tolerance: Number(solver.tolerance),
+            cone: ConeName::Elliptic,
+            impratio: Number(solver.impratio),
+        }
+    }
+}
+
+/// Shape of the friction cone, by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ConeName {
+    /// The cone of Coulomb's law.
+    Elliptic,
+    /// A pyramid inside it.
+    Pyramidal,
+}
+
+/// Reads a scene file.
+///
+/// # Errors
+/// A file that is missing or not TOML, or an entry that is unknown or of a wrong type, with its line.
+pub fn load(path: &Path) -> Result<SceneFile, ConfigError> {
+    let fault = |error: std::io::Error| ConfigError::Read {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    };
+    let text = std::fs::read_to_string(path).map_err(fault)?;
+    parse(&text, &path.display().to_string())
+}
+
+/// Reads a scene from TOML; `place` names the text in messages.
+///
+/// # Errors
+/// Text that is not TOML, or an entry that is unknown or of a wrong type, with its line.
+pub fn parse(text: &str, place: &str) -> Result<SceneFile, ConfigError> {
+    toml::from_str(text).map_err(|error| syntax(place, error.to_string()))
+}
+
+fn syntax(place: &str, reason: String) -> ConfigError {
+    ConfigError::Syntax {
+        place: place.to_owned(),
+        reason: reason.trim_end().to_owned(),
+    }
+}
+
+impl SceneFile {
+    /// The scene as TOML.
+    pub fn to_toml(&self) -> String {
+        let text = toml::to_string(self).expect("every entry has a form in TOML");
+        // TOML, unlike JSON, has a number for infinity; only lists and numbers of joint values can hold it
+        let mut lines = String::with_capacity(text.len());
+        for line in text.lines() {
+            if line.starts_with("joint_") {
+                lines.push_str(&line.replace("\"inf\"", "inf"));
+            } else {
+                lines.push_str(line);
+            }
+            lines.push('\n');
+        }
+        lines
+    }
+
+    /// The scene as JSON, infinity as the string `"inf"`.
+    pub fn to_json(&self) -> serde_json::Value {
+        serde_json::to_value(self).expect("every entry has a form in JSON")
+    }
+
+    /// Reads a scene from JSON text.
+    ///
+    /// # Errors
+    /// Text that is not JSON, or an entry that is unknown or of a wrong type, with its place.
+    pub fn from_json(text: &str) -> Result<SceneFile, ConfigError> {
+        serde_json::from_str(text).map_err(|error| syntax("scene", error.to_string()))
+    }
+
+    /// Writes the scene as TOML, with paths made relative to that file; so far they are relative to `base_dir`.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn save(&self, path: &Path, base_dir: &Path) -> Result<(), ConfigError> {
+        let mut scene = self.clone();
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for robot in &mut scene.robots {
+            for path in std::iter::once(&mut robot.urdf).chain(&mut robot.package_dirs) {
+                *path = paths::relative_to(folder, &base_dir.join(&*path));
+            }
+        }
+        for path in scene
+            .shapes
+            .iter_mut()
+            .filter_map(|shape| shape.path.as_mut())
+        {
+            *path = paths::relative_to(folder, &base_dir.join(&*path));
+        }
+        std::fs::write(path, scene.to_toml()).map_err(|error| ConfigError::Write {
+            path: path.to_owned(),
+            reason: error.to_string(),
+        })
+    }
+
+    /// The description this scene stands for, checked; relative paths are looked for in `base_dir`.
+    ///
+    /// # Errors
+    /// A robot file or a value that cannot be used, by name.
+    pub fn describe(&self, base_dir: &Path) -> Result<Description, ConfigError> {
+        let mut description = Description::new(self.dt.0, self.substeps);
+        description.gravity = self.gravity.map(|part| part.0);
+        for name in &self.params {
+            description.params.insert(param(name)?);
+        }
+        description.filters = self.contact_filters.clone();
+        description.command_delay_max = self.command_delay_max;
+        description.contacts_max = self.contacts_max;
+        description.rows_max = self.rows_max;
+        description.solver = Solver {
+            iterations: self.solver.iterations,
+            ls_iterations: self.solver.ls_iterations,
+            tolerance: self.solver.tolerance.0,
+            cone: match self.solver.cone {
+                ConeName::Elliptic => Cone::Elliptic,
+                ConeName::Pyramidal => Cone::Pyramidal,
+            },
+            impratio: self.solver.impratio.0,
+        };
+        let bodies: Vec<&str> = self.bodies.iter().map(|body| body.name.as_str()).collect();
+        for (index, shape) in self.shapes.iter().enumerate() {
+            shape.check_body(index, &bodies)?;
+            if shape.body.is_none() {
+                let name = shape.name.as_deref().unwrap_or_default();
+                let geometry = shape.shape(index, base_dir)?;
+                description.add_shape(name, geometry, shape.pose()).surface = shape.surface();
+            }
+        }
+        for table in &self.robots {
+            let robot =
+                description.add_urdf(base_dir.join(&table.urdf), table.options(base_dir))?;
+            table.set_surfaces(robot);
+            table.set_joints(robot)?;
+        }
+        for (index, shape) in self.shapes.iter().enumerate() {
+            if let Some((robot, link)) = shape.link() {
+                let collision = shape.collision(index, base_dir)?;
+                description.add_link_shape(robot, link, collision)?;
+            }
+        }
+        for table in &self.bodies {
+            description.add_body(table.body(&self.shapes, base_dir)?)?;
+        }
+        description.sites = self.sites.iter().map(SiteTable::site).collect();
+        let sensors = self.contact_sensors.iter();
+        description.contact_sensors = sensors.map(ContactSensorTable::sensor).collect();
+        self.randomize.write(&mut description)?;
+        description.validate()?;
+        Ok(description)
+    }
+
+    /// Kinematics and dynamics of the scene at states that a caller gives; paths as in [`SceneFile::describe`].
+    ///
+    /// # Errors
+    /// As [`SceneFile::describe`], and a mass matrix that cannot be factored.
+    pub fn dynamics(&self, base_dir: &Path) -> Result<Dynamics, ConfigError> {
+        Ok(Dynamics::new(self.describe(base_dir)?.compile()?))
+    }
+}
