@@ -202,6 +202,9 @@ impl Drawing {
             Shape::Mesh(mesh) if !whole => mesh.hulls.iter().fold(TriMesh::default(), with_hull),
             other => triangles(other),
         };
+        let (surface, note) = surface.thinned();
+        self.notes
+            .extend(note.map(|note| format!("a collision mesh {note}")));
         let place = self.meshes.len();
         self.meshes.push(surface);
         alike.push((shape.clone(), place));

@@ -13,7 +13,7 @@ from tightloop import checks
 from tightloop.errors import ArgumentError, WaitTimeout
 from tightloop.view import needs
 from tightloop.view.cameras import PRESETS, Camera
-from tightloop.view.looks import Kind
+from tightloop.view.display_options import Kind
 from tightloop.view.parts import parts
 from tightloop.view.picture import Picture
 from tightloop.view.rolls import Gif, Mp4, Png, Pngs, Roll

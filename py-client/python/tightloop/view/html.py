@@ -13,7 +13,7 @@ import numpy as np
 import viser
 
 from tightloop.view.cameras import Camera, camera
-from tightloop.view.looks import Kind, Looks
+from tightloop.view.display_options import Kind, Looks
 from tightloop.view.overlay import Overlay
 from tightloop.view.parts import Parts
 from tightloop.view.source import CONTACT_FIELDS

@@ -9,7 +9,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from tightloop.view.looks import Looks
+from tightloop.view.display_options import Looks
 from tightloop.view.parts import Part
 from tightloop.view.poses import Array, wxyz
 from tightloop.view.skins import skins

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from tightloop.dynamics import Dynamics
 from tightloop.errors import TightloopError
 from tightloop.view.cameras import camera
+from tightloop.view.display_options import Looks
 from tightloop.view.feed import Feed
 from tightloop.view.grip import Grip, grip
 from tightloop.view.joints import Joint, at_targets, joints
-from tightloop.view.looks import Looks
 from tightloop.view.overlay import Overlay
 from tightloop.view.panel import Panel
 from tightloop.view.parts import parts

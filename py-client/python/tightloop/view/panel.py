@@ -11,9 +11,9 @@ import numpy as np
 import viser
 
 from tightloop.view.cameras import PRESETS
+from tightloop.view.display_options import Looks
 from tightloop.view.feed import Feed
 from tightloop.view.joints import Joint
-from tightloop.view.looks import Looks
 from tightloop.view.pilot import Pilot
 from tightloop.view.player import Player
 from tightloop.view.plots import PLOTS_MAX, Plot, choices

@@ -8,8 +8,8 @@ from typing import Any
 import viser
 from numpy.typing import NDArray
 
+from tightloop.view.display_options import Looks
 from tightloop.view.joints import Joint
-from tightloop.view.looks import Looks
 from tightloop.view.pilot import Pilot
 
 # Steps of a slider over its range.

@@ -11,7 +11,7 @@ import viser
 from numpy.typing import NDArray
 
 from tightloop.view import grid
-from tightloop.view.looks import Looks
+from tightloop.view.display_options import Looks
 from tightloop.view.parts import Part
 from tightloop.view.poses import IDENTITY, Array, wxyz
 from tightloop.view.skins import Skin, skins

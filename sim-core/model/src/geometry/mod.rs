@@ -1,7 +1,8 @@
-//! Shapes and what derives from them: mesh files, mass properties, convex hulls, triangles for a picture.
+//! What shapes are made of, and look like: mesh files, mass properties, convex hulls, triangles for a picture.
 //!
 //! Everything is f64 and happens when a description is made, never in a step.
 
+mod cluster;
 mod hull;
 mod load;
 mod mass;
@@ -12,6 +13,7 @@ mod shape;
 mod tessellate;
 mod trimesh;
 mod vector;
+mod visual;
 
 pub use hull::{Edge, Face, Hull};
 pub use load::{FILE_MAX, TRIANGLES_MAX};
@@ -21,3 +23,4 @@ pub use polytope::NoHull;
 pub use shape::Shape;
 pub use tessellate::triangles;
 pub use trimesh::TriMesh;
+pub use visual::{Color, Image, TRIANGLES_SHOWN_MAX, Texture, VisualMesh};

@@ -3,5 +3,6 @@
 mod files;
 mod formats;
 mod hulls;
+mod looks;
 mod mass;
 mod refused;

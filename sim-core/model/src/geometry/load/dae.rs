@@ -2,15 +2,19 @@
 //!
 //! `<unit meter>` and `<up_axis>` are applied as the COLLADA 1.4.1 and 1.5 specifications have them (absent: 1 m, y up), as
 //! Bullet and Blender do; RViz leaves the axes as they are, so a turn is noted. Curves, lines and points are no surface and
-//! are passed over; skins are taken as they lie in the file.
+//! are passed over; skins are taken as they lie in the file. A geometry names its materials by symbols, which each instance
+//! binds.
 
 use std::collections::HashMap;
+use std::path::Path;
 use std::rc::Rc;
 
 use roxmltree::{Document, Node, NodeId, ParsingOptions};
 
 use super::super::vector::unit;
-use super::dae_mesh::{self, ById, Named, numbers, referred};
+use super::dae_material::Materials;
+use super::dae_mesh;
+use super::dae_xml::{ById, Named, numbers, referred};
 use super::scene::Affine;
 use super::{Limits, RawMesh};
 
@@ -21,7 +25,7 @@ const DEPTH_MAX: usize = 100;
 /// Most scene nodes visited, instances counted each time: a few that refer to one another can stand for billions.
 const VISITS_MAX: usize = 10_000;
 
-pub(super) fn read(bytes: &[u8], limits: Limits) -> Result<RawMesh, String> {
+pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMesh, String> {
     let text = String::from_utf8_lossy(bytes);
     let text = text.trim_start_matches('\u{feff}');
     let options = ParsingOptions {
@@ -46,6 +50,7 @@ pub(super) fn read(bytes: &[u8], limits: Limits) -> Result<RawMesh, String> {
         by_id,
         limits,
         mesh: RawMesh::default(),
+        materials: limits.looks.then(|| Materials::new(root, folder)),
         read: HashMap::new(),
         visits: 0,
     };
@@ -57,9 +62,14 @@ pub(super) fn read(bytes: &[u8], limits: Limits) -> Result<RawMesh, String> {
                 .descendants()
                 .filter(|node| node.has_tag_name_of("geometry"))
             {
-                scene.geometry(geometry, frame)?;
+                scene.geometry(geometry, frame, None)?;
             }
         }
+    }
+    if scene.materials.is_some_and(|materials| materials.broken) {
+        scene.mesh.notes.push(
+            "names materials that are broken or not there, and is shown without them".to_owned(),
+        );
     }
     Ok(scene.mesh)
 }
@@ -84,8 +94,10 @@ struct Scene<'a, 'input> {
     by_id: ById<'a, 'input>,
     limits: Limits,
     mesh: RawMesh,
-    /// Geometries that were shown before.
-    read: HashMap<NodeId, Rc<RawMesh>>,
+    /// Only where looks are wanted.
+    materials: Option<Materials<'a, 'input>>,
+    /// Geometries that were shown before, and the symbols of their materials.
+    read: HashMap<NodeId, Rc<(RawMesh, Vec<String>)>>,
     visits: usize,
 }
 
@@ -152,14 +164,15 @@ impl<'a, 'input> Scene<'a, 'input> {
                 }
                 "instance_geometry" => {
                     let target = referred(&self.by_id, node, "url")?;
-                    self.geometry(target, frame)?;
+                    self.geometry(target, frame, Some(node))?;
                 }
                 "instance_controller" => {
                     let controller = referred(&self.by_id, node, "url")?;
                     if let Some(skin) = controller.child("skin") {
                         let bind = skin.child("bind_shape_matrix").map(transform).transpose()?;
                         let target = referred(&self.by_id, skin, "source")?;
-                        self.geometry(target, frame.after(bind.unwrap_or(Affine::IDENTITY)))?;
+                        let frame = frame.after(bind.unwrap_or(Affine::IDENTITY));
+                        self.geometry(target, frame, Some(node))?;
                     }
                 }
                 _ => {}
@@ -168,8 +181,13 @@ impl<'a, 'input> Scene<'a, 'input> {
         Ok(())
     }
 
-    /// Shows a geometry, which is read when it is met first.
-    fn geometry(&mut self, geometry: Node<'a, 'input>, frame: Affine) -> Result<(), String> {
+    /// Shows a geometry, which is read when it is met first, in the materials of an instance.
+    fn geometry(
+        &mut self,
+        geometry: Node<'a, 'input>,
+        frame: Affine,
+        instance: Option<Node<'a, 'input>>,
+    ) -> Result<(), String> {
         let part = match self.read.get(&geometry.id()) {
             Some(part) => part.clone(),
             None => {
@@ -178,7 +196,24 @@ impl<'a, 'input> Scene<'a, 'input> {
                 part
             }
         };
-        self.mesh.place(&part, &frame, self.limits)
+        let (part, symbols) = &*part;
+        let before = self.mesh.runs.len();
+        self.mesh.place(part, &frame, self.limits)?;
+        if let (Some(materials), Some(instance)) = (&mut self.materials, instance) {
+            let bound = materials.bound(instance);
+            for (run, symbol) in self.mesh.runs[before..].iter_mut().zip(symbols) {
+                if let Some(material) = bound.get(symbol.as_str()) {
+                    run.material = material.clone();
+                    run.colors.clear();
+                }
+            }
+        }
+        for run in &mut self.mesh.runs[before..] {
+            if run.material.texture.is_none() {
+                run.uv.clear();
+            }
+        }
+        Ok(())
     }
 }
 

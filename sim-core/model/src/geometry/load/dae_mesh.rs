@@ -1,55 +1,29 @@
-//! The triangles of one COLLADA geometry.
+//! The triangles of one COLLADA geometry, with texture coordinates and vertex colours.
 
 use std::collections::HashMap;
+use std::rc::Rc;
 
 use roxmltree::{Node, NodeId};
 
-use super::{Limits, RawMesh};
+use super::color::{color_of, mean};
+use super::dae_xml::{ById, Named, numbers, referred};
+use super::raw::{fan, separate, strip};
+use super::{Limits, RawMesh, Run};
 
-/// Elements by their name alone: the namespace tells the version only.
-pub(super) trait Named<'a, 'input> {
-    fn has_tag_name_of(&self, name: &str) -> bool;
-    fn child(&self, name: &str) -> Option<Node<'a, 'input>>;
-}
-
-impl<'a, 'input> Named<'a, 'input> for Node<'a, 'input> {
-    fn has_tag_name_of(&self, name: &str) -> bool {
-        self.is_element() && self.tag_name().name() == name
-    }
-
-    fn child(&self, name: &str) -> Option<Node<'a, 'input>> {
-        self.children().find(|child| child.has_tag_name_of(name))
-    }
-}
-
-/// Elements by their `id`.
-pub(super) type ById<'a, 'input> = HashMap<&'a str, Node<'a, 'input>>;
-
-/// What an element's `url` or `source` refers to.
-pub(super) fn referred<'a, 'input>(
-    by_id: &ById<'a, 'input>,
-    node: Node,
-    attribute: &str,
-) -> Result<Node<'a, 'input>, String> {
-    let url = node.attribute(attribute).unwrap_or_default();
-    let found = url.strip_prefix('#').and_then(|id| by_id.get(id));
-    found.copied().ok_or_else(|| {
-        let name = node.tag_name().name();
-        format!("<{name} {attribute}=\"{url}\"> refers to nothing in the file; export it again")
-    })
-}
-
-/// The triangles of a `<geometry>`, in its own frame; none where it is no mesh.
+/// The triangles of a `<geometry>` in its own frame, none where it is no mesh, and which symbol each of its runs gives its
+/// material: what that is, each instance says.
 pub(super) fn read<'a, 'input>(
     geometry: Node<'a, 'input>,
     by_id: &ById<'a, 'input>,
     limits: Limits,
-) -> Result<RawMesh, String> {
+) -> Result<(RawMesh, Vec<String>), String> {
     let mut reader = Geometry {
         by_id,
         limits,
         mesh: RawMesh::default(),
-        sources: HashMap::new(),
+        symbols: Vec::new(),
+        points: HashMap::new(),
+        rows: HashMap::new(),
     };
     let parts = geometry
         .child("mesh")
@@ -64,15 +38,42 @@ pub(super) fn read<'a, 'input>(
             reader.part(part)?;
         }
     }
-    Ok(reader.mesh)
+    Ok((reader.mesh, reader.symbols))
 }
 
 struct Geometry<'b, 'a, 'input> {
     by_id: &'b ById<'a, 'input>,
     limits: Limits,
     mesh: RawMesh,
+    /// Of the material of each run.
+    symbols: Vec<String>,
     /// Index of the first point of a source, and how many it has.
-    sources: HashMap<NodeId, (u32, usize)>,
+    points: HashMap<NodeId, (u32, usize)>,
+    /// Sources of texture coordinates and colours; parts share them.
+    rows: HashMap<NodeId, Rc<Rows>>,
+}
+
+/// Numbers of a source.
+struct Rows {
+    values: Vec<f64>,
+    /// Numbers in each row.
+    stride: usize,
+}
+
+/// What of a part's lists stands for one of its inputs.
+struct Channel {
+    /// Which number of each corner's.
+    offset: usize,
+    rows: Rc<Rows>,
+}
+
+impl Channel {
+    /// The row of a corner, its index looked up among those of the list.
+    fn row(&self, corner: &[u32]) -> Option<&[f64]> {
+        let index = *corner.get(self.offset)? as usize;
+        let first = index.checked_mul(self.rows.stride)?;
+        self.rows.values.get(first..first + self.rows.stride)
+    }
 }
 
 impl<'a, 'input> Geometry<'_, 'a, 'input> {
@@ -82,17 +83,11 @@ impl<'a, 'input> Geometry<'_, 'a, 'input> {
             .children()
             .filter(|node| node.has_tag_name_of("input"))
             .collect();
-        let offset = |input: &Node| {
-            input
-                .attribute("offset")
-                .and_then(|text| text.trim().parse().ok())
-                .unwrap_or(0)
-        };
         let stride = inputs
             .iter()
-            .map(&offset)
+            .map(offset)
             .max()
-            .map_or(1, |last: u16| usize::from(last) + 1);
+            .map_or(1, |last| usize::from(last) + 1);
         let Some(vertices) = inputs
             .iter()
             .find(|input| input.attribute("semantic") == Some("VERTEX"))
@@ -109,6 +104,15 @@ impl<'a, 'input> Geometry<'_, 'a, 'input> {
             .ok_or("<vertices> is without POSITION; export it again")?;
         let source = referred(self.by_id, positions, "source")?;
         let (first, known) = self.points(source)?;
+        let [uv, color] = if self.limits.looks {
+            ["TEXCOORD", "COLOR"].map(|semantic| self.channel(&inputs, list, semantic))
+        } else {
+            [None, None]
+        };
+        let mut run = Run {
+            first: self.mesh.triangles.len(),
+            ..Run::default()
+        };
 
         let lists = part
             .children()
@@ -130,48 +134,119 @@ impl<'a, 'input> Geometry<'_, 'a, 'input> {
                 ));
             }
             let corners: Vec<u32> = corners.into_iter().map(|corner| first + corner).collect();
-            self.polygons(part.tag_name().name(), &corners, &mut counts)?;
+            let places = places(part.tag_name().name(), corners.len(), &mut counts)?;
+            self.mesh.extend(&corners, &places);
             self.limits.triangles(self.mesh.triangles.len())?;
+            let corner = |at: usize| indices.get(at * stride..).unwrap_or_default();
+            if let Some(uv) = &uv {
+                let row = |at| uv.row(corner(at))?.first_chunk::<2>();
+                run.uv.extend(places.iter().map_while(|places| {
+                    let [a, b, c] = places.map(row);
+                    Some([a?, b?, c?].map(|uv| uv.map(|part| part as f32)))
+                }));
+            }
+            if let Some(color) = &color {
+                let parts = |at| {
+                    let row = color.row(corner(at))?;
+                    let [r, g, b] = *row.first_chunk()?;
+                    Some([r, g, b, row.get(3).copied().unwrap_or(1.0)])
+                };
+                run.colors.extend(places.iter().map_while(|places| {
+                    let [a, b, c] = places.map(parts);
+                    Some(color_of(mean([a?, b?, c?])))
+                }));
+            }
+        }
+        run.count = self.mesh.triangles.len() - run.first;
+        if self.limits.looks && run.count > 0 {
+            // what only some triangles have is left out
+            if run.uv.len() != run.count {
+                run.uv.clear();
+            }
+            if run.colors.len() != run.count {
+                run.colors.clear();
+            }
+            let symbol = part.attribute("material").unwrap_or_default();
+            self.symbols.push(symbol.to_owned());
+            self.mesh.runs.push(run);
         }
         Ok(())
     }
 
-    /// The polygons of one list of corners; `counts` are the corners of each, for a `<polylist>`.
-    fn polygons(
+    /// An input of a part, or of its `<vertices>`; `None` where it has none that can be read.
+    fn channel(
         &mut self,
-        kind: &str,
-        corners: &[u32],
-        counts: &mut impl Iterator<Item = usize>,
-    ) -> Result<(), String> {
-        match kind {
-            "triangles" => corners
-                .chunks_exact(3)
-                .for_each(|corners| self.mesh.polygon(corners)),
-            "polylist" => {
-                let mut rest = corners;
-                for count in counts {
-                    let Some((polygon, after)) = rest.split_at_checked(count) else {
-                        return Err(
-                            "<vcount> asks for more corners than <p> has; export it again"
-                                .to_owned(),
-                        );
-                    };
-                    self.mesh.polygon(polygon);
-                    rest = after;
-                }
+        inputs: &[Node<'a, 'input>],
+        vertices: Node<'a, 'input>,
+        semantic: &str,
+    ) -> Option<Channel> {
+        let of_corner = inputs
+            .iter()
+            .find(|input| input.attribute("semantic") == Some(semantic));
+        let input = of_corner.copied().or_else(|| {
+            vertices.children().find(|node| {
+                node.has_tag_name_of("input") && node.attribute("semantic") == Some(semantic)
+            })
+        })?;
+        let holder = of_corner.or_else(|| {
+            inputs
+                .iter()
+                .find(|input| input.attribute("semantic") == Some("VERTEX"))
+        })?;
+        let source = referred(self.by_id, input, "source").ok()?;
+        let rows = match self.rows.get(&source.id()) {
+            Some(rows) => rows.clone(),
+            None => {
+                let default = if semantic == "COLOR" { 3 } else { 2 };
+                let (values, stride, _) = self.source(source, default).ok()?;
+                let rows = Rc::new(Rows { values, stride });
+                self.rows.insert(source.id(), rows.clone());
+                rows
             }
-            "tristrips" => self.mesh.strip(corners),
-            _ => self.mesh.polygon(corners), // polygons, and fans around their first corner
-        }
-        Ok(())
+        };
+        Some(Channel {
+            offset: usize::from(offset(holder)),
+            rows,
+        })
     }
 
     /// Points of a `<source>`, its numbers as its `<accessor>` steps through them: index of the first, and how many.
     fn points(&mut self, source: Node<'a, 'input>) -> Result<(u32, usize), String> {
         // parts share their points, so these are read once
-        if let Some(&known) = self.sources.get(&source.id()) {
+        if let Some(&known) = self.points.get(&source.id()) {
             return Ok(known);
         }
+        let (values, stride, count) = self.source(source, 3)?;
+        if stride < 3 {
+            return Err(format!(
+                "positions come in steps of {stride} numbers, not 3; export it again"
+            ));
+        }
+        let mut points: Vec<[f64; 3]> = values
+            .chunks(stride)
+            .filter_map(|point| point.first_chunk().copied())
+            .collect();
+        if let Some(count) = count {
+            if count > points.len() {
+                let found = points.len();
+                return Err(format!(
+                    "an <accessor> tells of {count} points, there are {found}; export it again"
+                ));
+            }
+            points.truncate(count);
+        }
+        let place = (self.mesh.vertices.len() as u32, points.len());
+        self.mesh.vertices.append(&mut points);
+        self.points.insert(source.id(), place);
+        Ok(place)
+    }
+
+    /// Numbers of a `<source>` from its first row on, how many a row has, and how many rows its `<accessor>` tells of.
+    fn source(
+        &self,
+        source: Node<'a, 'input>,
+        default_stride: usize,
+    ) -> Result<(Vec<f64>, usize, Option<usize>), String> {
         let accessor = source
             .child("technique_common")
             .and_then(|common| common.child("accessor"));
@@ -184,48 +259,41 @@ impl<'a, 'input> Geometry<'_, 'a, 'input> {
         let number = |name: &str| {
             accessor.and_then(|accessor| accessor.attribute(name)?.trim().parse::<usize>().ok())
         };
-        let (start, stride) = (number("offset").unwrap_or(0), number("stride").unwrap_or(3));
-        if stride < 3 {
-            return Err(format!(
-                "positions come in steps of {stride} numbers, not 3; export it again"
-            ));
-        }
-        let values = numbers::<f64>(Some(array))?;
-        let mut points: Vec<[f64; 3]> = values
-            .get(start..)
-            .unwrap_or_default()
-            .chunks(stride)
-            .filter_map(|point| point.first_chunk().copied())
-            .collect();
-        if let Some(count) = number("count") {
-            if count > points.len() {
-                let found = points.len();
-                return Err(format!(
-                    "an <accessor> tells of {count} points, there are {found}; export it again"
-                ));
-            }
-            points.truncate(count);
-        }
-        let place = (self.mesh.vertices.len() as u32, points.len());
-        self.mesh.vertices.append(&mut points);
-        self.sources.insert(source.id(), place);
-        Ok(place)
+        let stride = number("stride").unwrap_or(default_stride);
+        let mut values = numbers::<f64>(Some(array))?;
+        values.drain(..number("offset").unwrap_or(0).min(values.len()));
+        Ok((values, stride, number("count")))
     }
 }
 
-/// The numbers in an element's text; none where there is no element.
-pub(super) fn numbers<T: std::str::FromStr>(node: Option<Node>) -> Result<Vec<T>, String> {
-    let Some(node) = node else {
-        return Ok(Vec::new());
-    };
-    let text = node.text().unwrap_or_default();
-    text.split_ascii_whitespace()
-        .map(|word| {
-            word.parse().map_err(|_| {
-                let name = node.tag_name().name();
-                let word: String = word.chars().take(40).collect();
-                format!("`{word}` in <{name}> is no number of its kind; export it again")
-            })
-        })
-        .collect()
+/// Which number of each corner's is an input's index.
+fn offset(input: &Node) -> u16 {
+    let text = input.attribute("offset");
+    text.and_then(|text| text.trim().parse().ok()).unwrap_or(0)
+}
+
+/// The triangles of one list of corners, as places in it; `counts` are the corners of each polygon of a `<polylist>`.
+fn places(
+    kind: &str,
+    corners: usize,
+    counts: &mut impl Iterator<Item = usize>,
+) -> Result<Vec<[usize; 3]>, String> {
+    Ok(match kind {
+        "triangles" => separate(corners).collect(),
+        "polylist" => {
+            let (mut places, mut first) = (Vec::new(), 0);
+            for count in counts {
+                if count > corners - first {
+                    return Err(
+                        "<vcount> asks for more corners than <p> has; export it again".to_owned(),
+                    );
+                }
+                places.extend(fan(first, count));
+                first += count;
+            }
+            places
+        }
+        "tristrips" => strip(corners).collect(),
+        _ => fan(0, corners).collect(), // polygons, and fans around their first corner
+    })
 }

@@ -1,12 +1,22 @@
-//! Mesh files to triangles, in the file's own frame and units turned to metres and z up.
+//! Mesh files to triangles and their looks, in the file's own frame and units turned to metres and z up.
+//!
+//! One reader per format serves both: collisions take the triangles ([`load`]), visuals the materials, too
+//! ([`super::visual`]).
 //!
 //! What comes from outside is checked: sizes before memory is taken, indices before they are followed, numbers for being
 //! finite. STL and OBJ say nothing of units and axes and are taken as they are; COLLADA and glTF say both.
 
+mod color;
 mod dae;
+mod dae_material;
 mod dae_mesh;
+mod dae_xml;
 mod gltf;
+mod gltf_material;
+mod gltf_rows;
+mod mtl;
 mod obj;
+mod raw;
 mod scene;
 mod stl;
 
@@ -15,8 +25,7 @@ use std::io::Read as _;
 use std::path::Path;
 
 use super::trimesh::TriMesh;
-use super::vector::Vector;
-use scene::Affine;
+pub(super) use raw::{Material, RawMesh, Run, Uv};
 
 /// Largest file [bytes].
 pub const FILE_MAX: u64 = 256 << 20;
@@ -25,10 +34,15 @@ pub const TRIANGLES_MAX: usize = 4_000_000;
 /// Largest coordinate [m]: far beyond any robot, and its sixth power, which inertias need, is still a number.
 const COORDINATE_MAX: f64 = 1e9;
 
-/// What a file may ask for.
+/// What is said of a file that only has points and lines left.
+pub(super) const NO_AREA: &str = "all its triangles are without area; export a surface";
+
+/// What a file may ask for, and what is wanted of it.
 #[derive(Clone, Copy)]
 struct Limits {
     triangles: usize,
+    /// Whether materials are read, too.
+    looks: bool,
 }
 
 impl Limits {
@@ -55,55 +69,6 @@ impl Limits {
     }
 }
 
-/// Triangles as a file gives them.
-#[derive(Default)]
-struct RawMesh {
-    vertices: Vec<Vector>,
-    triangles: Vec<[u32; 3]>,
-    /// What was done to it that its author may not expect, a sentence each.
-    notes: Vec<String>,
-}
-
-impl RawMesh {
-    /// Adds a triangle with corners of its own.
-    fn triangle(&mut self, corners: [Vector; 3]) {
-        let first = self.vertices.len() as u32;
-        self.vertices.extend(corners);
-        self.triangles.push([first, first + 1, first + 2]);
-    }
-
-    /// Adds a part of a scene where this map puts it; a map that mirrors keeps the outside outside.
-    fn place(&mut self, part: &RawMesh, map: &Affine, limits: Limits) -> Result<(), String> {
-        limits.triangles(self.triangles.len() + part.triangles.len())?;
-        limits.vertices(self.vertices.len() + part.vertices.len())?;
-        let first = self.vertices.len() as u32;
-        let places = part.vertices.iter().map(|&vertex| map.apply(vertex));
-        self.vertices.extend(places);
-        let mirrors = map.mirrors();
-        self.triangles.extend(part.triangles.iter().map(|corners| {
-            let [a, b, c] = corners.map(|corner| first + corner);
-            if mirrors { [a, c, b] } else { [a, b, c] }
-        }));
-        Ok(())
-    }
-
-    /// Adds a strip of triangles, every other of which runs the other way.
-    fn strip(&mut self, corners: &[u32]) {
-        for (index, corners) in corners.windows(3).enumerate() {
-            let swap = index % 2;
-            self.polygon(&[corners[0], corners[1 + swap], corners[2 - swap]]);
-        }
-    }
-
-    /// Adds a polygon as a fan around its first corner, where it has three or more; integrals over it come out right even
-    /// where it is concave.
-    fn polygon(&mut self, corners: &[u32]) {
-        for pair in corners.windows(2).skip(1) {
-            self.triangles.push([corners[0], pair[0], pair[1]]);
-        }
-    }
-}
-
 /// Formats by the ending of the file's name.
 #[derive(Clone, Copy)]
 enum Format {
@@ -118,6 +83,23 @@ enum Format {
 /// # Errors
 /// Why the file cannot be used, and the cure.
 pub(super) fn load(path: &Path) -> Result<(TriMesh, Vec<String>), String> {
+    let raw = read(path, false)?;
+    let mesh = TriMesh {
+        vertices: raw.vertices,
+        triangles: raw.triangles,
+    }
+    .joined();
+    if mesh.triangles.is_empty() {
+        return Err(NO_AREA.to_owned());
+    }
+    Ok((mesh, raw.notes))
+}
+
+/// Reads a file as it is, with its materials if looks are wanted; coordinates are finite and indices in range.
+///
+/// # Errors
+/// Why the file cannot be used, and the cure.
+pub(super) fn read(path: &Path, looks: bool) -> Result<RawMesh, String> {
     let format = format_of(path)?;
     let bytes = bytes_of(path, FILE_MAX)?;
     if bytes.is_empty() {
@@ -125,12 +107,14 @@ pub(super) fn load(path: &Path) -> Result<(TriMesh, Vec<String>), String> {
     }
     let limits = Limits {
         triangles: TRIANGLES_MAX,
+        looks,
     };
+    let folder = path.parent().unwrap_or(Path::new(""));
     let raw = match format {
         Format::Stl => stl::read(&bytes, limits),
-        Format::Obj => obj::read(&bytes, limits),
-        Format::Dae => dae::read(&bytes, limits),
-        Format::Gltf => gltf::read(&bytes, path.parent().unwrap_or(Path::new("")), limits),
+        Format::Obj => obj::read(&bytes, folder, limits),
+        Format::Dae => dae::read(&bytes, folder, limits),
+        Format::Gltf => gltf::read(&bytes, folder, limits),
     }?;
     if raw.triangles.is_empty() {
         return Err("it holds no triangles; export a surface".to_owned());
@@ -145,15 +129,7 @@ pub(super) fn load(path: &Path) -> Result<(TriMesh, Vec<String>), String> {
             "a vertex has the coordinate {far}; give finite numbers of at most {COORDINATE_MAX:e}"
         ));
     }
-    let mesh = TriMesh {
-        vertices: raw.vertices,
-        triangles: raw.triangles,
-    }
-    .joined();
-    if mesh.triangles.is_empty() {
-        return Err("all its triangles are without area; export a surface".to_owned());
-    }
-    Ok((mesh, raw.notes))
+    Ok(raw)
 }
 
 fn format_of(path: &Path) -> Result<Format, String> {

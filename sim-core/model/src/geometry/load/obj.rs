@@ -1,11 +1,19 @@
-//! Wavefront OBJ: the vertices and faces of all its objects and groups; materials, normals and textures play no part.
+//! Wavefront OBJ: the vertices and faces of all its objects and groups, with the materials of its MTL files; normals play no
+//! part.
 
-use super::{Limits, RawMesh, lines};
+use std::collections::HashMap;
+use std::path::Path;
 
-pub(super) fn read(bytes: &[u8], limits: Limits) -> Result<RawMesh, String> {
+use super::color::{color_of, mean};
+use super::mtl;
+use super::raw::fan;
+use super::{Limits, Material, RawMesh, Run, lines};
+
+pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMesh, String> {
     let text = String::from_utf8_lossy(bytes);
     let mut mesh = RawMesh::default();
-    let mut corners = Vec::new();
+    let mut looks = limits.looks.then(|| Looks::new(folder));
+    let (mut corners, mut places) = (Vec::new(), Vec::new());
     // a backslash continues a line; such files are rare, so only they are copied
     let joined;
     let text = if text.contains("\\\n") || text.contains("\\\r\n") {
@@ -17,7 +25,11 @@ pub(super) fn read(bytes: &[u8], limits: Limits) -> Result<RawMesh, String> {
     for (index, line) in lines(text).enumerate() {
         let line = line.split('#').next().unwrap_or_default();
         let mut words = line.split_ascii_whitespace();
-        match words.next() {
+        let keyword = words.next();
+        if let Some(looks) = &mut looks {
+            looks.line(keyword.unwrap_or_default(), line, mesh.triangles.len());
+        }
+        match keyword {
             Some("v") => {
                 let mut next = || words.next()?.parse::<f64>().ok();
                 // what may follow is a weight or a colour
@@ -38,11 +50,20 @@ pub(super) fn read(bytes: &[u8], limits: Limits) -> Result<RawMesh, String> {
                         )
                     })?);
                 }
-                mesh.polygon(&corners);
+                places.clear();
+                places.extend(fan(0, corners.len()));
+                mesh.extend(&corners, &places);
+                if let Some(looks) = &mut looks {
+                    looks.face(line, &corners, &places);
+                }
                 limits.triangles(mesh.triangles.len())?;
             }
             _ => {}
         }
+    }
+    if let Some(mut looks) = looks {
+        looks.end_run(mesh.triangles.len());
+        mesh.runs = looks.runs;
     }
     Ok(mesh)
 }
@@ -61,4 +82,99 @@ fn vertex(word: &str, known: usize) -> Option<u32> {
         number - 1
     };
     (0..known).contains(&index).then_some(index as u32)
+}
+
+/// What the lines of a file say of looks, beside its triangles.
+struct Looks<'a> {
+    folder: &'a Path,
+    materials: HashMap<String, Material>,
+    /// Texture coordinates, counted as vertices are.
+    uv: Vec<[f32; 2]>,
+    /// Colour of each vertex, where a line gives it.
+    colors: Vec<Option<[f64; 4]>>,
+    runs: Vec<Run>,
+    /// The run that is being read; its count comes at its end.
+    run: Run,
+}
+
+impl Looks<'_> {
+    fn new(folder: &Path) -> Looks<'_> {
+        Looks {
+            folder,
+            materials: HashMap::new(),
+            uv: Vec::new(),
+            colors: Vec::new(),
+            runs: Vec::new(),
+            run: Run::default(),
+        }
+    }
+
+    /// Takes a line, so many triangles after the start.
+    fn line(&mut self, keyword: &str, line: &str, triangles: usize) {
+        let rest = || line.trim_start()[keyword.len()..].trim();
+        let numbers = || rest().split_ascii_whitespace().map(str::parse::<f64>);
+        match keyword {
+            "v" => {
+                let color: Vec<f64> = numbers().skip(3).map_while(Result::ok).collect();
+                self.colors.push(match color[..] {
+                    [r, g, b] | [r, g, b, _] => Some([r, g, b, 1.0]),
+                    _ => None, // nothing, or a weight
+                });
+            }
+            "vt" => {
+                let mut next = numbers().map(|number| number.unwrap_or(0.0) as f32);
+                self.uv
+                    .push([next.next().unwrap_or(0.0), next.next().unwrap_or(0.0)]);
+            }
+            // names may hold spaces
+            "mtllib" => self.materials.extend(mtl::read(self.folder, rest())),
+            "usemtl" => {
+                self.end_run(triangles);
+                self.run.material = self.materials.get(rest()).cloned().unwrap_or_default();
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes the triangles of a face.
+    fn face(&mut self, line: &str, corners: &[u32], places: &[[usize; 3]]) {
+        let Material { color, texture } = &self.run.material;
+        if texture.is_some() {
+            let words = line.split_ascii_whitespace().skip(1);
+            let uv: Option<Vec<_>> = words
+                .map(|word| {
+                    let at = vertex(word.split('/').nth(1)?, self.uv.len())?;
+                    Some(self.uv[at as usize])
+                })
+                .collect();
+            if let Some(uv) = uv {
+                let triangles = places.iter().map(|places| places.map(|at| uv[at]));
+                self.run.uv.extend(triangles);
+            }
+        } else if color.is_none() {
+            for places in places {
+                let [a, b, c] = places.map(|at| self.colors[corners[at] as usize]);
+                if let (Some(a), Some(b), Some(c)) = (a, b, c) {
+                    self.run.colors.push(color_of(mean([a, b, c])));
+                }
+            }
+        }
+    }
+
+    /// Ends the run, so many triangles after the start.
+    fn end_run(&mut self, triangles: usize) {
+        let mut run = std::mem::take(&mut self.run);
+        self.run.first = triangles;
+        run.count = triangles - run.first;
+        // what only some faces have is left out
+        if run.uv.len() != run.count {
+            run.uv.clear();
+        }
+        if run.colors.len() != run.count {
+            run.colors.clear();
+        }
+        if run.count > 0 {
+            self.runs.push(run);
+        }
+    }
 }
