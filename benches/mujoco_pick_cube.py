@@ -24,7 +24,7 @@ from tightloop.tasks import cube, pick_cube
 from tightloop.tasks.pick_cube import FrankaPickCube
 
 sys.path.append(str(REPOSITORY / "tests/python/mujoco"))
-from twin import limits_in_force_space  # the tests are no package
+from mujoco_model import limits_in_force_space  # the tests are no package
 
 ARM = 7
 STILL = "fr3_link0"  # the link that stands on the ground and never moves

@@ -35,7 +35,7 @@ import tightloop as tl
 MODELS = REPOSITORY.parent / "shared/reference/models"
 sys.path[:0] = [str(REPOSITORY / "examples"), str(REPOSITORY / "tests/python/mujoco")]
 from franka_lesson import FRAMES, START, scene, targets, torques  # noqa: E402  (the examples are no package)
-from twin import Twin  # noqa: E402  (nor are the tests)
+from mujoco_model import MujocoModel  # noqa: E402  (nor are the tests)
 
 WORLDS = 4096
 MUJOCO_WORLDS = 16
@@ -67,7 +67,7 @@ class Rival:
         if binary.exists():
             self.model, self.origin = mujoco.MjModel.from_binary_path(str(binary)), binary.name
         else:
-            self.model, self.origin = Twin(scene(driven=demo == "target")).model, "the project's URDF"
+            self.model, self.origin = MujocoModel(scene(driven=demo == "target")).model, "the project's URDF"
             self.model.opt.iterations, self.model.opt.tolerance = 20, 1e-8
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
         self.data = mujoco.MjData(self.model)
@@ -81,7 +81,7 @@ class Rival:
         control = commands.astype(float).swapaxes(0, 1).repeat(substeps, axis=1)
         spec = mujoco.mjtState.mjSTATE_QFRC_APPLIED if self.torque else mujoco.mjtState.mjSTATE_CTRL
         if not self.torque and self.model.nu == 2 * self.model.nv:
-            # a twin has two actuators a joint, and the second takes a velocity target
+            # the reference model has two actuators a joint, and the second takes a velocity target
             control = np.stack([control, np.zeros_like(control)], axis=-1).reshape(*control.shape[:2], -1)
         state = np.empty((*control.shape[:2], size))
         begin = time.perf_counter()

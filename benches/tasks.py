@@ -22,7 +22,7 @@ from record import print_table, write_results
 from tqdm import tqdm
 
 from tightloop.env import VectorEnv
-from tightloop.registration import TASKS
+from tightloop.env.registry import TASKS
 
 WORLDS = 4096
 STEPS = 20

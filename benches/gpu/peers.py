@@ -33,7 +33,7 @@ import contacts  # noqa: E402  (neither benches nor examples are a package)
 import franka_grasp as grasp  # noqa: E402
 import franka_lesson as lesson  # noqa: E402
 import legged  # noqa: E402
-from twin import Twin  # noqa: E402
+from mujoco_model import MujocoModel  # noqa: E402
 
 Array = NDArray[np.float32]
 # A frame: commands ``(worlds, controls)`` in, what it shows out
@@ -61,16 +61,16 @@ class Plan:
             self.start = np.r_[lesson.START, [0.0, -0.35, 0.125, 1, 0, 0, 0]]
             self.rows = grasp.targets()
         else:
-            self.model = Twin(lesson.scene(driven=name == "target")).model
+            self.model = MujocoModel(lesson.scene(driven=name == "target")).model
             self.model.opt.iterations, self.model.opt.tolerance = 20, 1e-8
-            # a twin's own flag, which MuJoCo-Warp does not know, goes
+            # the reference model's own flag, which MuJoCo-Warp does not know, goes
             self.model.opt.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT
             self.start = np.array(lesson.START)
             values = lesson.targets if name == "target" else lesson.torques
             one = np.ones(1)
             self.rows = np.array([values(frame, one)[0] for frame in range(lesson.FRAMES)])
             if name == "target" and self.model.nu == 2 * self.model.nv:
-                # a twin has two actuators a joint, and the second takes a velocity target
+                # the reference model has two actuators a joint, and the second takes a velocity target
                 self.rows = np.stack([self.rows, np.zeros_like(self.rows)], axis=-1).reshape(len(self.rows), -1)
         self.rows = self.rows.astype(np.float32)
         if name != "grasp":

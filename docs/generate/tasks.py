@@ -5,8 +5,7 @@ from __future__ import annotations
 import sys
 
 from generate.tables import table
-from tightloop.env.registry import make_task
-from tightloop.registration import TASKS
+from tightloop.env.registry import TASKS, make_task
 
 
 def parts() -> dict[str, str]:

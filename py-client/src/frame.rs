@@ -68,7 +68,7 @@ impl PyFrame {
                 self.__getattr__(py, view.name)?.call_method0("copy")?,
             )?;
         }
-        py.import("tightloop.sim")?
+        py.import("tightloop.frames")?
             .getattr("FrameCopy")?
             .call1((arrays,))
     }

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import tightloop as tl
-from tightloop.adapters import needs
+from tightloop.adapters.environment import adapted_environment, library
 from tightloop.env import AutoresetMode, VectorEnv
 
 
@@ -26,7 +26,7 @@ def env() -> Iterator[VectorEnv]:
 
 def test_a_missing_library_is_named_with_its_cure():
     with pytest.raises(tl.MissingLibrary, match=r"no module `no_such_library`: pip install 'no-such\[all\]'") as told:
-        needs.library("no_such_library.inside", install="no-such[all]")
+        library("no_such_library.inside", install="no-such[all]")
     assert isinstance(told.value, ImportError)
 
 
@@ -34,7 +34,7 @@ def test_what_a_library_itself_misses_is_its_own_to_tell(tmp_path, monkeypatch):
     (tmp_path / "half_a_library.py").write_text("import what_it_forgot")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ModuleNotFoundError, match="what_it_forgot") as told:
-        needs.library("half_a_library", install="half-a-library")
+        library("half_a_library", install="half-a-library")
     assert not isinstance(told.value, tl.TightloopError)
 
 
@@ -45,17 +45,17 @@ def test_tightloop_imports_no_library_of_reinforcement_learning():
 
 
 def test_an_environment_is_taken_as_it_is_or_refused(env):
-    assert needs.environment(env, None, AutoresetMode.NEXT_STEP, {}) is env
+    assert adapted_environment(env, None, AutoresetMode.NEXT_STEP, {}) is env
     with pytest.raises(tl.ArgumentError, match=r"NEXT_STEP, .* expects SAME_STEP; .*autoreset_mode='SAME_STEP'"):
-        needs.environment(env, None, AutoresetMode.SAME_STEP, {})
+        adapted_environment(env, None, AutoresetMode.SAME_STEP, {})
     with pytest.raises(tl.ArgumentError, match="num_envs, threads: the environment given has its own"):
-        needs.environment(env, 4, AutoresetMode.NEXT_STEP, {"threads": 1})
+        adapted_environment(env, 4, AutoresetMode.NEXT_STEP, {"threads": 1})
     with pytest.raises(tl.ArgumentError, match="the adapter chooses them"):
-        needs.environment("FrankaReach", 4, AutoresetMode.NEXT_STEP, {"copy": True})
+        adapted_environment("FrankaReach", 4, AutoresetMode.NEXT_STEP, {"copy": True})
 
 
 def test_a_task_becomes_an_environment_of_the_mode_asked_for():
-    made = needs.environment("CartPoleBalance", 3, AutoresetMode.DISABLED, {"max_episode_steps": math.inf})
+    made = adapted_environment("CartPoleBalance", 3, AutoresetMode.DISABLED, {"max_episode_steps": math.inf})
     try:
         assert made.num_envs == 3 and made.autoreset_mode is AutoresetMode.DISABLED and made.max_episode_steps is None
     finally:

@@ -16,21 +16,21 @@ from conftest import REPOSITORY
 from tightloop.demo import lesson, tour
 from tightloop.demo.command import main
 from tightloop.demo.policy import Policy
-from tightloop.demo.stops import STOPS, Grasp, Many, Stop, Target, Torque, Trained
+from tightloop.demo.scenes import SCENES, DemoScene, Grasp, Many, Target, Torque, Trained
 from tightloop.errors import MissingLibrary
-from tightloop.view import needs
+from tightloop.view import dependencies
 
 DATA = REPOSITORY / "tests/data"
 
 
-def ran(stop: Stop, frames: int) -> str:
+def ran(stop: DemoScene, frames: int) -> str:
     """What a stop has to say after so many frames of a round."""
     stop.open(None, "cpu", 1)
     try:
         stop.begin()
         for _ in range(frames):
             stop.advance()
-        return stop.told()
+        return stop.summary()
     finally:
         stop.close()
 
@@ -42,7 +42,7 @@ def number(pattern: str, told: str) -> float:
     return float(found[1].replace(",", ""))
 
 
-@pytest.mark.parametrize("name", [stop.name for stop, _ in STOPS])
+@pytest.mark.parametrize("name", [stop.name for stop, _ in SCENES])
 def test_each_stop_tells_a_line_and_leaves_a_picture(name, tmp_path, capsys):
     assert main(["--stop", name, "--seconds", "0.01", "--worlds", "3", "--device", "cpu", "--out", str(tmp_path)]) == 0
     said = capsys.readouterr()
@@ -151,12 +151,12 @@ def test_trouble_is_one_line(tmp_path, capsys):
 
 def test_without_the_libraries_of_pictures_there_are_numbers(tmp_path, capsys, monkeypatch):
     def missing(*modules: str) -> None:
-        raise MissingLibrary(f"the viewer needs `{modules[0]}`: {needs.INSTALL}")
+        raise MissingLibrary(f"the viewer needs `{modules[0]}`: {dependencies.INSTALL}")
 
-    monkeypatch.setattr(needs, "check", missing)
+    monkeypatch.setattr(dependencies, "check", missing)
     assert main(["--stop", "torque", "--seconds", "0.01", "--worlds", "2", "--out", str(tmp_path)]) == 0
     said = capsys.readouterr()
-    assert "physics steps/s" in said.out and needs.INSTALL in said.err
+    assert "physics steps/s" in said.out and dependencies.INSTALL in said.err
     assert not list(tmp_path.iterdir())
 
 
@@ -175,7 +175,7 @@ opened: list[_Page] = []
 
 
 def test_one_page_follows_all_stops(tmp_path, monkeypatch, capsys):
-    process = pytest.importorskip("tightloop.view.process")
+    process = pytest.importorskip("tightloop.viewer_process")
     monkeypatch.setattr(process, "Viewer", _Page)
     names = []
     stops = [Torque(2), Trained(2)]

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 import tightloop as tl
+from code_blocks import blocks, reading
 from conftest import REPOSITORY
-from fences import blocks, reading
 
 sys.path.insert(0, str(REPOSITORY / "docs"))
 from generate import command_line, pages, performance, scene_file

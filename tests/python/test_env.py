@@ -14,7 +14,8 @@ from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatist
 
 import tightloop as tl
 from tightloop.env import AutoresetMode, Env, VectorEnv
-from tightloop.registration import EPISODE_STEPS, TASKS
+from tightloop.env.registration import EPISODE_STEPS
+from tightloop.env.registry import TASKS
 from tightloop.tasks.cartpole import CartPoleBalance
 
 MODES = list(AutoresetMode)

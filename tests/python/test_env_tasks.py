@@ -1,4 +1,4 @@
-"""Tasks of one's own: what may be written in them, and what is told of what may not; the arena under them."""
+"""Tasks of one's own: what may be written in them, and what is told of what may not; the pool under them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import pytest
 import tightloop as tl
 from tightloop import _core
 from tightloop.env import AutoresetMode, Env, Gripper, JointTorque, Observed, VectorEnv, make_groups
-from tightloop.env.arena import Arena
+from tightloop.env.array_pool import ArrayPool
 from tightloop.tasks.cartpole import CartPoleBalance
 from tightloop.tasks.reach import FrankaReach
 
@@ -100,12 +100,12 @@ def test_what_a_task_keeps_stays_what_it_was(envs: Any) -> None:
     ],
 )
 def test_arithmetic_on_an_arena_is_numpys(function: Any) -> None:
-    arena, tape, rng = Arena(), [], np.random.default_rng(0)
+    pool, tape, rng = ArrayPool(), [], np.random.default_rng(0)
     for _ in range(12):
         array = rng.uniform(size=(5, 3))
         mask = array > 0.4
-        arena.play(tape)
-        ours, theirs = function(np, arena.wrap(array), arena.wrap(mask)), function(np, array, mask)
+        pool.play(tape)
+        ours, theirs = function(np, pool.wrap(array), pool.wrap(mask)), function(np, array, mask)
         np.testing.assert_array_equal(np.asarray(ours), theirs)
 
 
@@ -236,13 +236,13 @@ def test_a_file_may_hold_the_task(tmp_path: Path, envs: Any) -> None:
 def test_a_gripper_closes_and_opens(binary: bool, envs: Any) -> None:
     fingers = ["arm/fr3_finger_joint1", "arm/fr3_finger_joint2"]
 
-    class Grip(FrankaReach):
+    class DragSpring(FrankaReach):
         def __init__(self) -> None:
             super().__init__()
             self._arm_control = Gripper(fingers, low=0.0, high=0.04, binary=binary)
             self._arm_controls = [self._arm_control]
 
-    env = envs(Grip, 4)
+    env = envs(DragSpring, 4)
     obs = env.reset(seed=0)[0]
     for _ in range(60):
         obs = env.step(np.array([[-1.0], [-0.5], [0.5], [1.0]]))[0]

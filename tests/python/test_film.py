@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
 import tightloop as tl
-from leftovers import wait_until
+from processes import wait_until
 from tightloop.view import Film, Picture, film
 from tightloop.view.parts import parts
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import tightloop as tl
-from leftovers import alive, wait_until
+from processes import alive, wait_until
 
 
 def test_empty_fields_are_not_taken_for_those_that_lie_where_they_do():

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import tightloop as tl
-from leftovers import alive, left_of, stems_of, wait_until
+from processes import alive, left_of, stems_of, wait_until
 
 EACH, GROUPS = 7, 3
 WORLDS = EACH * GROUPS

@@ -13,7 +13,7 @@ import time
 import pytest
 
 import tightloop as tl
-from leftovers import alive, left_of, stems_of, wait_until
+from processes import alive, left_of, stems_of, wait_until
 
 # Kills each way
 KILLS = int(os.environ.get("TIGHTLOOP_KILLS", "50"))

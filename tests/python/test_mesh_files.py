@@ -6,15 +6,16 @@ import json
 import re
 from pathlib import Path
 
-import looks
 import numpy as np
 import pytest
-from looks import CORNERS, SIZE
+import sample_meshes as looks
 from PIL import Image
+from sample_meshes import CORNERS, SIZE
 
-from tightloop import _core
+from tightloop import _core, optional_imports
 from tightloop.errors import MissingLibrary
-from tightloop.view import mesh_files, needs, surface
+from tightloop.view import dependencies as needs
+from tightloop.view import mesh_files, surface
 from tightloop.view.surface import Surface, Unreadable
 
 RED, GREEN = [255, 0, 0, 255], [0, 255, 0, 255]
@@ -273,6 +274,7 @@ def test_hostile_and_strange_files_are_refused(tmp_path):
 def test_a_missing_library_is_named(monkeypatch, tmp_path):
     with pytest.raises(MissingLibrary, match=re.escape(needs.INSTALL)):
         needs.check("no_such_library_of_the_viewer")
-    monkeypatch.setattr(needs, "import_module", lambda name: (_ for _ in ()).throw(ModuleNotFoundError(name=name)))
+    missing = ModuleNotFoundError(name="trimesh")
+    monkeypatch.setattr(optional_imports, "import_module", lambda _: (_ for _ in ()).throw(missing))
     with pytest.raises(MissingLibrary, match="trimesh"):
         mesh_files.read(looks.stl(tmp_path / "box.stl"))

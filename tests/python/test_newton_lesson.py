@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
+from code_blocks import blocks
 from conftest import REPOSITORY
-from fences import blocks
 
 EXAMPLE = REPOSITORY / "examples/newton_lesson.py"
 PAGE = REPOSITORY / "docs/pages/lesson.md"

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import tightloop as tl
-from leftovers import alive, wait_until
+from processes import alive, wait_until
 
 
 def same(frame, expected):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import tightloop as tl
-from leftovers import alive
+from processes import alive
 
 WORLDS = 21
 FIELDS = ("joint_q", "joint_qd", "joint_qdd", "joint_f", "joint_target_q", "body_q")

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from plain_tasks import PLAIN, any_worlds, one
-from scripted import Lift, PickCube, PushCube
+from reference_tasks import PLAIN, any_worlds, one
+from scripted_policies import Lift, PickCube, PushCube
 
 from tightloop.env import VectorEnv, Worlds
-from tightloop.env.arena import Arena
-from tightloop.env.pack import Packer
-from tightloop.registration import TASKS
+from tightloop.env.array_pool import ArrayPool
+from tightloop.env.observations import ObservationPacker
+from tightloop.env.registry import TASKS
 from tightloop.tasks.franka import CONTROLS
 
 WORLDS = 64
@@ -38,7 +38,7 @@ def test_functions_are_those_of_the_documents(envs: Any) -> None:
     worlds, plain = any_worlds(envs, 4096, seed=1), PLAIN[name(envs)]
     low, high = envs.single_observation_space.low, envs.single_observation_space.high
     obs = np.empty((4096, len(low)), np.float32)
-    Packer(envs.task.observed()).pack(envs.task.observe(np, worlds), obs)
+    ObservationPacker(envs.task.observed()).pack(envs.task.observe(np, worlds), obs)
     reward, success = envs.task.reward(np, worlds), envs.task.success(np, worlds)
     terminated = envs.task.terminated(np, worlds)
     told = [plain(one(worlds, world)) for world in range(4096)]
@@ -95,19 +95,19 @@ def test_a_world_is_a_function_of_its_seed(envs: Any) -> None:
 
 
 def test_functions_on_an_arena_take_no_memory_of_the_size_of_the_worlds(envs: Any) -> None:
-    many, arena = 65536, Arena()
+    many, pool = 65536, ArrayPool()
     first, second = any_worlds(envs, many, seed=5), any_worlds(envs, many, seed=6)
-    pooled = Worlds(**{field: arena.wrap(array) for field, array in vars(first).items()})
+    pooled = Worlds(**{field: pool.wrap(array) for field, array in vars(first).items()})
     # an array of one number a world is 256 kB. NumPy's own buffers, for what has another type or no even stride, are of
     # 8192 numbers for each of up to three operands, and go when the operation ends
     least, buffers = 4 * many, 3 * 4 * 8192
     for function in ("observe", "reward", "success", "terminated"):
         call, tape = getattr(envs.task, function), []
         for _ in range(2):
-            arena.play(tape)
+            pool.play(tape)
             call(np, pooled)
         tracemalloc.start()
-        arena.play(tape)
+        pool.play(tape)
         call(np, pooled)
         kept, most = tracemalloc.get_traced_memory()
         tracemalloc.stop()
@@ -115,7 +115,7 @@ def test_functions_on_an_arena_take_no_memory_of_the_size_of_the_worlds(envs: An
         assert kept < least / 8, f"{function} keeps {kept} bytes"
         for field, array in vars(second).items():
             np.copyto(getattr(first, field), array)
-        arena.play(tape)
+        pool.play(tape)
         same(call(np, pooled), call(np, second))
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import looks
 import numpy as np
 import pytest
+import sample_meshes as looks
 from PIL import Image
 from test_reference import SHARED
 

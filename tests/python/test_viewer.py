@@ -16,18 +16,18 @@ import numpy as np
 import pytest
 
 import tightloop as tl
-from leftovers import alive, wait_until
-from tightloop.view import cameras, grid, needs
+from processes import alive, wait_until
+from tightloop.view import cameras, dependencies, grid
+from tightloop.view.batched_meshes import batched_meshes
 from tightloop.view.command import main
-from tightloop.view.feed import FIELDS
-from tightloop.view.grip import grip
+from tightloop.view.drag_spring import drag_spring
+from tightloop.view.frame_stream import FIELDS
 from tightloop.view.joints import at_targets, joints
+from tightloop.view.live_driver import LiveDriver
 from tightloop.view.parts import Mesh, Part
-from tightloop.view.pilot import Pilot
 from tightloop.view.player import Player
 from tightloop.view.plots import choices
 from tightloop.view.poses import IDENTITY
-from tightloop.view.skins import skins
 from tightloop.view.source import Live
 
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float32)
@@ -78,14 +78,14 @@ def test_every_preset_sees_the_whole_box_and_not_much_else(preset, aspect):
 
 def test_bodies_that_look_alike_share_a_skin_and_each_colour_is_one():
     shared, other = cube(), cube((0, 0, 255, 255))
-    found = skins([part(0, shared), part(1, shared), part(2, shared), part(2, other, x=2.0)])
-    assert sorted((skin.bodies, skin.color) for skin in found) == [
+    found = batched_meshes([part(0, shared), part(1, shared), part(2, shared), part(2, other, x=2.0)])
+    assert sorted((mesh.bodies, mesh.color) for mesh in found) == [
         ((0, 1), (200, 100, 50, 255)),
         ((2,), (0, 0, 255, 255)),
         ((2,), (200, 100, 50, 255)),
     ]
     # a corner of a cube is sharp: each of its three faces has one of its own
-    assert all(len(skin.vertices) == 24 and len(skin.faces) == 12 for skin in found)
+    assert all(len(mesh.vertices) == 24 and len(mesh.faces) == 12 for mesh in found)
 
 
 def test_a_mesh_of_many_colours_becomes_few_skins_of_near_ones():
@@ -93,9 +93,9 @@ def test_a_mesh_of_many_colours_becomes_few_skins_of_near_ones():
     mesh = Mesh(
         CUBE, CUBE_FACES, np.concatenate([rng.integers(0, 256, (12, 3)), np.full((12, 1), 255)], 1).astype("u1")
     )
-    found = skins([part(0, mesh)])
+    found = batched_meshes([part(0, mesh)])
     assert 1 < len(found) <= 6
-    assert sum(len(skin.faces) for skin in found) == 12
+    assert sum(len(mesh.faces) for mesh in found) == 12
 
 
 def test_sliders_are_of_joints_with_drives_and_go_to_their_limits(lesson):
@@ -142,48 +142,48 @@ class Newest:
 
 
 @pytest.fixture
-def piloted(lesson, unique):
-    """A simulation of three worlds, a pilot of it, and what it shows."""
+def driven(lesson, unique):
+    """A simulation of three worlds, a driver of it, and what it shows."""
     with tl.launch(lesson(driven=True), worlds=3, name=unique(), params=("body_f",)) as sim:
         sim.reset()
         sim.release()
         newest = Newest(sim.name)
-        pilot = Pilot(tl.attach(sim.name), newest)
-        yield sim, pilot, newest
-        pilot.close()
+        driver = LiveDriver(tl.attach(sim.name), newest)
+        yield sim, driver, newest
+        driver.close()
         newest.live.close()
 
 
-def test_a_pilot_plays_in_real_time_and_gives_control_back(piloted):
-    sim, pilot, newest = piloted
-    pilot.play()
+def test_a_pilot_plays_in_real_time_and_gives_control_back(driven):
+    sim, driver, newest = driven
+    driver.play()
     assert wait_until(lambda: newest().step[0] > 60, 20)
     # never faster than asked; how much slower is for the machine to say
-    assert pilot.pace <= 1.1
-    assert pilot.controller is None, "it is this process"
-    pilot.pause()
+    assert driver.pace <= 1.1
+    assert driver.controller is None, "it is this process"
+    driver.pause()
     assert wait_until(lambda: sim.controller() is None, 5)
     stood = sim.forward().step[0]
     assert sim.step().step[0] == stood + 1
-    pilot.play()
-    assert wait_until(lambda: "control" in pilot.problem, 5), "the message names who is in control"
-    assert not pilot.playing
+    driver.play()
+    assert wait_until(lambda: "control" in driver.problem, 5), "the message names who is in control"
+    assert not driver.playing
 
 
-def test_targets_are_set_in_one_world_or_in_all(piloted):
-    _, pilot, newest = piloted
+def test_targets_are_set_in_one_world_or_in_all(driven):
+    _, driver, newest = driven
     before = np.array(newest().joint_target_q)
-    pilot.set_target(0, 0.5, 1, everywhere=False)
+    driver.set_target(0, 0.5, 1, everywhere=False)
     assert wait_until(lambda: newest().joint_target_q[1, 0] == np.float32(0.5), 5)
     expected = before.copy()
     expected[1, 0] = 0.5
     assert np.array_equal(newest().joint_target_q, expected)
-    pilot.set_target(1, -0.25, 1, everywhere=True)
+    driver.set_target(1, -0.25, 1, everywhere=True)
     assert wait_until(lambda: bool(np.all(newest().joint_target_q[:, 1] == np.float32(-0.25))), 5)
     expected = np.tile(expected[1], (3, 1))
     expected[:, 1] = -0.25
     assert np.array_equal(newest().joint_target_q, expected)
-    pilot.reset(1)
+    driver.reset(1)
     assert wait_until(lambda: np.array_equal(newest().joint_target_q[1], before[1]), 5)
     assert np.array_equal(newest().joint_target_q[0], expected[0]), "the others keep theirs"
 
@@ -196,13 +196,13 @@ def test_a_grip_pulls_a_free_body_as_its_mass_asks_and_no_fixed_one(lesson):
         joint_q = sim.reset().joint_q[0]
     ends = np.array([[0, 0, 1], [0.1, 0, 1.0]])
     body = dynamics.body_names.index("cube/body")
-    held = grip(dynamics, (0, body), ends, joint_q, strength=1.0)
+    held = drag_spring(dynamics, (0, body), ends, joint_q, strength=1.0)
     # 400 kg/m³ of 5 cm a side are 50 g; the spring's frequency is 1.5 Hz
     assert held.stiffness == pytest.approx(0.05 * (3 * np.pi) ** 2)
     still = SimpleNamespace(body_qd=np.zeros((1, len(dynamics.body_names), 6)))
     assert held.force(still) == pytest.approx([held.stiffness * 0.1, 0, 0])
     with pytest.raises(tl.CommandRefused, match=r"arm/base.*fixed"):
-        grip(dynamics, (0, 0), ends, joint_q, strength=1.0)
+        drag_spring(dynamics, (0, 0), ends, joint_q, strength=1.0)
     assert cube.name == "cube"
 
 
@@ -258,9 +258,9 @@ def test_an_unknown_daemon_is_named_with_those_that_run(pendulum, unique, capsys
 def test_a_missing_library_is_named_with_its_cure(monkeypatch, capsys, restore_signals):
     monkeypatch.setitem(sys.modules, "viser", None)
     with pytest.raises(tl.MissingLibrary, match=r"viser.*pip install .*\[view\]"):
-        needs.check("viser")
+        dependencies.check("viser")
     assert main(["nobody"]) == 1
-    assert needs.INSTALL in capsys.readouterr().err
+    assert dependencies.INSTALL in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("wrong", [["a", "--port=0"], ["a", "--worlds=1025"], [], ["a", "--port=x"]])

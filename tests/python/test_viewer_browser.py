@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import tightloop as tl
 from browser import WIDE, WIDTH, View, chromium, differing, spots
-from leftovers import wait_until
+from processes import wait_until
 from tightloop import Frame
 
 START = [0.0, 0.0, 0.0, -2.4, 0.0, 2.4, 0.8, 0.04, 0.04]

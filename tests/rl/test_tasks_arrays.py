@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from tightloop.env import VectorEnv, Worlds
-from tightloop.registration import TASKS
+from tightloop.env.registry import TASKS
 
 sys.path[:0] = [str(Path(__file__).parents[1] / "python")]
-from plain_tasks import any_worlds  # noqa: E402  (tests are no package)
+from reference_tasks import any_worlds  # noqa: E402  (tests are no package)
 
 WORLDS = 1024
 # Libraries round square roots and hyperbolic tangents their own way, some ten times on the way

@@ -1,4 +1,4 @@
-"""Thousands of robot worlds on your own machine, stepped from Python through shared memory.
+"""Robot simulation in thousands of worlds on one machine, stepped from Python through shared memory.
 
 >>> import tightloop as tl
 >>> scene = tl.Scene(dt=1 / 480, substeps=8)
@@ -7,7 +7,7 @@
 ...     frame = sim.step(joint_f={"arm": torques})
 ...     frame.joint_q                      # (4096, 9), a view of shared memory
 
-Conventions: SI, radians, right-handed, z up; quaternions (x, y, z, w); arrays have the worlds first.
+Conventions: SI units, radians, right-handed axes, z up, quaternions (x, y, z, w). Arrays have the worlds first.
 """
 
 from __future__ import annotations
@@ -43,13 +43,14 @@ if TYPE_CHECKING:
         UrdfError,
         WaitTimeout,
     )
+    from tightloop.frames import FrameCopy
     from tightloop.groups import Groups
     from tightloop.launching import attach, launch
     from tightloop.robot import Link, Robot
     from tightloop.scene import Scene
-    from tightloop.sensed import ContactSensor, Site
+    from tightloop.sensors import ContactSensor, Site
     from tightloop.shapes import Shape, Surface
-    from tightloop.sim import FrameCopy, Sim
+    from tightloop.sim import Sim
     from tightloop.snapshot import Snapshot
 
 _HOMES = {
@@ -81,13 +82,14 @@ _HOMES = {
         "UrdfError",
         "WaitTimeout",
     ),
+    "tightloop.frames": ("FrameCopy",),
     "tightloop.groups": ("Groups",),
     "tightloop.launching": ("attach", "launch"),
     "tightloop.robot": ("Link", "Robot"),
     "tightloop.scene": ("Scene",),
-    "tightloop.sensed": ("ContactSensor", "Site"),
+    "tightloop.sensors": ("ContactSensor", "Site"),
     "tightloop.shapes": ("Shape", "Surface"),
-    "tightloop.sim": ("FrameCopy", "Sim"),
+    "tightloop.sim": ("Sim",),
     "tightloop.snapshot": ("Snapshot",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
@@ -138,7 +140,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    # Lazy (PEP 562): the daemon starts through this package too, and must not wait for NumPy.
+    # Lazy (PEP 562): the daemon also starts through this package, and must not wait for the import of NumPy.
     home = _HOME_OF.get(name)
     if home is None:
         raise AttributeError(f"module `tightloop` has no attribute `{name}`")

@@ -1,4 +1,4 @@
-"""Types of the Rust module."""
+"""Types of the compiled module."""
 
 import os
 from collections.abc import Sequence
@@ -7,7 +7,7 @@ from typing import Any, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.sim import FrameCopy
+from tightloop.frames import FrameCopy
 
 __version__: str
 
@@ -16,17 +16,17 @@ _Real = TypeVar("_Real", NDArray[np.float32], NDArray[np.float64])
 class Sample: ...
 
 class Frame:
-    """The state of all worlds at one instant: each field is a read-only NumPy view of shared memory, worlds first.
+    """The state of all worlds at one instant; each field is a read-only NumPy view of shared memory, worlds first.
 
-    A frame, and every array taken from it, stays valid and unchanged until dropped, even after the daemon died.
-    At most ``frames_held`` frames may be alive; ``copy()`` is for those to keep. Real arrays are float32 or float64,
-    as the precision of the run says. Only the fields asked for in ``launch(fields=...)`` are there, besides
-    ``time``, ``step``, ``status`` and ``contacts_left_out``.
+    A frame, and every array taken from it, stays valid and unchanged until you drop it, even after the daemon ended.
+    At most ``frames_held`` frames may be alive; ``copy()`` keeps one for longer. Real arrays are float32 or float64,
+    as the precision of the run. A frame carries the fields of ``launch(fields=...)``, and always ``time``, ``step``,
+    ``status`` and ``contacts_left_out``.
 
-    Every array begins at a multiple of 64 bytes, so other libraries take it as it is: ``np.from_dlpack``,
-    ``torch.from_dlpack`` and ``jax.device_put`` copy nothing, and what they return keeps the frame alive. torch knows
-    no read-only memory: writing to such a tensor ends the process, so ``clone()`` it first. JAX copies 64-bit arrays
-    unless it runs with ``jax_enable_x64``, and its ``from_dlpack`` refuses arrays that are read-only.
+    Every array is aligned to 64 bytes, so that ``np.from_dlpack``, ``torch.from_dlpack`` and ``jax.device_put`` copy
+    nothing, and their results keep the frame alive. torch does not support read-only memory: a write to such a tensor
+    ends the process, so ``clone()`` it first. JAX copies 64-bit arrays unless ``jax_enable_x64`` is set, and its
+    ``from_dlpack`` refuses read-only arrays.
 
     Raises:
         UnknownField: The frame does not carry that field; the message lists those it carries.
@@ -37,7 +37,7 @@ class Frame:
     joint_qd: NDArray[Any]
     """Joint velocities [rad/s or m/s], ``(worlds, dofs)``."""
     joint_qdd: NDArray[Any]
-    """Joint accelerations under the commands held, constraints included [rad/s² or m/s²], ``(worlds, dofs)``."""
+    """Joint accelerations at the current commands, with constraints [rad/s² or m/s²], ``(worlds, dofs)``."""
     joint_f: NDArray[Any]
     """Joint torques applied [N·m or N], ``(worlds, dofs)``."""
     joint_target_q: NDArray[Any]
@@ -50,35 +50,35 @@ class Frame:
     """Velocity of each link's centre of mass [m/s], then its angular velocity [rad/s], in world axes,
     ``(worlds, bodies, 6)``."""
     body_jacobian: NDArray[Any]
-    """What takes ``joint_qd`` to ``body_qd``, ``(worlds, bodies, 6, dofs)``."""
+    """Jacobian J of the bodies, ``body_qd = J @ joint_qd``, ``(worlds, bodies, 6, dofs)``."""
     mass_matrix: NDArray[Any]
-    """Joint-space inertia, armature included [kg·m², kg·m or kg], ``(worlds, dofs, dofs)``."""
+    """Joint-space inertia with armature [kg·m², kg·m or kg], ``(worlds, dofs, dofs)``."""
     bias_force: NDArray[Any]
     """Coriolis, centrifugal and gravity forces [N·m or N], ``(worlds, dofs)``."""
     smooth_force: NDArray[Any]
-    """All forces but the constraints', less the bias [N·m or N], ``(worlds, dofs)``."""
+    """All forces except constraint forces, minus the bias force [N·m or N], ``(worlds, dofs)``."""
     constraint_force: NDArray[Any]
     """Constraint forces in joint space [N·m or N], ``(worlds, dofs)``."""
     efc_J: NDArray[Any]
-    """Constraint Jacobian, zero in a row that is not active [–], ``(worlds, rows, dofs)``."""
+    """Constraint Jacobian, zero in inactive rows [–], ``(worlds, rows, dofs)``."""
     efc_D: NDArray[Any]
-    """Regularised stiffness of a constraint row, zero if not active [kg·m² or kg], ``(worlds, rows)``."""
+    """Regularised stiffness of each constraint row, zero if inactive [kg·m² or kg], ``(worlds, rows)``."""
     efc_aref: NDArray[Any]
-    """Reference acceleration of a constraint row [rad/s² or m/s²], ``(worlds, rows)``."""
+    """Reference acceleration of each constraint row [rad/s² or m/s²], ``(worlds, rows)``."""
     efc_force: NDArray[Any]
-    """Force of a constraint row [N·m or N], ``(worlds, rows)``."""
+    """Force of each constraint row [N·m or N], ``(worlds, rows)``."""
     contact_count: NDArray[np.int32]
-    """Contacts of the world: how many rows of the other contact fields are in use [–], ``(worlds,)``."""
+    """Number of contacts of the world, the used rows of the other contact fields [–], ``(worlds,)``."""
     contact_pos: NDArray[Any]
-    """Point half-way between the two surfaces, in the world [m], ``(worlds, contacts, 3)``."""
+    """Midpoint between the two surfaces, in the world [m], ``(worlds, contacts, 3)``."""
     contact_normal: NDArray[Any]
     """Unit normal from the first shape of the pair to the second [–], ``(worlds, contacts, 3)``."""
     contact_distance: NDArray[Any]
-    """Distance of the two surfaces, negative in penetration [m], ``(worlds, contacts)``."""
+    """Distance of the two surfaces, negative for penetration [m], ``(worlds, contacts)``."""
     contact_force: NDArray[Any]
     """Force on the second shape of the pair, in world axes [N], ``(worlds, contacts, 3)``."""
     contact_pair: NDArray[np.int32]
-    """The two shapes, as places in ``sim.shape_names`` [–]; -1 in a row not in use, ``(worlds, contacts, 2)``."""
+    """The two shapes, as indices in ``sim.shape_names`` [–]; -1 in unused rows, ``(worlds, contacts, 2)``."""
     body_contact_force: NDArray[Any]
     """Sum of the contact forces on each link, in world axes [N], ``(worlds, bodies, 3)``."""
     joint_q_measured: NDArray[Any]
@@ -90,24 +90,25 @@ class Frame:
     potential_energy: NDArray[Any]
     """Potential energy in gravity of the bodies that move [J], ``(worlds,)``: 0 at the height of the world's origin."""
     joint_torque: NDArray[Any]
-    """What ``joint_f`` and the drive, clamped by its effort limit, give [N·m or N], ``(worlds, dofs)``. Damping,
-    friction and contacts are not in it."""
+    """Sum of ``joint_f`` and the drive force, which its effort limit clamps [N·m or N], ``(worlds, dofs)``. It does not
+    include damping, friction and contacts."""
     site_q: NDArray[Any]
-    """Sites: position [m], then quaternion (x, y, z, w), in the world or the frame that a site is relative to,
+    """Pose of each site: position [m], then quaternion (x, y, z, w), in the world or in the site's reference frame,
     ``(worlds, sites, 7)``."""
     site_qd: NDArray[Any]
-    """Velocity of each site [m/s], then its angular velocity [rad/s], ``(worlds, sites, 6)``: in world axes, or as seen
-    from the frame that it is relative to, in its axes."""
+    """Velocity of each site [m/s], then its angular velocity [rad/s], ``(worlds, sites, 6)``: in world axes, or
+    relative to the site's reference frame and in its axes."""
     gyro: NDArray[Any]
     """Angular velocity of each site, in its own axes [rad/s], ``(worlds, sites, 3)``."""
     accelerometer: NDArray[Any]
-    """Acceleration of each site less gravity, in its own axes [m/s²], ``(worlds, sites, 3)``; 9.81 upwards at rest."""
+    """Acceleration of each site minus gravity, in its own axes [m/s²], ``(worlds, sites, 3)``; 9.81 upwards at rest."""
     site_inverse_jacobian: NDArray[Any]
-    """What takes a small displacement of each site to one of the joints [rad or m per m or rad], ``(worlds, sites,
-    dofs, 6)``: ``joint_qd * dt = site_inverse_jacobian @ d`` moves the site by about ``d``, three numbers of its origin
-    [m] and three of a rotation vector [rad], in the axes of ``site_qd``. Damped least squares, Jᵀ (J Jᵀ + λ² I)⁻¹,
-    where J takes ``joint_qd`` to ``site_qd`` and λ is the site's ``damping``. Zero for dofs that do not move the site;
-    those of a floating base do, and each joint of a mimic counts for itself."""
+    """Damped inverse Jacobian of each site [rad or m per m or rad], ``(worlds, sites, dofs, 6)``.
+
+    A joint displacement ``site_inverse_jacobian @ d`` moves the site by about ``d``: a displacement of its origin [m],
+    then a rotation vector [rad], in the axes of ``site_qd``. It is the damped least-squares inverse Jᵀ (J Jᵀ + λ² I)⁻¹,
+    where ``site_qd = J @ joint_qd`` and λ is the site's ``damping``. It is zero for dofs that do not move the site. It
+    includes the dofs of a floating base, and treats mimic joints as independent."""
     contact_sensor: NDArray[Any]
     """Sum of the contact forces of each contact sensor, in world axes [N], ``(worlds, contact_sensors, 3)``."""
     time: NDArray[np.float64]
@@ -115,26 +116,26 @@ class Frame:
     step: NDArray[np.uint64]
     """Control frames since the world's reset [–], ``(worlds,)``."""
     status: NDArray[np.uint32]
-    """Trouble of the world, as bits [–], ``(worlds,)``; 0 is none.
+    """Status bits of the world [–], ``(worlds,)``; 0 is no problem.
 
-    1: it was no longer finite (or, with ``on_nan="freeze"``, a command of it was not), 8: it was beyond the bounds of
-    the run: it is frozen until it is reset or restored. What is evaluated of a frozen world, such as ``joint_qdd``,
-    need not be finite while the commands or parameters are there that broke it.
-    2: the solver used up its iterations in some physics step of the last frame. 4: contacts did not fit into the
+    1: the state was not finite or, with ``on_nan="freeze"``, a command was not. 8: the state was beyond the bounds of
+    the run. With either bit the world is faulted and keeps its state until it is reset or restored. Evaluated fields of
+    a faulted world, such as ``joint_qdd``, may not be finite while the commands or parameters that broke it persist.
+    2: the solver reached its iteration limit in some physics step of the last frame. 4: contacts did not fit into the
     scene's ``contacts_max`` or ``rows_max``, and were left out.
     """
     contacts_left_out: NDArray[np.uint32]
-    """Contacts that did not fit: the most of any physics step of the last frame [–], ``(worlds,)``."""
+    """Contacts that did not fit: the maximum over the physics steps of the last frame [–], ``(worlds,)``."""
 
     state: NDArray[np.uint8]
-    """A snapshot of the worlds of this frame, as bytes; in frames of `Sim.latest` only."""
+    """A snapshot of the worlds of this frame, as bytes; only in frames of `Sim.latest`."""
 
     @property
     def fields(self) -> list[str]:
-        """Names of the fields that this frame carries."""
+        """Names of the fields in this frame."""
 
     def copy(self) -> FrameCopy:
-        """The frame's arrays in memory of their own, as attributes of the same names."""
+        """Copy the arrays into memory of their own, as attributes of the same names."""
 
 class Client:
     """A connection to a daemon; `tightloop.Sim` wraps it, and documents its methods."""
@@ -157,13 +158,13 @@ class Client:
     def close(self) -> None: ...
 
 class Evaluation:
-    """Worlds of a scene at states that a daemon shows; `tightloop.view` uses it.
+    """Evaluates fields at states that a daemon publishes; `tightloop.view` uses it.
 
     Args:
         scene: The scene as TOML, with paths relative to ``folder``.
-        worlds: How many: the first ones of each state.
-        precision: Of the run.
-        fields: What is evaluated, besides what every frame has.
+        worlds: Number of worlds: the first ones of each state.
+        precision: Precision of the run.
+        fields: Fields to evaluate, besides those of every frame.
 
     Raises:
         SceneError: The scene is not valid, or its files cannot be read.
@@ -174,22 +175,22 @@ class Evaluation:
     @property
     def model_hash(self) -> int: ...
     def evaluate(self, state: NDArray[np.uint8], /) -> dict[str, NDArray[Any]]:
-        """The fields by name, worlds first, at the ``state`` of a frame of `Client.latest`.
+        """Return the fields by name, worlds first, at the ``state`` of a frame of `Client.latest`.
 
         Raises:
-            SnapshotError: It is no state of such worlds.
+            SnapshotError: The state does not fit these worlds.
         """
 
 class Playback:
-    """A recording, run again without a daemon, frame after frame; `tightloop.view` uses it.
+    """Replays a recording frame by frame without a daemon; `tightloop.view` uses it.
 
     Args:
         path: The file.
-        worlds: How many worlds its frames show: the first ones.
-        fields: What they carry, besides what every frame has.
+        worlds: Number of worlds in its frames: the first ones.
+        fields: Fields of its frames, besides those of every frame.
 
     Raises:
-        RecordingError: It cannot be read, or is no recording, or its scene's files are not where they were.
+        RecordingError: The file cannot be read or is no recording, or files of its scene are missing.
         UnknownField: There is no such field.
     """
 
@@ -256,25 +257,25 @@ def draw(
     out: _Real,
     firsts: NDArray[np.uint32] | None = None,
 ) -> _Real:
-    """Uniform numbers in [0, 1), the same for the same seed, episode, stream and column, whatever else is asked for.
+    """Draw uniform numbers in [0, 1), as a function of seed, episode, stream and column alone.
 
-    Philox4x32-10 under the seed as key, at the counter (0, episode, 64 + stream, first + column). In float32 they are
+    Philox4x32-10 with the seed as key, at the counter (0, episode, 64 + stream, first + column). In float32 they are
     rounded towards zero, so that they stay below 1.
 
     Args:
         seeds: Seed of each row, uint64, shape ``(n,)``.
         episodes: Episode of each row, uint32, shape ``(n,)``.
-        stream: What the numbers are for, 0 to 31; those of different streams have nothing to do with each other.
-        columns: How many numbers a row gets, at most 2**24.
-        out: Where they go, float32 or float64, shape ``(n, columns)``, a part of another array if need be; a new
-            float64 array if left out.
-        firsts: Which number of the stream each row begins with, uint32, shape ``(n,)``; 0 if left out.
+        stream: Stream of the numbers, 0 to 31; different streams are independent.
+        columns: Numbers per row, at most 2**24.
+        out: Output, float32 or float64, shape ``(n, columns)``, possibly a view of a larger array; a new float64 array
+            if left out.
+        firsts: Index in the stream of each row's first number, uint32, shape ``(n,)``; 0 if left out.
 
     Returns:
         ``out``, or the new array, shape ``(n, columns)``.
 
     Raises:
-        ArgumentError: A shape or the stream is not as above. A wrong dtype is a TypeError.
+        ArgumentError: A shape or the stream is not valid. A wrong dtype is a TypeError.
     """
 
 def groups(name: str, /) -> int: ...
@@ -298,23 +299,23 @@ def load_scene(path: str, /) -> str: ...
 def parts(scene: str, folder: str, /) -> tuple[str, list[tuple[NDArray[np.float32], NDArray[np.uint32]]]]: ...
 
 class Renderer:
-    """Draws meshes on the processor: no display, no graphics driver. `tightloop.view.Picture` draws scenes with it.
+    """Draws meshes on the CPU, without a display or a graphics driver; `tightloop.view.Picture` uses it.
 
-    The same calls give the same bytes, on any number of threads.
+    The same calls give the same bytes, with any number of threads.
 
     Args:
-        width: Of pictures [pixels], at most 8192.
-        height: Likewise.
-        threads: Most threads a picture takes; all cores if left out.
+        width: Width of pictures [pixels], at most 8192.
+        height: Height of pictures [pixels], at most 8192.
+        threads: Largest number of threads per picture; all cores if left out.
 
     Raises:
-        ArgumentError: A size is out of range; also from its methods, where a shape or a number is not as they say.
-            A wrong dtype is a TypeError.
+        ArgumentError: A size is out of range. Its methods raise it for a shape or value that is not valid. A wrong
+            dtype is a TypeError.
     """
 
     def __new__(cls, width: int, height: int, threads: int | None = None) -> Renderer: ...
     def add(self, vertices: NDArray[np.float32], faces: NDArray[np.uint32], colors: NDArray[np.uint8]) -> int:
-        """Keep a mesh; returns its number.
+        """Add a mesh; returns its index.
 
         Args:
             vertices: Shape ``(n, 3)`` [m].
@@ -336,18 +337,18 @@ class Renderer:
         line_colors: NDArray[np.uint8],
         line_widths: NDArray[np.float32],
     ) -> NDArray[np.uint8]:
-        """A picture, shape ``(height, width, 3)``. What is not finite is left out.
+        """Render a picture, shape ``(height, width, 3)``; instances and lines that are not finite are left out.
 
         Args:
-            camera: Where it is, what it looks at [m], and what is up.
-            angle: Its vertical field of view [rad].
-            around: Middle of what matters and how far it reaches [m]: beyond, floor and shadows fade.
+            camera: Position [m], target [m] and up direction.
+            angle: Vertical field of view [rad].
+            around: Centre and radius of the scene [m]; floor and shadows fade beyond.
             floor: Height of the floor and distance of its lines [m]; None for no floor.
-            meshes: Numbers of the meshes that are seen, shape ``(k,)``.
-            poses: Where, position [m] and quaternion (x, y, z, w), shape ``(k, 7)``.
-            tints: A colour laid over each, and how much of it, shape ``(k, 4)``.
-            opacities: From 0 to 1, shape ``(k,)``.
-            lines: Both ends of lines on top [m], shape ``(l, 6)``; ends in one place are a dot.
+            meshes: Mesh index of each instance, shape ``(k,)``.
+            poses: Pose of each instance, position [m] and quaternion (x, y, z, w), shape ``(k, 7)``.
+            tints: Tint of each instance, and its strength, shape ``(k, 4)``.
+            opacities: Opacity of each instance, 0 to 1, shape ``(k,)``.
+            lines: Both ends of overlay lines [m], shape ``(l, 6)``; equal ends make a dot.
             line_colors: Red, green, blue, opacity, shape ``(l, 4)``.
-            line_widths: Shape ``(l,)`` [pixels].
+            line_widths: Width of each line [pixels], shape ``(l,)``.
         """

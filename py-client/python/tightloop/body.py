@@ -10,22 +10,23 @@ from numpy.typing import ArrayLike
 
 from tightloop import checks
 from tightloop.checks import Triple, Vector
+from tightloop.entity import Entity
 from tightloop.errors import SceneError
-from tightloop.placed import Placed
 
 
-class Body(Placed):
-    """A rigid body; made by `Scene.add_body`. ``scene.add_box(body=…)`` and the like give it shapes.
+class Body(Entity):
+    """A rigid body of a scene, made by `Scene.add_body`. ``scene.add_box(body=…)`` and the like give it shapes.
 
     Attributes:
-        name: Name in the scene. ``sim.bodies[name]`` is its place in ``body_q``, ``sim.dofs[name]`` in ``joint_qd``.
-        fixed: Whether it stands still; otherwise it has the six dofs ``name/free.vx`` … ``name/free.wz``.
+        name: Name in the scene. ``sim.bodies[name]`` is its slice of ``body_q``, ``sim.dofs[name]`` that of
+            ``joint_qd``.
+        fixed: Whether the body does not move. Otherwise it has the six dofs ``name/free.vx`` … ``name/free.wz``.
         mass: Mass [kg]; None takes it from the shapes.
         com: Centre of mass in the body's frame [m]; None takes it from the shapes.
         inertia: Inertia about the centre of mass, in body axes [kg·m²], 3 rows; None takes it from the shapes.
     """
 
-    # A misspelt property is an error
+    # a misspelt property is an error
     __slots__ = ("com", "fixed", "inertia", "mass")
 
     kind = "body"
@@ -51,7 +52,7 @@ class Body(Placed):
             raise SceneError(f"{what} has an inertia but no mass; give mass= too")
 
     def table(self) -> dict[str, Any]:
-        """The body as a scene file has it."""
+        """Return the body in the form of a scene file."""
         return {
             "name": self.name,
             "pos": self.pos,
@@ -67,7 +68,7 @@ class Body(Placed):
 
 
 def _tensor(what: str, values: ArrayLike) -> list[Sequence[float]]:
-    """A symmetric tensor from its 3 rows or from its diagonal."""
+    """Check a symmetric tensor, given by 3 rows or by its diagonal."""
     try:
         given = np.asarray(values, dtype=float)
     except (TypeError, ValueError) as problem:

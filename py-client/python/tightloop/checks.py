@@ -1,4 +1,4 @@
-"""Checks of single values at the door of a scene; each error names the value, and what it should be."""
+"""Checks of arguments; each error names the value and what is valid."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Triple = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]*")
-# The daemon, which knows the real bounds, reads its numbers into 64 bits.
+# The daemon reads integers into 64 bits, and checks tighter bounds itself.
 _INT_MAX = 2**63 - 1
-# A quaternion typed with four digits is off by less; anything further is a slip (degrees, Euler angles).
+# Rounding to four digits stays below this; more is a mistake such as degrees or Euler angles.
 _QUAT_NORM_SLACK = 1e-3
 
 
@@ -33,12 +33,12 @@ def number(
     least: float | None = None,
     error: type[Exception] = SceneError,
 ) -> float:
-    """A finite float, above or at least a bound."""
+    """Check a finite float, optionally with a lower bound."""
     try:
         checked = float(value)
     except (TypeError, ValueError):
         raise error(f"{what} is {value!r}; give a number") from None
-    except OverflowError:  # a whole number of more than 308 digits
+    except OverflowError:  # an int with more than 308 digits
         raise error(f"{what} is larger than any float; give a finite number") from None
     if not math.isfinite(checked):
         raise error(f"{what} is {checked}; give a finite number")
@@ -50,7 +50,7 @@ def number(
 
 
 def integer(what: str, value: SupportsIndex, *, least: int = 1, error: type[Exception] = SceneError) -> int:
-    """An int of 64 bits, at least a bound; floats are refused even when they are whole."""
+    """Check a 64-bit int with a lower bound; refuse floats, even whole ones."""
     try:
         checked = operator.index(value)
     except TypeError:
@@ -63,7 +63,7 @@ def integer(what: str, value: SupportsIndex, *, least: int = 1, error: type[Exce
 
 
 def text(what: str, value: str, *, error: type[Exception] = SceneError) -> str:
-    """A string that other programs can read: no lone surrogates, no zero bytes."""
+    """Check a string for use in other programs: no lone surrogates, no zero bytes."""
     if not isinstance(value, str):
         raise error(f"{what} is {value!r}; give a string")
     if "\0" in value or any("\ud800" <= letter <= "\udfff" for letter in value):
@@ -72,7 +72,7 @@ def text(what: str, value: str, *, error: type[Exception] = SceneError) -> str:
 
 
 def path(what: str, value: str | os.PathLike[str], *, error: type[Exception] = SceneError) -> Path:
-    """An absolute path; ``~`` is the user's home."""
+    """Return an absolute path; ``~`` is the home folder."""
     try:
         given = os.fspath(value)
     except TypeError:
@@ -85,13 +85,13 @@ def path(what: str, value: str | os.PathLike[str], *, error: type[Exception] = S
 
 
 def triple(what: str, values: Vector) -> Triple:
-    """Three finite floats."""
+    """Check three finite floats."""
     x, y, z = _numbers(what, values, 3)
     return x, y, z
 
 
 def quaternion(what: str, values: Vector) -> Quaternion:
-    """A unit quaternion (x, y, z, w)."""
+    """Check and normalise a unit quaternion (x, y, z, w)."""
     x, y, z, w = _numbers(what, values, 4)
     norm = math.hypot(x, y, z, w)
     if abs(norm - 1.0) > _QUAT_NORM_SLACK:
@@ -100,7 +100,7 @@ def quaternion(what: str, values: Vector) -> Quaternion:
 
 
 def name(what: str, given: str, taken: Sequence[str]) -> str:
-    """A name that can stand before a slash and that nothing else in the scene has."""
+    """Check a name that is unique in the scene and can precede a slash."""
     if not isinstance(given, str) or not _NAME.fullmatch(given):
         rule = "use letters, digits, `_`, `-` and `.`, of which the last two do not come first"
         raise SceneError(f"{what} name {given!r}: {rule}; name= gives another")
@@ -110,7 +110,7 @@ def name(what: str, given: str, taken: Sequence[str]) -> str:
 
 
 def choice(what: str, given: Any, known: Sequence[str]) -> None:
-    """One of a list of words."""
+    """Check that a value is one of a list of words."""
     if given not in known:
         raise SceneError(f"unknown {what} {given!r}; choose one of {', '.join(map(repr, known))}")
 

@@ -1,4 +1,4 @@
-"""The process behind `launch`: started with a scene, watched until it is ready, and never left behind."""
+"""The daemon process of `launch`: its start, its readiness and its end."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from tightloop import _core, errors
 from tightloop.errors import LaunchError
 
 _PROGRAM = Path(__file__).with_name("__main__.py")
-# A daemon that was told to stop needs milliseconds; after this it is killed.
+# A daemon stops within milliseconds; after this time it is killed [s].
 _STOP_SECONDS = 3.0
 
 
 class Daemon:
-    """A daemon process of our own, and its name."""
+    """A daemon process that this process started."""
 
     def __init__(self, process: subprocess.Popen[bytes], name: str, users: int) -> None:
         self.process = process
@@ -32,20 +32,20 @@ class Daemon:
         Args:
             scene: The scene as TOML; paths inside are absolute.
             arguments: Values of the long flags of ``tightloop serve``.
-            users: How many will `leave`.
+            users: Number of users, each of which will `leave`.
 
         Raises:
-            TightloopError: What the daemon said, as the exception of its kind.
+            TightloopError: The error that the daemon reported, as the exception of its kind.
         """
         if not sys.executable:
             raise LaunchError("this Python does not know its own executable; start `tightloop serve` and attach")
         flags = [f"--{flag}={value}" for flag, value in arguments.items()]
         process = subprocess.Popen(
-            # No site packages and no environment: the daemon needs only this package, and starts at once
+            # without site packages and environment variables: the daemon needs only this package, and starts faster
             [sys.executable, "-I", "-S", str(_PROGRAM), "serve", "-", f"--parent={os.getpid()}", *flags],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            # Ctrl-C in a terminal goes to the caller, who decides what becomes of the daemon
+            # Ctrl-C in a terminal goes to the caller, which decides whether the daemon stops
             start_new_session=True,
         )
         daemon = cls(process, arguments["name"], users)
@@ -62,7 +62,7 @@ class Daemon:
             with self.process.stdin as stdin:
                 stdin.write(scene.encode())
         except BrokenPipeError:
-            pass  # it ended before reading the scene, and its line says why
+            pass  # the daemon ended before it read the scene; its answer has the reason
         line = self.process.stdout.readline()
         try:
             answer = json.loads(line)
@@ -72,7 +72,7 @@ class Daemon:
             raise getattr(errors, answer["error"]["kind"], LaunchError)(answer["error"]["message"])
 
     def _end(self) -> str:
-        """How a daemon ended that closed its stdout, or wrote into it what it never does."""
+        """Describe the end of a daemon whose answer was empty or not understood."""
         try:
             code = self.process.wait(_STOP_SECONDS)
         except subprocess.TimeoutExpired:
@@ -80,13 +80,13 @@ class Daemon:
         return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
 
     def leave(self) -> None:
-        """One user less; `stop` after the last."""
+        """Remove a user; `stop` after the last one."""
         self._users -= 1
         if self._users == 0:
             self.stop()
 
     def stop(self) -> None:
-        """Wait for the daemon to end, make it end if it does not, and remove what a killed one leaves."""
+        """Stop the daemon, kill it if it does not stop, and remove the files of a killed one."""
         process = self.process
         try:
             process.terminate()

@@ -1,4 +1,4 @@
-"""Distributions of numbers that differ from world to world and from reset to reset."""
+"""Distributions of values that differ between worlds and between resets."""
 
 from __future__ import annotations
 
@@ -7,16 +7,20 @@ from dataclasses import dataclass
 from tightloop import checks
 from tightloop.errors import SceneError
 
-# As the daemon has it: a draw stays within float32
+# the daemon has the same limit, which keeps draws within float32
 _MOST = 1e6
 
 
 @dataclass(frozen=True)
 class Uniform:
-    """Every number from ``low`` to ``high`` is as likely as any other.
+    """The uniform distribution from ``low`` to ``high``.
+
+    Args:
+        low: Lower bound.
+        high: Upper bound.
 
     Raises:
-        SceneError: A number is not finite or above 1e6, or ``low`` is above ``high``.
+        SceneError: A bound is not finite or its size is above 1e6, or ``low`` is above ``high``.
     """
 
     low: float
@@ -30,16 +34,20 @@ class Uniform:
         object.__setattr__(self, "high", high)
 
     def table(self) -> dict[str, list[float]]:
-        """The distribution as a scene file has it."""
+        """Return the distribution in the form of a scene file."""
         return {"uniform": [self.low, self.high]}
 
 
 @dataclass(frozen=True)
 class Normal:
-    """Gauss's distribution of that mean and standard deviation.
+    """The normal distribution with a mean and a standard deviation.
+
+    Args:
+        mean: Mean.
+        std: Standard deviation, at least 0.
 
     Raises:
-        SceneError: A number is not finite or above 1e6, or ``std`` is negative.
+        SceneError: A value is not finite or its size is above 1e6, or ``std`` is negative.
     """
 
     mean: float
@@ -50,7 +58,7 @@ class Normal:
         object.__setattr__(self, "std", _number("Normal: std", self.std, least=0.0))
 
     def table(self) -> dict[str, list[float]]:
-        """The distribution as a scene file has it."""
+        """Return the distribution in the form of a scene file."""
         return {"normal": [self.mean, self.std]}
 
 
@@ -58,7 +66,7 @@ Distribution = Uniform | Normal
 
 
 def from_table(table: dict[str, list[float]]) -> Distribution:
-    """The inverse of ``table``."""
+    """Make a distribution from the form of a scene file."""
     [(kind, numbers)] = table.items()
     return {"uniform": Uniform, "normal": Normal}[kind](*map(float, numbers))
 

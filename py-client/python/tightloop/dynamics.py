@@ -1,4 +1,4 @@
-"""Kinematics and dynamics at states that you give: no world of a simulation is touched."""
+"""Kinematics and dynamics of a scene at given states, without a simulation."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Array = NDArray[np.float64]
 class Dynamics:
     """A scene's kinematics and dynamics as functions, computed in this process and in double precision.
 
-    `Sim.dynamics` is that of a running simulation. States are given one, ``(coords,)``, or many, ``(n, coords)``, such
-    as a frame's ``joint_q``; results have the same leading axis. An array of one state goes with many of another.
+    `Sim.dynamics` is that of a running simulation. Arguments hold one state, ``(coords,)``, or many, ``(n, coords)``,
+    such as a frame's ``joint_q``; results have the same leading axis. An argument of one state broadcasts to many.
 
     Args:
-        scene: What to evaluate; later changes to it have no effect.
+        scene: The scene; later changes to it have no effect.
 
     Attributes:
         dof_names: ``robot/joint`` of each dof.
@@ -29,6 +29,7 @@ class Dynamics:
         body_names: ``robot/link`` of each body.
 
     Raises:
+        ArgumentError: ``scene`` is not a `Scene`.
         SceneError: The scene is not valid.
     """
 
@@ -39,10 +40,13 @@ class Dynamics:
 
     @classmethod
     def of_daemon(cls, info: dict[str, Any]) -> Dynamics:
-        """The dynamics of what a daemon simulates, from what it tells about itself.
+        """Make the dynamics of a running simulation.
+
+        Args:
+            info: The daemon's description of itself, `Sim.info`.
 
         Raises:
-            SceneError: A robot's file cannot be read here, or is no longer what the daemon read.
+            SceneError: A robot's file cannot be read here, or has changed since the daemon read it.
         """
         core = _core.Dynamics(info["scene"], info["scene_folder"])
         if core.model_hash != info["model_hash"]:
@@ -57,11 +61,11 @@ class Dynamics:
 
     @property
     def model_hash(self) -> int:
-        """Hash of the scene's model, as `Sim.info` has that of a daemon's."""
+        """Hash of the scene's model, to compare with ``sim.info["model_hash"]``."""
         return self._core.model_hash
 
     def forward_kinematics(self, joint_q: ArrayLike) -> Array:
-        """Link frames in the world: position [m], then quaternion (x, y, z, w).
+        """Compute link frames in the world: position [m], then quaternion (x, y, z, w).
 
         Args:
             joint_q: Joint positions [rad or m], shape ``(coords,)`` or ``(n, coords)``.
@@ -70,12 +74,12 @@ class Dynamics:
             Shape ``(bodies, 7)`` or ``(n, bodies, 7)``.
 
         Raises:
-            ArgumentError: A wrong shape, dtype or value.
+            ArgumentError: A shape, dtype or value is wrong.
         """
         return self._evaluate("body_q", (len(self.body_names), 7), joint_q, None)
 
     def body_velocity(self, joint_q: ArrayLike, joint_qd: ArrayLike) -> Array:
-        """Velocity of each link's centre of mass [m/s], then its angular velocity [rad/s], in world axes.
+        """Compute the velocity of each link's centre of mass [m/s], then its angular velocity [rad/s], in world axes.
 
         Args:
             joint_q: Joint positions [rad or m], shape ``(coords,)`` or ``(n, coords)``.
@@ -87,16 +91,24 @@ class Dynamics:
         return self._evaluate("body_qd", (len(self.body_names), 6), joint_q, joint_qd)
 
     def body_jacobian(self, joint_q: ArrayLike) -> Array:
-        """What takes ``joint_qd`` to `body_velocity`: shape ``(bodies, 6, dofs)`` or ``(n, bodies, 6, dofs)``.
+        """Compute the Jacobian J of `body_velocity`, such that `body_velocity` is ``J @ joint_qd``.
 
-        Arguments and errors as in `forward_kinematics`.
+        Args:
+            joint_q: Joint positions [rad or m], shape ``(coords,)`` or ``(n, coords)``.
+
+        Returns:
+            Shape ``(bodies, 6, dofs)`` or ``(n, bodies, 6, dofs)``. Raises as `forward_kinematics` does.
         """
         return self._evaluate("body_jacobian", (len(self.body_names), 6, len(self.dof_names)), joint_q, None)
 
     def mass_matrix(self, joint_q: ArrayLike) -> Array:
-        """Joint-space inertia, armature included [kg·m², kg·m or kg]: shape ``(dofs, dofs)`` or ``(n, dofs, dofs)``.
+        """Compute the joint-space inertia with armature [kg·m², kg·m or kg].
 
-        Arguments and errors as in `forward_kinematics`.
+        Args:
+            joint_q: Joint positions [rad or m], shape ``(coords,)`` or ``(n, coords)``.
+
+        Returns:
+            Shape ``(dofs, dofs)`` or ``(n, dofs, dofs)``. Raises as `forward_kinematics` does.
         """
         return self._evaluate("mass_matrix", (len(self.dof_names), len(self.dof_names)), joint_q, None)
 
@@ -108,18 +120,18 @@ class Dynamics:
         *,
         damping: bool = True,
     ) -> Array:
-        """Joint forces that give an acceleration: ``M q̈ + c + d q̇``; with positions alone, what holds them.
+        """Compute the joint forces for an acceleration, ``M q̈ + c + d q̇``; with positions alone, those that hold them.
 
-        Sent as ``joint_f``, they make the joints accelerate by ``joint_qdd`` where no drive, dry friction, limit,
-        mimic joint or contact acts. ``M`` has the armature in it, ``c`` are Coriolis, centrifugal and gravity forces
-        (``bias_force``), ``d`` is the joints' damping. A floating base takes part with its wrench.
+        Sent as ``joint_f``, they accelerate the joints by ``joint_qdd`` if no drive, dry friction, limit, mimic joint
+        or contact acts. ``M`` includes the armature, ``c`` are Coriolis, centrifugal and gravity forces
+        (``bias_force``), and ``d`` is the joint damping. The result includes the wrench of a floating base.
 
         Args:
             joint_q: Joint positions [rad or m], shape ``(coords,)`` or ``(n, coords)``.
             joint_qd: Joint velocities [rad/s or m/s], shape ``(dofs,)`` or ``(n, dofs)``; zero if left out.
             joint_qdd: Joint accelerations [rad/s² or m/s²], same shapes; zero if left out.
-            damping: Whether to supply what damping takes; False leaves ``d q̇`` out, as the recursive Newton-Euler
-                algorithm does (Featherstone 2008, section 5.3).
+            damping: Whether to include ``d q̇``; without it, the result is that of the recursive Newton-Euler algorithm
+                (Featherstone 2008, section 5.3).
 
         Returns:
             Joint forces [N·m or N], shape ``(dofs,)`` or ``(n, dofs)``. Raises as `forward_kinematics` does.
@@ -132,14 +144,14 @@ class Dynamics:
     def _evaluate(self, field: str, shape: tuple[int, ...], joint_q: ArrayLike, joint_qd: ArrayLike | None) -> Array:
         many, q, qd, _ = self._states(joint_q, joint_qd, None)
         values = self._core.evaluate(field, q, qd)
-        if not self.coord_names:  # all states of what cannot move are alike
+        if not self.coord_names:  # a scene without coordinates has one state
             return np.broadcast_to(values.reshape(shape), (*many, *shape)).copy()
         return values.reshape((*many, *shape))
 
     def _states(
         self, joint_q: ArrayLike, joint_qd: ArrayLike | None, joint_qdd: ArrayLike | None
     ) -> tuple[tuple[int, ...], Array, Array, Array]:
-        """The leading axis, if there is one, and the arrays flat; what was left out is empty."""
+        """Return the leading axis, if any, and the flat arrays; those left out are empty."""
         coords, dofs = len(self.coord_names), len(self.dof_names)
         given = [_numbers("joint_q", joint_q, coords)]
         given += [

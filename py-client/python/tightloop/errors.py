@@ -1,22 +1,22 @@
-"""Every exception that tightloop raises on its own account; each says what is wrong and what to do.
+"""The exceptions of tightloop. Each message says what is wrong and how to fix it.
 
-All derive from `TightloopError`. Where Python has a word for the mistake (`ValueError`, `TimeoutError`, …) the
-exception derives from that too, so that ordinary `except` clauses work.
+All derive from `TightloopError`. Where Python has a built-in exception for the mistake (`ValueError`, `TimeoutError`,
+…), the exception also derives from that one, so that ordinary `except` clauses work.
 """
 
 from __future__ import annotations
 
 
 class TightloopError(Exception):
-    """Base of all exceptions of this package."""
+    """Base class of all exceptions of this package."""
 
 
 class ArgumentError(TightloopError, ValueError):
-    """An argument of `launch` or `attach` is not valid; the message lists what is."""
+    """An argument of a function or class is not valid; the message names it and what is valid."""
 
 
 class SceneError(TightloopError, ValueError):
-    """A scene, or a value written into one, is not valid. The message names the part and the cure."""
+    """A scene, or a value written into one, is not valid. The message names the part and the fix."""
 
 
 class UrdfError(SceneError):
@@ -24,15 +24,15 @@ class UrdfError(SceneError):
 
 
 class LaunchError(TightloopError, RuntimeError):
-    """The daemon could not be started; the message holds its reason."""
+    """The daemon could not be started; the message has the reason."""
 
 
 class ResourceError(LaunchError):
-    """There is not enough memory, or not enough room in shared memory, for that many worlds."""
+    """There is not enough memory, or not enough shared memory, for the number of worlds."""
 
 
 class MissingLibrary(TightloopError, ImportError):
-    """An adapter's library is not installed; the message says how to install it."""
+    """An optional library is not installed; the message says how to install it."""
 
 
 class UnknownDaemon(TightloopError, LookupError):
@@ -40,11 +40,11 @@ class UnknownDaemon(TightloopError, LookupError):
 
 
 class ProtocolMismatch(TightloopError, RuntimeError):
-    """Client and daemon are of different versions; the message names both."""
+    """Client and daemon have different versions; the message names both."""
 
 
 class TransportError(TightloopError, OSError):
-    """The shared-memory transport failed; the message holds its reason."""
+    """The shared-memory transport failed; the message has the reason."""
 
 
 class LeaseHeld(TightloopError, RuntimeError):
@@ -52,7 +52,7 @@ class LeaseHeld(TightloopError, RuntimeError):
 
 
 class LeaseLost(TightloopError, RuntimeError):
-    """This client controlled the daemon and no longer does, since it did not answer for too long."""
+    """This client lost control of the daemon, because it did not answer for too long."""
 
 
 class DaemonLost(TightloopError, ConnectionError):
@@ -60,7 +60,7 @@ class DaemonLost(TightloopError, ConnectionError):
 
 
 class DaemonRestarted(DaemonLost):
-    """A daemon of the same name runs, but not the one that this client knew; its state is lost."""
+    """Another daemon of the same name has replaced the one that this client knew, whose state is lost."""
 
 
 class SimClosed(TightloopError, RuntimeError):
@@ -68,23 +68,23 @@ class SimClosed(TightloopError, RuntimeError):
 
 
 class CommandRefused(TightloopError, ValueError):
-    """A command has a wrong shape, dtype or value; the message names field, world and dof. The daemon goes on."""
+    """A command has a wrong shape, dtype or value; the message names field, world and dof. The daemon continues."""
 
 
 class ConstantParameter(CommandRefused, AttributeError):
-    """A parameter is a constant of this run; the message says how to let it vary."""
+    """A parameter is constant in this run; the message says how to let it vary."""
 
 
 class SnapshotError(TightloopError, ValueError):
-    """A snapshot is damaged, of something else, or cannot be written; the message says which. No world was changed."""
+    """A snapshot is damaged, does not fit, or cannot be written; the message says which. No world changed."""
 
 
 class RecordingError(TightloopError, ValueError):
-    """A recording cannot be read, or not further, or the files of its scene are not what they were."""
+    """A recording cannot be read to its end, or the files of its scene are missing or have changed."""
 
 
 class UnknownField(TightloopError, AttributeError):
-    """Frames of this run do not carry that field; ask for it in ``fields`` at launch."""
+    """Frames of this run do not carry the field; add it to ``fields`` at launch."""
 
 
 class FramesHeld(TightloopError, RuntimeError):

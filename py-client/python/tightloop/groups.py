@@ -1,4 +1,4 @@
-"""Worlds of one daemon in groups that step independently."""
+"""Groups of a daemon's worlds, which step independently."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tightloop.sim import Sim
 
 
 class Groups(Sequence[Sim]):
-    """The groups of a daemon's worlds, each a `Sim`, in lock-step with whoever controls it and with no other group.
+    """The groups of a daemon's worlds: a sequence of `Sim`, each of which steps independently of the others.
 
     >>> groups = tl.launch(scene, worlds=4096, groups=2)
     >>> for sim in groups:
@@ -19,13 +19,13 @@ class Groups(Sequence[Sim]):
     ...         frame = sim.recv()
     ...         sim.send(joint_target_q=policy(frame))     # the other group steps meanwhile
 
-    World w of group g is world ``g * groups[g].worlds + w`` of all: what is drawn for it is drawn for that number.
-    Masks, seeds, snapshots, and the worlds that errors name are those of a group.
+    World ``w`` of group ``g`` is world ``g * groups[g].worlds + w`` of the daemon, and its draws use that index. Masks,
+    seeds, snapshots and error messages count the worlds of the group.
 
     Attributes:
         name: Name of the daemon.
-        pid: Its process.
-        worlds: Worlds of all groups.
+        pid: Process id of the daemon.
+        worlds: Number of worlds of all groups.
     """
 
     def __init__(self, name: str, sims: Sequence[Sim]) -> None:
@@ -47,7 +47,7 @@ class Groups(Sequence[Sim]):
         return self._sims[index]
 
     def close(self) -> None:
-        """End all simulations: a launched daemon stops, an attached one is released. Frames stay valid."""
+        """End all simulations: stop a launched daemon, or release an attached one. Frames stay valid."""
         for sim in self._sims:
             sim.close()
 

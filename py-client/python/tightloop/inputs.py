@@ -1,4 +1,4 @@
-"""Arrays that need a conversion before they can be commands. Ready ones (float, contiguous) never come here."""
+"""Conversion of arguments to the arrays of a command. Contiguous float arrays skip this module."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from tightloop.errors import CommandRefused
 
 
 def as_array(field: str, robot: str | None, value: Any, worlds: int, columns: int) -> NDArray[np.float64]:
-    """Any array of real numbers as float64, contiguous, shape ``(worlds, columns)``.
+    """Convert any array of real numbers to contiguous float64, shape ``(worlds, columns)``.
 
     Raises:
-        CommandRefused: The shape is neither ``(worlds, columns)`` nor ``(columns,)``, or these are no real numbers.
+        CommandRefused: The shape is neither ``(worlds, columns)`` nor ``(columns,)``, or the values are not real.
     """
     what = field if robot is None else f"{field} of robot `{robot}`"
     given = real_numbers(what, value)
     if given.shape not in ((worlds, columns), (columns,)):
         expected = f"expected shape {(worlds, columns)}, or {(columns,)} for every world alike"
         raise CommandRefused(f"{what}: {expected}; got {given.shape}")
-    with np.errstate(over="ignore"):  # float128 may become inf, which is refused by name
+    with np.errstate(over="ignore"):  # float128 may become inf, which the client refuses
         return np.array(np.broadcast_to(given, (worlds, columns)), dtype=np.float64, order="C")
 
 
 def real_numbers(what: str, value: Any) -> NDArray[Any]:
-    """Any array of real numbers, as it is.
+    """Convert any array of real numbers to NumPy, with its dtype.
 
     Raises:
-        CommandRefused: These are no real numbers, or no array.
+        CommandRefused: The value is no array, or its values are not real.
     """
     given = _numpy(what, value)
     if given.dtype.kind not in "fiu":
@@ -39,10 +39,10 @@ def real_numbers(what: str, value: Any) -> NDArray[Any]:
 
 
 def as_mask(name: str, value: Any, worlds: int) -> NDArray[np.bool_]:
-    """The argument of that name as a bool for every world, contiguous, shape ``(worlds,)``.
+    """Convert a mask to a contiguous bool array, shape ``(worlds,)``; ``name`` is for messages.
 
     Raises:
-        CommandRefused: Another shape or dtype.
+        CommandRefused: The shape or dtype is wrong.
     """
     given = _numpy(name, value)
     if given.dtype != np.bool_:
@@ -53,10 +53,10 @@ def as_mask(name: str, value: Any, worlds: int) -> NDArray[np.bool_]:
 
 
 def as_seed(value: Any, worlds: int) -> NDArray[np.uint64]:
-    """One seed for all worlds, or one a world, contiguous, shape ``(1,)`` or ``(worlds,)``.
+    """Convert one seed for all worlds, or one per world, to a contiguous array, shape ``(1,)`` or ``(worlds,)``.
 
     Raises:
-        CommandRefused: Another length, or something else than whole numbers from 0 to 2**64 - 1.
+        CommandRefused: The length is wrong, or a seed is not a whole number from 0 to 2**64 - 1.
     """
     try:
         alone = isinstance(value, str | bytes) or np.ndim(value) == 0
@@ -76,9 +76,9 @@ def as_seed(value: Any, worlds: int) -> NDArray[np.uint64]:
 
 
 def whole_seed(value: Any) -> int | None:
-    """A seed as an int; None if it is no whole number from 0 to 2**64 - 1."""
+    """Return a seed as an int; None if it is not a whole number from 0 to 2**64 - 1."""
     try:
-        # a bool is an index too, and never meant as a seed
+        # `operator.index` accepts a bool, which is never meant as a seed
         seed = None if isinstance(value, bool | np.bool_) else operator.index(value)
     except TypeError:
         return None

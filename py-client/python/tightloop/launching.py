@@ -1,4 +1,4 @@
-"""`launch` starts a daemon of its own, `attach` joins one that runs."""
+"""Start a daemon with `launch`, or join a running one with `attach`."""
 
 from __future__ import annotations
 
@@ -78,50 +78,49 @@ def launch(
     frames_held: int = 4,
     watch_worlds: int = 256,
 ) -> Sim | Groups:
-    """Start a daemon that simulates a scene, and join it. The daemon ends with this process, however that ends.
+    """Start a daemon that simulates a scene, and join it. The daemon ends with this process, even after a crash.
 
     Args:
-        scene: What to simulate; later changes to it have no effect.
-        worlds: How many copies of it, at least 1.
-        groups: Into how many groups to split the worlds, evenly. They step independently, so that you work on the frame
-            of one while another steps; each world does what it does without groups, bit for bit. Errors count the
-            worlds of their group. Left out, there is one simulation of all.
-        device: ``"cpu"``, ``"gpu"`` for the first GPU, ``"gpu:1"`` or ``"gpu:nvidia"`` for another, by its number or
-            part of its name, as ``tightloop devices`` lists them, or ``"auto"`` for a GPU if there is one that is no
-            software and there are at least 1024 worlds in single precision, else the CPU: `Sim.device` tells.
+        scene: The scene; later changes to it have no effect.
+        worlds: Number of worlds, at least 1.
+        groups: Number of groups that share the worlds evenly. Groups step independently, so that you can work on the
+            frame of one while another steps. Each world has the same bits as without groups. Error messages count the
+            worlds of their group. If left out, one simulation has all worlds.
+        device: ``"cpu"``, ``"gpu"`` for the first GPU, or ``"gpu:1"`` or ``"gpu:nvidia"`` for another, by its number or
+            a part of its name; ``tightloop devices`` lists them. ``"auto"`` uses a hardware GPU for 1024 or more worlds
+            in single precision, and the CPU otherwise. `Sim.device` names the choice.
         precision: ``"f32"``, or ``"f64"`` for the same physics in double precision.
-        threads: Most threads that steps may use, those of all groups together; all cores if left out.
-        fields: What frames carry besides ``time``, ``step``, ``status`` and ``contacts_left_out``: names of `Frame`
+        threads: Largest number of threads of a step, shared by all groups; all cores if left out.
+        fields: Frame fields besides ``time``, ``step``, ``status`` and ``contacts_left_out``: names of `Frame`
             attributes.
-        params: Numbers of the model that vary from world to world and may be written while it runs, besides those that
-            the scene names, such as ``"shape_mu"``, ``"joint_friction"``, ``"command_delay"``, ``"gyro_noise"``;
-            `Sim.params` lists them all. Those that `Scene.randomize` draws vary too.
-        bounds: Largest ``"joint_q"`` [rad or m] and ``"joint_qd"`` [rad/s or m/s], in size; a world beyond one is
-            frozen at its state before that frame, with bit 8 of ``status``. None if left out.
-        on_fault: What becomes of a frozen world: ``"freeze"`` keeps it until it is reset, ``"reset"`` resets it
-            before its next step, so that its ``status`` is seen once.
-        on_nan: What becomes of a command that is NaN or infinite in some world: ``"refuse"`` refuses it for all worlds,
-            ``"freeze"`` freezes that world as one that is no longer finite, and the others go on.
-        draws: What start states, parameters and noise that are drawn depend on, besides a world's episode and ``step``:
-            ``"world"`` its number and its seed, ``"seed"`` its seed alone, so that an environment has the same numbers
-            wherever it stands. Worlds of one seed are then alike, and so they begin, with seed 0: give
-            ``reset(seed=...)`` a sequence with one seed a world.
-        name: Name of the daemon, for `attach`; a unique one if left out. Several groups have it with their number,
-            ``"franka.0"``; a single one has the name itself, and `attach` gives its `Sim`.
-        log: File for the daemon's news, such as how many worlds were frozen, at most one line a second; warnings and
-            errors go to stderr if left out.
-        frames_held: How many frames may be alive at once, at least 1; of each group.
-        watch_worlds: How many worlds observers see, such as the viewer: the first ones, or all if there are fewer; of
-            each group.
+        params: Model parameters that vary between worlds and can be written at run time, such as ``"shape_mu"``,
+            ``"joint_friction"``, ``"command_delay"``, ``"gyro_noise"``; `Sim.params` lists them all. Parameters that
+            the scene names and those that `Scene.randomize` draws vary too.
+        bounds: Largest absolute ``"joint_q"`` [rad or m] and ``"joint_qd"`` [rad/s or m/s]. A world beyond a bound
+            faults: it keeps its state before that frame, with bit 8 of ``status``. No bounds if left out.
+        on_fault: What happens to a faulted world: ``"freeze"`` keeps its state until it is reset, ``"reset"`` resets it
+            before its next step, so that one frame shows its ``status``.
+        on_nan: What happens to a command that is NaN or infinite in some world: ``"refuse"`` refuses it for all worlds,
+            ``"freeze"`` faults that world, and the others continue.
+        draws: What the draws of start states, parameters and noise depend on, besides a world's episode and ``step``:
+            ``"world"`` is its index and its seed, ``"seed"`` its seed alone, so that an environment draws the same
+            values at any index. Worlds with the same seed then have the same draws, and all worlds start with seed 0:
+            give ``reset(seed=...)`` a sequence with one seed per world.
+        name: Name of the daemon for `attach`; a unique one if left out. With several groups, each has the name and its
+            index, such as ``"franka.0"``. With one group, `attach` returns its `Sim`.
+        log: File for the daemon's log, such as the number of faulted worlds, with at most one line per second. If left
+            out, warnings and errors go to stderr.
+        frames_held: Largest number of frames alive at once, at least 1, for each group.
+        watch_worlds: Largest number of worlds that observers such as the viewer see, for each group: the first ones.
 
     Returns:
-        A `Sim`, or with ``groups`` the `Groups`, which hold one for each.
+        A `Sim`, or with ``groups`` the `Groups`, a sequence of them.
 
     Raises:
-        ArgumentError: An argument is not valid; the message lists what is.
+        ArgumentError: An argument is not valid; the message lists what is valid.
         SceneError: The scene is not valid.
-        ResourceError: Memory or shared memory does not hold that many worlds.
-        LaunchError: The daemon did not start; the message holds its reason.
+        ResourceError: There is not enough memory or shared memory for the worlds.
+        LaunchError: The daemon did not start; the message has the reason.
     """
     if not isinstance(scene, Scene):
         raise ArgumentError(f"launch: scene is {type(scene).__name__}; give a tightloop.Scene")
@@ -130,7 +129,7 @@ def launch(
             raise ArgumentError(f"launch: {argument} is {names!r}; give a list of names, such as ({names!r},)")
         if not isinstance(names, Iterable):
             raise ArgumentError(f"launch: {argument} is {names!r}; give a list of names, or () for none")
-    # Types are checked here, values by the daemon, before it takes anything
+    # this checks types; the daemon checks values before it allocates anything
     arguments: dict[str, Any] = {
         "worlds": checks.integer("launch: worlds", worlds, error=ArgumentError),
         "device": checks.text("launch: device", device, error=ArgumentError),
@@ -180,25 +179,26 @@ def _joined(argument: str, names: Iterable[str]) -> str:
 
 
 def _names(daemon: str, groups: int) -> list[str]:
-    """Names of its simulations."""
+    """Return the names of the daemon's simulations."""
     return [daemon] if groups == 1 else [f"{daemon}.{group}" for group in range(groups)]
 
 
 def attach(name: str) -> Sim | Any:
-    """Join a daemon that is already running. It goes on when this client ends.
+    """Join a running daemon, which continues when this client ends.
 
-    The first command makes this client its controller; until it ends, others that try get `LeaseHeld`.
+    The first command makes this client the controller. Until it releases control, the commands of other clients raise
+    `LeaseHeld`.
 
     Args:
-        name: The daemon's, or ``"franka.0"`` for one of its groups.
+        name: Name of the daemon, or ``"franka.0"`` for one of its groups.
 
     Returns:
-        A `Sim`; the `Groups` of a daemon that has several.
+        A `Sim`, or the `Groups` of a daemon with several groups.
 
     Raises:
-        ArgumentError: No daemon can have that name.
+        ArgumentError: The name is not valid for a daemon.
         UnknownDaemon: No daemon of that name is running; the message lists those that are.
-        ProtocolMismatch: The daemon is of another release.
+        ProtocolMismatch: The daemon has another version.
     """
     count = _core.groups(checks.text("attach: name", name, error=ArgumentError))
     sims = [Sim(_core.Client(own, lease=False), None) for own in _names(name, count)]

@@ -1,4 +1,4 @@
-"""Parameters of a running simulation: numbers of its model that differ from world to world."""
+"""Parameters of a running simulation: values of its model that vary between worlds."""
 
 from __future__ import annotations
 
@@ -13,40 +13,41 @@ from tightloop._core import Frame
 from tightloop.errors import CommandRefused, ConstantParameter, UnknownField
 from tightloop.inputs import real_numbers
 
-#: Numbers of a link or site in a parameter that has several.
+#: Values per body or site, of parameters with several.
 PARTS = {"body_f": 6, "site_q_noise": 2, "site_qd_noise": 2}
-#: Parameters with one number a world.
+#: Parameters with one value per world.
 SINGLE = ("command_delay",)
 
 
 class Params:
-    """What `Sim.params` is: each parameter that the scene draws or names, or ``launch(params=...)``, is an attribute.
+    """The varying parameters of a simulation, as attributes of `Sim.params`.
 
-    Reading one gives an array, shape ``(worlds, ...)``, read-only (``.copy()`` is yours); assigning to one writes it in
-    all worlds, `write` in some. What is written holds from the next step on, over resets too, but for ``body_f``, which
-    a reset clears, and numbers that `Scene.randomize` draws, which a reset draws anew.
+    A parameter varies if ``launch(params=...)`` or the scene names it, or if `Scene.randomize` draws it. Reading one
+    returns a read-only array, shape ``(worlds, ...)``. Assigning to one writes it in all worlds, `write` in some. A
+    written value takes effect at the next step and survives resets. Exceptions are ``body_f``, which a reset clears,
+    and parameters that `Scene.randomize` draws, which a reset draws again.
 
-    Free joints have no drive and no dry friction: their gains, effort limits, ``joint_friction`` and noises of targets
-    have no effect. `Sim.inverse_dynamics` and the other functions of a state use the scene's numbers, not these.
-    Reading takes a snapshot, for which this client must be in control.
+    Free joints have no drive and no dry friction: their gains, effort limits, ``joint_friction`` and target noise have
+    no effect. `Sim.inverse_dynamics` and the other functions of a state use the scene's values, not these. Reading
+    takes a snapshot, so this client must be in control.
 
     ``gravity`` (worlds, 3) [m/s²], ``body_mass_scale`` (worlds, bodies) [–], ``joint_armature`` [kg·m² or kg],
     ``joint_damping``, ``joint_target_kd`` [N·m·s/rad or N·s/m], ``joint_target_ke`` [N·m/rad or N/m],
     ``joint_effort_limit`` [N·m or N; 1e30 is none], ``joint_friction`` [N·m or N], each (worlds, dofs),
     ``shape_mu`` (worlds, shapes) [–], ``body_f`` (worlds, bodies, 6) [N, N·m].
 
-    ``command_delay`` (worlds,) [substeps]: when ``joint_f`` and targets of a frame begin to act, a fraction counting as
-    a whole substep; at most ``Scene.command_delay_max``.
+    ``command_delay`` (worlds,) [substeps]: delay until ``joint_f`` and targets of a frame act, rounded up to whole
+    substeps; at most ``Scene.command_delay_max``.
 
-    Standard deviations of normal noise, drawn for each frame from (seed, world, episode, step): of commands
-    ``joint_f_noise``, ``joint_target_q_noise``, ``joint_target_qd_noise``, of measured fields ``joint_q_noise``,
-    ``joint_qd_noise``, ``joint_torque_noise``, each (worlds, dofs), in the unit of what it is added to;
+    Standard deviations of normal noise, drawn for each frame from (seed, world, episode, step). Noise on commands:
+    ``joint_f_noise``, ``joint_target_q_noise``, ``joint_target_qd_noise``; on measured fields: ``joint_q_noise``,
+    ``joint_qd_noise``, ``joint_torque_noise``; each (worlds, dofs), in the unit of the value it is added to;
     ``site_q_noise`` [m, rad] and ``site_qd_noise`` [m/s, rad/s] (worlds, sites, 2), ``gyro_noise`` [rad/s] and
     ``accelerometer_noise`` [m/s²] (worlds, sites), ``contact_sensor_noise`` [N] (worlds, contact_sensors).
 
     Raises:
         UnknownField: There is no parameter of that name.
-        ConstantParameter: It is a constant of this run; it is an AttributeError, so that `hasattr` is false.
+        ConstantParameter: The parameter is constant in this run. It is an AttributeError, so that `hasattr` is false.
         CommandRefused: The values do not fit; nothing was written.
     """
 
@@ -65,18 +66,18 @@ class Params:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Those that vary in this run."""
+        """Names of the parameters that vary in this run."""
         return tuple(name for name, param in self._known.items() if param["place"] is not None)
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         if name.startswith("_"):
             raise AttributeError(name)
         param = self._varying(name)
-        # the parameters are the last numbers of a world
+        # parameters are the last values of a world's record
         first = self._numbers - param["place"]
         rows = self._state()[:, -first:][:, : param["info"]["columns"]]
         array = np.array(rows).reshape(self._shape(name))
-        # what was set in it would go nowhere
+        # writing into this copy would have no effect
         array.flags.writeable = False
         return array
 
@@ -84,22 +85,24 @@ class Params:
         self.write(**{name: value})
 
     def write(self, *, mask: ArrayLike | None = None, **params: ArrayLike) -> Frame:
-        """Set parameters in some worlds, all of them or none.
+        """Set parameters in some worlds. All given parameters are written, or none after an error.
 
         Args:
-            mask: Which worlds, bool, shape ``(worlds,)``; all if left out.
-            **params: Arrays by name, each ``(worlds, ...)``, ``(...)`` for every world alike, or one number for all.
+            mask: Worlds to write, bool, shape ``(worlds,)``; all if left out.
+            **params: Arrays by name, each ``(worlds, ...)``, ``(...)`` for identical worlds, or one number for all.
 
         Returns:
-            A frame evaluated at the present state. Raises as `Sim.step` does, and UnknownField.
+            A frame at the current state. Raises as `Sim.step` does, and UnknownField.
         """
         return self._client.write_params({name: self.ready(name, value) for name, value in params.items()}, mask)
 
     def ready(self, name: str, value: Any) -> NDArray[np.float64]:
-        """A value of a parameter for every world, float64, contiguous, shape ``(worlds, columns)``.
+        """Convert a value of a parameter to a contiguous float64 array, shape ``(worlds, columns)``.
 
         Raises:
-            CommandRefused: It has another shape, or is no array of real numbers.
+            UnknownField: There is no parameter of that name.
+            ConstantParameter: The parameter is constant in this run.
+            CommandRefused: The shape is wrong, or the value is no array of real numbers.
         """
         self._varying(name)
         shape = self._shape(name)

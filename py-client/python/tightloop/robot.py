@@ -1,4 +1,4 @@
-"""A robot of a scene: what its URDF says, and the start state, drives and limits that the user sets over it."""
+"""A robot of a scene: the values of its URDF, and the start state, drives and limits that the user sets."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tightloop.checks import Vector
+from tightloop.entity import Entity
 from tightloop.errors import SceneError
-from tightloop.placed import Placed
 
 MODES = ("position", "velocity", "both")
 
 
 class _PerDof:
-    """A property with one entry a dof; a single value is written to every dof that can be driven."""
+    """A property with one entry per dof; a single value is written to every dof with a drive."""
 
     entry = "dof"
 
@@ -55,7 +55,7 @@ class _Numbers(_PerDof):
         if own is None and self.otherwise is not None:
             own = robot._start_targets()
         values = np.array(robot._urdf_values(self.name) if own is None else own, dtype=np.float64)
-        # `arm.joint_q[3] = 1` would change a copy: better an error than silence
+        # `arm.joint_q[3] = 1` would change a copy, so it raises an error
         values.flags.writeable = False
         return values
 
@@ -86,7 +86,7 @@ class _Numbers(_PerDof):
 
 
 class _Positions(_Numbers):
-    """One entry a position coordinate; a quaternion where a joint turns freely."""
+    """One entry per position coordinate; a joint that turns freely has a quaternion."""
 
     entry = "coordinate"
 
@@ -119,15 +119,15 @@ class _Modes(_PerDof):
         robot._own[self.name] = modes
 
 
-class Robot(Placed):
+class Robot(Entity):
     """A robot of a scene, made by `Scene.add_urdf`.
 
-    Properties have one entry a dof, in the order of ``dof_names`` (``joint_q``: a coordinate, ``coord_names``). A
-    single value is written to all of them, but for those of a free body, which has no drive. What is not set is the
-    URDF's.
+    Properties have one entry per dof, in the order of ``dof_names``; ``joint_q`` has one per coordinate, in the order
+    of ``coord_names``. A single value is written to all entries except those of free joints, which have no drive.
+    Properties that are not set keep the values of the URDF file.
     """
 
-    # A misspelt property is an error
+    # a misspelt property is an error
     __slots__ = (
         "_own",
         "_summary",
@@ -145,17 +145,17 @@ class Robot(Placed):
 
     joint_q = _Positions("Start positions [rad or m], shape ``(coords,)``.")
     joint_target_q = _Numbers(
-        "Position targets at the start [rad or m], shape ``(dofs,)``; the start positions if not set.",
+        "Position targets of the drives at the start [rad or m], shape ``(dofs,)``; the start positions if not set.",
         otherwise="joint_q",
     )
-    joint_target_qd = _Numbers("Velocity targets at the start [rad/s or m/s], shape ``(dofs,)``.")
+    joint_target_qd = _Numbers("Velocity targets of the drives at the start [rad/s or m/s], shape ``(dofs,)``.")
     joint_target_mode = _Modes(
-        "What a drive acts on: ``position``: ke (q* − q) − kd q̇; ``velocity``: kd (q̇* − q̇); ``both``: their sum."
+        "Drive law of each dof: ``position``: ke (q* − q) − kd q̇; ``velocity``: kd (q̇* − q̇); ``both``: their sum."
     )
     joint_target_ke = _Numbers("Proportional gains of the drives [N·m/rad or N/m], shape ``(dofs,)``.", signed=False)
     joint_target_kd = _Numbers("Derivative gains of the drives [N·m·s/rad or N·s/m], shape ``(dofs,)``.", signed=False)
     joint_effort_limit = _Numbers(
-        "Largest sum of a joint's drive forces [N·m or N], shape ``(dofs,)``; inf is no limit. Spares ``joint_f``.",
+        "Limit of a joint's drive force [N·m or N], shape ``(dofs,)``; inf is no limit. It does not limit ``joint_f``.",
         signed=False,
         limit=True,
     )
@@ -191,54 +191,59 @@ class Robot(Placed):
 
     @property
     def joint_names(self) -> list[str]:
-        """Moving joints in the order of their dofs, as the URDF names them (``sim.dof_names`` has ``robot/joint``)."""
+        """Names of the moving joints in the URDF, in dof order (``sim.dof_names`` has ``robot/joint``)."""
         return list(self._summary["joint_names"])
 
     @property
     def joint_types(self) -> dict[str, str]:
-        """What each moving joint is, in URDF's words: ``revolute``, ``continuous``, ``prismatic``, …"""
+        """URDF type of each moving joint: ``revolute``, ``continuous``, ``prismatic``, …"""
         return dict(zip(self._summary["joint_names"], self._summary["joint_types"], strict=True))
 
     @property
     def joint_leaders(self) -> dict[str, str]:
-        """The joint that each mimic joint follows."""
+        """Leader of each mimic joint, by the name of the mimic joint."""
         joints = zip(self._summary["joint_names"], self._summary["joint_mimic"], strict=True)
         return {joint: mimic["joint"] for joint, mimic in joints if mimic is not None}
 
     @property
     def joint_range(self) -> NDArray[np.float64]:
-        """Least and largest position of each dof [rad or m], shape ``(dofs, 2)``; infinite where there is no limit."""
+        """Lower and upper position limit of each dof [rad or m], shape ``(dofs, 2)``; infinite without a limit."""
         unlimited = [-np.inf, np.inf]
         return self._of_dofs([unlimited if range_ is None else range_ for range_ in self._summary["joint_range"]])
 
     @property
     def joint_velocity_limit(self) -> NDArray[np.float64]:
-        """Velocity limit of each dof's joint [rad/s or m/s], shape ``(dofs,)``, infinite without one; not enforced."""
+        """Velocity limit of each dof's joint [rad/s or m/s], shape ``(dofs,)``; infinite without one, not enforced."""
         return self._of_dofs(self._summary["joint_velocity_limit"])
 
     @property
     def dof_names(self) -> list[str]:
-        """Dofs: the joint, and for one with several ``joint.part``."""
+        """Names of the dofs: the joint, or ``joint.part`` for a joint with several dofs."""
         return list(self._summary["dof_names"])
 
     @property
     def coord_names(self) -> list[str]:
-        """Position coordinates: the joint, and for one with several ``joint.part``."""
+        """Names of the position coordinates: the joint, or ``joint.part`` for a joint with several coordinates."""
         return list(self._summary["coord_names"])
 
     @property
     def link_names(self) -> list[str]:
-        """Links in the order of their bodies, as the URDF names them."""
+        """Names of the links in the URDF, in the order of their bodies."""
         return list(self._summary["link_names"])
 
     @property
     def shape_names(self) -> list[str]:
-        """Collision shapes of its file, ``link/shape``, links in the order of their bodies; a shape without a name of
-        its own has its place in the link (``sim.shape_names`` has ``robot/link/shape``)."""
+        """Names of the collision shapes of its file, ``link/shape``, in the order of the bodies.
+
+        A shape without a name has its index in the link (``sim.shape_names`` has ``robot/link/shape``).
+        """
         return list(self._summary["shape_names"])
 
     def link(self, name: str) -> Link:
-        """One of its links, to bear a shape: ``scene.add_box(body=arm.link("hand"), …)``.
+        """Return a link, for example to attach a shape: ``scene.add_box(body=arm.link("hand"), …)``.
+
+        Args:
+            name: Name of the link in the URDF.
 
         Raises:
             SceneError: There is no such link.
@@ -249,7 +254,7 @@ class Robot(Placed):
 
     @property
     def notes(self) -> list[str]:
-        """What was ignored or mended while the URDF was read, one sentence each."""
+        """What the URDF reader ignored or repaired, one sentence each."""
         return list(self._summary["notes"])
 
     @property
@@ -258,8 +263,8 @@ class Robot(Placed):
         return len(self._summary["dof_names"])
 
     def table(self) -> dict[str, Any]:
-        """The robot as a scene file has it, paths absolute; what was not set is left out."""
-        # one value would spare a free body, and what was set on its drive must be refused, not lost
+        """Return the robot in the form of a scene file, with absolute paths and without properties that are not set."""
+        # a single value skips free joints, but values set on their drives must reach the daemon, which refuses them
         single = all(self._summary["dof_driven"])
         own = {
             name: values if isinstance(values, tuple) else _portable(values, single=single)
@@ -281,7 +286,7 @@ class Robot(Placed):
         } | own
 
     def _of_dofs(self, joints: list[Any]) -> NDArray[np.float64]:
-        """What each moving joint has, for each dof."""
+        """Expand a list of values per moving joint to one per dof."""
         own = dict(zip(self.joint_names, joints, strict=True))
         return np.array([own[dof if dof in own else dof.rpartition(".")[0]] for dof in self.dof_names], dtype=float)
 
@@ -293,7 +298,7 @@ class Robot(Placed):
         return self._summary.get(name, [0.0] * self.dofs)
 
     def _start_targets(self) -> list[float]:
-        """Targets that hold the start position; those of balls and free bodies are left to the scene's compiler."""
+        """Return targets that hold the start position; the daemon sets those of ball and free joints."""
         start = dict(zip(self.coord_names, self.joint_q, strict=True))
         return [float(start.get(name, 0.0)) for name in self.dof_names]
 
@@ -310,7 +315,7 @@ class Link:
 
     @property
     def name(self) -> str:
-        """``robot/link``."""
+        """Name in the scene, ``robot/link``."""
         return f"{self.robot.name}/{self.link}"
 
     def __str__(self) -> str:
@@ -321,7 +326,7 @@ PER_DOF = tuple(name for name, value in vars(Robot).items() if isinstance(value,
 
 
 def _portable(values: NDArray[np.float64], *, single: bool) -> float | str | list[float | str]:
-    """As JSON, which has no infinity; if ``single``, one value where all dofs have the same."""
+    """Convert values for JSON, which has no infinity; with ``single``, equal values become one."""
     entries = ["inf" if np.isinf(value) else float(value) for value in values]
     return entries[0] if single and entries and len(set(entries)) == 1 else entries
 

@@ -1,4 +1,4 @@
-"""What is simulated: robots, bodies, shapes, time step and solver. A scene is data; `tightloop.launch` runs it."""
+"""A scene: robots, bodies, shapes, time step and solver options. A scene is data; `tightloop.launch` runs it."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from tightloop import _core, checks
 from tightloop.body import Body
 from tightloop.checks import Triple, Vector
 from tightloop.errors import SceneError
-from tightloop.randomized import Randomized
 from tightloop.robot import PER_DOF, Robot
+from tightloop.scene_randomization import SceneRandomization
 from tightloop.shapes import ORIGIN, UPRIGHT, Shape, Surface, checked_surface
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ Cone = Literal["elliptic", "pyramidal"]
 
 @dataclass(frozen=True)
 class Solver:
-    """Options of the constraint solver; see `Scene.solver`."""
+    """The options of the constraint solver; see `Scene.solver`."""
 
     iterations: int = 20
     ls_iterations: int = 100
@@ -40,22 +40,21 @@ class Solver:
     impratio: float = 1000.0
 
 
-class Scene(Randomized):
-    """Robots, bodies and shapes, how time advances, and what differs from world to world.
+class Scene(SceneRandomization):
+    """A scene: robots, bodies and shapes, time step and solver options, and what varies between worlds.
 
-    In the arrays of a frame robots come first, then bodies, each in the order they were added.
+    In the arrays of a frame, robots come first, then bodies, each in the order in which they were added.
 
     Args:
         dt: Length of a physics step [s], above 0.
-        substeps: Physics steps a control frame, at least 1. One `Sim.step` advances ``substeps * dt`` seconds.
+        substeps: Physics steps per control frame, at least 1. One `Sim.step` advances ``substeps * dt`` seconds.
         gravity: Acceleration of gravity [m/s²], world axes, z up.
-        contacts_max: Most contacts that a world has room for, 1 to 4096; None is as many as its shapes can have, at
-            most 512. What does not fit is left out, counted and flagged in the world's status.
-        rows_max: Most constraint rows of contacts that a world has room for, 1 to 16384; None is as many as its
-            contacts need.
-        params: Numbers of the model that vary from world to world, besides those named at launch; see `launch`.
-        command_delay_max: Largest ``command_delay`` that a world may have, where that varies [substeps]; None is four
-            control frames. Each frame of it takes memory for a frame's commands in every world.
+        contacts_max: Capacity for contacts of a world, 1 to 4096; None is as many as its shapes can have, at most 512.
+            Further contacts are left out, counted and flagged in the world's status.
+        rows_max: Capacity for constraint rows of contacts of a world, 1 to 16384; None is as many as its contacts need.
+        params: Model parameters that vary between worlds, besides those named at launch; see `launch`.
+        command_delay_max: Largest ``command_delay`` of a world, if it varies [substeps]; None is four control frames.
+            Each control frame of it takes memory for one frame of commands in every world.
 
     Raises:
         SceneError: A value is out of range; the message names it.
@@ -104,7 +103,7 @@ class Scene(Randomized):
 
     @property
     def substeps(self) -> int:
-        """Physics steps a control frame."""
+        """Physics steps per control frame."""
         return self._substeps
 
     @substeps.setter
@@ -122,7 +121,7 @@ class Scene(Randomized):
 
     @property
     def params(self) -> tuple[str, ...]:
-        """Numbers of the model that vary from world to world, besides those named at launch; see `launch`."""
+        """Model parameters that vary between worlds, besides those named at launch; see `launch`."""
         return self._params
 
     @params.setter
@@ -133,7 +132,7 @@ class Scene(Randomized):
 
     @property
     def command_delay_max(self) -> int | None:
-        """Largest ``command_delay`` that a world may have [substeps]; None is four control frames."""
+        """Largest ``command_delay`` of a world [substeps]; None is four control frames."""
         return self._command_delay_max
 
     @command_delay_max.setter
@@ -143,7 +142,7 @@ class Scene(Randomized):
 
     @property
     def contacts_max(self) -> int | None:
-        """Most contacts that a world has room for; None is as many as its shapes can have, at most 512."""
+        """Capacity for contacts of a world; None is as many as its shapes can have, at most 512."""
         return self._contacts_max
 
     @contacts_max.setter
@@ -152,7 +151,7 @@ class Scene(Randomized):
 
     @property
     def rows_max(self) -> int | None:
-        """Most constraint rows of contacts that a world has room for; None is as many as its contacts need."""
+        """Capacity for constraint rows of contacts of a world; None is as many as its contacts need."""
         return self._rows_max
 
     @rows_max.setter
@@ -171,13 +170,16 @@ class Scene(Randomized):
         """Set the options of the constraint solver (primal Newton with exact line search).
 
         Args:
-            iterations: Newton iterations a physics step, at most.
-            ls_iterations: Line-search iterations a Newton iteration, at most.
-            tolerance: The solver stops once its scaled improvement is smaller [–]; at 0 only rounding stops it.
+            iterations: Largest number of Newton iterations per physics step.
+            ls_iterations: Largest number of line-search iterations per Newton iteration.
+            tolerance: The solver stops when its scaled improvement is smaller [–]; at 0 only rounding stops it.
             cone: Friction cone of contacts, ``"elliptic"`` or ``"pyramidal"``.
-            impratio: Frictional over normal impedance of contacts [–], above 0, at most 1e5. In float32 the edges of a
-                pyramidal cone are at most 1e4 times as stiff as its normal, which MuJoCo's exceed where ``mu`` is
-                below 0.22 at 1000.
+            impratio: Ratio of frictional to normal impedance of contacts [–], above 0, at most 1e5. In float32, the
+                edges of a pyramidal cone are at most 1e4 times as stiff as its normal. MuJoCo's edges exceed this limit
+                if ``mu`` is below 0.22 at an impratio of 1000.
+
+        Raises:
+            SceneError: A value is out of range; the message names it.
         """
         checks.choice("cone", cone, ("elliptic", "pyramidal"))
         self._solver = Solver(
@@ -203,33 +205,33 @@ class Scene(Randomized):
         package_dirs: Sequence[str | os.PathLike[str]] = (),
         **surface: Unpack[Surface],
     ) -> Robot:
-        """Add a robot from a URDF file, which is read and checked at once.
+        """Add a robot from a URDF file; the file is read and checked at once.
 
         Args:
             path: The URDF file.
-            name: Unique name, which stands before joint and link names; the robot's name in the file if left out.
-            pos: Where the root link stands in the world [m].
-            quat: Its orientation (x, y, z, w).
+            name: Unique name, which precedes joint and link names; the robot's name in the file if left out.
+            pos: Position of the root link in the world [m].
+            quat: Orientation of the root link (x, y, z, w).
             floating: Whether the root link moves freely.
-            self_collisions: Whether links of this robot touch each other (neighbours never do).
-            strict: Whether an inertia that no body can have (A + B < C) is refused. Otherwise it is balanced as MuJoCo
-                does, with a warning.
-            mesh_max_hull_vertices: Most vertices of the convex hull that stands for a collision mesh in contacts,
-                8 to 1024.
-                Its error is noted where it exceeds 1 mm or 1% of the mesh.
-            convex_decomposition: Whether a concave collision mesh becomes several convex hulls rather than one.
-            package_dirs: Folders that hold the packages of ``package://`` paths; those above the file if left out.
-            **surface: How all shapes of its file touch: ``mu``, ``ke``, ``kd``, ``kf``, ``margin``, ``gap``,
-                ``condim``, ``group``, as `tightloop.Surface` has them.
+            self_collisions: Whether links of this robot collide with each other; neighbours never do.
+            strict: Whether to refuse an inertia that no body can have (A + B < C). Otherwise it is balanced as in
+                MuJoCo, with a warning.
+            mesh_max_hull_vertices: Largest number of vertices of the convex hull of a collision mesh, 8 to 1024.
+                `Robot.notes` reports an error of the hull above 1 mm or 1 % of the mesh.
+            convex_decomposition: Whether a concave collision mesh becomes several convex hulls instead of one.
+            package_dirs: Folders with the packages of ``package://`` paths; the folders above the file if left out.
+            **surface: Contact parameters of all shapes of the file: ``mu``, ``ke``, ``kd``, ``kf``, ``margin``,
+                ``gap``, ``condim``, ``group``, see `tightloop.Surface`.
 
         Returns:
-            The robot, to set start state, drives and limits.
+            The robot, whose properties set start state, drives and limits.
 
         Warns:
-            UserWarning: Inertias were balanced, or visual meshes are missing; ``Robot.notes`` has everything.
+            UserWarning: Inertias were balanced, or visual meshes are missing; `Robot.notes` has all notes.
 
         Raises:
             UrdfError: The file is missing, is not URDF, or describes a robot that cannot be simulated.
+            SceneError: An argument is not valid; the message names it.
         """
         urdf = checks.path("add_urdf: path", path)
         touch = checked_surface("add_urdf", surface)
@@ -277,22 +279,22 @@ class Scene(Randomized):
         fixed: bool = False,
         name: str | None = None,
     ) -> Body:
-        """Add a rigid body, such as a cube to be grasped; ``add_box(body=…)`` and the like give it shapes.
+        """Add a rigid body, such as a cube to grasp. `add_box` and the other shape methods give it shapes.
 
-        Without ``mass`` it weighs what its shapes do. With ``mass`` and no ``inertia`` it has the inertia of its shapes
-        at that mass, or, without any shape, that of a solid ball of water (1000 kg/m³).
+        Without ``mass``, its shapes and their densities set the mass. With ``mass`` and without ``inertia``, it has the
+        inertia of its shapes scaled to that mass or, without shapes, that of a solid sphere of 1000 kg/m³.
 
         Args:
-            pos: Where its frame stands at the start [m].
+            pos: Position of its frame at the start [m].
             quat: Orientation of its frame at the start (x, y, z, w).
             mass: Mass [kg], above 0.
             com: Centre of mass in the body's frame [m]; that of its shapes, or the origin, if left out.
-            inertia: Inertia about the centre of mass in body axes [kg·m²], shape ``(3, 3)``, or a diagonal's ``(3,)``.
-            fixed: Whether it stands still; otherwise it moves freely.
+            inertia: Inertia about the centre of mass in body axes [kg·m²], shape ``(3, 3)``, or a diagonal ``(3,)``.
+            fixed: Whether the body does not move; otherwise it moves freely.
             name: Unique name; ``body``, ``body_2``, … if left out.
 
         Returns:
-            The body, to give it shapes.
+            The body, for the argument ``body`` of the shape methods.
 
         Raises:
             SceneError: A value is out of range; the message names it.
@@ -303,7 +305,7 @@ class Scene(Randomized):
         return body
 
     def add_table(self, *, name: str = "table", **surface: Unpack[Surface]) -> Shape:
-        """Add the lesson's table: a static box of 0.8 × 0.8 × 0.1 m, its top at z = 0.1 m, centred at (0, -0.5) m."""
+        """Add the table of the lesson: a static box of 0.8 × 0.8 × 0.1 m with its top at z = 0.1 m, at (0, -0.5) m."""
         return self.add_box(half_extents=(0.4, 0.4, 0.05), pos=(0.0, -0.5, 0.05), name=name, **surface)
 
     def add_cube(
@@ -314,13 +316,16 @@ class Scene(Randomized):
         name: str = "cube",
         **surface: Unpack[Surface],
     ) -> Body:
-        """Add the lesson's cube, which rests on its table: a free body, a box of 5 cm a side and 400 kg/m³.
+        """Add the cube of the lesson, which rests on its table: a free box of 5 cm side length and 400 kg/m³.
 
         Args:
-            pos: Its centre at the start [m].
-            quat: Its orientation at the start (x, y, z, w).
+            pos: Centre at the start [m].
+            quat: Orientation at the start (x, y, z, w).
             name: Name of the body.
-            **surface: How it touches; see `add_box`. Its margin is 1 mm if left out.
+            **surface: Contact parameters, see `add_box`. The margin is 1 mm if left out.
+
+        Returns:
+            The body.
         """
         checked_surface(f"body `{name}`", surface)
         surface.setdefault("margin", 1e-3)
@@ -329,7 +334,10 @@ class Scene(Randomized):
         return cube
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the scene as a TOML file; paths inside are relative to that file where they share a folder with it.
+        """Write the scene as a TOML file. Paths in it are relative if they share a folder with the file.
+
+        Args:
+            path: The file.
 
         Raises:
             SceneError: The file cannot be written.
@@ -338,18 +346,21 @@ class Scene(Randomized):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Scene:
-        """Read a scene file, and the robots that it names.
+        """Read a scene file and the robots that it names.
+
+        Args:
+            path: The file.
 
         Raises:
-            SceneError: The file is missing, or an entry in it is wrong.
-            UrdfError: A robot in it cannot be read.
+            SceneError: The file is missing, or an entry in it is not valid.
+            UrdfError: A robot of the scene cannot be read.
         """
         file = checks.path("load: path", path)
         return cls._read(file, file.parent)
 
     @classmethod
     def _read(cls, file: Path, folder: Path) -> Scene:
-        """Read a scene file whose relative paths are those of a folder, which need not be its own."""
+        """Read a scene file whose paths are relative to a given folder."""
         data = json.loads(_core.load_scene(str(file)))
         options = ("dt", "substeps", "gravity", "contacts_max", "rows_max", "params", "command_delay_max")
         scene = cls(**{option: data[option] for option in options if option in data})
@@ -376,7 +387,7 @@ class Scene(Randomized):
         return scene
 
     def to_toml(self) -> str:
-        """The scene as the text of a scene file, paths absolute; this is what a daemon gets."""
+        """Return the text of a scene file with absolute paths, as a daemon gets it."""
         return _core.scene_to_toml(self._json())
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""Shapes of a scene: static ones, and those of bodies and links; and how they touch."""
+"""Collision shapes and their contact parameters."""
 
 from __future__ import annotations
 
@@ -17,39 +17,41 @@ UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
 class Surface(TypedDict, total=False):
-    """What a shape is like where it touches another; what is left out has its default.
+    """The contact parameters of a shape; a parameter that is left out has its default.
 
-    Of two shapes that touch, margins and gaps are added, and the larger friction and ``condim`` count.
+    A contact of two shapes has the sum of their margins and gaps, and the larger friction and ``condim``.
     """
 
     mu: float | None
-    """Coefficient of sliding friction [–], 1; 0 to 1e12. Below 1e-5 it counts as that, as in MuJoCo."""
+    """Coefficient of sliding friction [–], default 1; 0 to 1e12. As in MuJoCo, 1e-5 is the lower limit in effect."""
     ke: float | None
-    """Contact stiffness [1/s²], as Newton's shape ``ke``, 2500, at most 1e12: with ``kd`` it is MuJoCo's
+    """Contact stiffness [1/s²], as Newton's shape ``ke``, default 2500, at most 1e12. With ``kd`` it is MuJoCo's
     ``solref = (2/kd, kd/(2 √ke))``."""
     kd: float | None
-    """Contact damping [1/s], as Newton's shape ``kd``, 100, at most 1e12."""
+    """Contact damping [1/s], as Newton's shape ``kd``, default 100, at most 1e12."""
     kf: float | None
-    """Friction damping [N·s/m], as Newton's shape ``kf``, 1000, at most 1e12: MuJoCo's ``solreffriction``."""
+    """Friction damping [N·s/m], as Newton's shape ``kf``, default 1000, at most 1e12; MuJoCo's ``solreffriction``."""
     margin: float | None
-    """Distance at which contact forces begin [m], 0."""
+    """Distance at which contact forces begin [m], default 0."""
     gap: float | None
-    """How much farther out contacts are listed, without a force [m], 0."""
+    """Additional distance at which contacts are listed without a force [m], default 0."""
     condim: int | None
-    """Directions in which a contact acts, 3: along the normal and with sliding friction; 1 is the normal alone."""
+    """Dimension of the contact, default 3: normal force and sliding friction; 1 is the normal force alone."""
     group: int | None
-    """Newton's collision group, 1: 0 touches nothing, a positive group itself and the negative ones, a negative group
-    all but itself."""
+    """Newton's collision group, default 1. Group 0 collides with nothing, a positive group with itself and with all
+    negative groups, a negative group with all groups but itself."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape: ``pos`` [m] and ``quat`` (x, y, z, w) of its centre in the world, or in the frame of the body or link
-    that bears it, sizes [m], density [kg/m³], and its surface, as `Surface` has it. What was left out is None.
+    """A collision shape, made by `Scene.add_box` and the like. Attributes that were left out are None.
+
+    It has ``pos`` [m] and ``quat`` (x, y, z, w) of its centre in the frame of its body, sizes [m], density [kg/m³] and
+    the contact parameters of `Surface`.
 
     Attributes:
-        body: Name of the body that bears it, or ``robot/link``; None for a static shape.
-        path: File of a mesh; ``notes`` say what was done to it.
+        body: Name of its body, or ``robot/link``; None for a static shape.
+        path: File of a mesh; ``notes`` say how the mesh was changed.
     """
 
     name: str
@@ -77,21 +79,21 @@ class Shape:
 
     @property
     def full_name(self) -> str:
-        """Its name in ``sim.shape_names``: ``shape``, ``body/shape`` or ``robot/link/shape``."""
+        """Name in ``sim.shape_names``: ``shape``, ``body/shape`` or ``robot/link/shape``."""
         return self.name if self.body is None else f"{self.body}/{self.name}"
 
     def table(self) -> dict[str, Any]:
-        """The shape as a scene file has it, its path absolute; what was left out is left out."""
+        """Return the shape in the form of a scene file, with an absolute path and without attributes that are None."""
         values = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "notes"}
         values["path"] = None if self.path is None else str(self.path)
         return {name: value for name, value in values.items() if value is not None}
 
 
 def checked(what: str, pos: Vector, quat: Vector, **sizes: Any) -> dict[str, Any]:
-    """Pose and sizes of a shape, refused by name.
+    """Check pose and sizes of a shape.
 
     Raises:
-        SceneError: A value is not finite, a size is not above 0, or the quaternion is no rotation.
+        SceneError: A value is not finite, a size is not above 0, or the quaternion is not a unit quaternion.
     """
     values: dict[str, Any] = {
         "pos": checks.triple(f"{what}: pos", pos),
@@ -107,7 +109,7 @@ def checked(what: str, pos: Vector, quat: Vector, **sizes: Any) -> dict[str, Any
 
 
 def checked_scale(what: str, scale: Vector | SupportsFloat) -> Triple:
-    """A factor for each axis, from one for all or from three."""
+    """Return a factor per axis, from one factor for all axes or from three."""
     if isinstance(scale, SupportsFloat):
         factor = checks.number(f"{what}: scale", scale)
         factors = (factor, factor, factor)
@@ -119,11 +121,11 @@ def checked_scale(what: str, scale: Vector | SupportsFloat) -> Triple:
 
 
 def checked_surface(what: str, given: Surface) -> dict[str, Any]:
-    """What is given of a surface, refused by name.
+    """Check the given contact parameters.
 
     Raises:
         SceneError: A value is out of range.
-        TypeError: There is no such argument.
+        TypeError: A parameter does not exist.
     """
     values: dict[str, Any] = {}
     for name, value in cast("dict[str, Any]", given).items():

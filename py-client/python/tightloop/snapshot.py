@@ -1,6 +1,6 @@
-"""All worlds of a simulation as bytes: `Sim.snapshot` takes them, `Sim.restore` goes back to them.
+"""Snapshots: all worlds of a simulation as bytes, from `Sim.snapshot` and for `Sim.restore`.
 
-A snapshot is a head of 40 bytes, then a record a world; `sim-core/engine/src/snapshot.rs` says how they lie.
+A snapshot is a header of 40 bytes, then a record per world; `sim-core/engine/src/snapshot.rs` defines the layout.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from numpy.typing import NDArray
 from tightloop import checks
 from tightloop.errors import SnapshotError
 
-# Magic, version, checksum, model, worlds, numbers of a world, bytes of a number; little endian
+# magic, version, checksum, model hash, worlds, values per world, bytes per value; little endian
 _HEAD = struct.Struct("<8sIIQQII")
 _MAGIC, _VERSION = b"tlsnap\r\n", 1
-# Where what the checksum covers begins; bytes of a world's counters, which come before its numbers
+# offset from which the checksum covers the bytes; bytes of a world's counters, which precede its values
 _COVERED, _COUNTERS = 16, 28
 _SHARED_MEMORY = Path("/dev/shm")
 
 
 class Snapshot:
-    """All worlds of a simulation at one instant; immutable, and of no use but to `Sim.restore`.
+    """All worlds of a simulation at one instant, for `Sim.restore`; immutable.
 
     Made by `Sim.snapshot`, `Snapshot.load` and `Snapshot.from_bytes`.
 
     Attributes:
         worlds: Number of worlds.
         precision: ``"f32"`` or ``"f64"``.
-        model_hash: Hash of the scene's model; ``sim.info["model_hash"]`` of a simulation that can restore it.
+        model_hash: Hash of the scene's model. A simulation with the same ``sim.info["model_hash"]`` can restore it.
     """
 
     def __init__(self, data: bytes, origin: str) -> None:
@@ -47,10 +47,13 @@ class Snapshot:
 
     @classmethod
     def from_bytes(cls, data: bytes | bytearray | memoryview) -> Snapshot:
-        """The snapshot that `to_bytes` gave.
+        """Make a snapshot from the bytes of `to_bytes`.
+
+        Args:
+            data: The bytes.
 
         Raises:
-            SnapshotError: These bytes are no snapshot, of another release, cut short or damaged.
+            SnapshotError: The bytes are no snapshot, or of another version, truncated or damaged.
         """
         if not isinstance(data, bytes | bytearray | memoryview):
             raise SnapshotError(f"snapshot: data is {type(data).__name__}; give the bytes of one")
@@ -58,10 +61,13 @@ class Snapshot:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Snapshot:
-        """The snapshot that `save` wrote.
+        """Read a snapshot from a file that `save` wrote.
+
+        Args:
+            path: The file.
 
         Raises:
-            SnapshotError: The file cannot be read, is no snapshot, of another release, cut short or damaged.
+            SnapshotError: The file cannot be read, is no snapshot, or is of another version, truncated or damaged.
         """
         file = checks.path("snapshot: path", path, error=SnapshotError)
         try:
@@ -72,26 +78,29 @@ class Snapshot:
 
     @property
     def numbers(self) -> NDArray[Any]:
-        """State, commands and parameters of each world, ``(worlds, numbers)``, read-only, as the daemon has them."""
+        """State, commands and parameters of each world, ``(worlds, values)``, read-only, in the daemon's layout."""
         real = int(self.precision[1:]) // 8
         records = np.frombuffer(self._data, np.uint8, offset=_HEAD.size).reshape(self.worlds, -1)
         return np.ascontiguousarray(records[:, _COUNTERS:]).view(f"<f{real}")
 
     def to_bytes(self) -> bytes:
-        """Everything that `from_bytes` needs."""
+        """Return the snapshot as bytes, for `from_bytes`."""
         return self._data
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write it into a file. What was there before is replaced as a whole or, after an error, not at all.
+        """Write the snapshot into a file. An existing file is replaced as a whole or, after an error, not at all.
+
+        Args:
+            path: The file.
 
         Raises:
-            SnapshotError: The file cannot be written; the message says why.
+            SnapshotError: The file cannot be written; the message has the reason.
         """
         file = checks.path("snapshot: path", path, error=SnapshotError)
-        # A device or a pipe would be replaced by a file
+        # the rename below would replace a device or a pipe by a file
         if file.exists() and not (file.is_file() or file.is_dir()):
             raise SnapshotError(f"{file}: is there and no file; give the path of one")
-        # A link stays, what it leads to is replaced
+        # keep a symbolic link, and replace its target
         file = file.resolve()
         part = file.with_name(f".tightloop-{secrets.token_hex(8)}")
         try:
@@ -99,7 +108,7 @@ class Snapshot:
                 with part.open("xb") as to:
                     to.write(self._data)
                     to.flush()
-                    # Or a power cut might leave the name with nothing behind it
+                    # without it, a power cut may leave an empty file
                     os.fsync(to.fileno())
                 part.replace(file)
             except BaseException:
@@ -113,11 +122,11 @@ class Snapshot:
 
 
 @contextmanager
-def passing() -> Iterator[Path]:
-    """Path of a file between client and daemon, which is gone afterwards; in shared memory where there is one.
+def transfer_file() -> Iterator[Path]:
+    """Provide the path of a temporary file between client and daemon, in shared memory if possible.
 
     Raises:
-        SnapshotError: There is no folder for it.
+        SnapshotError: The folder of the file cannot be made.
     """
     try:
         folder = tempfile.TemporaryDirectory(
@@ -130,7 +139,7 @@ def passing() -> Iterator[Path]:
 
 
 def _check(data: bytes, origin: str) -> tuple[int, int, int]:
-    """Model hash, worlds and bytes of a number, of a snapshot that is whole."""
+    """Check a snapshot; return its model hash, its number of worlds and the bytes per value."""
     if not data.startswith(_MAGIC):
         raise SnapshotError(f"{origin}: this is no snapshot; give what was saved as one")
     if len(data) < _HEAD.size:

@@ -12,11 +12,11 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from judge import assert_close
+from comparison import assert_close
+from contact_scenes import ContactScene, MujocoReference, ours, states_of, turn
+from mujoco_model import Array
 from numpy.random import Generator
-from piles import Judge, Pile, ours, states_of, turn
-from robots import Coordinates
-from twin import Array
+from random_robots import Coordinates
 
 import tightloop as tl
 
@@ -69,25 +69,25 @@ def random_size(rng: Generator, kind: str) -> dict:
     return {"radius": rng.uniform(0.03, 0.08), "half_height": rng.uniform(0.05, 0.12)}
 
 
-def random_pile(
+def random_contact_scene(
     rng: Generator, kinds: list[str], cone: str, impratio: float, *, margins: bool = True, off: float = 0.0
-) -> Pile:
+) -> ContactScene:
     """One to twelve bodies that fall onto a ground, or onto a table and each other.
 
     Centres of mass lie up to `off` [m] from the origin of the body's frame along each axis.
     """
-    pile = Pile(cone=cone, impratio=impratio)
-    pile.shape("plane", "ground", {}, quat=tilted(rng, 0.1), **random_surface(rng, margins=margins))
+    contact_scene = ContactScene(cone=cone, impratio=impratio)
+    contact_scene.shape("plane", "ground", {}, quat=tilted(rng, 0.1), **random_surface(rng, margins=margins))
     if "box" in kinds:
-        pile.shape(
+        contact_scene.shape(
             "box", "table", {"half_extents": (0.4, 0.3, 0.1)}, pos=(0.3, 0, 0.1), **random_surface(rng, margins=margins)
         )
     for number in range(rng.integers(1, 13)):
         name, kind = f"b{number}", str(rng.choice(kinds))
         place = np.array([*rng.uniform(-0.12, 0.12, 2), 0.35 + 0.12 * number])
-        pile.body(name, place, turn(rng))
+        contact_scene.body(name, place, turn(rng))
         shift = off * rng.uniform(-1, 1, 3)
-        pile.shape(
+        contact_scene.shape(
             kind,
             f"s{number}",
             random_size(rng, kind),
@@ -96,18 +96,18 @@ def random_pile(
             body=name,
             **random_surface(rng, margins=margins),
         )
-    return pile
+    return contact_scene
 
 
-def two_arms(folder: Path, rng: Generator, cone: str, impratio: float) -> Pile:
+def two_arms(folder: Path, rng: Generator, cone: str, impratio: float) -> ContactScene:
     """Two arms that hang over a table into each other, with a loose ball between them."""
-    pile = Pile(cone=cone, impratio=impratio)
+    contact_scene = ContactScene(cone=cone, impratio=impratio)
     file = folder / "arm.urdf"
     file.write_text(ARM)
-    pile.shape("box", "table", {"half_extents": (0.5, 0.5, 0.05)}, pos=(0, 0, 0), **random_surface(rng))
+    contact_scene.shape("box", "table", {"half_extents": (0.5, 0.5, 0.05)}, pos=(0, 0, 0), **random_surface(rng))
     for number, x in enumerate((-0.25, 0.25)):
-        pile.robot(f"arm{number}", file, pos=(x, 0.05 * number, 0.3), **random_surface(rng))
-        pile.shape(
+        contact_scene.robot(f"arm{number}", file, pos=(x, 0.05 * number, 0.3), **random_surface(rng))
+        contact_scene.shape(
             "box",
             f"hand{number}",
             {"half_extents": (0.03, 0.04, 0.06)},
@@ -116,9 +116,9 @@ def two_arms(folder: Path, rng: Generator, cone: str, impratio: float) -> Pile:
             body=f"arm{number}/upper",
             **random_surface(rng),
         )
-    pile.body("ball", np.array([0.0, 0.0, 0.2]), turn(rng))
-    pile.shape("sphere", "skin", {"radius": 0.06}, body="ball", **random_surface(rng))
-    return pile
+    contact_scene.body("ball", np.array([0.0, 0.0, 0.2]), turn(rng))
+    contact_scene.shape("sphere", "skin", {"radius": 0.06}, body="ball", **random_surface(rng))
+    return contact_scene
 
 
 def tilted(rng: Generator, angle: float) -> Array:
@@ -130,22 +130,24 @@ def tilted(rng: Generator, angle: float) -> Array:
 
 
 @contextmanager
-def touching(pile: Pile, rng: Generator, precision: str, *, push: float = 1.0, steps: list[int] = STEPS):
-    """A running scene at states of MuJoCo's motion: the frame, the judge and the states."""
-    model = pile.compile()
+def touching(
+    contact_scene: ContactScene, rng: Generator, precision: str, *, push: float = 1.0, steps: list[int] = STEPS
+):
+    """A running scene at states of MuJoCo's motion: the frame, the reference and the states."""
+    model = contact_scene.compile()
     # names are known once the scene runs: one world for them
-    with tl.launch(pile.scene, worlds=len(steps), precision=precision, threads=1, fields=FIELDS) as sim:
-        judge = Judge(model, sim)
+    with tl.launch(contact_scene.scene, worlds=len(steps), precision=precision, threads=1, fields=FIELDS) as sim:
+        reference = MujocoReference(model, sim)
         q, qd = states_of(model, Coordinates(model, sim), steps, push * rng.normal(size=model.nv))
         frame = sim.write(joint_q=q, joint_qd=qd)
-        yield frame, judge, frame.joint_q.astype(float), frame.joint_qd.astype(float)
+        yield frame, reference, frame.joint_q.astype(float), frame.joint_qd.astype(float)
 
 
-def assert_accelerations(pile: Pile, rng: Generator, precision: str) -> list[int]:
+def assert_accelerations(contact_scene: ContactScene, rng: Generator, precision: str) -> list[int]:
     """Those of every state are MuJoCo's; how many contacts the states have."""
-    with touching(pile, rng, precision) as (frame, judge, q, qd):
+    with touching(contact_scene, rng, precision) as (frame, reference, q, qd):
         assert not frame.status.any()
-        results = [judge.at(*state) for state in zip(q, qd, strict=True)]
+        results = [reference.at(*state) for state in zip(q, qd, strict=True)]
         counts = [count for _, count in results]
         # which points there are is another test's matter
         same = frame.contact_count == counts
@@ -164,7 +166,7 @@ def test_accelerations_of_piles_are_mujocos(kinds, cone, precision):
     for seed in SEEDS:
         rng = np.random.default_rng([seed, len(kinds[1])])
         impratio = float(rng.choice([1.0, 10.0, 1000.0]))
-        counts += assert_accelerations(random_pile(rng, kinds, cone, impratio), rng, precision)
+        counts += assert_accelerations(random_contact_scene(rng, kinds, cone, impratio), rng, precision)
     assert max(counts) >= (15 if "box" in kinds else 5), "some states have many contacts"
     assert min(counts) == 0, "some have none"
 
@@ -172,12 +174,12 @@ def test_accelerations_of_piles_are_mujocos(kinds, cone, precision):
 @pytest.mark.parametrize("cone", CONES)
 def test_friction_of_0_is_mujocos_least(cone):
     # of a pyramid with 1e-5: at an impratio of 1000 its edges are 5e12 times as stiff as the normal
-    pile = Pile(cone=cone, impratio=1.0)
-    pile.shape("plane", "ground", {}, mu=0.0)
+    contact_scene = ContactScene(cone=cone, impratio=1.0)
+    contact_scene.shape("plane", "ground", {}, mu=0.0)
     for number in range(3):
-        pile.body(f"b{number}", np.array([0.3 * number, 0, 0.1]), turn(np.random.default_rng(number)))
-        pile.shape("box", f"s{number}", {"half_extents": (0.05, 0.06, 0.07)}, body=f"b{number}", mu=0.0)
-    assert max(assert_accelerations(pile, np.random.default_rng(0), "f64")) >= 3
+        contact_scene.body(f"b{number}", np.array([0.3 * number, 0, 0.1]), turn(np.random.default_rng(number)))
+        contact_scene.shape("box", f"s{number}", {"half_extents": (0.05, 0.06, 0.07)}, body=f"b{number}", mu=0.0)
+    assert max(assert_accelerations(contact_scene, np.random.default_rng(0), "f64")) >= 3
 
 
 @pytest.mark.parametrize("precision", TOLERANCES)
@@ -186,7 +188,7 @@ def test_a_centre_of_mass_may_lie_anywhere(cone, precision):
     # MuJoCo's constraints act on accelerations of its coordinates: those of the origin of a free body's frame
     for seed in SEEDS:
         rng = np.random.default_rng([seed, 4])
-        assert_accelerations(random_pile(rng, ["sphere", "box"], cone, 1.0, off=0.05), rng, precision)
+        assert_accelerations(random_contact_scene(rng, ["sphere", "box"], cone, 1.0, off=0.05), rng, precision)
 
 
 @pytest.mark.parametrize("precision", TOLERANCES)
@@ -204,9 +206,9 @@ def test_surfaces_combine_as_those_of_mujocos_geoms(precision):
     # MuJoCo mixes geoms by itself, but knows no kf of them, which pyramids do not read either
     for seed in SEEDS:
         rng = np.random.default_rng([seed, 7])
-        pile = random_pile(rng, ["sphere", "box"], "pyramidal", 1.0, margins=False)
-        pile.by_pairs = False
-        assert max(assert_accelerations(pile, rng, precision)) >= 1
+        contact_scene = random_contact_scene(rng, ["sphere", "box"], "pyramidal", 1.0, margins=False)
+        contact_scene.by_pairs = False
+        assert max(assert_accelerations(contact_scene, rng, precision)) >= 1
 
 
 def shallow(rng: Generator, kind: str) -> tuple[Array, Array]:
@@ -233,22 +235,22 @@ def shallow(rng: Generator, kind: str) -> tuple[Array, Array]:
 @pytest.mark.parametrize("other", ["plane", "box"])
 def test_contacts_of_a_box_with_a_plane_or_a_box_are_mujocos(other, precision):
     rng = np.random.default_rng(5)
-    pile = Pile()
+    contact_scene = ContactScene()
     if other == "plane":
-        pile.shape("plane", "floor", {}, margin=1e-3)
+        contact_scene.shape("plane", "floor", {}, margin=1e-3)
     else:
-        pile.shape("box", "floor", {"half_extents": (0.3, 0.2, 0.1)}, pos=(0, 0, -0.1), margin=1e-3)
-    pile.body("b", np.zeros(3), np.array([0.0, 0, 0, 1]))
-    pile.shape("box", "s", {"half_extents": (0.1, 0.08, 0.06)}, body="b", gap=2e-3)
-    model, worlds = pile.compile(), 300
+        contact_scene.shape("box", "floor", {"half_extents": (0.3, 0.2, 0.1)}, pos=(0, 0, -0.1), margin=1e-3)
+    contact_scene.body("b", np.zeros(3), np.array([0.0, 0, 0, 1]))
+    contact_scene.shape("box", "s", {"half_extents": (0.1, 0.08, 0.06)}, body="b", gap=2e-3)
+    model, worlds = contact_scene.compile(), 300
     poses = [np.r_[shallow(rng, ("face", "edge", "any")[world % 3])] for world in range(worlds)]
     seen, odd = set(), []
-    with tl.launch(pile.scene, worlds=worlds, precision=precision, threads=1, fields=FIELDS) as sim:
-        judge = Judge(model, sim)
+    with tl.launch(contact_scene.scene, worlds=worlds, precision=precision, threads=1, fields=FIELDS) as sim:
+        reference = MujocoReference(model, sim)
         frame = sim.write(joint_q=np.array(poses))
         for world in range(worlds):
-            judge.at(frame.joint_q[world], frame.joint_qd[world])
-            theirs = judge.contacts()
+            reference.at(frame.joint_q[world], frame.joint_qd[world])
+            theirs = reference.contacts()
             count = int(frame.contact_count[world])
             if count != len(theirs):
                 odd.append((poses[world], count, theirs))
@@ -283,19 +285,19 @@ REST: dict[str, Callable[[Path], tuple]] = {
 @pytest.mark.parametrize("thing", REST)
 def test_a_body_at_rest_is_carried_as_mujocos(tmp_path, thing, floor, precision):
     kind, size, frame_of_shape, height = REST[thing](tmp_path)
-    pile = Pile(dt=1 / 480, substeps=96)
+    contact_scene = ContactScene(dt=1 / 480, substeps=96)
     if floor == "plane":
-        pile.shape("plane", "floor", {})
+        contact_scene.shape("plane", "floor", {})
     elif floor == "box":
-        pile.shape("box", "floor", {"half_extents": (0.5, 0.4, 0.1)}, pos=(0, 0, -0.1))
+        contact_scene.shape("box", "floor", {"half_extents": (0.5, 0.4, 0.1)}, pos=(0, 0, -0.1))
     else:
         slab = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.4, 0.4) for z in (-0.2, 0)])
-        pile.shape("mesh", "floor", {"points": slab, "file": tmp_path / "slab.obj"})
-    pile.body("b", np.array([0.02, 0.01, height + 1e-4]), np.array([0.0, 0, 0, 1]))
-    pile.shape(kind, "s", size, body="b", **frame_of_shape)
-    model = pile.compile()
-    with tl.launch(pile.scene, worlds=2, precision=precision, threads=1, fields=FIELDS) as sim:
-        judge = Judge(model, sim)
+        contact_scene.shape("mesh", "floor", {"points": slab, "file": tmp_path / "slab.obj"})
+    contact_scene.body("b", np.array([0.02, 0.01, height + 1e-4]), np.array([0.0, 0, 0, 1]))
+    contact_scene.shape(kind, "s", size, body="b", **frame_of_shape)
+    model = contact_scene.compile()
+    with tl.launch(contact_scene.scene, worlds=2, precision=precision, threads=1, fields=FIELDS) as sim:
+        reference = MujocoReference(model, sim)
         start = sim.reset().joint_q[0].astype(float)
         weight = model.body_mass[1] * 9.81
         # the second world is pushed along what lies, and leaned on
@@ -304,10 +306,10 @@ def test_a_body_at_rest_is_carried_as_mujocos(tmp_path, thing, floor, precision)
         for _ in range(20):
             frame = sim.step(joint_f=push)
         for world in range(2):
-            judge.at(start, np.zeros(6), push[world])
+            reference.at(start, np.zeros(6), push[world])
             for _ in range(20 * 96):
-                mujoco.mj_step(model, judge.data)
-            carried = judge.constraint_force(ours(judge.to, judge.data)[0])
+                mujoco.mj_step(model, reference.data)
+            carried = reference.constraint_force(ours(reference.to, reference.data)[0])
             # torques about an arm of a tenth of a metre count as forces
             scale = weight * np.array([1, 1, 1, 0.1, 0.1, 0.1])
             error = np.abs(frame.constraint_force[world] - carried) / scale

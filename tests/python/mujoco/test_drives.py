@@ -5,8 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
-from judge import Case, assert_dynamics, assert_motion, running, scene_of
-from trees import Features, random_urdf
+from comparison import Case, assert_dynamics, assert_motion, running, scene_of
+from random_trees import Features, random_urdf
 
 import tightloop as tl
 
@@ -75,8 +75,8 @@ def test_effort_limit_clamps_the_sum_of_the_drive_as_mujocos(tmp_path, seed, dof
         move_targets(case, seed)
         # the first world is so near that nothing clamps
         case.commands.joint_target_q[0], case.commands.joint_target_qd[0] = 1e-3, 1e-3
-        _, judge = assert_dynamics(case)
-        clamped = np.abs(judge.drive) == limit
+        _, expected = assert_dynamics(case)
+        clamped = np.abs(expected.drive) == limit
         assert clamped.any(), "some drives are clamped"
         assert not clamped[0].any(), "some are not"
         assert_motion(case)
@@ -88,8 +88,8 @@ def test_an_effort_limit_of_zero_leaves_only_the_damping_of_the_step(tmp_path, s
     scene.robots["r0"].joint_effort_limit = 0.0
     with running(scene, seed=seed) as case:
         move_targets(case, seed)
-        _, judge = assert_dynamics(case)
-        assert not judge.drive.any()
+        _, expected = assert_dynamics(case)
+        assert not expected.drive.any()
         assert_motion(case)
 
 
@@ -121,7 +121,7 @@ def test_joint_damping_stays_beside_kd(tmp_path, seed, dofs):
     robot = scene.robots["r0"]
     robot.joint_target_ke, robot.joint_target_kd, robot.joint_armature = KE, KD, 0.1
     with running(scene, seed=seed) as case:
-        assert (case.twin.model.dof_damping > 0).all()
+        assert (case.reference.model.dof_damping > 0).all()
         move_targets(case, seed)
         assert_dynamics(case)
         assert_motion(case)
@@ -135,14 +135,14 @@ def test_a_clamped_drive_keeps_the_derivative_of_kd(tmp_path, seed, dofs):
     robot.joint_target_kd, robot.joint_effort_limit = 100.0, 0.1
     with running(scene, seed=seed, frames=50) as case:
         case.commands.joint_target_q += 1.0
-        _, judge = assert_dynamics(case)
-        assert (np.abs(judge.drive) == 0.1).mean() > 0.9
+        _, expected = assert_dynamics(case)
+        assert (np.abs(expected.drive) == 0.1).mean() > 0.9
         ours = assert_motion(case)
         # MuJoCo drops the derivative when the actuators' own range clamps
-        model = case.twin.model
+        model = case.reference.model
         model.actuator_forcelimited[:] = True
         model.actuator_forcerange[:] = [-0.05, 0.05]
-        dropped, _ = case.twin.trajectory(case.q, case.qd, case.commands, case.sim.substeps)
+        dropped, _ = case.reference.trajectory(case.q, case.qd, case.commands, case.sim.substeps)
         assert np.abs(dropped - ours).max() > 1e-3
         assert model.opt.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from judge import DOUBLE, MOTION, NOTHING, SINGLE, assert_link_frames
+from comparison import DOUBLE, MOTION, NOTHING, SINGLE, assert_link_frames
+from mujoco_model import CHAOS, ITERATIONS, PERTURBATION, Array
 from numpy.random import Generator
-from robots import KINDS, SCALARS, Coordinates, Tree, judge_of, random_tree
-from twin import CHAOS, ITERATIONS, PERTURBATION, Array
+from random_robots import KINDS, SCALARS, Coordinates, Tree, mujoco_model_of, random_tree
 
 import tightloop as tl
 
@@ -111,7 +111,7 @@ def command(to: Coordinates, data: mujoco.MjData, q: Array, commands: dict[str, 
 def test_dynamics_of_every_joint_are_mujocos(tmp_path, seed, dofs, precision):
     tolerances = DOUBLE if precision == "f64" else SINGLE
     scene, trees, rng = random_scene(tmp_path, seed, dofs)
-    model = judge_of(scene, trees)
+    model = mujoco_model_of(scene, trees)
     with launch(scene, precision) as sim:
         assert len(sim.dof_names) == dofs
         to, data = Coordinates(model, sim), mujoco.MjData(model)
@@ -151,7 +151,7 @@ def test_single_precision_holds_along_a_chain_of_forty_dofs(tmp_path, seed):
     (tmp_path / "chain.urdf").write_text(tree.text())
     scene = tl.Scene(dt=1e-3, substeps=1)
     scene.add_urdf(tmp_path / "chain.urdf", name="r")
-    model = judge_of(scene, {"r": tree})
+    model = mujoco_model_of(scene, {"r": tree})
     with launch(scene, "f32") as sim:
         to, data = Coordinates(model, sim), mujoco.MjData(model)
         for _ in range(20):
@@ -186,7 +186,7 @@ def test_single_precision_carries_a_heavy_load_on_a_light_chain(tmp_path, dofs, 
     (tmp_path / "chain.urdf").write_text(tree.text())
     scene = tl.Scene(dt=1e-3, substeps=1)
     scene.add_urdf(tmp_path / "chain.urdf", name="r")
-    model = judge_of(scene, {"r": tree})
+    model = mujoco_model_of(scene, {"r": tree})
     with launch(scene, "f32") as sim:
         data = mujoco.MjData(model)
         for _ in range(20):
@@ -199,7 +199,7 @@ def test_single_precision_carries_a_heavy_load_on_a_light_chain(tmp_path, dofs, 
 @SCENES
 def test_two_hundred_steps_of_every_joint_follow_mujoco(tmp_path, seed, dofs):
     scene, trees, rng = random_scene(tmp_path, seed, dofs)
-    model = judge_of(scene, trees)
+    model = mujoco_model_of(scene, trees)
     with launch(scene, "f64") as sim:
         to, data, nudged = Coordinates(model, sim), mujoco.MjData(model), mujoco.MjData(model)
         q, qd = random_state(rng, sim)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
+from contact_scenes import ContactScene, turn
+from mujoco_model import Array
 from numpy.random import Generator
-from piles import Pile, turn
-from robots import Coordinates
-from twin import Array
+from random_robots import Coordinates
 
 import tightloop as tl
 
@@ -43,16 +43,16 @@ def poses(rng: Generator) -> Array:
 @pytest.mark.parametrize("kind", OTHERS)
 def test_distances_of_cylinders_are_those_of_geom_distance(tmp_path, kind):
     rng = np.random.default_rng(list(OTHERS).index(kind))
-    pile = Pile()
+    contact_scene = ContactScene()
     size = OTHERS[kind] or {"points": WEDGE, "file": tmp_path / "wedge.obj"}
-    pile.shape(kind, "other", size, gap=FAR, quat=turn(rng))
-    pile.body("c", np.zeros(3), np.array([0.0, 0, 0, 1]))
-    pile.shape("cylinder", "round", CYLINDER, body="c")
-    model = pile.compile()
+    contact_scene.shape(kind, "other", size, gap=FAR, quat=turn(rng))
+    contact_scene.body("c", np.zeros(3), np.array([0.0, 0, 0, 1]))
+    contact_scene.shape("cylinder", "round", CYLINDER, body="c")
+    model = contact_scene.compile()
     data = mujoco.MjData(model)
     geoms = [model.geom(name).id for name in ("other", "c/round")]
     fields = ("joint_q", "contact_count", "contact_distance", "contact_normal", "contact_pair")
-    with tl.launch(pile.scene, worlds=WORLDS, precision="f64", fields=fields) as sim:
+    with tl.launch(contact_scene.scene, worlds=WORLDS, precision="f64", fields=fields) as sim:
         to = Coordinates(model, sim)
         frame = sim.write(joint_q=poses(rng)).copy()
         other = sim.shape_names.index("other")

@@ -7,9 +7,9 @@ import itertools
 import mujoco
 import numpy as np
 import pytest
-from piles import lesson
-from robots import Coordinates, matrix
-from twin import Array
+from contact_scenes import lesson
+from mujoco_model import Array
+from random_robots import Coordinates, matrix
 
 import tightloop as tl
 from conftest import REPOSITORY
@@ -20,11 +20,11 @@ SECONDS = 60
 @pytest.mark.parametrize("precision", ["f64", "f32"])
 def test_the_cube_slips_no_more_than_mujocos(precision):
     targets = np.loadtxt(REPOSITORY / "tests/data/grasp_targets.csv", delimiter=",", dtype=np.float32)
-    pile, compiled = lesson(driven=True)
-    pile.body("cube", np.array([0.0, -0.35, 0.125]), np.array([0.0, 0, 0, 1]))
-    pile.shape("box", "skin", {"half_extents": (0.025,) * 3}, body="cube", density=400.0, margin=1e-3)
+    contact_scene, compiled = lesson(driven=True)
+    contact_scene.body("cube", np.array([0.0, -0.35, 0.125]), np.array([0.0, 0, 0, 1]))
+    contact_scene.shape("box", "skin", {"half_extents": (0.025,) * 3}, body="cube", density=400.0, margin=1e-3)
     model = compiled()
-    with tl.launch(pile.scene, worlds=1, precision=precision, threads=1, fields=("joint_q", "body_q")) as sim:
+    with tl.launch(contact_scene.scene, worlds=1, precision=precision, threads=1, fields=("joint_q", "body_q")) as sim:
         to, data = Coordinates(model, sim), mujoco.MjData(model)
         data.qpos[:] = to.positions(sim.reset().joint_q[0].astype(float))
         hand, cube = (sim.body_names.index(name) for name in ("arm/fr3_hand", "cube/body"))

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from judge import DOUBLE, assert_dynamics, assert_motion, running, scene_of
-from trees import Features, random_urdf
+from comparison import DOUBLE, assert_dynamics, assert_motion, running, scene_of
+from random_trees import Features, random_urdf
 
 # The first one's joint has a range
 TREES = pytest.mark.parametrize(("seed", "dofs"), [(24, 1), (1, 3), (2, 5), (3, 8), (4, 12)])
@@ -52,9 +52,11 @@ def test_a_limit_is_soft_within_a_millimetre_as_mujocos(tmp_path, seed, dofs):
     # the impedance rises over that width, along two parabolas
     scene = scene_of(tmp_path, random_urdf(seed, dofs, Features(limits=True)))
     with running(scene, seed=seed, worlds=32) as case:
-        lower, upper = case.twin.model.jnt_range.T
+        lower, upper = case.reference.model.jnt_range.T
         depth = np.linspace(0, 1.2e-3, 32)[:, None]
-        case.q[:] = np.where(case.twin.model.jnt_limited, np.where(case.qd > 0, upper + depth, lower - depth), case.q)
+        case.q[:] = np.where(
+            case.reference.model.jnt_limited, np.where(case.qd > 0, upper + depth, lower - depth), case.q
+        )
         frame, _ = assert_dynamics(case)
         assert (frame.efc_D[1:] != 0).all()
         assert len(np.unique(frame.efc_D[:, 0])) > 20
@@ -65,7 +67,7 @@ def test_a_start_outside_its_limits_settles_as_mujocos(tmp_path, seed, dofs):
     scene = scene_of(tmp_path, random_urdf(seed, dofs, Features(limits=True, damping=True)), gravity=(0, 0, 0))
     robot = scene.robots["r0"]
     with running(scene, seed=seed) as case:
-        limited, (lower, upper) = case.twin.model.jnt_limited.astype(bool), case.twin.model.jnt_range.T
+        limited, (lower, upper) = case.reference.model.jnt_limited.astype(bool), case.reference.model.jnt_range.T
     narrow = limited & (upper < 1)
     assert narrow.any()
     # a tenth of the range outside, above and below in turn
@@ -88,9 +90,9 @@ def test_dry_friction_sticks_and_slides_as_mujocos(tmp_path, seed, dofs):
     with running(scene, seed=seed, worlds=8) as case:
         # from rest to fast
         case.qd *= np.linspace(0, 1, 8)[:, None] ** 4
-        _, judge = assert_dynamics(case)
-        loss = case.twin.model.dof_frictionloss[case.twin.model.dof_frictionloss > 0]
-        slides = np.array([np.isclose(np.abs(rows.force), loss, rtol=1e-9) for rows in judge.rows])
+        _, expected = assert_dynamics(case)
+        loss = case.reference.model.dof_frictionloss[case.reference.model.dof_frictionloss > 0]
+        slides = np.array([np.isclose(np.abs(rows.force), loss, rtol=1e-9) for rows in expected.rows])
         assert slides.any(), "some slide"
         assert not slides.all(), "some stick"
         assert_motion(case)
@@ -102,7 +104,7 @@ def test_mimics_follow_as_mujocos(tmp_path, seed, dofs):
     scene = scene_of(tmp_path, random_urdf(seed, max(dofs, 2), features))
     scene.robots["r0"].joint_armature = ARMATURE
     with running(scene, seed=seed) as case:
-        assert case.twin.model.neq == features.mimics
+        assert case.reference.model.neq == features.mimics
         case.q *= 0.1
         assert_dynamics(case)
         assert_motion(case)
@@ -139,7 +141,7 @@ def test_joint_damping_is_mujocos(tmp_path, seed, dofs):
     # a long step, where damping in the step and damping at its start differ
     scene = scene_of(tmp_path, text.replace('damping="1.', 'damping="31.'), dt=1 / 100)
     with running(scene, seed=seed) as case:
-        assert case.twin.model.dof_damping.any()
+        assert case.reference.model.dof_damping.any()
         assert_dynamics(case)
         assert_motion(case)
 
@@ -170,7 +172,7 @@ def test_axes_of_any_length_and_the_default_axis_are_mujocos(tmp_path):
 
 def test_turns_of_many_rounds_are_mujocos(tmp_path):
     with running(scene_of(tmp_path, random_urdf(3, 6)), worlds=16) as case:
-        case.q *= np.geomspace(1, 1e4, 16)[:, None] ** ~case.twin.slides
+        case.q *= np.geomspace(1, 1e4, 16)[:, None] ** ~case.reference.slides
         assert np.abs(case.q).max() > 1e4
         # the angle itself is rounded, to 1e4 × 1e-16
         assert_dynamics(case, replace(DOUBLE, pose=1e-10))

@@ -8,10 +8,10 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from judge import DOUBLE
-from robots import Coordinates
+from comparison import DOUBLE
+from mujoco_model import ITERATIONS
+from random_robots import Coordinates
 from test_every_joint import off
-from twin import ITERATIONS
 
 import tightloop as tl
 

@@ -7,10 +7,10 @@ import copy
 import mujoco
 import numpy as np
 import pytest
+from contact_scenes import ContactScene, MujocoReference, lesson, states_of
+from mujoco_model import Array
 from numpy.random import Generator
-from piles import Judge, Pile, lesson, states_of
-from robots import Coordinates
-from twin import Array
+from random_robots import Coordinates
 
 import tightloop as tl
 from conftest import START
@@ -74,14 +74,14 @@ def assert_same(
     touching = 0
     for world in range(WORLDS):
         own = give(model, sim, world, params)
-        judge = Judge(own, sim)
+        reference = MujocoReference(own, sim)
         push = np.zeros((own.nbody, 6))
         for link, wrench in zip(sim.body_names, params["body_f"][world], strict=True):
             body = mujoco.mj_name2id(own, mujoco.mjtObj.mjOBJ_BODY, link)
             if body >= 0:
                 push[body] = wrench
         here, speed = frame.joint_q[world].astype(float), frame.joint_qd[world].astype(float)
-        expected, count = judge.at(here, speed, push=push, control=targets(own, sim))
+        expected, count = reference.at(here, speed, push=push, control=targets(own, sim))
         off = np.abs(frame.joint_qdd[world] - expected).max() / max(1.0, np.abs(expected).max())
         assert off < TOLERANCES[sim.precision], f"world {world}: {off}"
         touching += count > 0
@@ -98,11 +98,15 @@ def targets(model: mujoco.MjModel, sim: tl.Sim) -> Array:
 @pytest.mark.parametrize("precision", TOLERANCES)
 def test_an_arm_with_numbers_of_its_own_in_each_world(precision: str):
     rng = np.random.default_rng(5)
-    pile, compiled = lesson(driven=True)
+    contact_scene, compiled = lesson(driven=True)
     model = compiled()
     names = ("gravity", "body_mass_scale", *OF_DOFS, "shape_mu", "body_f")
     with tl.launch(
-        pile.scene, worlds=WORLDS, precision=precision, params=names, fields=("joint_q", "joint_qd", "joint_qdd")
+        contact_scene.scene,
+        worlds=WORLDS,
+        precision=precision,
+        params=names,
+        fields=("joint_q", "joint_qd", "joint_qdd"),
     ) as sim:
         assert sim.params.names == names
         params = {name: around(rng, getattr(sim.params, name)[0]) for name in names[:-1]}
@@ -117,15 +121,21 @@ def test_an_arm_with_numbers_of_its_own_in_each_world(precision: str):
 @pytest.mark.parametrize("precision", TOLERANCES)
 def test_bodies_that_lie_and_slide_with_numbers_of_their_own(precision: str):
     rng = np.random.default_rng(6)
-    pile = Pile()
-    pile.shape("plane", "ground", {}, mu=0.4)
+    contact_scene = ContactScene()
+    contact_scene.shape("plane", "ground", {}, mu=0.4)
     for number in range(4):
-        pile.body(f"b{number}", np.array([0.2 * number, 0, 0.06 + 0.02 * number]), np.array([0, 0, 0, 1.0]))
-        pile.shape("box", f"s{number}", {"half_extents": (0.05, 0.04, 0.05)}, body=f"b{number}", mu=0.2 * number)
-    model = pile.compile()
+        contact_scene.body(f"b{number}", np.array([0.2 * number, 0, 0.06 + 0.02 * number]), np.array([0, 0, 0, 1.0]))
+        contact_scene.shape(
+            "box", f"s{number}", {"half_extents": (0.05, 0.04, 0.05)}, body=f"b{number}", mu=0.2 * number
+        )
+    model = contact_scene.compile()
     names = ("gravity", "body_mass_scale", "shape_mu", "body_f")
     with tl.launch(
-        pile.scene, worlds=WORLDS, precision=precision, params=names, fields=("joint_q", "joint_qd", "joint_qdd")
+        contact_scene.scene,
+        worlds=WORLDS,
+        precision=precision,
+        params=names,
+        fields=("joint_q", "joint_qd", "joint_qdd"),
     ) as sim:
         steps = list(np.linspace(20, 300, WORLDS, dtype=int))
         q, qd = states_of(model, Coordinates(model, sim), steps, rng.uniform(-0.5, 0.5, model.nv))

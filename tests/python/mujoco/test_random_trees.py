@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from judge import (
+from comparison import (
     DOUBLE,
     SINGLE,
     Case,
@@ -21,8 +21,8 @@ from judge import (
     running,
     scene_of,
 )
-from trees import PLAIN, Features, random_urdf
-from twin import Evaluation
+from mujoco_model import Evaluation
+from random_trees import PLAIN, Features, random_urdf
 
 import tightloop as tl
 
@@ -51,8 +51,8 @@ def evaluated(tree: Case) -> tuple[tl.Frame, Evaluation]:
 
 
 def test_mass_matrix_is_mujocos(evaluated):
-    frame, judge = evaluated
-    assert_close("mass_matrix", frame.mass_matrix, judge.mass_matrix, DOUBLE.dynamics)
+    frame, expected = evaluated
+    assert_close("mass_matrix", frame.mass_matrix, expected.mass_matrix, DOUBLE.dynamics)
 
 
 def test_energy_is_mujocos(evaluated):
@@ -62,18 +62,18 @@ def test_energy_is_mujocos(evaluated):
 
 
 def test_bias_force_is_mujocos(evaluated):
-    frame, judge = evaluated
-    assert_close("bias_force", frame.bias_force, judge.bias_force, DOUBLE.dynamics)
+    frame, expected = evaluated
+    assert_close("bias_force", frame.bias_force, expected.bias_force, DOUBLE.dynamics)
 
 
 def test_acceleration_is_mujocos(evaluated):
-    frame, judge = evaluated
-    assert_close("joint_qdd", frame.joint_qdd, judge.joint_qdd, DOUBLE.acceleration)
+    frame, expected = evaluated
+    assert_close("joint_qdd", frame.joint_qdd, expected.joint_qdd, DOUBLE.acceleration)
 
 
 def test_link_frames_are_mujocos(evaluated):
-    frame, judge = evaluated
-    assert_link_frames(frame.body_q, judge.body_q, DOUBLE.pose)
+    frame, expected = evaluated
+    assert_link_frames(frame.body_q, expected.body_q, DOUBLE.pose)
 
 
 def test_two_hundred_steps_follow_mujoco(tree):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from judge import FIELDS, assert_close, assert_link_frames
+from comparison import FIELDS, assert_close, assert_link_frames
 
 import tightloop as tl
 from conftest import REPOSITORY

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from judge import MOTION, assert_close, assert_dynamics, assert_link_frames, assert_motion, running, scene_of
-from trees import Features, random_urdf
+from comparison import MOTION, assert_close, assert_dynamics, assert_link_frames, assert_motion, running, scene_of
+from random_trees import Features, random_urdf
 
 TREES = pytest.mark.parametrize(("seed", "dofs"), [(10, 2), (11, 6), (12, 11)])
 EVERYTHING = Features(limits=True, friction=True, damping=True, effort=True, mimics=2)
@@ -83,7 +83,9 @@ def test_several_robots_are_as_mujocos(tmp_path, seed, dofs):
         frame, _ = assert_dynamics(case)
         # one robot's dofs do not feel the other's
         blocks = list(case.sim.dofs.values())
-        assert not frame.mass_matrix.reshape(-1, case.twin.dofs, case.twin.dofs)[:, blocks[0], blocks[1]].any()
+        assert not frame.mass_matrix.reshape(-1, case.reference.dofs, case.reference.dofs)[
+            :, blocks[0], blocks[1]
+        ].any()
         assert_motion(case)
 
 
@@ -124,11 +126,11 @@ def test_fields_of_a_frame_belong_to_its_state(tmp_path, seed, dofs):
         held = case.commands.at(0)
         for _ in range(20):
             frame = case.sim.step(**held)
-        judge = case.twin.evaluate(frame.joint_q, frame.joint_qd, *held.values())
-        assert_close("mass_matrix", frame.mass_matrix, judge.mass_matrix, 1e-8)
-        assert_close("bias_force", frame.bias_force, judge.bias_force, 1e-8)
-        assert_close("joint_qdd", frame.joint_qdd, judge.joint_qdd, 1e-8)
-        assert_link_frames(frame.body_q, judge.body_q, 1e-12)
+        expected = case.reference.evaluate(frame.joint_q, frame.joint_qd, *held.values())
+        assert_close("mass_matrix", frame.mass_matrix, expected.mass_matrix, 1e-8)
+        assert_close("bias_force", frame.bias_force, expected.bias_force, 1e-8)
+        assert_close("joint_qdd", frame.joint_qdd, expected.joint_qdd, 1e-8)
+        assert_link_frames(frame.body_q, expected.body_q, 1e-12)
 
 
 @TREES
@@ -149,7 +151,7 @@ def test_what_a_step_leaves_out_keeps_its_last_value(tmp_path, seed, dofs):
         for number in range(1, 60):
             changed = {20: ("joint_f",), 40: ("joint_target_q",)}.get(number, ())
             frame = sim.step(**{name: commands.at(number)[name] for name in changed})
-        theirs, _ = case.twin.trajectory(case.q, case.qd, commands, sim.substeps)
+        theirs, _ = case.reference.trajectory(case.q, case.qd, commands, sim.substeps)
         assert np.abs(frame.joint_q - theirs[:, -1]).max() <= MOTION
 
 

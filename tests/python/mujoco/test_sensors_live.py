@@ -7,12 +7,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from judge import DOUBLE, SINGLE
+from comparison import DOUBLE, SINGLE
+from contact_scenes import ContactScene, MujocoReference
+from mujoco_model import Array
 from numpy.random import Generator
-from piles import Judge, Pile
-from robots import Coordinates, judge_of
+from random_robots import Coordinates, mujoco_model_of
 from test_every_joint import command, off, random_commands, random_scene, random_state
-from twin import Array
 
 import tightloop as tl
 
@@ -73,7 +73,7 @@ def test_sites_and_torques_of_random_robots_are_mujocos(tmp_path: Path, seed: in
     tolerances = DOUBLE if precision == "f64" else SINGLE
     scene, trees, rng = random_scene(tmp_path, seed, dofs)
     add_sites(rng, scene)
-    model = judge_of(scene, trees, lambda spec: give_sites(scene, spec))
+    model = mujoco_model_of(scene, trees, lambda spec: give_sites(scene, spec))
     with tl.launch(scene, worlds=1, precision=precision, fields=FIELDS) as sim:
         assert sim.site_names == [f"s{number}" for number in range(SITES)]
         to, data = Coordinates(model, sim), mujoco.MjData(model)
@@ -129,7 +129,7 @@ def jacobian(model: mujoco.MjModel, data: mujoco.MjData, scene: tl.Scene, site: 
 def test_inverse_jacobians_of_sites_of_random_robots_are_mujocos(tmp_path: Path, seed: int, dofs: int, precision: str):
     scene, trees, rng = random_scene(tmp_path, seed, dofs)
     add_sites(rng, scene)
-    model = judge_of(scene, trees, lambda spec: give_sites(scene, spec))
+    model = mujoco_model_of(scene, trees, lambda spec: give_sites(scene, spec))
     with tl.launch(scene, worlds=1, precision=precision, fields=("joint_q", "site_inverse_jacobian")) as sim:
         to, data = Coordinates(model, sim), mujoco.MjData(model)
         for _ in range(STATES):
@@ -153,7 +153,7 @@ def test_inverse_jacobians_of_sites_of_random_robots_are_mujocos(tmp_path: Path,
 def test_dry_friction_of_each_world_is_mujocos(tmp_path: Path, seed: int, dofs: int, precision: str):
     tolerances = DOUBLE if precision == "f64" else SINGLE
     scene, trees, rng = random_scene(tmp_path, seed, dofs)
-    model = judge_of(scene, trees)
+    model = mujoco_model_of(scene, trees)
     worlds = 6
     with tl.launch(scene, worlds=worlds, precision=precision, params=("joint_friction",), fields=FIELDS) as sim:
         to, data = Coordinates(model, sim), mujoco.MjData(model)
@@ -182,27 +182,30 @@ def test_dry_friction_of_each_world_is_mujocos(tmp_path: Path, seed: int, dofs: 
 @PRECISIONS
 def test_contact_sensors_add_up_what_mujoco_has_of_each_contact(precision: str):
     rng = np.random.default_rng(8)
-    pile = Pile()
-    pile.shape("plane", "ground", {})
+    contact_scene = ContactScene()
+    contact_scene.shape("plane", "ground", {})
     for number, height in enumerate((0.049, 0.147)):
-        pile.body(f"b{number}", np.array([0.01 * number, 0, height]), np.array([0, 0, 0, 1.0]))
-        pile.shape("box", f"s{number}", {"half_extents": (0.05, 0.05, 0.05)}, body=f"b{number}")
-    model = pile.compile()
+        contact_scene.body(f"b{number}", np.array([0.01 * number, 0, height]), np.array([0, 0, 0, 1.0]))
+        contact_scene.shape("box", f"s{number}", {"half_extents": (0.05, 0.05, 0.05)}, body=f"b{number}")
+    model = contact_scene.compile()
     pairs = [("b0", None), ("b0", "b1"), ("b1/s1", "b0"), ("ground", None), ("b1", "ground")]
     for of, against in pairs:
-        pile.scene.add_contact_sensor(of=of, against=against)
+        contact_scene.scene.add_contact_sensor(of=of, against=against)
     with tl.launch(
-        pile.scene, worlds=1, precision=precision, fields=("joint_q", "joint_qd", "contact_sensor", "contact_count")
+        contact_scene.scene,
+        worlds=1,
+        precision=precision,
+        fields=("joint_q", "joint_qd", "contact_sensor", "contact_count"),
     ) as sim:
         assert sim.contact_sensor_names == ["contact", *(f"contact_{k}" for k in range(2, 6))]
         frame = sim.write(joint_qd=rng.uniform(-0.1, 0.1, (1, 12)))
-        judge = Judge(model, sim)
-        _, count = judge.at(frame.joint_q[0].astype(float), frame.joint_qd[0].astype(float))
+        reference = MujocoReference(model, sim)
+        _, count = reference.at(frame.joint_q[0].astype(float), frame.joint_qd[0].astype(float))
         assert count == frame.contact_count[0] == 8
         expected = np.zeros((len(pairs), 3))
-        for number, contact in enumerate(judge.data.contact):
+        for number, contact in enumerate(reference.data.contact):
             wrench = np.zeros(6)
-            mujoco.mj_contactForce(model, judge.data, number, wrench)
+            mujoco.mj_contactForce(model, reference.data, number, wrench)
             # on the second geom, along the contact's axes
             force = contact.frame.reshape(3, 3).T @ wrench[:3]
             first, second = (model.geom(geom).name for geom in contact.geom)

@@ -7,16 +7,16 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from piles import lesson, ours
-from robots import Coordinates
-from twin import Array
+from contact_scenes import lesson, ours
+from mujoco_model import Array
+from random_robots import Coordinates
 
 import tightloop as tl
 from conftest import START
 
 WORLDS, FRAMES, SUBSTEPS = 4096, 180, 8
 # Worlds of MuJoCo's, which are the first of ours
-JUDGED = 1024
+COMPARED = 1024
 # Worlds of which energies are compared
 WEIGHED = 96
 # Frames before its greatest depth from which a world is given to MuJoCo
@@ -31,10 +31,10 @@ def torque(frame: int) -> Array:
 
 
 def test_it_sinks_in_no_deeper_than_mujocos_and_gains_no_more_energy():
-    pile, compiled = lesson(driven=False)
+    contact_scene, compiled = lesson(driven=False)
     model = compiled()
     starts = START + np.random.default_rng(0).uniform(-1e-3, 1e-3, (WORLDS, 9)) * (np.arange(9) < 7)
-    with tl.launch(pile.scene, worlds=WORLDS, fields=("joint_q", "joint_qd", "contact_distance")) as sim:
+    with tl.launch(contact_scene.scene, worlds=WORLDS, fields=("joint_q", "joint_qd", "contact_distance")) as sim:
         to = Coordinates(model, sim)
         frame = sim.write(joint_q=starts)
         states, depths = [(frame.joint_q.copy(), frame.joint_qd.copy())], [np.zeros(WORLDS)]
@@ -44,20 +44,20 @@ def test_it_sinks_in_no_deeper_than_mujocos_and_gains_no_more_energy():
             states.append((frame.joint_q.copy(), frame.joint_qd.copy()))
             depths.append(-frame.contact_distance.min(axis=1))
     depth = np.max(depths, axis=0)
-    their_q, their_qd, their_depth = motion_of(model, to, judged(starts))
+    their_q, their_qd, their_depth = motion_of(model, to, compared(starts))
     # neither side's deepest world is the other's
     for share in (0.5, 0.9, 0.99):
         most = max(2e-3, 1.1 * np.quantile(their_depth, share))
         assert np.quantile(depth, share) <= most, f"{np.sort(depth)[-50:]}, MuJoCo {np.sort(their_depth)}"
     # of four times as many worlds a few are hit harder than any of MuJoCo's, which sinks in as deep when it is hit so
     beyond = np.flatnonzero(depth > max(2e-3, 1.1 * their_depth.max()))
-    assert len(beyond) <= WORLDS // JUDGED, f"{depth[beyond]}, MuJoCo {np.sort(their_depth)}"
+    assert len(beyond) <= WORLDS // COMPARED, f"{depth[beyond]}, MuJoCo {np.sort(their_depth)}"
     for world in beyond:
         deepest = int(np.argmax([row[world] for row in depths]))
         first = max(0, deepest - LED)
         q, qd = (array[world].astype(float) for array in states[first])
         assert depth[world] <= 1.1 * depth_after(model, to, q, qd, range(first, deepest)), f"world {world}"
-    q, qd = ([judged(state[k]) for state in states] for k in (0, 1))
+    q, qd = ([compared(state[k]) for state in states] for k in (0, 1))
     gain = gain_of(model, to, np.array(q)[:, :WEIGHED], np.array(qd)[:, :WEIGHED])
     theirs = gain_of(model, to, their_q[:, :WEIGHED], their_qd[:, :WEIGHED])
     for share in (0.5, 0.9, 1.0):
@@ -66,9 +66,9 @@ def test_it_sinks_in_no_deeper_than_mujocos_and_gains_no_more_energy():
         assert np.quantile(gain, share) <= most, f"{np.sort(gain)}, MuJoCo {np.sort(theirs)}"
 
 
-def judged(state: Array) -> Array:
+def compared(state: Array) -> Array:
     """Of the worlds that are compared in full."""
-    return state[:JUDGED].astype(float)
+    return state[:COMPARED].astype(float)
 
 
 def depth_after(model: mujoco.MjModel, to: Coordinates, q: Array, qd: Array, frames: range) -> float:

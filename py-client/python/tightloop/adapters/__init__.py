@@ -1,6 +1,6 @@
-"""Environments as the libraries of reinforcement learning want them; each module imports its own library.
+"""Adapters of environments to reinforcement-learning libraries; each module imports its own library.
 
-| module | library | class or function | episodes go on |
+| module | library | class or function | next episode starts |
 |---|---|---|---|
 | `tightloop.adapters.sb3` | Stable-Baselines3 | `Sb3VecEnv` | in the same step |
 | `tightloop.adapters.rsl_rl` | rsl_rl 5 | `RslRlVecEnv` | in the same step |
@@ -8,6 +8,6 @@
 | `tightloop.adapters.torchrl` | torchrl | `TorchRlEnv` | when torchrl resets them |
 | `tightloop.adapters.rllib` | RLlib | `register` | in the next step |
 
-All take a `tightloop.env.VectorEnv`, or a task and what `VectorEnv` takes besides; `register` takes a task. What they
-hand out belongs to the library, which may keep it or write into it: also where the environment has ``copy=False``.
+All take a `tightloop.env.VectorEnv`, or a task and further arguments of `VectorEnv`; `register` takes a task. They
+return copies, which the library may keep or overwrite, also if the environment has ``copy=False``.
 """

@@ -1,4 +1,4 @@
-"""RLlib: each env runner has a daemon and many worlds of its own.
+"""Adapter to RLlib: each env runner has its own daemon with many worlds.
 
 >>> from ray.rllib.algorithms.ppo import PPOConfig
 >>> from tightloop.adapters.rllib import register
@@ -14,7 +14,7 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
-from tightloop.adapters.needs import library
+from tightloop.adapters.environment import library
 from tightloop.env import Env, Task, VectorEnv
 from tightloop.errors import ArgumentError
 
@@ -22,21 +22,21 @@ registry = library("ray.tune.registry", install="ray[rllib]")
 
 
 def register(task: Task | type[Task] | str, *, name: str | None = None, **options: Any) -> str:
-    """Tell Ray, and all its workers, of a task.
+    """Register a task with Ray and all its workers.
 
-    The environments go on in the next step and return new arrays, as RLlib expects.
+    The environments start the next episode in the next step and return new arrays, as RLlib expects.
 
     Args:
         task: A task, its class or its name.
-        name: What Ray calls it; ``tightloop/`` and the task's name if left out.
-        **options: What `VectorEnv` takes besides, such as ``threads=1`` where many runners share a machine.
+        name: Name in Ray; ``tightloop/`` and the task's name if left out.
+        **options: Further arguments of `VectorEnv`, such as ``threads=1`` where many runners share a machine.
             ``environment(…, env_config={…})`` adds to them.
 
     Returns:
         The name, for ``config.environment(name)``.
 
     Raises:
-        ArgumentError: An option is not the user's to choose.
+        ArgumentError: The adapter sets one of the options itself.
     """
     _check(options)
     if name is None:
@@ -47,10 +47,10 @@ def register(task: Task | type[Task] | str, *, name: str | None = None, **option
 
 
 def make(task: Task | type[Task] | str, options: Mapping[str, Any], context: Mapping[str, Any]) -> VectorEnv | Env:
-    """What an env runner calls: with ``num_envs`` in the context many worlds, without it one.
+    """Make an environment for an env runner: many worlds with ``num_envs`` in the context, else one.
 
     Raises:
-        ArgumentError: An option is not the user's to choose.
+        ArgumentError: The adapter sets one of the options itself.
     """
     asked = {name: value for name, value in context.items() if name != "num_envs"}
     _check(asked)

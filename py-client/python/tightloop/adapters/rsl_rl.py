@@ -1,4 +1,4 @@
-"""rsl_rl: many worlds as its `VecEnv`.
+"""Adapter to rsl_rl: many worlds as its `VecEnv`.
 
 >>> from rsl_rl.runners import OnPolicyRunner
 >>> from tightloop.adapters.rsl_rl import RslRlVecEnv
@@ -13,45 +13,45 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from tightloop.adapters.needs import Given, environment, library
+from tightloop.adapters.environment import Given, adapted_environment, library
 from tightloop.errors import ArgumentError
 
 rsl_env = library("rsl_rl.env", install="rsl-rl-lib")
 tensordicts = library("tensordict", install="rsl-rl-lib")
 torch = library("torch", install="torch")
 
-#: Group of the observation, the one that rsl_rl takes where its ``obs_groups`` name no other.
+#: Group of the observation: the default of rsl_rl's ``obs_groups``.
 GROUP = "policy"
 
 
 class RslRlVecEnv(rsl_env.VecEnv):
-    """A `VectorEnv` as rsl_rl has it: a world whose episode ended begins the next one in the same step.
+    """A `VectorEnv` as a `VecEnv` of rsl_rl, which starts the next episode in the same step.
 
-    Observations are a TensorDict with the group ``"policy"``. ``extras["time_outs"]`` says where time was up, and
-    ``extras["log"]["/success"]`` which part of the episodes that ended had the task done, where the task knows.
+    Observations are a TensorDict with the group ``"policy"``. ``extras["time_outs"]`` says which episodes the time
+    limit ended, and ``extras["log"]["/success"]`` is the success rate of ended episodes, if the task defines success.
 
     Attributes:
         env: The `VectorEnv`.
-        num_envs: How many worlds.
-        num_actions: How many numbers an action has.
+        num_envs: Number of worlds.
+        num_actions: Length of an action.
         max_episode_length: Steps after which an episode is truncated.
-        device: Where torch's tensors go.
-        cfg: What is logged as this environment's configuration.
+        device: Device of torch's tensors.
+        cfg: Configuration of the environment, for logs.
     """
 
     def __init__(self, env: Given, num_envs: int | None = None, *, torch_device: str = "cpu", **options: Any) -> None:
-        """An environment of mode ``SAME_STEP``, or a task for one of its own.
+        """Adapt an environment of the mode ``SAME_STEP``, or make one for a task.
 
         Args:
             env: A `VectorEnv`, or a task.
-            num_envs: How many worlds, for a task.
-            torch_device: Where torch's tensors go, such as ``"cuda:0"``; ``device`` is that of the physics.
-            **options: What `VectorEnv` takes besides, for a task.
+            num_envs: Number of worlds, for a task.
+            torch_device: Device of torch's tensors, such as ``"cuda:0"``; ``device`` is that of the physics.
+            **options: Further arguments of `VectorEnv`, for a task.
 
         Raises:
-            ArgumentError: The environment has another autoreset mode, or episodes without end.
+            ArgumentError: The environment has another autoreset mode, or endless episodes.
         """
-        self.env = environment(env, num_envs, AutoresetMode.SAME_STEP, options)
+        self.env = adapted_environment(env, num_envs, AutoresetMode.SAME_STEP, options)
         if self.env.max_episode_steps is None:
             raise ArgumentError("max_episode_steps: rsl_rl needs episodes that end; give a number")
         self.num_envs = self.env.num_envs
@@ -68,9 +68,9 @@ class RslRlVecEnv(rsl_env.VecEnv):
 
     @property
     def episode_length_buf(self) -> Any:
-        """Steps of each world's episode so far, int64, shape ``(num_envs,)``: a copy; assigning sets them.
+        """Steps of each world's episode, int64, shape ``(num_envs,)``: a copy; assign to it to set them.
 
-        rsl_rl does so that the first episodes do not all end at once.
+        rsl_rl assigns to it so that the first episodes do not all end at once.
         """
         return torch.tensor(self.env.elapsed, dtype=torch.long, device=self.device)
 
@@ -81,13 +81,13 @@ class RslRlVecEnv(rsl_env.VecEnv):
         self.env.elapsed = steps.cpu().numpy()
 
     def reset(self, seed: int | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begin episodes in all worlds; world i gets the seed ``seed + i``. Observations and no extras."""
+        """Start episodes in all worlds; world i gets the seed ``seed + i``. Returns observations and empty extras."""
         obs, _ = self.env.reset(seed=seed)
         self._obs = self._observation(obs)
         return self._obs, {}
 
     def get_observations(self) -> Any:
-        """The last observations, those of a reset at first."""
+        """Return the last observations; the first call resets all worlds."""
         if self._obs is None:
             self.reset()
         return self._obs
@@ -96,7 +96,7 @@ class RslRlVecEnv(rsl_env.VecEnv):
         """Advance all worlds by one control step.
 
         Args:
-            actions: Shape ``(num_envs, num_actions)``; what is beyond the bounds of actions counts as the bound.
+            actions: Shape ``(num_envs, num_actions)``, clipped to the bounds of actions.
 
         Returns:
             Observations, rewards and ends (0 or 1), shape ``(num_envs,)``, and extras.

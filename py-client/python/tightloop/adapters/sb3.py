@@ -1,4 +1,4 @@
-"""Stable-Baselines3: many worlds as its `VecEnv`.
+"""Adapter to Stable-Baselines3: many worlds as its `VecEnv`.
 
 >>> from stable_baselines3 import PPO
 >>> from tightloop.adapters.sb3 import Sb3VecEnv
@@ -15,41 +15,44 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from tightloop.adapters.needs import Given, environment, library
+from tightloop.adapters.environment import Given, adapted_environment, library
 from tightloop.errors import ArgumentError
 
 vec_env = library("stable_baselines3.common.vec_env", install="stable-baselines3")
 
 
 class Sb3VecEnv(vec_env.VecEnv):
-    """A `VectorEnv` as Stable-Baselines3 has it: a world whose episode ended begins the next one in the same step.
+    """A `VectorEnv` as a `VecEnv` of Stable-Baselines3, which starts the next episode in the same step.
 
-    The last observation of an episode is ``infos[i]["terminal_observation"]``; ``infos[i]["TimeLimit.truncated"]`` says
-    that time was up, and ``infos[i]["is_success"]`` whether the task was done then. All arrays belong to the caller.
+    ``infos[i]["terminal_observation"]`` is the last observation of an episode. ``infos[i]["TimeLimit.truncated"]`` says
+    whether the time limit ended it, and ``infos[i]["is_success"]`` whether it ended in success. All arrays are copies.
 
     Attributes:
         env: The `VectorEnv`.
     """
 
     def __init__(self, env: Given, num_envs: int | None = None, **options: Any) -> None:
-        """An environment of mode ``SAME_STEP``, or a task for one of its own.
+        """Adapt an environment of the mode ``SAME_STEP``, or make one for a task.
 
         Args:
             env: A `VectorEnv`, or a task.
-            num_envs: How many worlds, for a task.
-            **options: What `VectorEnv` takes besides, for a task.
+            num_envs: Number of worlds, for a task.
+            **options: Further arguments of `VectorEnv`, for a task.
 
         Raises:
             ArgumentError: The environment has another autoreset mode.
         """
-        self.env = environment(env, num_envs, AutoresetMode.SAME_STEP, options)
+        self.env = adapted_environment(env, num_envs, AutoresetMode.SAME_STEP, options)
         super().__init__(self.env.num_envs, self.env.single_observation_space, self.env.single_action_space)
 
     def reset(self) -> NDArray[np.float32]:
-        """Begin episodes in all worlds, with the seeds of `seed` if it was called; shape ``(num_envs, size)``.
+        """Start episodes in all worlds, with the seeds of `seed` if it was called.
+
+        Returns:
+            Observations, shape ``(num_envs, size)``.
 
         Raises:
-            ArgumentError: `set_options` was called with some.
+            ArgumentError: `set_options` was called with options.
         """
         if any(self._options):
             self._reset_options()
@@ -60,11 +63,11 @@ class Sb3VecEnv(vec_env.VecEnv):
         return obs.copy()
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Send actions, shape ``(num_envs, actions)``, and return at once."""
+        """Send actions, shape ``(num_envs, actions)``, and return at once; `step_wait` returns the results."""
         self.env.send(actions)
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
-        """What became of them: observations, rewards, ends and infos, the worlds first."""
+        """Wait for observations, rewards, ends and infos, worlds first."""
         obs, reward, terminated, truncated, infos = self.env.recv()
         done = terminated | truncated
         news: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -83,19 +86,19 @@ class Sb3VecEnv(vec_env.VecEnv):
         self.env.close()
 
     def get_images(self) -> list[Any]:
-        """A picture of each world, or None without ``render_mode="rgb_array"``."""
+        """Return a picture of each world, or None without ``render_mode="rgb_array"``."""
         pictures = None if self.env.render_mode is None else self.env.render()
         return [None] * self.num_envs if pictures is None else list(pictures)
 
     def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
-        """An attribute of the `VectorEnv`, once for each world asked for."""
+        """Return an attribute of the `VectorEnv`, once per requested world."""
         return [getattr(self.env, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None) -> None:
         """Set an attribute of the `VectorEnv`, which all worlds share.
 
         Raises:
-            ArgumentError: Only some of the worlds are meant.
+            ArgumentError: ``indices`` names only some of the worlds.
         """
         if len(set(self._get_indices(indices))) != self.num_envs:
             raise ArgumentError(f"set_attr: all worlds share {attr_name!r}; leave `indices` out")
@@ -104,10 +107,10 @@ class Sb3VecEnv(vec_env.VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: int | Iterable[int] | None = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Call a method of the `VectorEnv` once, for all worlds; its result, once for each world asked for."""
+        """Call a method of the `VectorEnv` once for all worlds; return its result once per requested world."""
         result = getattr(self.env, method_name)(*method_args, **method_kwargs)
         return [result for _ in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: int | Iterable[int] | None = None) -> list[bool]:
-        """Worlds have no wrappers of their own; `VecMonitor` and its like go around this."""
+        """Return False for each world: `VecMonitor` and the like wrap this object, not single worlds."""
         return [False for _ in self._get_indices(indices)]

@@ -1,4 +1,4 @@
-"""skrl: many worlds as its wrapped environment.
+"""Adapter to skrl: many worlds as its wrapped environment.
 
 >>> from skrl.trainers.torch import SequentialTrainer, SequentialTrainerCfg
 >>> from tightloop.adapters.skrl import SkrlEnv
@@ -12,35 +12,35 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
-from tightloop.adapters.needs import Given, environment, library
+from tightloop.adapters.environment import Given, adapted_environment, library
 
 skrl = library("skrl", install="skrl")
 gymnasium_envs = library("skrl.envs.wrappers.torch.gymnasium_envs", install="skrl")
 
 
 class SkrlEnv(gymnasium_envs.GymnasiumWrapper):
-    """skrl's wrapper of vectorized environments around a `VectorEnv`, in torch.
+    """A `VectorEnv` in skrl's torch wrapper of vectorized environments.
 
-    Episodes go on in the next step, so that ``time_limit_bootstrap`` sees their last observation; the step in which a
-    world is reset is a transition with reward 0, whose action has no effect.
+    A world starts its next episode in the next step, so that ``time_limit_bootstrap`` sees the last observation. The
+    step in which a world is reset is a transition with reward 0, whose action has no effect.
     """
 
     def __init__(self, env: Given, num_envs: int | None = None, *, torch_device: str = "cpu", **options: Any) -> None:
-        """An environment of mode ``NEXT_STEP``, or a task for one of its own.
+        """Adapt an environment of the mode ``NEXT_STEP``, or make one for a task.
 
         Args:
             env: A `VectorEnv`, or a task.
-            num_envs: How many worlds, for a task.
-            torch_device: Where torch's tensors go, such as ``"cuda:0"``; ``device`` is that of the physics.
-            **options: What `VectorEnv` takes besides, for a task.
+            num_envs: Number of worlds, for a task.
+            torch_device: Device of torch's tensors, such as ``"cuda:0"``; ``device`` is that of the physics.
+            **options: Further arguments of `VectorEnv`, for a task.
 
         Raises:
             ArgumentError: The environment has another autoreset mode.
         """
-        # the wrapper copies all that it takes into tensors of its own
-        super().__init__(environment(env, num_envs, AutoresetMode.NEXT_STEP, options))
+        # the wrapper copies all arrays into its own tensors
+        super().__init__(adapted_environment(env, num_envs, AutoresetMode.NEXT_STEP, options))
         self._device = skrl.config.torch.parse_device(torch_device)
 
     def render(self, *args: Any, **kwargs: Any) -> Any:
-        """As of the `VectorEnv`; nothing without a render mode, as trainers ask unless they are told ``headless``."""
+        """Render as the `VectorEnv` does; None without a render mode, since trainers call this unless ``headless``."""
         return None if self._env.render_mode is None else self._env.render()

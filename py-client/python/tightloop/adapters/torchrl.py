@@ -1,10 +1,11 @@
-"""torchrl: many worlds as one batched `EnvBase`.
+"""Adapter to torchrl: many worlds as one batched `EnvBase`.
 
 >>> from torchrl.collectors import Collector
 >>> from tightloop.adapters.torchrl import TorchRlEnv
 >>> TorchRlEnv("FrankaReach", 256).rollout(100, break_when_any_done=False)
 
-torchrl's own `GymWrapper` hands out the environment's arrays and fails at a reset of a TensorDict without ``_reset``.
+torchrl's own `GymWrapper` returns the environment's arrays without a copy, and fails for a reset of a TensorDict
+without ``_reset``.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from tightloop.adapters.needs import Given, environment, library
+from tightloop.adapters.environment import Given, adapted_environment, library
 
 envs = library("torchrl.envs", install="torchrl")
 specs = library("torchrl.data", install="torchrl")
@@ -26,27 +27,27 @@ torch = library("torch", install="torch")
 class TorchRlEnv(envs.EnvBase):
     """A `VectorEnv` of batch size ``(num_envs,)``; torchrl resets the worlds whose episodes ended.
 
-    Keys: ``observation``, ``action``, ``reward``, ``done``, ``terminated`` and ``truncated``. What the environment
-    tells besides, such as ``success``, is in ``infos``: a key of its own would be handed to every policy.
+    Keys: ``observation``, ``action``, ``reward``, ``done``, ``terminated`` and ``truncated``. Further values,
+    such as ``success``, are in the attribute ``infos``: torchrl would pass a key of its own to every policy.
 
     Attributes:
         env: The `VectorEnv`.
-        infos: Those of the last step.
+        infos: Infos of the last step.
     """
 
     def __init__(self, env: Given, num_envs: int | None = None, *, torch_device: str = "cpu", **options: Any) -> None:
-        """An environment of mode ``DISABLED``, or a task for one of its own.
+        """Adapt an environment of the mode ``DISABLED``, or make one for a task.
 
         Args:
             env: A `VectorEnv`, or a task.
-            num_envs: How many worlds, for a task.
-            torch_device: Where torch's tensors go, such as ``"cuda:0"``; ``device`` is that of the physics.
-            **options: What `VectorEnv` takes besides, for a task.
+            num_envs: Number of worlds, for a task.
+            torch_device: Device of torch's tensors, such as ``"cuda:0"``; ``device`` is that of the physics.
+            **options: Further arguments of `VectorEnv`, for a task.
 
         Raises:
             ArgumentError: The environment has another autoreset mode.
         """
-        inner = environment(env, num_envs, AutoresetMode.DISABLED, options)
+        inner = adapted_environment(env, num_envs, AutoresetMode.DISABLED, options)
         super().__init__(device=torch.device(torch_device), batch_size=torch.Size([inner.num_envs]))
         self.env = inner
         self.infos: dict[str, Any] = {}
@@ -67,7 +68,7 @@ class TorchRlEnv(envs.EnvBase):
         self.done_spec = specs.Composite({name: flag.clone() for name in names}, shape=size, device=self.device)
 
     def _reset(self, tensordict: Any = None, **kwargs: Any) -> Any:
-        """Begin episodes in the worlds of ``_reset``, or in all."""
+        """Start episodes in the worlds of ``_reset``, or in all worlds."""
         asked = None if tensordict is None else tensordict.get("_reset", None)
         mask = None if asked is None else asked.reshape(-1).cpu().numpy()
         seed, self._seed = self._seed, None
@@ -76,7 +77,7 @@ class TorchRlEnv(envs.EnvBase):
         return self._dict(observation=obs, done=never, terminated=never, truncated=never)
 
     def _step(self, tensordict: Any) -> Any:
-        """Advance all worlds by one control step; what is beyond the bounds of actions counts as the bound."""
+        """Advance all worlds by one control step; actions are clipped to their bounds."""
         action = tensordict.get("action").detach().cpu().numpy()
         obs, reward, terminated, truncated, self.infos = self.env.step(action)
         return self._dict(
@@ -88,7 +89,7 @@ class TorchRlEnv(envs.EnvBase):
         )
 
     def _set_seed(self, seed: int | None) -> None:
-        """World i gets the seed ``seed + i`` at the next reset."""
+        """Set the seed ``seed + i`` of world i for the next reset."""
         self._seed = seed
 
     def close(self, *, raise_if_closed: bool = True) -> None:
@@ -98,7 +99,7 @@ class TorchRlEnv(envs.EnvBase):
 
     def _dict(self, **arrays: NDArray[Any]) -> Any:
         tensors = {name: self._tensor(array) for name, array in arrays.items()}
-        # what is one number a world has a last axis of 1
+        # values with one number per world get a last axis of 1
         columns = {name: tensor if tensor.ndim > 1 else tensor[:, None] for name, tensor in tensors.items()}
         return tensordicts.TensorDict(columns, batch_size=self.batch_size, device=self.device)
 

@@ -1,1 +1,1 @@
-"""A tour of what tightloop does, `tightloop demo`: torques, targets, a grasp, many worlds, a trained policy."""
+"""The tour `tightloop demo`: torques, targets, a grasp, many worlds, a trained policy."""

@@ -7,7 +7,7 @@ import signal
 import sys
 from pathlib import Path
 
-from tightloop.demo.stops import STOPS
+from tightloop.demo.scenes import SCENES
 from tightloop.demo.tour import Plan, tour
 from tightloop.errors import TightloopError
 
@@ -22,15 +22,15 @@ examples:
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    width = max(len(stop.name) for stop, _ in STOPS) + 2
-    stops = "\n  ".join(f"{stop.name:<{width}}{worlds} {stop.title}" for stop, worlds in STOPS)
+    width = max(len(stop.name) for stop, _ in SCENES) + 2
+    stops = "\n  ".join(f"{stop.name:<{width}}{worlds} {stop.title}" for stop, worlds in SCENES)
     made = argparse.ArgumentParser(
         prog="tightloop demo",
         description="Tour the features of tightloop. Each stop prints a line of numbers and writes a picture.",
         epilog=_EPILOG.format(stops=stops),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    names = [stop.name for stop, _ in STOPS]
+    names = [stop.name for stop, _ in SCENES]
     made.add_argument(
         "--stop", action="append", choices=names, metavar="NAME", help="show only this stop; can be repeated"
     )
@@ -49,7 +49,7 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: list[str]) -> int:
     """Run the subcommand; returns its exit code: 0 done, 1 failed, 2 misused, 130 ended by Ctrl-C."""
     given = parser().parse_args(arguments)
-    chosen = [stop(given.worlds or worlds) for stop, worlds in STOPS if not given.stop or stop.name in given.stop]
+    chosen = [stop(given.worlds or worlds) for stop, worlds in SCENES if not given.stop or stop.name in given.stop]
     plan = Plan(given.out, given.seconds, given.view, given.port, given.device, given.threads)
     try:
         tour(chosen, plan)

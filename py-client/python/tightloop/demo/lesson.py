@@ -1,4 +1,4 @@
-"""The lesson's arm and what it is told to do: scenes and commands of the demo's stops."""
+"""The arm of the lesson: scenes and commands of the demo."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def record(name: str) -> NDArray[np.float64]:
 
 
 def amplitudes(worlds: int) -> NDArray[np.float64]:
-    """A number for each world, from 1, the record's, down to -1."""
+    """Return a factor per world, from 1, the record's, to -1."""
     return np.linspace(1.0, -1.0, worlds)
 
 

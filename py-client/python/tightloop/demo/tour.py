@@ -1,4 +1,4 @@
-"""One stop after the other: run, told in a line, kept as a picture, shown in the browser."""
+"""The tour: runs the demo's scenes one after the other, each with a line of results and a picture."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tightloop.demo.stops import Stop
+from tightloop.demo.scenes import DemoScene
 from tightloop.errors import MissingLibrary
 
 # Size of the pictures [pixels].
 _SIZE = (1280, 720)
-# Longer in the browser than what a round takes: people look around.
+# Time per scene in the browser [s].
 _SECONDS_SEEN = 15.0
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How to go through the stops.
+    """The options of a tour.
 
     Attributes:
         out: Folder of the pictures.
-        seconds: How long to stay at each stop; a round if None, and in the browser some more.
-        view: Whether to show it in the browser, in real time.
-        port: Port of that page.
-        device: Where worlds are kept, as `tightloop.launch` has it.
-        threads: Most threads of a step; all cores if None.
+        seconds: Time per scene [s]; None is one round, and longer in the browser.
+        view: Whether to show the scenes in the browser, in real time.
+        port: Port of the page.
+        device: Device of the physics, as of `tightloop.launch`.
+        threads: Largest number of threads of a step; all cores if None.
     """
 
     out: Path
@@ -40,45 +40,45 @@ class Plan:
     threads: int | None = None
 
 
-def tour(stops: Sequence[Stop], plan: Plan) -> None:
-    """Go through the stops.
+def tour(demo_scenes: Sequence[DemoScene], plan: Plan) -> None:
+    """Run the demo's scenes.
 
     Raises:
         TightloopError: A daemon did not start, or ended.
     """
     plan.out.mkdir(parents=True, exist_ok=True)
-    # one page follows a daemon by its name, from stop to stop
+    # one page follows the daemon by its name, from scene to scene
     name = f"demo-{os.getpid()}-{secrets.token_hex(2)}" if plan.view else None
     with _Page(plan.port) as page:
-        for stop in stops:
-            stop.open(name, plan.device, plan.threads)
+        for demo_scene in demo_scenes:
+            demo_scene.open(name, plan.device, plan.threads)
             try:
                 if name is not None:
-                    page.show(name, stop.worlds)
-                print(_visited(stop, plan), flush=True)
+                    page.show(name, demo_scene.worlds)
+                print(_visit(demo_scene, plan), flush=True)
             finally:
-                stop.close()
+                demo_scene.close()
 
 
-def _visited(stop: Stop, plan: Plan) -> str:
+def _visit(demo_scene: DemoScene, plan: Plan) -> str:
     """Stay at a stop; returns what there is to say."""
     seconds = _SECONDS_SEEN if plan.view and plan.seconds is None else plan.seconds
     until = None if seconds is None else time.monotonic() + seconds
-    told = None
-    while told is None or (until is not None and time.monotonic() < until):
-        stop.begin()
-        for _ in _paced(stop, until, real_time=plan.view):
-            stop.advance()
-        # of the first round: a later one may have been cut short
-        told = told or _told(stop, plan.out / f"{stop.name}.png")
-    return told
+    summary = None
+    while summary is None or (until is not None and time.monotonic() < until):
+        demo_scene.begin()
+        for _ in _paced(demo_scene, until, real_time=plan.view):
+            demo_scene.advance()
+        # the summary of the first round: a later one may be cut short
+        summary = summary or _visit_summary(demo_scene, plan.out / f"{demo_scene.name}.png")
+    return summary
 
 
-def _paced(stop: Stop, until: float | None, *, real_time: bool) -> Iterator[int]:
-    """The frames of a round, at least one, as many as there is time for."""
+def _paced(demo_scene: DemoScene, until: float | None, *, real_time: bool) -> Iterator[int]:
+    """Yield the frames of a round: at least one, and as many as there is time for."""
     began = time.monotonic()
-    period = stop.sim.dt * stop.sim.substeps
-    for frame in range(stop.frames):
+    period = demo_scene.sim.dt * demo_scene.sim.substeps
+    for frame in range(demo_scene.frames):
         if frame and until is not None and time.monotonic() >= until:
             return
         yield frame
@@ -86,37 +86,38 @@ def _paced(stop: Stop, until: float | None, *, real_time: bool) -> Iterator[int]
             time.sleep(max(began + (frame + 1) * period - time.monotonic(), 0.0))
 
 
-def _told(stop: Stop, path: Path) -> str:
-    line = f"{stop.name:<8}{stop.worlds} {stop.title}: {stop.rate():,.0f} physics steps/s; {stop.told()}"
+def _visit_summary(demo_scene: DemoScene, path: Path) -> str:
+    shown = f"{demo_scene.name:<8}{demo_scene.worlds} {demo_scene.title}"
+    line = f"{shown}: {demo_scene.rate():,.0f} physics steps/s; {demo_scene.summary()}"
     try:
-        _draw(stop, path)
+        _draw(demo_scene, path)
     except MissingLibrary as missing:
         print(f"tightloop: no picture: {missing}", file=sys.stderr)
         return line
     return f"{line}; {path}"
 
 
-def _draw(stop: Stop, path: Path) -> None:
-    """A picture of what is to be seen now."""
-    from tightloop.view import needs
+def _draw(demo_scene: DemoScene, path: Path) -> None:
+    """Save a picture of the current frame."""
+    from tightloop.view import dependencies
 
-    needs.check("PIL", "trimesh")
+    dependencies.check("PIL", "trimesh")
     from PIL import Image
 
     from tightloop.view.parts import parts
     from tightloop.view.picture import Picture
     from tightloop.view.source import Shown
 
-    sim = stop.sim
-    # computed here, so that no frame has to carry them
-    body_q = sim.forward_kinematics(stop.state())
+    sim = demo_scene.sim
+    # computed here, so that frames need not carry them
+    body_q = sim.forward_kinematics(demo_scene.state())
     look = parts(sim.info["scene"], sim.info["scene_folder"], sim.body_names)
     picture = Picture(look, *_SIZE)
-    Image.fromarray(picture.render(Shown({"body_q": body_q}), goals=stop.goals())).save(path)
+    Image.fromarray(picture.render(Shown({"body_q": body_q}), goals=demo_scene.goals())).save(path)
 
 
 class _Page:
-    """The page in the browser, which waits for the next daemon of its name when one ends."""
+    """The page in the browser; when a daemon ends, it waits for the next one of the same name."""
 
     def __init__(self, port: int) -> None:
         self._port, self._viewer = port, None
@@ -129,9 +130,9 @@ class _Page:
             self._viewer.close()
 
     def show(self, name: str, worlds: int) -> None:
-        """Open it, at the first stop."""
+        """Open the page for the first scene."""
         if self._viewer is None:
-            from tightloop.view.process import Viewer
+            from tightloop.viewer_process import Viewer
 
             self._viewer = Viewer(name, port=self._port, worlds=256, open=True)
             print(f"the page is at {self._viewer.url}", flush=True)

@@ -1,4 +1,4 @@
-"""Reinforcement learning: tasks in thousands of worlds, as gymnasium environments.
+"""Gymnasium environments of tasks in thousands of worlds, for reinforcement learning.
 
 >>> import gymnasium, tightloop.env
 >>> envs = gymnasium.make_vec("tightloop/FrankaReach-v0", num_envs=4096)
@@ -13,10 +13,10 @@ from gymnasium.vector import AutoresetMode
 from tightloop.env.controls import EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
 from tightloop.env.groups import make_groups
 from tightloop.env.names import Names
+from tightloop.env.registration import register
 from tightloop.env.single import Env
 from tightloop.env.task import Observed, Task, Worlds
 from tightloop.env.vector import VectorEnv
-from tightloop.registration import register
 
 __all__ = [
     "AutoresetMode",

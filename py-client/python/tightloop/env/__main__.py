@@ -9,17 +9,16 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tightloop import _core
-from tightloop.env.registry import make_task
+from tightloop.env.registry import TASKS, make_task
 from tightloop.env.rendering import FIELDS
-from tightloop.env.start import DAEMON_OPTIONS, fields_of
+from tightloop.env.simulation import DAEMON_OPTIONS, fields_of
 from tightloop.errors import ArgumentError
-from tightloop.registration import TASKS
 
 
 def arguments_of(
     task: str, options: Mapping[str, Any], extra: Sequence[str], fields: Sequence[str] = ()
 ) -> tuple[str, list[str]]:
-    """The scene of a task as TOML, and the arguments of ``tightloop serve`` for it, with further fields."""
+    """Return the scene of a task as TOML, and the arguments of ``tightloop serve`` for it."""
     made = make_task(task, options)
     read = fields_of(made, made.controls())
     arguments = ["--fields", ",".join(dict.fromkeys([*read, *fields]))]

@@ -1,7 +1,7 @@
-"""What a policy's numbers do: torques, joint targets, steps of joints or of the hand, a gripper.
+"""Controls: how the values of an action become torques, joint targets, displacements or gripper targets.
 
-Each control takes some of an action's numbers, in [-1, 1] but where it says otherwise, scales them, and writes columns
-of the commands.
+Each control takes some values of the action, in [-1, 1] unless it says otherwise, scales them, and writes columns of
+the commands.
 """
 
 from __future__ import annotations
@@ -19,37 +19,37 @@ from tightloop.errors import ArgumentError
 
 
 class Control(Protocol):
-    """Some of an action's numbers and what they do."""
+    """The interface of controls."""
 
-    #: How many numbers of the action it takes.
+    #: Number of action values that it takes.
     size: int
-    #: How large they may be.
+    #: Largest absolute action value.
     limit: float
-    #: Fields of the frame that it reads.
+    #: Frame fields that it reads.
     fields: tuple[str, ...]
 
     def bind(self, names: Names, commands: Commands) -> None:
-        """Look up names, and take the commands that it writes."""
+        """Look up names, and get the commands that it writes."""
         ...
 
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
-        """Write commands: ``action`` is of shape ``(worlds, size)``, within the limit; the frame is the last one."""
+        """Write commands for an action, shape ``(worlds, size)``, within the limit; ``frame`` is the last frame."""
         ...
 
 
 class _Joints:
-    """A control of some dofs, one number each."""
+    """A control with one action value per dof."""
 
     fields: tuple[str, ...] = ()
     limit = 1.0
     _field = "joint_target_q"
 
     def __init__(self, dofs: Sequence[str], scale: ArrayLike) -> None:
-        """A control of some dofs.
+        """Make a control of some dofs.
 
         Args:
-            dofs: Their names, ``robot/joint``.
-            scale: What an action of 1 means, for all or each of them.
+            dofs: Names of the dofs, ``robot/joint``.
+            scale: Effect of an action of 1, for all dofs or for each.
         """
         if isinstance(dofs, str) or not dofs:
             raise ArgumentError(f"{type(self).__name__}: dofs is {dofs!r}; give a list of names, robot/joint")
@@ -70,22 +70,22 @@ class _Joints:
         self._low, self._high = (np.ascontiguousarray(end) for end in commands.range[places].T)
 
     def _drive(self, action: NDArray[np.float32], start: NDArray[np.float32] | None) -> None:
-        """Write ``start + scale * action``, or without it what stands there moved on, within the dofs' range."""
+        """Write ``start + scale * action`` or, without a start, add ``scale * action`` to it, within limits."""
         _core.drive(self._array, self._first, action, self._scale, start, self._low, self._high)
 
 
 class JointTorque(_Joints):
-    """Torques: ``joint_f = scale * action`` [N·m or N], and on request what holds the joints against gravity."""
+    """Joint torques, ``joint_f = scale * action`` [N·m or N], optionally with gravity compensation."""
 
     _field = "joint_f"
 
     def __init__(self, dofs: Sequence[str], scale: ArrayLike, *, hold: bool = False) -> None:
-        """Torques of some dofs.
+        """Make a torque control of some dofs.
 
         Args:
-            dofs: Their names, ``robot/joint``.
-            scale: What an action of 1 means [N·m or N], for all or each of them.
-            hold: Whether ``bias_force`` at the beginning of the step is added, as a Franka's own controller does.
+            dofs: Names of the dofs, ``robot/joint``.
+            scale: Torque of an action of 1 [N·m or N], for all dofs or for each.
+            hold: Whether to add ``bias_force`` at the start of the step, as a Franka's own controller does.
         """
         super().__init__(dofs, scale)
         self._hold = hold
@@ -106,15 +106,15 @@ class JointTorque(_Joints):
 
 
 class JointTarget(_Joints):
-    """Drive targets about the scene's: ``start + scale * action`` [rad or m], within the joints' ranges."""
+    """Drive targets relative to the scene's, ``start + scale * action`` [rad or m], clipped to the joint limits."""
 
     def __init__(self, dofs: Sequence[str], scale: ArrayLike, *, limit: float = 1.0) -> None:
-        """Drive targets of some dofs.
+        """Make a target control of some dofs.
 
         Args:
-            dofs: Their names, ``robot/joint``.
-            scale: What an action of 1 means [rad or m], for all or each of them.
-            limit: How large an action may be.
+            dofs: Names of the dofs, ``robot/joint``.
+            scale: Offset of an action of 1 [rad or m], for all dofs or for each.
+            limit: Largest absolute action value.
         """
         super().__init__(dofs, scale)
         self.limit = checks.number("JointTarget: limit", limit, above=0.0, error=ArgumentError)
@@ -125,27 +125,27 @@ class JointTarget(_Joints):
 
 
 class JointDelta(_Joints):
-    """Steps of the drive targets: ``target + scale * action`` [rad or m], within the joints' ranges.
+    """Increments of the drive targets, ``target + scale * action`` [rad or m], clipped to the joint limits.
 
-    A step is from the last target, not from where the joint is, so that a load does not make it drift.
+    An increment starts from the last target, not from the joint position, so that a load causes no drift.
     """
 
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
-        """Move the targets on."""
+        """Increment the targets."""
         self._drive(action, None)
 
 
 class Gripper(_Joints):
-    """One number for all fingers: their target is ``low`` at -1, ``high`` at 1, evenly in between."""
+    """One action value for all fingers: their target is ``low`` at -1, ``high`` at 1, and linear in between."""
 
     def __init__(self, dofs: Sequence[str], low: float, high: float, *, binary: bool = False) -> None:
-        """A gripper.
+        """Make a gripper control.
 
         Args:
             dofs: Names of the fingers' dofs, ``robot/joint``.
-            low: Closed [m or rad]; below the fingers' range it presses harder.
-            high: Open.
-            binary: Whether there is nothing in between: below 0 it closes.
+            low: Closed target [m or rad]; a target below the fingers' range presses harder.
+            high: Open target [m or rad].
+            binary: Whether the gripper is only open or closed; it closes below 0.
         """
         super().__init__(dofs, 0.5 * (high - low))
         self.size, self._middle, self._binary = 1, 0.5 * (high + low), binary
@@ -160,29 +160,29 @@ class Gripper(_Joints):
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
         """Write the targets."""
         if self._binary:
-            # the sum keeps NaN, which is to fail
+            # the sum keeps NaN, which must fault the world
             action = np.where(action < 0.0, -1.0, 1.0) + 0.0 * action
         np.copyto(self._fingers, action)
         self._drive(self._fingers, self._start)
 
 
 class EndEffectorDelta(_Joints):
-    """Steps of a site: the drive targets move by the damped least squares of a displacement in world axes.
+    """Displacements of a site in world axes, which damped least squares turn into increments of the drive targets.
 
     ``target + J⁺ (pos_scale * action[:3], rot_scale * action[3:])``, with the field ``site_inverse_jacobian`` as J⁺.
-    Without ``rot_scale`` it takes three numbers, and the site keeps its orientation.
+    Without ``rot_scale`` it takes three values, and the site keeps its orientation.
     """
 
     fields = ("site_inverse_jacobian",)
 
     def __init__(self, site: str, dofs: Sequence[str], pos_scale: float, rot_scale: float | None = None) -> None:
-        """A control of a site.
+        """Make a control of a site.
 
         Args:
-            site: Its name.
+            site: Name of the site.
             dofs: Names of the dofs that move it, ``robot/joint``.
-            pos_scale: What an action of 1 moves it a step [m].
-            rot_scale: What an action of 1 turns it a step, about world axes [rad].
+            pos_scale: Displacement per step of an action of 1 [m].
+            rot_scale: Rotation per step of an action of 1, about world axes [rad].
         """
         super().__init__(dofs, 1.0)
         self._site_name = site
@@ -198,7 +198,7 @@ class EndEffectorDelta(_Joints):
         self._turn = np.empty((worlds, self._count), np.float32)
 
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
-        """Move the targets on."""
+        """Increment the targets."""
         dofs = slice(self._first, self._first + self._count)
         inverse = frame.site_inverse_jacobian[:, self._site, dofs, : self.size]
         np.multiply(action, self._step, out=self._displacement)

@@ -1,4 +1,4 @@
-"""Seeds and episodes of the worlds, and the random numbers that tasks get of them."""
+"""Seeds and episodes of the worlds, and their goals."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from tightloop.env.task import Task, Worlds
 from tightloop.errors import ArgumentError
 from tightloop.inputs import whole_seed
 
-#: Stream of the numbers that goals are made of.
+#: Stream of random numbers for goals.
 _GOALS = 0
 
 
 class Episodes:
-    """Which episode of which seed each world is in, how long it has gone on, and its goal.
+    """Seed, episode, elapsed steps and goal of each world.
 
-    The daemon counts the same way, so that a world's start and its goals are functions of its seed and episode alone.
+    The daemon counts episodes the same way, so that start and goals of a world depend only on its seed and episode.
 
     Attributes:
         elapsed: Control steps since the reset, shape ``(worlds,)``, int32.
@@ -39,13 +39,13 @@ class Episodes:
     def seed(
         self, seed: int | Sequence[int | None] | None, mask: NDArray[np.bool_], entropy: np.random.Generator
     ) -> NDArray[np.uint64] | None:
-        """Take new seeds of the worlds under the mask, and count their episodes.
+        """Set seeds of the worlds in the mask, or count their next episode.
 
         Returns:
-            Seeds of all worlds if some are new, for `Sim.reset`; None if each world begins its next episode.
+            Seeds of all worlds for `Sim.reset`; None if each world starts its next episode.
 
         Raises:
-            ArgumentError: These are no seeds.
+            ArgumentError: A seed is not valid.
         """
         worlds = len(self._seeds)
         if seed is None and self._known:
@@ -56,31 +56,31 @@ class Episodes:
             own = given[world]
             self._seeds[world] = entropy.integers(2**63) if own is None else own
         self._episodes[mask] = 0
-        # worlds outside a mask have had no seed yet
+        # worlds outside the first mask have no seed yet
         self._known = self._known or bool(mask.all())
         return self._seeds
 
     def next(self, mask: NDArray[np.bool_]) -> None:
-        """Count the next episode of the worlds under the mask, as `Sim.reset` without seeds does."""
+        """Count the next episode of the worlds in the mask, as `Sim.reset` without seeds does."""
         self._episodes[mask] += 1
 
     def begin(self, mask: NDArray[np.bool_], worlds: Worlds) -> None:
-        """Begin episodes of the worlds under the mask, which is their state now, and give them goals."""
+        """Start episodes of the worlds in the mask, and draw their goals at the state ``worlds``."""
         self.elapsed[mask] = 0
         self._goals[mask] = 0
         self._draw(np.flatnonzero(mask), worlds)
 
     def due(self) -> NDArray[np.bool_] | None:
-        """Which worlds are due for their next goal; None if none can be."""
+        """Return which worlds are due for their next goal; None if the task has one goal per episode."""
         steps = self._task.goal_steps
         if steps is None:
             return None
-        # not `==`: `elapsed` may have been set ahead, and then the goals follow, one a step. An episode that is to end
-        # here keeps its goal in its last observation, whoever counts its steps
+        # not `==`: `elapsed` may have been set ahead, and then goals follow at one per step. An episode that ends here
+        # keeps its goal for its last observation, also if a wrapper counts its steps
         return (self.elapsed >= steps * (self._goals + 1)) & (self.elapsed != self._task.max_episode_steps)
 
     def renew(self, mask: NDArray[np.bool_], worlds: Worlds) -> None:
-        """Give the worlds under the mask their next goal."""
+        """Draw the next goal of the worlds in the mask."""
         self._goals[mask] += 1
         self._draw(np.flatnonzero(mask), worlds)
 

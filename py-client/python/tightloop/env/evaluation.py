@@ -1,4 +1,4 @@
-"""The functions of a task, called with what the worlds are now."""
+"""Evaluates the functions of a task at the current worlds."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.env.arena import Arena
-from tightloop.env.pack import Packer
+from tightloop.env.array_pool import ArrayPool
+from tightloop.env.observations import ObservationPacker
 from tightloop.env.task import Array, Task, Worlds
 from tightloop.errors import ArgumentError
 
@@ -17,29 +17,29 @@ _REAL, _BOOL, _ANY = "fiu", "b", "fiub"
 
 
 class Evaluation:
-    """Calls a task's functions; what they compute lies in memory that is used again in the next call.
+    """Calls a task's functions, whose temporary arrays come from a pool and are reused by the next call.
 
-    The first time that a function is called, its result is checked, and what is wrong is told by name.
+    The result of each function's first call is checked; errors name the function.
 
     Attributes:
-        worlds: What the functions see.
-        observed: How many numbers an observation has.
-        space: Space of one world's observation.
+        worlds: The worlds that the functions see.
+        observed: Length of an observation.
+        space: Observation space of one world.
     """
 
     def __init__(self, task: Task, worlds: int) -> None:
         self._task, self._count = task, worlds
-        self._arena, self._tapes = Arena(), {}
-        self._packer = Packer(task.observed())
+        self._pool, self._tapes = ArrayPool(), {}
+        self._packer = ObservationPacker(task.observed())
         self.observed, self.space = self._packer.size, self._packer.space
         self.worlds = Worlds()
 
     def see(self, frame: Any, **own: NDArray[Any]) -> None:
-        """Show the functions a frame, and the environment's own arrays by name."""
-        shown = {name: self._arena.wrap(array) for name, array in own.items()}
+        """Show a frame and the environment's own arrays to the functions."""
+        shown = {name: self._pool.wrap(array) for name, array in own.items()}
         for array in shown.values():
             array.flags.writeable = False
-        self.worlds = Worlds(**shown, **{name: self._arena.wrap(getattr(frame, name)) for name in self._task.fields})
+        self.worlds = Worlds(**shown, **{name: self._pool.wrap(getattr(frame, name)) for name in self._task.fields})
 
     def observe(self, out: NDArray[np.float32]) -> None:
         """Write the observations, shape ``(worlds, size)``."""
@@ -50,12 +50,12 @@ class Evaluation:
         np.copyto(out, self._checked("reward", _REAL), casting="same_kind")
 
     def terminated(self, out: NDArray[np.bool_]) -> None:
-        """Write which worlds have come to an end, shape ``(worlds,)``."""
+        """Write which worlds are terminated, shape ``(worlds,)``."""
         ended = self._checked("terminated", _BOOL, optional=True)
         np.copyto(out, False if ended is None else ended)
 
-    def told(self) -> dict[str, NDArray[Any]]:
-        """Copies of what the task tells of the worlds besides, by name: its metrics, and ``success``."""
+    def infos(self) -> dict[str, NDArray[Any]]:
+        """Return copies of the task's metrics and of ``success``, by name."""
         first = "metrics" not in self._tapes
         metrics = self.call("metrics")
         if first and not isinstance(metrics, Mapping):
@@ -68,8 +68,8 @@ class Evaluation:
         return {name: np.array(value) for name, value in named.items()}
 
     def call(self, name: str) -> Any:
-        """What a function of the task says of the worlds; its arrays are used again once nobody holds them."""
-        self._arena.play(self._tapes.setdefault(name, []))
+        """Call a function of the task; its arrays are reused once nobody holds them."""
+        self._pool.play(self._tapes.setdefault(name, []))
         return getattr(self._task, name)(np, self.worlds)
 
     def _checked(self, name: str, kinds: str, *, optional: bool = False) -> Array:

@@ -1,4 +1,4 @@
-"""Worlds in groups that step independently: a policy works on one group while the others step."""
+"""Groups of environments that step independently: a policy works on one group while the others step."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 import tightloop as tl
 from tightloop import checks
 from tightloop.env.registry import make_task
-from tightloop.env.start import options_of
+from tightloop.env.simulation import options_of
 from tightloop.env.task import Task
 from tightloop.env.vector import VectorEnv
 from tightloop.errors import ArgumentError
 
-#: What `VectorEnv` takes by name; the rest is the task's.
+#: Keyword arguments of `VectorEnv`; all others are the task's.
 _OF_ENVIRONMENTS = {
     name for name, parameter in signature(VectorEnv).parameters.items() if parameter.kind is Parameter.KEYWORD_ONLY
 }
@@ -29,9 +29,9 @@ def make_groups(
     threads: int | None = None,
     **options: Any,
 ) -> list[VectorEnv]:
-    """Environments whose worlds are, together, those of one `VectorEnv` of ``num_envs``, kept by one daemon.
+    """Make groups of environments in one daemon, which together have the worlds of one `VectorEnv`.
 
-    With the same seed each world does what it does there, whichever group it is in. The daemon ends with the last one.
+    With the same seed, each world does what it does in that `VectorEnv`. The daemon ends with the last group.
 
     >>> groups = make_groups("FrankaReach", 4096)
     >>> for group in groups:
@@ -44,15 +44,18 @@ def make_groups(
 
     Args:
         task: As of `VectorEnv`.
-        num_envs: How many worlds all groups have.
-        groups: How many groups, which divides ``num_envs``.
+        num_envs: Number of worlds of all groups.
+        groups: Number of groups; it divides ``num_envs``.
         device: As of `VectorEnv`.
         precision: As of `VectorEnv`.
-        threads: Most threads that steps may use, those of all groups together; all cores if left out.
+        threads: Largest number of threads of a step, shared by all groups; all cores if left out.
         **options: As of `VectorEnv`.
 
+    Returns:
+        A `VectorEnv` per group.
+
     Raises:
-        ArgumentError: The worlds cannot be shared out evenly. Other errors are those of `VectorEnv`.
+        ArgumentError: The groups cannot share the worlds evenly. Other errors are those of `VectorEnv`.
     """
     num_envs = checks.integer("make_groups: num_envs", num_envs, error=ArgumentError)
     groups = checks.integer("make_groups: groups", groups, error=ArgumentError)

@@ -1,4 +1,4 @@
-"""Where things are in the arrays of a simulation, by name."""
+"""Indices in the arrays of a simulation, by name."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from tightloop.errors import ArgumentError
 
 
 class Names:
-    """Places in the arrays of frames and commands.
+    """Indices in the arrays of frames and commands, by name.
+
+    Its methods raise `ArgumentError` for a name that the scene does not have; the message lists those it has.
 
     Attributes:
         coords: Slice of each robot's or free body's entries of ``joint_q``.
         dofs: Slice of its entries of ``joint_qd`` and of commands.
-        bodies: Slice of its bodies.
+        bodies: Slice of its entries of ``body_q``.
         dof_names: ``robot/joint`` of each dof.
     """
 
@@ -32,23 +34,23 @@ class Names:
         }
 
     def coord(self, name: str) -> int:
-        """Place of a coordinate, ``robot/joint``, in ``joint_q``."""
+        """Return the index of a coordinate, ``robot/joint``, in ``joint_q``."""
         return self._place("coordinate", name)
 
     def dof(self, name: str) -> int:
-        """Place of a dof, ``robot/joint``, in ``joint_qd`` and in commands."""
+        """Return the index of a dof, ``robot/joint``, in ``joint_qd`` and in commands."""
         return self._place("dof", name)
 
     def body(self, name: str) -> int:
-        """Place of a body, ``robot/link``, in ``body_q`` and its like."""
+        """Return the index of a body, ``robot/link``, in ``body_q`` and the other body fields."""
         return self._place("body", name)
 
     def site(self, name: str) -> int:
-        """Place of a site in ``site_q`` and its like."""
+        """Return the index of a site in ``site_q`` and the other site fields."""
         return self._place("site", name)
 
     def contact_sensor(self, name: str) -> int:
-        """Place of a contact sensor in ``contact_sensor``."""
+        """Return the index of a contact sensor in ``contact_sensor``."""
         return self._place("contact sensor", name)
 
     def _place(self, kind: str, name: str) -> int:

@@ -1,4 +1,4 @@
-"""Tasks by name."""
+"""Finds tasks by name."""
 
 from __future__ import annotations
 
@@ -12,11 +12,20 @@ from typing import Any
 
 from tightloop.env.task import Task
 from tightloop.errors import ArgumentError
-from tightloop.registration import TASKS
+
+#: Module and class of each task that comes with tightloop.
+TASKS = {
+    "CartPoleBalance": "tightloop.tasks.cartpole:CartPoleBalance",
+    "CartPoleSwingUp": "tightloop.tasks.cartpole:CartPoleSwingUp",
+    "FrankaReach": "tightloop.tasks.reach:FrankaReach",
+    "FrankaPushCube": "tightloop.tasks.push_cube:FrankaPushCube",
+    "FrankaPickCube": "tightloop.tasks.pick_cube:FrankaPickCube",
+    "FrankaLift": "tightloop.tasks.lift:FrankaLift",
+}
 
 
 def make_task(task: Task | type[Task] | str, options: Mapping[str, Any]) -> Task:
-    """A task as it is, of its class, by the name of one of `tightloop.tasks`, or as ``FILE.py:CLASS``.
+    """Make a task from a task, a class, the name of one of `tightloop.tasks`, or ``FILE.py:CLASS``.
 
     Raises:
         ArgumentError: There is no such task, or it does not take these options.
@@ -53,7 +62,7 @@ def _named(task: str) -> type[Task]:
 def _of_file(path: Path, name: str) -> type[Task]:
     if not path.is_file():
         raise ArgumentError(f"there is no file {path}; give the task as FILE.py:CLASS")
-    # a name that no installed module has
+    # no installed module has this name
     spec = spec_from_file_location(f"tightloop_task_{path.stem}", path)
     assert spec is not None and spec.loader is not None, "the name ends in .py"
     module = sys.modules[spec.name] = module_from_spec(spec)

@@ -1,4 +1,4 @@
-"""What ``render`` shows: pictures as arrays, or a page in the browser."""
+"""Render modes of environments: pictures as arrays, or a page in the browser."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ if TYPE_CHECKING:
     from tightloop.sim import Sim
     from tightloop.view.picture import Picture
 
-#: As gymnasium names them: a page in the browser, and pictures.
+#: Gymnasium's render modes: a page in the browser, and pictures.
 MODES = ("human", "rgb_array")
-#: What frames must carry for pictures, besides what the task reads.
+#: Frame fields for pictures, besides those that the task reads.
 FIELDS = ("body_q",)
-# Of pictures [pixels]: what a policy's film needs, and no more.
+# Size of pictures [pixels], enough for a film of a policy.
 _SIZE = (480, 360)
 _GOAL = (40, 190, 90)
 
 
 def check(mode: str | None) -> str | None:
-    """A render mode, or an error that names those there are."""
+    """Check a render mode."""
     if mode is not None and mode not in MODES:
         raise ArgumentError(f"render_mode is {mode!r}; give one of {', '.join(map(repr, MODES))}, or None")
     return mode
 
 
 def marks(task: Task, goal: NDArray[Any]) -> dict[str, Any] | None:
-    """Goals as `Picture.render` marks them; None of a task whose goals have no place."""
+    """Return goals for `Picture.render`; None if the task's goals have no position."""
     return None if task.goal_radius is None else {"goal": (goal[:, :3], task.goal_radius, _GOAL)}
 
 
@@ -42,11 +42,11 @@ class Rendering:
 
     Args:
         sim: The simulation.
-        task: What its worlds are about; a goal with a place is marked.
+        task: The task; goals with a position are marked.
         mode: One of `MODES`.
 
     Raises:
-        ArgumentError: The frames of a daemon that was joined carry no ``body_q``.
+        ArgumentError: The frames of a joined daemon carry no ``body_q``.
         MissingLibrary: The extra ``view`` is not installed.
     """
 
@@ -62,14 +62,14 @@ class Rendering:
             raise ArgumentError(f"render_mode is {mode!r}, and frames of daemon `{sim.name}` carry no body_q; {cure}")
 
     def pace(self, seconds: float) -> None:
-        """In the browser, let a step take as long as it takes in the world [s]."""
+        """In the mode ``"human"``, wait until a step has taken its simulated time [s]."""
         if self._mode == "human":
             now = time.monotonic()
             time.sleep(max(self._due - now, 0.0))
             self._due = max(self._due, now) + seconds
 
     def render(self, frame: Any, goal: NDArray[Any]) -> tuple[NDArray[np.uint8], ...] | None:
-        """A picture of each world; nothing in the browser, which shows them by itself.
+        """Render a picture of each world; None in the mode ``"human"``, whose page updates itself.
 
         Raises:
             CommandRefused: No episode has begun.

@@ -1,4 +1,4 @@
-"""One environment, as gymnasium has it."""
+"""A single environment, as a `gymnasium.Env`."""
 
 from __future__ import annotations
 
@@ -15,18 +15,23 @@ from tightloop.env.vector import VectorEnv
 
 
 class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
-    """A task in one world; its arrays are new ones in each step.
+    """A task in one world; each step returns new arrays.
 
-    With the same seed it does what the world of that seed does in a `VectorEnv`.
+    An episode of a seed equals that of the world with the same seed in a `VectorEnv`.
 
     Attributes:
-        vector: The `VectorEnv` of one world that it is made of.
+        vector: The underlying `VectorEnv` with one world.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(MODES)}  # noqa: RUF012
 
     def __init__(self, task: Task | type[Task] | str, **options: Any) -> None:
-        """A task in one world; ``options`` are those of `VectorEnv`, but for ``num_envs`` and ``autoreset_mode``."""
+        """Make a task's environment.
+
+        Args:
+            task: As of `VectorEnv`.
+            **options: As of `VectorEnv`, except ``num_envs`` and ``autoreset_mode``.
+        """
         if options.get("daemon") is None:
             options.setdefault("threads", 1)
         self.vector = VectorEnv(task, 1, autoreset_mode=AutoresetMode.DISABLED, **options)
@@ -38,19 +43,26 @@ class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin an episode: the first one of a seed, or the next one."""
+        """Start an episode: the first one of a seed, or the next one. Returns the observation and an empty dict."""
         super().reset(seed=seed)
         obs, _ = self.vector.reset(seed=seed)
         return obs[0], {}
 
     def step(self, action: ArrayLike) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Advance by one control step. Raises as `VectorEnv.step` does."""
+        """Advance by one control step.
+
+        Args:
+            action: Shape ``(actions,)``, clipped to ``action_space``.
+
+        Returns:
+            ``obs, reward, terminated, truncated, info``. Raises as `VectorEnv.step` does.
+        """
         obs, reward, terminated, truncated, infos = self.vector.step(np.asarray(action)[None])
         info = {name: value[0] for name, value in infos.items() if not name.startswith("_") and infos[f"_{name}"][0]}
         return obs[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """A picture as it is now, shape ``(height, width, 3)``, in the mode ``"rgb_array"``. As `VectorEnv.render`."""
+        """Render a picture, shape ``(height, width, 3)``, in the mode ``"rgb_array"``; None in other modes."""
         pictures = self.vector.render()
         return None if pictures is None else pictures[0]
 

@@ -1,4 +1,4 @@
-"""What an environment is about: a scene, controls, and pure functions of arrays."""
+"""Tasks: a scene, controls, and pure functions of arrays."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ Namespace = Any
 class Worlds:
     """All worlds at one instant, as the functions of a task see them; arrays have the worlds first.
 
-    Attributes:
-        action: What was asked for in the step that led here, shape ``(worlds, actions)``; 0 after a reset.
-        previous_action: What was asked for in the step before.
-        goal: What `Task.goal` gave, shape ``(worlds, …)``.
-        elapsed: Control steps since the reset, shape ``(worlds,)``, int32.
+    Further attributes are the frame fields that `Task.fields` names, such as ``joint_q``.
 
-    The others are the fields of a frame that `Task.fields` names, such as ``joint_q``.
+    Attributes:
+        action: Action of the last step, shape ``(worlds, actions)``; 0 after a reset.
+        previous_action: Action of the step before.
+        goal: Result of `Task.goal`, shape ``(worlds, …)``.
+        elapsed: Control steps since the reset, shape ``(worlds,)``, int32.
     """
 
     action: Array
@@ -46,20 +46,20 @@ class Worlds:
         raise AttributeError(f"worlds have no {name!r}; name it in the task's `fields`; there are: {known}")
 
     def rows(self, rows: NDArray[np.intp]) -> Worlds:
-        """Some of the worlds only, as copies."""
+        """Return copies of some of the worlds, by index."""
         return Worlds(**{name: np.asarray(array)[rows] for name, array in self.__dict__.items()})
 
 
 @dataclass(frozen=True)
 class Observed:
-    """A part of the observation: what it is, how many numbers, and between which bounds they are.
+    """A part of the observation: name, size, bounds and unit.
 
     Attributes:
-        name: What it is.
-        low: Least value, for all or each of its numbers; what is below counts as this.
-        high: Largest value, likewise.
-        size: How many numbers it has.
-        unit: Their unit.
+        name: What the part is.
+        low: Lower bound, for all values or for each; values are clipped to it.
+        high: Upper bound, likewise.
+        size: Number of values.
+        unit: Unit of the values.
     """
 
     name: str
@@ -82,20 +82,21 @@ class Observed:
 
 
 class Task:
-    """What an environment is about; a subclass says it, see ``examples/own_task.py``.
+    """The base class of tasks: a subclass defines scene, controls, observation and reward.
 
-    `observe`, `reward`, `terminated`, `success`, `metrics` and `goal` are pure: arrays in, arrays out, for all worlds
-    at once. They use arithmetic and the functions of the namespace ``xp`` that NumPy and the array API share, so that
-    they run on arrays of torch and JAX too. They see no simulation and draw no random numbers.
+    ``examples/own_task.py`` is an example. `observe`, `reward`, `terminated`, `success`, `metrics` and `goal` are pure
+    functions of arrays, for all worlds at once. They use arithmetic and those functions of the namespace ``xp`` that
+    NumPy and the array API share, so that they also run on arrays of torch and JAX. They have no access to a simulation
+    and draw no random numbers.
 
     Attributes:
-        fields: Fields of the frame that the functions read.
+        fields: Frame fields that the functions read.
         max_episode_steps: Control steps after which an episode is truncated.
-        goal_draws: How many random numbers `goal` takes a world.
-        goal_steps: Control steps after which a goal gives way to the next one; None for one an episode.
+        goal_draws: Number of random numbers that `goal` takes per world.
+        goal_steps: Control steps after which the next goal replaces a goal; None for one goal per episode.
         launch_options: Further arguments of `tightloop.launch`, such as ``bounds``.
-        goal_radius: Where the first three numbers of a goal are a place, the radius of the ball that marks it in
-            pictures [m]; None for no ball.
+        goal_radius: Radius of the ball that marks a goal in pictures [m], if the first three values of a goal are a
+            position; None for no ball.
     """
 
     fields: ClassVar[Sequence[str]] = ("joint_q", "joint_qd")
@@ -106,46 +107,46 @@ class Task:
     goal_radius: ClassVar[float | None] = None
 
     def scene(self) -> Scene:
-        """The scene, with what `Scene.randomize` draws at each reset. ``dt * substeps`` is a control step."""
+        """Return the scene with its randomization. ``dt * substeps`` is the length of a control step."""
         raise NotImplementedError(f"{type(self).__name__} has no `scene`")
 
     def controls(self) -> Sequence[Control]:
-        """What the action's numbers do, in their order."""
+        """Return the controls, in the order of the action's values."""
         raise NotImplementedError(f"{type(self).__name__} has no `controls`")
 
     def observed(self) -> Sequence[Observed]:
-        """The parts of the observation, as `observe` returns them."""
+        """Return the parts of the observation, in the order of `observe`."""
         raise NotImplementedError(f"{type(self).__name__} has no `observed`")
 
     def bind(self, names: Names) -> None:
-        """Called once, before the functions: look up where things are in the arrays."""
+        """Look up indices in the arrays; called once, before the other functions."""
 
     def observe(self, xp: Namespace, worlds: Worlds) -> Sequence[Array]:
-        """The observation in parts, each of shape ``(worlds,)`` or ``(worlds, size)``, as `observed` lists them."""
+        """Return the parts of the observation, of shape ``(worlds,)`` or ``(worlds, size)``, like `observed`."""
         raise NotImplementedError(f"{type(self).__name__} has no `observe`")
 
     def reward(self, xp: Namespace, worlds: Worlds) -> Array:
-        """Reward of the step that led here, shape ``(worlds,)``."""
+        """Return the reward of the last step, shape ``(worlds,)``."""
         raise NotImplementedError(f"{type(self).__name__} has no `reward`")
 
     def terminated(self, xp: Namespace, worlds: Worlds) -> Array | None:
-        """Which worlds have come to an end, bool, shape ``(worlds,)``; None if none ever does."""
+        """Return which worlds are terminated, bool, shape ``(worlds,)``; None if the task never terminates."""
         return None
 
     def success(self, xp: Namespace, worlds: Worlds) -> Array | None:
-        """Which worlds do what is asked for, bool, shape ``(worlds,)``; None if the task knows no success."""
+        """Return which worlds fulfil the task, bool, shape ``(worlds,)``; None if the task defines no success."""
         return None
 
     def metrics(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
-        """What else is worth knowing of a step, by name, each of shape ``(worlds,)``; it goes into ``infos``."""
+        """Return further values of a step for ``infos``, by name, each of shape ``(worlds,)``."""
         return {}
 
     def goal(self, xp: Namespace, worlds: Worlds, draws: Array) -> Array:
-        """Goals of worlds that begin an episode, or the next goal of one.
+        """Return goals for worlds that start an episode, or their next goals.
 
         Args:
             xp: The namespace.
-            worlds: These worlds.
+            worlds: Only these worlds.
             draws: Uniform random numbers in [0, 1), shape ``(worlds, goal_draws)``.
 
         Returns:
@@ -154,7 +155,7 @@ class Task:
         return draws[:, :0]
 
     def describe(self) -> str:
-        """The observation as a table: place, what it is, range, unit."""
+        """Return a table of the observation: index, name, range, unit."""
         lines, place = [], 0
         for part in self.observed():
             places = f"{place}" if part.size == 1 else f"{place}–{place + part.size - 1}"
@@ -165,10 +166,10 @@ class Task:
 
 
 def episode_steps(task: Task, given: float | None) -> int | None:
-    """Control steps after which episodes are truncated; None for never.
+    """Return the control steps after which episodes are truncated; None for never.
 
     Raises:
-        ArgumentError: It is no whole number of at least 1, and not infinite.
+        ArgumentError: The number is neither a whole number of at least 1 nor infinite.
     """
     steps = task.max_episode_steps if given is None else given
     if steps == math.inf:

@@ -1,4 +1,4 @@
-"""Many environments at once: a task in the worlds of a daemon, as `gymnasium.vector` has it."""
+"""Vectorized environments: a task in the worlds of a daemon, as a `gymnasium.vector.VectorEnv`."""
 
 from __future__ import annotations
 
@@ -14,21 +14,19 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from tightloop import checks
-from tightloop.env.commands import Actions
+from tightloop.env.actions import Actions
 from tightloop.env.episodes import Episodes
 from tightloop.env.evaluation import Evaluation
 from tightloop.env.names import Names
 from tightloop.env.registry import make_task
 from tightloop.env.rendering import FIELDS, MODES, Rendering, marks
 from tightloop.env.rendering import check as check_mode
-from tightloop.env.slots import Slot, Slots
-from tightloop.env.start import begin
+from tightloop.env.simulation import open_simulation
+from tightloop.env.step_buffers import BufferRing, StepBuffers
 from tightloop.env.task import Task, episode_steps
 from tightloop.errors import ArgumentError, CommandRefused
+from tightloop.frames import FAULTED
 from tightloop.sim import Sim
-
-#: Bits of ``status`` of a world that is frozen: no longer finite, or beyond the bounds of the run.
-FROZEN = 1 | 8
 
 Step = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 
@@ -36,21 +34,21 @@ Step = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], NDArra
 class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
     """A task in many worlds.
 
-    Observations are float32, shape ``(num_envs, size)``, within the bounds of ``single_observation_space``; actions
-    of shape ``(num_envs, actions)`` within those of ``single_action_space``, and what is beyond counts as the bound.
-    Rewards are float32.
+    Observations are float32, shape ``(num_envs, size)``, clipped to ``single_observation_space``. Actions have shape
+    ``(num_envs, actions)`` and are clipped to ``single_action_space``. Rewards are float32.
 
-    ``infos["success"]`` says in which worlds the task is done now, where the task knows; its `Task.metrics` are told
-    likewise, and ``infos["_success"]`` says in which rows: not of worlds that have just begun. A world that failed (no
-    longer finite, or beyond the task's bounds) is terminated, and ``infos["fault"]`` holds the bits of its ``status``.
+    ``infos["success"]`` says which worlds fulfil the task now, if the task defines success. The values of
+    `Task.metrics` are in ``infos`` too. ``infos["_success"]`` and its like say which rows are valid; rows of worlds
+    that have just begun an episode are not. A faulted world (not finite, or beyond the task's bounds) is terminated,
+    and ``infos["fault"]`` has the bits of its ``status``.
 
     Attributes:
         sim: The simulation.
         task: The task.
-        autoreset_mode: When a world whose episode ended begins the next one.
+        autoreset_mode: When a world starts its next episode.
         max_episode_steps: Control steps after which an episode is truncated; None for never.
-        control_dt: Length of a step [s].
-        evaluation: Calls the task's functions with what the worlds are now.
+        control_dt: Length of a control step [s].
+        evaluation: Evaluates the task's functions at the current worlds.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(MODES)}  # noqa: RUF012
@@ -72,28 +70,28 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        """Launch a daemon with that many worlds, or join one.
+        """Launch a daemon for a task, or join one.
 
         Args:
             task: A `Task`, its class, the name of one of `tightloop.tasks`, such as ``"FrankaReach"``, or
                 ``"own_task.py:Circle"``, a class in a file.
-            num_envs: How many worlds; those of the daemon if one is joined, else 1.
+            num_envs: Number of worlds; if left out, that of the joined daemon, else 1.
             autoreset_mode: ``NEXT_STEP``, ``SAME_STEP`` or ``DISABLED``, as gymnasium defines them.
-            copy: Whether each step returns new arrays. Otherwise they are views of a ring, overwritten by the step or
-                reset that comes ``slots`` of these later: for loops that have read them by then.
+            copy: Whether each step returns new arrays. Otherwise it returns views of a ring buffer, which the step or
+                reset ``slots`` calls later overwrites.
             slots: Slots of that ring, at least 2.
-            device: As `launch` has it, such as ``"gpu"``.
-            precision: ``"f32"``, or ``"f64"`` for the physics in double precision; that of a daemon that is joined.
-            threads: Most threads a step may use; all cores if left out.
+            device: As of `launch`, such as ``"gpu"``.
+            precision: ``"f32"``, or ``"f64"`` for the physics in double precision; that of a joined daemon if left out.
+            threads: Largest number of threads of a step; all cores if left out.
             max_episode_steps: Steps after which an episode is truncated, ``math.inf`` for never; the task's if left
                 out.
-            daemon: Name of a running daemon to join, which ``python -m tightloop.env serve`` started for that task. It
-                goes on when this process ends, however it ends. Or a simulation of your own, such as one of `Groups`,
-                which `close` then closes. None launches one that ends with this process.
-            first_env: Number of the first world among those that ``reset(seed=…)`` counts, for groups of environments.
-            render_mode: ``"rgb_array"`` for `render`, ``"human"`` for a page in the browser, where each step takes its
-                time; both need the extra ``view``.
-            **options: What the task's class takes.
+            daemon: Name of a running daemon to join, which ``python -m tightloop.env serve`` started for the task. It
+                continues when this process ends. Or a simulation of your own, such as one of `Groups`, which `close`
+                then closes. None launches a daemon that ends with this process.
+            first_env: Index of the first world in the count of ``reset(seed=…)``, for groups of environments.
+            render_mode: ``"rgb_array"`` for `render`, or ``"human"`` for a browser page in real time; both need the
+                extra ``view``.
+            **options: Arguments of the task's class.
 
         Raises:
             ArgumentError: An argument is not valid; the message names it.
@@ -104,12 +102,12 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         first_env = checks.integer("first_env", first_env, least=0, error=ArgumentError)
         if num_envs is not None:
             num_envs = checks.integer("num_envs", num_envs, error=ArgumentError)
-        # a task is bound to one environment: another with the same one would write into its arrays
+        # a task is bound to one environment: two environments would share its arrays
         self.task = copying.deepcopy(make_task(task, options))
         self.autoreset_mode = _mode(autoreset_mode)
         self.max_episode_steps = episode_steps(self.task, max_episode_steps)
         controls = list(self.task.controls())
-        scene, self.sim = begin(
+        scene, self.sim = open_simulation(
             self.task,
             controls,
             num_envs,
@@ -140,7 +138,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         self.single_action_space = self._actions.space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._slots = None if copy else Slots(self.num_envs, self.evaluation.observed, slots)
+        self._ring = None if copy else BufferRing(self.num_envs, self.evaluation.observed, slots)
         self._done = np.zeros(self.num_envs, np.bool_)
         self._all = np.ones(self.num_envs, np.bool_)
         self._frame: Any = None
@@ -148,7 +146,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
 
     @property
     def elapsed(self) -> NDArray[np.int32]:
-        """Control steps of each world's episode so far, shape ``(num_envs,)``; assigning spreads when episodes end."""
+        """Control steps of each world's episode, shape ``(num_envs,)``; assign to it to spread the ends of episodes."""
         return self._episodes.elapsed
 
     @elapsed.setter
@@ -158,27 +156,30 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
 
     @property
     def frame(self) -> Any:
-        """The frame that the last reset or step ended with, as `Sim.step` returns it; None before the first."""
+        """Frame of the last reset or step, as `Sim.step` returns it; None before the first."""
         return self._frame
 
     @property
     def marks(self) -> dict[str, Any] | None:
-        """The goals of now, as `tightloop.view` marks them in pictures; None of a task whose goals have no place."""
+        """Current goals, as pictures of `tightloop.view` mark them; None if the task's goals have no position."""
         return marks(self.task, self._episodes.goal)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin episodes in all worlds, or in those of ``options["reset_mask"]``.
+        """Start episodes in all worlds, or in those of ``options["reset_mask"]``.
 
-        An episode is a function of its seed and of how many the world has had with it: ``reset(seed=…)`` begins the
-        same ones again, whatever the number of worlds and wherever a world stands among them.
+        An episode depends only on its seed and on the number of episodes since that seed. ``reset(seed=…)`` repeats the
+        same episodes, for any number of worlds and at any index.
 
         Args:
-            seed: World i gets the seed ``seed + i``; or a list with one a world, None for one by chance. Left out,
-                worlds go on to their next episode; the first time they get seeds by chance.
-            options: ``{"reset_mask": mask}``, a bool array of shape ``(num_envs,)`` with at least one True. The
-                observations of the other worlds stay what they are.
+            seed: World i gets the seed ``seed + i``. Or a list with one seed per world, None for a random one. If left
+                out, worlds start their next episode; the first reset draws random seeds.
+            options: ``{"reset_mask": mask}``, a bool array of shape ``(num_envs,)`` with at least one True. Other
+                worlds and their observations do not change.
+
+        Returns:
+            Observations, shape ``(num_envs, size)``, and an empty dict.
 
         Raises:
             ArgumentError: The mask or the seed is not valid.
@@ -190,24 +191,24 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         self._begin(mask, self.sim.reset(mask=mask, seed=seeds))
         self._done[mask] = False
         self._ready = True
-        slot = self._next_slot()
-        self._observe(slot.obs)
-        return slot.obs, {}
+        buffers = self._next_buffers()
+        self._observe(buffers.obs)
+        return buffers.obs, {}
 
     def step(self, actions: ArrayLike) -> Step:
-        """Advance all worlds by one control step: `send`, then `recv`."""
+        """Advance all worlds by one control step: `send`, then `recv`. Arguments, results and errors are theirs."""
         self.send(actions)
         return self.recv()
 
     def send(self, actions: ArrayLike) -> None:
-        """Send the actions of a step, and return at once; `recv` waits for what becomes of them.
+        """Send the actions of a step, and return at once; `recv` waits for the results.
 
         Args:
-            actions: Shape ``(num_envs, actions)``, within ``action_space``. NaN makes a world fail, and no other.
+            actions: Shape ``(num_envs, actions)``, clipped to ``action_space``. NaN faults only its own world.
 
         Raises:
-            ArgumentError: The shape is another, or these are no numbers.
-            CommandRefused: There was no reset, or a step is on its way, or, without autoreset, an episode has ended.
+            ArgumentError: The shape is wrong, or the values are not real numbers.
+            CommandRefused: There was no reset, or a step is in flight, or, without autoreset, an episode has ended.
         """
         self._check_idle("send")
         if not self._ready:
@@ -220,15 +221,15 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         self._in_flight = True
 
     def recv(self) -> Step:
-        """What became of the actions sent last.
+        """Wait for the results of the actions that `send` sent.
 
         Returns:
-            ``obs, reward, terminated, truncated, infos``. In the mode ``SAME_STEP`` the rows that
-            ``infos["_final_obs"]`` names hold in ``infos["final_obs"]`` the last observation of the episode that
-            ended, and in ``infos["final_info"]`` what was told of it; the other rows are zeros.
+            ``obs, reward, terminated, truncated, infos``. In the mode ``SAME_STEP``, ``infos["final_obs"]`` has the
+            last observations of episodes that ended, and ``infos["final_info"]`` their infos, in the rows that
+            ``infos["_final_obs"]`` marks; other rows are zero.
 
         Raises:
-            CommandRefused: There is no step on its way.
+            CommandRefused: No step is in flight.
             DaemonLost: The daemon went away; its state is lost.
         """
         if not self._in_flight:
@@ -236,14 +237,14 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         try:
             frame = self.sim.recv()
         except KeyboardInterrupt:
-            raise  # it may be called again
+            raise  # `recv` may be called again
         except BaseException:
             self._in_flight = False
             raise
         self._in_flight = False
         if self._rendering is not None:
             self._rendering.pace(self.control_dt)
-        slot, infos = self._next_slot(), {}
+        buffers, infos = self._next_buffers(), {}
         begun = self._done if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._done.any() else None
         if begun is None:
             self._see(frame)
@@ -252,20 +253,20 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             self._episodes.next(begun)
             self._begin(begun, self.sim.reset(mask=begun))
         self._episodes.elapsed += 1 if begun is None else ~begun
-        self._score(slot, infos, begun)
-        np.logical_or(slot.terminated, slot.truncated, out=self._done)
+        self._score(buffers, infos, begun)
+        np.logical_or(buffers.terminated, buffers.truncated, out=self._done)
         due = self._episodes.due()
         if due is not None and (due := due & ~self._done).any():
             self._episodes.renew(due, self.evaluation.worlds)
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._done.any():
-            self._end(slot, infos)
-        self._observe(slot.obs)
-        return slot.obs, slot.reward, slot.terminated, slot.truncated, infos
+            self._end(buffers, infos)
+        self._observe(buffers.obs)
+        return buffers.obs, buffers.reward, buffers.terminated, buffers.truncated, infos
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Pictures of all worlds as they are now, each of shape ``(height, width, 3)``, in the mode ``"rgb_array"``.
+        """Render a picture per world, shape ``(height, width, 3)``, in the mode ``"rgb_array"``; None in other modes.
 
-        None in other modes. A world takes milliseconds: `tightloop.view.Picture` shows many of them in one picture.
+        A world takes milliseconds. `tightloop.view.Picture` shows many worlds in one picture.
 
         Raises:
             CommandRefused: No episode has begun.
@@ -276,36 +277,36 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         return self._rendering.render(self._frame, self._episodes.goal)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """End the simulation, or leave the daemon that was joined."""
-        # gymnasium closes, too, what could not be made
+        """End the simulation, or leave a joined daemon."""
+        # gymnasium also closes environments whose constructor failed
         if "sim" in vars(self):
             self.sim.close()
 
-    def _end(self, slot: Slot, infos: dict[str, Any]) -> None:
-        """Keep the last observations of episodes that ended, and begin the next ones."""
+    def _end(self, buffers: StepBuffers, infos: dict[str, Any]) -> None:
+        """Keep the last observations of episodes that ended, and start the next episodes."""
         ended = self._done.copy()
-        self._observe(slot.final_obs)
-        slot.final_obs[~ended] = 0.0
-        # of the worlds that go on, what is told is of this step; of those that ended, it was of their last one
+        self._observe(buffers.final_obs)
+        buffers.final_obs[~ended] = 0.0
+        # infos of running episodes belong to this step, those of ended episodes to their last step
         infos["final_info"] = {name: mine & ended if name[0] == "_" else mine for name, mine in infos.items()}
         for name in infos["final_info"]:
             if name[0] == "_":
                 infos[name] = infos[name] & ~ended
-        infos["final_obs"], infos["_final_obs"] = slot.final_obs, ended
+        infos["final_obs"], infos["_final_obs"] = buffers.final_obs, ended
         infos["_final_info"] = ended.copy()
         self._episodes.next(ended)
         self._begin(ended, self.sim.reset(mask=ended))
 
     def _begin(self, mask: NDArray[np.bool_], frame: Any) -> None:
-        """Begin episodes of worlds that the daemon has reset."""
+        """Start episodes of worlds that the daemon has reset."""
         self._actions.begin(mask)
         self._see(frame)
         self._episodes.begin(mask, self.evaluation.worlds)
-        # the first goals of all are an array that was not there before
+        # the first goals make a new array, which the task's functions must see
         self._see(frame)
 
     def _see(self, frame: Any) -> None:
-        """Make a frame what the task's functions see."""
+        """Show a frame to the task's functions."""
         self._frame = frame
         self.evaluation.see(
             frame,
@@ -317,35 +318,35 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
 
     def _observe(self, out: NDArray[np.float32]) -> None:
         self.evaluation.observe(out)
-        frozen = self._frame.status & FROZEN
-        if frozen.any():
-            # what is derived from a frozen state need not be finite
-            out[frozen > 0] = np.nan_to_num(out[frozen > 0], nan=0.0)
+        faulted = self._frame.status & FAULTED
+        if faulted.any():
+            # observations of a faulted world may not be finite
+            out[faulted > 0] = np.nan_to_num(out[faulted > 0], nan=0.0)
 
-    def _score(self, slot: Slot, infos: dict[str, Any], begun: NDArray[np.bool_] | None) -> None:
-        """Reward and ends of the step; worlds that have just begun have neither."""
-        self.evaluation.reward(slot.reward)
-        self.evaluation.terminated(slot.terminated)
+    def _score(self, buffers: StepBuffers, infos: dict[str, Any], begun: NDArray[np.bool_] | None) -> None:
+        """Write rewards and ends of the step; worlds that have just begun an episode have neither."""
+        self.evaluation.reward(buffers.reward)
+        self.evaluation.terminated(buffers.terminated)
         if self.max_episode_steps is None:
-            slot.truncated[:] = False
+            buffers.truncated[:] = False
         else:
-            np.greater_equal(self._episodes.elapsed, self.max_episode_steps, out=slot.truncated)
-        fault = self._frame.status & FROZEN
+            np.greater_equal(self._episodes.elapsed, self.max_episode_steps, out=buffers.truncated)
+        fault = self._frame.status & FAULTED
         if fault.any():
             failed = fault > 0
-            slot.terminated |= failed
-            slot.reward[failed & ~np.isfinite(slot.reward)] = 0.0
+            buffers.terminated |= failed
+            buffers.reward[failed & ~np.isfinite(buffers.reward)] = 0.0
             infos["fault"], infos["_fault"] = fault, failed
         if begun is not None:
-            slot.reward[begun] = 0.0
-            slot.terminated[begun] = slot.truncated[begun] = False
-        for name, value in self.evaluation.told().items():
+            buffers.reward[begun] = 0.0
+            buffers.terminated[begun] = buffers.truncated[begun] = False
+        for name, value in self.evaluation.infos().items():
             infos[name], infos[f"_{name}"] = value, self._all.copy() if begun is None else ~begun
 
-    def _next_slot(self) -> Slot:
-        if self._slots is None:
-            return Slot(self.num_envs, self.evaluation.observed)
-        return self._slots.next()
+    def _next_buffers(self) -> StepBuffers:
+        if self._ring is None:
+            return StepBuffers(self.num_envs, self.evaluation.observed)
+        return self._ring.next()
 
     def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
         if options is None or "reset_mask" not in options:

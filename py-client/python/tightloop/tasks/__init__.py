@@ -1,1 +1,1 @@
-"""Tasks that come with tightloop; their names are those of `tightloop.registration`."""
+"""Tasks that come with tightloop; their names are those of `tightloop.env.registry.TASKS`."""

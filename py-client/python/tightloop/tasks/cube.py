@@ -16,7 +16,7 @@ from typing import ClassVar
 import tightloop as tl
 from tightloop.env.controls import Control
 from tightloop.env.names import Names
-from tightloop.env.task import Array, Namespace, Observed, Task
+from tightloop.env.task import Array, Namespace, Task
 from tightloop.tasks import franka
 
 #: Half the edge [m].
@@ -82,15 +82,6 @@ class CubeTask(Task):
         self._tcp = names.site(franka.TCP)
         self._pos, self._quat = slice(first, first + 3), slice(first + 3, first + 7)
         self._touch = [names.contact_sensor(name) for name in TOUCH]
-
-
-def joints_observed() -> list[Observed]:
-    """Positions and velocities of the nine joints."""
-    reach = [6.0] * 7 + [0.1] * 2
-    return [
-        Observed("joint positions", [-end for end in reach], reach, 9, "rad, m"),
-        Observed("joint velocities", -10, 10, 9, "rad/s, m/s"),
-    ]
 
 
 def grasped(xp: Namespace, quats: Array, left: Array, right: Array) -> Array:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import tightloop as tl
 from tightloop.checks import Vector
 from tightloop.env.controls import Control, EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
+from tightloop.env.task import Observed
 from tightloop.errors import ArgumentError
 from tightloop.shapes import ORIGIN, Surface
 
@@ -79,3 +80,12 @@ def gripper(*, binary: bool = False) -> Gripper:
         binary: Whether there is nothing in between.
     """
     return Gripper(FINGERS, low=-0.01, high=0.04, binary=binary)
+
+
+def joints_observed() -> list[Observed]:
+    """Return the observed positions and velocities of the nine joints."""
+    reach = [6.0] * 7 + [0.1] * 2
+    return [
+        Observed("joint positions", [-end for end in reach], reach, 9, "rad, m"),
+        Observed("joint velocities", -10, 10, 9, "rad/s, m/s"),
+    ]

@@ -1,6 +1,8 @@
-"""Lengths, distances and turns; arrays have the worlds first."""
+"""Lengths, distances and angles; arrays have the worlds first."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from tightloop.env.task import Array, Namespace
 
@@ -22,3 +24,14 @@ def angle(xp: Namespace, quats: Array, others: Array) -> Array:
     alike = abs(xp.vecdot(quats, others))
     # rounding may take it above 1
     return 2.0 * xp.acos(xp.minimum(alike, alike * 0.0 + 1.0))
+
+
+def in_box(draws: Array, low: Sequence[float], high: Sequence[float]) -> list[Array]:
+    """Return a point in a box, one array of shape ``(worlds,)`` per axis.
+
+    Args:
+        draws: Uniform random numbers in [0, 1), shape ``(worlds, 3)`` or wider.
+        low: Lower corner of the box.
+        high: Upper corner of the box.
+    """
+    return [start + (end - start) * draws[:, axis] for axis, (start, end) in enumerate(zip(low, high, strict=True))]

@@ -36,8 +36,9 @@ import numpy as np
 import tightloop as tl
 from tightloop.env.names import Names
 from tightloop.env.task import Array, Namespace, Observed, Worlds
-from tightloop.tasks.cube import CubeTask, joints_observed
-from tightloop.tasks.geometry import distance, squares
+from tightloop.tasks import franka
+from tightloop.tasks.cube import CubeTask
+from tightloop.tasks.geometry import distance, in_box, squares
 from tightloop.tasks.reach import START
 
 LOW, HIGH = (0.4, -0.25, 0.25), (0.6, 0.25, 0.5)  # of the goals [m]
@@ -66,7 +67,7 @@ class FrankaLift(CubeTask):
         """The table above."""
         arm, _ = self.controls()
         return [
-            *joints_observed(),
+            *franka.joints_observed(),
             Observed("cube: position", -2, 2, 3, "m"),
             Observed("goal: position", LOW, HIGH, 3, "m"),
             Observed("goal: orientation", -1, 1, 4),
@@ -81,7 +82,7 @@ class FrankaLift(CubeTask):
 
     def goal(self, xp: Namespace, worlds: Worlds, draws: Array) -> Array:
         """A place in the box, upright."""
-        place = [low + (high - low) * draws[:, axis] for axis, (low, high) in enumerate(zip(LOW, HIGH, strict=True))]
+        place = in_box(draws, LOW, HIGH)
         zero = 0.0 * place[0]
         return xp.stack([*place, zero, zero, zero, zero + 1.0], 1)
 

@@ -38,8 +38,9 @@ import numpy as np
 
 import tightloop as tl
 from tightloop.env.task import Array, Namespace, Observed, Worlds
-from tightloop.tasks.cube import HALF, CubeTask, grasped, joints_observed
-from tightloop.tasks.geometry import distance
+from tightloop.tasks import franka
+from tightloop.tasks.cube import HALF, CubeTask, grasped
+from tightloop.tasks.geometry import distance, in_box
 
 START = [0.0, np.pi / 8, 0.0, -np.pi * 5 / 8, 0.0, np.pi * 3 / 4, np.pi / 4, 0.04, 0.04]  # [rad, m]
 BASE = (-0.615, 0.0, 0.0)  # [m]
@@ -73,7 +74,7 @@ class FrankaPickCube(CubeTask):
     def observed(self) -> Sequence[Observed]:
         """The table above."""
         return [
-            *joints_observed(),
+            *franka.joints_observed(),
             Observed("held", 0, 1),
             Observed("tcp: position", -2, 2, 3, "m"),
             Observed("tcp: orientation", -1, 1, 4),
@@ -86,7 +87,7 @@ class FrankaPickCube(CubeTask):
 
     def goal(self, xp: Namespace, worlds: Worlds, draws: Array) -> Array:
         """A place in the box."""
-        place = [low + (high - low) * draws[:, axis] for axis, (low, high) in enumerate(zip(LOW, HIGH, strict=True))]
+        place = in_box(draws, LOW, HIGH)
         return xp.stack(place, 1)
 
     def observe(self, xp: Namespace, worlds: Worlds) -> Sequence[Array]:

@@ -29,7 +29,8 @@ from collections.abc import Sequence
 
 import tightloop as tl
 from tightloop.env.task import Array, Namespace, Observed, Worlds
-from tightloop.tasks.cube import HALF, CubeTask, joints_observed
+from tightloop.tasks import franka
+from tightloop.tasks.cube import HALF, CubeTask
 from tightloop.tasks.pick_cube import BASE, SPREAD, START
 
 AHEAD = 0.2  # of the goal before the cube [m]
@@ -59,7 +60,7 @@ class FrankaPushCube(CubeTask):
     def observed(self) -> Sequence[Observed]:
         """The table above."""
         return [
-            *joints_observed(),
+            *franka.joints_observed(),
             Observed("tcp: position", -2, 2, 3, "m"),
             Observed("tcp: orientation", -1, 1, 4),
             Observed("goal", (AHEAD - SPREAD, -SPREAD, 0.0), (AHEAD + SPREAD, SPREAD, GOAL_Z), 3, "m"),

@@ -31,7 +31,7 @@ from tightloop.env.controls import Control
 from tightloop.env.names import Names
 from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
 from tightloop.tasks import franka
-from tightloop.tasks.geometry import angle, distance, squares
+from tightloop.tasks.geometry import angle, distance, in_box, squares
 
 START = [0.0, -0.569, 0.0, -2.81, 0.0, 3.037, 0.741, 0.04, 0.04]  # [rad, m]
 LIMIT = 4.0  # of actions: 2 rad from the start
@@ -65,10 +65,8 @@ class FrankaReach(Task):
 
     def observed(self) -> Sequence[Observed]:
         """The table above."""
-        reach = [6.0] * 7 + [0.1] * 2
         return [
-            Observed("joint positions", [-end for end in reach], reach, 9, "rad, m"),
-            Observed("joint velocities", -10, 10, 9, "rad/s, m/s"),
+            *franka.joints_observed(),
             Observed("goal: position", LOW, HIGH, 3, "m"),
             Observed("goal: orientation", -1, 1, 4),
             Observed("last action", -self._arm_control.limit, self._arm_control.limit, self._arm_control.size),
@@ -81,7 +79,7 @@ class FrankaReach(Task):
 
     def goal(self, xp: Namespace, worlds: Worlds, draws: Array) -> Array:
         """Position in the box, and the hand's z axis downwards: half a turn about x, then a turn about z."""
-        place = [low + (high - low) * draws[:, axis] for axis, (low, high) in enumerate(zip(LOW, HIGH, strict=True))]
+        place = in_box(draws, LOW, HIGH)
         yaw = np.pi * (2.0 * draws[:, 3] - 1.0)
         zero = 0.0 * yaw
         return xp.stack([*place, xp.cos(0.5 * yaw), xp.sin(0.5 * yaw), zero, zero], 1)

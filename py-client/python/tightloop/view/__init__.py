@@ -1,4 +1,4 @@
-"""Looking at worlds: in a browser, as pictures, as films; from a running daemon or from a recording.
+"""Shows worlds in a browser, as pictures or as films, from a running daemon or a recording.
 
 Its libraries come with the extra ``view``; docs/pages/install.md says how to install it.
 
@@ -23,7 +23,7 @@ __all__ = ["Camera", "Film", "Picture", "film"]
 
 
 def __getattr__(name: str) -> Any:
-    # Lazy (PEP 562): a simulation that nobody looks at needs none of the libraries
+    # Lazy (PEP 562): a simulation without a viewer needs none of the libraries
     home = _HOMES.get(name)
     if home is None:
         raise AttributeError(f"module `tightloop.view` has no attribute `{name}`")

@@ -1,4 +1,4 @@
-"""Where one looks from: presets by name, for the page in the browser and for pictures."""
+"""Cameras and their presets by name, for the page in the browser and for pictures."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: Directions from what is looked at to the camera, x forward, z up; "follow" is "three-quarter" that goes along.
+#: Directions from the target to the camera, x forward, z up; "follow" is a "three-quarter" camera that moves along.
 PRESETS = {
     "three-quarter": (1.0, -1.0, 0.7),
     "front": (1.0, 0.0, 0.15),
     "side": (0.0, -1.0, 0.15),
-    # not quite from above, where up would have no direction
+    # not exactly vertical: the up direction would be undefined
     "top": (0.0, -1e-3, 1.0),
     "follow": (1.0, -1.0, 0.7),
 }
 
-# That part of the picture is what is looked at, the rest is around it.
+# Fraction of the picture that the target fills.
 _MARGIN = 0.9
 _LEAST_DISTANCE = 0.1
 
@@ -27,10 +27,10 @@ class Camera:
     """A point of view.
 
     Attributes:
-        position: Where the camera is [m].
-        target: What it looks at [m].
+        position: Position of the camera [m].
+        target: Point that it looks at [m].
         fov: Vertical field of view [rad].
-        up: What is upwards in the picture.
+        up: Direction that points up in the picture.
     """
 
     position: tuple[float, float, float]
@@ -40,12 +40,12 @@ class Camera:
 
 
 def camera(preset: str, box: NDArray[np.float64], *, aspect: float = 1.0, fov: float = 0.7) -> Camera:
-    """The camera that sees a box whole.
+    """Return a preset camera that shows a whole box.
 
     Args:
         preset: A name of `PRESETS`.
-        box: Least and largest corner of what is looked at [m], shape ``(2, 3)``.
-        aspect: Width of the picture over its height.
+        box: Lower and upper corner of the box [m], shape ``(2, 3)``.
+        aspect: Width of the picture divided by its height.
         fov: Vertical field of view [rad].
     """
     centre = box.mean(axis=0)
@@ -54,7 +54,7 @@ def camera(preset: str, box: NDArray[np.float64], *, aspect: float = 1.0, fov: f
     across /= np.linalg.norm(across)
     upward = np.cross(towards, across)
     corners = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3) - centre
-    # each corner has to be inside both angles: its side over its distance from the camera is at most their tangent
+    # a corner is visible if its offset over its distance is at most the tangent of half the view angle, both ways
     tangent = np.tan(fov / 2) * _MARGIN
     needed = np.maximum(np.abs(corners @ across) / (tangent * aspect), np.abs(corners @ upward) / tangent)
     distance = float(np.max(corners @ towards + needed))

@@ -14,7 +14,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from tightloop.view import needs, paint
+from tightloop.view import dependencies as needs
+from tightloop.view import paint
 from tightloop.view.surface import Surface, Unreadable, joined
 
 # To z up: (x, y, z) to (x, -z, y), and to (-y, -z, x).

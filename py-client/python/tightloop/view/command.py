@@ -13,7 +13,7 @@ import webbrowser
 from pathlib import Path
 
 from tightloop.errors import TightloopError
-from tightloop.view import needs
+from tightloop.view import dependencies
 
 _WORLDS_MAX = 1024
 _EPILOG = """examples:
@@ -54,7 +54,7 @@ def main(arguments: list[str]) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.set())
     try:
-        needs.check("viser")
+        dependencies.check("viser")
         from tightloop.view.server import Server
 
         _give_way()

@@ -1,4 +1,4 @@
-"""What the page shows, as the one who looks chose it; the panel writes it, the stage reads it."""
+"""What the page shows, as its user chose it. The panel writes these options, the page and its meshes read them."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ Contacts = Literal["off", "followed world", "all worlds"]
 
 
 @dataclass
-class Looks:
-    """Choices of the one who looks.
+class DisplayOptions:
+    """Display options of a page.
 
     Attributes:
-        kind: What robots look like: their visual meshes or the shapes that touch.
-        world: The world that is followed: ghosts, frames, plots, sliders and pushes are of it.
-        alone: Whether it is shown alone.
-        ghosts: Whether the robot is shown at its joint targets, too.
+        kind: How robots are drawn: by their visual meshes or by their collision shapes.
+        world: The followed world: ghosts, body frames, plots, sliders and drag forces refer to it.
+        alone: Whether only that world is shown.
+        ghosts: Whether the robot is also shown at its joint targets.
         frames: Whether the axes of each body are shown.
-        contacts: In which worlds contacts are shown.
-        force_scale: Length of an arrow [m/N].
-        follow: Whether the camera goes along with the followed world.
+        contacts: The worlds whose contacts are shown.
+        force_scale: Length of a force arrow [m/N].
+        follow: Whether the camera follows that world.
     """
 
     kind: Kind = "visual"
@@ -36,13 +36,13 @@ class Looks:
     _changed: threading.Event = field(default_factory=threading.Event, repr=False)
 
     def choose(self, **choices: Any) -> None:
-        """Change what is shown, from the next picture on."""
+        """Change options; the next picture uses them."""
         for name, value in choices.items():
             setattr(self, name, value)
         self._changed.set()
 
     def take_changes(self) -> bool:
-        """Whether anything changed since this was asked last."""
+        """Return whether an option changed since the last call."""
         changed = self._changed.is_set()
         self._changed.clear()
         return changed

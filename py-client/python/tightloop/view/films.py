@@ -1,4 +1,4 @@
-"""Films of a run without a display: PNG, GIF, MP4, HTML, from a simulation, a daemon or a recording."""
+"""Films of a run as PNG, GIF, MP4 or HTML, without a display, from a simulation, a daemon or a recording."""
 
 from __future__ import annotations
 
@@ -11,56 +11,56 @@ from typing import TYPE_CHECKING, Any
 
 from tightloop import checks
 from tightloop.errors import ArgumentError, WaitTimeout
-from tightloop.view import needs
+from tightloop.view import dependencies
 from tightloop.view.cameras import PRESETS, Camera
 from tightloop.view.display_options import Kind
+from tightloop.view.encoders import Encoder, GifEncoder, Mp4Encoder, PngFile, PngFolder
 from tightloop.view.parts import parts
 from tightloop.view.picture import Picture
-from tightloop.view.rolls import Gif, Mp4, Png, Pngs, Roll
 from tightloop.view.source import Live, Recorded, Source, is_recording
 
 if TYPE_CHECKING:
     from tightloop.sim import Sim
 
-#: What a film is made of.
+#: Frame fields of a film.
 FIELDS = ("body_q", "contact_count", "contact_pos", "contact_force")
-#: How long a daemon is filmed [s], where nothing else is said.
+#: Default length of a film of a daemon [s].
 LIVE_SECONDS = 5.0
-# A daemon that rests shows its state once.
+# A paused daemon publishes its state only once.
 _FIRST_SECONDS = 5.0
-# Sums of times are off by roundings.
+# Tolerance for rounding errors in sums of times.
 _SLACK = 1e-6
 Progress = Callable[[float], bool]
-# Browsers slow pictures down that are shown more shortly than 20 ms.
+# Browsers slow down pictures of less than 20 ms.
 _GIF_FPS_MAX = 50
 _ENDINGS = (".png", ".gif", ".mp4", ".html")
 
 
 class Film:
-    """Frames of a run, as they are added, made into a file.
+    """Writes frames of a run into a picture or a film.
 
-    ``.png`` is one picture, the first; ``.gif``, ``.mp4`` and ``.html``, which a browser shows from all sides, are
-    films; a name without ending is a folder of PNG files. Pictures are drawn by the processor, ``fps`` for each second
-    that the frames say.
+    A ``.png`` file is the first picture. ``.gif`` and ``.mp4`` files are films, and an ``.html`` file is a film that a
+    browser shows from all sides. A name without an ending is a folder of PNG files. The CPU draws ``fps`` pictures per
+    second of the run.
 
     Attributes:
-        pictures: How many there are by now.
+        pictures: Number of pictures so far.
 
     Args:
-        out: The file, or folder.
-        sim: What frames are of: a `Sim`, or anything with its ``info``.
+        out: The file or folder.
+        sim: Simulation of the frames: a `Sim`, or anything with its ``info``.
         size: Width and height [pixels].
-        fps: Pictures a second.
-        worlds: How many worlds are seen, the first ones; or which ones. One is ``world``.
-        world: The world that is seen alone, or that the camera ``"follow"`` goes along with.
+        fps: Pictures per second.
+        worlds: How many worlds are shown, the first ones; or a list of them. A single one is ``world``.
+        world: World that is shown alone, or that the camera ``"follow"`` follows.
         camera: ``"three-quarter"``, ``"front"``, ``"side"``, ``"top"``, ``"follow"``, or a `Camera`.
-        kind: ``"visual"``, or ``"collision"`` for the shapes that touch.
-        contacts: Whether contacts are drawn, where frames have ``contact_count``, ``contact_pos``, ``contact_force``.
-        speed: Seconds of the run a second of film.
+        kind: ``"visual"``, or ``"collision"`` for collision shapes.
+        contacts: Whether to draw contacts, if frames have ``contact_count``, ``contact_pos``, ``contact_force``.
+        speed: Seconds of the run per second of film.
 
     Raises:
         ArgumentError: An argument is not valid; the message names it.
-        MissingLibrary: What writes such a file is not installed.
+        MissingLibrary: The library for this kind of file is not installed.
     """
 
     def __init__(
@@ -91,43 +91,43 @@ class Film:
         self._camera, self._world, self._contacts = camera, world, contacts
         self._worlds = chosen_worlds(worlds, world, info["worlds"])
         self._page: Any = None
-        self._roll: Roll | None = None
+        self._encoder: Encoder | None = None
         seen = parts(info["scene"], info["scene_folder"], info["body_names"])
-        #: What could not be drawn as its file has it.
+        #: Notes on what could not be drawn as in its file.
         self.notes: list[str] = list(seen.notes)
         if isinstance(worlds, int) and worlds > len(self._worlds):
             self.notes.append(f"{worlds} worlds were asked for, and {len(self._worlds)} can be seen")
         self._picture = Picture(seen, *size, kind=kind)
         if _ending(path) == ".html":
-            needs.check("viser", "trimesh")
+            dependencies.check("viser", "trimesh")
             from tightloop.view.html import Html
 
             bodies = len(info["body_names"])
             self._page = Html(path, seen, bodies, fps=self._fps, view=camera, kind=kind, contacts=contacts)
         else:
-            self._roll = _roll(path, self._fps, size)
+            self._encoder = _encoder(path, self._fps, size)
         self._single = _ending(path) == ".png"
         self.pictures = 0
         self._time: float | None = None
 
     @property
     def spacing(self) -> float:
-        """Time of the run from picture to picture [s]."""
+        """Time of the run between two pictures [s]."""
         return self._speed / self._fps
 
     @property
     def seconds(self) -> float:
-        """Time of the run that was added, up to its last frame [s]."""
+        """Time of the run up to the last added frame [s]."""
         return self._time or 0.0
 
     def add(self, frame: Any, seconds: float | None = None, *, goals: Mapping[str, Any] | None = None) -> None:
         """Add the next frame.
 
         Args:
-            frame: A `Frame`, a copy of one, or a `Shown`, with ``body_q`` of all worlds that are seen.
-            seconds: Time since the frame before [s]; a control frame if left out. Where a picture is due it is drawn;
-                where frames are farther apart, it stands.
-            goals: As `Picture.render` has them; the HTML shows none.
+            frame: A `Frame`, a copy of one, or a `Shown`, with ``body_q`` of all shown worlds.
+            seconds: Time since the frame before [s]; a control frame if left out. A picture is drawn when it is due,
+                and repeated if frames are farther apart.
+            goals: As of `Picture.render`; HTML shows no goals.
         """
         self._time = 0.0 if self._time is None else self._time + (self._period if seconds is None else seconds)
         more = self._reached(self._time) - self.pictures
@@ -137,7 +137,7 @@ class Film:
             for _ in range(more):
                 self._page.add(frame, self._worlds)
         else:
-            assert self._roll is not None
+            assert self._encoder is not None
             pixels = self._picture.render(
                 frame,
                 worlds=self._worlds,
@@ -147,15 +147,15 @@ class Film:
                 goals=goals,
             )
             for _ in range(more):
-                self._roll.add(pixels)
+                self._encoder.add(pixels)
         self.pictures += more
 
     def close(self) -> None:
-        """Finish the file; a second time does nothing."""
-        for kept in (self._roll, self._page):
+        """Finish the file; a second call does nothing."""
+        for kept in (self._encoder, self._page):
             if kept is not None:
                 kept.close()
-        self._roll = self._page = None
+        self._encoder = self._page = None
 
     def __enter__(self) -> Film:
         return self
@@ -164,7 +164,7 @@ class Film:
         self.close()
 
     def _reached(self, seconds: float) -> int:
-        """Pictures that a film of this length has; a picture at each end."""
+        """Return the number of pictures of a film of this length, with one at each end."""
         return int(seconds / self.spacing + _SLACK) + 1
 
 
@@ -179,27 +179,27 @@ def film(
     progress: Progress | None = None,
     **options: Any,
 ) -> Film:
-    """Film a daemon as it runs, or a recording (``tightloop record``).
+    """Make a film of a running daemon, or of a recording (``tightloop record``).
 
     Args:
         source: Name of a daemon, a `Sim`, or path of a recording, which ends in ``.tlrec``.
         out: As of `Film`.
-        seconds: How long: of a daemon time as it passes, 5 s if left out; of a recording simulated time, all of it if
-            left out.
-        at: When the film begins, or the picture is taken, after the recording's begin [s]; of a daemon, from now.
+        seconds: Length [s]: wall-clock time of a daemon, 5 s if left out; simulated time of a recording, all if left
+            out.
+        at: Start of the film, or time of the picture, after the start of the recording [s]; of a daemon, from now.
         worlds: As of `Film`.
         world: As of `Film`.
-        progress: Called with the time that was filmed [s], frame by frame; the film ends where it returns False.
+        progress: Called after each frame with the filmed time [s]; the film ends when it returns False.
         **options: As of `Film`: ``size``, ``fps``, ``camera``, ``kind``, ``contacts``, ``speed``.
 
     Returns:
-        The film, finished.
+        The finished film.
 
     Raises:
         ArgumentError: An argument is not valid; the message names it.
         UnknownDaemon: No daemon of that name is running; the message lists those that are.
         RecordingError: The recording cannot be read.
-        WaitTimeout: The daemon shows nothing.
+        WaitTimeout: The daemon published no frame.
     """
     at = 0.0 if at is None else checks.number("film: at", at, least=0.0, error=ArgumentError)
     if seconds is not None:
@@ -212,7 +212,7 @@ def film(
     watched: Live | Recorded = Recorded(text, most, FIELDS) if recorded else Live(text, most, FIELDS)
     try:
         if watched.worlds < most:
-            # who is not seen is refused by name
+            # report a world that is not there
             chosen_worlds(worlds, world, watched.worlds)
         with Film(out, watched, worlds=worlds, world=world, **options) as made:
             told = progress or (lambda _: True)
@@ -226,9 +226,9 @@ def film(
 
 
 def _play(source: Recorded, made: Film, at: float, seconds: float | None, progress: Progress) -> None:
-    """A recording's frames, from a time on."""
+    """Add the frames of a recording from a time on."""
     frames = 0
-    # a frame a control period from its begin on; the last one that began by then is what is seen at a time
+    # one frame per control period; the picture at a time shows the last frame that began by then
     begin = int(at / source.period + _SLACK)
     while (shown := source.poll()) is not None:
         if frames >= begin:
@@ -243,7 +243,7 @@ def _play(source: Recorded, made: Film, at: float, seconds: float | None, progre
 
 
 def _watch(source: Live, made: Film, at: float, seconds: float, progress: Progress) -> None:
-    """What a daemon shows, as time passes."""
+    """Add the frames of a daemon in real time."""
     shown = source.poll(_FIRST_SECONDS)
     if shown is None:
         raise WaitTimeout(f"film: daemon `{source.info['name']}` has shown nothing for {_FIRST_SECONDS:g} s")
@@ -253,7 +253,7 @@ def _watch(source: Live, made: Film, at: float, seconds: float, progress: Progre
         due = made.pictures
         while (wait := began + due * spacing - time.monotonic()) > 0:
             shown = source.poll(wait) or shown
-        # where drawing takes longer than there is time, pictures stand, and the film keeps the pace
+        # if drawing is too slow, pictures repeat and the film keeps real time
         late = int((time.monotonic() - began) / spacing)
         made.add(shown, min(max(due, late), count - 1) * spacing - made.seconds)
         if not progress(made.seconds):
@@ -261,7 +261,7 @@ def _watch(source: Live, made: Film, at: float, seconds: float, progress: Progre
 
 
 def most_worlds(worlds: int | Sequence[int], world: int) -> int:
-    """How many worlds a source must show."""
+    """Return how many worlds a source must show."""
     world = checks.integer("film: world", world, least=0, error=ArgumentError)
     if isinstance(worlds, int):
         return max(checks.integer("film: worlds", worlds, least=1, error=ArgumentError), world + 1)
@@ -269,10 +269,10 @@ def most_worlds(worlds: int | Sequence[int], world: int) -> int:
 
 
 def chosen_worlds(worlds: int | Sequence[int], world: int, there: int) -> list[int]:
-    """Which worlds are seen, of so many.
+    """Return the worlds to show.
 
     Raises:
-        ArgumentError: One is not there; the message names it.
+        ArgumentError: A world does not exist; the message names it.
     """
     world = checks.integer("film: world", world, least=0, error=ArgumentError)
     if isinstance(worlds, int):
@@ -289,18 +289,18 @@ def chosen_worlds(worlds: int | Sequence[int], world: int, there: int) -> list[i
 
 
 def _ending(path: Path) -> str:
-    """What kind of file it is to be: also of a name in capitals."""
+    """Return the ending of a file name in lower case."""
     return path.suffix.lower()
 
 
-def _roll(path: Path, fps: float, size: tuple[int, int]) -> Roll:
+def _encoder(path: Path, fps: float, size: tuple[int, int]) -> Encoder:
     ending = _ending(path)
     if ending == "" or path.is_dir():
-        return Pngs(path)
+        return PngFolder(path)
     if ending not in _ENDINGS:
         raise ArgumentError(f"film: out is {path.name!r}; it ends in {', '.join(_ENDINGS)}, or is a folder")
     if ending == ".png":
-        return Png(path)
+        return PngFile(path)
     if ending == ".gif" and fps > _GIF_FPS_MAX:
         raise ArgumentError(f"film: fps is {fps:g}; a GIF has at most {_GIF_FPS_MAX}, give an .mp4 for more")
-    return Gif(path, fps) if ending == ".gif" else Mp4(path, fps, size)
+    return GifEncoder(path, fps) if ending == ".gif" else Mp4Encoder(path, fps, size)

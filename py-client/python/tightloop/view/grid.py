@@ -1,4 +1,4 @@
-"""Where worlds stand when many are shown: on a grid that one world fits into, with the first at its own place."""
+"""Positions of many worlds on a grid whose cells fit one world; the first world is not moved."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from numpy.typing import NDArray
 from tightloop.view.parts import Part
 from tightloop.view.poses import IDENTITY, Array, place
 
-# A floor reaches further than what happens on it; the grid is for the latter.
+# Larger static parts count as floors, which do not set the size of a cell [m].
 _FLOOR_SIZE = 4.0
-# Room for what moves beyond where it stands at first, and between neighbours.
+# Factor for motion beyond the start, and for space between neighbours.
 _ROOM = 1.25
 _LEAST_SIZE = 0.5
 
 
 def extent(parts: Iterable[Part], body_q: Array) -> NDArray[np.float64]:
-    """The box around one world, floors left out [m].
+    """Return the bounding box of one world without floors [m].
 
     Args:
-        parts: What it looks like.
-        body_q: Poses of its bodies, shape ``(bodies, 7)``.
+        parts: Parts of the world.
+        body_q: Body poses, shape ``(bodies, 7)``.
 
     Returns:
-        Its least and its largest corner, shape ``(2, 3)``; a cube about the origin where there is nothing.
+        Lower and upper corner, shape ``(2, 3)``; a cube about the origin if there are no parts.
     """
     corners: list[Array] = []
     for part in parts:
@@ -43,11 +43,11 @@ def extent(parts: Iterable[Part], body_q: Array) -> NDArray[np.float64]:
 
 
 def offsets(worlds: int, box: NDArray[np.float64]) -> NDArray[np.float32]:
-    """What is added to the positions of each world [m], shape ``(worlds, 3)``; nothing to those of the first.
+    """Return the position of each world on the grid [m], shape ``(worlds, 3)``; the first one is zero.
 
     Args:
-        worlds: How many.
-        box: What `extent` gives for one.
+        worlds: Number of worlds.
+        box: Bounding box of one world, from `extent`.
     """
     columns = math.ceil(math.sqrt(worlds))
     size = np.maximum(box[1] - box[0], _LEAST_SIZE) * _ROOM

@@ -1,4 +1,4 @@
-"""A run as one HTML file that shows it from all sides, in any browser and without a server."""
+"""A run as one HTML file, which any browser shows from all sides and without a server."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ import numpy as np
 import viser
 
 from tightloop.view.cameras import Camera, camera
-from tightloop.view.display_options import Kind, Looks
+from tightloop.view.display_options import DisplayOptions, Kind
 from tightloop.view.overlay import Overlay
 from tightloop.view.parts import Parts
 from tightloop.view.source import CONTACT_FIELDS
-from tightloop.view.stage import Stage
+from tightloop.view.world_meshes import WorldMeshes
 
-# Of the browser's window, which is not known yet.
+# Aspect ratio assumed for the browser's window, which is not known yet.
 _ASPECT = 1.6
 
 
 class Html:
-    """Takes what the page in the browser would show, and writes it with the page itself.
+    """Records what the viewer's page would show, and writes it into one HTML file.
 
     Args:
         path: The file.
-        parts: What a world looks like.
-        bodies: How many bodies a world has.
-        fps: Frames a second.
-        view: Where the camera is at first: a preset, or a `Camera`. ``"follow"`` stands still.
-        kind: Whether robots are shown as they look, or as the shapes that touch.
+        parts: Parts of one world.
+        bodies: Number of bodies of a world.
+        fps: Frames per second.
+        view: First camera: a preset, or a `Camera`. ``"follow"`` does not move.
+        kind: ``"visual"`` for visual meshes, ``"collision"`` for collision shapes.
         contacts: Whether contacts are shown.
     """
 
@@ -49,21 +49,21 @@ class Html:
     ) -> None:
         self._path, self._parts, self._bodies = path, parts, bodies
         self._fps, self._view = fps, view
-        self._looks = Looks(kind=kind, contacts="all worlds" if contacts else "off")
-        with contextlib.redirect_stdout(io.StringIO()):  # viser greets
+        self._options = DisplayOptions(kind=kind, contacts="all worlds" if contacts else "off")
+        with contextlib.redirect_stdout(io.StringIO()):  # viser prints a greeting
             self._server = viser.ViserServer("127.0.0.1", 0, verbose=False)
-        self._stage: Stage | None = None
+        self._world_meshes: WorldMeshes | None = None
         self._overlay: Overlay | None = None
         self._serializer: Any = None
 
     def add(self, shown: Any, chosen: Sequence[int]) -> None:
-        """Add a frame, of these worlds."""
+        """Add a frame of the chosen worlds."""
         there = [name for name in ("body_q", "status", *CONTACT_FIELDS) if hasattr(shown, name)]
         own = SimpleNamespace(**{name: np.asarray(getattr(shown, name))[list(chosen)] for name in there})
-        if self._stage is None:
+        if self._world_meshes is None:
             self._begin(own.body_q)
-        assert self._stage is not None and self._overlay is not None
-        self._stage.show(own.body_q, getattr(own, "status", np.zeros(len(own.body_q), int)))
+        assert self._world_meshes is not None and self._overlay is not None
+        self._world_meshes.show(own.body_q, getattr(own, "status", np.zeros(len(own.body_q), int)))
         if all(hasattr(own, name) for name in CONTACT_FIELDS):
             self._overlay.show_contacts(own, range(len(own.body_q)))
         if self._serializer is None:
@@ -79,9 +79,9 @@ class Html:
 
     def _begin(self, body_q: Any) -> None:
         scene = self._server.scene
-        self._stage = Stage(self._server, self._parts, len(body_q), self._looks, body_q[0])
-        box, offsets = self._stage.box, self._stage.offsets
-        self._overlay = Overlay(self._server, self._parts, self._looks, self._stage, bodies=self._bodies)
+        self._world_meshes = WorldMeshes(self._server, self._parts, len(body_q), self._options, body_q[0])
+        box, offsets = self._world_meshes.box, self._world_meshes.offsets
+        self._overlay = Overlay(self._server, self._parts, self._options, self._world_meshes, bodies=self._bodies)
         scene.set_up_direction("+z")
         scene.add_grid(
             "/ground", infinite_grid=True, cell_size=0.1, section_size=1.0, fade_distance=40.0, shadow_opacity=0.2

@@ -1,4 +1,4 @@
-"""The joints of a scene that have drives: their limits, and where a robot is when it has reached its targets."""
+"""The driven joints of a scene: their limits, and the pose of a robot at its joint targets."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tightloop.scene import Scene
 from tightloop.view.poses import Array
 
-# How far a slider goes where a joint has no limit [rad or m].
+# Range of a slider for a joint without limits [rad or m].
 _UNLIMITED = np.pi
 
 
@@ -23,11 +23,11 @@ class Joint:
     """A dof with a drive.
 
     Attributes:
-        dof: Its place in ``dof_names``.
+        dof: Index in ``dof_names``.
         name: ``robot/joint``, or ``robot/joint.part`` where a joint has several.
-        lower: Least target that a slider sets [rad or m].
-        upper: Largest one.
-        follows: The name of the joint that it follows (a mimic joint), or none.
+        lower: Smallest target that a slider sets [rad or m].
+        upper: Largest target [rad or m].
+        follows: Leader of a mimic joint, or None.
     """
 
     dof: int
@@ -38,7 +38,7 @@ class Joint:
 
 
 def joints(info: dict[str, Any]) -> list[Joint]:
-    """Dofs whose targets have an effect, from what a daemon tells about itself.
+    """Return the dofs whose targets have an effect, from a daemon's description of itself.
 
     Raises:
         SceneError: A robot's file cannot be read here.
@@ -57,13 +57,13 @@ def joints(info: dict[str, Any]) -> list[Joint]:
 
 
 def at_targets(info: dict[str, Any], driven: Sequence[Joint], joint_q: Array, targets: Array) -> NDArray[np.float64]:
-    """Positions of a world whose driven joints are at their targets, and whose others are where they are.
+    """Return the joint positions of a world with its driven joints at their targets.
 
     Args:
-        info: What a daemon tells about itself.
-        driven: The joints that have drives.
-        joint_q: Positions now, shape ``(coords,)``.
-        targets: Its ``joint_target_q``, shape ``(dofs,)``.
+        info: A daemon's description of itself, ``sim.info``.
+        driven: The driven joints.
+        joint_q: Current positions, shape ``(coords,)``.
+        targets: ``joint_target_q`` of the world, shape ``(dofs,)``.
     """
     place = {name: index for index, name in enumerate(info["coord_names"])}
     reached = np.array(joint_q, np.float64)
@@ -73,7 +73,7 @@ def at_targets(info: dict[str, Any], driven: Sequence[Joint], joint_q: Array, ta
             reached[place[joint.name]] = targets[joint.dof]
         else:
             balls.setdefault(joint.name.rpartition(".")[0], []).append(joint.dof)
-    # the target of a ball is a rotation vector, its coordinates are a quaternion
+    # the target of a ball joint is a rotation vector, its coordinates are a quaternion
     for ball, dofs in balls.items():
         first = place.get(f"{ball}.qx")
         if first is not None and len(dofs) == 3:

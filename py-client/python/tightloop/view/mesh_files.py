@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from tightloop.errors import MissingLibrary
-from tightloop.view import needs, paint
+from tightloop.view import dependencies as needs
+from tightloop.view import paint
 from tightloop.view.surface import Surface, Unreadable, joined
 
 # Largest file [bytes], as of collision meshes.

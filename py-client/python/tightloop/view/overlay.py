@@ -1,4 +1,4 @@
-"""What is laid over the worlds: contact points and forces, the robot at its targets, the axes of its bodies."""
+"""The overlay of a page: contact points and forces, the robot at its targets, the axes of its bodies."""
 
 from __future__ import annotations
 
@@ -9,39 +9,45 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from tightloop.view.display_options import Looks
+from tightloop.view.batched_meshes import batched_meshes
+from tightloop.view.display_options import DisplayOptions
 from tightloop.view.parts import Part
 from tightloop.view.poses import Array, wxyz
-from tightloop.view.skins import skins
-from tightloop.view.stage import Stage
+from tightloop.view.world_meshes import WorldMeshes
 
 _POINT_COLOR = (250, 190, 30)
 _FORCE_COLOR = (230, 60, 40)
 _GHOST_COLOR = (60, 170, 240)
 _POINT_SIZE = 0.008
-# Longest arrow [m]: the first millisecond of an impact would fill the page.
+# Longest arrow [m]: without it, the first millisecond of an impact fills the page.
 _ARROW_MAX = 0.5
-# Axes of a body are that part of the size of a world.
+# Length of body axes as a fraction of the size of a world.
 _AXES_PART = 0.05
 
 
 class Overlay:
-    """Handles of what is laid over the worlds.
+    """The scene handles of the overlay.
 
     Args:
-        server: Where it is shown.
-        parts: What a world looks like.
-        looks: What the one who looks chose.
-        stage: Where the worlds stand.
+        server: Server of the page.
+        parts: Parts of one world.
+        options: Display options of the page.
+        world_meshes: Meshes of the worlds, which know where each world stands.
         bodies: Number of bodies of a world.
     """
 
     def __init__(
-        self, server: viser.ViserServer, parts: Iterable[Part], looks: Looks, stage: Stage, *, bodies: int
+        self,
+        server: viser.ViserServer,
+        parts: Iterable[Part],
+        options: DisplayOptions,
+        world_meshes: WorldMeshes,
+        *,
+        bodies: int,
     ) -> None:
-        self._looks = looks
-        self._offsets = stage.offsets
-        box = stage.box
+        self._options = options
+        self._offsets = world_meshes.offsets
+        box = world_meshes.box
         scene = server.scene
         self._points = scene.add_point_cloud(
             "/contacts/points",
@@ -61,9 +67,9 @@ class Overlay:
             head_length=0.02,
             visible=False,
         )
-        # a grip is pulled along a line from where it is held
-        self._pull = scene.add_line_segments(
-            "/pull", np.zeros((0, 2, 3), np.float32), np.array(_FORCE_COLOR), thickness=3.0, visible=False
+        # a dragged body is connected to the pointer by a line
+        self._drag_line = scene.add_line_segments(
+            "/drag", np.zeros((0, 2, 3), np.float32), np.array(_FORCE_COLOR), thickness=3.0, visible=False
         )
         length = float(np.linalg.norm(box[1] - box[0])) * _AXES_PART
         self._axes = scene.add_batched_axes(
@@ -77,13 +83,13 @@ class Overlay:
         moving = [part for part in parts if part.kind == "visual" and part.body >= 0]
         self._ghosts = [
             (
-                skin.bodies,
+                mesh.bodies,
                 scene.add_batched_meshes_simple(
                     f"/ghost/{number}",
-                    skin.vertices,
-                    skin.faces,
-                    np.tile([1.0, 0, 0, 0], (len(skin.bodies), 1)),
-                    np.zeros((len(skin.bodies), 3)),
+                    mesh.vertices,
+                    mesh.faces,
+                    np.tile([1.0, 0, 0, 0], (len(mesh.bodies), 1)),
+                    np.zeros((len(mesh.bodies), 3)),
                     batched_colors=_GHOST_COLOR,
                     opacity=0.35,
                     lod="off",
@@ -92,50 +98,50 @@ class Overlay:
                     visible=False,
                 ),
             )
-            for number, skin in enumerate(skins(moving))
+            for number, mesh in enumerate(batched_meshes(moving))
         ]
 
     def show_contacts(self, shown: Any, worlds: Iterable[int]) -> None:
-        """Contact points and forces of worlds, if they were chosen.
+        """Show contact points and forces, if the options ask for them.
 
         Args:
-            shown: Arrays ``contact_count``, ``contact_pos`` and ``contact_force`` of all worlds.
-            worlds: The worlds that are seen.
+            shown: Frame with ``contact_count``, ``contact_pos`` and ``contact_force``.
+            worlds: Visible worlds.
         """
-        wanted = self._looks.contacts != "off"
+        wanted = self._options.contacts != "off"
         self._points.visible = self._forces.visible = wanted
         if not wanted:
             return
-        chosen = [self._looks.world] if self._looks.contacts == "followed world" else list(worlds)
+        chosen = [self._options.world] if self._options.contacts == "followed world" else list(worlds)
         counts = np.asarray(shown.contact_count)[chosen]
         used = np.arange(shown.contact_pos.shape[1]) < counts[:, None]
         points = (shown.contact_pos[chosen] + self._offsets[chosen, None])[used].astype(np.float32)
-        arrows = shown.contact_force[chosen][used] * self._looks.force_scale
+        arrows = shown.contact_force[chosen][used] * self._options.force_scale
         length = np.linalg.norm(arrows, axis=-1, keepdims=True)
         arrows = arrows * np.minimum(1.0, _ARROW_MAX / np.maximum(length, _ARROW_MAX))
         self._points.points = points
         self._forces.points = np.stack([points, points + arrows], axis=1).astype(np.float32)
 
     def show_axes(self, body_q: Array) -> None:
-        """Axes of the bodies of the followed world, if they were chosen; ``body_q`` of all worlds."""
-        wanted = self._looks.frames and body_q.shape[1] > 0
+        """Show the body axes of the followed world, if the options ask for them; ``body_q`` is of all worlds."""
+        wanted = self._options.frames and body_q.shape[1] > 0
         self._axes.visible = wanted
         if wanted:
-            poses = body_q[self._looks.world]
-            self._axes.batched_positions = (poses[:, :3] + self._offsets[self._looks.world]).astype(np.float32)
+            poses = body_q[self._options.world]
+            self._axes.batched_positions = (poses[:, :3] + self._offsets[self._options.world]).astype(np.float32)
             self._axes.batched_wxyzs = wxyz(poses[:, 3:]).astype(np.float32)
 
     def show_ghost(self, body_q: Array | None) -> None:
-        """The followed world at its joint targets, poses ``(bodies, 7)``; None hides it."""
+        """Show the followed world at its joint targets, poses ``(bodies, 7)``; None hides it."""
         for bodies, handle in self._ghosts:
             handle.visible = body_q is not None
             if body_q is not None:
                 poses = body_q[list(bodies)]
-                handle.batched_positions = (poses[:, :3] + self._offsets[self._looks.world]).astype(np.float32)
+                handle.batched_positions = (poses[:, :3] + self._offsets[self._options.world]).astype(np.float32)
                 handle.batched_wxyzs = wxyz(poses[:, 3:]).astype(np.float32)
 
-    def show_pull(self, ends: NDArray[np.float64] | None, world: int) -> None:
-        """The line along which a body is pulled, from the grip to the pointer [m], shape ``(2, 3)``; None hides it."""
-        self._pull.visible = ends is not None
+    def show_drag(self, ends: NDArray[np.float64] | None, world: int) -> None:
+        """Show the line from the grabbed point to the pointer [m], shape ``(2, 3)``; None hides it."""
+        self._drag_line.visible = ends is not None
         if ends is not None:
-            self._pull.points = (ends + self._offsets[world])[None].astype(np.float32)
+            self._drag_line.points = (ends + self._offsets[world])[None].astype(np.float32)

@@ -1,4 +1,7 @@
-"""The page's controls: who drives and how fast, what is shown, from where. They change `Looks` and ask the driver."""
+"""The page's controls: time, display, joint targets, drag forces and plots.
+
+They change `DisplayOptions` and send requests to the driver.
+"""
 
 from __future__ import annotations
 
@@ -10,22 +13,22 @@ from typing import Any
 import numpy as np
 import viser
 
+from tightloop.frames import FAULTED
 from tightloop.view.cameras import PRESETS
-from tightloop.view.display_options import Looks
-from tightloop.view.feed import Feed
+from tightloop.view.display_options import DisplayOptions
+from tightloop.view.frame_stream import FrameStream
 from tightloop.view.joints import Joint
-from tightloop.view.pilot import Pilot
+from tightloop.view.live_driver import LiveDriver
 from tightloop.view.player import Player
 from tightloop.view.plots import PLOTS_MAX, Plot, choices
 from tightloop.view.sliders import Sliders
-from tightloop.view.source import FROZEN
 
 SPEEDS = {"0.1×": 0.1, "0.25×": 0.25, "0.5×": 0.5, "1×": 1.0, "2×": 2.0, "5×": 5.0, "max": float("inf")}
 _STATUS = {1: "not finite, frozen", 2: "solver out of iterations", 4: "contacts left out", 8: "out of bounds, frozen"}
-# How often text and plots are sent [s].
+# Period of updates of text and plots [s].
 _PERIOD = 0.1
 _RATE_SECONDS = 2.0
-# More sliders than that are folded away at first.
+# With more joints than this, the folder of sliders starts closed.
 _OPEN_JOINTS = 12
 
 
@@ -33,43 +36,43 @@ class Panel:
     """The controls of a page.
 
     Args:
-        server: Whose page.
-        feed: What it shows, and whom the controls ask to play.
-        looks: What the controls write.
+        server: Server of the page.
+        stream: The frames and their driver.
+        options: Display options, which the controls write.
         driven: Joints that get sliders.
-        aim: Called with a preset's name when one is chosen.
-        notes: What is to be told about the scene's looks.
+        aim: Called with the name of a chosen camera preset.
+        notes: What is to be told about the scene's options.
     """
 
     def __init__(
         self,
         server: viser.ViserServer,
-        feed: Feed,
-        looks: Looks,
+        stream: FrameStream,
+        options: DisplayOptions,
         *,
         driven: list[Joint],
         aim: Callable[[str], None],
         notes: list[str],
     ) -> None:
         self._gui = server.gui
-        self._info = info = feed.info
-        self._worlds = worlds = feed.worlds
-        self._looks = looks
-        self._driver = driver = feed.driver
+        self._info = info = stream.info
+        self._worlds = worlds = stream.worlds
+        self._options = options
+        self._driver = driver = stream.driver
         self._plots: list[Plot] = []
         self._shown_at: deque[float] = deque(maxlen=400)
-        self._told_at = 0.0
+        self._updated_at = 0.0
         self.strength = 1.0
         self._gui.set_panel_label(f"tightloop · {info['name']}")
         self._text = self._gui.add_markdown("")
         with self._gui.add_folder("Time"):
             self._add_time()
         with self._gui.add_folder("Look"):
-            self._add_looks(aim)
+            self._add_display(aim)
         self._sliders = None
-        if isinstance(driver, Pilot):
+        if isinstance(driver, LiveDriver):
             with self._gui.add_folder("Joint targets", expand_by_default=0 < len(driven) <= _OPEN_JOINTS):
-                self._sliders = Sliders(self._gui, driven, driver, looks, worlds)
+                self._sliders = Sliders(self._gui, driven, driver, options, worlds)
             with self._gui.add_folder("Push", expand_by_default=False):
                 self._add_push(driver)
         with self._gui.add_folder("Plots", expand_by_default=False):
@@ -83,45 +86,45 @@ class Panel:
         """Fields that plots show."""
         return {plot.field for plot in self._plots}
 
-    def tell(self, shown: Any, *, new: bool) -> None:
-        """Keep text, sliders and plots up to date.
+    def update(self, shown: Any, *, new: bool) -> None:
+        """Update text, sliders and plots.
 
         Args:
-            shown: The frame that is shown.
-            new: Whether it was not shown before.
+            shown: Frame on the page.
+            new: Whether the page shows it for the first time.
         """
         now = time.monotonic()
-        world = self._looks.world
+        world = self._options.world
         if new:
             self._shown_at.append(now)
             for plot in self._plots:
-                # a field that was chosen since this frame was asked for comes with the next one
+                # a field chosen after this frame was requested arrives with the next one
                 if not hasattr(shown, plot.field):
                     continue
                 plot.add(float(shown.time[world]), np.asarray(getattr(shown, plot.field)[world]))
-        if now - self._told_at < _PERIOD:
+        if now - self._updated_at < _PERIOD:
             return
-        self._told_at = now
+        self._updated_at = now
         taken = self._driver.controller
         self._text.content = self._text_of(shown, taken, now)
         self._play.label = "Pause" if self._driver.playing else "Play"
         for control in self._of_driver:
             control.disabled = taken is not None
         if self._sliders is not None:
-            self._sliders.tell(np.asarray(shown.joint_target_q)[world], disabled=taken is not None)
+            self._sliders.update(np.asarray(shown.joint_target_q)[world], disabled=taken is not None)
         for plot in self._plots:
             plot.draw()
 
     def follow(self, world: int) -> None:
-        """Follow another world, as when it was clicked."""
+        """Follow another world, for example after a click on it."""
         self._world.value = world
 
     def _text_of(self, shown: Any, taken: int | None, now: float) -> str:
-        world, driver = self._looks.world, self._driver
+        world, driver = self._options.world, self._driver
         rate = sum(now - at < _RATE_SECONDS for at in self._shown_at) / _RATE_SECONDS
         bits = int(shown.status[world])
         trouble = ", ".join(text for bit, text in _STATUS.items() if bits & bit)
-        frozen = int(np.count_nonzero(np.asarray(shown.status) & FROZEN))
+        frozen = int(np.count_nonzero(np.asarray(shown.status) & FAULTED))
         if taken is not None:
             who = f"process **{taken}** is in control; you watch"
         elif not driver.live:
@@ -158,42 +161,42 @@ class Panel:
         elif self._worlds > 1:
             one = self._gui.add_button("Reset this world")
             self._of_driver.append(one)
-            one.on_click(lambda _: driver.reset(self._looks.world))
+            one.on_click(lambda _: driver.reset(self._options.world))
 
-    def _add_looks(self, aim: Callable[[str], None]) -> None:
-        gui, looks = self._gui, self._looks
+    def _add_display(self, aim: Callable[[str], None]) -> None:
+        gui, options = self._gui, self._options
         camera = gui.add_dropdown("Camera", tuple(PRESETS), initial_value="three-quarter")
 
         def choose_camera(_: Any) -> None:
-            looks.choose(follow=camera.value == "follow")
+            options.choose(follow=camera.value == "follow")
             aim(camera.value)
 
         camera.on_update(choose_camera)
         world = self._world = gui.add_slider(
-            "World", 0, max(self._worlds - 1, 1), 1, looks.world, visible=self._worlds > 1
+            "World", 0, max(self._worlds - 1, 1), 1, options.world, visible=self._worlds > 1
         )
-        alone = gui.add_checkbox("This world alone", looks.alone, visible=self._worlds > 1)
-        shapes = gui.add_checkbox("Collision shapes", looks.kind == "collision")
-        ghosts = gui.add_checkbox("Targets as ghosts", looks.ghosts)
-        frames = gui.add_checkbox("Body frames", looks.frames)
+        alone = gui.add_checkbox("This world alone", options.alone, visible=self._worlds > 1)
+        shapes = gui.add_checkbox("Collision shapes", options.kind == "collision")
+        ghosts = gui.add_checkbox("Targets as ghosts", options.ghosts)
+        frames = gui.add_checkbox("Body frames", options.frames)
         where = ("off", "followed world") + (("all worlds",) if self._worlds > 1 else ())
-        contacts = gui.add_dropdown("Contacts", where, initial_value=looks.contacts)
-        scale = gui.add_number("Arrow length [m/N]", looks.force_scale, min=1e-4, max=1.0, step=1e-3)
+        contacts = gui.add_dropdown("Contacts", where, initial_value=options.contacts)
+        scale = gui.add_number("Arrow length [m/N]", options.force_scale, min=1e-4, max=1.0, step=1e-3)
 
         def choose_world(_: Any) -> None:
-            looks.choose(world=min(world.value, self._worlds - 1))
+            options.choose(world=min(world.value, self._worlds - 1))
             for plot in self._plots:
                 plot.clear()
 
         world.on_update(choose_world)
-        alone.on_update(lambda _: looks.choose(alone=alone.value))
-        shapes.on_update(lambda _: looks.choose(kind="collision" if shapes.value else "visual"))
-        ghosts.on_update(lambda _: looks.choose(ghosts=ghosts.value))
-        frames.on_update(lambda _: looks.choose(frames=frames.value))
-        contacts.on_update(lambda _: looks.choose(contacts=contacts.value))
-        scale.on_update(lambda _: looks.choose(force_scale=scale.value))
+        alone.on_update(lambda _: options.choose(alone=alone.value))
+        shapes.on_update(lambda _: options.choose(kind="collision" if shapes.value else "visual"))
+        ghosts.on_update(lambda _: options.choose(ghosts=ghosts.value))
+        frames.on_update(lambda _: options.choose(frames=frames.value))
+        contacts.on_update(lambda _: options.choose(contacts=contacts.value))
+        scale.on_update(lambda _: options.choose(force_scale=scale.value))
 
-    def _add_push(self, driver: Pilot) -> None:
+    def _add_push(self, driver: LiveDriver) -> None:
         if not driver.can_push:
             self._gui.add_markdown('To push bodies, launch with `params=("body_f",)`.')
             return

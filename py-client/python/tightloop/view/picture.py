@@ -1,4 +1,4 @@
-"""Pictures of worlds without a display, a browser or a graphics driver."""
+"""Pictures of worlds, drawn without a display, a browser or a graphics driver."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core, checks
 from tightloop.errors import ArgumentError
+from tightloop.frames import FAULTED
 from tightloop.view import grid
-from tightloop.view.balls import ball
 from tightloop.view.cameras import PRESETS, Camera, camera
+from tightloop.view.goal_markers import goal_marker
 from tightloop.view.parts import Mesh, Part
 from tightloop.view.poses import Array, compose
-from tightloop.view.source import FROZEN
 
 _RED = (225, 40, 40, 180)
 _GHOST = (60, 170, 240, 190)
@@ -25,34 +25,34 @@ _PLAIN = (0, 0, 0, 0)
 _POINT = (250, 190, 30, 255)
 _FORCE = (230, 60, 40, 255)
 _POINT_WIDTH, _FORCE_WIDTH = 6.0, 2.5
-# Length of a force [m/N], and the longest one: the first millisecond of an impact would fill the picture.
+# Length of a force arrow [m/N], and its limit: the first millisecond of an impact would fill the picture [m].
 _FORCE_SCALE, _FORCE_MAX = 0.01, 1.0
-# The camera stands still, so there is room for what moves.
+# The camera does not move, so leave room for motion.
 _ROOM = 1.1
-# Distances of lines on the floor [m]; about so many of them cross what is looked at.
+# Distances of lines on the floor [m], and about how many of them cross the scene.
 _SPACINGS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 _LINES = 12
 
 
 class Picture:
-    """Draws worlds as they are shown by a frame or a `Shown`; the same worlds give the same bytes.
+    """Draws the worlds of a frame or a `Shown`; the same worlds give the same bytes.
 
-    The camera of a preset is set up by the first picture, so that it stands still in those that follow.
+    The first picture sets the camera of a preset, which does not move in later pictures.
 
     Attributes:
-        width: Of the pictures [pixels].
-        height: Likewise.
-        offsets: Where each world stands [m], shape ``(worlds, 3)``; known once there was a picture.
+        width: Width of pictures [pixels].
+        height: Height of pictures [pixels].
+        offsets: Position of each world on the grid [m], shape ``(worlds, 3)``; known after the first picture.
 
     Args:
-        parts: What a world looks like, as `tightloop.view.parts.parts` reads it.
-        width: Of the pictures [pixels], 16 to 8192.
-        height: Likewise.
-        kind: Whether robots are drawn as they look, or as the shapes that touch.
-        threads: Most threads that a picture takes; all cores if left out.
+        parts: Parts of one world, as `tightloop.view.parts.parts` reads them.
+        width: Width of pictures [pixels], 16 to 8192.
+        height: Height of pictures [pixels], 16 to 8192.
+        kind: ``"visual"`` for visual meshes, ``"collision"`` for collision shapes.
+        threads: Largest number of threads per picture; all cores if left out.
 
     Raises:
-        ArgumentError: A size is out of range, or there is no such kind.
+        ArgumentError: A size is out of range, or ``kind`` does not exist.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class Picture:
         )
         self._renderer = _core.Renderer(self.width, self.height, threads)
         own = [part for part in parts if part.kind == kind]
-        # a floor is drawn as one that has no end; a slope is drawn as it is
+        # a floor is drawn as infinite; a slope is drawn as its mesh
         self._floors = [float(part.pose[2]) for part in own if _is_floor(part)]
         self._parts = [part for part in own if not _is_floor(part)]
         numbers: dict[int, int] = {}
@@ -82,7 +82,7 @@ class Picture:
         self._meshes = np.array([numbers[id(part.mesh)] for part in self._parts], np.uint32)
         self._bodies = np.array([part.body for part in self._parts], np.intp)
         self._poses = np.array([part.pose for part in self._parts], float).reshape(-1, 7)
-        self._balls: dict[tuple[float, tuple[int, ...]], int] = {}
+        self._markers: dict[tuple[float, tuple[int, ...]], int] = {}
         self._stands: dict[tuple[Any, ...], tuple[NDArray[np.float64], NDArray[np.float64], float]] = {}
         self.offsets: NDArray[np.float32] = np.zeros((0, 3), np.float32)
 
@@ -97,25 +97,25 @@ class Picture:
         ghost: ArrayLike | None = None,
         goals: Mapping[str, tuple[ArrayLike, float, Sequence[int]]] | None = None,
     ) -> NDArray[np.uint8]:
-        """A picture.
+        """Render a picture.
 
         Args:
-            shown: A frame with ``body_q``; with ``status`` frozen worlds are red, and where it has ``contact_count``,
+            shown: A frame with ``body_q``. With ``status``, faulted worlds are red. With ``contact_count``,
                 ``contact_pos`` and ``contact_force``, contacts are drawn.
-            worlds: How many worlds are drawn, on a grid, the first ones; or which ones. All if left out.
-            camera: A preset, ``"three-quarter"``, ``"front"``, ``"side"``, ``"top"`` or ``"follow"``, which goes along
-                with ``world``; or a `Camera` of your own.
-            world: The world that the ghost is of, and that ``"follow"`` follows.
-            contacts: Whether contacts are drawn.
-            ghost: Where the bodies of ``world`` are to be, shape ``(bodies, 7)``, drawn as a shade.
-            goals: Translucent balls by name: middles [m], shape ``(worlds, 3)`` or ``(worlds, n, 3)``, in the axes of
+            worlds: How many worlds are drawn on a grid, the first ones; or a list of them. All if left out.
+            camera: A preset, ``"three-quarter"``, ``"front"``, ``"side"``, ``"top"`` or ``"follow"``, which follows
+                ``world``; or a `Camera`.
+            world: World of the ghost, and of the camera ``"follow"``.
+            contacts: Whether to draw contacts.
+            ghost: Target poses of the bodies of ``world``, shape ``(bodies, 7)``, drawn translucent.
+            goals: Translucent balls by name: centres [m], shape ``(worlds, 3)`` or ``(worlds, n, 3)``, in the axes of
                 each world, radius [m], and colour as red, green, blue.
 
         Returns:
             Shape ``(height, width, 3)``: red, green, blue.
 
         Raises:
-            ArgumentError: There is no such world or camera; the message names it.
+            ArgumentError: A world or camera does not exist; the message names it.
             UnknownField: The frame carries no ``body_q``.
         """
         body_q = np.asarray(shown.body_q, float)
@@ -128,8 +128,8 @@ class Picture:
         self.offsets = offsets.astype(np.float32)
         place = int(np.argmax(chosen == world))
         meshes, poses = self._instances(body_q[chosen], offsets)
-        frozen = np.asarray(_field(shown, "status", np.zeros(len(body_q), int)))[chosen] & FROZEN
-        tints = np.where(frozen[:, None, None] > 0, _RED, _PLAIN).astype(np.uint8)
+        faulted = np.asarray(_field(shown, "status", np.zeros(len(body_q), int)))[chosen] & FAULTED
+        tints = np.where(faulted[:, None, None] > 0, _RED, _PLAIN).astype(np.uint8)
         tints = np.repeat(tints, len(self._parts), axis=1).reshape(-1, 4)
         layers = [(meshes, poses, tints, np.ones(len(meshes), np.float32))]
         if ghost is not None:
@@ -174,14 +174,14 @@ class Picture:
         return chosen.astype(np.intp)
 
     def _stand(self, chosen: NDArray[np.intp], body_q: Array) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """The box around one world, where each stands, and how high the floor is: as the first picture had it."""
+        """Return box and positions of the worlds and the height of the floor, as in the first picture."""
         key = (*chosen.tolist(),)
         if key not in self._stands:
             first = next((world for world in chosen if np.isfinite(body_q[world]).all()), None)
-            # nowhere is no place to keep in mind
+            # do not keep a box of worlds that are not finite
             box = grid.extent(() if first is None else self._parts, body_q[0 if first is None else first])
             offsets = grid.offsets(len(chosen), box).astype(float)
-            # what stands on the floor may have its rim below it by a rounding
+            # rounding may put the rim of an object below the floor
             lowest = float(box[0, 2])
             own = [floor for floor in self._floors if np.isfinite(floor)]
             floor = max(own) if own else (lowest if lowest < -1e-3 else 0.0)
@@ -191,9 +191,9 @@ class Picture:
         return self._stands[key]
 
     def _instances(self, body_q: Array, offsets: Array) -> tuple[NDArray[np.uint32], Array]:
-        """Meshes and poses of all parts of some worlds."""
+        """Return meshes and poses of all parts of some worlds."""
         still = np.broadcast_to(np.array([0, 0, 0, 0, 0, 0, 1.0]), (len(body_q), 1, 7))
-        # the world is the body after the last, as -1 says
+        # index -1 is the world, appended after the last body
         poses = compose(np.concatenate([body_q, still], axis=1)[:, self._bodies], self._poses)
         poses[..., :3] += offsets[:, None]
         return np.tile(self._meshes, len(body_q)), poses.reshape(-1, 7)
@@ -215,13 +215,13 @@ class Picture:
             raise ArgumentError(f"picture: goal {name!r} has shape {middles.shape}; give (worlds, 3) or (worlds, n, 3)")
         middles = middles.reshape(len(middles), -1, 3)[chosen] + offsets[:, None]
         key = (float(radius), tuple(color))
-        if key not in self._balls:
-            self._balls[key] = self._add(ball(key[0], (*key[1], 255)))
+        if key not in self._markers:
+            self._markers[key] = self._add(goal_marker(key[0], (*key[1], 255)))
         poses = np.zeros((middles.size // 3, 7))
         poses[:, :3], poses[:, 6] = middles.reshape(-1, 3), 1.0
         count = len(poses)
         tints = np.zeros((count, 4), np.uint8)
-        return np.full(count, self._balls[key], np.uint32), poses, tints, np.full(count, 0.45, np.float32)
+        return np.full(count, self._markers[key], np.uint32), poses, tints, np.full(count, 0.45, np.float32)
 
     def _contacts(self, shown: Any, chosen: NDArray[np.intp], offsets: Array) -> tuple[Array, Array, Array]:
         fields = [_field(shown, name) for name in ("contact_count", "contact_pos", "contact_force")]
@@ -242,12 +242,12 @@ class Picture:
     def _view(
         self, given: str | Camera, box: Array, body_q: Array, offset: Array
     ) -> tuple[Camera, tuple[float, float, float, float]]:
-        """The camera, and the middle and the reach of what matters."""
+        """Return the camera, and centre and radius of the scene."""
         places = self.offsets.astype(float)
         whole = np.stack([box[0] + places.min(axis=0), box[1] + places.max(axis=0)])
         middle = whole.mean(axis=0)
         if given == "follow":
-            # the bodies may be far from where the world began
+            # bodies may be far from their start
             bodies = body_q[np.isfinite(body_q).all(axis=-1)]
             centre = (
                 (0.5 * (bodies[:, :3].min(axis=0) + bodies[:, :3].max(axis=0))) if len(bodies) else box.mean(axis=0)
@@ -266,7 +266,7 @@ class Picture:
 
 
 def _is_floor(part: Part) -> bool:
-    """Whether it is a plane that lies level, upside up."""
+    """Return whether a part is a horizontal plane that faces up."""
     turned = np.abs(part.pose[3:5]).max()
     return part.body < 0 and part.shape == "plane" and bool(turned < 1e-6)
 

@@ -1,4 +1,4 @@
-"""A recording that is looked at: played at its own pace or a multiple of it, by single frames, or skipped over."""
+"""Plays a recording in the viewer: in real time or a multiple of it, frame by frame, or with skips."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-# Half of a frame's time on a page that shows 60 a second.
-_HURRY_SECONDS = 0.008
+# Half of the time of a frame at 60 frames per second.
+_UNPACED_SECONDS = 0.008
 _LATE_MAX = 0.1
 
 
 class Frames(Protocol):
-    """What a recording gives: its frames, one after the other."""
+    """A source of recorded frames."""
 
     period: float
 
@@ -22,15 +22,15 @@ class Frames(Protocol):
 
 
 class Player:
-    """Plays a recording; it goes forwards only, and begins anew.
+    """Plays a recording forwards, and restarts it on `reset`.
 
     Attributes:
-        playing: Whether it plays.
-        speed: Recorded seconds a second; infinite for as fast as it goes.
-        problem: Nothing, or that it is at its end.
+        playing: Whether the recording plays.
+        speed: Recorded seconds per second; infinite for as fast as possible.
+        problem: A message at the end of the recording, else empty.
 
     Args:
-        open_frames: Opens the recording at its begin.
+        open_frames: Opens the recording at its start.
     """
 
     live = False
@@ -43,40 +43,40 @@ class Player:
         self.problem = ""
         self._open = open_frames
         self._frames = open_frames()
-        self._wanted = 1  # frames to be shown at once: the first one
+        self._wanted = 1  # frames to show at once: the first one
         self._due = time.monotonic()
         self._restart = False
         self._changed = threading.Condition()
 
     @property
     def pace(self) -> float:
-        """Recorded seconds a second."""
+        """Recorded seconds per second."""
         return self.speed if self.playing else 0.0
 
     def play(self) -> None:
-        """Play on."""
+        """Start to play."""
         self._set(playing=True)
 
     def pause(self) -> None:
-        """Stand still."""
+        """Pause."""
         self._set(playing=False)
 
     def step(self) -> None:
-        """Show the next frame, and stand still."""
+        """Show the next frame, then pause."""
         self._set(playing=False, more=1)
 
     def skip(self, seconds: float) -> None:
-        """Go on to what is that much later [s]."""
+        """Skip forwards by some recorded time [s]."""
         self._set(playing=self.playing, more=max(round(seconds / self._frames.period), 1))
 
     def reset(self, world: int | None) -> None:
-        """Begin anew; ``world`` makes no difference."""
+        """Restart the recording; ``world`` has no effect."""
         with self._changed:
             self._restart, self._wanted, self.problem = True, 1, ""
             self._changed.notify_all()
 
     def poll(self, timeout: float) -> Any:
-        """The frame to be shown next, None if there is none in that time [s]."""
+        """Return the next frame to show, or None if none is due within ``timeout`` [s]."""
         with self._changed:
             now = time.monotonic()
             wait = min(max(self._due - now, 0.0), timeout) if self.playing else timeout
@@ -87,13 +87,13 @@ class Player:
             wanted, self._wanted = self._wanted, 0
             now = time.monotonic()
             if not wanted and self.playing and now >= self._due:
-                # frames that the page has no time for are passed over
+                # frames that the page is too late for are dropped
                 late = now - self._due
                 wanted = 1 + int(late / self._spacing) if self._spacing > 0 and late < _LATE_MAX else 1
                 self._due = (self._due if late < _LATE_MAX else now) + wanted * self._spacing
         shown = None
-        # without a pace, as many as there is time for until the page wants one
-        until = now + _HURRY_SECONDS if wanted and self.playing and self._spacing == 0 else now
+        # at infinite speed, read as many frames as the time allows
+        until = now + _UNPACED_SECONDS if wanted and self.playing and self._spacing == 0 else now
         while wanted > 0 or time.monotonic() < until:
             wanted -= 1
             following = self._frames.poll(0.0)

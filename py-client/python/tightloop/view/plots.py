@@ -1,4 +1,4 @@
-"""Plots of chosen fields of the followed world: their last seconds."""
+"""Plots of chosen fields of the followed world over the last seconds."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import viser.uplot
 from numpy.typing import NDArray
 
 SECONDS = 10.0
-#: Each plot is data to send, ten times a second.
+#: Each plot sends its data ten times per second.
 PLOTS_MAX = 4
-# Rows that are kept of each plot: the frames of these seconds at 60 Hz.
+# Rows that each plot keeps: `SECONDS` at 60 Hz.
 _ROWS_MAX = 600
 _COLORS = ("#2f7ed8", "#e4572e", "#3aa655", "#a05cc8", "#e0a020", "#1fa5a5", "#c2477f", "#6b7280", "#8a6d3b")
-# What each axis of a field is of, as keys of a daemon's description.
+# Names along each axis of a field, as keys of a daemon's description.
 _AXES = {
     "dofs": "dof_names",
     "coords": "coord_names",
@@ -29,7 +29,7 @@ _ALL = "all"
 
 
 def choices(info: dict[str, Any]) -> dict[str, list[str]]:
-    """Fields that can be plotted, and what of each: one number a world, a column by name, or all columns."""
+    """Return the fields that can be plotted, each with its columns by name and ``"all"``."""
     found = {}
     for field in info["known_fields"]:
         axes = field["axes"].strip("()").replace(" ", "").split(",")[1:]
@@ -47,10 +47,10 @@ class Plot:
     """One field, or one column of it, of the followed world.
 
     Args:
-        gui: Where it is drawn.
-        info: What the daemon tells about itself.
+        gui: GUI that holds the plot.
+        info: The daemon's description of itself.
         field: Name of the field.
-        column: One of its `choices`.
+        column: One of the field's `choices`.
     """
 
     def __init__(self, gui: viser.GuiApi, info: dict[str, Any], field: str, column: str) -> None:
@@ -81,20 +81,20 @@ class Plot:
         )
 
     def add(self, time: float, values: NDArray[Any]) -> None:
-        """Take a world's values of the field, at a simulated time [s]."""
+        """Append a world's values of the field at a simulated time [s]."""
         row = np.atleast_1d(values[self._row] if values.ndim else values).astype(np.float64)[: len(self._series)]
         if self._rows and time < self._rows[-1][0]:
-            # it was reset
+            # the world was reset
             self._rows.clear()
         if not self._rows or time > self._rows[-1][0]:
             self._rows.append((time, row))
 
     def clear(self) -> None:
-        """Forget what was, as for another world."""
+        """Drop all rows, for example when the followed world changes."""
         self._rows.clear()
 
     def draw(self) -> None:
-        """Send what there is."""
+        """Send the rows to the page."""
         if not self._rows:
             return
         times = np.array([time for time, _ in self._rows])

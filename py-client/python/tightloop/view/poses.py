@@ -1,4 +1,4 @@
-"""Poses as arrays: position [m], then quaternion (x, y, z, w), in the last axis of seven. viser has w first."""
+"""Poses as arrays with a last axis of 7: position [m], then quaternion (x, y, z, w). viser puts w first."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
-#: The pose that changes nothing.
+#: The identity pose.
 IDENTITY = np.array([0, 0, 0, 0, 0, 0, 1], dtype=np.float32)
 
 
 def rotate(quat: Array, vectors: Array) -> Array:
-    """Vectors turned by quaternions (x, y, z, w): ``v + 2 w (u × v) + 2 u × (u × v)``; leading axes broadcast."""
+    """Rotate vectors by quaternions (x, y, z, w): ``v + 2 w (u × v) + 2 u × (u × v)``; leading axes broadcast."""
     u, w = quat[..., :3], quat[..., 3:]
     across = 2 * np.cross(u, vectors)
     return vectors + w * across + np.cross(u, across)
 
 
 def place(pose: Array, points: Array) -> Array:
-    """Points ``(n, 3)`` of a frame, in the frame that its pose ``(7,)`` is given in."""
+    """Transform points ``(n, 3)`` from a frame into its parent, by the frame's pose ``(7,)``."""
     return pose[:3] + rotate(pose[3:], points)
 
 
 def compose(outer: Array, inner: Array) -> Array:
-    """Poses ``inner`` in frames whose own poses are ``outer``, as poses in what those are in; leading axes cast."""
+    """Compose poses: ``inner`` in the frames ``outer``, as poses in the parent of ``outer``; leading axes broadcast."""
     u, w = outer[..., 3:6], outer[..., 6:]
     v, s = inner[..., 3:6], inner[..., 6:]
     position = outer[..., :3] + rotate(outer[..., 3:], inner[..., :3])
@@ -35,5 +35,5 @@ def compose(outer: Array, inner: Array) -> Array:
 
 
 def wxyz(quat: Array) -> Array:
-    """Quaternions (x, y, z, w) as viser has them, w first."""
+    """Reorder quaternions (x, y, z, w) as viser expects them, w first."""
     return quat[..., [3, 0, 1, 2]]

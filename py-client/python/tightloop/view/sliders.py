@@ -1,4 +1,4 @@
-"""A slider for each joint with a drive: it shows the followed world's target, and sets it when it is moved."""
+"""A slider for each driven joint, which shows and sets the followed world's target."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 import viser
 from numpy.typing import NDArray
 
-from tightloop.view.display_options import Looks
+from tightloop.view.display_options import DisplayOptions
 from tightloop.view.joints import Joint
-from tightloop.view.pilot import Pilot
+from tightloop.view.live_driver import LiveDriver
 
-# Steps of a slider over its range.
+# Number of steps of a slider over its range.
 _STEPS = 1000
-# So long a slider stays where a hand put it, until the simulation shows that target [s].
+# A moved slider keeps its position for this time, until frames show the new target [s].
 _HELD_SECONDS = 1.0
 
 
@@ -22,14 +22,16 @@ class Sliders:
     """Sliders of joint targets.
 
     Args:
-        gui: Where they are.
-        driven: The joints.
-        driver: Who sets their targets.
-        looks: Which world is followed.
-        worlds: How many worlds can be seen.
+        gui: GUI that holds the sliders.
+        driven: The driven joints.
+        driver: Driver that sets their targets.
+        options: Display options, which name the followed world.
+        worlds: Number of visible worlds.
     """
 
-    def __init__(self, gui: viser.GuiApi, driven: list[Joint], driver: Pilot, looks: Looks, worlds: int) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, driven: list[Joint], driver: LiveDriver, options: DisplayOptions, worlds: int
+    ) -> None:
         self._driven = driven
         self._moved_at = dict.fromkeys((joint.dof for joint in driven), 0.0)
         self._handles: list[viser.GuiSliderHandle[float]] = []
@@ -50,13 +52,13 @@ class Sliders:
 
             @handle.on_update
             def _(event: Any, joint: Joint = joint, handle: Any = handle) -> None:
-                # what `tell` writes is no wish of a hand
+                # values that `update` writes are not from a user
                 if event.client is not None:
                     self._moved_at[joint.dof] = time.monotonic()
-                    driver.set_target(joint.dof, handle.value, looks.world, everywhere=everywhere.value)
+                    driver.set_target(joint.dof, handle.value, options.world, everywhere=everywhere.value)
 
-    def tell(self, targets: NDArray[Any], *, disabled: bool) -> None:
-        """Show the followed world's targets, shape ``(dofs,)``; ``disabled`` while another is in control."""
+    def update(self, targets: NDArray[Any], *, disabled: bool) -> None:
+        """Show the followed world's targets, shape ``(dofs,)``; ``disabled`` while another client is in control."""
         now = time.monotonic()
         for joint, handle in zip(self._driven, self._handles, strict=True):
             handle.disabled = disabled

@@ -1,4 +1,4 @@
-"""Where what is shown comes from: a running daemon, which pays next to nothing for it, or a recording."""
+"""Sources of frames for the viewer: a running daemon, with about 1 % overhead, or a recording."""
 
 from __future__ import annotations
 
@@ -22,22 +22,19 @@ from tightloop.errors import (
     UnknownField,
 )
 
-#: What viewers need of every frame; time, step, status and contacts_left_out come with it.
+#: Fields that viewers need in every frame, besides time, step, status and contacts_left_out.
 FIELDS = ("body_q", "joint_q", "joint_qd", "joint_target_q")
-#: What they need besides to show contacts.
+#: Further fields to show contacts.
 CONTACT_FIELDS = ("contact_count", "contact_pos", "contact_normal", "contact_force")
-
-#: Bits of ``status`` of a world that is frozen: no longer finite, or beyond the bounds of the run.
-FROZEN = 1 | 8
 
 
 def is_recording(target: str) -> bool:
-    """Whether a file is meant, and not the name of a daemon."""
+    """Return whether a target is a file, not the name of a daemon."""
     return target.endswith(".tlrec") or "/" in target
 
 
 class Shown:
-    """The worlds at one instant. Attributes are arrays by field, worlds first, as in `Frame`; they are the caller's."""
+    """The worlds at one instant, as arrays in memory of their own. Attributes are fields, as in `Frame`."""
 
     def __init__(self, arrays: dict[str, NDArray[Any]]) -> None:
         self.__dict__.update(arrays)
@@ -47,11 +44,11 @@ class Shown:
 
 
 class Source(Protocol):
-    """Something that can be looked at.
+    """A source of frames.
 
     Attributes:
-        info: What the daemon tells about itself, as `Sim.info`.
-        worlds: Worlds that are shown: the first ones.
+        info: The daemon's description of itself, as `Sim.info`.
+        worlds: Number of worlds in its frames: the first ones.
         period: Simulated time between two control frames [s].
     """
 
@@ -60,29 +57,28 @@ class Source(Protocol):
     period: float
 
     def poll(self, timeout: float = 0.0) -> Shown | None:
-        """The next thing to show, or None if there is nothing new within ``timeout`` [s]."""
+        """Return the next frame, or None if there is none within ``timeout`` [s]."""
         ...
 
     def rest(self) -> None:
-        """Let it cost nothing until the next `poll`."""
+        """Cause no work until the next `poll`."""
         ...
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the source."""
         ...
 
 
 class Live:
-    """The worlds of a running daemon, as its observers see them: some 60 times a second, half as often where they
-    see more than 256 worlds.
+    """The worlds of a running daemon, as its observers see them.
 
-    The daemon shows the state of its first ``watch_worlds`` worlds; fields are evaluated here, in this process, so that
-    any may be asked for, whatever the frames of the daemon carry.
+    The daemon publishes the state of its first ``watch_worlds`` worlds about 60 times per second, half as often for
+    more than 256 worlds. Fields are evaluated in this process, so that any field is available.
 
     Args:
-        name: Name of the daemon; ``"franka.1"`` is a group of its worlds, and the first one is shown if none is named.
-        worlds: How many worlds to show; the ``watch_worlds`` of the daemon if there are fewer.
-        fields: What to evaluate.
+        name: Name of the daemon, or of a group such as ``"franka.1"``; the first group if none is named.
+        worlds: Largest number of worlds to show; at most the daemon's ``watch_worlds``.
+        fields: Fields to evaluate.
 
     Raises:
         UnknownDaemon: No daemon of that name is running; the message lists those that are.
@@ -92,10 +88,10 @@ class Live:
 
     def __init__(self, name: str, worlds: int = 256, fields: Sequence[str] = (*FIELDS, *CONTACT_FIELDS)) -> None:
         asked = checks.integer("view: worlds", worlds, least=1, error=ArgumentError)
-        # of worlds in groups the first is shown, unless another is named
+        # with several groups, show the first one unless another is named
         named = checks.text("view: name", name, error=ArgumentError)
         self._name = named if _core.groups(named) == 1 else f"{named}.0"
-        #: When the newest frame came, by the monotonic clock [s].
+        #: When the newest frame arrived, on the monotonic clock [s].
         self.came = time.monotonic()
         self._closed = False
         self._client: _core.Client | None = _core.Client(self._name, lease=False)
@@ -113,16 +109,16 @@ class Live:
             raise
 
     def poll(self, timeout: float = 0.0, patience: float = 0.0) -> Shown | None:
-        """The newest state, or None if there is none that was not shown, within ``timeout`` [s].
+        """Return the newest frame, or None if there is no new one within ``timeout`` [s].
 
         Args:
-            timeout: How long to wait for one [s].
-            patience: How long to wait for the one after it, where one is there already [s]: who polls every other
-                frame so sees evenly spaced ones.
+            timeout: How long to wait for a frame [s].
+            patience: How long to wait for the following frame if one is there already [s], so that a client that
+                shows every other frame gets evenly spaced ones.
 
         Raises:
             DaemonLost: The daemon went away.
-            SimClosed: This was closed.
+            SimClosed: This source was closed.
         """
         client = self._client = self._client or self._again()
         frame = client.latest()
@@ -135,13 +131,13 @@ class Live:
         return None if frame is None else Shown(self._evaluation.evaluate(frame.state))
 
     def rest(self) -> None:
-        """Have the daemon show nothing until the next `poll`: what nobody sees costs it nothing."""
+        """Detach until the next `poll`, so that the daemon publishes no frames."""
         if self._client is not None:
             self._client.close()
             self._client = None
 
     def close(self) -> None:
-        """Let go of the daemon, which goes on."""
+        """Detach from the daemon, which continues."""
         self._closed = True
         self.rest()
 
@@ -152,7 +148,7 @@ class Live:
             client = _core.Client(self._name, lease=False)
         except UnknownDaemon as gone:
             raise DaemonLost(str(gone)) from gone
-        except (ArgumentError, ProtocolMismatch) as other:  # of groups now, or of another version
+        except (ArgumentError, ProtocolMismatch) as other:  # it now has groups, or another version
             raise DaemonRestarted(f"another daemon runs as `{self._name}`: {other}") from other
         if json.loads(client.describe())["session"] != self.info["session"]:
             client.close()
@@ -161,18 +157,18 @@ class Live:
 
 
 class Recorded:
-    """The frames of a recording (``tightloop record``), run again one after the other.
+    """The frames of a recording (``tightloop record``), replayed one after the other.
 
     Args:
         path: The file.
-        worlds: How many worlds to show; those it has if they are fewer.
-        fields: What to evaluate.
+        worlds: Largest number of worlds to show.
+        fields: Fields to evaluate.
 
     Attributes:
-        note: What is to be known about it, if anything.
+        note: A note on the recording, or None.
 
     Raises:
-        RecordingError: It cannot be read, is no recording, or its scene's files are not where they were.
+        RecordingError: The file cannot be read or is no recording, or files of its scene are missing.
         UnknownField: There is no such field.
     """
 
@@ -191,11 +187,11 @@ class Recorded:
 
     @property
     def end(self) -> str | None:
-        """Why there are no more frames, once there are none."""
+        """Why the recording ended, once there are no more frames."""
         return self._playback.end
 
     def poll(self, timeout: float = 0.0) -> Shown | None:
-        """The next frame, or None at the end; it does not wait.
+        """Return the next frame, or None at the end; it does not wait.
 
         Raises:
             RecordingError: The file cannot be read further.
@@ -204,7 +200,7 @@ class Recorded:
         return None if arrays is None else Shown(arrays)
 
     def rest(self) -> None:
-        """It costs nothing between two polls."""
+        """Do nothing: a recording causes no work between two polls."""
 
     def close(self) -> None:
-        """Nothing is held that would have to be let go."""
+        """Do nothing: no resource is held."""

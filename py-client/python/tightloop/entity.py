@@ -1,0 +1,46 @@
+"""The base class of robots and bodies in a scene: a name and a pose."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tightloop import checks
+from tightloop.checks import Quaternion, Triple, Vector
+
+
+class Entity:
+    """A named part of a scene with a pose in the world."""
+
+    # a misspelt property is an error
+    __slots__ = ("_name", "_pos", "_quat")
+
+    #: Kind of entity, for messages.
+    kind: ClassVar[str]
+
+    def __init__(self, name: str, pos: Vector, quat: Vector) -> None:
+        self._name = name
+        self.pos = pos
+        self.quat = quat
+
+    @property
+    def name(self) -> str:
+        """Name in the scene; it precedes the names of its joints and links."""
+        return self._name
+
+    @property
+    def pos(self) -> Triple:
+        """Position of the frame (of a robot: its root link) in the world [m]; the start position if it moves freely."""
+        return self._pos
+
+    @pos.setter
+    def pos(self, pos: Vector) -> None:
+        self._pos = checks.triple(f"{self.kind} `{self.name}`: pos", pos)
+
+    @property
+    def quat(self) -> Quaternion:
+        """Orientation of the frame, unit quaternion (x, y, z, w)."""
+        return self._quat
+
+    @quat.setter
+    def quat(self, quat: Vector) -> None:
+        self._quat = checks.quaternion(f"{self.kind} `{self.name}`: quat", quat)

@@ -1,0 +1,63 @@
+"""Actions of all worlds, from a policy to the commands of a step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import ArrayLike, NDArray
+
+from tightloop.env.commands import Commands
+from tightloop.env.controls import Control
+from tightloop.env.names import Names
+from tightloop.errors import ArgumentError
+from tightloop.scene import Scene
+
+
+class Actions:
+    """The actions of all worlds, which controls turn into commands.
+
+    Attributes:
+        space: Action space of one world.
+        now: Last actions, shape ``(worlds, actions)``; 0 in worlds that have just begun an episode.
+        before: Actions of the step before.
+    """
+
+    def __init__(self, controls: Sequence[Control], scene: Scene, names: Names, worlds: int) -> None:
+        if not controls:
+            raise ArgumentError("controls: there is none; list what the action's numbers do")
+        self._commands = Commands(scene, names, worlds)
+        self._controls: list[tuple[Control, slice]] = []
+        first = 0
+        for control in controls:
+            control.bind(names, self._commands)
+            self._controls.append((control, slice(first, first + control.size)))
+            first += control.size
+        limits = np.concatenate([np.full(control.size, control.limit, np.float32) for control in controls])
+        self.space = Box(-limits, limits, dtype=np.float32)
+        # a scalar if all limits are equal: NumPy is slow on short rows
+        self._limits = limits[0] if (limits == limits[0]).all() else limits
+        self.now, self.before = (np.zeros((worlds, first), np.float32) for _ in range(2))
+
+    def take(self, actions: ArrayLike, frame: Any) -> dict[str, NDArray[np.float32]]:
+        """Apply actions, clipped to the action space; returns the arguments of a step, by name.
+
+        Raises:
+            ArgumentError: The shape is wrong, or the values are no real numbers.
+        """
+        given = np.asarray(actions)
+        if given.shape != self.now.shape or given.dtype.kind not in "fiu":
+            expected = f"expected real numbers of shape {self.now.shape}"
+            raise ArgumentError(f"actions: {expected}; got {given.dtype} of shape {given.shape}")
+        self.now, self.before = self.before, self.now
+        np.clip(given, -self._limits, self._limits, out=self.now, casting="same_kind")
+        for control, numbers in self._controls:
+            control.apply(self.now[:, numbers], frame)
+        return self._commands.sent
+
+    def begin(self, mask: NDArray[np.bool_]) -> None:
+        """Clear actions and commands of worlds that begin an episode."""
+        self._commands.begin(mask)
+        self.now[mask] = self.before[mask] = 0.0

@@ -1,0 +1,289 @@
+"""The shapes of a scene: methods that add shapes and filter contacts."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Container
+from typing import TYPE_CHECKING, Any
+
+from tightloop import _core, checks
+from tightloop.body import Body
+from tightloop.checks import Vector
+from tightloop.errors import SceneError
+from tightloop.robot import Link, Robot
+from tightloop.shapes import ORIGIN, UPRIGHT, Shape, ShapeType, Surface, checked, checked_scale, checked_surface
+
+if TYPE_CHECKING:
+    # typing has it from Python 3.11 on, the package runs on 3.10
+    from typing_extensions import Unpack
+
+Collidable = Shape | Robot | Body | Link | str
+
+
+class SceneShapes:
+    """Mixin of `Scene` with its shapes."""
+
+    __slots__ = ("bodies", "filters", "robots", "shapes")
+
+    def __init__(self) -> None:
+        self.robots: dict[str, Robot] = {}
+        self.bodies: dict[str, Body] = {}
+        self.shapes: dict[str, Shape] = {}
+        self.filters: list[tuple[str, str]] = []
+
+    def add_box(
+        self,
+        *,
+        half_extents: Vector,
+        pos: Vector = ORIGIN,
+        quat: Vector = UPRIGHT,
+        body: Body | Link | str | None = None,
+        density: float | None = None,
+        name: str | None = None,
+        **surface: Unpack[Surface],
+    ) -> Shape:
+        """Add a box, static or on a body or link.
+
+        Args:
+            half_extents: Half the length of each side [m], above 0.
+            pos: Centre in the world, or in the body's frame [m].
+            quat: Orientation in that frame (x, y, z, w).
+            body: Body of the box, a robot's link (``robot.link("hand")``), or the name of either (``"cube"``,
+                ``"arm/hand"``). None for a static box.
+            density: Density of a box on a body [kg/m³], 1000 if left out. If the body has a mass, only the ratios of
+                its shapes' densities matter. A link keeps the mass of its robot's file.
+            name: Unique name; ``box``, ``box_2``, … if left out.
+            **surface: Contact parameters: ``mu``, ``ke``, ``kd``, ``kf``, ``margin``, ``gap``, ``condim``, ``group``,
+                see `tightloop.Surface`.
+
+        Returns:
+            The shape.
+
+        Raises:
+            SceneError: A value is out of range; the message names it.
+        """
+        return self._add_shape("box", name, body, density, surface, pos=pos, quat=quat, half_extents=half_extents)
+
+    def add_sphere(
+        self,
+        *,
+        radius: float,
+        pos: Vector = ORIGIN,
+        quat: Vector = UPRIGHT,
+        body: Body | Link | str | None = None,
+        density: float | None = None,
+        name: str | None = None,
+        **surface: Unpack[Surface],
+    ) -> Shape:
+        """Add a sphere with a ``radius`` [m]; the other arguments are those of `add_box`."""
+        return self._add_shape("sphere", name, body, density, surface, pos=pos, quat=quat, radius=radius)
+
+    def add_cylinder(
+        self,
+        *,
+        radius: float,
+        half_height: float,
+        pos: Vector = ORIGIN,
+        quat: Vector = UPRIGHT,
+        body: Body | Link | str | None = None,
+        density: float | None = None,
+        name: str | None = None,
+        **surface: Unpack[Surface],
+    ) -> Shape:
+        """Add a cylinder along its z axis, sizes in [m]; the other arguments are those of `add_box`."""
+        return self._add_shape(
+            "cylinder", name, body, density, surface, pos=pos, quat=quat, radius=radius, half_height=half_height
+        )
+
+    def add_capsule(
+        self,
+        *,
+        radius: float,
+        half_height: float,
+        pos: Vector = ORIGIN,
+        quat: Vector = UPRIGHT,
+        body: Body | Link | str | None = None,
+        density: float | None = None,
+        name: str | None = None,
+        **surface: Unpack[Surface],
+    ) -> Shape:
+        """Add a capsule along its z axis, sizes in [m]; ``half_height`` is half the distance of the caps' centres."""
+        return self._add_shape(
+            "capsule", name, body, density, surface, pos=pos, quat=quat, radius=radius, half_height=half_height
+        )
+
+    def add_mesh(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        scale: Vector | float = 1.0,
+        max_hull_vertices: int = 64,
+        convex_decomposition: bool = False,
+        pos: Vector = ORIGIN,
+        quat: Vector = UPRIGHT,
+        body: Body | Link | str | None = None,
+        density: float | None = None,
+        name: str | None = None,
+        **surface: Unpack[Surface],
+    ) -> Shape:
+        """Add a mesh from a file; contacts use its convex hull. The file is read and checked at once.
+
+        Args:
+            path: The file: STL, OBJ, COLLADA or glTF.
+            scale: Factor on the file's coordinates [–], one for all axes or one per axis; a negative one mirrors.
+            max_hull_vertices: Largest number of vertices of the hull, 8 to 1024. Contacts keep twelve corners of a face
+                and test 48 edges in deep penetrations, which is enough for 64 vertices.
+            convex_decomposition: Whether a concave mesh becomes several convex hulls instead of one.
+            pos: Position of the file's origin in the world, or in the body's frame [m].
+            quat: Orientation of the file's axes in that frame (x, y, z, w).
+            body: As in `add_box`.
+            density: As in `add_box`; a mesh that is not closed has the mass of its hull.
+            name: Unique name; ``mesh``, ``mesh_2``, … if left out.
+            **surface: Contact parameters, see `add_box`.
+
+        Returns:
+            The shape; its ``notes`` say how the mesh was changed.
+
+        Raises:
+            SceneError: The file cannot be used, or a value is out of range; the message names it.
+        """
+        file = checks.path("add_mesh: path", path)
+        factors = checked_scale("add_mesh", scale)
+        vertices = checks.integer("add_mesh: max_hull_vertices", max_hull_vertices)
+        decompose = bool(convex_decomposition)
+        summary = json.loads(_core.read_mesh(str(file), factors, vertices, decompose))
+        mesh = {
+            "path": file,
+            "scale": factors,
+            "max_hull_vertices": vertices,
+            "convex_decomposition": decompose,
+            "notes": tuple(summary["notes"]),
+        }
+        return self._add_shape("mesh", name, body, density, surface, mesh=mesh, pos=pos, quat=quat)
+
+    def add_plane(
+        self,
+        *,
+        pos: Vector = ORIGIN,
+        quat: Vector = UPRIGHT,
+        name: str | None = None,
+        **surface: Unpack[Surface],
+    ) -> Shape:
+        """Add an infinite plane, such as a slope; all below z = 0 of its frame is solid.
+
+        Args:
+            pos: A point of the plane in the world [m].
+            quat: Orientation (x, y, z, w); the z axis points outward.
+            name: Unique name; ``plane``, ``plane_2``, … if left out.
+            **surface: Contact parameters, see `add_box`.
+
+        Returns:
+            The shape.
+        """
+        return self._add_shape("plane", name, None, None, surface, pos=pos, quat=quat)
+
+    def add_ground(self, *, z: float = 0.0, name: str | None = None, **surface: Unpack[Surface]) -> Shape:
+        """Add an infinite horizontal ground at height ``z`` [m], named ``ground``; see `add_plane`."""
+        height = checks.number("add_ground: z", z)
+        name = self._free_name("ground") if name is None else name
+        return self.add_plane(pos=(0.0, 0.0, height), name=name, **surface)
+
+    def filter_contacts(self, a: Collidable, b: Collidable) -> None:
+        """Exclude contacts between two shapes, or between all shapes of robots, bodies or links.
+
+        Args:
+            a: A shape; a robot, body or link for all its shapes; or a name. Names are those of ``sim.shape_names``,
+                such as ``"table"``, ``"cube/box"``, ``"arm/hand/0"``, or of a robot, body or link: ``"arm"``,
+                ``"arm/hand"``.
+            b: Likewise. The same value as ``a`` excludes contacts among its own shapes.
+
+        Raises:
+            SceneError: ``a`` or ``b`` does not exist in the scene; add it before the filter.
+        """
+        what = "filter_contacts"
+        self.filters.append((self._collidable(what, a), self._collidable(what, b)))
+
+    def _add_shape(
+        self,
+        kind: ShapeType,
+        name: str | None,
+        body: Body | Link | str | None,
+        density: float | None,
+        surface: Surface,
+        *,
+        mesh: dict[str, Any] | None = None,
+        **frame_and_sizes: Any,
+    ) -> Shape:
+        name = checks.name(kind, self._free_name(kind) if name is None else name, self._names())
+        what = f"{kind} `{name}`"
+        carrier = None if body is None else self._carrier(what, body)
+        if density is not None:
+            if carrier is None:
+                raise SceneError(f"{what} is static and has no density; leave it out, or give body=")
+            if "/" in carrier:
+                raise SceneError(
+                    f"{what}: link `{carrier}` has the mass that its robot's file gives it; leave out density"
+                )
+            density = checks.number(f"{what}: density", density, above=0.0)
+        values = checked(what, **frame_and_sizes) | checked_surface(what, surface) | (mesh or {})
+        shape = Shape(name, kind, body=carrier, density=density, **values)
+        self.shapes[name] = shape
+        return shape
+
+    def _carrier(self, what: str, body: Body | Link | str) -> str:
+        """Return the name of a body of this scene, or ``robot/link``."""
+        if isinstance(body, Body) and self.bodies.get(body.name) is not body:
+            raise SceneError(f"{what}: body `{body.name}` is of another scene; give one of this scene's")
+        if isinstance(body, Link) and self.robots.get(body.robot.name) is not body.robot:
+            raise SceneError(f"{what}: link `{body}` is of another scene; give one of this scene's")
+        if not isinstance(body, (Body, Link, str)):
+            raise SceneError(f"{what}: body is {body!r}; give a body, robot.link(…), or the name of either")
+        carrier = body.name if isinstance(body, (Body, Link)) else body
+        robot, slash, link = carrier.partition("/")
+        if slash and robot in self.robots:
+            self.robots[robot].link(link)
+        elif carrier in self.robots:
+            raise SceneError(f"{what}: body is the robot {carrier!r}; give one of its links, as in robot.link(…)")
+        elif carrier not in self.bodies:
+            known = ", ".join(f"`{body}`" for body in self.bodies) or "none yet; add_body makes one"
+            raise SceneError(f"{what}: body is {carrier!r}, which is no body of this scene; there are: {known}")
+        return carrier
+
+    def _collidable(self, what: str, thing: Collidable) -> str:
+        """Return the name of a shape, robot, body or link; `what` is for messages."""
+        if isinstance(thing, Shape):
+            if self.shapes.get(thing.name) is not thing:
+                raise SceneError(f"{what}: shape `{thing.name}` is of another scene; give one of this scene's")
+            return thing.full_name
+        if isinstance(thing, Robot):
+            if self.robots.get(thing.name) is not thing:
+                raise SceneError(f"{what}: robot `{thing.name}` is of another scene; give one of this scene's")
+            return thing.name
+        if isinstance(thing, (Body, Link)):
+            return self._carrier(what, thing)
+        shapes = [shape.full_name for shape in self.shapes.values()]
+        names = [*shapes, *self.robots, *self.bodies]
+        for robot in self.robots.values():
+            names += (f"{robot.name}/{part}" for part in (*robot.link_names, *robot.shape_names))
+        if thing not in names:
+            known = ", ".join(f"`{name}`" for name in (*shapes, *self.robots, *self.bodies)) or "none yet"
+            raise SceneError(
+                f"{what}: there is no shape, robot, body or link {thing!r}; there are: {known}, and the "
+                "robots' links and shapes (robot.link_names, robot.shape_names)"
+            )
+        return thing
+
+    def _names(self) -> list[str]:
+        return [*self.robots, *self.bodies, *self.shapes]
+
+    def _free_name(self, kind: str) -> str:
+        return free_name(kind, self._names())
+
+
+def free_name(kind: str, taken: Container[str]) -> str:
+    """Return the first name of ``kind``, ``kind_2``, … that is not taken."""
+    count = 1
+    while (name := kind if count == 1 else f"{kind}_{count}") in taken:
+        count += 1
+    return name

@@ -1,0 +1,43 @@
+"""Sensors of a scene: sites, and sums of contact forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tightloop.checks import Quaternion, Triple
+
+
+@dataclass(frozen=True)
+class Site:
+    """A frame of interest on a body or in the world, made by `Scene.add_site`.
+
+    Attributes:
+        name: Name, as in ``sim.site_names``.
+        body: Body or ``robot/link`` that carries the site; None for the world.
+        pos: Position in the frame of the body [m].
+        quat: Orientation in that frame (x, y, z, w).
+        relative_to: Site, body or ``robot/link`` that is the reference frame; None for the world.
+        damping: Damping of the inverse Jacobian [m or rad].
+    """
+
+    name: str
+    body: str | None
+    pos: Triple
+    quat: Quaternion
+    relative_to: str | None
+    damping: float
+
+
+@dataclass(frozen=True)
+class ContactSensor:
+    """A sum of contact forces, made by `Scene.add_contact_sensor`.
+
+    Attributes:
+        name: Name, as in ``sim.contact_sensor_names``.
+        of: What the forces act on.
+        against: What they come from; None for everything.
+    """
+
+    name: str
+    of: str
+    against: str | None

@@ -1,0 +1,66 @@
+"""The browser viewer of a simulation, in a process of its own so that it does not slow the loop."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import weakref
+
+from tightloop.errors import LaunchError
+
+_STOP_SECONDS = 3.0
+
+
+class Viewer:
+    """A viewer, started by `Sim.view`. It ends with the simulation, with this process, or by ``close``.
+
+    Attributes:
+        url: Address of the page.
+        pid: Process id of the viewer.
+    """
+
+    def __init__(self, name: str, *, port: int, worlds: int, open: bool) -> None:
+        command = [sys.executable, "-m", "tightloop", "view", name, f"--port={port}", f"--worlds={worlds}"]
+        command += [f"--parent={os.getpid()}", *(["--open"] if open else [])]
+        # the viewer shares our stderr; Ctrl-C in a terminal goes to this process, which decides when the viewer ends
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True)
+        assert process.stdout is not None
+        line = process.stdout.readline().decode().strip()
+        if not line:
+            try:
+                code: int | None = process.wait(_STOP_SECONDS)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                code = process.wait()
+            raise LaunchError(f"the viewer ended with exit code {code}; stderr says why")
+        self.url = line
+        self.pid = process.pid
+        self._process = process
+        self._end = weakref.finalize(self, _end, process, os.getpid())
+
+    @property
+    def open(self) -> bool:
+        """Whether the viewer runs."""
+        return self._end.alive and self._process.poll() is None
+
+    def close(self) -> None:
+        """End the viewer; the simulation continues."""
+        self._end()
+
+    def __repr__(self) -> str:
+        return f"Viewer({self.url!r}, pid={self.pid}{'' if self.open else ', closed'})"
+
+
+def _end(process: subprocess.Popen[bytes], owner: int) -> None:
+    # a forked child must not end its parent's viewer
+    if os.getpid() != owner:
+        return
+    process.terminate()
+    try:
+        process.wait(_STOP_SECONDS)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    if process.stdout is not None:
+        process.stdout.close()

@@ -1,0 +1,38 @@
+"""Checks of processes: whether one runs, and which shared-memory files a daemon leaves behind."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+
+def stems_of(pid: int) -> set[str]:
+    """Return the prefixes of a daemon's shared-memory files, read from the running process."""
+    maps = Path(f"/proc/{pid}/maps").read_text()
+    return set(re.findall(r"/dev/shm/(tl[0-9a-f]{16})", maps))
+
+
+def left_of(stems: set[str]) -> list[str]:
+    """Return the shared-memory files with these prefixes."""
+    assert stems, "a running daemon has shared memory"
+    return sorted(path.name for path in Path("/dev/shm").iterdir() if path.name.startswith(tuple(stems)))
+
+
+def alive(pid: int) -> bool:
+    """Return whether a process runs; a zombie does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False
+
+
+def wait_until(condition: Callable[[], bool], seconds: float) -> bool:
+    """Poll until a condition holds; return whether it did in time."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.01)
+    return True

@@ -1,0 +1,159 @@
+"""Reference implementations of the tasks in plain Python, for one world, from the formulas of their documents."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop.env import Worlds
+
+#: Arrays of one world, by name.
+World = Mapping[str, NDArray[np.float64]]
+Vector = Sequence[float] | NDArray[np.float64]
+
+
+@dataclass
+class Told:
+    """What a task says of a world."""
+
+    obs: list[float]
+    reward: float
+    terminated: bool = False
+    success: bool = False
+
+
+def cart_pole_balance(world: World) -> Told:
+    (x, angle), (speed, rate) = world["joint_q"], world["joint_qd"]
+    return Told([x, math.sin(angle), math.cos(angle), speed, rate], 1.0, terminated=abs(angle) > 0.2095 or abs(x) > 2.4)
+
+
+def cart_pole_swing_up(world: World) -> Told:
+    (x, angle), (_, rate), (force,) = world["joint_q"], world["joint_qd"], world["action"]
+    upright, quiet, middle = (1 + math.cos(angle)) / 2, 1 / (1 + rate**2 / 25), 1 - x**2 / 2.4**2
+    reward = upright * (1 + quiet) / 2 * (1 + middle) / 2 * (1 - force**2 / 5)
+    upright = abs(math.remainder(angle, 2 * math.pi)) < 0.2
+    return Told(cart_pole_balance(world).obs, reward, success=upright and abs(rate) < 1)
+
+
+def reach(world: World) -> Told:
+    start = [0.0, -0.569, 0.0, -2.81, 0.0, 3.037, 0.741, 0.04, 0.04]
+    q, qd, tcp, goal = world["joint_q"], world["joint_qd"], world["site_q"][0], world["goal"]
+    error = math.dist(tcp[:3], goal[:3])
+    angle = 2 * math.acos(min(1.0, abs(dot(tcp[3:], goal[3:]))))
+    effort = math.dist(world["action"], world["previous_action"]) ** 2 + dot(qd, qd)
+    reward = -0.2 * error + 0.1 * (1 - math.tanh(error / 0.1)) - 0.1 * angle - 1e-4 * effort
+    return Told([*(q - start), *qd, *goal, *world["action"]], reward, success=error < 0.02)
+
+
+def push_cube(world: World) -> Told:
+    q, qd, tcp, goal = world["joint_q"], world["joint_qd"], world["site_q"][0], world["goal"]
+    cube = q[9:12]
+    to_push = math.dist(tcp[:3], [cube[0] - 0.025, cube[1], cube[2]])
+    error = math.dist(cube[:2], goal[:2])
+    success = error < 0.1 and cube[2] < 0.025
+    reward = 1 - math.tanh(5 * to_push)
+    if to_push < 0.01:
+        reward += 1 - math.tanh(5 * error)
+    return Told([*q[:9], *qd[:9], *tcp, *goal, *q[9:16]], 1.0 if success else reward / 3, success=success)
+
+
+def pick_cube(world: World) -> Told:
+    q, qd, tcp, goal = world["joint_q"], world["joint_qd"], world["site_q"][0], world["goal"]
+    cube, arm = q[9:12], [abs(speed) for speed in qd[:7]]
+    held = holds(tcp[3:], *world["contact_sensor"])
+    error = math.dist(cube, goal)
+    success = error <= 0.025 and max(arm) <= 0.2
+    reward = 1 - math.tanh(5 * math.dist(tcp[:3], cube))
+    if held:
+        reward += 1 + 1 - math.tanh(5 * error)
+    if error <= 0.025:
+        reward += 1 - math.tanh(5 * math.hypot(*arm))
+    obs = [*q[:9], *qd[:9], float(held), *tcp, *goal, *q[9:16], *(cube - tcp[:3]), *(goal - cube)]
+    return Told(obs, 1.0 if success else reward / 5, success=success)
+
+
+def lift(world: World) -> Told:
+    start = [0.0, -0.569, 0.0, -2.81, 0.0, 3.037, 0.741, 0.04, 0.04]
+    q, qd, tcp, goal = world["joint_q"], world["joint_qd"], world["site_q"][0], world["goal"]
+    cube = q[9:12]
+    error = math.dist(cube, goal[:3])
+    reward = 1 - math.tanh(math.dist(tcp[:3], cube) / 0.1)
+    if cube[2] > 0.04:
+        reward += 15 + 16 * (1 - math.tanh(error / 0.3)) + 5 * (1 - math.tanh(error / 0.05))
+    reward -= 1e-4 * math.dist(world["action"], world["previous_action"]) ** 2 + 1e-4 * dot(qd[:9], qd[:9])
+    return Told([*(q[:9] - start), *qd[:9], *cube, *goal, *world["action"]], reward, success=error < 0.025)
+
+
+PLAIN: dict[str, Callable[[World], Told]] = {
+    "CartPoleBalance": cart_pole_balance,
+    "CartPoleSwingUp": cart_pole_swing_up,
+    "FrankaReach": reach,
+    "FrankaPushCube": push_cube,
+    "FrankaPickCube": pick_cube,
+    "FrankaLift": lift,
+}
+
+
+def dot(a: Vector, b: Vector) -> float:
+    return math.fsum(x * y for x, y in zip(a, b, strict=True))
+
+
+def holds(hand: Vector, left: Vector, right: Vector) -> bool:
+    """Whether each finger is pressed with 0.5 N or more, within 85° of the way in which it opens."""
+    x, y, z, w = hand
+    opens = [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)]
+    for force, sign in ((left, 1), (right, -1)):
+        size = math.hypot(*force)
+        if size < 0.5 or math.degrees(math.acos(sign * dot(force, opens) / size)) > 85:
+            return False
+    return True
+
+
+def any_worlds(envs: Any, count: int, seed: int) -> Worlds:
+    """Worlds in any states, among them such as a task has a special case for; float32, as frames have them."""
+    rng, frame = np.random.default_rng(seed), envs.sim.forward()
+
+    def near(center: Any, *scales: float) -> NDArray[np.float64]:
+        """Around a centre, in each world as far as one of these scales."""
+        shape = np.shape(center)
+        scale = rng.choice(scales, (count,) + (1,) * (len(shape) - 1))
+        return center + scale * rng.uniform(-1, 1, shape)
+
+    def turned(shape: tuple[int, ...]) -> NDArray[np.float64]:
+        quats = rng.normal(size=shape)
+        return quats / np.linalg.norm(quats, axis=-1, keepdims=True)
+
+    arrays: dict[str, Any] = {name: np.zeros((count, *getattr(frame, name).shape[1:])) for name in envs.task.fields}
+    arrays["joint_q"] = near(arrays["joint_q"], 0.1, 4.0)
+    arrays["joint_qd"] = near(arrays["joint_qd"], 0.01, 0.25, 5.0)
+    arrays["action"], arrays["previous_action"] = rng.uniform(-1, 1, (2, count, *envs.single_action_space.shape))
+    arrays["goal"] = np.zeros((count, 0))
+    if "site_q" in arrays:
+        tcp = arrays["site_q"]
+        tcp[:, 0, :3], tcp[:, 0, 3:] = near(np.full((count, 3), 0.1), 0.3), turned((count, 4))
+        goal = near(tcp[:, 0, :3], 0.01, 0.1, 0.5)
+        if arrays["joint_q"].shape[1] > 9:
+            arrays["joint_q"][:, 9:12] = near(tcp[:, 0, :3], 0.005, 0.05, 0.5)
+            arrays["joint_q"][:, 12:] = turned((count, 4))
+            # on the ground, and above it
+            arrays["joint_q"][:, 11] = np.where(rng.uniform(size=count) < 0.5, 0.02, arrays["joint_q"][:, 11])
+            goal = near(arrays["joint_q"][:, 9:12], 0.01, 0.1, 0.5)
+        size = envs.task.goal(np, Worlds(**{n: a[:1] for n, a in arrays.items()}), np.zeros((1, 9))).shape[1]
+        arrays["goal"] = np.concatenate([goal, turned((count, 4))], 1)[:, :size]
+    if "contact_sensor" in arrays:
+        x, y, z, w = arrays["site_q"][:, 0, 3:].T
+        opens = np.stack([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)], 1)
+        pressed = near(np.stack([opens, -opens], 1), 0.5, 3.0)
+        arrays["contact_sensor"] = rng.choice([0.0, 0.4, 1.0, 30.0], (count, 2, 1)) * pressed
+    elapsed = np.zeros(count, np.int32)
+    return Worlds(elapsed=elapsed, **{name: array.astype(np.float32) for name, array in arrays.items()})
+
+
+def one(worlds: Worlds, world: int) -> World:
+    """A world of these, in float64."""
+    return {name: np.asarray(array)[world].astype(np.float64) for name, array in vars(worlds).items()}
