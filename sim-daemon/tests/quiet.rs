@@ -36,6 +36,8 @@ impl Daemon {
         let mut process = Command::new(env!("CARGO_BIN_EXE_tightloop"))
             .args(["serve", "scene.toml", "--log", "log", "--name", &name])
             .args(arguments)
+            // it ends with us, also where a test fails
+            .args(["--parent", &std::process::id().to_string()])
             .current_dir(&folder)
             .env_remove("XDG_RUNTIME_DIR")
             .env_remove("TIGHTLOOP_ROOT")
@@ -76,7 +78,8 @@ impl Daemon {
 fn on_the_processor_it_prints_nothing_on_stderr_and_loads_no_vulkan() {
     for device in ["cpu", "auto"] {
         let daemon = Daemon::serve(device, &["--device", device, "--worlds", "8"]);
-        assert_eq!(daemon.ready["device"], "cpu", "{}", daemon.ready);
+        let chosen = daemon.ready["device"].as_str().unwrap();
+        assert!(chosen.starts_with("cpu"), "{chosen}");
         assert!(!daemon.has_loaded("vulkan"));
         let left = daemon.end();
         assert_eq!((left.stderr.as_str(), left.code), ("", Some(0)));

@@ -17,7 +17,7 @@ fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
         let recordings: Vec<Option<(Recording, Recording, [Split; 2])>> = StageId::all()
             .map(|stage| {
                 let recording = stage.is_needed(m).then(|| recorded_stage(m, stage))?;
-                let packed = recording.packed();
+                let packed = recording.vectorized();
                 let splits = KERNEL_COSTS.map(|most| toy::in_kernels(&recording, most));
                 Some((recording, packed, splits))
             })

@@ -4,7 +4,7 @@ use std::fmt;
 
 use sim_protocol::{Dtype, Row, Table};
 
-use super::records::Command;
+use super::records::RecordedCommand;
 
 /// A frame that was made again.
 pub(super) struct Seen<'a> {

@@ -10,7 +10,7 @@ use sim_protocol::host::{Inbox, free_memory};
 use sim_protocol::{CommandHeader, Description, Op};
 
 use super::failure::unreadable;
-use super::records::Command;
+use super::records::RecordedCommand;
 use crate::config;
 use crate::error::DaemonError;
 use crate::export::{self, Advance};

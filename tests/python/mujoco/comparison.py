@@ -13,7 +13,8 @@ from random_trees import states
 
 import tightloop as tl
 
-FIELDS = "joint_q joint_qd joint_qdd body_q mass_matrix bias_force efc_J efc_D efc_aref efc_force kinetic_energy potential_energy".split()
+ENERGIES = ["kinetic_energy", "potential_energy"]
+FIELDS = "joint_q joint_qd joint_qdd body_q mass_matrix bias_force efc_J efc_D efc_aref efc_force".split() + ENERGIES
 FRAMES = 200
 
 # What is smaller throughout, in SI units, is zero but for rounding: the gravity force of a slide that lies level

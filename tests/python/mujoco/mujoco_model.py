@@ -128,7 +128,7 @@ class MujocoModel:
             out["joint_qdd"].append(data.qacc.copy())
             out["body_q"].append(np.hstack([data.xpos[1:], np.roll(data.xquat[1:], -1, axis=1)]))
             out["drive"].append(data.qfrc_actuator.copy())
-            # static bodies, which MuJoCo counts here since they are not fused, have a potential energy that never changes
+            # MuJoCo counts static bodies, which are not fused here: their potential energy never changes
             static = np.flatnonzero(model.body_weldid == 0)
             still = model.body_mass[static] @ (data.xipos[static] @ model.opt.gravity)
             out["energy"].append(data.energy + np.array([still, 0.0]))
