@@ -128,7 +128,7 @@ const ORDER: &[(&str, &[&str])] = &[
     (
         "sim-core/engine/src/backend",
         &[
-            "error", "frozen", "state", "input", "noise", "shown", "gather", "cpu", "gpu",
+            "error", "frozen", "state", "input", "noise", "gather", "cpu", "gpu",
         ],
     ),
     (

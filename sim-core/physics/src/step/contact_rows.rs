@@ -44,6 +44,7 @@ impl Stage for ContactRows {
     }
 }
 
+/// Writes the rows of all contacts that the worlds have now.
 #[inline(always)]
 fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let t = &m.contacts;
@@ -51,107 +52,172 @@ fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
-            let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
-            let normal = load_vec3(cx, t.memory.rows, r, row::NORMAL);
-            let point = load_vec3(cx, t.memory.rows, r, row::POINT);
-            let number = cx.load(t.memory.rows, r, row::PAIR);
-            let rubs = shared(cx, t, class, number, pair::RUBS);
-            let along = match t.cone {
-                Cone::Elliptic => None,
-                Cone::Pyramidal => Some(load_vec3(cx, t.memory.rows, r, row::TANGENTS)),
-            };
-            let tangents = tangents(normal, along);
-            // without friction a contact has no tangents
-            let frame = [normal, tangents[0] * rubs, tangents[1] * rubs];
-            let mut velocity = [zero; 3];
-            let w = &b.work;
-            let second = w.reference[class.trees.1];
-            let point_first = match class.trees.0 {
-                Some(tree) if tree != class.trees.1 => {
-                    add_difference(point, second, w.reference[tree])
-                }
-                _ => point,
-            };
-            let mut torques = [[Vec3::zero(); 3]; 2];
-            for (i, axis) in frame.iter().enumerate() {
-                torques[0][i] = point_first.cross(*axis);
-                torques[1][i] = point.cross(*axis);
-            }
-            for (c, column) in class.columns.iter().enumerate() {
-                let Spatial([linear, angular]) = w.motion[column.dof];
-                let lever = shared(cx, t, class, number, column.lever);
-                let speed = cx.get(&b.joint_qd[column.dof]);
-                let torques = &torques[usize::from(!column.is_first)];
-                let mut jacobian = [zero; 3];
-                for i in 0..3 {
-                    let turned = linear.dot(frame[i]) + angular.dot(Vec3(torques[i].0));
-                    jacobian[i] = lever * turned;
-                    velocity[i] = jacobian[i].fma(speed, velocity[i]);
-                }
-                cx.fill_all(t.memory.rows, r, row::JACOBIAN + 3 * c, jacobian);
-            }
-            cx.fill_all(t.memory.rows, r, row::TANGENTS, frame[1].0);
-            cx.fill_all(t.memory.rows, r, row::TANGENTS + 3, frame[2].0);
+            let contact = Contact::read(cx, t, class, r);
+            let velocity = contact.write_jacobian(cx, b);
             let swing = swing_between(cx, m, b, class);
-            let distance = cx.load(t.memory.rows, r, row::DISTANCE);
-            let position = distance - shared(cx, t, class, number, pair::MARGIN);
-            let d = impedance(&m.contact_impedance, position);
-            let mu = match t.memory.mu.rows {
-                0 => shared(cx, t, class, number, pair::MU),
-                _ => cx.load(t.memory.rows, r, row::MU),
-            };
-            let mu = mu * rubs;
-            let weight = shared(cx, t, class, number, pair::WEIGHT);
-            let stiff = d.div((one - d) * weight);
-            let damping = shared(cx, t, class, number, pair::DAMPING);
-            let spring = shared(cx, t, class, number, pair::STIFFNESS) * d * position;
-            let mut aref = [-velocity[0].fma(damping, spring), zero, zero];
-            let (stiff, sliding) = match t.cone {
-                Cone::Elliptic => (stiff, shared(cx, t, class, number, pair::SLIDING)),
-                Cone::Pyramidal => {
-                    let square = mu * mu;
-                    let mut edges = C::F::k(t.impratio).div(square + square);
-                    edges = edges.div(one + square);
-                    if !<<C::F as Num>::Real as Real>::DOUBLE {
-                        edges = edges.min(C::F::c(EDGES_MAX));
-                    }
-                    // without friction four edges fall together
-                    let share = C::F::select(zero.lt(mu), edges, C::F::c(0.25));
-                    (stiff * share, damping)
-                }
-            };
-            for i in 1..3 {
-                aref[i] = -(velocity[i] * sliding);
-            }
-            let smaller = shared(cx, t, class, number, pair::SMALLER);
-            let pushes = position.lt(contact_slack(smaller));
-            let stiff = C::F::select(pushes, stiff, zero);
-            cx.fill(t.memory.rows, r, row::STIFFNESS, stiff);
-            if t.cone == Cone::Elliptic {
-                let ratio = C::F::c(1.0 / t.impratio.to_f64());
-                let soft = stiff.div((mu * mu).fma(ratio, one));
-                cx.fill(t.memory.rows, r, row::SOFT, soft);
-            }
-            cx.fill(t.memory.rows, r, row::MU, mu);
-            for (x, axis) in aref.iter_mut().zip(frame) {
-                if let Some(swing) = swing {
-                    *x = *x + axis.dot(swing);
-                }
-                *x = C::F::select(pushes, *x, zero);
-            }
-            cx.fill_all(t.memory.rows, r, row::AREF, aref);
+            contact.write_softness(cx, m, velocity, swing);
         });
     }
 }
 
-/// Most stiffness in `f32` of a pyramid's edge over that of the elliptic cone's normal row [–].
+/// A contact whose row is written.
+struct Contact<'a, C: Cx> {
+    t: &'a Contacts<<C::F as Num>::Real>,
+    class: &'a Class<<C::F as Num>::Real>,
+    row: C::I,
+    /// Index of its pair.
+    pair: C::F,
+    /// From the reference point of the class's second tree [m].
+    point: Vec3<C::F>,
+    /// 1 with friction, 0 without.
+    rubs: C::F,
+    /// Normal and two tangents; the tangents are 0 without friction.
+    frame: [Vec3<C::F>; 3],
+}
+
+impl<'a, C: Cx> Contact<'a, C> {
+    /// Reads what the narrow phase left, and chooses the tangents.
+    #[inline(always)]
+    fn read(
+        cx: &mut C,
+        t: &'a Contacts<<C::F as Num>::Real>,
+        class: &'a Class<<C::F as Num>::Real>,
+        r: C::I,
+    ) -> Self {
+        let normal = load_vec3(cx, t.memory.rows, r, row::NORMAL);
+        let point = load_vec3(cx, t.memory.rows, r, row::POINT);
+        let pair = cx.load(t.memory.rows, r, row::PAIR);
+        let rubs = shared(cx, t, class, pair, pair::RUBS);
+        let along = match t.cone {
+            Cone::Elliptic => None,
+            Cone::Pyramidal => Some(load_vec3(cx, t.memory.rows, r, row::TANGENTS)),
+        };
+        let tangents = tangents(normal, along);
+        Contact {
+            t,
+            class,
+            row: r,
+            pair,
+            point,
+            rubs,
+            frame: [normal, tangents[0] * rubs, tangents[1] * rubs],
+        }
+    }
+
+    /// A scalar of the contact's pair.
+    #[inline(always)]
+    fn of_pair(&self, cx: &mut C, k: usize) -> C::F {
+        shared(cx, self.t, self.class, self.pair, k)
+    }
+
+    /// Writes J and the tangents, and returns J q̇.
+    #[inline(always)]
+    fn write_jacobian(&self, cx: &mut C, b: &BlockOf<C>) -> [C::F; 3] {
+        let (t, class, frame, w) = (self.t, self.class, &self.frame, &b.work);
+        // the same point from the reference point of the first tree
+        let second = w.reference[class.trees.1];
+        let point_first = match class.trees.0 {
+            Some(tree) if tree != class.trees.1 => self.point + (second - w.reference[tree]),
+            _ => self.point,
+        };
+        let mut torques = [[Vec3::zero(); 3]; 2];
+        for (i, axis) in frame.iter().enumerate() {
+            torques[0][i] = point_first.cross(*axis);
+            torques[1][i] = self.point.cross(*axis);
+        }
+        // J(i, dof) = ± (axis · v + (point × axis) · ω)
+        let mut velocity = [C::F::c(0.0); 3];
+        for (c, column) in class.columns.iter().enumerate() {
+            let Spatial([linear, angular]) = w.motion[column.dof];
+            let lever = self.of_pair(cx, column.lever);
+            let speed = cx.get(&b.joint_qd[column.dof]);
+            let torques = &torques[usize::from(!column.is_first)];
+            let mut jacobian = [C::F::c(0.0); 3];
+            for i in 0..3 {
+                let moved = linear.dot(frame[i]) + angular.dot(Vec3(torques[i].0));
+                jacobian[i] = lever * moved;
+                velocity[i] = jacobian[i].fma(speed, velocity[i]);
+            }
+            cx.fill_all(t.memory.rows, self.row, row::JACOBIAN + 3 * c, jacobian);
+        }
+        cx.fill_all(t.memory.rows, self.row, row::TANGENTS, frame[1].0);
+        cx.fill_all(t.memory.rows, self.row, row::TANGENTS + 3, frame[2].0);
+        velocity
+    }
+
+    /// Writes D, aref and the coefficient of friction.
+    #[inline(always)]
+    fn write_softness(
+        &self,
+        cx: &mut C,
+        m: &ConstantsOf<C>,
+        velocity: [C::F; 3],
+        swing: Option<Vec3<C::F>>,
+    ) {
+        let (t, r) = (self.t, self.row);
+        let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+        let distance = cx.load(t.memory.rows, r, row::DISTANCE);
+        let position = distance - self.of_pair(cx, pair::MARGIN);
+        let d = impedance(&m.contact_impedance, position);
+        let mu = match t.memory.mu.rows {
+            0 => self.of_pair(cx, pair::MU),
+            _ => cx.load(t.memory.rows, r, row::MU),
+        };
+        let mu = mu * self.rubs;
+        let weight = self.of_pair(cx, pair::WEIGHT);
+        let stiff = d.div((one - d) * weight);
+        let damping = self.of_pair(cx, pair::DAMPING);
+        let spring = self.of_pair(cx, pair::STIFFNESS) * d * position;
+        let mut aref = [-velocity[0].fma(damping, spring), zero, zero];
+        let (stiff, sliding) = match t.cone {
+            Cone::Elliptic => (stiff, self.of_pair(cx, pair::SLIDING)),
+            Cone::Pyramidal => (stiff * edge_stiffness(t.impratio, mu), damping),
+        };
+        for i in 1..3 {
+            aref[i] = -(velocity[i] * sliding);
+        }
+        // a contact past the margin has no force
+        let smaller = self.of_pair(cx, pair::SMALLER);
+        let pushes = position.lt(contact_slack(smaller));
+        let stiff = C::F::select(pushes, stiff, zero);
+        cx.fill(t.memory.rows, r, row::STIFFNESS, stiff);
+        if t.cone == Cone::Elliptic {
+            let ratio = C::F::c(1.0 / t.impratio.to_f64());
+            let soft = stiff.div((mu * mu).fma(ratio, one));
+            cx.fill(t.memory.rows, r, row::SOFT, soft);
+        }
+        cx.fill(t.memory.rows, r, row::MU, mu);
+        for (x, axis) in aref.iter_mut().zip(self.frame) {
+            if let Some(swing) = swing {
+                *x = *x + axis.dot(swing);
+            }
+            *x = C::F::select(pushes, *x, zero);
+        }
+        cx.fill_all(t.memory.rows, r, row::AREF, aref);
+    }
+}
+
+/// D of a pyramid's edge over that of the elliptic cone's normal row: impratio / (2 μ² (1 + μ²)).
+#[inline(always)]
+fn edge_stiffness<F: Num>(impratio: F::Real, mu: F) -> F {
+    let square = mu * mu;
+    let mut edges = F::k(impratio).div(square + square);
+    edges = edges.div(F::c(1.0) + square);
+    if !F::Real::DOUBLE {
+        edges = edges.min(F::c(EDGES_MAX));
+    }
+    // without friction the four edges coincide
+    F::select(F::c(0.0).lt(mu), edges, F::c(0.25))
+}
+
+/// Upper bound of [`edge_stiffness`] in `f32` [–].
 ///
-/// An edge is as rigid then as `f32` can tell; with 20 times as much, rounding threw bodies off. MuJoCo's is more
-/// below mu = 0.22 at the default impratio of 1000.
+/// An edge is then as rigid as `f32` can resolve. With 20 times as much, rounding threw bodies off. MuJoCo's is larger for
+/// mu < 0.22 at the default impratio of 1000.
 const EDGES_MAX: f64 = 1e4;
 
-/// What MuJoCo's J q̈ lacks of ours: a free joint's acceleration is of its frame's origin there, of the centre of mass
-/// here, and they differ by ω × (ω × r). None where no centre lies off its frame.
+/// The difference between MuJoCo's J q̈ and ours. The acceleration of a free joint is that of its frame's origin there, of the
+/// centre of mass here: they differ by ω × (ω × r). None where every centre of mass is its frame's origin.
 #[inline(always)]
 fn swing_between<C: Cx>(
     cx: &mut C,
@@ -161,7 +227,7 @@ fn swing_between<C: Cx>(
 ) -> Option<Vec3<C::F>> {
     let (first, second) = class.trees;
     if first == Some(second) {
-        // both bodies are carried by it
+        // both bodies move with the same tree
         return None;
     }
     let first = first.and_then(|tree| swing(cx, m, b, tree));
@@ -173,7 +239,7 @@ fn swing_between<C: Cx>(
     }
 }
 
-/// ω × (ω × r) of a tree's free body, whose centre of mass is at r from its frame's origin.
+/// ω × (ω × r) of a tree's free body, with its centre of mass at r from its frame's origin.
 #[inline(always)]
 fn swing<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, tree: usize) -> Option<Vec3<C::F>> {
     let free = m.trees[tree].free?;
@@ -189,7 +255,7 @@ fn swing<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, tree: usize) -> 
     Some(spin.cross(b.work.origin[free].cross(spin)))
 }
 
-/// Keeps the largest number of contacts that did not fit.
+/// Keeps the largest count of contacts that did not fit.
 #[inline(always)]
 fn note_overflow<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, most: &mut C::V) {
     let mut left_out = C::F::c(0.0);
@@ -206,7 +272,7 @@ fn note_overflow<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, most: &mu
     cx.set(most, left_out);
 }
 
-/// The contacts of a class that the worlds have now.
+/// The list of a class's contacts.
 #[inline(always)]
 pub(super) fn class_list<C: Cx>(
     cx: &mut C,
@@ -218,29 +284,23 @@ pub(super) fn class_list<C: Cx>(
     cx.kept(t.memory.counts, at, first, capacity)
 }
 
-/// A number of a contact's pair, which may be the same for all pairs of the class.
+/// A scalar of a contact's pair: a constant where all pairs of the class share it.
 #[inline(always)]
 fn shared<C: Cx>(
     cx: &mut C,
     t: &Contacts<<C::F as Num>::Real>,
     class: &Class<<C::F as Num>::Real>,
-    number: C::F,
+    pair: C::F,
     k: usize,
 ) -> C::F {
     match class.shared[k] {
         Some(x) => C::F::k(x),
-        None => cx.pick(t.handles.pair_numbers, number, k),
+        None => cx.pick(t.handles.pair_numbers, pair, k),
     }
 }
 
-/// a + (b - c)
-#[inline(always)]
-fn add_difference<F: Num>(a: Vec3<F>, b: Vec3<F>, c: Vec3<F>) -> Vec3<F> {
-    a + (b - c)
-}
-
-/// Two unit vectors across the normal, as MuJoCo's `mju_makeFrame` chooses them: the first lies along a direction if one
-/// is given, else along y unless the normal is near y, then z.
+/// Two unit vectors across the normal, as MuJoCo's `mju_makeFrame` chooses them: the first is along a direction if one is
+/// given, else along y, or along z where the normal is near y.
 #[inline(always)]
 fn tangents<F: Num>(normal: Vec3<F>, along: Option<Vec3<F>>) -> [Vec3<F>; 2] {
     let (zero, one) = (F::c(0.0), F::c(1.0));
@@ -253,7 +313,7 @@ fn tangents<F: Num>(normal: Vec3<F>, along: Option<Vec3<F>>) -> [Vec3<F>; 2] {
     let mut across = across(normal, axis);
     if let Some(along) = along {
         let first = self::across(normal, along);
-        // a capsule that stands upright has no direction, to the rounding of f32
+        // an upright capsule has no direction across the normal, up to the rounding of `f32`
         let lies = F::c(1e-12).lt(first.dot(first));
         for (x, y) in across.iter_mut().zip(*first) {
             *x = F::select(lies, y, *x);

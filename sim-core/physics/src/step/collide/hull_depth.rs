@@ -1,36 +1,43 @@
 //! The axis of least depth of two hulls that penetrate: that of the nearest face of their Minkowski difference.
 //!
 //! A face of the difference comes from a face of either hull, or from two edges whose arcs of normals cross on the sphere
-//! (Gregorius, GDC 2013). Pairs of edges are too many to try. Along the arc of an edge with the point a, between n₁ and
-//! n₂, the depth is at least the lesser of (a - b) · n₁ and (a - b) · n₂ if both are positive, for any b of the second
-//! hull; so with b its farthest point against n₁ + n₂ few edges are left to be tried with all of the second hull.
+//! (Gregorius, GDC 2013). There are too many pairs of edges to try them all, so most edges of the first hull are rejected by
+//! a bound: along the arc of an edge with the point a, between the normals n₁ and n₂, and for any point b of the second hull,
+//!
+//! ```text
+//! depth ≥ min((a - b) · n₁, (a - b) · n₂)        where both are positive
+//! ```
+//!
+//! With b the farthest point against n₁ + n₂ few edges are left to be tried with all edges of the second hull.
 
-use super::choose::select;
-use super::gjk::Restart;
-use super::hull_axes::Axis;
-use super::support::{Polyhedron, Support, Turned, get3, negated, pick3, set3, signed, var3};
+use super::hull::{Hull, Part, PosedHull};
+use super::hull_axes::SeparatingAxis;
+use super::restart::Restart;
+use super::select::{select, with_sign};
+use super::support::Support;
+use super::variables::{get3, pick3, set3, var3};
 use crate::lane::{Cx, Num, Table};
 use crate::math::vec3::Vec3;
 use crate::{each, push, span, when};
 
-/// Two hulls, in the frame of the second.
-pub(super) struct LeastDepth<'a, 'b, C: Cx> {
-    pub first: &'a Turned<'b, C>,
-    pub second: &'a Polyhedron<'b, C>,
-    /// Depth past which it is looked for [m].
+/// Two hulls in the frame of the second, as a restart of GJK from the best of all their axes.
+pub(super) struct MinkowskiFaces<'a, C: Cx> {
+    pub first: PosedHull<'a, C>,
+    pub second: Hull<'a, C>,
+    /// Depth past which all faces of the difference are searched [m].
     pub depth: C::F,
-    /// Scratch rows of edges.
-    pub promising: Table,
+    /// Scratch rows for edges.
+    pub edges: Table,
 }
 
 /// The best axis so far.
-struct Best<C: Cx> {
+struct BestAxis<C: Cx> {
     depth: C::V,
     axis: [C::V; 3],
 }
 
-impl<C: Cx> Best<C> {
-    /// Takes an axis that is better.
+impl<C: Cx> BestAxis<C> {
+    /// Takes an axis that is less deep.
     #[inline(always)]
     fn offer(&mut self, cx: &mut C, depth: C::F, axis: Vec3<C::F>) {
         let (old, kept) = (cx.get(&self.depth), get3(cx, &self.axis));
@@ -40,7 +47,7 @@ impl<C: Cx> Best<C> {
     }
 }
 
-impl<C: Cx> Restart<C> for LeastDepth<'_, '_, C> {
+impl<C: Cx> Restart<C> for MinkowskiFaces<'_, C> {
     const TRIES: usize = 1;
     const BETTER: bool = true;
     #[inline(always)]
@@ -49,44 +56,44 @@ impl<C: Cx> Restart<C> for LeastDepth<'_, '_, C> {
     }
 
     #[inline(always)]
-    fn axis(&self, cx: &mut C, known: Axis<C::F>, _: Vec3<C::F>) -> Axis<C::F> {
-        let mut best = Best {
+    fn axis(&self, cx: &mut C, known: SeparatingAxis<C::F>, _: Vec3<C::F>) -> SeparatingAxis<C::F> {
+        let mut best = BestAxis {
             depth: cx.var(-known.distance),
             axis: var3(cx, known.normal),
         };
-        // the points that are deepest now tell which faces and edges are too far from them to be better
+        // the deepest points along the known axis bound the depth of other faces and edges from below
         let on_a = self.first.farthest(cx, known.normal);
-        let on_b = self.second.farthest(cx, negated(known.normal));
+        let on_b = self.second.farthest(cx, -known.normal);
         self.faces(cx, on_a, on_b, &mut best);
-        let mut promising = cx.list(self.promising.rows);
-        self.choose(cx, on_b, &best, &mut promising);
-        self.cross(cx, &promising, &mut best);
-        Axis {
+        let mut promising = cx.list(self.edges.rows);
+        self.list_edges(cx, on_b, &best, &mut promising);
+        self.edge_pairs(cx, &promising, &mut best);
+        SeparatingAxis {
             normal: get3(cx, &best.axis),
             distance: -cx.get(&best.depth),
         }
     }
 }
 
-impl<C: Cx> LeastDepth<'_, '_, C> {
+impl<C: Cx> MinkowskiFaces<'_, C> {
     /// The faces of both hulls.
     #[inline(always)]
-    fn faces(&self, cx: &mut C, on_a: Vec3<C::F>, on_b: Vec3<C::F>, best: &mut Best<C>) {
-        let (first, second) = (self.first, self.second);
+    fn faces(&self, cx: &mut C, on_a: Vec3<C::F>, on_b: Vec3<C::F>, best: &mut BestAxis<C>) {
+        let (first, second) = (&self.first, &self.second);
         let faces = second.tables.faces;
-        let (start, end) = first.own.span(cx, 1);
+        let (start, end) = first.own.span(cx, Part::Faces);
         span!(cx, face in start, end, {
             let n = first.axes * Vec3(cx.constants(faces, face, 0));
             let height = cx.constant(faces, face, 3) + n.dot(first.center);
             let bound = height - n.dot(on_b);
             when!(cx, bound.lt(cx.get(&best.depth)), {
-                let depth = second.reach(cx, negated(n)) + height;
+                let depth = second.reach(cx, -n) + height;
                 best.offer(cx, depth, n);
             });
         });
-        let (start, end) = second.span(cx, 1);
+        let (start, end) = second.span(cx, Part::Faces);
         span!(cx, face in start, end, {
-            let n = negated(Vec3(cx.constants(faces, face, 0)));
+            let n = -Vec3(cx.constants(faces, face, 0));
             let height = cx.constant(faces, face, 3);
             let bound = height + n.dot(on_a);
             when!(cx, bound.lt(cx.get(&best.depth)), {
@@ -99,24 +106,30 @@ impl<C: Cx> LeastDepth<'_, '_, C> {
 
     /// Lists the edges of the first hull that may be less deep than the best axis.
     #[inline(always)]
-    fn choose(&self, cx: &mut C, on_b: Vec3<C::F>, best: &Best<C>, promising: &mut C::List) {
-        let (first, second) = (self.first, self.second);
-        let edges = second.tables.edges;
-        let (start, end) = first.own.span(cx, 2);
+    fn list_edges(
+        &self,
+        cx: &mut C,
+        on_b: Vec3<C::F>,
+        best: &BestAxis<C>,
+        promising: &mut C::List,
+    ) {
+        let (first, second) = (&self.first, &self.second);
+        let table = second.tables.edges;
+        let (start, end) = first.own.span(cx, Part::Edges);
         span!(cx, edge in start, end, {
-            let n1 = first.axes * Vec3(cx.constants(edges, edge, 6));
-            let n2 = first.axes * Vec3(cx.constants(edges, edge, 9));
-            let point = cx.constants(edges, edge, 0);
+            let n1 = first.axes * Vec3(cx.constants(table, edge, 6));
+            let n2 = first.axes * Vec3(cx.constants(table, edge, 9));
+            let point = cx.constants(table, edge, 0);
             let point = first.axes.mul_add(Vec3(point), first.center);
             let way = point - on_b;
             let bound = way.dot(n1).min(way.dot(n2));
             when!(cx, bound.lt(cx.get(&best.depth)), {
-                let vertex = second.farthest(cx, negated(n1 + n2));
+                let vertex = second.farthest(cx, -(n1 + n2));
                 let way = point - vertex;
                 let bound = way.dot(n1).min(way.dot(n2));
                 push!(cx, *promising, bound.lt(cx.get(&best.depth)), row, {
                     let number = cx.number(edge);
-                    cx.init(self.promising, row, 0, number);
+                    cx.init(self.edges, row, 0, number);
                 });
             });
         });
@@ -124,23 +137,23 @@ impl<C: Cx> LeastDepth<'_, '_, C> {
 
     /// The edges of the list with those of the second hull.
     #[inline(always)]
-    fn cross(&self, cx: &mut C, promising: &C::List, best: &mut Best<C>) {
+    fn edge_pairs(&self, cx: &mut C, promising: &C::List, best: &mut BestAxis<C>) {
         let c = C::F::c;
-        let (first, second) = (self.first, self.second);
-        let edges = second.tables.edges;
+        let (first, second) = (&self.first, &self.second);
+        let table = second.tables.edges;
         each!(cx, row in *promising, {
-            let edge = cx.load(self.promising, row, 0);
-            let point = pick3(cx, edges, edge, 0);
+            let edge = cx.load(self.edges, row, 0);
+            let point = pick3(cx, table, edge, 0);
             let point = first.axes.mul_add(point, first.center);
-            let d = first.axes * pick3(cx, edges, edge, 3);
-            let n1 = first.axes * pick3(cx, edges, edge, 6);
-            let n2 = first.axes * pick3(cx, edges, edge, 9);
+            let d = first.axes * pick3(cx, table, edge, 3);
+            let n1 = first.axes * pick3(cx, table, edge, 6);
+            let n2 = first.axes * pick3(cx, table, edge, 9);
             let outward = n1 + n2;
-            let (start, end) = second.span(cx, 2);
+            let (start, end) = second.span(cx, Part::Edges);
             span!(cx, other in start, end, {
-                let q = Vec3(cx.constants(edges, other, 3));
-                let n3 = Vec3(cx.constants(edges, other, 6));
-                let n4 = Vec3(cx.constants(edges, other, 9));
+                let q = Vec3(cx.constants(table, other, 3));
+                let n3 = Vec3(cx.constants(table, other, 6));
+                let n4 = Vec3(cx.constants(table, other, 9));
                 // d is across n₁ and n₂, q across n₃ and n₄: each arc crosses the other's plane, on the same side
                 let crosses = (d.dot(n3) * d.dot(n4)).lt(c(0.0)) & (q.dot(n1) * q.dot(n2)).lt(c(0.0));
                 when!(cx, crosses, {
@@ -149,8 +162,8 @@ impl<C: Cx> LeastDepth<'_, '_, C> {
                     let side = axis.dot(outward);
                     let same = (side * axis.dot(n3 + n4)).lt(c(0.0));
                     let unit = c(1.0).div(square.max(c(1e-8)).sqrt());
-                    let axis = axis * signed(unit, side);
-                    let point_b = cx.constants(edges, other, 0);
+                    let axis = axis * with_sign(unit, side);
+                    let point_b = cx.constants(table, other, 0);
                     let depth = axis.dot(point - Vec3(point_b));
                     // of nearly parallel edges the normal is a face's
                     let is = same & c(1e-8).lt(square);

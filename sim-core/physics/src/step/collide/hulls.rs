@@ -1,53 +1,96 @@
-//! Convex hulls against planes, spheres, capsules, boxes and each other.
+//! A plane, sphere, capsule, box, cylinder or hull against a hull.
 //!
-//! All is found in the hull's frame; of two hulls, in the second's. Planes: the hull's lowest vertices. Spheres, capsules
-//! and boxes: the best of all separating axes, which is exact in penetration, and GJK from there where they are apart. A
-//! sphere is a point, a capsule a segment, with a radius about it. Two hulls: GJK at a stand-off, and where they penetrate
-//! more deeply, the nearest face of their Minkowski difference.
+//! - Plane: the hull's lowest vertices.
+//! - Sphere, capsule, box: all separating axes, which are exact in penetration, and GJK from the best of them otherwise.
+//! - Cylinder: GJK at a stand-off from the best axis of the hull.
+//! - Hull: GJK at a stand-off, and in deep penetration the nearest face of the Minkowski difference.
 
-use super::choose::select;
-use super::gjk::{NoRestart, closest};
+use super::convex::{ConvexPair, add_convex_contacts, separation_by_axes};
+use super::features::{HullFace, aligned};
+use super::hull::{Hull, Part, PosedHull, vertex_row};
 use super::hull_axes::{
-    Best, BoxReach, PointReach, Reach, SegmentReach, bounding_axis, hull_axis, slack,
+    BoxReach, HullAxes, Reach, SeparatingAxis, axis_tolerance, bounding_box_axis,
 };
-use super::hull_depth::LeastDepth;
-use super::manifold::{Near, add_points, aligned};
-use super::points::{Placed, Points};
-use super::sides::{BoxSide, HullSide, SegmentSide};
-use super::spread::Spread;
-use super::support::{
-    Block, Point, Polyhedron, Segment, Support, Turned, across, four, get3, negated, pick3, set3,
-    var3,
-};
-use crate::constants::clip::Cut;
-use crate::constants::hull::HullTables;
-use crate::lane::{Cx, Num};
+use super::hull_depth::MinkowskiFaces;
+use super::manifold::{FeaturePair, Separation};
+use super::narrow::{ShapePair, ShapePose};
+use super::points::Points;
+use super::posed::{FacetedShape, PosedBox, PosedCapsule, PosedCylinder, PosedSphere};
+use super::reduction::ReductionScore;
+use super::restart::DirectionSamples;
+use super::select::{perpendicular, select};
+use super::variables::{get3, set3, var3};
+use crate::lane::{Cx, Num, Table};
 use crate::math::vec3::{Mat3, Vec3};
 use crate::{span, when};
 
-/// A plane and a hull: the deepest vertex below the margin and three others that span most.
+/// Depth past which the nearest axis of two hulls may not be that of least depth, relative to the smaller radius.
+const DEEP: f64 = 0.01;
+/// Vertices whose heights differ by less than this part of the hull's radius count as equally deep.
+const SAME_DEPTH: f64 = 2e-6;
+/// Vertices nearer to those chosen than this part of the hull's radius do not widen a contact.
+const SPREAD: f64 = 1e-3;
+
+/// Plane and hull: the deepest vertex below the margin, and three others that span most.
 #[inline(always)]
-pub fn plane_hull<C: Cx>(
-    cx: &mut C,
-    axes_a: &Mat3<C::F>,
-    b: &Placed<C::F>,
-    hull: C::I,
-    tables: &HullTables,
-    margin: C::F,
-    out: &mut Points<C>,
-) {
-    let c = C::F::c;
-    let hull = Polyhedron { tables, hull };
-    let n = b.axes.transpose_mul(axes_a[2]);
-    let height = axes_a[2].dot(b.center);
+pub fn plane_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+    let (hull, b, normal) = (pair.hull_b(), pair.pose_b, pair.axes_a[2]);
+    let n = b.axes.transpose_mul(normal);
+    let height = normal.dot(b.center);
     let half = hull.half_extents(cx);
     let reach = BoxReach(half).reach(n);
-    when!(cx, (height - reach).lt(margin), {
+    when!(cx, (height - reach).lt(pair.margin), {
         let size = hull.radius(cx);
-        let u = across(n);
+        let u = perpendicular(n);
         let view = Mat3([u, n.cross(u), n]);
-        let (first, end) = hull.span(cx, 0);
-        let mut spot = [
+        let vertices = Vertices {
+            view,
+            height,
+            size,
+            span: hull.span(cx, Part::Vertices),
+        };
+        let (spots, found) = vertices.choose(cx, pair, &hull);
+        for k in 0..4 {
+            let x = get3(cx, &spots[k]);
+            let distance = x[2] + height;
+            // half-way between vertex and plane
+            let on_hull = view[0].scale_add(
+                x[0],
+                view[1].scale_add(x[1], n * (x[2] - C::F::c(0.5) * distance)),
+            );
+            let is = C::F::c(0.5).lt(cx.get(&found[k]));
+            let point = b.axes.mul_add(on_hull, b.center);
+            out.add(cx, is, point, distance, normal);
+        }
+    });
+}
+
+/// Vertices of a hull as seen along the normal of a plane.
+struct Vertices<F, I> {
+    /// Two directions across the normal, and the normal.
+    view: Mat3<F>,
+    /// Height of the hull's centre above the plane [m].
+    height: F,
+    /// Radius of the hull [m].
+    size: F,
+    /// Rows of the vertices.
+    span: (I, I),
+}
+
+/// Variables of four points and of whether there is one.
+type FourPoints<V> = ([[V; 3]; 4], [V; 4]);
+
+impl<F: Num, I: Copy> Vertices<F, I> {
+    /// Chooses four vertices.
+    #[inline(always)]
+    fn choose<C: Cx<F = F, I = I>>(
+        &self,
+        cx: &mut C,
+        pair: &ShapePair<'_, C>,
+        hull: &Hull<'_, C>,
+    ) -> FourPoints<C::V> {
+        let c = F::c;
+        let mut spots = [
             var3(cx, Vec3::zero()),
             var3(cx, Vec3::zero()),
             var3(cx, Vec3::zero()),
@@ -59,371 +102,294 @@ pub fn plane_hull<C: Cx>(
             cx.var(c(0.0)),
             cx.var(c(0.0)),
         ];
-        // of vertices as deep up to rounding the first stays, so that a resting hull keeps its points
+        let deepest = self.deepest(cx, hull);
+        set3(cx, &mut spots[0], deepest);
+        cx.set(
+            &mut found[0],
+            F::select((deepest[2] + self.height).lt(pair.margin), c(1.0), c(0.0)),
+        );
+        for count in 0..3 {
+            let chosen: [Vec3<F>; 3] = [
+                get3(cx, &spots[0]),
+                get3(cx, &spots[1]),
+                get3(cx, &spots[2]),
+            ];
+            let (x, is) = self.farthest(cx, pair, hull, count, chosen);
+            set3(cx, &mut spots[count + 1], x);
+            cx.set(&mut found[count + 1], is);
+        }
+        (spots, found)
+    }
+
+    /// The deepest vertex; of those that are equally deep the first, so that a resting hull keeps its points.
+    #[inline(always)]
+    fn deepest<C: Cx<F = F, I = I>>(&self, cx: &mut C, hull: &Hull<'_, C>) -> Vec3<F> {
+        let c = F::c;
+        let (first, end) = self.span;
         let mut lowest = var3(cx, Vec3([c(0.0), c(0.0), c(1e18)]));
         span!(cx, row in first, end, {
-            for point in four(cx, tables, row) {
-                let x = view.transpose_mul(point);
+            for point in vertex_row(cx, hull.tables, row) {
+                let x = self.view.transpose_mul(point);
                 let old = get3(cx, &lowest);
-                let deeper = (x[2] + c(2e-6) * size).lt(old[2]);
+                let deeper = (x[2] + c(SAME_DEPTH) * self.size).lt(old[2]);
                 set3(cx, &mut lowest, select(deeper, x, old));
             }
         });
-        let deepest = get3(cx, &lowest);
-        set3(cx, &mut spot[0], deepest);
-        cx.set(
-            &mut found[0],
-            C::F::select((deepest[2] + height).lt(margin), c(1.0), c(0.0)),
-        );
-        for stage in 0..3 {
-            let chosen: [Vec3<C::F>; 3] =
-                [get3(cx, &spot[0]), get3(cx, &spot[1]), get3(cx, &spot[2])];
-            let spread = Spread::of(stage, chosen);
-            let mut best = cx.var(spread.threshold(c(1e-3) * size));
-            let mut place = var3(cx, chosen[0]);
-            let mut is = cx.var(c(0.0));
-            span!(cx, row in first, end, {
-                for point in four(cx, tables, row) {
-                    let x = view.transpose_mul(point);
-                    let score = spread.score(x[0], x[1]);
-                    let (old, kept, had) = (cx.get(&best), get3(cx, &place), cx.get(&is));
-                    let farther = old.lt(score) & (x[2] + height).lt(margin);
-                    cx.set(&mut best, C::F::select(farther, score, old));
-                    set3(cx, &mut place, select(farther, x, kept));
-                    cx.set(&mut is, C::F::select(farther, c(1.0), had));
-                }
-            });
-            let (x, is) = (get3(cx, &place), cx.get(&is));
-            set3(cx, &mut spot[stage + 1], x);
-            cx.set(&mut found[stage + 1], is);
-        }
-        for k in 0..4 {
-            let x = get3(cx, &spot[k]);
-            let distance = x[2] + height;
-            let on_hull = view[0].scale_add(
-                x[0],
-                view[1].scale_add(x[1], n * (x[2] - c(0.5) * distance)),
-            );
-            let is = c(0.5).lt(cx.get(&found[k]));
-            out.add(
-                cx,
-                is,
-                b.axes.mul_add(on_hull, b.center),
-                distance,
-                axes_a[2],
-            );
-        }
-    });
+        get3(cx, &lowest)
+    }
+
+    /// The vertex below the margin that adds most to the `count` + 1 chosen, and 1 if there is one, else 0.
+    #[inline(always)]
+    fn farthest<C: Cx<F = F, I = I>>(
+        &self,
+        cx: &mut C,
+        pair: &ShapePair<'_, C>,
+        hull: &Hull<'_, C>,
+        count: usize,
+        chosen: [Vec3<F>; 3],
+    ) -> (Vec3<F>, F) {
+        let c = F::c;
+        let (first, end) = self.span;
+        let score = ReductionScore::of(count, chosen);
+        let mut best = cx.var(score.threshold(c(SPREAD) * self.size));
+        let mut place = var3(cx, chosen[0]);
+        let mut is = cx.var(c(0.0));
+        span!(cx, row in first, end, {
+            for point in vertex_row(cx, hull.tables, row) {
+                let x = self.view.transpose_mul(point);
+                let here = score.at(x[0], x[1]);
+                let (old, kept, had) = (cx.get(&best), get3(cx, &place), cx.get(&is));
+                let farther = old.lt(here) & (x[2] + self.height).lt(pair.margin);
+                cx.set(&mut best, F::select(farther, here, old));
+                set3(cx, &mut place, select(farther, x, kept));
+                cx.set(&mut is, F::select(farther, c(1.0), had));
+            }
+        });
+        (get3(cx, &place), cx.get(&is))
+    }
 }
 
-/// A sphere and a hull: one point.
+/// Sphere and hull: one point.
 #[inline(always)]
-pub fn sphere_hull<C: Cx>(
-    cx: &mut C,
-    radius: C::F,
-    b: &Placed<C::F>,
-    hull: C::I,
-    tables: &HullTables,
-    margin: C::F,
-    out: &mut Points<C>,
-) {
-    let c = C::F::c;
-    let hull = Polyhedron { tables, hull };
-    let (zero, one) = (c(0.0), c(1.0));
-    let upright = Mat3([
-        Vec3([one, zero, zero]),
-        Vec3([zero, one, zero]),
-        Vec3([zero, zero, one]),
-    ]);
-    let center = negated(b.axes.transpose_mul(b.center));
-    let near = near_hull(
-        cx,
-        &hull,
-        &upright,
-        center,
-        &PointReach,
-        &Point(center),
-        radius,
-        radius,
-        margin,
-    );
+pub fn sphere_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+    let (hull, b) = (pair.hull_b(), pair.pose_b);
+    let near = separation_by_axes(cx, &hull, &PosedSphere::of(pair), pair.margin);
     let point = b.axes.mul_add(near.point, b.center);
     let normal = b.axes * near.normal;
-    out.add(cx, near.distance.lt(margin), point, near.distance, normal);
+    let touches = near.distance.lt(pair.margin);
+    out.add(cx, touches, point, near.distance, normal);
 }
 
-/// A capsule along z and a hull: two points where it lies on a face, or one.
+/// Capsule and hull: two points where it lies on a face, or one.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
-pub fn capsule_hull<C: Cx>(
-    cx: &mut C,
-    axes_a: &Mat3<C::F>,
-    radius: C::F,
-    half_height: C::F,
-    b: &Placed<C::F>,
-    hull: C::I,
-    tables: &HullTables,
-    margin: C::F,
-    cut: Cut,
-    out: &mut Points<C>,
-) {
-    let hull = Polyhedron { tables, hull };
-    let (axes, center) = in_frame_of(b, axes_a);
-    let half = axes[2] * half_height;
-    let other = SegmentReach(half_height);
-    let segment = Segment { center, half };
-    let size = radius + half_height;
-    let near = near_hull(
-        cx, &hull, &axes, center, &other, &segment, radius, size, margin,
-    );
-    when!(cx, near.distance.lt(margin), {
-        let face = HullSide::find(cx, &hull, None, negated(near.normal));
-        let side = SegmentSide::new(near.normal.scale_add(radius, center), half, near.normal);
-        let flat = aligned(face.outward, near.normal);
-        let size = size.min(hull.radius(cx));
-        add_points(
-            cx,
-            &near,
-            flat,
-            &side,
-            &face,
-            C::F::c(1.0),
-            size,
-            margin,
-            &b.axes,
-            b.center,
-            cut,
-            out,
-        );
-    });
-}
-
-/// A box and a hull: up to four points.
-#[inline(always)]
-#[allow(clippy::too_many_arguments)]
-pub fn box_hull<C: Cx>(
-    cx: &mut C,
-    axes_a: &Mat3<C::F>,
-    half_a: Vec3<C::F>,
-    b: &Placed<C::F>,
-    hull: C::I,
-    tables: &HullTables,
-    margin: C::F,
-    cut: Cut,
-    out: &mut Points<C>,
-) {
-    let hull = Polyhedron { tables, hull };
-    let (axes, center) = in_frame_of(b, axes_a);
-    let half = [
-        axes[0] * half_a[0],
-        axes[1] * half_a[1],
-        axes[2] * half_a[2],
-    ];
-    let block = Block {
-        center,
-        half: Mat3(half),
+pub fn capsule_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+    let shapes = AgainstHull {
+        first: PosedCapsule::of(pair),
+        hull: pair.hull_b(),
     };
-    let size = half_a.dot(half_a).sqrt();
-    let zero = C::F::c(0.0);
-    let near = near_hull(
-        cx,
-        &hull,
-        &axes,
-        center,
-        &BoxReach(half_a),
-        &block,
-        zero,
-        size,
-        margin,
-    );
-    when!(cx, near.distance.lt(margin), {
-        let face = HullSide::find(cx, &hull, None, negated(near.normal));
-        let side = BoxSide::find(&axes, half_a, center, near.normal);
-        let flat = aligned(face.outward, near.normal) | aligned(side.outward, near.normal);
-        let size = size.min(hull.radius(cx));
-        add_points(
-            cx,
-            &near,
-            flat,
-            &side,
-            &face,
-            C::F::c(1.0),
-            size,
-            margin,
-            &b.axes,
-            b.center,
-            cut,
-            out,
-        );
-    });
+    add_convex_contacts(cx, pair, &shapes, out);
+}
+
+/// Box and hull: up to four points.
+#[inline(always)]
+pub fn box_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+    let shapes = AgainstHull {
+        first: PosedBox::of(pair),
+        hull: pair.hull_b(),
+    };
+    add_convex_contacts(cx, pair, &shapes, out);
+}
+
+/// Cylinder and hull: four points where a cap lies on a face, two where the side does, or one.
+#[inline(always)]
+pub fn cylinder_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+    let shapes = AgainstHull {
+        first: PosedCylinder::of(pair),
+        hull: pair.hull_b(),
+    };
+    add_convex_contacts(cx, pair, &shapes, out);
 }
 
 /// Two hulls: up to four points.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
-pub fn hull_hull<C: Cx>(
-    cx: &mut C,
-    axes_a: &Mat3<C::F>,
-    hull_a: C::I,
-    b: &Placed<C::F>,
-    hull_b: C::I,
-    tables: &HullTables,
-    margin: C::F,
-    cut: Cut,
-    out: &mut Points<C>,
-) {
-    let (axes, center) = in_frame_of(b, axes_a);
-    let second = Polyhedron {
-        tables,
-        hull: hull_b,
+pub fn hull_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+    let pose = pair.pose_a_in_b();
+    let (second, own) = (pair.hull_b(), pair.hull_a());
+    let shapes = TwoHulls {
+        pose,
+        own,
+        second,
+        half_extents: [own.half_extents(cx), second.half_extents(cx)],
+        radii: [own.radius(cx), second.radius(cx)],
+        edges: pair.clip_tables.edges,
     };
-    let own = Polyhedron {
-        tables,
-        hull: hull_a,
-    };
-    let (half_a, half_b) = (own.half_extents(cx), second.half_extents(cx));
-    let (radius_a, radius_b) = (own.radius(cx), second.radius(cx));
-    let first = Turned { own, axes, center };
-    let outer = bounding_axis(half_b, &axes, center, &BoxReach(half_a));
-    when!(cx, outer.distance.lt(margin), {
-        let small = radius_a.min(radius_b);
-        let depth = LeastDepth {
-            first: &first,
-            second: &second,
-            depth: small * C::F::c(DEEP),
-            promising: cut.edges,
+    add_convex_contacts(cx, pair, &shapes, out);
+}
+
+/// A shape in the frame of a hull.
+struct AgainstHull<'a, C: Cx, A> {
+    first: A,
+    hull: Hull<'a, C>,
+}
+
+impl<'a, C: Cx, A: FacetedShape<C>> ConvexPair<C> for AgainstHull<'a, C, A> {
+    const AXES_ARE_EXACT: bool = A::AXES_ARE_EXACT;
+    const HAS_BETTER_AXIS: bool = true;
+    type First = A::Core;
+    type Second = Hull<'a, C>;
+    type Restart = DirectionSamples<C::F, A::Reach, Hull<'a, C>>;
+    type Clipped = A::Feature;
+    type Clipping = HullFace<'a, C::F>;
+
+    #[inline(always)]
+    fn radius(&self) -> Option<C::F> {
+        self.first.radius()
+    }
+    #[inline(always)]
+    fn rejecting_axis(&self, cx: &mut C) -> SeparatingAxis<C::F> {
+        let half = self.hull.half_extents(cx);
+        bounding_box_axis(half, self.first.pose(), &self.first.reach())
+    }
+    #[inline(always)]
+    fn better_axis(&self, cx: &mut C, limit: C::F) -> SeparatingAxis<C::F> {
+        let (pose, reach) = (self.first.pose(), self.first.reach());
+        let axes = HullAxes {
+            hull: &self.hull,
+            axes: &pose.axes,
+            center: pose.center,
+            other: &reach,
+            limit,
+            tolerance: axis_tolerance(self.cores_size(cx)),
         };
-        let found = closest(
-            cx,
-            &first,
-            &second,
-            outer.normal,
-            radius_a + radius_b,
-            margin,
-            &depth,
-        );
-        let near = found.near();
-        when!(cx, near.distance.lt(margin), {
-            let side = HullSide::find(cx, &first.own, Some((axes, center)), near.normal);
-            let face = HullSide::find(cx, &second, None, negated(near.normal));
-            let flat = aligned(face.outward, near.normal) | aligned(side.outward, near.normal);
-            add_points(
-                cx,
-                &near,
-                flat,
-                &side,
-                &face,
-                C::F::c(1.0),
-                small,
-                margin,
-                &b.axes,
-                b.center,
-                cut,
-                out,
-            );
-        });
-    });
-}
-
-/// Depth past which the nearest axis may not be that of least depth, relative to the smaller radius.
-const DEEP: f64 = 0.01;
-
-/// The axes and the centre of the first shape, which is at the origin, in the frame of the second.
-#[inline(always)]
-pub(super) fn in_frame_of<F: Num>(b: &Placed<F>, axes_a: &Mat3<F>) -> (Mat3<F>, Vec3<F>) {
-    let axes = [
-        b.axes.transpose_mul(axes_a[0]),
-        b.axes.transpose_mul(axes_a[1]),
-        b.axes.transpose_mul(axes_a[2]),
-    ];
-    (Mat3(axes), negated(b.axes.transpose_mul(b.center)))
-}
-
-/// Where a shape, with `radius` around what `other` and `shape` say of it, is nearest to a hull; 1e18 m away where they
-/// are found to be farther apart than the margin. `size` is its radius about its centre.
-#[inline(always)]
-#[allow(clippy::too_many_arguments)]
-fn near_hull<C: Cx, R: Reach<C::F>>(
-    cx: &mut C,
-    hull: &Polyhedron<C>,
-    axes: &Mat3<C::F>,
-    center: Vec3<C::F>,
-    other: &R,
-    shape: &impl Support<C>,
-    radius: C::F,
-    size: C::F,
-    margin: C::F,
-) -> Near<C::F> {
-    let c = C::F::c;
-    let limit = margin + radius;
-    let mut distance = cx.var(c(1e18));
-    let mut normal = var3(cx, Vec3::zero());
-    let mut point = var3(cx, Vec3::zero());
-    let half = hull.half_extents(cx);
-    let outer = bounding_axis(half, axes, center, other);
-    when!(cx, outer.distance.lt(limit), {
-        let size = size + hull.radius(cx);
-        let best = hull_axis(cx, hull, axes, center, other, limit, slack(size));
-        let apart = c(0.0).lt(best.axis.distance) & best.axis.distance.lt(limit);
-        let inside = !c(0.0).lt(best.axis.distance);
-        when!(cx, apart, {
-            let found = closest(cx, shape, hull, best.axis.normal, size, limit, &NoRestart);
-            set3(cx, &mut normal, found.axis.normal);
-            set3(cx, &mut point, found.point);
-            cx.set(&mut distance, found.axis.distance);
-        });
-        when!(cx, inside, {
-            let x = deepest_point(cx, hull, axes, shape, &best);
-            set3(cx, &mut normal, best.axis.normal);
-            set3(cx, &mut point, x);
-            cx.set(&mut distance, best.axis.distance);
-        });
-    });
-    let normal = get3(cx, &normal);
-    Near {
-        normal,
-        distance: cx.get(&distance) - radius,
-        point: normal.scale_add(c(0.5) * radius, get3(cx, &point)),
+        axes.best(cx).axis
+    }
+    #[inline(always)]
+    fn separation(&self, cx: &mut C, margin: C::F) -> Separation<C::F> {
+        separation_by_axes(cx, &self.hull, &self.first, margin)
+    }
+    #[inline(always)]
+    fn cores(&self) -> (A::Core, Hull<'a, C>) {
+        (self.first.core(), self.hull)
+    }
+    #[inline(always)]
+    fn cores_size(&self, cx: &mut C) -> C::F {
+        self.first.size() + self.hull.radius(cx)
+    }
+    #[inline(always)]
+    fn restart(&self) -> Self::Restart {
+        DirectionSamples {
+            axes: self.first.pose().axes,
+            center: self.first.pose().center,
+            a: self.first.reach(),
+            b: self.hull,
+            depth: self.first.restart_depth(),
+        }
+    }
+    #[inline(always)]
+    fn features(
+        &self,
+        cx: &mut C,
+        normal: Vec3<C::F>,
+    ) -> FeaturePair<C::F, A::Feature, HullFace<'a, C::F>> {
+        let feature = self.first.feature(normal);
+        let face = HullFace::find(cx, &self.hull, None, -normal);
+        let face_is_flat = aligned(face.outward, normal);
+        FeaturePair {
+            flat: match A::lies_flat(&feature, normal) {
+                Some(flat) => flat | face_is_flat,
+                None => face_is_flat,
+            },
+            clipped: feature,
+            clipping: face,
+            side: C::F::c(1.0),
+        }
+    }
+    #[inline(always)]
+    fn smaller_size(&self, cx: &mut C) -> C::F {
+        self.first.size().min(self.hull.radius(cx))
     }
 }
 
-/// The middle of the closest points along the axis of least depth.
-#[inline(always)]
-fn deepest_point<C: Cx>(
-    cx: &mut C,
-    hull: &Polyhedron<C>,
-    axes: &Mat3<C::F>,
-    shape: &impl Support<C>,
-    best: &Best<C::F>,
-) -> Vec3<C::F> {
-    let c = C::F::c;
-    let n = best.axis.normal;
-    let half = n * (c(0.5) * best.axis.distance);
-    let corner = shape.farthest(cx, n);
-    let middle = [
-        corner[0] + half[0],
-        corner[1] + half[1],
-        corner[2] + half[2],
-    ];
-    let mut point = var3(cx, Vec3(middle));
-    when!(cx, best.of_other(), {
-        let vertex = hull.farthest(cx, negated(n));
-        set3(cx, &mut point, vertex - half);
-    });
-    when!(cx, best.of_edges(), {
-        // the hull's edge x = p + s d and the other's x = r + t q, where n is across both: (p - r + s d - t q) ∥ n
-        let edges = hull.tables.edges;
-        let (p, d) = (
-            pick3(cx, edges, best.edge, 0),
-            pick3(cx, edges, best.edge, 3),
-        );
-        let (first, second) = (best.along.lt(c(0.5)), best.along.lt(c(1.5)));
-        let q = select(first, axes[0], select(second, axes[1], axes[2]));
-        let mixed = d.dot(q);
-        let square = mixed.fnma(mixed, c(1.0)).max(c(1e-7));
-        let way = corner - p;
-        let s = mixed.fnma(way.dot(q), way.dot(d)).div(square);
-        set3(cx, &mut point, d.scale_add(s, p) - half);
-    });
-    get3(cx, &point)
+/// Two hulls in the frame of the second.
+struct TwoHulls<'a, C: Cx> {
+    /// Pose of the first.
+    pose: ShapePose<C::F>,
+    own: Hull<'a, C>,
+    second: Hull<'a, C>,
+    /// Half extents of their bounding boxes, and their radii [m].
+    half_extents: [Vec3<C::F>; 2],
+    radii: [C::F; 2],
+    /// Scratch rows for edges.
+    edges: Table,
+}
+
+impl<'a, C: Cx> TwoHulls<'a, C> {
+    #[inline(always)]
+    fn first(&self) -> PosedHull<'a, C> {
+        PosedHull {
+            own: self.own,
+            axes: self.pose.axes,
+            center: self.pose.center,
+        }
+    }
+
+    /// Radius of the smaller hull [m].
+    #[inline(always)]
+    fn smaller(&self) -> C::F {
+        self.radii[0].min(self.radii[1])
+    }
+}
+
+impl<'a, C: Cx> ConvexPair<C> for TwoHulls<'a, C> {
+    type First = PosedHull<'a, C>;
+    type Second = Hull<'a, C>;
+    type Restart = MinkowskiFaces<'a, C>;
+    type Clipped = HullFace<'a, C::F>;
+    type Clipping = HullFace<'a, C::F>;
+
+    #[inline(always)]
+    fn radius(&self) -> Option<C::F> {
+        None
+    }
+    #[inline(always)]
+    fn rejecting_axis(&self, _: &mut C) -> SeparatingAxis<C::F> {
+        let [half_a, half_b] = self.half_extents;
+        bounding_box_axis(half_b, &self.pose, &BoxReach(half_a))
+    }
+    #[inline(always)]
+    fn cores(&self) -> (PosedHull<'a, C>, Hull<'a, C>) {
+        (self.first(), self.second)
+    }
+    #[inline(always)]
+    fn cores_size(&self, _: &mut C) -> C::F {
+        self.radii[0] + self.radii[1]
+    }
+    #[inline(always)]
+    fn restart(&self) -> MinkowskiFaces<'a, C> {
+        MinkowskiFaces {
+            first: self.first(),
+            second: self.second,
+            depth: self.smaller() * C::F::c(DEEP),
+            edges: self.edges,
+        }
+    }
+    #[inline(always)]
+    fn features(
+        &self,
+        cx: &mut C,
+        normal: Vec3<C::F>,
+    ) -> FeaturePair<C::F, HullFace<'a, C::F>, HullFace<'a, C::F>> {
+        let first = HullFace::find(cx, &self.own, Some(self.pose), normal);
+        let second = HullFace::find(cx, &self.second, None, -normal);
+        FeaturePair {
+            flat: aligned(second.outward, normal) | aligned(first.outward, normal),
+            clipped: first,
+            clipping: second,
+            side: C::F::c(1.0),
+        }
+    }
+    #[inline(always)]
+    fn smaller_size(&self, _: &mut C) -> C::F {
+        self.smaller()
+    }
 }

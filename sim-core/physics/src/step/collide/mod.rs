@@ -1,27 +1,40 @@
 //! Collision detection: which pairs of shapes are near each other, and where they touch.
 //!
-//! Every pair of the model's table is looked at: spheres around the shapes first, then, of those that pass, the shapes
-//! themselves. A shape's position is kept relative to the reference point of its tree, that of a pair relative to its
-//! first shape, so that `f32` keeps its digits far from the origin.
+//! The broad phase tests bounding spheres, then bounding boxes, of every pair of the model's table. The narrow phase has one
+//! stage for each pair of kinds ([`narrow`]). Positions of shapes are relative to the reference point of their tree, and
+//! those of a pair are relative to its first shape, so that `f32` keeps its digits far from the origin.
+//!
+//! | Pairs | Method | File |
+//! |---|---|---|
+//! | plane, sphere, capsule | closed form | `planes`, `spheres`, `capsules` |
+//! | box and box | separating axes, clipping | `boxes`, `box_faces` |
+//! | with a cylinder or a hull | [`convex`]: axes, GJK, clipping | `cylinders`, `hulls` |
 
-pub mod box_faces;
-pub mod boxes;
-pub mod capsules;
-pub mod choose;
-pub mod cylinders;
+mod box_faces;
+mod boxes;
+mod capsules;
+mod clip;
+mod convex;
+mod cylinders;
+mod features;
 mod gjk;
+mod hull;
 mod hull_axes;
 mod hull_depth;
-pub mod hulls;
-pub mod manifold;
+mod hulls;
+mod manifold;
 mod narrow;
-pub mod planes;
-pub mod points;
-mod samples;
-mod sides;
-pub mod spheres;
-mod spread;
+mod planes;
+mod points;
+mod posed;
+mod reduction;
+mod restart;
+mod select;
+mod simplex;
+mod spheres;
+mod start_axes;
 mod support;
+mod variables;
 
 use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::Array as A;
@@ -31,13 +44,13 @@ use crate::constants::contact::{
     COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, MU_MIN, pair,
 };
 use crate::constants::params::Param;
-use crate::lane::{Cx, Num, Real, Table};
+use crate::lane::{Cx, MaskOf, Num, Real, Table};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
 use crate::{span, when};
 pub use narrow::*;
-use points::{Placed, Points, Room};
+use points::{Points, Room};
 
-/// Where the shapes are.
+/// Poses of shapes.
 pub struct Place;
 
 impl Stage for Place {
@@ -50,13 +63,13 @@ impl Stage for Place {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        place(cx, m, b);
+        place_shapes(cx, m, b);
     }
 }
 
-/// Poses of all shapes, and the reference points that they are relative to; no contacts yet.
+/// Writes poses of all shapes and the reference points that they are relative to, and empties the lists of contacts.
 #[inline(always)]
-fn place<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
+fn place_shapes<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
     let (w, memory) = (&b.work, &m.contacts.memory);
     for count in 0..memory.counts.rows {
         let (row, zero) = (cx.at(count), C::F::c(0.0));
@@ -91,22 +104,22 @@ fn place<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
     cx.fill_all(memory.origins, world, 0, [C::F::c(0.0); 3]);
 }
 
-/// Contacts of all pairs of two kinds.
+/// Adds the contacts of all pairs of two kinds.
 #[inline(always)]
-fn touch<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>) {
+fn collide_group<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>) {
     if let Some(group) = t.group(N::KINDS) {
         let (first, end) = (cx.at(group.first), cx.at(group.end));
         span!(cx, p in first, end, {
-            pair_of::<C, N>(cx, t, p);
+            collide_pair::<C, N>(cx, t, p);
         });
     }
 }
 
-/// The contacts of a pair.
+/// Adds the contacts of a pair, if nothing shows that it has none.
 #[inline(always)]
-fn pair_of<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) {
+fn collide_pair<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) {
     let kinds = N::KINDS;
-    let (numbers, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
+    let (scalars, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
     let (poses, origins) = (t.memory.poses, t.memory.origins);
     let a = cx.index(indices, p, pair::SOLID_A, poses.rows);
     let b = cx.index(indices, p, pair::SOLID_B, poses.rows);
@@ -116,63 +129,81 @@ fn pair_of<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C
     let origin_a = load_vec3(cx, origins, origin_a, 0);
     let between = load_vec3(cx, origins, origin_b, 0) - origin_a;
     let center = (load_vec3(cx, poses, b, 9) - center_a) + between;
-    let radius = cx.constant(numbers, p, pair::RADIUS);
+    // bounding spheres
+    let radius = cx.constant(scalars, p, pair::RADIUS);
     let near = match kinds.0 {
         Kind::Plane => load_vec3(cx, poses, a, 6).dot(center).lt(radius),
         _ => center.dot(center).lt(radius * radius),
     };
     when!(cx, near, {
-        let axes = axes_of(cx, poses, a);
-        let first = Shape::read(cx, t, kinds.0, p, pair::SIZE_A, pair::HULL_A);
-        // the ball around one against the box around the other: a table's own ball is as wide as the table
+        let axes_a = axes_of(cx, poses, a);
+        let shape_a = Shape::read(cx, t, kinds.0, p, pair::SIZE_A, pair::HULL_A);
+        // sphere against bounding box: the sphere around a table is as wide as the table
         let mut near = near;
         if kinds.0 >= Kind::Box {
-            let radius = cx.constant(numbers, p, pair::RADIUS_B);
-            near = within(&axes, first.half(kinds.0), center, radius);
+            let radius = cx.constant(scalars, p, pair::RADIUS_B);
+            near = sphere_near_box(&axes_a, shape_a.bounding_box(kinds.0), center, radius);
         }
         when!(cx, near, {
-            let other = Placed {
+            let pose_b = ShapePose {
                 axes: axes_of(cx, poses, b),
                 center,
             };
-            let second = Shape::read(cx, t, kinds.1, p, pair::SIZE_B, pair::HULL_B);
-            let smaller = cx.constant(numbers, p, pair::SMALLER);
-            let margin = cx.constant(numbers, p, pair::REACH) + contact_slack(smaller);
-            let mut near = near;
-            if kinds.1 >= Kind::Box && kinds.0 != Kind::Plane {
-                let radius = cx.constant(numbers, p, pair::RADIUS_A);
-                near = within(&other.axes, second.half(kinds.1), center, radius);
-            }
-            // the boxes around both, where what comes next takes longer: boxes begin with this themselves
-            if kinds.0 >= Kind::Box && kinds.1 > Kind::Box {
-                let halves = [first.half(kinds.0), second.half(kinds.1)];
-                near = near & overlap(&axes, &other, halves, margin);
-            }
+            let shape_b = Shape::read(cx, t, kinds.1, p, pair::SIZE_B, pair::HULL_B);
+            let smaller = cx.constant(scalars, p, pair::SMALLER);
+            let shapes = ShapePair {
+                axes_a: &axes_a,
+                a: shape_a,
+                pose_b: &pose_b,
+                b: shape_b,
+                margin: cx.constant(scalars, p, pair::REACH) + contact_slack(smaller),
+                hull_tables: &t.hulls,
+                clip_tables: t.memory.cut,
+            };
+            let near = boxes_near::<C, N>(cx, t, p, &shapes, near);
             when!(cx, near, {
-                let two = Two {
-                    axes: &axes,
-                    first,
-                    other: &other,
-                    second,
-                    margin,
-                };
-                let base = (center_a, origin_a);
-                let mut points = points_of::<C>(cx, t, p, base);
-                N::contacts(cx, t, &two, &mut points);
+                let mut points = points_of::<C>(cx, t, p, center_a, origin_a);
+                N::contacts(cx, &shapes, &mut points);
             });
         });
     });
 }
 
-/// What the distances of corners of one face may differ by for rounding, of a shape with this radius [m].
+/// Whether the bounding boxes of a pair are near each other; `near` for kinds that are not tested.
+#[inline(always)]
+fn boxes_near<C: Cx, N: Narrow>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    p: C::I,
+    shapes: &ShapePair<'_, C>,
+    near: MaskOf<C>,
+) -> MaskOf<C> {
+    let (kinds, mut near, pose_b) = (N::KINDS, near, shapes.pose_b);
+    if kinds.1 >= Kind::Box && kinds.0 != Kind::Plane {
+        let radius = cx.constant(t.handles.pair_numbers, p, pair::RADIUS_A);
+        let half = shapes.b.bounding_box(kinds.1);
+        near = sphere_near_box(&pose_b.axes, half, pose_b.center, radius);
+    }
+    // box against box where the narrow phase is expensive; boxes themselves begin with this test
+    if kinds.0 >= Kind::Box && kinds.1 > Kind::Box {
+        let halves = [
+            shapes.a.bounding_box(kinds.0),
+            shapes.b.bounding_box(kinds.1),
+        ];
+        near = near & boxes_overlap(shapes.axes_a, pose_b, halves, shapes.margin);
+    }
+    near
+}
+
+/// Rounding of the distances of a face's corners, for a shape with this radius [m].
 ///
-/// Contacts begin that much early: of faces that just touch, all corners do, and not those that were rounded down.
+/// Contacts begin that much early: of a face that just touches, all corners do, not only those that were rounded down.
 #[inline(always)]
 pub(super) fn contact_slack<F: Num>(radius: F) -> F {
     radius * F::c(2.0 * <F::Real as Real>::EPSILON)
 }
 
-/// Axes of a shape.
+/// Axes of a shape, by columns.
 #[inline(always)]
 fn axes_of<C: Cx>(cx: &mut C, poses: Table, row: C::I) -> Mat3<C::F> {
     Mat3([
@@ -182,9 +213,9 @@ fn axes_of<C: Cx>(cx: &mut C, poses: Table, row: C::I) -> Mat3<C::F> {
     ])
 }
 
-/// Is a ball at `center` (from a box, or to it) within a radius of the box?
+/// Is the sphere at `center` from a box, or the box at `center` from the sphere, nearer than a radius? (Arvo 1990)
 #[inline(always)]
-fn within<F: Num>(axes: &Mat3<F>, half: Vec3<F>, center: Vec3<F>, radius: F) -> F::Mask {
+fn sphere_near_box<F: Num>(axes: &Mat3<F>, half: Vec3<F>, center: Vec3<F>, radius: F) -> F::Mask {
     let mut square = F::c(0.0);
     for (axis, half) in axes.iter().zip(*half) {
         let beyond = ((*axis).dot(center).abs() - half).max(F::c(0.0));
@@ -193,11 +224,12 @@ fn within<F: Num>(axes: &Mat3<F>, half: Vec3<F>, center: Vec3<F>, radius: F) -> 
     square.lt(radius * radius)
 }
 
-/// Does no face of either box have the other beyond it by more than `reach`? The first box's centre is 0.
+/// Do two boxes overlap along all face axes, up to `reach`? The centre of the first box is the origin. Edge axes are left
+/// out: they cost more than they reject.
 #[inline(always)]
-fn overlap<F: Num>(
+fn boxes_overlap<F: Num>(
     axes: &Mat3<F>,
-    other: &Placed<F>,
+    other: &ShapePose<F>,
     [half, other_half]: [Vec3<F>; 2],
     reach: F,
 ) -> F::Mask {
@@ -206,9 +238,9 @@ fn overlap<F: Num>(
     for (axis, half) in axes.iter().zip(*half) {
         let mut width = half;
         for j in 0..3 {
-            let turn = (*axis).dot(other.axes[j]).abs();
-            width = turn.fma(other_half[j], width);
-            widths[j] = turn.fma(half, widths[j]);
+            let cosine = (*axis).dot(other.axes[j]).abs();
+            width = cosine.fma(other_half[j], width);
+            widths[j] = cosine.fma(half, widths[j]);
         }
         gap = gap.max((*axis).dot(other.center).abs() - (width + reach));
     }
@@ -219,7 +251,7 @@ fn overlap<F: Num>(
     gap.lt(F::c(0.0))
 }
 
-/// Coefficient of friction of a pair whose shapes' vary: the larger.
+/// Coefficient of friction of a pair where those of shapes vary: the larger (MuJoCo: `mj_contactParam`).
 #[inline(always)]
 fn friction<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) -> C::F {
     let (indices, table) = (t.handles.pair_indices, t.memory.mu);
@@ -229,15 +261,16 @@ fn friction<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) -> C:
     a.max(b).max(C::F::c(MU_MIN))
 }
 
-/// Where the contacts of a pair go.
+/// The list of a pair's contacts. Its rows count from the reference point of the pair's class.
 #[inline(always)]
 fn points_of<C: Cx>(
     cx: &mut C,
     t: &Contacts<<C::F as Num>::Real>,
     p: C::I,
-    (center_a, origin_a): (Vec3<C::F>, Vec3<C::F>),
+    center_a: Vec3<C::F>,
+    origin_a: Vec3<C::F>,
 ) -> Points<C> {
-    let (numbers, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
+    let (scalars, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
     let origins = t.memory.origins;
     let origin = cx.index(indices, p, pair::ORIGIN, origins.rows);
     let origin = load_vec3(cx, origins, origin, 0);
@@ -250,12 +283,12 @@ fn points_of<C: Cx>(
         table: t.memory.rows,
         pair: cx.number(p),
         base: (center_a + (origin_a - Vec3(origin.0))),
-        flip: cx.constant(numbers, p, pair::FLIP),
+        flip: cx.constant(scalars, p, pair::FLIP),
         mu: match t.memory.mu.rows {
             0 => None,
             _ => Some(friction(cx, t, p)),
         },
-        // a pyramid is not the same along all tangents
+        // the forces of a pyramidal cone depend on the tangents' direction
         along: (t.cone == Cone::Pyramidal).then_some(Vec3([C::F::c(0.0); 3])),
         room: Room {
             counts: t.memory.counts,
@@ -264,7 +297,7 @@ fn points_of<C: Cx>(
             left_out: t.classes.len() + COUNT_LEFT_OUT,
             contacts_max: C::F::c(t.contacts_max as f64),
             rows_max: C::F::c(t.rows_max as f64),
-            of_a_contact: cx.constant(numbers, p, pair::ROWS),
+            of_a_contact: cx.constant(scalars, p, pair::ROWS),
             is_tight: t.may_overflow,
         },
     }

@@ -1,26 +1,29 @@
-//! The narrow phase: which function finds the contacts of two kinds of shapes.
+//! The narrow phase: one stage for each pair of shape kinds, and the function that finds its contacts.
 
-use super::points::{Placed, Points};
-use super::{boxes, capsules, cylinders, hulls, planes, spheres, touch};
+use super::hull::Hull;
+use super::points::Points;
+use super::{boxes, capsules, collide_group, cylinders, hulls, planes, spheres};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
+use crate::constants::clip::Cut;
 use crate::constants::contact::{Contacts, Kind};
+use crate::constants::hull::HullTables;
 use crate::lane::{Cx, Num, Real};
 use crate::math::vec3::{Mat3, Vec3};
 use crate::step::{BlockOf, ConstantsOf, Stage};
 
 type ContactsOf<C> = Contacts<<<C as Cx>::F as Num>::Real>;
 
-/// A shape of a pair by itself.
+/// Size and hull of one shape of a pair.
 pub struct Shape<C: Cx> {
-    /// As its kind has it.
+    /// See [`Kind`].
     size: Vec3<C::F>,
-    /// Its row in the table of hulls; of other kinds it is not used.
+    /// Its row in the table of hulls; not used by other kinds.
     hull: C::I,
 }
 
 impl<C: Cx> Shape<C> {
-    /// The first or second shape of a pair.
+    /// Reads the first or second shape of a pair.
     #[inline(always)]
     pub fn read(
         cx: &mut C,
@@ -30,12 +33,12 @@ impl<C: Cx> Shape<C> {
         size: usize,
         hull: usize,
     ) -> Shape<C> {
-        let (numbers, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
+        let (scalars, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
         Shape {
             size: Vec3([
-                cx.constant(numbers, p, size),
-                cx.constant(numbers, p, size + 1),
-                cx.constant(numbers, p, size + 2),
+                cx.constant(scalars, p, size),
+                cx.constant(scalars, p, size + 1),
+                cx.constant(scalars, p, size + 2),
             ]),
             hull: match kind {
                 Kind::Hull => cx.index(indices, p, hull, t.hulls.spans.rows),
@@ -43,12 +46,28 @@ impl<C: Cx> Shape<C> {
             },
         }
     }
-}
 
-impl<C: Cx> Shape<C> {
-    /// Half extents of the box around it, of kinds that are no thinner than one.
+    /// Radius of a sphere, capsule or cylinder [m].
     #[inline(always)]
-    pub fn half(&self, kind: Kind) -> Vec3<C::F> {
+    pub fn radius(&self) -> C::F {
+        self.size[0]
+    }
+
+    /// Half the length of a capsule's axis, or of a cylinder [m].
+    #[inline(always)]
+    pub fn half_height(&self) -> C::F {
+        self.size[1]
+    }
+
+    /// Half extents of a box, or of the bounding box of a hull [m].
+    #[inline(always)]
+    pub fn half_extents(&self) -> Vec3<C::F> {
+        self.size
+    }
+
+    /// Half extents of the bounding box of a box, cylinder or hull [m].
+    #[inline(always)]
+    pub fn bounding_box(&self, kind: Kind) -> Vec3<C::F> {
         let Vec3([x, y, _]) = self.size;
         match kind {
             Kind::Cylinder => Vec3([x, x, y]),
@@ -57,18 +76,73 @@ impl<C: Cx> Shape<C> {
     }
 }
 
-/// Two shapes, the second where it is relative to the first.
-pub struct Two<'a, C: Cx> {
-    /// Axes of the first.
-    pub axes: &'a Mat3<C::F>,
-    /// The first.
-    pub first: Shape<C>,
-    /// Where the second is.
-    pub other: &'a Placed<C::F>,
-    /// The second.
-    pub second: Shape<C>,
+/// Axes and centre of a shape, relative to the centre of the pair's first shape.
+#[derive(Clone, Copy)]
+pub struct ShapePose<F> {
+    /// Its axes, by columns [–].
+    pub axes: Mat3<F>,
+    /// Its centre [m].
+    pub center: Vec3<F>,
+}
+
+impl<F: Num> ShapePose<F> {
+    /// Pose in this frame of a shape at the origin with these axes.
+    #[inline(always)]
+    pub fn to_local(self, axes: &Mat3<F>) -> ShapePose<F> {
+        let axes = [
+            self.axes.transpose_mul(axes[0]),
+            self.axes.transpose_mul(axes[1]),
+            self.axes.transpose_mul(axes[2]),
+        ];
+        ShapePose {
+            axes: Mat3(axes),
+            center: -self.axes.transpose_mul(self.center),
+        }
+    }
+}
+
+/// Two shapes of which the narrow phase finds the contacts. The centre of the first, `a`, is the origin.
+pub struct ShapePair<'a, C: Cx> {
+    /// Axes of `a`, by columns [–].
+    pub axes_a: &'a Mat3<C::F>,
+    /// The first shape.
+    pub a: Shape<C>,
+    /// Pose of `b`.
+    pub pose_b: &'a ShapePose<C::F>,
+    /// The second shape.
+    pub b: Shape<C>,
     /// Distance below which contacts are found [m].
     pub margin: C::F,
+    /// Tables of the model's hulls.
+    pub hull_tables: &'a HullTables,
+    /// Scratch tables for clipping.
+    pub clip_tables: Cut,
+}
+
+impl<'a, C: Cx> ShapePair<'a, C> {
+    /// The first shape as a hull.
+    #[inline(always)]
+    pub(super) fn hull_a(&self) -> Hull<'a, C> {
+        Hull {
+            tables: self.hull_tables,
+            row: self.a.hull,
+        }
+    }
+
+    /// The second shape as a hull.
+    #[inline(always)]
+    pub(super) fn hull_b(&self) -> Hull<'a, C> {
+        Hull {
+            tables: self.hull_tables,
+            row: self.b.hull,
+        }
+    }
+
+    /// Pose of the first shape in the frame of the second.
+    #[inline(always)]
+    pub(super) fn pose_a_in_b(&self) -> ShapePose<C::F> {
+        self.pose_b.to_local(self.axes_a)
+    }
 }
 
 /// The narrow phase of two kinds of shapes, of which the lower kind is the first.
@@ -76,17 +150,16 @@ pub trait Narrow {
     /// The kinds.
     const KINDS: (Kind, Kind);
 
-    /// Adds the contacts of two shapes.
-    fn contacts<C: Cx>(cx: &mut C, t: &ContactsOf<C>, two: &Two<'_, C>, out: &mut Points<C>);
+    /// Adds the contacts of a pair.
+    fn contacts<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>);
 }
 
 /// Defines a stage for each pair of kinds.
 ///
-/// A type for each, and not an argument: the other functions then never reach the compiler's optimizer, which would take
-/// minutes to find that they are not called.
+/// Each is a type of its own, not a run-time argument: the optimizer then never sees the code of the other pairs, which it
+/// would need minutes to remove.
 macro_rules! pairs {
-    ($cx:ident, $out:ident; $x:ident $o:ident $margin:ident $r:ident $h:ident $s:ident $k:ident $a:ident $b:ident $f:ident $g:ident $tables:ident $cut:ident;
-     $($name:ident($first:ident, $second:ident): $contacts:expr;)*) => {
+    ($($name:ident($first:ident, $second:ident) = $contacts:path;)*) => {
         $(
             #[doc = concat!("Contacts of a ", stringify!($first), " and a ", stringify!($second), ".")]
             pub struct $name;
@@ -95,14 +168,8 @@ macro_rules! pairs {
                 const KINDS: (Kind, Kind) = (Kind::$first, Kind::$second);
 
                 #[inline(always)]
-                #[allow(unused_variables)]
-                fn contacts<C: Cx>($cx: &mut C, t: &ContactsOf<C>, two: &Two<'_, C>, $out: &mut Points<C>) {
-                    let ($x, $o, $margin) = (two.axes, two.other, two.margin);
-                    let (Vec3([$r, $h, _]), Vec3([$s, $k, _])) = (two.first.size, two.second.size);
-                    let ($a, $b) = (two.first.size, two.second.size);
-                    let ($f, $g) = (two.first.hull, two.second.hull);
-                    let ($tables, $cut) = (&t.hulls, t.memory.cut);
-                    $contacts
+                fn contacts<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+                    $contacts(cx, pair, out);
                 }
             }
 
@@ -116,32 +183,32 @@ macro_rules! pairs {
 
                 #[inline(always)]
                 fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, _b: &mut BlockOf<C>) {
-                    touch::<C, $name>(cx, &m.contacts);
+                    collide_group::<C, $name>(cx, &m.contacts);
                 }
             }
         )*
     };
 }
 
-pairs! { cx, out; x o margin r h s k a b f g tables cut;
-    PlaneSphere(Plane, Sphere): planes::plane_sphere(cx, x, o, s, margin, out);
-    PlaneCapsule(Plane, Capsule): planes::plane_capsule(cx, x, o, s, k, margin, out);
-    PlaneBox(Plane, Box): planes::plane_box(cx, x, o, b, margin, out);
-    PlaneCylinder(Plane, Cylinder): planes::plane_cylinder(cx, x, o, s, k, margin, out);
-    PlaneHull(Plane, Hull): hulls::plane_hull(cx, x, o, g, tables, margin, out);
-    SphereSphere(Sphere, Sphere): spheres::sphere_sphere(cx, r, o, s, margin, out);
-    SphereCapsule(Sphere, Capsule): spheres::sphere_capsule(cx, r, o, s, k, margin, out);
-    SphereBox(Sphere, Box): spheres::sphere_box(cx, r, o, b, margin, out);
-    SphereCylinder(Sphere, Cylinder): cylinders::sphere_cylinder(cx, r, o, s, k, margin, out);
-    SphereHull(Sphere, Hull): hulls::sphere_hull(cx, r, o, g, tables, margin, out);
-    CapsuleCapsule(Capsule, Capsule): capsules::capsule_capsule(cx, x, r, h, o, s, k, margin, out);
-    CapsuleBox(Capsule, Box): capsules::capsule_box(cx, x, r, h, o, b, margin, out);
-    CapsuleCylinder(Capsule, Cylinder): cylinders::capsule_cylinder(cx, x, r, h, o, s, k, margin, cut, out);
-    CapsuleHull(Capsule, Hull): hulls::capsule_hull(cx, x, r, h, o, g, tables, margin, cut, out);
-    BoxBox(Box, Box): boxes::box_box(cx, x, a, o, b, margin, out);
-    BoxCylinder(Box, Cylinder): cylinders::box_cylinder(cx, x, a, o, s, k, margin, cut, out);
-    BoxHull(Box, Hull): hulls::box_hull(cx, x, a, o, g, tables, margin, cut, out);
-    CylinderCylinder(Cylinder, Cylinder): cylinders::cylinder_cylinder(cx, x, r, h, o, s, k, margin, cut, out);
-    CylinderHull(Cylinder, Hull): cylinders::cylinder_hull(cx, x, r, h, o, g, tables, margin, cut, out);
-    HullHull(Hull, Hull): hulls::hull_hull(cx, x, f, o, g, tables, margin, cut, out);
+pairs! {
+    PlaneSphere(Plane, Sphere) = planes::plane_sphere;
+    PlaneCapsule(Plane, Capsule) = planes::plane_capsule;
+    PlaneBox(Plane, Box) = planes::plane_box;
+    PlaneCylinder(Plane, Cylinder) = planes::plane_cylinder;
+    PlaneHull(Plane, Hull) = hulls::plane_hull;
+    SphereSphere(Sphere, Sphere) = spheres::sphere_sphere;
+    SphereCapsule(Sphere, Capsule) = spheres::sphere_capsule;
+    SphereBox(Sphere, Box) = spheres::sphere_box;
+    SphereCylinder(Sphere, Cylinder) = cylinders::sphere_cylinder;
+    SphereHull(Sphere, Hull) = hulls::sphere_hull;
+    CapsuleCapsule(Capsule, Capsule) = capsules::capsule_capsule;
+    CapsuleBox(Capsule, Box) = capsules::capsule_box;
+    CapsuleCylinder(Capsule, Cylinder) = cylinders::capsule_cylinder;
+    CapsuleHull(Capsule, Hull) = hulls::capsule_hull;
+    BoxBox(Box, Box) = boxes::box_box;
+    BoxCylinder(Box, Cylinder) = cylinders::box_cylinder;
+    BoxHull(Box, Hull) = hulls::box_hull;
+    CylinderCylinder(Cylinder, Cylinder) = cylinders::cylinder_cylinder;
+    CylinderHull(Cylinder, Hull) = hulls::cylinder_hull;
+    HullHull(Hull, Hull) = hulls::hull_hull;
 }

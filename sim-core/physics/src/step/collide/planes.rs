@@ -1,78 +1,64 @@
-//! A plane against sphere, capsule, box and cylinder. The plane is z = 0 of the first shape, and its z axis the normal.
+//! A plane against sphere, capsule, box and cylinder (MuJoCo: `engine_collision_primitive.c`).
+//!
+//! The plane is z = 0 of the first shape, so the normal is its z axis. The distance of a point x of the other shape is n · x.
 
-use super::choose::{select, sign};
-use super::points::{Placed, Points};
+use super::narrow::ShapePair;
+use super::points::Points;
+use super::select::{select, sign};
 use crate::lane::{Cx, Num};
-use crate::math::vec3::{Mat3, Vec3};
+use crate::math::vec3::Vec3;
 
-/// Below this sine between axis and normal a cylinder stands: its lowest rim point is then its x axis'. Above the rounding
-/// of f32; the height of the rim is wrong by that part of the radius at most.
+/// Sine between a cylinder's axis and the normal below which it stands upright: its first rim point is then on its x axis.
+/// Above the rounding of `f32`; the height of the rim is wrong by at most that part of the radius.
 const UPRIGHT: f64 = 2e-6;
 
-/// Adds the contact of a point of a shape with the plane.
+/// Adds the contact of a point of a shape with the plane, half-way between both.
 #[inline(always)]
-fn lowest<C: Cx>(
+fn add_plane_contact<C: Cx>(
     cx: &mut C,
-    normal: Vec3<C::F>,
+    pair: &ShapePair<'_, C>,
     at: Vec3<C::F>,
     distance: C::F,
-    margin: C::F,
     out: &mut Points<C>,
 ) {
+    let normal = pair.axes_a[2];
     let middle = normal.scale_add(distance * C::F::c(-0.5), at);
-    out.add(cx, distance.lt(margin), middle, distance, normal);
+    out.add(cx, distance.lt(pair.margin), middle, distance, normal);
 }
 
-/// Contact point of a plane and a sphere.
+/// Adds the contact of a sphere with the plane.
 #[inline(always)]
-pub fn plane_sphere<C: Cx>(
-    cx: &mut C,
-    axes_a: &Mat3<C::F>,
-    b: &Placed<C::F>,
-    radius: C::F,
-    margin: C::F,
-    out: &mut Points<C>,
-) {
-    let normal = axes_a[2];
-    let distance = normal.dot(b.center) - radius;
-    let at = normal.scale_add(-radius, b.center);
-    lowest(cx, normal, at, distance, margin, out);
+fn add_sphere<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, center: Vec3<C::F>, out: &mut Points<C>) {
+    let (normal, radius) = (pair.axes_a[2], pair.b.radius());
+    let distance = normal.dot(center) - radius;
+    let at = normal.scale_add(-radius, center);
+    add_plane_contact(cx, pair, at, distance, out);
 }
 
-/// Contact points of a plane and a capsule: one of each end. The first tangent lies along the capsule, as MuJoCo's.
+/// Plane and sphere: one point.
 #[inline(always)]
-pub fn plane_capsule<C: Cx>(
-    cx: &mut C,
-    axes_a: &Mat3<C::F>,
-    b: &Placed<C::F>,
-    radius: C::F,
-    half_height: C::F,
-    margin: C::F,
-    out: &mut Points<C>,
-) {
+pub fn plane_sphere<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+    add_sphere(cx, pair, pair.pose_b.center, out);
+}
+
+/// Plane and capsule: a point for each end.
+#[inline(always)]
+pub fn plane_capsule<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+    let (b, half_height) = (pair.pose_b, pair.b.half_height());
+    // the first tangent lies along the capsule (MuJoCo: `mjc_PlaneCapsule`)
     if out.along.is_some() {
         out.along = Some(b.axes[2]);
     }
     for half in [half_height, -half_height] {
-        let end = Placed {
-            axes: b.axes,
-            center: b.axes[2].scale_add(half, b.center),
-        };
-        plane_sphere(cx, axes_a, &end, radius, margin, out);
+        let end = b.axes[2].scale_add(half, b.center);
+        add_sphere(cx, pair, end, out);
     }
 }
 
-/// Contact points of a plane and a box: of each pair of opposite corners the lower one.
+/// Plane and box: the lower corner of each pair of opposite corners. All four lowest corners are among them.
 #[inline(always)]
-pub fn plane_box<C: Cx>(
-    cx: &mut C,
-    axes_a: &Mat3<C::F>,
-    b: &Placed<C::F>,
-    half: Vec3<C::F>,
-    margin: C::F,
-    out: &mut Points<C>,
-) {
-    let normal = axes_a[2];
+pub fn plane_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+    let (normal, b, half) = (pair.axes_a[2], pair.pose_b, pair.b.half_extents());
     let height = normal.dot(b.center);
     let x = b.axes[0] * half[0];
     let y = b.axes[1] * half[1];
@@ -83,44 +69,43 @@ pub fn plane_box<C: Cx>(
         (y, z * C::F::c(-1.0)),
         (y * C::F::c(-1.0), z * C::F::c(-1.0)),
     ] {
+        // the corner or its opposite: whichever is below the centre
         let corner = x + (y + z);
         let above = normal.dot(corner);
         let at = corner.scale_add(-sign(above), b.center);
-        lowest(cx, normal, at, height - above.abs(), margin, out);
+        add_plane_contact(cx, pair, at, height - above.abs(), out);
     }
 }
 
-/// Contact points of a plane and a cylinder: a square on the rim of the lower end, turned so that one corner is the lowest
-/// point, and the rim of the other end above that corner.
+/// Plane and cylinder: four points on the rim of the lower cap, one of them the lowest, and the point of the upper rim above
+/// that one (as MuJoCo's `mjc_PlaneCylinder`, which has a triangle in place of the square).
 #[inline(always)]
-pub fn plane_cylinder<C: Cx>(
-    cx: &mut C,
-    axes_a: &Mat3<C::F>,
-    b: &Placed<C::F>,
-    radius: C::F,
-    half_height: C::F,
-    margin: C::F,
-    out: &mut Points<C>,
-) {
+pub fn plane_cylinder<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let c = C::F::c;
-    let normal = axes_a[2];
+    let (normal, b) = (pair.axes_a[2], pair.pose_b);
+    let (radius, half_height) = (pair.b.radius(), pair.b.half_height());
     let height = normal.dot(b.center);
     let down = b.axes[2] * -sign(normal.dot(b.axes[2]));
     let cosine = normal.dot(down);
-    // the part of -normal across the axis
+    // the part of -normal across the axis points to the lowest point of the rim
     let across = (down * cosine) - normal;
     let sine = across.dot(across).sqrt();
     let upright = sine.lt(c(UPRIGHT));
     let unit = c(1.0).div(C::F::select(upright, c(1.0), sine));
     let rim = select(upright, b.axes[0], across * unit) * radius;
     let side = down.cross(rim);
-    let end = down.scale_add(half_height, b.center);
-    let other = down.scale_add(-half_height, b.center);
+    let lower_cap = down.scale_add(half_height, b.center);
+    let upper_cap = down.scale_add(-half_height, b.center);
     let reach = half_height * cosine;
+    // heights of the two rim directions
     let (fall, lean) = (normal.dot(rim), normal.dot(side));
-    lowest(cx, normal, end + rim, height + reach + fall, margin, out);
-    lowest(cx, normal, other + rim, height - reach + fall, margin, out);
-    lowest(cx, normal, end + side, height + reach + lean, margin, out);
-    lowest(cx, normal, end - side, height + reach - lean, margin, out);
-    lowest(cx, normal, end - rim, height + reach - fall, margin, out);
+    for (at, distance) in [
+        (lower_cap + rim, height + reach + fall),
+        (upper_cap + rim, height - reach + fall),
+        (lower_cap + side, height + reach + lean),
+        (lower_cap - side, height + reach - lean),
+        (lower_cap - rim, height + reach - fall),
+    ] {
+        add_plane_contact(cx, pair, at, distance, out);
+    }
 }

@@ -1,149 +1,146 @@
-//! A sphere against sphere, capsule and box. The sphere's centre is the origin.
+//! A sphere against sphere, capsule and box (MuJoCo: `engine_collision_primitive.c`, `engine_collision_box.c`).
+//!
+//! The centre of the first shape, the sphere, is the origin.
 
-use super::choose::{clamped, lowest_of, one_of, select, sign};
-use super::points::{Placed, Points};
+use super::narrow::ShapePair;
+use super::points::Points;
+use super::select::{clamp_to_box, column_at, min_component, select, sign};
 use crate::lane::{Cx, MaskOf, Num};
 use crate::math::vec3::{Mat3, Vec3};
 
-/// Adds the contact of two spheres; `beside` is the normal where their centres coincide.
+/// A sphere, or one that a capsule's axis carries.
+pub struct Ball<F> {
+    /// Its centre [m].
+    pub center: Vec3<F>,
+    /// Its radius [m].
+    pub radius: F,
+}
+
+/// Adds the contact of two spheres; `fallback` is the normal where their centres coincide.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)] // two spheres, and where points go
-pub fn spheres<C: Cx>(
+pub fn add_sphere_sphere<C: Cx>(
     cx: &mut C,
-    center_a: Vec3<C::F>,
-    radius_a: C::F,
-    center_b: Vec3<C::F>,
-    radius_b: C::F,
-    beside: Vec3<C::F>,
+    a: &Ball<C::F>,
+    b: &Ball<C::F>,
+    fallback: Vec3<C::F>,
     margin: C::F,
     out: &mut Points<C>,
 ) {
     let c = C::F::c;
-    let between = center_b - center_a;
+    let between = b.center - a.center;
     let square = between.dot(between);
     let apart = c(0.0).lt(square);
     let length = square.sqrt();
     let inverse = c(1.0).div(C::F::select(apart, length, c(1.0)));
-    let normal = select(apart, between * inverse, beside);
-    let distance = length - radius_a - radius_b;
-    let at = normal.scale_add(distance.fma(c(0.5), radius_a), center_a);
+    let normal = select(apart, between * inverse, fallback);
+    let distance = length - a.radius - b.radius;
+    // half-way between the surfaces
+    let at = normal.scale_add(distance.fma(c(0.5), a.radius), a.center);
     out.add(cx, distance.lt(margin), at, distance, normal);
 }
 
-/// Contact point of two spheres.
+/// The first shape of a pair as a ball.
 #[inline(always)]
-pub fn sphere_sphere<C: Cx>(
-    cx: &mut C,
-    radius_a: C::F,
-    b: &Placed<C::F>,
-    radius_b: C::F,
-    margin: C::F,
-    out: &mut Points<C>,
-) {
-    let up = Vec3([C::F::c(0.0), C::F::c(0.0), C::F::c(1.0)]);
-    spheres(
-        cx,
-        Vec3::zero(),
-        radius_a,
-        b.center,
-        radius_b,
-        up,
-        margin,
-        out,
-    );
+fn ball_a<C: Cx>(pair: &ShapePair<'_, C>) -> Ball<C::F> {
+    Ball {
+        center: Vec3::zero(),
+        radius: pair.a.radius(),
+    }
 }
 
-/// Contact point of a sphere and a capsule: of the sphere and that of the capsule's axis nearest to it.
+/// Two spheres: one point.
 #[inline(always)]
-pub fn sphere_capsule<C: Cx>(
-    cx: &mut C,
-    radius_a: C::F,
-    b: &Placed<C::F>,
-    radius_b: C::F,
-    half_height: C::F,
-    margin: C::F,
-    out: &mut Points<C>,
-) {
+pub fn sphere_sphere<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+    let up = Vec3([C::F::c(0.0), C::F::c(0.0), C::F::c(1.0)]);
+    let b = Ball {
+        center: pair.pose_b.center,
+        radius: pair.b.radius(),
+    };
+    add_sphere_sphere(cx, &ball_a(pair), &b, up, pair.margin, out);
+}
+
+/// Sphere and capsule: one point, of the sphere around the point of the capsule's axis that is nearest.
+#[inline(always)]
+pub fn sphere_capsule<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+    let (b, half_height) = (pair.pose_b, pair.b.half_height());
     let along = (-b.axes[2].dot(b.center))
         .min(half_height)
         .max(-half_height);
-    let nearest = b.axes[2].scale_add(along, b.center);
-    spheres(
-        cx,
-        Vec3::zero(),
-        radius_a,
-        nearest,
-        radius_b,
-        b.axes[0],
-        margin,
-        out,
-    );
+    let nearest = Ball {
+        center: b.axes[2].scale_add(along, b.center),
+        radius: pair.b.radius(),
+    };
+    add_sphere_sphere(cx, &ball_a(pair), &nearest, b.axes[0], pair.margin, out);
 }
 
-/// Contact point of a sphere and a box. A centre inside the box leaves through the nearest face.
+/// Sphere and box: one point. A centre inside the box leaves through the nearest face.
 #[inline(always)]
-pub fn sphere_box<C: Cx>(
-    cx: &mut C,
-    radius: C::F,
-    b: &Placed<C::F>,
-    half: Vec3<C::F>,
-    margin: C::F,
-    out: &mut Points<C>,
-) {
+pub fn sphere_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+    let (b, margin) = (pair.pose_b, pair.margin);
     let center = b.axes.transpose_mul(b.center) * C::F::c(-1.0);
-    let (distance, way) = leave_box(center, half);
+    let exit = BoxExit::find(center, pair.b.half_extents());
     let always = !margin.lt(margin);
-    sphere_off_box(cx, radius, center, distance, way, b, always, margin, out);
+    add_sphere_box(cx, pair, always, center, &exit, out);
 }
 
-/// Adds the contact of a sphere and a box: the sphere's centre is `at` in the box's frame, `distance` from the box along the
-/// unit vector `way`.
+/// Adds the contact of a ball of the first shape and the second shape, a box. The ball's centre is `at` in the box's frame.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)] // a sphere, its way out of the box, and where points go
-pub fn sphere_off_box<C: Cx>(
+pub fn add_sphere_box<C: Cx>(
     cx: &mut C,
-    radius: C::F,
-    at: Vec3<C::F>,
-    distance: C::F,
-    way: Vec3<C::F>,
-    b: &Placed<C::F>,
+    pair: &ShapePair<'_, C>,
     mask: MaskOf<C>,
-    margin: C::F,
+    at: Vec3<C::F>,
+    exit: &BoxExit<C::F>,
     out: &mut Points<C>,
 ) {
     let c = C::F::c;
-    // the surfaces are at -radius and at -distance
-    let middle = way.scale_add((radius + distance) * c(-0.5), at);
-    let distance = distance - radius;
+    let (b, radius) = (pair.pose_b, pair.a.radius());
+    // along the direction the surfaces are at -radius and at -distance
+    let middle = exit
+        .direction
+        .scale_add((radius + exit.distance) * c(-0.5), at);
+    let distance = exit.distance - radius;
     out.add(
         cx,
-        mask & distance.lt(margin),
+        mask & distance.lt(pair.margin),
         b.axes.mul_add(middle, b.center),
         distance,
-        (b.axes * way) * c(-1.0),
+        (b.axes * exit.direction) * c(-1.0),
     );
 }
 
-/// The way from a box to a point in its frame: the distance, negative inside, and the unit direction.
-#[inline(always)]
-pub fn leave_box<F: Num>(point: Vec3<F>, half: Vec3<F>) -> (F, Vec3<F>) {
-    let (zero, one) = (F::c(0.0), F::c(1.0));
-    let apart = point - clamped(point, half);
-    let square = apart.dot(apart);
-    let outside = zero.lt(square);
-    let length = square.sqrt();
-    let inverse = one.div(F::select(outside, length, one));
-    let depths = Vec3([
-        half[0] - point[0].abs(),
-        half[1] - point[1].abs(),
-        half[2] - point[2].abs(),
-    ]);
-    let (face, depth) = lowest_of(depths);
-    let faces = Mat3([
-        Vec3([sign(point[0]), zero, zero]),
-        Vec3([zero, sign(point[1]), zero]),
-        Vec3([zero, zero, sign(point[2])]),
-    ]);
-    let direction = select(outside, apart * inverse, one_of(face, faces));
-    (F::select(outside, length, -depth), direction)
+/// The shortest way from a box to a point in its frame.
+pub struct BoxExit<F> {
+    /// Distance, negative inside [m].
+    pub distance: F,
+    /// Unit direction from the box to the point.
+    pub direction: Vec3<F>,
+}
+
+impl<F: Num> BoxExit<F> {
+    /// Finds it: outside from the nearest point of the box, inside through the nearest face.
+    #[inline(always)]
+    pub fn find(point: Vec3<F>, half: Vec3<F>) -> BoxExit<F> {
+        let (zero, one) = (F::c(0.0), F::c(1.0));
+        let apart = point - clamp_to_box(point, half);
+        let square = apart.dot(apart);
+        let outside = zero.lt(square);
+        let length = square.sqrt();
+        let inverse = one.div(F::select(outside, length, one));
+        let depths = Vec3([
+            half[0] - point[0].abs(),
+            half[1] - point[1].abs(),
+            half[2] - point[2].abs(),
+        ]);
+        let (face, depth) = min_component(depths);
+        let faces = Mat3([
+            Vec3([sign(point[0]), zero, zero]),
+            Vec3([zero, sign(point[1]), zero]),
+            Vec3([zero, zero, sign(point[2])]),
+        ]);
+        BoxExit {
+            distance: F::select(outside, length, -depth),
+            direction: select(outside, apart * inverse, column_at(face, faces)),
+        }
+    }
 }

@@ -18,6 +18,7 @@
 //! result, which mostly makes the first iteration the only one; in `f64`, the reference, it is chosen as
 //! MuJoCo does (see [`choose_start`]).
 
+mod cones;
 mod contacts;
 mod line;
 mod linear;

@@ -1,9 +1,12 @@
-//! Which four points of a flat contact span most of it.
+//! Reduction of a flat contact to the four points that span most of it.
+//!
+//! Points are chosen one after the other: the deepest, the farthest from it, the farthest from the line of both, and the
+//! farthest outside the triangle of the three (as in Bullet's and PhysX' contact reduction).
 
 use crate::lane::Num;
 use crate::math::vec3::Vec3;
 
-/// A straight line in the plane, and what is beyond it: a x + b y > d.
+/// A line in the plane; a point is beyond it where a x + b y > d.
 #[derive(Clone, Copy)]
 pub(super) struct Line<F> {
     a: F,
@@ -12,7 +15,7 @@ pub(super) struct Line<F> {
 }
 
 impl<F: Num> Line<F> {
-    /// Through two points, what is to the right beyond; all zero where they are one.
+    /// Through two points: what is to their right is beyond. All zero where they coincide.
     #[inline(always)]
     fn through(p: Vec3<F>, q: Vec3<F>) -> Line<F> {
         let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
@@ -25,8 +28,9 @@ impl<F: Num> Line<F> {
         }
     }
 
+    /// The same line; where the sign is -1 the other side is beyond.
     #[inline(always)]
-    fn turned(self, sign: F) -> Line<F> {
+    fn facing(self, sign: F) -> Line<F> {
         Line {
             a: self.a * sign,
             b: self.b * sign,
@@ -34,39 +38,40 @@ impl<F: Num> Line<F> {
         }
     }
 
+    /// How far beyond a point is.
     #[inline(always)]
     fn beyond(&self, x: F, y: F) -> F {
         self.a.fma(x, self.b.fma(y, -self.d))
     }
 }
 
-/// How much a point would add to those chosen so far: the second by its distance from the first, the third by that from
-/// the line of the two, the fourth by how far outside the triangle it is. Numbers 0 and 1 of a point are its place.
-pub(super) enum Spread<F> {
-    /// One point is chosen.
+/// How much a point would add to those chosen so far. Components 0 and 1 of a point are its place in the plane.
+pub(super) enum ReductionScore<F> {
+    /// One point is chosen: squared distance from it.
     Point(Vec3<F>),
-    /// Two are.
+    /// Two are: distance from their line.
     Segment(Line<F>),
-    /// Three are.
+    /// Three are: distance outside their triangle.
     Triangle([Line<F>; 3]),
 }
 
-impl<F: Num> Spread<F> {
-    /// With `stage` + 1 of the points chosen.
+impl<F: Num> ReductionScore<F> {
+    /// With `count` + 1 of the points chosen.
     #[inline(always)]
-    pub fn of(stage: usize, chosen: [Vec3<F>; 3]) -> Spread<F> {
+    pub fn of(count: usize, chosen: [Vec3<F>; 3]) -> ReductionScore<F> {
         let [p, q, r] = chosen;
-        match stage {
-            0 => Spread::Point(p),
-            1 => Spread::Segment(Line::through(p, q)),
+        match count {
+            0 => ReductionScore::Point(p),
+            1 => ReductionScore::Segment(Line::through(p, q)),
             _ => {
                 let base = Line::through(p, q);
+                // the third point may lie on either side of the first two
                 let inside = base.beyond(r[0], r[1]);
                 let sign = F::select(F::c(0.0).lt(inside), F::c(-1.0), F::c(1.0));
-                Spread::Triangle([
-                    base.turned(sign),
-                    Line::through(q, r).turned(sign),
-                    Line::through(r, p).turned(sign),
+                ReductionScore::Triangle([
+                    base.facing(sign),
+                    Line::through(q, r).facing(sign),
+                    Line::through(r, p).facing(sign),
                 ])
             }
         }
@@ -76,21 +81,21 @@ impl<F: Num> Spread<F> {
     #[inline(always)]
     pub fn threshold(&self, least: F) -> F {
         match self {
-            Spread::Point(_) => least * least,
+            ReductionScore::Point(_) => least * least,
             _ => least,
         }
     }
 
     /// The score of a point.
     #[inline(always)]
-    pub fn score(&self, x: F, y: F) -> F {
+    pub fn at(&self, x: F, y: F) -> F {
         match self {
-            Spread::Point(p) => {
+            ReductionScore::Point(p) => {
                 let (dx, dy) = (x - p[0], y - p[1]);
                 dx.fma(dx, dy * dy)
             }
-            Spread::Segment(line) => line.beyond(x, y).abs(),
-            Spread::Triangle(sides) => {
+            ReductionScore::Segment(line) => line.beyond(x, y).abs(),
+            ReductionScore::Triangle(sides) => {
                 let (p, q, r) = (
                     sides[0].beyond(x, y),
                     sides[1].beyond(x, y),

@@ -1,39 +1,62 @@
-//! The faces and segments of shapes that lie on others.
+//! Features of shapes that touch in more than a point: faces, caps and edges, as polygons to be clipped.
+//!
+//! A feature is found for a direction: the face or line of its shape that faces it best. A segment is a polygon with two
+//! corners, and a cap of a cylinder one with [`CORNERS_MAX`].
 
-use super::choose::select;
-use super::manifold::{Side, aligned};
-use super::support::{Polyhedron, pick3, signed};
+use super::hull::{Hull, Part};
+use super::narrow::ShapePose;
+use super::select::{select, with_sign};
+use super::variables::pick3;
 use crate::constants::hull::{CORNERS_MAX, HullTables};
 use crate::lane::{Cx, Num};
 use crate::math::vec3::{Mat3, Vec3};
 use crate::span;
 
+/// Cosine to the normal past which a face lies flat on the other shape: 1.8°.
+const ALIGNED: f64 = 0.9995;
+
+/// Whether a face with this outward normal lies flat on the other shape.
+#[inline(always)]
+pub(super) fn aligned<F: Num>(outward: Vec3<F>, normal: Vec3<F>) -> F::Mask {
+    F::c(ALIGNED).lt(outward.dot(normal).abs())
+}
+
+/// A flat polygon on the surface of a shape.
+pub(super) trait Feature<C: Cx> {
+    /// A vector across it, outward, of any length.
+    fn normal(&self) -> Vec3<C::F>;
+    /// Its number of corners.
+    fn count(&self) -> C::F;
+    /// Corner `i`, counter-clockwise from outside; corner 0 past the last.
+    fn corner(&self, cx: &mut C, i: C::I) -> Vec3<C::F>;
+}
+
 /// The face of a hull that faces a direction best.
-pub(super) struct HullSide<'a, F> {
+pub(super) struct HullFace<'a, F> {
     tables: &'a HullTables,
     /// Its outward unit normal.
     pub outward: Vec3<F>,
     first: F,
     count: F,
-    /// Axes and centre of the hull, where it is not in its own frame.
-    placed: Option<(Mat3<F>, Vec3<F>)>,
+    /// Pose of the hull, where it is not in its own frame.
+    pose: Option<ShapePose<F>>,
 }
 
-impl<'a, F: Num> HullSide<'a, F> {
+impl<'a, F: Num> HullFace<'a, F> {
     /// Finds it for the direction `d`.
     #[inline(always)]
     pub fn find<C: Cx<F = F>>(
         cx: &mut C,
-        hull: &Polyhedron<'a, C>,
-        placed: Option<(Mat3<F>, Vec3<F>)>,
+        hull: &Hull<'a, C>,
+        pose: Option<ShapePose<F>>,
         d: Vec3<F>,
-    ) -> HullSide<'a, F> {
+    ) -> HullFace<'a, F> {
         let faces = hull.tables.faces;
-        let d = match &placed {
-            Some((axes, _)) => axes.transpose_mul(d),
+        let d = match &pose {
+            Some(pose) => pose.axes.transpose_mul(d),
             None => d,
         };
-        let (start, end) = hull.span(cx, 1);
+        let (start, end) = hull.span(cx, Part::Faces);
         let mut best = cx.var(F::c(-2.0));
         let mut at = cx.var(F::c(0.0));
         span!(cx, face in start, end, {
@@ -46,20 +69,20 @@ impl<'a, F: Num> HullSide<'a, F> {
         });
         let at = cx.get(&at);
         let m = pick3(cx, faces, at, 0);
-        HullSide {
+        HullFace {
             tables: hull.tables,
-            outward: match &placed {
-                Some((axes, _)) => axes * m,
+            outward: match &pose {
+                Some(pose) => pose.axes * m,
                 None => m,
             },
             first: cx.pick(faces, at, 4),
             count: cx.pick(faces, at, 5),
-            placed,
+            pose,
         }
     }
 }
 
-impl<C: Cx> Side<C> for HullSide<'_, C::F> {
+impl<C: Cx> Feature<C> for HullFace<'_, C::F> {
     #[inline(always)]
     fn normal(&self) -> Vec3<C::F> {
         self.outward
@@ -74,15 +97,15 @@ impl<C: Cx> Side<C> for HullSide<'_, C::F> {
         let half = C::F::c(0.5);
         let place = C::F::select(place.lt(self.count - half), place, C::F::c(0.0));
         let corner = pick3(cx, self.tables.corners, self.first + place, 0);
-        match &self.placed {
-            Some((axes, center)) => axes.mul_add(corner, *center),
+        match &self.pose {
+            Some(pose) => pose.axes.mul_add(corner, pose.center),
             None => corner,
         }
     }
 }
 
 /// The face of a box that faces a direction best.
-pub(super) struct BoxSide<F> {
+pub(super) struct BoxFace<F> {
     /// Its outward unit normal.
     pub outward: Vec3<F>,
     center: Vec3<F>,
@@ -90,18 +113,19 @@ pub(super) struct BoxSide<F> {
     v: Vec3<F>,
 }
 
-impl<F: Num> BoxSide<F> {
-    /// Of the box with these axes, half extents and centre, for the direction `d`.
+impl<F: Num> BoxFace<F> {
+    /// Finds it for the direction `d`, of a box with these half extents.
     #[inline(always)]
-    pub fn find(axes: &Mat3<F>, half: Vec3<F>, center: Vec3<F>, d: Vec3<F>) -> BoxSide<F> {
+    pub fn find(pose: &ShapePose<F>, half: Vec3<F>, d: Vec3<F>) -> BoxFace<F> {
+        let (axes, center) = (&pose.axes, pose.center);
         let facing = axes.transpose_mul(d);
-        let mut best = BoxSide::face(axes, half, center, 0, facing[0]);
+        let mut best = BoxFace::face(axes, half, center, 0, facing[0]);
         let mut most = facing[0].abs();
         for j in 1..3 {
-            let other = BoxSide::face(axes, half, center, j, facing[j]);
+            let other = BoxFace::face(axes, half, center, j, facing[j]);
             let is = most.lt(facing[j].abs());
             most = most.max(facing[j].abs());
-            best = BoxSide {
+            best = BoxFace {
                 outward: select(is, other.outward, best.outward),
                 center: select(is, other.center, best.center),
                 u: select(is, other.u, best.u),
@@ -111,20 +135,21 @@ impl<F: Num> BoxSide<F> {
         best
     }
 
+    /// The face across axis `j` on the side of the sign of `facing`.
     #[inline(always)]
-    fn face(axes: &Mat3<F>, half: Vec3<F>, center: Vec3<F>, j: usize, facing: F) -> BoxSide<F> {
+    fn face(axes: &Mat3<F>, half: Vec3<F>, center: Vec3<F>, j: usize, facing: F) -> BoxFace<F> {
         let (k, l) = ((j + 1) % 3, (j + 2) % 3);
-        let outward = axes[j] * signed(F::c(1.0), facing);
-        BoxSide {
+        let outward = axes[j] * with_sign(F::c(1.0), facing);
+        BoxFace {
             outward,
             center: outward.scale_add(half[j], center),
             u: (axes[k] * half[k]),
-            v: (axes[l] * signed(half[l], facing)),
+            v: (axes[l] * with_sign(half[l], facing)),
         }
     }
 }
 
-impl<C: Cx> Side<C> for BoxSide<C::F> {
+impl<C: Cx> Feature<C> for BoxFace<C::F> {
     #[inline(always)]
     fn normal(&self) -> Vec3<C::F> {
         self.outward
@@ -147,20 +172,21 @@ impl<C: Cx> Side<C> for BoxSide<C::F> {
     }
 }
 
-/// A segment on a shape's surface.
-pub(super) struct SegmentSide<F> {
+/// A line on the surface of a capsule.
+pub(super) struct SegmentLine<F> {
     center: Vec3<F>,
     half: Vec3<F>,
     outward: Vec3<F>,
 }
 
-impl<F: Num> SegmentSide<F> {
+impl<F: Num> SegmentLine<F> {
     /// From `center - half` to `center + half`, seen along `normal`, which points outward.
     #[inline(always)]
-    pub fn new(center: Vec3<F>, half: Vec3<F>, normal: Vec3<F>) -> SegmentSide<F> {
+    pub fn new(center: Vec3<F>, half: Vec3<F>, normal: Vec3<F>) -> SegmentLine<F> {
         let square = half.dot(half).max(F::c(1e-24));
         let slope = half.dot(normal).div(square);
-        SegmentSide {
+        // the part of the normal across the line
+        SegmentLine {
             center,
             half,
             outward: (normal - (half * slope)),
@@ -168,7 +194,7 @@ impl<F: Num> SegmentSide<F> {
     }
 }
 
-impl<C: Cx> Side<C> for SegmentSide<C::F> {
+impl<C: Cx> Feature<C> for SegmentLine<C::F> {
     #[inline(always)]
     fn normal(&self) -> Vec3<C::F> {
         self.outward
@@ -187,8 +213,8 @@ impl<C: Cx> Side<C> for SegmentSide<C::F> {
     }
 }
 
-/// The cap of a cylinder as a polygon, or a line along its side.
-pub(super) struct CylinderSide<F: Num> {
+/// The cap of a cylinder as a regular polygon, or a line along its side.
+pub(super) struct CylinderFeature<F: Num> {
     /// Its outward unit normal.
     pub outward: Vec3<F>,
     center: Vec3<F>,
@@ -199,18 +225,13 @@ pub(super) struct CylinderSide<F: Num> {
     pub cap: F::Mask,
 }
 
-impl<F: Num> CylinderSide<F> {
-    /// Of the cylinder with these axes and centre, for the unit direction `d`; a cap where that is steeper than 45°.
+impl<F: Num> CylinderFeature<F> {
+    /// Finds it for the unit direction `d`: a cap where that is within 45° of the axis.
     #[inline(always)]
-    pub fn find(
-        axes: &Mat3<F>,
-        radius: F,
-        half_height: F,
-        center: Vec3<F>,
-        d: Vec3<F>,
-    ) -> CylinderSide<F> {
+    pub fn find(pose: &ShapePose<F>, radius: F, half_height: F, d: Vec3<F>) -> CylinderFeature<F> {
+        let (axes, center) = (&pose.axes, pose.center);
         let local = axes.transpose_mul(d);
-        // an upright one keeps its rim points: their direction is not left to rounding
+        // an upright cylinder keeps its rim points: rounding must not choose their direction
         let width = local[0].fma(local[0], local[1] * local[1]).sqrt();
         let upright = width.lt(F::c(1e-4));
         let unit = F::c(1.0).div(width.max(F::c(1e-4)));
@@ -220,9 +241,9 @@ impl<F: Num> CylinderSide<F> {
         );
         let rim = axes[0].scale_add(x, axes[1] * y);
         let cap = F::c(0.7).lt(local[2].abs());
-        let end = axes[2] * signed(F::c(1.0), local[2]);
+        let end = axes[2] * with_sign(F::c(1.0), local[2]);
         let half = axes[2] * half_height;
-        CylinderSide {
+        CylinderFeature {
             outward: select(cap, end, rim),
             center: select(
                 cap,
@@ -236,7 +257,7 @@ impl<F: Num> CylinderSide<F> {
         }
     }
 
-    /// Is it a cap that is flat on the other shape?
+    /// Is it a cap that lies flat on the other shape?
     #[inline(always)]
     pub fn flat(&self, normal: Vec3<F>) -> F::Mask {
         self.cap & aligned(self.outward, normal)
@@ -244,9 +265,13 @@ impl<F: Num> CylinderSide<F> {
 
     /// `a` where the mask holds, else `b`.
     #[inline(always)]
-    pub fn select(mask: F::Mask, a: &CylinderSide<F>, b: &CylinderSide<F>) -> CylinderSide<F> {
+    pub fn select(
+        mask: F::Mask,
+        a: &CylinderFeature<F>,
+        b: &CylinderFeature<F>,
+    ) -> CylinderFeature<F> {
         let cap = (mask & a.cap) | (!mask & b.cap);
-        CylinderSide {
+        CylinderFeature {
             outward: select(mask, a.outward, b.outward),
             center: select(mask, a.center, b.center),
             u: select(mask, a.u, b.u),
@@ -257,7 +282,7 @@ impl<F: Num> CylinderSide<F> {
     }
 }
 
-impl<C: Cx> Side<C> for CylinderSide<C::F> {
+impl<C: Cx> Feature<C> for CylinderFeature<C::F> {
     #[inline(always)]
     fn normal(&self) -> Vec3<C::F> {
         self.outward

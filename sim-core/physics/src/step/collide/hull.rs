@@ -1,0 +1,131 @@
+//! Convex hulls as rows of the model's tables, and their support functions.
+//!
+//! A support function looks at every vertex: hulls are small (at most 64 vertices), and hill climbing over neighbours
+//! (as in MuJoCo's `engine_collision_convex.c`) would take another path in each world of a block.
+
+use super::support::Support;
+use super::variables::pick3;
+use crate::constants::hull::HullTables;
+use crate::lane::{Cx, Fixed, Num};
+use crate::math::vec3::{Mat3, Vec3};
+use crate::span;
+
+/// A hull in its own frame.
+pub(super) struct Hull<'a, C: Cx> {
+    pub tables: &'a HullTables,
+    /// Its row in the tables.
+    pub row: C::I,
+}
+
+impl<C: Cx> Clone for Hull<'_, C> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<C: Cx> Copy for Hull<'_, C> {}
+
+/// A hull in another frame.
+pub(super) struct PosedHull<'a, C: Cx> {
+    pub own: Hull<'a, C>,
+    pub axes: Mat3<C::F>,
+    pub center: Vec3<C::F>,
+}
+
+/// Rows of a hull in the tables.
+#[derive(Clone, Copy)]
+pub(super) enum Part {
+    Vertices,
+    Faces,
+    Edges,
+}
+
+impl<C: Cx> Hull<'_, C> {
+    /// First and end of its rows of a kind.
+    #[inline(always)]
+    pub fn span(&self, cx: &mut C, part: Part) -> (C::I, C::I) {
+        let part = part as usize;
+        let rows = [self.tables.vertices, self.tables.faces, self.tables.edges][part].rows;
+        let first = cx.index(self.tables.spans, self.row, 2 * part, rows + 1);
+        let end = cx.index(self.tables.spans, self.row, 2 * part + 1, rows + 1);
+        (first, end)
+    }
+
+    /// Half extents of its bounding box [m].
+    #[inline(always)]
+    pub fn half_extents(&self, cx: &mut C) -> Vec3<C::F> {
+        Vec3(cx.constants(self.tables.sizes, self.row, 0))
+    }
+
+    /// Radius about its centre [m].
+    #[inline(always)]
+    pub fn radius(&self, cx: &mut C) -> C::F {
+        cx.constant(self.tables.sizes, self.row, 3)
+    }
+
+    /// How far it reaches along `d`: the largest d · vertex.
+    #[inline(always)]
+    pub fn reach(&self, cx: &mut C, d: Vec3<C::F>) -> C::F {
+        let (first, end) = self.span(cx, Part::Vertices);
+        let mut best = cx.var(C::F::c(-1e18));
+        span!(cx, row in first, end, {
+            let mut reach = cx.get(&best);
+            for point in vertex_row(cx, self.tables, row) {
+                reach = reach.max(point.dot(d));
+            }
+            cx.put(&mut best, reach);
+        });
+        cx.get(&best)
+    }
+}
+
+impl<C: Cx> Support<C> for Hull<'_, C> {
+    #[inline(always)]
+    fn farthest(&self, cx: &mut C, d: Vec3<C::F>) -> Vec3<C::F> {
+        let (first, end) = self.span(cx, Part::Vertices);
+        let mut best = cx.var(C::F::c(-1e18));
+        // row of the vertex, and its quarter of the row
+        let mut at = cx.var(C::F::c(0.0));
+        span!(cx, row in first, end, {
+            let number = cx.number(row);
+            let (mut reach, mut place) = (cx.get(&best), cx.get(&at));
+            for (k, point) in vertex_row(cx, self.tables, row).into_iter().enumerate() {
+                let x = point.dot(d);
+                let farther = reach.lt(x);
+                reach = reach.max(x);
+                place = C::F::select(farther, number + C::F::c(0.25 * k as f64), place);
+            }
+            cx.put(&mut best, reach);
+            cx.put(&mut at, place);
+        });
+        // the same table with one vertex a row
+        let single = Fixed {
+            stride: 3,
+            rows: 4 * self.tables.vertices.rows,
+            ..self.tables.vertices
+        };
+        let place = cx.get(&at) * C::F::c(4.0);
+        pick3(cx, single, place, 0)
+    }
+}
+
+impl<C: Cx> Support<C> for PosedHull<'_, C> {
+    #[inline(always)]
+    fn farthest(&self, cx: &mut C, d: Vec3<C::F>) -> Vec3<C::F> {
+        let point = self.own.farthest(cx, self.axes.transpose_mul(d));
+        self.axes.mul_add(point, self.center)
+    }
+}
+
+/// The four vertices of a row of the tables.
+#[inline(always)]
+pub(super) fn vertex_row<C: Cx>(cx: &mut C, tables: &HullTables, row: C::I) -> [Vec3<C::F>; 4] {
+    let [a, b, c, d, e, f, g, h, i, j, k, l] = cx.constants(tables.vertices, row, 0);
+    [
+        Vec3([a, b, c]),
+        Vec3([d, e, f]),
+        Vec3([g, h, i]),
+        Vec3([j, k, l]),
+    ]
+}
