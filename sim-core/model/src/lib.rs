@@ -2,7 +2,7 @@
 //!
 //! A [`Description`] is named, f64 and editable. It is checked, then compiled to a [`Model`], which is sorted and immutable.
 //!
-//! Modules import only those before them (`tests/tidy.rs` checks it):
+//! Modules import only those before them (`tests/tidy/main.rs` checks it):
 //!
 //! | module | what it holds |
 //! |---|---|

@@ -1,0 +1,289 @@
+//! What may import what, which package has which door, and where `unsafe` may stand.
+
+/// Modules of a crate, each of which may import those before it.
+pub const ORDER: &[(&str, &[&str])] = &[
+    (
+        "sim-core/physics/src",
+        &[
+            "lane",
+            "math",
+            "constants",
+            "arrays",
+            "step",
+            "schedule",
+            "compiled",
+        ],
+    ),
+    (
+        "sim-core/device/src",
+        &[
+            "error",
+            "source",
+            "module",
+            "cache",
+            "raw_op",
+            "allocation",
+            "vulkan",
+            "vulkan_absent",
+            "adapter",
+            "device",
+            "portable",
+            "memory",
+            "workers",
+            "program",
+            "batch_op",
+            "staging",
+            "encode",
+            "batch",
+            "run",
+            "software",
+            "compile",
+        ],
+    ),
+    (
+        "sim-core/record/src",
+        &[
+            "error",
+            "tree",
+            "uses",
+            "recording",
+            "vectorize",
+            "wgsl",
+            "evaluate",
+            "split",
+            "loop_fusion",
+            "handles",
+            "known_values",
+            "state",
+            "memory",
+            "fold",
+            "iterations",
+            "loops",
+            "lists",
+            "scalar",
+            "recorder",
+            "dead_code",
+            "record",
+        ],
+    ),
+    (
+        "sim-core/record/src/split",
+        &[
+            "order",
+            "cost",
+            "kernel",
+            "items",
+            "live_out",
+            "live_ranges",
+            "partition",
+            "private",
+            "plan",
+            "emit",
+            "stops_last",
+        ],
+    ),
+    (
+        "sim-core/model/src",
+        &[
+            "joint_kind",
+            "error",
+            "pose",
+            "value_checks",
+            "inertia",
+            "geometry",
+            "distribution",
+            "surface",
+            "description",
+            "validate",
+            "urdf",
+            "rigid_body",
+            "hull_tables",
+            "model",
+            "compile",
+        ],
+    ),
+    (
+        "sim-core/engine/src",
+        &[
+            "random",
+            "start",
+            "backend",
+            "snapshot",
+            "options",
+            "simulation",
+            "checks",
+            "params",
+            "write",
+            "command",
+            "dynamics",
+        ],
+    ),
+    (
+        "sim-core/engine/src/backend",
+        &[
+            "error", "frozen", "state", "input", "noise", "gather", "cpu", "gpu",
+        ],
+    ),
+    (
+        "sim-core/engine/src/backend/cpu",
+        &[
+            "lane_assignment",
+            "chunk",
+            "delay",
+            "faults",
+            "noise",
+            "records",
+            "regroup",
+            "reset",
+            "transfer",
+            "contacts",
+            "run",
+            "backend",
+            "dispatch",
+        ],
+    ),
+    (
+        "sim-core/engine/src/backend/gpu",
+        &[
+            "words",
+            "workgroups",
+            "mirror",
+            "places",
+            "programs",
+            "show",
+            "bookkeeping",
+            "software",
+            "compiled",
+            "uploads",
+            "sizing",
+            "tile",
+            "imported",
+            "backend",
+            "worlds",
+            "frame",
+            "create",
+        ],
+    ),
+    (
+        "sim-daemon/picture/src",
+        &[
+            "vector", "view", "normals", "mesh", "clip", "cover", "threads", "project", "tile",
+            "rays", "outlines", "shadow", "shade", "marks", "renderer",
+        ],
+    ),
+    (
+        "sim-daemon/protocol/src",
+        &[
+            "header",
+            "journal_header",
+            "error",
+            "hash",
+            "description",
+            "control",
+            "hook",
+            "paths",
+            "daemon_lock",
+            "liveness",
+            "discovery",
+            "table",
+            "digest",
+            "transport",
+            "connection",
+            "heartbeat",
+            "affinity",
+            "waiter",
+            "command",
+            "memory",
+            "loaned",
+            "frame",
+            "controller",
+            "observer",
+            "journal",
+            "client",
+            "host",
+        ],
+    ),
+    (
+        "sim-daemon/src",
+        &[
+            "config",
+            "error",
+            "cli",
+            "environment",
+            "devices",
+            "inspect",
+            "refusal",
+            "snapshot",
+            "export",
+            "arrays",
+            "recording",
+            "observe",
+            "groups",
+            "log",
+            "fault_log",
+            "server",
+            "watchdog",
+            "session",
+            "commands",
+        ],
+    ),
+    (
+        "py-client/src",
+        &[
+            "errors", "parts", "input", "frame", "client", "scene", "dynamics", "arrays",
+            "picture", "observe", "random",
+        ],
+    ),
+];
+
+/// The only door of each heavy package.
+pub const DOORS: [(&str, &str); 20] = [
+    ("ash", "sim-core/device/src/vulkan"),
+    ("naga", "sim-core/device/src/module.rs"),
+    ("wgpu", "sim-core/device/src"),
+    ("urdf_rs", "sim-core/model/src/urdf"),
+    ("faer", "sim-core/model/src"),
+    ("parry3d_f64", "sim-core/model/src/geometry"),
+    ("gltf", "sim-core/model/src/geometry/load"),
+    ("base64", "sim-core/model/src/geometry/load"),
+    ("rayon", "sim-core/engine/src/backend/cpu"),
+    ("crc32fast", "sim-core/engine/src/snapshot.rs"),
+    ("iceoryx2", "sim-daemon/protocol/src"),
+    ("clap", "sim-daemon/src/cli"),
+    ("clap_complete", "sim-daemon/src/cli/pages.rs"),
+    ("clap_mangen", "sim-daemon/src/cli/pages.rs"),
+    ("lz4_flex", "sim-daemon/src/recording/blocks.rs"),
+    ("xxhash_rust", "sim-daemon/protocol/src/digest.rs"),
+    ("noto_sans_mono_bitmap", "sim-daemon/src/inspect/picture"),
+    ("png", "sim-daemon/src/inspect/picture"),
+    ("pyo3", "py-client/src"),
+    ("numpy", "py-client/src"),
+];
+
+/// Where `unsafe` may stand, and why.
+pub const UNSAFE: [&str; 24] = [
+    "py-client/src/frame.rs",                      // NumPy views
+    "sim-core/device/src/memory.rs",               // imports pages of the host
+    "sim-core/device/src/portable.rs",             // programs without checks at run time
+    "sim-core/device/src/software/exit.rs",        // process exit beside a driver thread
+    "sim-core/device/src/vulkan/memory.rs",        // the driver's memory, and the host's
+    "sim-core/device/src/vulkan/mod.rs",           // the driver's handles
+    "sim-core/device/src/vulkan/pipeline.rs",      // as mod.rs
+    "sim-core/device/src/vulkan/recording.rs",     // as mod.rs
+    "sim-core/device/src/vulkan_absent.rs",        // the same functions, never called
+    "sim-core/engine/src/backend/cpu/backend.rs",  // calls what dispatch chose
+    "sim-core/engine/src/backend/cpu/contacts.rs", // rows of a frame, as transfer.rs
+    "sim-core/engine/src/backend/cpu/dispatch.rs", // instruction sets
+    "sim-core/engine/src/backend/cpu/run.rs",      // calls the stages of an instruction set
+    "sim-core/engine/src/backend/cpu/transfer.rs", // rows of a frame, written by several threads
+    "sim-core/engine/src/backend/gpu/backend.rs",  // as imported.rs
+    "sim-core/engine/src/backend/gpu/imported.rs", // memory of readers that a device writes to
+    "sim-core/engine/src/backend/mod.rs",          // as imported.rs
+    "sim-core/engine/src/simulation.rs",           // as imported.rs
+    "sim-core/physics/src/compiled.rs", // what only a processor with the instructions may run
+    "sim-core/physics/src/lane/simd.rs", // intrinsics
+    "sim-daemon/protocol/src/frame.rs", // views of a sample
+    "sim-daemon/protocol/src/loaned.rs", // loaned samples
+    "sim-daemon/src/environment.rs",    // a variable, set while there is one thread
+    "sim-daemon/src/server.rs",         // samples that a device writes to
+];
