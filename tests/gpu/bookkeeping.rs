@@ -96,6 +96,31 @@ fn parameters_are_written_read_and_reach_the_next_step() {
 }
 
 #[test]
+fn a_load_waits_for_the_frame_and_a_later_write_of_it_counts_as_on_the_cpu() {
+    let mut scene = lesson(Demo::Target);
+    scene.params = [Param::BodyF].into();
+    let model = scene.compile().unwrap();
+    let columns = Param::BodyF.columns(&model.sizes());
+    let loads: Vec<f32> = (0..WORLDS * columns).map(|k| 0.1 * k as f32).collect();
+    let later: Vec<f32> = (0..WORLDS * 3).map(|k| -(k as f32)).collect();
+    let mask: Vec<bool> = (0..WORLDS).map(|w| w % 3 == 1).collect();
+    let options = options(gpu(), WORLDS, &[Field::JointQ]);
+    let runs = both(&model, &options, |run| {
+        run.sim
+            .command(Param::BodyF, 0..columns, Values::F32(&loads))
+            .unwrap();
+        run.sim
+            .write_param(Param::BodyF, 0..3, Values::F32(&later), Some(&mask))
+            .unwrap();
+    });
+    let [here, there] = runs.map(|run| run.sim.param(Param::BodyF).unwrap());
+    assert_eq!(here, there);
+    assert_eq!(here[columns], -3.0);
+    assert_eq!(here[0], 0.0);
+    assert_eq!(here[3], f64::from(loads[3]));
+}
+
+#[test]
 fn a_run_resumes_from_a_snapshot_bit_for_bit_and_takes_the_cpus() {
     let model = lesson(Demo::Target).compile().unwrap();
     let fields = [Field::JointQ, Field::JointQd];

@@ -74,6 +74,8 @@ macro_rules! arrays {
 
         impl<F: Num, V: Copy> Block<F, V> {
             /// Arrays for a model: every scalar 0, every cell a copy of `cell`; parameters as worlds start from them.
+            // arrays that stand for tables have no entries
+            #[allow(clippy::zero_repeat_side_effects)]
             pub fn new<R: Real>($m: &Constants<R>, cell: V) -> Self {
                 let mut block = Block {
                     $($c: vec![cell; $clen],)*

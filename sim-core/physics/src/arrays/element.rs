@@ -5,7 +5,7 @@ use crate::math::spatial;
 use crate::math::vec3;
 use bytemuck::TransparentWrapper;
 
-/// An entry of a value array: one scalar or a fixed number of them.
+/// An entry of a value array: one scalar, or several.
 pub trait Element<F>: Copy {
     /// Scalars of an entry.
     const SCALARS: usize;

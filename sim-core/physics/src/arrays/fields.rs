@@ -1,4 +1,4 @@
-//! What a row says of a field that clients write, step or read: name, group, shape, unit.
+//! Description of a field that clients write, step or read: name, group, shape, unit.
 
 use super::table::{Field, Source};
 use crate::constants::Sizes;
@@ -70,7 +70,7 @@ pub enum Axis {
     Sites,
     /// Contact sensors.
     ContactSensors,
-    /// A fixed number.
+    /// A fixed length.
     Size(usize),
 }
 

@@ -111,7 +111,7 @@ arrays! { m;
         // +1 where the lower bound is the nearer, -1 where the upper is
         limit_side: LimitSide [Scalar; m.limits.len()] Stage "–";
 
-        // contacts lie in the tables of `Contacts::memory`; these have no entries and stand for them in `READS` and `WRITES`
+        // contacts are in the tables of `Contacts::memory`; these arrays have no entries and represent them in `READS` and `WRITES`
         shape_poses: ShapePoses [Scalar; 0] Stage "–";
         contact_points: ContactPoints [Scalar; 0] Stage "–";
         contact_rows: ContactRows [Scalar; 0] Stage "–";

@@ -1,25 +1,24 @@
-//! Scratch tables in which faces of two shapes are cut against each other.
+//! Scratch tables in which features of two shapes are clipped against each other.
 
 use super::hull::CORNERS_MAX;
 use crate::lane::Table;
 
-/// Scratch tables of a pair.
+/// Scratch tables of a pair; see `step/collide/clip.rs`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut {
     /// Corners of both faces across and along the normal (2 × 3), and the second's edges as half-planes (3).
     pub corners: Table,
-    /// Candidates: the ends of an edge of the first that is cut, a corner of the second (3 × 3).
+    /// Candidates of each corner: the ends of the clipped edge of the first, a corner of the second (3 × 3).
     pub candidates: Table,
-    /// Edges of a hull that may cross one of another where they are least deep.
+    /// Edges of a hull that may make the nearest face of the Minkowski difference with one of another hull.
     pub edges: Table,
 }
 
 impl Cut {
-    /// Rows and numbers a row of `corners`.
+    /// Rows of `corners`, and scalars per row.
     pub const CORNERS: [usize; 2] = [CORNERS_MAX + 1, 9];
-    /// Rows and numbers a row of `candidates`.
+    /// Rows of `candidates`, and scalars per row.
     pub const CANDIDATES: [usize; 2] = [CORNERS_MAX + 1, 9];
-    /// Rows and numbers a row of `edges`. A hull of 64 vertices has at most 186 edges; of more than this many the rest
-    /// is left out.
+    /// Rows of `edges`, and scalars per row. A hull of 64 vertices has at most 186 edges; those that do not fit are left out.
     pub const EDGES: [usize; 2] = [48, 1];
 }

@@ -1,4 +1,4 @@
-//! What the text reads of a model's shapes: where they are, which pairs may touch, and how soft they are.
+//! Shapes of a model as physics code reads them: where they are, which pairs may touch, and how soft they are.
 
 use super::clip::Cut;
 use super::hull::HullTables;
@@ -33,7 +33,7 @@ pub enum Kind {
     Hull,
 }
 
-/// Pairs of kinds that can touch, in the order in which they are looked at. Each has a stage of its own.
+/// Pairs of kinds that can touch, in the order of their stages.
 pub const PAIR_KINDS: [(Kind, Kind); 20] = {
     use Kind::*;
     [
@@ -80,9 +80,9 @@ recast! {
         pub contacts_max: usize,
         /// Rows that they may have.
         pub rows_max: usize,
-        /// Can more be found than there is room for?
+        /// Can there be more contacts than there is room for?
         pub may_overflow: bool,
-        /// Numbers of pairs, and of hulls.
+        /// Scalars and indices of pairs and hulls.
         pub tables: Tables<R>,
         /// Where they are.
         pub handles: Handles,
@@ -96,7 +96,7 @@ recast! {
 /// Tables of the model.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Handles {
-    /// Numbers of a pair; see [`pair`].
+    /// Scalars of a pair; see [`pair`].
     pub pair_numbers: Fixed,
     /// Indices of a pair; see [`pair`].
     pub pair_indices: Fixed,
@@ -119,19 +119,19 @@ pub struct Memory {
     pub cut: Cut,
     /// Coefficient of friction of each solid, where it varies [–].
     pub mu: Table,
-    /// Numbers of all of them.
+    /// Scalars of all tables.
     pub len: usize,
 }
 
 recast! {
-    /// A shape of a body, or one that stands still.
+    /// A shape of a body, or a static one.
     #[derive(Clone, Debug)]
     pub struct Solid<R> {
         /// What it is.
         pub kind: Kind,
         /// Its shape, as in `shape_names`.
         pub shape: usize,
-        /// The body that bears it, or none.
+        /// The body that carries it, or none.
         pub body: Option<usize>,
         /// Its axes in the body's frame, or in the world: columns [–].
         pub axes: [[R; 3]; 3],
@@ -153,8 +153,7 @@ pub struct Group {
     pub end: usize,
 }
 
-/// A pair for people: numbers of shapes in the order of [`super::Model::shape_names`]; the normal points from the first to
-/// the second.
+/// A pair for output: places of its shapes in the model's list of shape names. The normal points from the first to the second.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pair {
     /// The two shapes.
@@ -166,10 +165,10 @@ pub struct Pair {
 }
 
 recast! {
-    /// Contacts of like bodies: the columns of their Jacobians are the same dofs.
+    /// Contacts whose Jacobians have the same dofs as columns.
     #[derive(Clone, Debug)]
     pub struct Class<R> {
-        /// Trees of the bodies on its two sides; the first is none where that side stands still.
+        /// Trees of the bodies on its two sides; the first is none where that side is static.
         pub trees: (Option<usize>, usize),
         /// Its dofs, rising.
         pub columns: Vec<Column>,
@@ -182,11 +181,11 @@ recast! {
         pub couples: bool,
         /// Parts of the mass matrix that its columns are of, each once, as [`Pattern::parts`](crate::math::factor::Pattern::parts) counts them.
         pub parts: Vec<usize>,
-        /// Numbers of a pair that all its pairs share.
+        /// Scalars of a pair that are the same for all of its pairs.
         pub shared: Vec<Option<R>>,
         /// First row of its contacts.
         pub first: usize,
-        /// Their number at most.
+        /// Most contacts.
         pub capacity: usize,
     }
 }
@@ -198,7 +197,7 @@ pub struct Column {
     pub dof: usize,
     /// Is it of the first side's tree?
     pub is_first: bool,
-    /// Where the number of a pair is that says how it moves the second body relative to the first: 1, -1 or 0.
+    /// Place of its lever among the scalars of a pair: how it moves the second body relative to the first, 1, -1 or 0.
     pub lever: usize,
 }
 
@@ -244,7 +243,7 @@ impl Run {
     }
 }
 
-/// Places of the numbers and indices of a pair.
+/// Places of the scalars and indices of a pair.
 pub mod pair {
     /// Distance below which contacts are found [m].
     pub const REACH: usize = 0;
@@ -281,9 +280,9 @@ pub mod pair {
     /// First of the levers.
     pub const LEVERS: usize = 20;
 
-    /// Number of the first shape among the solids.
+    /// Index of the first shape among the solids.
     pub const SOLID_A: usize = 0;
-    /// Number of the second shape among the solids.
+    /// Index of the second shape among the solids.
     pub const SOLID_B: usize = 1;
     /// Row of the first shape's reference point.
     pub const ORIGIN_A: usize = 2;
@@ -301,7 +300,7 @@ pub mod pair {
     pub const INDICES: usize = 8;
 }
 
-/// Places of the numbers of a contact.
+/// Places of the scalars of a contact.
 pub mod row {
     /// Point between the surfaces, relative to the reference point of the class's last tree (3) [m].
     pub const POINT: usize = 0;
@@ -309,7 +308,7 @@ pub mod row {
     pub const DISTANCE: usize = 3;
     /// From the class's first side to its second (3) [–].
     pub const NORMAL: usize = 4;
-    /// Number of the pair.
+    /// Index of the pair.
     pub const PAIR: usize = 7;
     /// Regularised stiffness D of the normal row, or of an edge of the pyramid [kg].
     pub const STIFFNESS: usize = 8;
@@ -327,7 +326,7 @@ pub mod row {
     pub const TANGENTS: usize = 22;
     /// Stiffness of an elliptic cone's contact that slides, along its own slope [kg].
     pub const SOFT: usize = 28;
-    /// Of a round of the solver: which piece of its cost the contact is on.
+    /// Of an iteration of the solver: which piece of its cost the contact is on.
     pub const STATE: usize = 29;
     /// Of a line search: force times the change of `AHEAD` [N·m/s²].
     pub const POWER: usize = 30;
@@ -360,7 +359,7 @@ impl<R> Contacts<R> {
 }
 
 impl<R> Contacts<R> {
-    /// Bounds of the first rows and of the capacities of classes: what a machine may know of `class_rows`.
+    /// Bounds of the first rows and of the capacities of classes: for backends that check the indices of `class_rows`.
     #[inline(always)]
     pub fn row_ends(&self) -> [usize; 2] {
         let capacity = self.classes.iter().map(|class| class.capacity).max();

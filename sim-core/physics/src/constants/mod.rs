@@ -1,4 +1,4 @@
-//! What the physics reads of a model: constants in the precision of the run.
+//! Constants of a model as physics code reads them, in the precision of the run.
 
 pub mod clip;
 pub mod contact;
@@ -58,7 +58,7 @@ recast! {
         pub contact_impedance: Impedance<R>,
         /// Solver options.
         pub solver: Newton<R>,
-        /// Which of all these numbers vary from world to world.
+        /// Which of these scalars vary from world to world.
         pub varying: Varying,
         /// How late commands may be.
         pub delay: Delay,
@@ -88,11 +88,11 @@ pub struct Coupled {
 /// How a body moves in the frame that carries it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
-    /// Turns about its z axis: 1 coordinate, 1 dof.
+    /// Rotates about its z axis: 1 coordinate, 1 dof.
     Revolute,
     /// Slides along its z axis: 1 coordinate, 1 dof.
     Prismatic,
-    /// Turns about its origin: a quaternion, and the angular velocity in the body's axes.
+    /// Rotates about its origin: a quaternion, and the angular velocity in the body's axes.
     Ball,
     /// Moves freely in the world: position and quaternion of its frame; velocity of its centre of mass,
     /// then angular velocity, in world axes.
@@ -135,7 +135,7 @@ recast! {
         pub coord: usize,
         /// Frame at rest in the carrier's frame: columns of the rotation [–].
         pub rotation: [[R; 3]; 3],
-        /// The same rotation, where it only exchanges axes: which of the carrier's each one is, and whether turned round.
+        /// The same rotation, where it only permutes axes: which axis of the carrier each one is, and whether it is reversed.
         pub exchange: Option<[(usize, bool); 3]>,
         /// The same rotation as a quaternion (x, y, z, w) [–].
         pub quat: [R; 4],
@@ -156,7 +156,7 @@ recast! {
     /// A link that is fixed to others, or the only one of a body.
     #[derive(Clone, Debug)]
     pub struct Part<R> {
-        /// Its number among the links.
+        /// Its index among the links.
         pub link: usize,
         /// [kg]
         pub mass: R,
@@ -234,7 +234,7 @@ recast! {
         pub position: [R; 3],
         /// Orientation in the carrier's frame, (x, y, z, w) [–].
         pub quat: [R; 4],
-        /// The link's own centre of mass in the carrier's frame, or relative to the base; its origin if nothing says where that is [m].
+        /// The link's own centre of mass in the carrier's frame, or relative to the base; its origin if the link has no inertial [m].
         pub center: [R; 3],
     }
 }
@@ -290,7 +290,7 @@ recast! {
     /// Dry friction: a force of at most `loss` against motion.
     #[derive(Clone, Debug)]
     pub struct Friction<R> {
-        /// Dof that rubs.
+        /// Dof with friction.
         pub dof: usize,
         /// Bound of the force [N·m or N].
         pub loss: R,
@@ -330,7 +330,7 @@ recast! {
         pub ls_iterations: usize,
         /// Improvement of the cost below which the solver stops: the option × mean inertia × dofs.
         pub tolerance: R,
-        /// How often `f32` corrects its accelerations (`step/solver/refine.rs`).
+        /// Corrections of the accelerations in `f32` (`step/solver/refine.rs`).
         pub refinements: usize,
     }
 }

@@ -1,13 +1,13 @@
-//! THE table of parameters: numbers of a model that may differ from world to world, and change while it runs.
+//! THE table of parameters: scalars of a model that may differ from world to world, and change while it runs.
 //!
 //! Those that a scene names (`Description::params` in `sim-model`) vary; the others are constants of the program.
 
 use super::{Constants, Dof, Sizes};
 
-/// What a parameter has a number for.
+/// What a parameter has a value for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Per {
-    /// A fixed number of entries.
+    /// A fixed count of entries.
     Entry(usize),
     /// Each degree of freedom.
     Dof,
@@ -26,11 +26,11 @@ pub enum Per {
 pub struct ParamRow {
     /// Its name for clients.
     pub name: &'static str,
-    /// What it has a number for.
+    /// What it has a value for.
     pub per: Per,
     /// Unit; `–` for none.
     pub unit: &'static str,
-    /// The least that it may be; none = any number.
+    /// Its lower bound; none = any value.
     pub least: Option<f64>,
     /// What it is.
     pub doc: &'static str,
@@ -38,7 +38,7 @@ pub struct ParamRow {
 
 macro_rules! params {
     ($($param:ident $name:literal $per:expr, $unit:literal $least:expr, $doc:literal;)*) => {
-        /// A number of a model that may vary.
+        /// A parameter that may vary.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum Param {
             $(#[doc = $doc] $param,)*
@@ -94,7 +94,7 @@ params! {
 
 /// Least mass and inertia of a link over those of the scene [–].
 const MASS_SCALE_MIN: f64 = 1e-3;
-/// Stands for no limit of the effort [N·m or N].
+/// The effort limit of a drive without one [N·m or N].
 pub const NO_LIMIT: f64 = 1e30;
 
 impl Param {
@@ -105,7 +105,7 @@ impl Param {
             .find(|param| param.row().name == name)
     }
 
-    /// Numbers of a world that it has.
+    /// Its values per world.
     pub fn columns(self, sizes: &Sizes) -> usize {
         match self.row().per {
             Per::Entry(n) => n,
@@ -117,7 +117,7 @@ impl Param {
         }
     }
 
-    /// What worlds start from; `mu` is of each shape, and there are so many contact sensors.
+    /// Initial values of a world, from the coefficient of friction of each shape and the count of contact sensors.
     pub fn starts(self, m: &Constants<f64>, mu: &[f64], sensors: usize) -> Vec<f64> {
         let of_dofs = |number: fn(&Dof<f64>) -> f64| m.dofs.iter().map(number).collect();
         match self {
@@ -148,7 +148,7 @@ impl Param {
         }
     }
 
-    /// Is it a load that a reset takes away?
+    /// Is it a load, which a reset clears?
     pub fn is_load(self) -> bool {
         self == Param::BodyF
     }
@@ -161,7 +161,7 @@ pub const COMMAND_NOISES: [Param; 3] = [
     Param::JointTargetQdNoise,
 ];
 
-/// Which parameters vary, and where their numbers are among those of a world.
+/// Which parameters vary, and where their values are among those of a world.
 #[derive(Clone, Debug, Default)]
 pub struct Varying {
     first: [Option<usize>; Param::ALL.len()],
@@ -169,19 +169,19 @@ pub struct Varying {
 }
 
 impl Varying {
-    /// Adds a parameter with the numbers that worlds start from.
+    /// Adds a parameter with its initial values.
     pub fn add(&mut self, param: Param, numbers: impl IntoIterator<Item = f64>) {
         self.first[param as usize] = Some(self.starts.len());
         self.starts.extend(numbers.into_iter().map(|x| (param, x)));
     }
 
-    /// The first of its numbers, if it varies.
+    /// Place of its first value, if it varies.
     #[inline(always)]
     pub fn first(&self, param: Param) -> Option<usize> {
         self.first[param as usize]
     }
 
-    /// Its numbers, if it varies.
+    /// Places of its values, if it varies.
     pub fn range(&self, param: Param) -> Option<std::ops::Range<usize>> {
         let first = self.first(param)?;
         let len = self.starts.iter().filter(|(of, _)| *of == param).count();
@@ -194,18 +194,18 @@ impl Varying {
         all.filter(|param| self.first(*param).is_some())
     }
 
-    /// What worlds start from, number by number, each with its parameter.
+    /// Initial values of a world, each with its parameter.
     pub fn starts(&self) -> &[(Param, f64)] {
         &self.starts
     }
 
-    /// Numbers of a world.
+    /// Values per world.
     #[inline(always)]
     pub fn len(&self) -> usize {
         self.starts.len()
     }
 
-    /// Does none vary?
+    /// Does no parameter vary?
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.starts.is_empty()

@@ -1,10 +1,10 @@
-//! The same constants in another precision: scalars are rounded, all else is kept.
+//! The same constants in another precision: scalars are rounded, everything else is copied.
 
 use crate::lane::{Real, Tables};
 
-/// What has scalars of one precision can be had in another.
+/// A type with scalars of one precision that converts to another precision.
 pub trait Recast<S> {
-    /// The same with scalars of precision `S`.
+    /// The type with scalars of precision `S`.
     type Out;
     /// The same, rounded.
     fn recast(&self) -> Self::Out;

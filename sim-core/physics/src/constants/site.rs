@@ -1,4 +1,4 @@
-//! Frames of interest, as the text of physics reads them.
+//! Sites: frames of interest, as physics code reads them.
 
 use super::recast::{Recast, recast, same};
 
@@ -22,7 +22,7 @@ recast! {
 pub struct Column {
     /// The dof.
     pub dof: usize,
-    /// Does it move that frame, and not the site?
+    /// Does it move that frame instead of the site?
     pub is_of_other: bool,
 }
 
@@ -30,7 +30,7 @@ recast! {
     /// A frame on a body, or in the world.
     #[derive(Clone, Debug)]
     pub struct Mount<R> {
-        /// The body that carries it; none for what stands still.
+        /// The body that carries it; none for a static frame.
         pub body: Option<usize>,
         /// The robot of that body.
         pub tree: Option<usize>,

@@ -1,4 +1,4 @@
-//! How many of everything a model has: what the shapes of arrays are made of.
+//! Sizes of a model, which make the shapes of arrays.
 
 /// Lengths of a model's arrays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,8 +1,8 @@
-//! The CPU machine: a mask of active worlds, and scratch rows of one block of worlds.
+//! The execution context of the CPU: a mask of active worlds, and scratch rows of one block of worlds.
 
 use super::{Cx, Fixed, Lane, Real, Table, Tables};
 
-/// Runs the text natively: loops are Rust loops, blocks are masks.
+/// Runs physics code natively: loops are Rust loops, blocks are masks.
 pub struct Cpu<'a, F: Lane> {
     mask: F::Mask,
     memory: &'a mut [F],
@@ -10,7 +10,7 @@ pub struct Cpu<'a, F: Lane> {
 }
 
 impl<'a, F: Lane> Cpu<'a, F> {
-    /// A machine with every world active, over scratch memory for the tables of the text and the tables of a model.
+    /// A context with every world active, over scratch memory and the tables of a model.
     #[inline(always)]
     pub fn new(memory: &'a mut [F], tables: &'a Tables<F::Real>) -> Self {
         Cpu {
@@ -29,8 +29,7 @@ impl<'a, F: Lane> Cpu<'a, F> {
         &mut self.memory[t.base + row * t.stride + k]
     }
 
-    /// Rows of a list per world. That of a kept list is read whenever it is used, so that two handles on
-    /// one list agree.
+    /// Rows of a list per world. The count of a kept list is read whenever it is used, so that two handles of one list agree.
     #[inline(always)]
     fn count(&self, list: &Rows<F>) -> F {
         match list.home {
@@ -46,7 +45,7 @@ pub struct Rows<F> {
     capacity: usize,
     /// Rows per world, those that did not fit included, where the list is not kept.
     count: F,
-    /// Where the count of a kept list stands.
+    /// Place of the count of a kept list.
     home: Option<usize>,
 }
 
@@ -58,9 +57,9 @@ pub struct Fresh<F> {
     shared: Option<usize>,
 }
 
-/// An open loop: over the rows of a list, or a number of rounds.
+/// An open loop: over the rows of a list, or over indices.
 pub struct Loop<F: Lane> {
-    /// Index of round 0.
+    /// Index of iteration 0.
     first: usize,
     round: usize,
     rounds: usize,
@@ -134,7 +133,7 @@ impl<F: Lane> Cx for Cpu<'_, F> {
     #[inline(always)]
     fn pick(&mut self, t: Fixed, row: F, k: usize) -> F {
         debug_assert!(k < t.stride, "number {k} of {t:?}");
-        // a number that is none becomes 0
+        // NaN becomes 0
         let row = row.max(F::c(0.0)).min(F::c(t.rows as f64 - 1.0));
         let numbers = &self.tables.numbers[t.base + k..t.base + t.rows * t.stride];
         F::gather(numbers, row * F::c(t.stride as f64))
@@ -169,9 +168,9 @@ impl<F: Lane> Cx for Cpu<'_, F> {
     }
     #[inline(always)]
     fn add_triples(&mut self, t: Table, row: usize, k: usize, by: [F; 3], cells: &mut [F]) {
-        // -0 + x is x, where 0 + x would make 0 of -0: what other worlds add changes no bit
+        // -0 + x is x for every x, while 0 + -0 is 0: inactive worlds keep their bits
         let (first, mask, zero) = (t.base + row * t.stride + k, self.mask, F::c(-0.0));
-        // one check of the bounds instead of one a number
+        // one check of the bounds instead of one per scalar
         let (triples, _) = self.memory[first..first + 3 * cells.len()].as_chunks::<3>();
         for (cell, triple) in cells.iter_mut().zip(triples) {
             for i in 0..3 {
@@ -321,7 +320,7 @@ impl<F: Lane> Cx for Cpu<'_, F> {
     fn next(&mut self, l: &mut Loop<F>) -> Option<usize> {
         let round = l.round;
         if round > 0 {
-            // a world that stopped in the last round stays stopped; one whose rows ended stays so too
+            // a world that stopped, or whose rows ended, in the last iteration stays out
             l.live = self.mask;
         }
         if round < l.rounds {

@@ -1,12 +1,14 @@
-//! The machine that the one text of physics is written for.
+//! What physics code is written in: scalars of many worlds ([`Num`]) and an execution context ([`Cx`]).
 //!
-//! Equations are plain functions over [`Num`], one value per world. What needs control flow or
-//! scratch memory takes a machine [`Cx`] and the macros [`each!`], [`times!`], [`span!`], [`push!`],
-//! [`when!`] and [`break_if!`]. Three machines run the same text: [`scalar`] numbers (`f64`, the reference,
-//! and `f32`), [`simd`] registers with one world a lane, and the recording one of crate `sim-record`, which turns it into WGSL.
+//! Equations are plain functions over [`Num`], one value per world. Code with control flow or scratch memory takes a [`Cx`]
+//! and the macros [`each!`], [`times!`], [`span!`], [`push!`], [`when!`] and [`break_if!`]. Three backends run it:
 //!
-//! A run-time `if` on a world's value does not type-check: select with [`Num::select`], or open a
-//! block with [`when!`]. Loops over the tree and branches on model constants are native Rust.
+//! - [`scalar`]: one world at a time, in `f64` (the reference) and `f32`,
+//! - [`simd`]: registers with one world per lane,
+//! - the recorder of crate `sim-record`, which writes WGSL.
+//!
+//! A run-time `if` on a world's value does not type-check: select with [`Num::select`], or open a block with [`when!`]. Loops
+//! over the tree and branches on model constants are native Rust.
 
 pub mod memory;
 pub mod scalar;
@@ -16,7 +18,7 @@ use std::ops::{Add, BitAnd, BitOr, Mul, Neg, Not, Sub};
 
 /// The precision in which constants of the model are kept: `f32` or `f64`.
 pub trait Real: Copy + Default + PartialOrd + Send + Sync + std::fmt::Debug + 'static {
-    /// Distance from 1 to the next larger number.
+    /// Distance from 1 to the next larger value.
     const EPSILON: f64;
     /// True for `f64`.
     const DOUBLE: bool;
@@ -24,7 +26,7 @@ pub trait Real: Copy + Default + PartialOrd + Send + Sync + std::fmt::Debug + 's
     fn of(x: f64) -> Self;
     /// Widens to a double.
     fn to_f64(self) -> f64;
-    /// The whole number that it is; 0 for what is below 0 or no number.
+    /// As an integer, rounded towards 0; 0 for negative values and NaN.
     #[inline(always)]
     fn to_usize(self) -> usize {
         self.to_f64() as usize
@@ -57,16 +59,16 @@ impl Real for f64 {
     }
 }
 
-/// A number of every world of a block: what the equations are written in.
+/// A scalar of every world of a block.
 ///
-/// All operations are correctly rounded (IEEE 754) on the CPU, `fma` included, so that a world's
-/// result does not depend on the width of the block it runs in.
+/// All operations are correctly rounded (IEEE 754) on the CPU, `fma` included: the result of a world does not depend on the
+/// width of its block.
 pub trait Num:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
     /// Precision of constants.
     type Real: Real;
-    /// A truth value of every world; `&`, `|` and `!` combine them.
+    /// A boolean of every world; `&`, `|` and `!` combine masks.
     type Mask: Copy
         + BitAnd<Output = Self::Mask>
         + BitOr<Output = Self::Mask>
@@ -87,23 +89,23 @@ pub trait Num:
     fn div(self, b: Self) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
-    /// The smaller; `b` where either is not a number.
+    /// The smaller; `b` where either is NaN.
     fn min(self, b: Self) -> Self;
-    /// The larger; `b` where either is not a number.
+    /// The larger; `b` where either is NaN.
     fn max(self, b: Self) -> Self;
     /// Absolute value.
     fn abs(self) -> Self;
     /// Nearest integer, ties to even.
     fn round(self) -> Self;
-    /// `self < b`, false where either is not a number.
+    /// `self < b`, false where either is NaN.
     fn lt(self, b: Self) -> Self::Mask;
     /// `a` where the mask holds, else `b`.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
 
     /// The angle of the point (x, self) for self ≥ 0, x ≥ 0, not both 0: in [0, π/2].
     ///
-    /// atan(t) of the smaller over the larger; past tan(π/8) turned back by π/4, so that the Taylor
-    /// series is cut where its remainder is below an eighth of an ulp.
+    /// The Taylor series of atan(t), where t is the smaller over the larger. Past tan(π/8) the angle is reduced by π/4. The
+    /// remainder is below an eighth of an ulp.
     #[inline(always)]
     fn atan2_positive(self, x: Self) -> Self {
         let (one, quarter) = (Self::c(1.0), Self::c(std::f64::consts::FRAC_PI_4));
@@ -123,11 +125,10 @@ pub trait Num:
         Self::select(steep, Self::c(std::f64::consts::FRAC_PI_2) - angle, angle)
     }
 
-    /// Sine and cosine, by the project's own polynomials: the same on every machine.
+    /// Sine and cosine by polynomials of our own: the same bits on every backend.
     ///
-    /// Reduction to [-π/4, π/4] by three parts of π/2 (Cody and Waite 1980), then the Taylor
-    /// polynomials, cut where the remainder is below an eighth of an ulp.
-    /// Good to about an ulp while |self| < 10⁴ in `f32`, 10⁸ in `f64`.
+    /// Reduction to [-π/4, π/4] by three parts of π/2 (Cody and Waite 1980), then Taylor polynomials with a remainder below an
+    /// eighth of an ulp. The error is about an ulp while |self| < 10⁴ in `f32`, 10⁸ in `f64`.
     #[inline(always)]
     fn sincos(self) -> (Self, Self) {
         let n = (self * Self::c(std::f64::consts::FRAC_2_PI)).round();
@@ -144,7 +145,7 @@ pub trait Num:
         }
         let s = (r * r2).fma(s, r);
         let c = r2.fma(c, Self::c(1.0));
-        // n mod 4 = swap + 2 half, by arithmetic that every machine has
+        // n mod 4 = swap + 2 half, by arithmetic that every backend has
         let quadrant = Self::c(4.0).fnma(n.fma(Self::c(0.25), Self::c(-0.375)).round(), n);
         let half = quadrant.fma(Self::c(0.5), Self::c(-0.25)).round();
         let swap = Self::c(2.0).fnma(half, quadrant);
@@ -163,7 +164,7 @@ fn sign(i: usize) -> f64 {
     if i.is_multiple_of(2) { 1.0 } else { -1.0 }
 }
 
-/// π/2 as a sum of numbers of the given precision, largest first.
+/// π/2 as a sum of three scalars of the given precision, largest first.
 #[inline(always)]
 fn half_pi_parts<R: Real>() -> [f64; 3] {
     if R::DOUBLE {
@@ -194,7 +195,7 @@ const INVERSE_FACTORIAL: [f64; 18] = {
     t
 };
 
-/// A number that the CPU can load, store and look into: one register of worlds.
+/// A scalar of worlds in a register: the CPU can load and store it, and read single lanes.
 pub trait Lane: Num + Default + Send + Sync + 'static {
     /// Worlds in a register.
     const WIDTH: usize;
@@ -202,61 +203,61 @@ pub trait Lane: Num + Default + Send + Sync + 'static {
     fn load(from: &[Self::Real]) -> Self;
     /// Writes `WIDTH` neighbouring values.
     fn store(self, to: &mut [Self::Real]);
-    /// Writes four numbers of every world side by side: those of world w from `w * stride` on.
+    /// Writes four scalars of every world next to each other: those of world w from `w * stride` on.
     fn store_rows(numbers: [Self; 4], to: &mut [Self::Real], stride: usize);
     /// The mask that holds in every world.
     fn all() -> Self::Mask;
     /// Does the mask hold in any world?
     fn any(mask: Self::Mask) -> bool;
-    /// The worlds of the mask, one bit a lane, lane 0 lowest.
+    /// The mask as bits, lane 0 lowest.
     fn bits(mask: Self::Mask) -> u32;
-    /// The number of one world.
+    /// The scalar of one world.
     fn lane(self, lane: usize) -> Self::Real;
-    /// Writes the number of each world of the mask to its place in a register of `to`: number `rows * stride`,
-    /// where `rows` are whole. The numbers of the other worlds stay.
+    /// Writes the scalar of each world of the mask to its lane of register `rows * stride` of `to`, where `rows` are whole. Other
+    /// worlds keep theirs.
     fn scatter(self, mask: Self::Mask, to: &mut [Self], rows: Self, stride: usize);
-    /// Reads one number for every world: that at `places`, which are whole and lie inside.
+    /// Reads one scalar for every world, at `places`: whole, and inside `from`.
     fn gather(from: &[Self::Real], places: Self) -> Self;
 }
 
-/// A table of rows in scratch memory: `rows` rows of `stride` numbers, one value per world.
+/// A table in scratch memory: `rows` rows of `stride` scalars, each with a value per world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Table {
-    /// First number of row 0.
+    /// First scalar of row 0.
     pub base: usize,
-    /// Numbers in a row.
+    /// Scalars per row.
     pub stride: usize,
     /// Rows that fit.
     pub rows: usize,
 }
 
-/// A table of the model: the same for every world, read at an index that is found at run time.
+/// A table of the model: the same for every world, read at a run-time index.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Fixed {
-    /// First number of row 0.
+    /// First scalar of row 0.
     pub base: usize,
-    /// Numbers in a row.
+    /// Scalars per row.
     pub stride: usize,
-    /// Its rows.
+    /// Rows.
     pub rows: usize,
 }
 
-/// The tables of a model, one after another: of numbers, and of indices into tables.
+/// The tables of a model, one after another: scalars, and indices into tables.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tables<R> {
-    /// What [`Cx::constant`] and [`Cx::pick`] read.
+    /// For [`Cx::constant`] and [`Cx::pick`].
     pub numbers: Vec<R>,
-    /// What [`Cx::index`] reads.
+    /// For [`Cx::index`].
     pub indices: Vec<u32>,
 }
 
-/// The machine: variables, scratch rows, and control flow in which every world stops by itself.
+/// The execution context: variables, scratch rows, and control flow with a mask of active worlds.
 ///
-/// A stop is sticky: a world that has left a loop does not change because its neighbours go on.
+/// A world that has left a loop stays out: it does not change while other worlds of its block iterate.
 pub trait Cx: Sized {
-    /// One number per world.
+    /// A scalar per world.
     type F: Num;
-    /// A mutable cell, for what changes inside a block or from one round of a loop to the next.
+    /// A mutable cell, for values that change inside a block or between iterations of a loop.
     type V: Copy;
     /// A row or loop index, the same in all worlds.
     type I: Copy;
@@ -275,19 +276,19 @@ pub trait Cx: Sized {
     fn get(&self, v: &Self::V) -> Self::F;
     /// Assigns in the active worlds only.
     fn set(&mut self, v: &mut Self::V, x: Self::F);
-    /// Assigns where the inactive worlds need no guard: `x` is what they have already, or nobody reads
-    /// it there. A masked store costs more; see [`Cx::only`].
+    /// Assigns without a mask, where inactive worlds need no guard: `x` is the value they have already, or it is not read there.
+    /// Cheaper than [`Cx::set`]; see [`Cx::only`].
     fn put(&mut self, v: &mut Self::V, x: Self::F);
     /// `x` in the active worlds, 0 elsewhere.
     fn only(&mut self, x: Self::F) -> Self::F;
 
     /// A constant index.
     fn at(&self, i: usize) -> Self::I;
-    /// An index as a number.
+    /// An index as a scalar.
     fn number(&mut self, i: Self::I) -> Self::F;
-    /// Number `k` of a row of a table of the model.
+    /// Scalar `k` of a row of a table of the model.
     fn constant(&mut self, t: Fixed, row: Self::I, k: usize) -> Self::F;
-    /// Neighbouring numbers of a row of a table of the model, from number `k` on.
+    /// Neighbouring scalars of a row of a table of the model, from scalar `k` on.
     #[inline(always)]
     fn constants<const N: usize>(&mut self, t: Fixed, row: Self::I, k: usize) -> [Self::F; N] {
         let mut numbers = [Self::F::c(0.0); N];
@@ -296,14 +297,14 @@ pub trait Cx: Sized {
         }
         numbers
     }
-    /// Number `k` of a row of a table of the model, another row in each world: `row` is whole; past the ends
-    /// it is the nearest. Where a world is inactive the result is undefined.
+    /// Scalar `k` of a row of a table of the model, another row in each world. `row` is whole, and clamped to the table. The
+    /// result is undefined in inactive worlds.
     fn pick(&mut self, t: Fixed, row: Self::F, k: usize) -> Self::F;
     /// Index `k` of a row of an index table of the model, below `end`.
     fn index(&mut self, t: Fixed, row: Self::I, k: usize, end: usize) -> Self::I;
-    /// Reads number `k` of a row.
+    /// Reads scalar `k` of a row.
     fn load(&mut self, t: Table, row: Self::I, k: usize) -> Self::F;
-    /// Reads three neighbouring numbers of a row, from number `k` on.
+    /// Reads three neighbouring scalars of a row, from scalar `k` on.
     #[inline(always)]
     fn load3(&mut self, t: Table, row: Self::I, k: usize) -> [Self::F; 3] {
         [
@@ -312,8 +313,8 @@ pub trait Cx: Sized {
             self.load(t, row, k + 2),
         ]
     }
-    /// Adds to each cell three neighbouring numbers of a row times three others, in the active worlds: those of the first
-    /// cell are from number `k` on, those of the next follow. Inactive worlds need no guard; see [`Cx::put`].
+    /// Adds to cell c, in the active worlds, the dot product of `by` and the three scalars of a row from `k + 3 c` on. Inactive
+    /// worlds need no guard; see [`Cx::put`].
     #[inline(always)]
     fn add_triples(
         &mut self,
@@ -332,8 +333,8 @@ pub trait Cx: Sized {
             self.put(cell, sum);
         }
     }
-    /// `sum` and three neighbouring numbers of a row times each x: those of the first x are from number `k` on, those of
-    /// the next follow. Where a world is inactive the result is undefined.
+    /// `sum` plus, for each x(c), the three scalars of a row from `k + 3 c` on times x(c). The result is undefined in inactive
+    /// worlds.
     #[inline(always)]
     fn sum_triples(
         &mut self,
@@ -352,11 +353,11 @@ pub trait Cx: Sized {
         }
         sum
     }
-    /// Writes number `k` of a row, in the active worlds only.
+    /// Writes scalar `k` of a row, in the active worlds only.
     fn store(&mut self, t: Table, row: Self::I, k: usize, x: Self::F);
-    /// Writes number `k` of a row; what inactive worlds hold there becomes undefined.
+    /// Writes scalar `k` of a row; it becomes undefined in inactive worlds.
     fn fill(&mut self, t: Table, row: Self::I, k: usize, x: Self::F);
-    /// Writes neighbouring numbers of a row, from number `k` on, as [`Cx::fill`] does.
+    /// Writes neighbouring scalars of a row, from scalar `k` on, as [`Cx::fill`] does.
     #[inline(always)]
     fn fill_all<const N: usize>(
         &mut self,
@@ -369,9 +370,9 @@ pub trait Cx: Sized {
             self.fill(t, row, k + i, x);
         }
     }
-    /// First write to number `k` of a fresh row.
+    /// First write to scalar `k` of a fresh row.
     fn init(&mut self, t: Table, row: Self::Row, k: usize, x: Self::F);
-    /// First writes to the leading numbers of a fresh row.
+    /// First writes to the leading scalars of a fresh row.
     #[inline(always)]
     fn init_all(&mut self, t: Table, row: Self::Row, numbers: &[Self::F]) {
         for (k, x) in numbers.iter().enumerate() {
@@ -379,10 +380,10 @@ pub trait Cx: Sized {
         }
     }
 
-    /// An empty list of at most `capacity` rows; what does not fit is counted, not stored.
+    /// An empty list of at most `capacity` rows; rows that do not fit are counted, not stored.
     fn list(&mut self, capacity: usize) -> Self::List;
-    /// A list that outlasts the text: its rows are `first..first + capacity` of its tables, and its length
-    /// is number 0 of row `at` of `counts`, read whenever the list is used.
+    /// A list that outlasts the stage: its rows are `first..first + capacity` of its tables, and its length is scalar 0 of row
+    /// `at` of `counts`, read whenever the list is used.
     fn kept(&mut self, counts: Table, at: Self::I, first: Self::I, capacity: Self::I)
     -> Self::List;
     /// Opens a block for the worlds in `mask`, with a fresh row; see [`push!`].
@@ -395,8 +396,8 @@ pub trait Cx: Sized {
     fn pushed(&mut self, list: &Self::List) -> Self::F;
     /// Opens a block for the worlds in `mask`; false if there are none. See [`when!`].
     fn enter(&mut self, mask: MaskOf<Self>) -> (Self::Block, bool);
-    /// False if the mask holds in no active world: what only such worlds need may be left out then. A machine that
-    /// cannot know says true, so a text must give every world the same numbers either way.
+    /// False if the mask holds in no active world, so work for such worlds may be skipped. A backend that cannot know returns
+    /// true, so results must be the same either way.
     #[inline(always)]
     fn anywhere(&mut self, _mask: MaskOf<Self>) -> bool {
         true
@@ -406,17 +407,17 @@ pub trait Cx: Sized {
 
     /// Opens a loop over the rows of a list; see [`each!`].
     fn rows(&mut self, list: &Self::List) -> Self::Loop;
-    /// Opens a loop of at most `n` rounds; see [`times!`].
+    /// Opens a loop of at most `n` iterations; see [`times!`].
     fn times(&mut self, n: usize) -> Self::Loop;
-    /// Opens a loop with a round for each index of `first..end`; see [`span!`].
+    /// Opens a loop over the indices `first..end`; see [`span!`].
     fn span(&mut self, first: Self::I, end: Self::I) -> Self::Loop;
-    /// Enters the next round, or closes the loop.
+    /// Enters the next iteration, or closes the loop.
     fn next(&mut self, l: &mut Self::Loop) -> Option<Self::I>;
     /// Ends the loop for the worlds in `mask`; true if none is left. See [`break_if!`].
     fn stop(&mut self, mask: MaskOf<Self>) -> bool;
 }
 
-/// The mask of a machine's numbers.
+/// The mask of an execution context's scalars.
 pub type MaskOf<C> = <<C as Cx>::F as Num>::Mask;
 
 /// `each!(cx, row in list, { … })`: the body for every row of the list.
@@ -428,7 +429,7 @@ macro_rules! each {
     }};
 }
 
-/// `times!(cx, n, { … })` or `times!(cx, i in n, { … })`: at most `n` rounds; see [`break_if!`].
+/// `times!(cx, n, { … })` or `times!(cx, i in n, { … })`: at most `n` iterations; see [`break_if!`].
 #[macro_export]
 macro_rules! times {
     ($cx:ident, $i:ident in $n:expr, $body:block) => {{
@@ -441,7 +442,7 @@ macro_rules! times {
     }};
 }
 
-/// `span!(cx, i in first, end, { … })`: a round for each index from `first` to before `end`.
+/// `span!(cx, i in first, end, { … })`: the body for every index from `first` to before `end`.
 #[macro_export]
 macro_rules! span {
     ($cx:ident, $i:ident in $first:expr, $end:expr, $body:block) => {{

@@ -27,7 +27,7 @@ macro_rules! scalar {
             fn sqrt(self) -> Self {
                 <$real>::sqrt(self)
             }
-            // not `f32::min`: that one returns the number where the other is not one, and x86 does not
+            // as x86 does: `b` where either is NaN; `f32::min` would return the other
             #[inline(always)]
             fn min(self, b: Self) -> Self {
                 if self < b { self } else { b }

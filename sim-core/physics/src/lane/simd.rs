@@ -1,10 +1,10 @@
-//! One world a lane of an x86 register: [`F32x8`] (AVX2) and [`F32x16`] (AVX-512).
+//! One world per lane of an x86 register: [`F32x8`] (AVX2) and [`F32x16`] (AVX-512).
 //!
 //! SAFETY of every intrinsic here: the types are used only below a function that enables their
-//! target features (`backend/cpu/dispatch.rs`), after the machine was asked whether it has them;
+//! target features (`backend/cpu/dispatch.rs`), after a check that the processor has them;
 //! everything above is `#[inline(always)]`, so that it inherits the features.
 #![cfg(target_arch = "x86_64")]
-#![allow(clippy::undocumented_unsafe_blocks)] // one proof serves all blocks: the module's text
+#![allow(clippy::undocumented_unsafe_blocks)] // one proof serves all blocks: the module's documentation
 
 use super::{Lane, Num};
 use std::arch::x86_64::*;
@@ -124,13 +124,13 @@ macro_rules! register {
             #[inline(always)]
             fn store_rows(numbers: [Self; 4], to: &mut [f32], stride: usize) {
                 let [a, b, c, d] = numbers;
-                // blocks of four worlds; world 4 l + r of a register stands in block l of `worlds[r]`
+                // blocks of four worlds; world 4 l + r of a register is in block l of `worlds[r]`
                 let worlds = unsafe { $transpose([a.0, b.0, c.0, d.0]) };
                 let mut rows = to;
                 for l in 0..$width / 4 {
                     for r in 0..4 {
                         let block = unsafe { $block(worlds[r], l) };
-                        // the row holds four numbers (the index is checked)
+                        // the row holds four scalars (the index is checked)
                         unsafe { _mm_storeu_ps(rows[..4].as_mut_ptr(), block) };
                         if 4 * l + r + 1 < $width {
                             rows = &mut rows[stride..];
@@ -158,13 +158,13 @@ macro_rules! register {
             }
             #[inline(always)]
             fn scatter(self, mask: $mask, to: &mut [Self], rows: Self, stride: usize) {
-                // SAFETY: a register is transparent over $width numbers, those of its worlds in order
+                // SAFETY: a register is transparent over $width scalars, those of its worlds in order
                 let to = unsafe { std::slice::from_raw_parts_mut(to.as_mut_ptr().cast::<f32>(), to.len() * $width) };
                 unsafe { $scatter(self.0, mask, to, rows.0, stride * $width) }
             }
             #[inline(always)]
             fn gather(from: &[f32], places: Self) -> Self {
-                // inside, whatever was asked for: a number that is none becomes 0
+                // clamped to the slice; NaN becomes 0
                 let last = from.len().min(1 << 24) as f32 - 1.0;
                 assert!(last >= 0.0, "nothing to read");
                 let places = places.max(Self::k(0.0)).min(Self::k(last));
@@ -194,7 +194,7 @@ register!(
     masks [any16 all16 bits16], places [gather16 scatter16]
 );
 
-/// Truth values of eight worlds: all bits of a lane, or none. AVX-512 has registers for masks, which Rust knows as `u16`.
+/// Booleans of eight worlds: all bits of a lane, or none. AVX-512 has registers for masks, which are `u16` in Rust.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
 pub struct Mask8(__m256);
@@ -253,13 +253,13 @@ unsafe fn any8(a: Mask8) -> bool {
 unsafe fn bits8(a: Mask8) -> u32 {
     unsafe { _mm256_movemask_ps(a.0) as u32 }
 }
-/// Numbers of `from` at whole places inside it.
+/// Scalars of `from` at whole places inside it.
 #[inline(always)]
 unsafe fn gather8(from: &[f32], places: __m256) -> __m256 {
     unsafe { _mm256_i32gather_ps::<4>(from.as_ptr(), _mm256_cvtps_epi32(places)) }
 }
 
-/// Writes the number of each world w of the mask to `to[rows * stride + w]`, where `rows` are whole.
+/// Writes the scalar of each world w of the mask to `to[rows * stride + w]`, where `rows` are whole.
 #[inline(always)]
 unsafe fn scatter8(x: __m256, mask: Mask8, to: &mut [f32], rows: __m256, stride: usize) {
     let (mut numbers, mut places) = ([0.0; 8], [0u32; 8]);
@@ -275,7 +275,7 @@ unsafe fn scatter8(x: __m256, mask: Mask8, to: &mut [f32], rows: __m256, stride:
     }
 }
 
-/// In each block of four worlds: from numbers by world to worlds by number.
+/// In each block of four worlds: from scalars by world to worlds by scalar.
 #[inline(always)]
 unsafe fn transpose8([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
     unsafe {

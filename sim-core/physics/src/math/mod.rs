@@ -1,4 +1,4 @@
-//! Small algebra, written once for every machine: vectors, rotations, spatial inertia, factors.
+//! Small algebra, written once for every backend: vectors, rotations, spatial inertia, factors.
 
 pub mod factor;
 pub mod quat;

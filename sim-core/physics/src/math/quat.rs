@@ -12,7 +12,7 @@ pub fn constant<F: Num>(a: Quat<F::Real>) -> Quat<F> {
     [F::k(a[0]), F::k(a[1]), F::k(a[2]), F::k(a[3])]
 }
 
-/// Hamilton's product: first `b`, then `a`.
+/// Hamilton's product: the rotation `b`, then `a`.
 #[inline(always)]
 pub fn mul<F: Num>(a: Quat<F>, b: Quat<F>) -> Quat<F> {
     let ([ax, ay, az, aw], [bx, by, bz, bw]) = (a, b);
@@ -24,7 +24,7 @@ pub fn mul<F: Num>(a: Quat<F>, b: Quat<F>) -> Quat<F> {
     ]
 }
 
-/// `a` after a turn about its own z by an angle whose half has this sine and cosine.
+/// `a` after a rotation about its own z, given sine and cosine of half the angle.
 #[inline(always)]
 pub fn turn_z<F: Num>(a: Quat<F>, sin_half: F, cos_half: F) -> Quat<F> {
     let [x, y, z, w] = a;
@@ -51,7 +51,7 @@ pub fn matrix<F: Num>(q: Quat<F>) -> Mat3<F> {
     ])
 }
 
-/// The quaternion after turning with angular velocity `spin` (in its own axes) for a time, made unit again.
+/// The quaternion after rotating with angular velocity `spin` (in its own axes) for a time, normalised.
 #[inline(always)]
 pub fn turned<F: Num>(q: Quat<F>, spin: Vec3<F>, time: F) -> Quat<F> {
     let r = mul(q, exp(spin * time));
@@ -71,7 +71,7 @@ pub fn conjugate<F: Num>(q: Quat<F>) -> Quat<F> {
     [-q[0], -q[1], -q[2], q[3]]
 }
 
-/// The turn by a rotation vector [rad].
+/// The rotation of a rotation vector [rad].
 #[inline(always)]
 pub fn exp<F: Num>(turn: Vec3<F>) -> Quat<F> {
     let half = F::c(0.5);
@@ -88,7 +88,7 @@ pub fn exp<F: Num>(turn: Vec3<F>) -> Quat<F> {
 #[inline(always)]
 pub fn log<F: Num>(q: Quat<F>) -> Vec3<F> {
     let (zero, two) = (F::c(0.0), F::c(2.0));
-    // q and -q are the same turn: take the short way
+    // q and -q are the same rotation: take the short way
     let w = q[3];
     let sign = F::select(w.lt(zero), -two, two);
     let axis = Vec3([q[0], q[1], q[2]]);
@@ -134,7 +134,7 @@ mod tests {
             let error = (0..3)
                 .map(|i| (back[i] - turn[i]).abs())
                 .fold(0.0, f64::max);
-            // near a half turn the angle is that of a small cosine
+            // near π the angle is that of a small cosine
             assert!(
                 error <= 4.0 * f64::EPSILON * angle.max(1e-16),
                 "{angle}: {back:?}"

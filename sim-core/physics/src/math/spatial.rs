@@ -49,7 +49,7 @@ impl<F: Num> Spatial<F> {
         self[LINEAR].dot(force[LINEAR]) + self[ANGULAR].dot(force[ANGULAR])
     }
 
-    /// Rate of change of a motion vector that is carried along with velocity `v`: v × m.
+    /// Rate of change of a motion vector that moves along with this velocity: v × m.
     #[inline(always)]
     pub fn cross_motion(&self, m: Self) -> Self {
         let v = self;
@@ -60,7 +60,7 @@ impl<F: Num> Spatial<F> {
         ])
     }
 
-    /// v ×* f + g, the rate of change of a force vector that is carried along, added to another.
+    /// v ×* f + g: the rate of change of a force vector that moves along with this velocity, plus another.
     #[inline(always)]
     pub fn cross_force_add(&self, f: Self, g: Self) -> Self {
         let v = self;

@@ -1,7 +1,7 @@
 //! Vectors and rotation matrices. A matrix is its three columns.
 //!
-//! Operators round once per operation. The named methods fuse a product into the sum that follows it; equations choose
-//! between the two, and no other order of operations is used anywhere.
+//! Operators round once per operation. Named methods fuse a product into the sum that follows it. Equations choose between
+//! the two, so the order of operations is the same on every backend.
 
 use crate::lane::{Cx, Num, Table};
 use bytemuck::TransparentWrapper;

@@ -5,9 +5,9 @@
 //! smooth = joint_f + drive - damping q̇ - bias + Σ Jᵀ body_f
 //! ```
 //!
-//! The target of a ball is a rotation vector; its error is the rotation vector from here to there.
+//! The target of a ball is a rotation vector. Its error is the rotation vector from the present rotation to the target.
 
-use super::command::{Kind, acting};
+use super::command::{Kind, command_of};
 use super::kinematics::read_quat;
 use super::{BlockOf, ConstantsOf, Stage, param};
 use crate::arrays::{Array as A, Workspace};
@@ -43,7 +43,7 @@ impl Stage for Actuation {
     }
 }
 
-/// What drives the joints, for output.
+/// Joint forces of commands and drives, for output.
 pub struct JointTorque;
 
 impl Stage for JointTorque {
@@ -64,8 +64,10 @@ impl Stage for JointTorque {
     }
 }
 
+/// Writes `smooth_force`: applied and drive forces, less damping and bias.
 #[inline(always)]
 fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    // damping of joints is passive: the effort limit does not clamp it
     for body in &m.bodies {
         let torques = torques(cx, m, b, body);
         for (j, torque) in body.dofs().zip(torques) {
@@ -75,11 +77,11 @@ fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         }
     }
     if let Some(first) = m.varying.first(Param::BodyF) {
-        push(m, &b.params, first, &mut b.work);
+        add_link_forces(m, &b.params, first, &mut b.work);
     }
 }
 
-/// What the joints are driven by, for output.
+/// Writes `joint_torque`: applied and drive forces alone.
 #[inline(always)]
 fn joint_torque<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     for body in &m.bodies {
@@ -88,7 +90,7 @@ fn joint_torque<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     }
 }
 
-/// Applied and drive forces of the dofs of a body, as many as it has.
+/// Applied and drive forces of the dofs of a body; the rest is 0.
 #[inline(always)]
 fn torques<C: Cx>(
     cx: &mut C,
@@ -100,19 +102,21 @@ fn torques<C: Cx>(
     let first = body.dof;
     match body.motion {
         Motion::Revolute | Motion::Prismatic => {
-            let target = acting::<C>(m, b, Kind::Position, first);
+            let target = command_of::<C>(m, b, Kind::Position, first);
             let error = target - cx.get(&b.joint_q[body.coord]);
-            torques[0] = driven(cx, m, b, first, error);
+            torques[0] = joint_force(cx, m, b, first, error);
         }
         Motion::Ball => {
+            // three drives, one about each axis of the body
             let errors = ball_error(cx, m, b, body.coord, first);
             for k in 0..3 {
-                torques[k] = driven(cx, m, b, first + k, errors[k]);
+                torques[k] = joint_force(cx, m, b, first + k, errors[k]);
             }
         }
+        // nothing drives a free body
         Motion::Free => {
             for k in 0..6 {
-                torques[k] = acting::<C>(m, b, Kind::Force, first + k);
+                torques[k] = command_of::<C>(m, b, Kind::Force, first + k);
             }
         }
     }
@@ -121,11 +125,18 @@ fn torques<C: Cx>(
 
 /// Applied and drive force of dof `j` at this position error.
 #[inline(always)]
-fn driven<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, j: usize, error: C::F) -> C::F {
+fn joint_force<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    j: usize,
+    error: C::F,
+) -> C::F {
     let dof = &m.dofs[j];
     let qd = cx.get(&b.joint_qd[j]);
+    // kd damps towards 0 where the drive has no velocity target
     let rate = if dof.follows_velocity {
-        acting::<C>(m, b, Kind::Velocity, j) - qd
+        command_of::<C>(m, b, Kind::Velocity, j) - qd
     } else {
         -qd
     };
@@ -137,15 +148,21 @@ fn driven<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, j: usize, error
         Some(first) => Some(b.params[first + j]),
         None => dof.effort_limit.map(C::F::k),
     };
+    // the limit is that of the drive alone (MuJoCo: `actfrcrange`); `joint_f` is not clamped
     if let Some(limit) = limit {
         drive = drive.min(limit).max(-limit);
     }
-    acting::<C>(m, b, Kind::Force, j) + drive
+    command_of::<C>(m, b, Kind::Force, j) + drive
 }
 
-/// Adds the forces on links to those of the joints that carry them.
+/// Adds the forces on links, Σ Jᵀ body_f, body by body from the leaves.
 #[inline(always)]
-fn push<F: Num>(m: &Constants<F::Real>, params: &[F], first: usize, w: &mut Workspace<F>) {
+fn add_link_forces<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    first: usize,
+    w: &mut Workspace<F>,
+) {
     for force in &mut w.force {
         *force = Spatial::zero();
     }
@@ -155,6 +172,7 @@ fn push<F: Num>(m: &Constants<F::Real>, params: &[F], first: usize, w: &mut Work
             let force = Vec3([given[0], given[1], given[2]]);
             let torque = Vec3([given[3], given[4], given[5]]);
             let point = w.rotation[body].mul_add(Vec3::constant(frame.center), w.origin[body]);
+            // moved to the reference point: n + p × f
             let wrench = Spatial([force, point.cross_add(force, torque)]);
             w.force[body] = w.force[body] + wrench;
         }
@@ -162,11 +180,11 @@ fn push<F: Num>(m: &Constants<F::Real>, params: &[F], first: usize, w: &mut Work
     for (k, body) in m.bodies.iter().enumerate().rev() {
         let force = w.force[k];
         for (axis, d) in body.dofs().enumerate() {
-            let pushed = match body.motion {
+            let projected = match body.motion {
                 Motion::Free => force.scalars()[axis],
                 _ => w.motion[d].dot(force),
             };
-            w.smooth_force[d] = w.smooth_force[d] + pushed;
+            w.smooth_force[d] = w.smooth_force[d] + projected;
         }
         if let Some(parent) = body.parent {
             w.force[parent] = w.force[parent] + force;
@@ -185,7 +203,7 @@ fn ball_error<C: Cx>(
 ) -> Vec3<C::F> {
     let mut turn = Vec3::zero();
     for k in 0..3 {
-        turn[k] = acting::<C>(m, b, Kind::Position, dof + k);
+        turn[k] = command_of::<C>(m, b, Kind::Position, dof + k);
     }
     let target = quat::exp(turn);
     let here = read_quat(cx, &b.joint_q, coord);

@@ -5,7 +5,8 @@
 //! f(b) = I a + v ×* I v + Σ f(child)   c(dof) = S · f(b)
 //! ```
 //!
-//! A free body has S = 1. Its axes stand still, but those of its rotation follow its centre of mass: a = v × ω.
+//! A free body has S = 1. The axes of its linear velocity are fixed, those of its rotation move with its centre of mass:
+//! a = v × ω.
 
 use super::{BlockOf, ConstantsOf, Stage, gravity};
 use crate::arrays::Array as A;
@@ -48,7 +49,7 @@ impl Stage for Bias {
             let inertial = w.inertia[k] * w.force[k];
             w.force[k] = v.cross_force_add(w.inertia[k] * v, inertial);
         }
-        // children come after their parents, so the backward pass has all of a body's force when it comes to it
+        // children follow their parents, so in the backward pass the force of a body is complete when it is reached
         for (k, body) in m.bodies.iter().enumerate().rev() {
             let force = w.force[k];
             if body.motion == Motion::Free {

@@ -1,7 +1,7 @@
-//! Commands as they act: late by the delay of the world, and with the noise of the frame.
+//! Commands as they act: delayed by the world's delay, and with the noise of the frame.
 //!
 //! ```text
-//! applied(s) = sent in the last frame that began at s - delay or before, + noise        s counts substeps
+//! applied(s) = command of the last frame that began at s - delay or before + noise        s counts substeps
 //! ```
 
 use super::{BlockOf, ConstantsOf, Stage};
@@ -31,11 +31,11 @@ impl Stage for Commands {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        arrive(cx, m, b);
+        delay_commands(cx, m, b);
     }
 }
 
-/// A command, by its place in `applied`, in a frame of the history and in the noise.
+/// A command. Its value is its place in `applied`, in a frame of the history and in the noise.
 #[derive(Clone, Copy)]
 pub(super) enum Kind {
     Force,
@@ -43,8 +43,9 @@ pub(super) enum Kind {
     Velocity,
 }
 
+/// Writes `applied`, and counts the substep.
 #[inline(always)]
-fn arrive<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+fn delay_commands<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let n = m.dofs.len();
     let applied = &mut b.work.applied;
     applied[..n].copy_from_slice(&b.joint_f);
@@ -55,7 +56,7 @@ fn arrive<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let substep = cx.get(&b.substep[0]);
         let late = b.params[delay] - substep;
         for (age, sent) in b.command_history.chunks_exact(3 * n).enumerate() {
-            // later than what came in the frame after it
+            // due: the frame after it is not due yet
             let is_due = C::F::c((age * m.delay.substeps) as f64).lt(late);
             for (applied, sent) in applied.iter_mut().zip(sent) {
                 *applied = C::F::select(is_due, *sent, *applied);
@@ -68,9 +69,14 @@ fn arrive<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     }
 }
 
-/// The command of dof `j` that acts.
+/// The command of dof `j` as it acts in this substep.
 #[inline(always)]
-pub(super) fn acting<C: Cx>(m: &ConstantsOf<C>, b: &BlockOf<C>, command: Kind, j: usize) -> C::F {
+pub(super) fn command_of<C: Cx>(
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    command: Kind,
+    j: usize,
+) -> C::F {
     if m.alters_commands() {
         return b.work.applied[command as usize * m.dofs.len() + j];
     }

@@ -5,8 +5,8 @@
 //! aref = -b v - k d(r) r          R = (1 - d) / d × inverse weight,  D = 1 / R
 //! ```
 //!
-//! Rows stand in MuJoCo's order: equalities, frictions, limits. Their Jacobians have one or two
-//! entries, known when the model is compiled; only the side of a limit is found at run time.
+//! Rows are in MuJoCo's order: equalities, frictions, limits. Their Jacobians have one or two entries, known when the model
+//! is compiled. Only the side of a limit is found at run time.
 
 use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::Array as A;
@@ -27,6 +27,7 @@ impl Stage for Constraint {
     }
 }
 
+/// Writes D and aref of every row, and the side of every limit.
 #[inline(always)]
 fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let w = &mut b.work;
@@ -61,6 +62,7 @@ fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         cx.set(&mut b.efc_weight[row + n], zero);
         cx.set(&mut b.efc_aref[row + n], zero);
     }
+    // most blocks have no world at a limit
     when!(cx, nearest.lt(zero), {
         for (n, limit) in m.limits.iter().enumerate() {
             let velocity = w.limit_side[n] * cx.get(&b.joint_qd[limit.dof]);
@@ -84,7 +86,7 @@ fn soft_row<F: Num>(soft: &Soft<F::Real>, position: F, velocity: F) -> (F, F) {
     (weight, -velocity.fma(F::k(soft.damping), spring))
 }
 
-/// d(r): from `d_min` at 0 to `d_max` at `width`, along two parabolas.
+/// d(r): from `d_min` at 0 to `d_max` at `width`, along two parabolas (MuJoCo: `solimp` with power 2).
 #[inline(always)]
 pub(super) fn impedance<F: Num>(i: &Impedance<F::Real>, position: F) -> F {
     let (one, midpoint) = (F::c(1.0), i.midpoint.to_f64());

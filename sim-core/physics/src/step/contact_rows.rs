@@ -134,7 +134,7 @@ impl<'a, C: Cx> Contact<'a, C> {
             let torques = &torques[usize::from(!column.is_first)];
             let mut jacobian = [C::F::c(0.0); 3];
             for i in 0..3 {
-                let moved = linear.dot(frame[i]) + angular.dot(Vec3(torques[i].0));
+                let moved = linear.dot(frame[i]) + angular.dot(torques[i]);
                 jacobian[i] = lever * moved;
                 velocity[i] = jacobian[i].fma(speed, velocity[i]);
             }

@@ -4,19 +4,20 @@
 //! (M + h diag(damping + kd)) q̈' = smooth + constraint        q̇ += h q̈'        q += h q̇
 //! ```
 //!
-//! In `f32` what a sum q + h q̇ rounds away is kept for the next one (Kahan 1965): an arm that creeps by less than half a
-//! rounding of its angle a step would else stand still and say that it moves, and rub along what it holds.
+//! In `f32` the rounding error of q + h q̇ is kept and added to the next step (compensated summation, Kahan 1965). Without it an
+//! arm that moves by less than half a rounding of its angle per step would stand still with a velocity, and slip on an object
+//! that it holds.
 //!
-//! A quaternion moves by the turn h ω in the body's axes. A free body is stepped as MuJoCo steps it, by
-//! the velocity of its frame's origin and the angular velocity in its own axes:
+//! A quaternion is rotated by h ω in the body's axes. A free body is stepped as in MuJoCo, by the velocity of its frame's origin
+//! and the angular velocity in its own axes:
 //!
 //! ```text
 //! r = R c     v = v(c) - ω × r     a = a(c) - α × r - ω × (ω × r)
 //! v += h a    p += h v             ω' = Rᵀω + h Rᵀα        R' = R exp(h ω')
 //! ```
 //!
-//! One that carries nothing that moves is also implicit in its gyroscopic force, to first order, as MuJoCo is since 3.11:
-//! so it gains no energy by spinning. With J the inertia about c, A that with drives' inertia and damping, L = J ω:
+//! A free body without moving children is also implicit in its gyroscopic force, to first order, as in MuJoCo since 3.11: it
+//! gains no energy by spinning. With J the inertia about c, A the same with armature and damping, and L = J ω:
 //!
 //! ```text
 //! (A + h ∂(ω × L)/∂ω) δ = -h (α × L + ω × J α)       α += δ       a -= h (α × (ω × r) + ω × (α × r))
@@ -48,7 +49,7 @@ impl Stage for Integrate {
         A::SmoothForce,
         A::ConstraintForce,
     ];
-    // the last stage of a step: nobody needs the mass matrix after it
+    // the last stage of a step: the mass matrix is not read after it
     const WRITES: &'static [A] = &[A::JointQ, A::JointQRest, A::JointQd, A::MassMatrix];
 
     #[inline(always)]
@@ -66,9 +67,9 @@ impl Stage for Integrate {
                 if m.bodies.iter().all(|other| other.parent != Some(k)) {
                     gyroscopic(cx, m, b, k);
                 }
-                free(cx, m, b, k);
+                integrate_free(cx, m, b, k);
             } else {
-                joint(cx, m, b, body);
+                integrate_joint(cx, m, b, body);
             }
         }
     }
@@ -78,7 +79,7 @@ impl Stage for Integrate {
 #[inline(always)]
 fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let (w, dt) = (&mut b.work, C::F::k(m.dt));
-    // M q̈ is what acts, and without the rounding of stiff forces that cancel
+    // M q̈ equals the forces, without the rounding of stiff contact forces that cancel
     let mut rounded = None;
     if !<<C::F as Num>::Real as Real>::DOUBLE {
         rounded = super::solver::touching(cx, m);
@@ -108,7 +109,7 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
 
 /// Velocity first, then the position by the new velocity.
 #[inline(always)]
-fn joint<C: Cx>(
+fn integrate_joint<C: Cx>(
     cx: &mut C,
     m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
@@ -124,13 +125,13 @@ fn joint<C: Cx>(
         let turned = quat::turned(read_quat(cx, &b.joint_q, c), qd, dt);
         write_quat(cx, &mut b.joint_q, c, turned);
     } else {
-        advance(cx, &mut b.joint_q[c], &mut b.joint_q_rest[c], qd[0], dt);
+        add_compensated(cx, &mut b.joint_q[c], &mut b.joint_q_rest[c], qd[0], dt);
     }
 }
 
-/// q += h v
+/// q += h v, compensated in `f32`.
 #[inline(always)]
-fn advance<C: Cx>(cx: &mut C, q: &mut C::V, rest: &mut C::V, v: C::F, dt: C::F) {
+fn add_compensated<C: Cx>(cx: &mut C, q: &mut C::V, rest: &mut C::V, v: C::F, dt: C::F) {
     let before = cx.get(q);
     if <<C::F as Num>::Real as Real>::DOUBLE {
         cx.set(q, dt.fma(v, before));
@@ -138,12 +139,12 @@ fn advance<C: Cx>(cx: &mut C, q: &mut C::V, rest: &mut C::V, v: C::F, dt: C::F) 
     }
     let change = dt.fma(v, cx.get(rest));
     let after = before + change;
-    // exact where q is the larger of the two, and else a rounding of the change off
+    // exact where |q| is larger than the change, otherwise off by a rounding of the change
     cx.set(rest, change - (after - before));
     cx.set(q, after);
 }
 
-/// Makes the accelerations of a free body implicit in its gyroscopic force.
+/// Makes the acceleration of a free body implicit in its gyroscopic force.
 #[inline(always)]
 fn gyroscopic<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize) {
     let (body, dt) = (&m.bodies[k], C::F::k(m.dt));
@@ -157,12 +158,12 @@ fn gyroscopic<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usiz
     // relative to the trace, so that determinants of small bodies stay within f32
     let trace: f64 = body.inertia[..3].iter().map(|x| x.to_f64()).sum();
     let unit = C::F::c(1.0 / trace);
-    let momentum = turned(m, params, body, rotation, spin) * unit;
+    let momentum = rotated_inertia(m, params, body, rotation, spin) * unit;
     let mut columns = [Vec3::zero(); 3];
     for (i, column) in columns.iter_mut().enumerate() {
         let mut axis = Vec3::zero();
         axis[i] = C::F::c(1.0);
-        let inertia = turned(m, params, body, rotation, axis) * unit;
+        let inertia = rotated_inertia(m, params, body, rotation, axis) * unit;
         let rate = axis.cross_add(momentum, spin.cross(inertia));
         *column = rate.scale_add(dt, inertia);
         let (j, dof) = (d + 3 + i, &m.dofs[d + 3 + i]);
@@ -171,7 +172,7 @@ fn gyroscopic<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usiz
         let driven = dt.fma(damping, armature);
         column[i] = driven.fma(unit, column[i]);
     }
-    let inertia = turned(m, params, body, rotation, angular) * unit;
+    let inertia = rotated_inertia(m, params, body, rotation, angular) * unit;
     let rate = angular.cross_add(momentum, spin.cross(inertia));
     let change = rate * -dt;
     let [x, y, z] = columns;
@@ -183,7 +184,7 @@ fn gyroscopic<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usiz
     let arm = rotation * Vec3::constant(body.center);
     let swing = angular.cross_add(spin.cross(arm), spin.cross(angular.cross(arm)));
     for i in 0..3 {
-        // of the centre of mass: the origin's, which the step takes, lags behind it by so much
+        // acceleration of the centre of mass; the step takes that of the origin, which differs by the swing
         acceleration[d + i] = dt.fnma(swing[i], acceleration[d + i]);
         acceleration[d + 3 + i] = angular[i];
     }
@@ -191,7 +192,7 @@ fn gyroscopic<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usiz
 
 /// J v in world axes, J the inertia about the centre of mass; of links whose masses vary, each about its own.
 #[inline(always)]
-fn turned<F: Num>(
+fn rotated_inertia<F: Num>(
     m: &Constants<F::Real>,
     params: &[F],
     body: &Body<F::Real>,
@@ -219,7 +220,7 @@ fn turned<F: Num>(
 
 /// A free body, in MuJoCo's coordinates: velocity of its frame's origin, angular velocity in its own axes.
 #[inline(always)]
-fn free<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize) {
+fn integrate_free<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize) {
     let (body, dt) = (&m.bodies[k], C::F::k(m.dt));
     let (c, d) = (body.coord, body.dof);
     let (rotation, acceleration) = (b.work.rotation[k], &b.work.acceleration);
@@ -241,7 +242,7 @@ fn free<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize) {
         .transpose_mul(angular)
         .scale_add(dt, rotation.transpose_mul(spin));
     for i in 0..3 {
-        advance(cx, &mut joint_q[c + i], &mut rests[c + i], origin[i], dt);
+        add_compensated(cx, &mut joint_q[c + i], &mut rests[c + i], origin[i], dt);
     }
     let turned = quat::turned(read_quat(cx, joint_q, c + 3), own, dt);
     write_quat(cx, joint_q, c + 3, turned);
@@ -254,6 +255,7 @@ fn free<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize) {
     }
 }
 
+/// Writes the quaternion that begins at coordinate `c`.
 #[inline(always)]
 fn write_quat<C: Cx>(cx: &mut C, joint_q: &mut [C::V], c: usize, q: Quat<C::F>) {
     for i in 0..4 {

@@ -1,10 +1,9 @@
-//! Forces that make given accelerations: Newton's and Euler's equations of each body about its own frame's origin
-//! (Featherstone 2008, section 5.4), so that rounding is relative to what a joint carries, not to how far
-//! it is from the robot's reference point.
+//! Inverse dynamics: Newton's and Euler's equations of each body about its own frame's origin (Featherstone 2008, section
+//! 5.4). So rounding is relative to the load of a joint, not to its distance from the robot's reference point.
 //!
 //! ```text
-//! ω(b) = ω(parent) + z q̇              α(b) = α(parent) + z q̈ + ω(parent) × z q̇          a joint that turns
-//! a(b) = a(parent) + α × r + ω × (ω × r)  … + z q̈ + 2 ω × z q̇                           one that slides
+//! ω(b) = ω(parent) + z q̇              α(b) = α(parent) + z q̈ + ω(parent) × z q̇          revolute
+//! a(b) = a(parent) + α × r + ω × (ω × r)  … + z q̈ + 2 ω × z q̇                           prismatic
 //! F = m (a + α × c + ω × (ω × c))     N = I α + ω × I ω + c × F
 //! f(b) = F + Σ f(child)               n(b) = N + Σ n(child) + r × f(child)
 //! τ = z · n  or  z · f
@@ -17,7 +16,7 @@ use crate::lane::{Cx, Num};
 use crate::math::spatial::{ANGULAR, LINEAR, Spatial, symmetric};
 use crate::math::vec3::{Mat3, Vec3};
 
-/// The forces of `joint_qdd` at this state, into `missing`.
+/// Writes the forces that `joint_qdd` needs at this state, to `missing`.
 #[inline(always)]
 pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     // `force` holds the acceleration of a body's origin until its force is known
@@ -26,7 +25,7 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
         let w = &mut b.work;
         let (axes, omega) = (&w.rotation[k], w.velocity[k][ANGULAR]);
         w.force[k] = match m.varying.first(Param::BodyMassScale) {
-            None => held::<C::F>(
+            None => newton_euler::<C::F>(
                 body.mass,
                 body.center,
                 body.inertia,
@@ -37,7 +36,7 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
             Some(first) => {
                 let mut whole = Spatial::zero();
                 for part in &body.parts {
-                    let own = held::<C::F>(
+                    let own = newton_euler::<C::F>(
                         part.mass,
                         part.center,
                         part.inertia,
@@ -52,6 +51,7 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
         };
     }
     for (k, body) in m.bodies.iter().enumerate().rev() {
+        // what body and subtree need, about the origin of the body
         let arm = arm(cx, b, k, body);
         let w = &mut b.work;
         let Spatial([force, moment]) = w.force[k];
@@ -61,6 +61,7 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
             Motion::Revolute => torque[d] = axes[2].dot(moment),
             Motion::Prismatic => torque[d] = axes[2].dot(force),
             Motion::Ball => torque[d..d + 3].copy_from_slice(&*axes.transpose_mul(moment)),
+            // the dofs of a free body are those of its centre of mass
             Motion::Free => {
                 let center = axes * Vec3::constant(body.center);
                 torque[d..d + 3].copy_from_slice(&*force);
@@ -72,13 +73,14 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
             w.force[parent] = w.force[parent] + carried;
         }
     }
+    // the rotor of a drive
     for (j, dof) in m.dofs.iter().enumerate() {
-        let driven = param(m, &b.params, Param::JointArmature, j, dof.armature);
-        b.work.missing[j] = driven.fma(cx.get(&b.joint_qdd[j]), b.work.missing[j]);
+        let armature = param(m, &b.params, Param::JointArmature, j, dof.armature);
+        b.work.missing[j] = armature.fma(cx.get(&b.joint_qdd[j]), b.work.missing[j]);
     }
 }
 
-/// Accelerations of the origins of all bodies less gravity, and angular ones, into `force`; that of what stands still.
+/// Writes the accelerations of all body origins less gravity, and the angular ones, to `force`. Returns that of a static body.
 #[inline(always)]
 pub(super) fn proper_accelerations<C: Cx>(
     cx: &mut C,
@@ -93,7 +95,7 @@ pub(super) fn proper_accelerations<C: Cx>(
             Some(parent) => (w.force[parent], w.velocity[parent][ANGULAR]),
             None => (base, Vec3::zero()),
         };
-        let carried = [carried_along(above, spin, arm), above[ANGULAR]];
+        let carried = [point_acceleration(above, spin, arm), above[ANGULAR]];
         let axes = w.rotation[k];
         let z = axes[2];
         let d = body.dof;
@@ -121,16 +123,16 @@ pub(super) fn proper_accelerations<C: Cx>(
                 let center = Spatial([base[LINEAR] + linear, angular]);
                 let back = Vec3::zero() - axes * Vec3::constant(body.center);
                 let omega = w.velocity[k][ANGULAR];
-                [carried_along(center, omega, back), angular]
+                [point_acceleration(center, omega, back), angular]
             }
         });
     }
     base[LINEAR]
 }
 
-/// The force that gives a mass its acceleration, and its moment about the origin of the frame that carries it.
+/// The force of a mass under its acceleration, and its moment about the origin of its body.
 #[inline(always)]
-fn held<F: Num>(
+fn newton_euler<F: Num>(
     mass: F::Real,
     center: [F::Real; 3],
     inertia: [F::Real; 6],
@@ -139,7 +141,7 @@ fn held<F: Num>(
     acceleration: Spatial<F>,
 ) -> Spatial<F> {
     let center = axes * Vec3::constant(center);
-    let force = carried_along(acceleration, omega, center) * F::k(mass);
+    let force = point_acceleration(acceleration, omega, center) * F::k(mass);
     let (spin, turn) = (
         axes.transpose_mul(omega),
         axes.transpose_mul(acceleration[ANGULAR]),
@@ -148,14 +150,18 @@ fn held<F: Num>(
     Spatial([force, axes.mul_add(own, center.cross(force))])
 }
 
-/// Acceleration of a point `arm` away on a body that moves so: a + α × r + ω × (ω × r).
+/// Acceleration of a point of a body at `arm` from its origin: a + α × r + ω × (ω × r).
 #[inline(always)]
-pub(super) fn carried_along<F: Num>(origin: Spatial<F>, omega: Vec3<F>, arm: Vec3<F>) -> Vec3<F> {
+pub(super) fn point_acceleration<F: Num>(
+    origin: Spatial<F>,
+    omega: Vec3<F>,
+    arm: Vec3<F>,
+) -> Vec3<F> {
     let swing = origin[ANGULAR].cross_add(arm, origin[LINEAR]);
     omega.cross_add(omega.cross(arm), swing)
 }
 
-/// From the origin of the carrier to that of body `k`; the difference of their origins would round as these do.
+/// From the origin of the parent to that of body `k`. The difference of their positions would have the rounding of these.
 #[inline(always)]
 fn arm<C: Cx>(
     cx: &mut C,

@@ -1,10 +1,10 @@
 //! Forward kinematics (Featherstone 2008, section 4.1): frames, motion axes and inertias of all bodies.
 //!
 //! ```text
-//! R(b) = R(parent) E(b) Rz(q)     p(b) = p(parent) + R(parent) r(b)     a joint that turns
-//! R(b) = R(parent) E(b)           p(b) = … + z q                        one that slides
-//! R(b) = R(parent) E(b) R(q)      p(b) = …                              a ball
-//! R(b) = R(q)                     p(b) = -R(b) c                        a free body
+//! R(b) = R(parent) E(b) Rz(q)     p(b) = p(parent) + R(parent) r(b)     revolute
+//! R(b) = R(parent) E(b)           p(b) = … + z q                        prismatic
+//! R(b) = R(parent) E(b) R(q)      p(b) = …                              ball
+//! R(b) = R(q)                     p(b) = -R(b) c                        free
 //! S = (p × z, z)  or  (z, 0)      linear, angular, at the robot's reference point
 //! ```
 //!
@@ -49,13 +49,13 @@ fn at_zero<F: Num, V>(b: &Block<F, V>, body: &Body<F::Real>) -> (Mat3<F>, Vec3<F
         Some(parent) => {
             let r = &b.work.rotation[parent];
             let origin = r.mul_add(Vec3::constant(body.position), b.work.origin[parent]);
-            (rested(r, body), origin)
+            (rest_rotation(r, body), origin)
         }
         None => (Mat3::constant(body.rotation), Vec3::constant(body.position)),
     }
 }
 
-/// Axes and origin of a body as its joint has moved it; writes the joint's motion axes.
+/// Axes and origin of a body moved by its joint; writes the joint's motion axes.
 #[inline(always)]
 fn moved<C: Cx>(
     cx: &mut C,
@@ -70,8 +70,8 @@ fn moved<C: Cx>(
         Motion::Revolute => {
             let (sin, cos) = cx.get(&b.joint_q[c]).sincos();
             w.motion[d] = Spatial([origin.cross(z), z]);
-            let turned = [y.scale_add(sin, x * cos), y * cos - x * sin, z];
-            (Mat3(turned), origin)
+            let columns = [y.scale_add(sin, x * cos), y * cos - x * sin, z];
+            (Mat3(columns), origin)
         }
         Motion::Prismatic => {
             w.motion[d] = Spatial([z, Vec3::zero()]);
@@ -127,11 +127,11 @@ fn inertia<F: Num>(
     sum
 }
 
-/// R(parent) E(b); most joints stand at right angles to each other, which costs no product.
+/// R(parent) E(b). Most joints are at right angles to each other: E only permutes axes then, which needs no product.
 #[inline(always)]
-fn rested<F: Num>(r: &Mat3<F>, body: &Body<F::Real>) -> Mat3<F> {
+fn rest_rotation<F: Num>(r: &Mat3<F>, body: &Body<F::Real>) -> Mat3<F> {
     match body.exchange {
-        Some([x, y, z]) => Mat3([exchanged(r, x), exchanged(r, y), exchanged(r, z)]),
+        Some([x, y, z]) => Mat3([permuted(r, x), permuted(r, y), permuted(r, z)]),
         None => {
             let [x, y, z] = body.rotation;
             Mat3([
@@ -143,9 +143,10 @@ fn rested<F: Num>(r: &Mat3<F>, body: &Body<F::Real>) -> Mat3<F> {
     }
 }
 
+/// A column of R, negated where it is reversed.
 #[inline(always)]
-fn exchanged<F: Num>(r: &Mat3<F>, (axis, back): (usize, bool)) -> Vec3<F> {
-    if back { -r[axis] } else { r[axis] }
+fn permuted<F: Num>(r: &Mat3<F>, (axis, is_reversed): (usize, bool)) -> Vec3<F> {
+    if is_reversed { -r[axis] } else { r[axis] }
 }
 
 /// The quaternion that begins at coordinate `c`.

@@ -26,7 +26,7 @@ impl Stage for MassMatrix {
         for &place in &m.mass_zeros {
             w.mass_matrix[place] = C::F::c(0.0);
         }
-        // children come after their parents: all of them were added when a body's turn comes
+        // children follow their parents: in this order the inertia of a subtree is complete when its root is reached
         for (k, body) in m.bodies.iter().enumerate().rev() {
             let composite = w.inertia[k];
             let is_free = m.trees[body.tree].free.is_some();
@@ -62,7 +62,7 @@ impl Stage for MassMatrix {
     }
 }
 
-/// Row `axis` of an inertia as a matrix of 6 × 6, linear then angular, up to its diagonal.
+/// Row `axis` of an inertia as a 6 × 6 matrix, linear then angular, up to its diagonal.
 #[inline(always)]
 fn free_row<F: Num>(inertia: &Inertia<F>, axis: usize) -> [F; 6] {
     let Inertia([m, hx, hy, hz, xx, yy, zz, xy, xz, yz]) = *inertia;

@@ -1,11 +1,11 @@
-//! Parameters as stages read them: the worlds' own where they vary, else constants of the model.
+//! Parameters as stages read them: values of each world where they vary, otherwise constants of the model.
 
 use crate::constants::Constants;
 use crate::constants::params::Param;
 use crate::lane::Num;
 use crate::math::vec3::Vec3;
 
-/// Value `k` of a parameter: the worlds' own where it varies, else `fixed`, the model's.
+/// Value `k` of a parameter: that of each world where it varies, otherwise the model's, `fixed`.
 #[inline(always)]
 pub(super) fn param<F: Num>(
     m: &Constants<F::Real>,

@@ -1,7 +1,7 @@
 //! Link frames in the world, for output.
 //!
-//! Orientations follow the chain of joints as quaternions, which never leave the unit sphere by
-//! more than rounding and need no case distinction, as a conversion from matrices does.
+//! Orientations are quaternions along the chain of joints: they stay unit up to rounding, and need no case distinction, which
+//! a conversion from matrices needs.
 
 use super::kinematics::read_quat;
 use super::{BlockOf, ConstantsOf, Stage};

@@ -1,21 +1,20 @@
-//! What takes a small displacement of a site to one of the joints, for output: the inverse of its Jacobian by damped least
-//! squares (Wampler 1986; Nakamura and Hanafusa 1986; Buss 2004).
+//! Inverse Jacobian of a site by damped least squares, for output: it maps a small displacement of the site to one of the
+//! joints (Wampler 1986; Nakamura and Hanafusa 1986; Buss 2004).
 //!
 //! ```text
-//! J(d) = ± [v(d) + ω(d) × p, ω(d)]      + for a dof that moves the site, - for one that moves what it is measured from
+//! J(d) = ± [v(d) + ω(d) × p, ω(d)]      + for a dof that moves the site, - for one that moves the frame it is relative to
 //! J⁺ = Jᵀ (J Jᵀ + λ² 1)⁻¹
 //! [Jᵀ; λ 1] = [Q; S] R                  columns of [Q; S] orthonormal, R upper triangular: Rᵀ R = J Jᵀ + λ² 1
-//! J⁺ = Q R⁻ᵀ = Q Sᵀ / λ                 its rows in the axes of what the site is measured from
+//! J⁺ = Q R⁻ᵀ = Q Sᵀ / λ                 its rows in the axes of the frame that the site is relative to
 //! ```
 //!
-//! J⁺ x is the motion of the joints that makes |J q - x|² + λ² |q|² smallest: the more damping, the shorter it is where the arm
-//! is stretched. A dof that moves both moves neither against the other, and has no column. So J q̇ is the velocity of
-//! [`super::sites`], and displacements are in the axes of that.
+//! q = J⁺ x minimises |J q - x|² + λ² |q|²: more damping makes it shorter where the arm is stretched. A dof that moves both
+//! frames has no column. J q̇ is the velocity of [`super::sites`], and displacements are in the same axes.
 //!
-//! R is found from J (modified Gram-Schmidt), not from J Jᵀ, in whose rounding small λ² would drown in `f32`: no column ever is
-//! shorter than λ, and no number of J⁺ much above 1 / λ, whatever rounds.
+//! R is found from J by modified Gram-Schmidt, not from J Jᵀ: in `f32` the rounding of J Jᵀ would exceed a small λ². No column
+//! is shorter than λ, so no entry of J⁺ is much larger than 1 / λ.
 
-use super::sites::{back, position, reference};
+use super::sites::{position, reference, to_local};
 use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
@@ -24,10 +23,10 @@ use crate::lane::{Cx, Num, Real};
 use crate::math::spatial::Spatial;
 use crate::math::vec3::Vec3;
 
-/// Numbers of a displacement: of the origin, then of the rotation.
+/// Scalars of a displacement: of the origin, then of the rotation.
 const SIX: usize = 6;
 
-/// What moves the sites by a little, for output.
+/// Inverse Jacobians of sites, for output.
 pub struct SiteInverse;
 
 impl Stage for SiteInverse {
@@ -44,7 +43,7 @@ impl Stage for SiteInverse {
     }
 }
 
-/// The rows of J⁺ of the dofs that move each site, one site after the other.
+/// Writes the rows of J⁺ of the dofs that move each site, site by site.
 #[inline(always)]
 fn inverse_jacobian<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
     let mut end = 0;
@@ -74,8 +73,8 @@ fn inverse_jacobian<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
             }
             if let Some(other) = &site.relative_to {
                 let [x, y, z, turn_x, turn_y, turn_z] = row;
-                let Vec3([x, y, z]) = back(w, other, Vec3([x, y, z]));
-                let turn = back(w, other, Vec3([turn_x, turn_y, turn_z]));
+                let Vec3([x, y, z]) = to_local(w, other, Vec3([x, y, z]));
+                let turn = to_local(w, other, Vec3([turn_x, turn_y, turn_z]));
                 let Vec3([turn_x, turn_y, turn_z]) = turn;
                 row = [x, y, z, turn_x, turn_y, turn_z];
             }

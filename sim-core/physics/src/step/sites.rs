@@ -1,4 +1,4 @@
-//! Sites for output: their frames and velocities, and what an inertial measurement unit in each would show.
+//! Sites for output: frames, velocities, and the readings of an inertial measurement unit (gyro and accelerometer) in each.
 //!
 //! ```text
 //! q = p + r             v = v(b) + ω × p                                   in the world
@@ -6,10 +6,10 @@
 //! gyro = Rᵀ ω           accelerometer = Rᵀ (a(b) + α × s + ω × (ω × s))    a less gravity, s from the body's origin
 //! ```
 //!
-//! p is about the reference point r of the robot, so that a site measured from another of the same robot loses nothing far
-//! from the origin.
+//! p is relative to the reference point r of the robot: a site relative to another of the same robot keeps its digits far from
+//! the origin.
 
-use super::inverse_dynamics::{carried_along, proper_accelerations};
+use super::inverse_dynamics::{point_acceleration, proper_accelerations};
 use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
@@ -42,7 +42,7 @@ impl Stage for Sites {
     }
 }
 
-/// What inertial measurement units in the sites show, for output.
+/// Readings of inertial measurement units in the sites, for output.
 pub struct Imu;
 
 impl Stage for Imu {
@@ -66,7 +66,7 @@ impl Stage for Imu {
     }
 }
 
-/// Frames and velocities of the sites.
+/// Writes frames and velocities of the sites.
 #[inline(always)]
 fn site_q<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
     for (k, site) in m.sites.iter().enumerate() {
@@ -85,10 +85,10 @@ fn site_q<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
                 }
                 let carried = angular.cross_add(position, linear);
                 velocity = Spatial([
-                    back(w, other, velocity[LINEAR] - carried),
-                    back(w, other, velocity[ANGULAR] - angular),
+                    to_local(w, other, velocity[LINEAR] - carried),
+                    to_local(w, other, velocity[ANGULAR] - angular),
                 ]);
-                position = back(w, other, position);
+                position = to_local(w, other, position);
                 orientation = mul(conjugate(from), orientation);
             }
         }
@@ -98,7 +98,7 @@ fn site_q<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
     }
 }
 
-/// What turns and accelerates each site, in its own axes.
+/// Writes angular velocity and proper acceleration of each site, in its own axes.
 #[inline(always)]
 fn imu<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let base = proper_accelerations(cx, m, b);
@@ -109,16 +109,16 @@ fn imu<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             Some(body) => {
                 let arm = w.rotation[body] * Vec3::constant(mount.position);
                 let omega = w.velocity[body][ANGULAR];
-                (carried_along(w.force[body], omega, arm), omega)
+                (point_acceleration(w.force[body], omega, arm), omega)
             }
             None => (base, Vec3::zero()),
         };
-        w.gyro[k] = back(w, mount, omega);
-        w.accelerometer[k] = back(w, mount, acceleration);
+        w.gyro[k] = to_local(w, mount, omega);
+        w.accelerometer[k] = to_local(w, mount, acceleration);
     }
 }
 
-/// Where it is, from the reference point of its robot.
+/// Position of a mount, from the reference point of its robot.
 #[inline(always)]
 pub(super) fn position<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
     let own = Vec3::constant(mount.position);
@@ -128,7 +128,7 @@ pub(super) fn position<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3
     }
 }
 
-/// The reference point of its robot.
+/// The reference point of a mount's robot.
 #[inline(always)]
 pub(super) fn reference<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
     match mount.tree {
@@ -137,6 +137,7 @@ pub(super) fn reference<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec
     }
 }
 
+/// Orientation of a mount in the world.
 #[inline(always)]
 fn orientation<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Quat<F> {
     let own = quat::constant(mount.quat);
@@ -146,7 +147,7 @@ fn orientation<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Quat<F> {
     }
 }
 
-/// How the point moves, in world axes.
+/// Velocity of a mount in world axes, at its own position.
 #[inline(always)]
 fn velocity<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>, position: Vec3<F>) -> Spatial<F> {
     match mount.body {
@@ -158,9 +159,13 @@ fn velocity<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>, position: Vec3<F>)
     }
 }
 
-/// A vector of the world in the axes of a frame.
+/// A vector of the world in the axes of a mount.
 #[inline(always)]
-pub(super) fn back<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>, vector: Vec3<F>) -> Vec3<F> {
+pub(super) fn to_local<F: Num>(
+    w: &Workspace<F>,
+    mount: &Mount<F::Real>,
+    vector: Vec3<F>,
+) -> Vec3<F> {
     let own = Mat3::constant(mount.rotation);
     match mount.body {
         Some(body) => own.transpose_mul(w.rotation[body].transpose_mul(vector)),

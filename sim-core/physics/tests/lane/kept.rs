@@ -1,4 +1,4 @@
-//! Tables of the model and kept lists on the CPU machines.
+//! Tables of the model and kept lists on the CPU backends.
 
 use crate::toy::{self, contacts};
 #[cfg(target_arch = "x86_64")]
@@ -62,7 +62,7 @@ fn kept_lists_are_bitwise_the_same_in_every_width_and_order() {
         }
     };
     if has_eight() {
-        // SAFETY: the machine has the features, as was just asked
+        // SAFETY: the processor has the features (checked above)
         unsafe {
             check(
                 wide::contacts_by_eight(&worlds),
@@ -71,7 +71,7 @@ fn kept_lists_are_bitwise_the_same_in_every_width_and_order() {
         };
     }
     if has_sixteen() {
-        // SAFETY: the machine has the features, as was just asked
+        // SAFETY: the processor has the features (checked above)
         unsafe {
             check(
                 wide::contacts_by_sixteen(&worlds),

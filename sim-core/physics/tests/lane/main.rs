@@ -1,4 +1,4 @@
-//! The CPU machines: the same text gives the same bits whatever the width of a block.
+//! The CPU backends: the same code gives the same bits for every width of a block.
 
 mod kept;
 mod sincos;
@@ -15,7 +15,7 @@ const POINTS: Table = Table {
 };
 const POINTS_SCRATCH: usize = 8;
 
-/// A text in the style of a contact solver: rows found at run time, a damped Newton iteration over
+/// Code in the style of a contact solver: rows found at run time, a damped Newton iteration over
 /// them that stops by itself, and blocks. Its inputs: where the points are, and a start.
 #[inline(always)]
 fn solve<C: Cx>(cx: &mut C, x: &[C::F]) -> Vec<C::F> {
@@ -164,7 +164,7 @@ fn eight_worlds_a_block_equal_one_bitwise() {
     if wide::has_eight() {
         // 27: a block that is not full, too
         let worlds = inputs(27);
-        // SAFETY: the machine has the features, as was just asked
+        // SAFETY: the processor has the features (checked above)
         let eight = unsafe { wide::solve_by_eight(&worlds) };
         assert_eq!(bits(&eight), bits(&scalar(&worlds)));
     }
@@ -175,7 +175,7 @@ fn eight_worlds_a_block_equal_one_bitwise() {
 fn sixteen_worlds_a_block_equal_one_bitwise() {
     if wide::has_sixteen() {
         let worlds = inputs(75);
-        // SAFETY: the machine has the features, as was just asked
+        // SAFETY: the processor has the features (checked above)
         let sixteen = unsafe { wide::solve_by_sixteen(&worlds) };
         assert_eq!(bits(&sixteen), bits(&scalar(&worlds)));
     }
@@ -243,7 +243,7 @@ fn order_of_worlds_does_not_change_their_bits() {
         }
     };
     if wide::has_eight() {
-        // SAFETY: the machine has the features, as was just asked
+        // SAFETY: the processor has the features (checked above)
         unsafe {
             check(
                 wide::solve_by_eight(&worlds),
@@ -252,7 +252,7 @@ fn order_of_worlds_does_not_change_their_bits() {
         };
     }
     if wide::has_sixteen() {
-        // SAFETY: the machine has the features, as was just asked
+        // SAFETY: the processor has the features (checked above)
         unsafe {
             check(
                 wide::solve_by_sixteen(&worlds),
@@ -279,12 +279,12 @@ fn random_programs_agree_bitwise_in_every_width() {
         let worlds = toy::worlds::<{ toy::INPUTS }>(&mut random, 40);
         let one = same_bits(&toy::on_cpu::<f32>(&steps, &worlds));
         if wide::has_eight() {
-            // SAFETY: the machine has the features, as was just asked
+            // SAFETY: the processor has the features (checked above)
             let eight = unsafe { wide::run_by_eight(&steps, &worlds) };
             assert_eq!(same_bits(&eight), one, "8 worlds, seed {seed}: {steps:#?}");
         }
         if wide::has_sixteen() {
-            // SAFETY: the machine has the features, as was just asked
+            // SAFETY: the processor has the features (checked above)
             let sixteen = unsafe { wide::run_by_sixteen(&steps, &worlds) };
             assert_eq!(
                 same_bits(&sixteen),
@@ -417,7 +417,7 @@ fn a_row_outside_its_table_is_found_in_debug_builds() {
 fn what_other_worlds_add_leaves_the_sign_of_a_zero() {
     if wide::has_eight() {
         let worlds: Vec<[f32; 3]> = (0..8).map(|k| [k as f32 - 3.5, 0.0, 0.0]).collect();
-        // SAFETY: the machine has the features, as was just asked
+        // SAFETY: the processor has the features (checked above)
         let found = unsafe { wide::add_by_eight(&worlds) };
         for (world, sum) in worlds.iter().zip(&found) {
             let expected = if world[0] > 0.0 { 3.0 * world[0] } else { -0.0 };

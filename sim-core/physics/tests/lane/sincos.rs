@@ -97,11 +97,11 @@ fn sincos_is_bitwise_the_same_in_every_width() {
         wide.into_iter().zip(&one).all(|(a, b)| bits(a) == bits(*b))
     };
     if has_eight() {
-        // SAFETY: the machine has the features, as was just asked
+        // SAFETY: the processor has the features (checked above)
         assert!(same(unsafe { wide::sincos_by_eight(&angles) }));
     }
     if has_sixteen() {
-        // SAFETY: the machine has the features, as was just asked
+        // SAFETY: the processor has the features (checked above)
         assert!(same(unsafe { wide::sincos_by_sixteen(&angles) }));
     }
 }

@@ -1,7 +1,7 @@
 //! Small full blocks, unrolled.
 //!
-//! A full block is a single path ([`super::tree`]) whose rows stand at known places: taken [`TILE`] at a time,
-//! rows and columns are constants of the functions, and only how many there are is known at run time.
+//! A full block is a single path ([`super::tree`]) whose rows are at known places. They are taken [`TILE`] at a time, so
+//! rows and columns are constants of the functions, and only their count is known at run time.
 
 use super::tree::{self, Removed};
 use super::tri;
@@ -79,7 +79,7 @@ fn forward_tile<F: Num, const S: usize>(p: usize, factor: &[F], x: &mut [F]) {
     tree::forward::<F, S>(own, &ROWS[..p], x_above, x);
 }
 
-/// `f::<F, K>(…)` for every row K below `n`: a loop over a short row costs more than its numbers.
+/// `f::<F, K>(…)` for every row K below `n`: a loop over a short row costs more than its arithmetic.
 macro_rules! rows {
     ($n:expr, $f:ident($($arg:expr),*)) => {
         rows!(@ $n, $f($($arg),*), 0 1 2 3 4 5 6 7 8 9 10 11)

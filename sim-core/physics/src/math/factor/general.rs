@@ -1,10 +1,10 @@
-//! Blocks with zeros, or too large to be unrolled: loops over the runs of each row.
+//! Blocks with zeros, or too large to be unrolled: loops over the runs of each row. The reference of the other kernels.
 
 use super::pattern::{Block, Pattern};
 use super::tri;
 use crate::lane::Num;
 
-/// y -= s x, number by number.
+/// y -= s x
 #[inline(always)]
 fn subtract<F: Num>(y: &mut [F], s: F, x: &[F]) {
     for (y, x) in y.iter_mut().zip(x) {

@@ -1,10 +1,13 @@
 //! Sparse symmetric factor A = Lᵀ D L, and solve (Featherstone 2008, section 6.5).
 //!
-//! Elimination runs from the last dof to the first, so that a tree makes no fill. The pattern is fixed
-//! when the model is compiled: independent parts of the scene are blocks of their own, each a packed
-//! lower triangle, or the paths of a tree. A solve eliminates the right-hand side along with the matrix. Small full blocks, such as an arm, run unrolled ([`dense`]), as
-//! do trees ([`tree`]); the others follow the runs of their rows ([`general`]). All do the same operations
-//! in the same order.
+//! Elimination runs from the last dof to the first, so that a tree makes no fill. The pattern is fixed when the model is
+//! compiled: independent parts of the scene are blocks, each a packed lower triangle or the paths of a tree. A solve
+//! eliminates the right-hand side along with the matrix. There are three kernels, which do the same operations in the same
+//! order:
+//!
+//! - [`dense`]: small full blocks, such as an arm, unrolled,
+//! - [`tree`]: trees, unrolled along their paths,
+//! - [`general`]: other blocks, by the runs of their rows.
 
 mod dense;
 mod general;
@@ -34,8 +37,8 @@ pub fn solve<F: Num>(pattern: &Pattern, a: &mut [F], x: &mut [F]) {
     }
 }
 
-/// 1/D of a pivot, or 0 for one that is not above 0: rounding has left nothing of it, and its unknown becomes 0 but for
-/// what the others make of it.
+/// 1/D of a pivot; 0 for one that is not positive, of which rounding has left nothing. Its unknown is then the coupling to
+/// others alone.
 #[inline(always)]
 fn inverse<F: Num>(pivot: F) -> F {
     let (zero, one) = (F::c(0.0), F::c(1.0));

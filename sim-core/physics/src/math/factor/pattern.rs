@@ -9,9 +9,9 @@ pub struct Pattern {
     blocks: Vec<Block>,
     /// Where each row begins.
     starts: Vec<usize>,
-    /// Where each column stands in the rows that have it.
+    /// Place of each column in the rows that have it.
     places: Vec<usize>,
-    /// Numbers that a matrix takes.
+    /// Scalars of a matrix.
     len: usize,
     /// Block of each row.
     block_of: Vec<usize>,
@@ -22,7 +22,7 @@ pub struct Pattern {
     path_bounds: Vec<usize>,
     /// Rows on the path to the root, root first, counted from the block's first.
     path_rows: Vec<usize>,
-    /// Where they begin, counted from the block's first number.
+    /// Where they begin, counted from the block's first scalar.
     path_starts: Vec<usize>,
     /// Segments of the trees.
     segments: Vec<Segment>,
@@ -35,17 +35,17 @@ pub(super) struct Block {
     pub first: usize,
     /// Its number of rows.
     pub size: usize,
-    /// Where its numbers begin.
+    /// Where its scalars begin.
     pub offset: usize,
-    /// How many they are.
+    /// How many scalars it has.
     pub len: usize,
-    /// What it looks like.
+    /// Its structure.
     pub kind: Kind,
     /// Its part of the segments, if it is no general one.
     segments: (usize, usize),
 }
 
-/// What a block looks like, and so how it is kept.
+/// Structure of a block, which decides how it is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// No zeros, and small: a packed triangle.
@@ -70,7 +70,7 @@ pub(super) struct Segment {
     pub first: usize,
     /// Its number of rows.
     pub size: usize,
-    /// Where its numbers begin, counted from the block's first.
+    /// Where its scalars begin, counted from the block's first.
     pub start: usize,
     /// Where they end.
     end: usize,
@@ -82,7 +82,7 @@ impl Segment {
     pub fn rows(&self) -> std::ops::Range<usize> {
         self.first..self.first + self.size
     }
-    /// Its numbers, counted from the block's first.
+    /// Its scalars, counted from the block's first.
     #[inline(always)]
     pub fn range(&self) -> std::ops::Range<usize> {
         self.start..self.end
@@ -96,7 +96,7 @@ impl Segment {
 
 /// A row of a tree.
 pub(super) struct Path<'a> {
-    /// Where the row begins, counted from the block's first number.
+    /// Where the row begins, counted from the block's first scalar.
     pub start: usize,
     /// Rows on the path to the root, root first, counted from the block's first.
     pub rows: &'a [usize],
@@ -118,7 +118,7 @@ impl Pattern {
             }
         }
         for k in (0..size).rev() {
-            // the last of a row hands the others on, to its own last in turn
+            // fill: eliminating a row couples its last column to all others
             let mut row = rows[k].clone();
             if let Some(last) = row.pop_last() {
                 rows[last].append(&mut row);
@@ -227,7 +227,7 @@ impl Pattern {
         self.run_starts.push(self.runs.len());
     }
 
-    /// Numbers that a matrix of this pattern takes.
+    /// Scalars of a matrix with this pattern.
     pub fn len(&self) -> usize {
         self.len
     }

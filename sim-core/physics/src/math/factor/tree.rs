@@ -1,10 +1,9 @@
 //! Blocks that are a tree: every row couples to the rows on its path to the root, and to no others.
 //!
-//! A row keeps its path only, root first, so that the row of an ancestor is as long as its place on the
-//! path: what elimination subtracts is a prefix of the row. Rows that follow each other on a path are taken
-//! up to [`SEGMENT`] at a time: a number of an ancestor is then loaded and stored once for all of them, which
-//! takes less than half of the instructions row by row (a step of a quadruped was 15% faster for it). The
-//! root's rows are a full triangle, and run as [`super::dense`].
+//! A row keeps its path only, root first, so elimination subtracts a prefix of the row from the row of each ancestor. Rows
+//! that follow each other on a path are taken up to [`SEGMENT`] at a time: an ancestor's scalar is then loaded and stored once
+//! for all of them, with less than half of the instructions (a step of a quadruped is 15 % faster). The root's rows are a
+//! full triangle, and run as [`super::dense`].
 
 use super::dense;
 use super::pattern::{Block, Path, Pattern};
@@ -24,8 +23,8 @@ macro_rules! of_size {
     };
 }
 
-/// `f::<F, S, I>(…)` for every I below `n` and [`UNROLLED`], falling: a loop over a short row costs more than
-/// its numbers.
+/// `f::<F, S, I>(…)` for every I below `n` and [`UNROLLED`], in descending order: a loop over a short row costs more
+/// than its arithmetic.
 macro_rules! ancestors {
     ($n:expr, $f:ident($($arg:expr),*)) => {
         ancestors!(@ $n, $f($($arg),*), 11 10 9 8 7 6 5 4 3 2 1 0)
@@ -96,7 +95,7 @@ fn eliminate<F: Num, const S: usize>(
     ancestors!(length, subtract(above, path, &mut segment, x_above));
 }
 
-/// S rows less what they share with each other, ready to be subtracted from those of their ancestors.
+/// S rows eliminated among themselves, ready to be subtracted from the rows of their ancestors.
 pub(super) struct Removed<'a, F, const S: usize> {
     /// Their entries with the ancestors.
     rows: [&'a mut [F]; S],
@@ -107,7 +106,7 @@ pub(super) struct Removed<'a, F, const S: usize> {
 }
 
 impl<'a, F: Num, const S: usize> Removed<'a, F, S> {
-    /// From the rows' numbers and the number of their ancestors.
+    /// From the rows' scalars and the count of their ancestors.
     #[inline(always)]
     pub fn new(own: &'a mut [F], length: usize, x: &mut [F]) -> Self {
         let mut rows = split::<F, S>(own, length);
@@ -148,7 +147,7 @@ impl<'a, F: Num, const S: usize> Removed<'a, F, S> {
         Removed { rows, inverse, y }
     }
 
-    /// Subtracts their share from an ancestor's row and its part of the right-hand side.
+    /// Subtracts the rows from an ancestor's row, and from its part of the right-hand side.
     #[inline(always)]
     pub fn subtract_from(&mut self, target: &mut [F], x: &mut F) {
         let (rows, last) = (&mut self.rows, target.len() - 1);

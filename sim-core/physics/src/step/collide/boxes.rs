@@ -127,7 +127,7 @@ impl<F: Num> FaceAxis<F> {
         let in_b = b.axes.transpose_mul(b.center);
         let (mut first, mut code) = (c(-1e9), c(0.0));
         for i in 0..3 {
-            let x = in_a[i].abs() - half_a[i] - half_b.dot(Vec3(widths[i].0));
+            let x = in_a[i].abs() - half_a[i] - half_b.dot(widths[i]);
             let better = first.lt(x);
             first = F::select(better, x, first);
             code = F::select(better, c(i as f64), code);
@@ -302,7 +302,7 @@ fn add_edge_contact<C: Cx>(
     let on_a = first.scale_add(x, axes_a * Vec3(a));
     let on_b = second.scale_add(y, b.axes.mul_add(Vec3(other), b.center));
     let at = (on_a + on_b) * c(0.5);
-    // past an end the lines do not meet: then something else is nearest, unless the boxes overlap
+    // past an end the edges do not face each other: another feature is nearest, unless the boxes overlap
     let found = distance.lt(pair.margin) & !(over & c(0.0).lt(distance));
     out.add(cx, found, at, distance, axes_a * normal);
     C::F::select(found, distance, c(1e9))

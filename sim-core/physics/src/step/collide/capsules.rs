@@ -352,7 +352,7 @@ fn leave_over_edge<C: Cx>(
     }
     let to = flat.dot(corner - p).div(square);
     let at = axis.at(to.min(h).max(-h));
-    let distance = direction.dot(at - Vec3(corner.0));
+    let distance = direction.dot(at - corner);
     let exit = BoxExit {
         distance,
         direction,

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! 1. reject     a few axes of the shapes bound their distance from below
-//! 2. separate   GJK at a stand-off from the best of them, or where the pair is a hull and a shape with few axes, all axes
+//! 2. separate   GJK at a stand-off from the best of them; for a hull and a shape with few axes, all of their axes
 //! 3. clip       features that face each other along the normal, see [`super::manifold`]
 //! ```
 //!
@@ -43,7 +43,7 @@ pub(super) trait ConvexPair<C: Cx> {
 
     /// Radius around the first core, if it has one [m].
     fn radius(&self) -> Option<C::F>;
-    /// An axis that shows most pairs to be apart.
+    /// An axis that rejects most pairs.
     fn rejecting_axis(&self, cx: &mut C) -> SeparatingAxis<C::F>;
     /// A better one, where [`ConvexPair::HAS_BETTER_AXIS`].
     #[inline(always)]
@@ -143,7 +143,7 @@ fn add_features<C: Cx, P: ConvexPair<C>>(
 
 /// The separation of a shape and a hull by all of their axes; 1e18 m where they are farther apart than the margin.
 ///
-/// Apart, closest points may be vertices, which no axis shows: GJK goes on from the best axis. In penetration the best axis
+/// Apart, the closest points may be vertices, along none of the axes: GJK goes on from the best axis. In penetration the best axis
 /// is exact, and GJK is not needed.
 #[inline(always)]
 pub(super) fn separation_by_axes<C: Cx, A: PosedShape<C>>(

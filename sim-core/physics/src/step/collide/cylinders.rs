@@ -1,6 +1,6 @@
 //! A sphere, capsule, box or cylinder against a cylinder.
 //!
-//! A sphere has a closed form. The others are convex pairs ([`super::convex`]): a few axes reject what is far, and GJK at a
+//! A sphere has a closed form. The others are convex pairs ([`super::convex`]): a few axes reject most pairs, and GJK at a
 //! stand-off goes on from the best of them with the cylinder's exact support function.
 
 use super::convex::{ConvexPair, add_convex_contacts};
@@ -84,6 +84,7 @@ struct AgainstCylinder<F, A> {
 }
 
 impl<F: Num, A> AgainstCylinder<F, A> {
+    /// A shape and the second of a pair.
     #[inline(always)]
     fn new<C: Cx<F = F>>(pair: &ShapePair<'_, C>, first: A) -> Self {
         AgainstCylinder {
@@ -93,7 +94,7 @@ impl<F: Num, A> AgainstCylinder<F, A> {
         }
     }
 
-    /// Reaches of both.
+    /// Both shapes by their reaches.
     #[inline(always)]
     fn axes<C: Cx<F = F>>(&self) -> StartAxes<'_, F, A::Reach, CylinderReach<F>>
     where
@@ -113,6 +114,7 @@ impl<F: Num, A> AgainstCylinder<F, A> {
     }
 }
 
+// a curved shape: a few axes reject, GJK finds the normal, sampled directions escape from local minima of depth
 impl<C: Cx, A: FacetedShape<C>> ConvexPair<C> for AgainstCylinder<C::F, A> {
     type First = A::Core;
     type Second = LocalCylinder<C::F>;
@@ -150,6 +152,7 @@ impl<C: Cx, A: FacetedShape<C>> ConvexPair<C> for AgainstCylinder<C::F, A> {
         _: &mut C,
         normal: Vec3<C::F>,
     ) -> FeaturePair<C::F, A::Clipped, A::Clipping> {
+        // the first shape faces along the normal, the cylinder against it
         let own_frame = ShapePose {
             axes: unit_axes(),
             center: Vec3::zero(),

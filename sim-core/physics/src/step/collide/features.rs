@@ -57,6 +57,7 @@ impl<'a, F: Num> HullFace<'a, F> {
             None => d,
         };
         let (start, end) = hull.span(cx, Part::Faces);
+        // below any cosine
         let mut best = cx.var(F::c(-2.0));
         let mut at = cx.var(F::c(0.0));
         span!(cx, face in start, end, {
@@ -93,6 +94,7 @@ impl<C: Cx> Feature<C> for HullFace<'_, C::F> {
     }
     #[inline(always)]
     fn corner(&self, cx: &mut C, i: C::I) -> Vec3<C::F> {
+        // past the last corner the first again
         let place = cx.number(i);
         let half = C::F::c(0.5);
         let place = C::F::select(place.lt(self.count - half), place, C::F::c(0.0));
@@ -109,6 +111,7 @@ pub(super) struct BoxFace<F> {
     /// Its outward unit normal.
     pub outward: Vec3<F>,
     center: Vec3<F>,
+    /// Half its sides.
     u: Vec3<F>,
     v: Vec3<F>,
 }
@@ -162,6 +165,7 @@ impl<C: Cx> Feature<C> for BoxFace<C::F> {
     fn corner(&self, cx: &mut C, i: C::I) -> Vec3<C::F> {
         let c = C::F::c;
         let place = cx.number(i);
+        // corners 0 to 3 and 0 again: (+, +), (-, +), (-, -), (+, -)
         let left = c(0.5).lt(place) & place.lt(c(2.5));
         let low = c(1.5).lt(place) & place.lt(c(3.5));
         let (x, y) = (
@@ -175,6 +179,7 @@ impl<C: Cx> Feature<C> for BoxFace<C::F> {
 /// A line on the surface of a capsule.
 pub(super) struct SegmentLine<F> {
     center: Vec3<F>,
+    /// From the centre to one end.
     half: Vec3<F>,
     outward: Vec3<F>,
 }
@@ -218,6 +223,7 @@ pub(super) struct CylinderFeature<F: Num> {
     /// Its outward unit normal.
     pub outward: Vec3<F>,
     center: Vec3<F>,
+    /// Two radii of a cap, or half of a line.
     u: Vec3<F>,
     v: Vec3<F>,
     count: F,
@@ -297,6 +303,7 @@ impl<C: Cx> Feature<C> for CylinderFeature<C::F> {
         let place = cx.number(i);
         let inside = place.lt(self.count - c(0.5));
         let place = C::F::select(inside, place, c(0.0));
+        // around the rim, or from one end of the line to the other
         let (sin, cos) = (place * c(std::f64::consts::TAU / CORNERS_MAX as f64)).sincos();
         let (x, y) = (
             C::F::select(self.cap, cos, c(2.0).fma(place, c(-1.0))),

@@ -1,6 +1,6 @@
 //! Convex hulls as rows of the model's tables, and their support functions.
 //!
-//! A support function looks at every vertex: hulls are small (at most 64 vertices), and hill climbing over neighbours
+//! A support function visits every vertex: hulls are small (at most 64 vertices), and hill climbing over neighbours
 //! (as in MuJoCo's `engine_collision_convex.c`) would take another path in each world of a block.
 
 use super::support::Support;

@@ -177,7 +177,7 @@ pub(super) struct HullAxes<'a, 'b, C: Cx, R> {
     pub axes: &'a Mat3<C::F>,
     pub center: Vec3<C::F>,
     pub other: &'a R,
-    /// Past this distance the search ends at any axis that shows it [m].
+    /// Past this distance the search ends at any axis that proves it [m].
     pub limit: C::F,
     /// A face is preferred to an edge that is better by no more than this [m].
     pub tolerance: C::F,
@@ -263,8 +263,8 @@ impl<C: Cx, R: Reach<C::F>> HullAxes<'_, '_, C, R> {
             let farther = old.lt(x);
             let kept = get3(cx, &search.normal);
             cx.put(&mut search.distance, C::F::select(farther, x, old));
-            put3(cx, &mut search.normal, select(farther, Vec3(m.0), kept));
-            // any face that shows the limit will do
+            put3(cx, &mut search.normal, select(farther, m, kept));
+            // any face that proves the limit is enough
             break_if!(cx, self.limit.lt(x));
         });
         search

@@ -41,6 +41,7 @@ pub fn plane_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C
     let reach = BoxReach(half).reach(n);
     when!(cx, (height - reach).lt(pair.margin), {
         let size = hull.radius(cx);
+        // seen along the normal: two directions across it, and the height
         let u = perpendicular(n);
         let view = Mat3([u, n.cross(u), n]);
         let vertices = Vertices {
@@ -152,6 +153,7 @@ impl<F: Num, I: Copy> Vertices<F, I> {
         let (first, end) = self.span;
         let score = ReductionScore::of(count, chosen);
         let mut best = cx.var(score.threshold(c(SPREAD) * self.size));
+        // where none is found the first point stands in, and nothing is found after it
         let mut place = var3(cx, chosen[0]);
         let mut is = cx.var(c(0.0));
         span!(cx, row in first, end, {
@@ -173,6 +175,7 @@ impl<F: Num, I: Copy> Vertices<F, I> {
 #[inline(always)]
 pub fn sphere_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let (hull, b) = (pair.hull_b(), pair.pose_b);
+    // in the frame of the hull, then back in that of the pair
     let near = separation_by_axes(cx, &hull, &PosedSphere::of(pair), pair.margin);
     let point = b.axes.mul_add(near.point, b.center);
     let normal = b.axes * near.normal;
@@ -229,9 +232,11 @@ pub fn hull_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>
 /// A shape in the frame of a hull.
 struct AgainstHull<'a, C: Cx, A> {
     first: A,
+    /// In its own frame.
     hull: Hull<'a, C>,
 }
 
+// shapes with few axes need no search; a cylinder starts from the best axis of hull and cylinder
 impl<'a, C: Cx, A: FacetedShape<C>> ConvexPair<C> for AgainstHull<'a, C, A> {
     const AXES_ARE_EXACT: bool = A::AXES_ARE_EXACT;
     const HAS_BETTER_AXIS: bool = true;
@@ -291,6 +296,7 @@ impl<'a, C: Cx, A: FacetedShape<C>> ConvexPair<C> for AgainstHull<'a, C, A> {
         cx: &mut C,
         normal: Vec3<C::F>,
     ) -> FeaturePair<C::F, A::Feature, HullFace<'a, C::F>> {
+        // a face of either shape that lies flat makes the contact a polygon
         let feature = self.first.feature(normal);
         let face = HullFace::find(cx, &self.hull, None, -normal);
         let face_is_flat = aligned(face.outward, normal);
@@ -314,6 +320,7 @@ impl<'a, C: Cx, A: FacetedShape<C>> ConvexPair<C> for AgainstHull<'a, C, A> {
 struct TwoHulls<'a, C: Cx> {
     /// Pose of the first.
     pose: ShapePose<C::F>,
+    /// Both in their own frames.
     own: Hull<'a, C>,
     second: Hull<'a, C>,
     /// Half extents of their bounding boxes, and their radii [m].
@@ -324,6 +331,7 @@ struct TwoHulls<'a, C: Cx> {
 }
 
 impl<'a, C: Cx> TwoHulls<'a, C> {
+    /// The first hull in the frame of the second.
     #[inline(always)]
     fn first(&self) -> PosedHull<'a, C> {
         PosedHull {
@@ -340,6 +348,7 @@ impl<'a, C: Cx> TwoHulls<'a, C> {
     }
 }
 
+// pairs of edges are too many for axes: GJK from the bounding boxes, and all axes only in deep penetration
 impl<'a, C: Cx> ConvexPair<C> for TwoHulls<'a, C> {
     type First = PosedHull<'a, C>;
     type Second = Hull<'a, C>;
@@ -379,6 +388,7 @@ impl<'a, C: Cx> ConvexPair<C> for TwoHulls<'a, C> {
         cx: &mut C,
         normal: Vec3<C::F>,
     ) -> FeaturePair<C::F, HullFace<'a, C::F>, HullFace<'a, C::F>> {
+        // the faces that face each other along the normal
         let first = HullFace::find(cx, &self.own, Some(self.pose), normal);
         let second = HullFace::find(cx, &self.second, None, -normal);
         FeaturePair {

@@ -10,7 +10,7 @@ use super::clip::{Clip, ClipPlane, NO_CANDIDATE, deepest_candidate, farthest_can
 use super::features::Feature;
 use super::narrow::ShapePair;
 use super::points::Points;
-use super::select::perpendicular;
+use super::select::{perpendicular, select};
 use super::support::rounding_error;
 use super::variables::{get3, set3, var3};
 use crate::constants::hull::CORNERS_MAX;
@@ -174,11 +174,7 @@ fn reduce<C: Cx>(
     let least = rounding_error::<C::F>() * clip.size;
     let (x, deep) = deepest_candidate(cx, clip.tables, most, least, distance);
     let old = get3(cx, &chosen.spots[0]);
-    set3(
-        cx,
-        &mut chosen.spots[0],
-        super::select::select(deep, x, old),
-    );
+    set3(cx, &mut chosen.spots[0], select(deep, x, old));
     let is_closest = C::F::select(deep, C::F::c(0.0), C::F::c(1.0));
     cx.set(&mut chosen.is_closest, is_closest);
     for count in 0..3 {

@@ -4,6 +4,10 @@
 //! stage for each pair of kinds ([`narrow`]). Positions of shapes are relative to the reference point of their tree, and
 //! those of a pair are relative to its first shape, so that `f32` keeps its digits far from the origin.
 //!
+//! The model lists all pairs of convex pieces that may touch, sorted by their kinds. Contacts of a world stand in the order of
+//! these pairs, whatever other worlds of its block found. Contacts that do not fit are counted (`contacts_left_out`), and the
+//! world gets a bit in `status`; contacts are taken in the order of the pairs, so other worlds keep their bits.
+//!
 //! | Pairs | Method | File |
 //! |---|---|---|
 //! | plane, sphere, capsule | closed form | `planes`, `spheres`, `capsules` |
@@ -100,6 +104,7 @@ fn place_shapes<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
         let row = cx.at(t);
         cx.fill_all(memory.origins, row, 0, reference.0);
     }
+    // static shapes are relative to the origin of the world, the last row
     let world = cx.at(w.reference.len());
     cx.fill_all(memory.origins, world, 0, [C::F::c(0.0); 3]);
 }
@@ -115,7 +120,7 @@ fn collide_group<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>
     }
 }
 
-/// Adds the contacts of a pair, if nothing shows that it has none.
+/// Adds the contacts of a pair that the broad phase does not reject.
 #[inline(always)]
 fn collide_pair<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) {
     let kinds = N::KINDS;
@@ -233,6 +238,7 @@ fn boxes_overlap<F: Num>(
     [half, other_half]: [Vec3<F>; 2],
     reach: F,
 ) -> F::Mask {
+    // the largest gap along any axis; overlapping boxes have none
     let mut gap = F::c(-1.0);
     let mut widths = [F::c(0.0); 3];
     for (axis, half) in axes.iter().zip(*half) {
@@ -282,7 +288,7 @@ fn points_of<C: Cx>(
         list: cx.kept(t.memory.counts, class, first, capacity),
         table: t.memory.rows,
         pair: cx.number(p),
-        base: (center_a + (origin_a - Vec3(origin.0))),
+        base: (center_a + (origin_a - origin)),
         flip: cx.constant(scalars, p, pair::FLIP),
         mu: match t.memory.mu.rows {
             0 => None,

@@ -24,8 +24,11 @@ pub(super) trait PosedShape<C: Cx> {
     /// Its core.
     type Core: Support<C>;
 
+    /// Its pose.
     fn pose(&self) -> &ShapePose<C::F>;
+    /// See [`Reach`].
     fn reach(&self) -> Self::Reach;
+    /// See [`Support`].
     fn core(&self) -> Self::Core;
     /// Radius around the core, if it has one [m].
     fn radius(&self) -> Option<C::F>;
@@ -224,6 +227,7 @@ impl<C: Cx> PosedShape<C> for PosedCapsule<C::F> {
     }
 }
 
+// its feature is a line: two points on a face of the other shape
 impl<C: Cx> FacetedShape<C> for PosedCapsule<C::F> {
     const AXES_ARE_EXACT: bool = true;
     type Feature = SegmentLine<C::F>;
@@ -248,6 +252,7 @@ impl<C: Cx> FacetedShape<C> for PosedCapsule<C::F> {
         &self,
         axes: &StartAxes<'_, C::F, Self::Reach, CylinderReach<C::F>>,
     ) -> SeparatingAxis<C::F> {
+        // across both axes, and from the cylinder's axis to ends and middle of the capsule's
         let (c, center) = (C::F::c, self.pose.center);
         axes.cylinder_axis()
             .or(axes.across_both(2))
@@ -263,6 +268,7 @@ impl<C: Cx> FacetedShape<C> for PosedCapsule<C::F> {
         cylinder: CylinderFeature<C::F>,
         normal: Vec3<C::F>,
     ) -> FeaturePair<C::F, SegmentLine<C::F>, CylinderFeature<C::F>> {
+        // a capsule is a line already: it lies along the side of the cylinder
         let along = !cylinder.cap & lines_along::<C>(&self.pose);
         FeaturePair {
             flat: cylinder.flat(normal) | along,
@@ -279,6 +285,7 @@ fn lines_along<C: Cx>(pose: &ShapePose<C::F>) -> MaskOf<C> {
     C::F::c(PARALLEL).lt(pose.axes[2][2].abs())
 }
 
+// no radius: the core is the box itself
 impl<C: Cx> PosedShape<C> for PosedBox<C::F> {
     type Reach = BoxReach<C::F>;
     type Core = BoxCore<C::F>;
@@ -309,6 +316,7 @@ impl<C: Cx> PosedShape<C> for PosedBox<C::F> {
     }
 }
 
+// its feature is a face
 impl<C: Cx> FacetedShape<C> for PosedBox<C::F> {
     const AXES_ARE_EXACT: bool = true;
     type Feature = BoxFace<C::F>;
@@ -332,6 +340,7 @@ impl<C: Cx> FacetedShape<C> for PosedBox<C::F> {
         &self,
         axes: &StartAxes<'_, C::F, Self::Reach, CylinderReach<C::F>>,
     ) -> SeparatingAxis<C::F> {
+        // the axes of box and cylinder, their products, and the line of centres, also straight out of the cylinder's side
         let mut start = axes.cylinder_axis();
         for j in 0..3 {
             start = start.or(axes.own(j)).or(axes.across_both(j));
@@ -356,6 +365,7 @@ impl<C: Cx> FacetedShape<C> for PosedBox<C::F> {
     }
 }
 
+// no radius: the core is the cylinder itself
 impl<C: Cx> PosedShape<C> for PosedCylinder<C::F> {
     type Reach = CylinderReach<C::F>;
     type Core = CylinderCore<C::F>;
@@ -387,6 +397,7 @@ impl<C: Cx> PosedShape<C> for PosedCylinder<C::F> {
     }
 }
 
+// its feature is a cap or a line; its side is curved, so no list of axes is complete
 impl<C: Cx> FacetedShape<C> for PosedCylinder<C::F> {
     const AXES_ARE_EXACT: bool = false;
     type Feature = CylinderFeature<C::F>;
@@ -411,6 +422,7 @@ impl<C: Cx> FacetedShape<C> for PosedCylinder<C::F> {
         axes: &StartAxes<'_, C::F, Self::Reach, CylinderReach<C::F>>,
     ) -> SeparatingAxis<C::F> {
         let ShapePose { axes: own, center } = &self.pose;
+        // the axes of both, their product, and the line of centres, also straight out of either side
         let across = own[2].scale_add(-own[2].dot(*center), *center);
         axes.cylinder_axis()
             .or(axes.own(2))

@@ -114,7 +114,7 @@ impl<C: Cx, A: Reach<C::F>, B: Extent<C>> Restart<C> for DirectionSamples<C::F, 
             let is = old.lt(distance) & other;
             let kept = get3(cx, &axis);
             cx.set(&mut best, C::F::select(is, distance, old));
-            set3(cx, &mut axis, select(is, Vec3(n.0), kept));
+            set3(cx, &mut axis, select(is, n, kept));
         });
         SeparatingAxis {
             normal: get3(cx, &axis),

@@ -15,7 +15,7 @@ use crate::step::contact_rows::class_list;
 type ContactsOf<C> = Contacts<<<C as Cx>::F as Num>::Real>;
 type ClassOf<C> = Class<<<C as Cx>::F as Num>::Real>;
 
-/// The law of a contact at a `jar` of its row.
+/// The law of a contact at a residual `jar`.
 #[inline(always)]
 fn law_at<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, jar: [C::F; 3]) -> ConeLaw<C::F> {
     let stiff = cx.load(t.memory.rows, r, row::STIFFNESS);
@@ -43,6 +43,7 @@ fn law_along<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, alpha: C::F) -> Line
         ];
         return elliptic_along(t.impratio, normal, squares, alpha, scalars);
     }
+    // a pyramid is evaluated at the point of the line
     let (jar, jv) = (cx.load3(rows, r, row::JAR), cx.load3(rows, r, row::AHEAD));
     let mut there = jar;
     for i in 0..3 {
@@ -100,6 +101,7 @@ pub(super) fn residual<C: Cx>(cx: &mut C, t: &ContactsOf<C>, a: &[C::F], place: 
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
+            // columns that follow each other, in dofs too, are one run
             let [x, y, z] = cx.load3(t.memory.rows, r, row::AREF);
             let mut jar = [-x, -y, -z];
             for run in &class.runs {
@@ -129,6 +131,7 @@ pub(super) fn assemble<C: Cx>(
         cx.fill(t.memory.rows, r, row::STATE, law.state);
         let [nn, nx, ny, xx, xy, yy] = law.stiffness;
         let rows = [[nn, nx, ny], [nx, xx, xy], [ny, xy, yy]];
+        // worlds without this contact add 0
         let mut pull = law.force;
         for x in &mut pull {
             *x = cx.only(*x);
@@ -165,6 +168,7 @@ pub(super) fn changes<C: Cx>(cx: &mut C, t: &ContactsOf<C>, sum: &mut C::V, curv
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
+            // the piece at `JAR` is that of the last assembly
             let before = cx.load(t.memory.rows, r, row::STATE);
             let ahead = cx.load3(t.memory.rows, r, row::AHEAD);
             let after = law_at(cx, t, r, ahead).state;
@@ -184,6 +188,7 @@ pub(super) fn forces<C: Cx>(cx: &mut C, t: &ContactsOf<C>, joint: &mut [C::V]) {
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
+            // f = -s' at the accelerations found
             let jar = cx.load3(t.memory.rows, r, row::JAR);
             let law = law_at(cx, t, r, jar);
             let mut force = law.force;
@@ -207,6 +212,7 @@ pub(super) fn cost<C: Cx>(cx: &mut C, t: &ContactsOf<C>, place: usize, sum: &mut
         each!(cx, r in list, {
             let jar = cx.load3(t.memory.rows, r, place);
             let law = law_at(cx, t, r, jar);
+            // s at the residual of this place
             let more = cx.get(sum) + cx.only(law.cost);
             cx.put(sum, more);
         });
@@ -236,11 +242,13 @@ pub(super) fn begin_line<C: Cx>(
             let more = cx.get(descent) + cx.only(bend);
             cx.put(descent, more);
             cx.fill_all(t.memory.rows, r, row::POWER, [power(&law.force, jv), bend]);
+            // the slip at any α is the root of a quadratic: keep its coefficients
             if t.cone == Cone::Elliptic {
                 let [[_, x, y], [_, u, v]] = [jar, jv];
                 let squares = [x.fma(x, y * y), x.fma(u, y * v), u.fma(u, v * v)];
                 cx.fill_all(t.memory.rows, r, row::SQUARES, squares);
             }
+            // rounding of the terms of J a - aref, by their stiffness
             let aref = cx.load3(t.memory.rows, r, row::AREF);
             let [nn, _, _, xx, _, yy] = law.stiffness;
             let mut sum = C::F::c(0.0);
@@ -269,6 +277,7 @@ pub(super) fn derivative<C: Cx>(
         each!(cx, r in list, {
             let here = law_along(cx, t, r, alpha);
             let [state, power, bend] = cx.load3(t.memory.rows, r, row::STATE);
+            // -p' of the quadratic model, whose force is power at α = 0
             let model = power - alpha * bend;
             let moved = (here.state - state).abs() + is_curved(t.cone, here.state);
             // exactly 0 where the piece is the same quadratic, in spite of rounding
@@ -280,6 +289,7 @@ pub(super) fn derivative<C: Cx>(
             cx.put(slope, sum);
             let sum = cx.get(size) + more.abs();
             cx.put(size, sum);
+            // of the curvature likewise
             let bend = C::F::select(differs, here.bend - bend, zero);
             let sum = cx.get(curvature) + cx.only(bend);
             cx.put(curvature, sum);

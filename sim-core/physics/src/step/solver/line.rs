@@ -16,14 +16,14 @@ use crate::{break_if, times};
 ///
 /// Rows that stay on their piece of cost follow the model, and add nothing.
 pub(super) struct Line<'a, F> {
-    /// -p'(0), what the model says of the gain at α = 1, twice.
+    /// -p'(0): twice the gain at α = 1 that the model predicts.
     pub descent: F,
-    /// The gain that rounding alone may promise.
+    /// The gain that rounding alone may predict.
     ///
-    /// Of a correction: ½ gᵀ H⁻¹ g of a gradient g that is but the rounding of jar in Jᵀ W jar and of τ, hence at most about
-    /// ε² (Σ W (|J a| + |aref|)² + |τ a|). Else, where each round solves for the whole minimum, the rounding of p'.
+    /// For a correction: ½ gᵀ H⁻¹ g of a gradient g that is only the rounding of jar in Jᵀ W jar and of τ, at most about
+    /// ε² (Σ W (|J a| + |aref|)² + |τ a|). Where each iteration solves for the whole minimum: the rounding of p'.
     pub noise: F,
-    /// Has any world contacts?
+    /// Has any world of the block contacts?
     touches: bool,
     params: &'a [F],
     weight: &'a [F],
@@ -39,10 +39,8 @@ struct Derivative<F> {
 }
 
 impl<'a, F: Num> Line<'a, F> {
-    /// `curvature` is sᵀ M s, `power` |τ a|; `jar_minimum` has the change of `jar` over the segment. In the worlds where the
-    /// solver `corrects`, they touch.
-    ///
-    /// Turns what contacts have ahead into its change.
+    /// `curvature` is sᵀ M s, `power` is |τ a|, and `jar_minimum` has the change of `jar` over the segment. The worlds that
+    /// `corrects` holds in have contacts; of these `AHEAD` becomes the change of `JAR`.
     #[inline(always)]
     pub fn new<C: Cx<F = F>>(
         cx: &mut C,
@@ -103,7 +101,7 @@ impl<'a, F: Num> Line<'a, F> {
             let start = law(m, self.params, r, self.jar[r], weight);
             let here = law(m, self.params, r, alpha.fma(jv, self.jar[r]), weight);
             let model = (start.stiffness * alpha).fnma(jv, start.force);
-            // exactly nothing where the piece is the same, whatever rounding says
+            // exactly 0 where the piece is the same, in spite of rounding
             let moved = F::c(0.5).lt((here.state - start.state).abs());
             let power = F::select(moved, (model - here.force) * jv, F::c(0.0));
             d.slope = d.slope + power;
@@ -126,7 +124,7 @@ impl<'a, F: Num> Line<'a, F> {
     }
 }
 
-/// The law of a row by its number.
+/// The law of row `r`.
 #[inline(always)]
 fn law<F: Num>(m: &Constants<F::Real>, params: &[F], r: usize, jar: F, weight: F) -> Law<F> {
     let frictions = m.equalities.len();
@@ -142,14 +140,14 @@ fn law<F: Num>(m: &Constants<F::Real>, params: &[F], r: usize, jar: F, weight: F
     }
 }
 
-/// Slope over that at the start below which a search ends in `f32`: the next round finds the rest, and a search to MuJoCo's
-/// `ls_tolerance` of 0.01 takes half as many steps again.
+/// Slope relative to that at the start below which a search ends in `f32`: the next iteration finds the rest. A search to
+/// MuJoCo's `ls_tolerance` of 0.01 takes half as many steps again.
 const SLACK: f64 = 0.1;
-/// Beyond any minimum [–].
+/// An α beyond any minimum [–].
 const FAR: f64 = 1e10;
 
-/// The exact minimum on the segment, and beyond it: p'(α) = 0 by Newton's method while its moves halve, and otherwise by the
-/// chord between the ends of the bracket, of which an end that stays counts half (Illinois; Dowell and Jarratt 1971).
+/// The exact minimum on the segment or beyond it, p'(α) = 0: by Newton's method while its moves halve, otherwise by the chord
+/// of the bracket, with half the slope of an end that stays (Illinois method; Dowell and Jarratt 1971).
 #[inline(always)]
 pub(super) fn search<C: Cx>(
     cx: &mut C,
@@ -184,7 +182,7 @@ pub(super) fn search<C: Cx>(
         cx.set(&mut high, above);
         let before = cx.get(&side);
         let now = C::F::select(falls, -one, one);
-        // the end that stays for the second time counts half
+        // an end that stays for the second time has half its slope
         let weight = C::F::select(half.lt(before * now), half, one);
         let below_slope = C::F::select(falls, d.slope, cx.get(&low_slope) * weight);
         let above_slope = C::F::select(falls, cx.get(&high_slope) * weight, d.slope);

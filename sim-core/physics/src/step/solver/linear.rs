@@ -1,4 +1,4 @@
-//! The linear system of an iteration, H x = rhs, with the rows of contacts.
+//! The linear system of an iteration, H x = rhs, with the terms of contacts.
 
 use super::{contacts, gather};
 use crate::lane::{Cx, MaskOf, Num};
@@ -6,10 +6,10 @@ use crate::math::factor::solve as solve_linear;
 use crate::step::{BlockOf, ConstantsOf};
 use crate::when;
 
-/// What is solved for, in place of its right-hand side.
+/// What is solved for. It takes the place of its right-hand side.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Unknown {
-    /// The minimum of the model, in `minimum`; the force of contacts is added to the right-hand side.
+    /// The minimum of the model, in `minimum`; contact forces are added to the right-hand side.
     Minimum,
     /// A correction of accelerations, in `missing`.
     Missing,
@@ -17,7 +17,7 @@ pub(super) enum Unknown {
 
 /// Solves (M + Jᵀ W J) x = rhs. `hessian` has the rows of joints already; `touching` is that of [`contacts::touching`].
 ///
-/// A world whose contacts couple what the mass matrix does not solves a larger system; the others need not.
+/// A world whose contacts couple dofs that the mass matrix does not couple solves a larger system.
 #[inline(always)]
 pub(super) fn solve_system<C: Cx>(
     cx: &mut C,
@@ -44,7 +44,7 @@ pub(super) fn solve_system<C: Cx>(
     let couples = touches && t.couples();
     let coupling = contacts::coupling(cx, t);
     let (none, half) = (coupling.lt(C::F::c(0.5)), C::F::c(0.5));
-    // a loop, so that assembly and solver are compiled once: they are long
+    // a loop, so that assembly and factorisation are compiled once: they are long
     for larger in [false, true] {
         if larger && !couples {
             break;
@@ -91,8 +91,8 @@ pub(super) fn solve_system<C: Cx>(
     gather(cx, &b.solution, vector);
 }
 
-/// The gain of a whole step, ½ gᵀ H⁻¹ g, of the parts of the mass matrix in which bodies touch; more where contacts
-/// of several classes touch one part. The others are solved to rounding, however far they go.
+/// The gain of a whole step, ½ gᵀ H⁻¹ g, summed over the parts of the mass matrix with contacts; a part that several classes
+/// touch counts several times. Parts without contacts are solved to rounding in any case.
 ///
 /// The step is in `minimum`, the gradient is the right-hand side that it was solved for.
 #[inline(always)]
@@ -104,7 +104,7 @@ pub(super) fn touched_gain<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
         for j in rows {
             sum = cx.get(&b.pull[j]).fma(step[j], sum);
         }
-        // alone, a part of what contacts couple may lose
+        // one part of a coupled system may have a negative gain
         *gain = half * sum.abs();
     }
     let mut sum = zero;

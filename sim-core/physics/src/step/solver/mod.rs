@@ -12,11 +12,45 @@
 //! (M + Jᵀ W J) (a⁺ - a) = τ + Jᵀ f - M a       the same, where there are contacts
 //! ```
 //!
-//! If no row changes its state between `a` and `a⁺` the model was exact and `a⁺` is the answer.
-//! Otherwise an exact line search on the segment finds the next `a` (in `f32` only if three whole steps
-//! did not get there, or would overshoot). The start is the last step's
-//! result, which mostly makes the first iteration the only one; in `f64`, the reference, it is chosen as
-//! MuJoCo does (see [`choose_start`]).
+//! If no row changes its piece of cost between `a` and `a⁺`, the model was exact and `a⁺` is the answer. Otherwise an exact
+//! line search on the segment finds the next `a` (in `f32` only after three whole steps, or where these may overshoot). The
+//! start is the result of the last step, so mostly one iteration is enough. In `f64`, the reference, the start is chosen as in
+//! MuJoCo (see [`choose_start`]).
+//!
+//! # Rows
+//!
+//! Rows of joints (equalities, dry friction, limits) are known when the model is compiled. Their Jacobians have one or two
+//! entries and run unrolled ([`rows`]). Contacts are found at run time and lie in lists, one for each class of bodies that
+//! the same dofs move ([`contacts`]). The solver needs a law (force, stiffness, piece of the cost) and a Jacobian of each row.
+//!
+//! # Precision
+//!
+//! In `f64` the start and the line search are MuJoCo's, so runs agree with it to rounding even where its tolerance stops it
+//! early. In `f32` a whole step is tried three times before a search, unless a dry friction turned, since whole steps then
+//! oscillate.
+//!
+//! Contacts are up to 10⁶ times as stiff as bodies are heavy. So in worlds that touch, an iteration solves for the step
+//! a⁺ - a, not for a⁺. It ends where the gain is what rounding alone would promise ([`Line::noise`]). A whole step that found
+//! the minimum is followed by one more, unless bodies that touch gained less than the tolerance.
+//!
+//! Where the mass matrix loses too many digits in `f32`, [`refine`] corrects the accelerations by inverse dynamics.
+//!
+//! # What is skipped
+//!
+//! Where limits and contacts are the only rows and none acts in a block, `f32` skips the solver: the integrator factors a
+//! matrix of its own. [`Accelerations`] then finds accelerations for output only.
+//!
+//! A contact adds Jᵀ W J to the mass matrix. Contacts that couple two trees need a larger pattern. That system is assembled
+//! and solved only in worlds that have such a contact ([`linear`]).
+//!
+//! | File | What it has |
+//! |---|---|
+//! | `linear` | the system of an iteration |
+//! | `rows`, `cones` | laws of joint rows and of contacts: force, stiffness, cost |
+//! | `contacts` | sums over contacts |
+//! | `line` | the line search |
+//! | `progress` | which worlds search, and which have arrived |
+//! | `refine` | corrections by inverse dynamics, in `f32` |
 
 mod cones;
 mod contacts;
@@ -76,7 +110,7 @@ fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let acts = acts(cx, m, &b.efc_weight);
     gather(cx, &b.efc_weight, &mut b.work.row_weight);
     gather(cx, &b.efc_aref, &mut b.work.row_aref);
-    // contacts are so stiff that M is lost in the rounding of H a⁺; of H (a⁺ - a) less is asked
+    // contacts are so stiff that M is lost in the rounding of H a⁺: worlds with contacts solve for the correction a⁺ - a
     let corrects = contacts::touching(cx, &m.contacts);
     let mut progress = Progress::new(cx, acts, corrects);
     times!(cx, m.solver.iterations, {
@@ -113,8 +147,8 @@ fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     }
 }
 
-/// H and the right-hand side at `a`: τ + Jᵀ (f + W J a), or in the worlds that correct τ + Jᵀ f - M a. Contacts add theirs
-/// in [`linear::solve_system`].
+/// Writes H and the right-hand side at `a`: τ + Jᵀ (f + W J a), or τ + Jᵀ f - M a in worlds that solve for a correction.
+/// [`linear::solve_system`] adds the terms of contacts.
 #[inline(always)]
 fn model_cost<C: Cx>(
     cx: &mut C,
@@ -142,7 +176,7 @@ fn model_cost<C: Cx>(
     }
 }
 
-/// Solves for the minimum a⁺ of the model; returns the gain of bodies that touch, where it is known.
+/// Solves for the minimum a⁺ of the model. Returns the gain of bodies in contact, where it is known.
 #[inline(always)]
 fn minimize_model<C: Cx>(
     cx: &mut C,
@@ -177,7 +211,7 @@ fn advance<C: Cx>(cx: &mut C, b: &mut BlockOf<C>, plan: &Plan<C>, found: &Found<
     }
 }
 
-/// The segment from a to a⁺ in the worlds that search: how far the cost falls, and whether that ends the solve.
+/// Searches the segment from a to a⁺ for the least cost, and judges whether that ends the solve.
 #[inline(always)]
 fn search_segment<C: Cx>(
     cx: &mut C,
@@ -242,7 +276,7 @@ fn constraint_forces<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) 
     contacts::forces(cx, &m.contacts, &mut b.constraint_force);
 }
 
-/// No gain is as large [J/s²].
+/// A gain that is not known [J/s²]: larger than any.
 const UNKNOWN: f64 = 1e30;
 
 /// The values of cells.
@@ -253,17 +287,17 @@ fn gather<C: Cx>(cx: &mut C, cells: &[C::V], to: &mut [C::F]) {
     }
 }
 
-/// Can the solver pass over a world in which no constraint acts?
+/// Can the solver skip a world in which no constraint acts?
 ///
-/// Without constraints a = M⁻¹ τ. If a drive is damped only the outside reads that: the integrator factors
-/// a matrix of its own, and the next solve can start from anywhere. So a block of worlds that stay inside
-/// their limits saves the solver, a quarter of its step. In `f64` the start is MuJoCo's.
+/// Without constraints a = M⁻¹ τ. With damping only outputs read it: the integrator factors a matrix of its own, and the next
+/// solve may start from anywhere. A block of worlds inside their limits then saves the solver, a quarter of its step. `f64` does
+/// not skip: its start is MuJoCo's.
 fn may_idle<C: Cx>(m: &ConstantsOf<C>) -> bool {
     let only_limits = m.equalities.is_empty() && m.frictions.is_empty();
     !<<C::F as Num>::Real as Real>::DOUBLE && only_limits && m.damped
 }
 
-/// The worlds that the solver may not pass over.
+/// The worlds that the solver must not skip.
 #[inline(always)]
 fn acts<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, weight: &[C::V]) -> MaskOf<C> {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
@@ -281,9 +315,9 @@ fn acts<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, weight: &[C::V]) -> MaskOf<C> {
 
 /// Starts from M⁻¹ τ where that costs less than the last step's result (MuJoCo: `mj_warmstart`).
 ///
-/// The minimum is the same; where the tolerance stops the solver short of it depends on the start by
-/// up to 5e-4 in q̈, which the reference must reproduce. In `f32` it is not worth a factor and the
-/// extra rounds: a start without constraints changes the state of more rows.
+/// The minimum is the same, but where the tolerance stops the solver depends on the start by up to 5e-4 in q̈, which the
+/// reference must reproduce. In `f32` it is not worth a factorisation and extra iterations: from a start without constraints
+/// more rows change their piece.
 #[inline(always)]
 fn choose_start<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let n = m.dofs.len();

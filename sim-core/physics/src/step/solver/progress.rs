@@ -1,4 +1,4 @@
-//! How Newton's method goes on: which worlds search the segment, and which have arrived.
+//! Progress of Newton's method: which worlds search the segment, and which have arrived.
 
 use super::line::Line;
 use super::rows::{changes, residual};
@@ -7,9 +7,9 @@ use crate::constants::contact::{Cone, row};
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::step::{BlockOf, ConstantsOf};
 
-/// What one iteration leaves for the next. Cells are 1 for yes, 0 for no.
+/// State between iterations. Cells are 1 for yes, 0 for no.
 pub(super) struct Progress<C: Cx> {
-    /// Did the last iteration leave every row that touches on its piece? Then the next whole step ends.
+    /// Did every row keep its piece in the last iteration? Then the next whole step ends the solve.
     calm: C::V,
     /// Has the world not arrived?
     busy: C::V,
@@ -19,43 +19,43 @@ pub(super) struct Progress<C: Cx> {
     last_gain: C::V,
 }
 
-/// What rows do between a and a⁺.
+/// Rows between a and a⁺.
 pub(super) struct Pieces<C: Cx> {
     /// Is some row on another piece of its cost?
     changed: MaskOf<C>,
-    /// No contact slides and no dry friction turns: there a whole step overshoots, and may do so for ever.
+    /// No contact slides and no dry friction reverses: whole steps would overshoot there, possibly without end.
     straight: MaskOf<C>,
 }
 
-/// What an iteration does.
+/// What an iteration does in each world.
 pub(super) struct Plan<C: Cx> {
     changed: MaskOf<C>,
     /// After the first iteration.
     later: MaskOf<C>,
-    /// What bodies that touch would gain by one more iteration is less than the tolerance already.
+    /// The gain of bodies in contact is below the tolerance already.
     quiet: MaskOf<C>,
     /// Searches the segment instead of taking the whole step.
     pub searches: MaskOf<C>,
 }
 
-/// What a search found.
+/// The result of a search.
 pub(super) struct Found<C: Cx> {
     /// α of the next accelerations a + α (a⁺ - a); 0 where the step is not taken [–].
     pub length: C::V,
-    /// 1 where no step can help any more.
+    /// 1 where no further step can help.
     pub settled: C::V,
 }
 
-/// A gain above this share of the last iteration's is no progress of Newton's method [–].
+/// A gain above this share of the last iteration's is not the convergence of Newton's method [–].
 const STALLED: f64 = 0.25;
-/// Without progress, a gain up to this many times [`Line::noise`] is taken for noise [–]. Of 327 states of random piles,
-/// both cones, no acceleration is then off by more than 3e-4 in `f32`, where 10,000 times leave 2e-3.
+/// A gain that does not shrink counts as noise up to this many times [`Line::noise`] [–]. In 327 states of random piles, both
+/// cones, accelerations are then off by at most 3e-4 in `f32`; with 10,000 times by 2e-3.
 const DOUBTED: f64 = 100.0;
 
 /// Iterations that take the whole step without a line search, which costs as much as two iterations.
 ///
-/// Newton's method on a piecewise quadratic mostly ends by itself in two or three; a world that goes
-/// on after these searches. The reference always searches, since MuJoCo does.
+/// Newton's method on a piecewise quadratic mostly ends in two or three iterations. A world that needs more searches. The
+/// reference always searches, since MuJoCo does.
 fn trusted_iterations<F: Num>() -> f64 {
     if F::Real::DOUBLE { -1.0 } else { 2.5 }
 }
@@ -95,7 +95,7 @@ impl<C: Cx> Progress<C> {
     #[inline(always)]
     pub fn new(cx: &mut C, acts: MaskOf<C>, corrects: Option<MaskOf<C>>) -> Progress<C> {
         let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
-        // a factor of rows a million times as stiff as M leaves a step its first digits only: one more iteration finds the rest
+        // with rows a million times as stiff as M a step has its first digits only: one more iteration finds the rest
         let polished = match corrects {
             Some(corrects) => C::F::select(corrects, zero, one),
             None => one,
@@ -125,7 +125,7 @@ impl<C: Cx> Progress<C> {
             .get(&self.iteration)
             .lt(C::F::c(trusted_iterations::<C::F>()));
         let mut trusted = early & pieces.straight;
-        // and where a pyramid's edges are too stiff for their factor
+        // the edges of a pyramid may be too stiff for the factorisation
         if let (Some(corrects), Cone::Pyramidal) = (corrects, m.contacts.cone) {
             trusted = trusted & !corrects;
         }
@@ -140,9 +140,9 @@ impl<C: Cx> Progress<C> {
 
     /// Whether a search settles the world.
     ///
-    /// The model promises a gain of ½ |p'(0)|. Below the tolerance the step is not taken, as in MuJoCo, but for the first;
-    /// below what rounding makes it is the last that can help. In `f32` it is the last too if Newton's next one, of which
-    /// the gain shrinks with the square, would be below the tolerance.
+    /// The model predicts a gain of ½ |p'(0)|. Below the tolerance the step is not taken, except the first (as in MuJoCo). Below
+    /// the rounding of the gain it is the last step. In `f32` it is also the last where the gain of the next step would be below
+    /// the tolerance: gains of Newton's method shrink with the square.
     #[inline(always)]
     pub fn judge(
         &mut self,
@@ -160,7 +160,7 @@ impl<C: Cx> Progress<C> {
         let mut last = gain.lt(line.noise);
         if let Some(corrects) = corrects {
             let before = cx.get(&self.last_gain);
-            // Newton's gains shrink fast; one that does not, and is hardly more than rounding, is rounding
+            // a gain that does not shrink and is near rounding is rounding
             let stalls = (C::F::c(STALLED) * before).lt(gain);
             let is_small = gain.lt(line.noise * C::F::c(DOUBTED));
             let mut ends = stalls & is_small;

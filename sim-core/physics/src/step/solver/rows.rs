@@ -1,4 +1,7 @@
-//! Laws of the constraint rows, and sums over them.
+//! Laws of the constraint rows of joints, and sums over them (Todorov 2014; MuJoCo: `mj_constraintUpdate`).
+//!
+//! A row has a cost s of its residual jar = J a - aref, piecewise quadratic: force -s', stiffness s''. Rows are in MuJoCo's
+//! order: equalities, frictions, limits. J has one or two entries per row, so no row is stored.
 
 use crate::arrays::Workspace;
 use crate::constants::params::Param;
@@ -6,10 +9,13 @@ use crate::constants::{Constants, Friction};
 use crate::lane::Num;
 use crate::step::param;
 
-/// What a row does at `jar`: force -s', stiffness s'', and which piece of s it is on.
+/// The law of a row at a residual `jar`: force -s', stiffness s'', and which piece of s it is on.
 pub(super) struct Law<F> {
+    /// [N·m or N]
     pub force: F,
+    /// [kg·m² or kg]
     pub stiffness: F,
+    /// 0, or ± 1 on the other pieces.
     pub state: F,
 }
 
@@ -23,7 +29,7 @@ pub(super) fn equality<F: Num>(jar: F, weight: F) -> Law<F> {
     }
 }
 
-/// s = ½ D jar² within the zone R × loss, beyond it a line of slope ± loss (Huber).
+/// s = ½ D jar² within the zone R × loss, beyond it a line of slope ± loss (Huber 1964).
 #[inline(always)]
 pub(super) fn dry_friction<F: Num>(jar: F, weight: F, zone: F, loss: F) -> Law<F> {
     let (zero, one) = (F::c(0.0), F::c(1.0));
@@ -37,7 +43,7 @@ pub(super) fn dry_friction<F: Num>(jar: F, weight: F, zone: F, loss: F) -> Law<F
     }
 }
 
-/// Zone and loss of a dry friction.
+/// Zone and loss of a dry friction, which may vary from world to world.
 #[inline(always)]
 pub(super) fn bounds<F: Num>(
     m: &Constants<F::Real>,
@@ -98,7 +104,8 @@ fn pull<F: Num>(law: &Law<F>, jar: F, aref: F, corrects: Option<F::Mask>) -> F {
     }
 }
 
-/// Adds Jᵀ W J to `hessian`, and to the right-hand side in `minimum` Jᵀ (f + W J a), or Jᵀ f in the worlds where the solver `corrects`.
+/// Adds Jᵀ W J to `hessian`, and Jᵀ (f + W J a) to the right-hand side in `minimum`, or Jᵀ f in the worlds where the solver
+/// `corrects`.
 #[inline(always)]
 pub(super) fn assemble<F: Num>(
     m: &Constants<F::Real>,
@@ -109,6 +116,7 @@ pub(super) fn assemble<F: Num>(
     let (hessian, rhs) = (&mut w.hessian, &mut w.minimum);
     let (side, weight, aref, jar) = (&w.limit_side, &w.row_weight, &w.row_aref, &w.jar);
     let mut r = 0;
+    // J = (1, -ratio): four entries of the Hessian
     for e in &m.equalities {
         let law = equality(jar[r], weight[r]);
         let pull = pull(&law, jar[r], aref[r], corrects);
@@ -123,6 +131,7 @@ pub(super) fn assemble<F: Num>(
         rhs[l] = ratio.fnma(pull, rhs[l]);
         r += 1;
     }
+    // J = 1 or ± 1: the diagonal alone
     for f in &m.frictions {
         let [zone, loss] = bounds(m, params, f);
         let law = dry_friction(jar[r], weight[r], zone, loss);
@@ -141,7 +150,7 @@ pub(super) fn assemble<F: Num>(
     }
 }
 
-/// How many rows are on another piece of their cost; and how many dry frictions slide the other way.
+/// The count of rows on another piece of their cost, and of dry frictions that slide the other way.
 #[inline(always)]
 pub(super) fn changes<F: Num>(
     m: &Constants<F::Real>,
@@ -152,11 +161,13 @@ pub(super) fn changes<F: Num>(
 ) -> [F; 2] {
     let (zero, one) = (F::c(0.0), F::c(1.0));
     let (mut sum, mut turned) = (zero, zero);
+    // equalities have one piece only
     let mut r = m.equalities.len();
     for f in &m.frictions {
         let [zone, loss] = bounds(m, params, f);
         let before = dry_friction(jar[r], weight[r], zone, loss).state;
         let after = dry_friction(other[r], weight[r], zone, loss).state;
+        // from one bound to the other the state changes by 2
         let moved = (before - after).abs();
         sum = sum + moved;
         turned = turned + F::select(one.lt(moved), one, zero);
@@ -171,7 +182,7 @@ pub(super) fn changes<F: Num>(
     [sum, turned]
 }
 
-/// Force of every row, and their sum in joint space.
+/// Writes the force of every row, and adds Jᵀ f to `joint`.
 #[inline(always)]
 pub(super) fn forces<F: Num>(
     m: &Constants<F::Real>,
@@ -214,12 +225,14 @@ pub(super) fn cost<F: Num>(m: &Constants<F::Real>, params: &[F], weight: &[F], j
     }
     for f in &m.frictions {
         let ([zone, loss], size) = (bounds(m, params, f), jar[r].abs());
+        // Huber: quadratic inside the zone, linear outside
         let inside = half * weight[r] * jar[r] * jar[r];
         let outside = loss * half.fnma(zone, size);
         sum = sum + F::select(zone.lt(size), outside, inside);
         r += 1;
     }
     for _ in &m.limits {
+        // ½ D jar² = -½ f jar where active
         let push = one_sided(jar[r], weight[r]).force;
         sum = (half * push).fnma(jar[r], sum);
         r += 1;
