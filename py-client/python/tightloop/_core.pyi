@@ -38,35 +38,52 @@ class Frame:
     """Joint velocities [rad/s or m/s], ``(worlds, dofs)``."""
     joint_qdd: NDArray[Any]
     """Joint accelerations at the current commands, with constraints [rad/s² or m/s²], ``(worlds, dofs)``."""
-    joint_f: NDArray[Any]
-    """Joint torques applied [N·m or N], ``(worlds, dofs)``."""
-    joint_target_q: NDArray[Any]
-    """Position targets of the drives [rad or m], ``(worlds, dofs)``."""
-    joint_target_qd: NDArray[Any]
-    """Velocity targets of the drives [rad/s or m/s], ``(worlds, dofs)``."""
-    body_q: NDArray[Any]
-    """Link frames in the world: position [m], then quaternion (x, y, z, w), ``(worlds, bodies, 7)``."""
-    body_qd: NDArray[Any]
-    """Velocity of each link's centre of mass [m/s], then its angular velocity [rad/s], in world axes,
-    ``(worlds, bodies, 6)``."""
-    body_jacobian: NDArray[Any]
-    """Jacobian J of the bodies, ``body_qd = J @ joint_qd``, ``(worlds, bodies, 6, dofs)``."""
-    mass_matrix: NDArray[Any]
-    """Joint-space inertia with armature [kg·m², kg·m or kg], ``(worlds, dofs, dofs)``."""
-    bias_force: NDArray[Any]
-    """Coriolis, centrifugal and gravity forces [N·m or N], ``(worlds, dofs)``."""
-    smooth_force: NDArray[Any]
-    """All forces except constraint forces, minus the bias force [N·m or N], ``(worlds, dofs)``."""
-    constraint_force: NDArray[Any]
-    """Constraint forces in joint space [N·m or N], ``(worlds, dofs)``."""
-    efc_J: NDArray[Any]
-    """Constraint Jacobian, zero in inactive rows [–], ``(worlds, rows, dofs)``."""
     efc_D: NDArray[Any]
     """Regularised stiffness of each constraint row, zero if inactive [kg·m² or kg], ``(worlds, rows)``."""
     efc_aref: NDArray[Any]
     """Reference acceleration of each constraint row [rad/s² or m/s²], ``(worlds, rows)``."""
     efc_force: NDArray[Any]
     """Force of each constraint row [N·m or N], ``(worlds, rows)``."""
+    constraint_force: NDArray[Any]
+    """Constraint forces in joint space [N·m or N], ``(worlds, dofs)``."""
+    joint_f: NDArray[Any]
+    """Joint torques applied [N·m or N], ``(worlds, dofs)``."""
+    joint_target_q: NDArray[Any]
+    """Position targets of the drives [rad or m], ``(worlds, dofs)``."""
+    joint_target_qd: NDArray[Any]
+    """Velocity targets of the drives [rad/s or m/s], ``(worlds, dofs)``."""
+    bias_force: NDArray[Any]
+    """Coriolis, centrifugal and gravity forces [N·m or N], ``(worlds, dofs)``."""
+    smooth_force: NDArray[Any]
+    """All forces except constraint forces, minus the bias force [N·m or N], ``(worlds, dofs)``."""
+    body_q: NDArray[Any]
+    """Link frames in the world: position [m], then quaternion (x, y, z, w), ``(worlds, bodies, 7)``."""
+    body_qd: NDArray[Any]
+    """Velocity of each link's centre of mass [m/s], then its angular velocity [rad/s], in world axes,
+    ``(worlds, bodies, 6)``."""
+    kinetic_energy: NDArray[Any]
+    """Kinetic energy of the world, ½ q̇ᵀ M q̇ with the armature [J], ``(worlds,)``."""
+    potential_energy: NDArray[Any]
+    """Potential energy in gravity of the bodies that move [J], ``(worlds,)``: 0 at the height of the world's origin."""
+    joint_torque: NDArray[Any]
+    """Sum of ``joint_f`` and the drive force, which its effort limit clamps [N·m or N], ``(worlds, dofs)``. It does not
+    include damping, friction and contacts."""
+    site_q: NDArray[Any]
+    """Pose of each site: position [m], then quaternion (x, y, z, w), in the world or in the site's reference frame,
+    ``(worlds, sites, 7)``."""
+    site_qd: NDArray[Any]
+    """Velocity of each site [m/s], then its angular velocity [rad/s], ``(worlds, sites, 6)``: in world axes, or
+    relative to the site's reference frame and in its axes."""
+    gyro: NDArray[Any]
+    """Angular velocity of each site, in its own axes [rad/s], ``(worlds, sites, 3)``."""
+    accelerometer: NDArray[Any]
+    """Acceleration of each site minus gravity, in its own axes [m/s²], ``(worlds, sites, 3)``; 9.81 upwards at rest."""
+    body_jacobian: NDArray[Any]
+    """Jacobian J of the bodies, ``body_qd = J @ joint_qd``, ``(worlds, bodies, 6, dofs)``."""
+    mass_matrix: NDArray[Any]
+    """Joint-space inertia with armature [kg·m², kg·m or kg], ``(worlds, dofs, dofs)``."""
+    efc_J: NDArray[Any]
+    """Constraint Jacobian, zero in inactive rows [–], ``(worlds, rows, dofs)``."""
     contact_count: NDArray[np.int32]
     """Number of contacts of the world, the used rows of the other contact fields [–], ``(worlds,)``."""
     contact_pos: NDArray[Any]
@@ -85,23 +102,6 @@ class Frame:
     """Joint positions with the noise of ``params.joint_q_noise`` [rad or m], ``(worlds, coords)``."""
     joint_qd_measured: NDArray[Any]
     """Joint velocities with the noise of ``params.joint_qd_noise`` [rad/s or m/s], ``(worlds, dofs)``."""
-    kinetic_energy: NDArray[Any]
-    """Kinetic energy of the world, ½ q̇ᵀ M q̇ with the armature [J], ``(worlds,)``."""
-    potential_energy: NDArray[Any]
-    """Potential energy in gravity of the bodies that move [J], ``(worlds,)``: 0 at the height of the world's origin."""
-    joint_torque: NDArray[Any]
-    """Sum of ``joint_f`` and the drive force, which its effort limit clamps [N·m or N], ``(worlds, dofs)``. It does not
-    include damping, friction and contacts."""
-    site_q: NDArray[Any]
-    """Pose of each site: position [m], then quaternion (x, y, z, w), in the world or in the site's reference frame,
-    ``(worlds, sites, 7)``."""
-    site_qd: NDArray[Any]
-    """Velocity of each site [m/s], then its angular velocity [rad/s], ``(worlds, sites, 6)``: in world axes, or
-    relative to the site's reference frame and in its axes."""
-    gyro: NDArray[Any]
-    """Angular velocity of each site, in its own axes [rad/s], ``(worlds, sites, 3)``."""
-    accelerometer: NDArray[Any]
-    """Acceleration of each site minus gravity, in its own axes [m/s²], ``(worlds, sites, 3)``; 9.81 upwards at rest."""
     site_inverse_jacobian: NDArray[Any]
     """Damped inverse Jacobian of each site [rad or m per m or rad], ``(worlds, sites, dofs, 6)``.
 
@@ -126,7 +126,6 @@ class Frame:
     """
     contacts_left_out: NDArray[np.uint32]
     """Contacts that did not fit: the maximum over the physics steps of the last frame [–], ``(worlds,)``."""
-
     state: NDArray[np.uint8]
     """A snapshot of the worlds of this frame, as bytes; only in frames of `Sim.latest`."""
 
