@@ -48,7 +48,7 @@ mod core {
     #[pymodule_export]
     use super::observe::{Evaluation, Playback};
     #[pymodule_export]
-    use super::parts::parts;
+    use super::parts::{parts, visual_mesh};
     #[pymodule_export]
     use super::picture::Renderer;
     #[pymodule_export]

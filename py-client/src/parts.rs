@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use sim_daemon::config;
+use pyo3::types::{PyBytes, PyDict};
+use sim_daemon::config::{self, ConfigError, Image, Texture, VisualMesh};
 
 use crate::errors::raise;
 
@@ -24,11 +25,55 @@ pub(crate) fn parts<'py>(
     let surfaces = found.meshes.iter().map(|mesh| {
         let corners = mesh.vertices.as_flattened();
         let corners = PyArray1::from_iter(py, corners.iter().map(|&part| part as f32));
-        let triangles = PyArray1::from_slice(py, mesh.triangles.as_flattened());
         Ok((
             corners.reshape([mesh.vertices.len(), 3])?,
-            triangles.reshape([mesh.triangles.len(), 3])?,
+            rows(py, &mesh.triangles)?,
         ))
     });
     Ok((found.told.to_string(), surfaces.collect::<PyResult<_>>()?))
+}
+
+/// A mesh file as it looks ([`VisualMesh`]), its arrays by name; `textures` is a list of dicts, `image` a path or bytes.
+#[pyfunction]
+pub(crate) fn visual_mesh(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
+    let mesh = py
+        .detach(|| VisualMesh::load(&path))
+        .map_err(|error| raise(py, "SceneError", ConfigError::from(error).to_string()))?;
+    let colors: Vec<_> = mesh.colors.iter().map(|c| c.unwrap_or_default()).collect();
+    let painted = mesh.colors.iter().map(Option::is_some);
+    let textures: Vec<_> = mesh
+        .textures
+        .iter()
+        .map(|own| texture(py, own))
+        .collect::<PyResult<_>>()?;
+    let found = PyDict::new(py);
+    found.set_item("vertices", rows(py, &mesh.vertices)?)?;
+    found.set_item("faces", rows(py, &mesh.triangles)?)?;
+    found.set_item("colors", rows(py, &colors)?)?;
+    found.set_item("painted", PyArray1::from_iter(py, painted))?;
+    found.set_item("textures", textures)?;
+    found.set_item("notes", mesh.notes)?;
+    Ok(found)
+}
+
+fn texture<'py>(py: Python<'py>, texture: &Texture) -> PyResult<Bound<'py, PyDict>> {
+    let uv = texture.uv.as_ref().map(|uv| {
+        PyArray1::from_slice(py, uv.as_flattened().as_flattened()).reshape([uv.len(), 3, 2])
+    });
+    let found = PyDict::new(py);
+    match &texture.image {
+        Image::File(path) => found.set_item("image", path.as_os_str())?,
+        Image::Bytes(bytes) => found.set_item("image", PyBytes::new(py, bytes))?,
+    }
+    found.set_item("faces", PyArray1::from_slice(py, &texture.triangles))?;
+    found.set_item("uv", uv.transpose()?)?;
+    found.set_item("tints", rows(py, &texture.tints)?)?;
+    Ok(found)
+}
+
+fn rows<'py, T: Element + Copy, const N: usize>(
+    py: Python<'py>,
+    rows: &[[T; N]],
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    PyArray1::from_slice(py, rows.as_flattened()).reshape([rows.len(), N])
 }

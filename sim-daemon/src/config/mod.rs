@@ -31,7 +31,7 @@ pub use sim_engine::backend::BackendError;
 pub use sim_engine::dynamics::Dynamics;
 pub use sim_engine::random::{Draw, Stream, TASK_STREAMS};
 pub use sim_model::UrdfOptions;
-pub use sim_model::geometry::{Image, MeshOptions, VisualMesh};
+pub use sim_model::geometry::{Image, MeshOptions, Texture, VisualMesh};
 pub use sim_physics::arrays::Field;
 pub(crate) use summary::{joint_type, mesh_properties, robot_summary};
 pub use summary::{mesh_summary, urdf_summary};

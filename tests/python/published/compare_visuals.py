@@ -13,7 +13,7 @@ from compare_with_mujoco import File, files
 
 from tightloop import _core
 from tightloop.errors import SceneError
-from tightloop.view import mesh_files
+from tightloop.view import visual_mesh
 
 
 def visuals(file: File) -> list[dict]:
@@ -36,11 +36,11 @@ def test_visual_files_are_read_and_lie_where_physics_has_them(request: pytest.Fi
             if path is None or path in seen:
                 continue
             seen.add(path)
-            surface = mesh_files.read(path)
-            painted += bool(surface.painted.any())
+            mesh = visual_mesh.read(path)
+            painted += bool(mesh.painted.any())
             physics = json.loads(_core.read_mesh(path, (1.0, 1.0, 1.0), 64, False))
             extent = np.array(physics["extent"])
             # one reader keeps float32, and what lies at one place to it is one vertex
-            off = np.abs([surface.vertices.min(axis=0), surface.vertices.max(axis=0)] - extent).max()
+            off = np.abs([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)] - extent).max()
             assert off <= 1e-5 * np.abs(extent).max(), f"{path}: {off} m"
     assert len(seen) > 100 and painted > 50, "the wheels have hundreds of visuals, and most of them have colours"

@@ -101,7 +101,7 @@ def _draw(demo_scene: DemoScene, path: Path) -> None:
     """Save a picture of the current frame."""
     from tightloop.view import dependencies
 
-    dependencies.check("PIL", "trimesh")
+    dependencies.check("PIL")
     from PIL import Image
 
     from tightloop.view.parts import parts

@@ -99,7 +99,7 @@ class Film:
             self.notes.append(f"{worlds} worlds were asked for, and {len(self._worlds)} can be seen")
         self._picture = Picture(seen, *size, kind=kind)
         if _ending(path) == ".html":
-            dependencies.check("viser", "trimesh")
+            dependencies.check("viser")
             from tightloop.view.html import Html
 
             bodies = len(info["body_names"])

@@ -34,14 +34,6 @@ def of_floats(color: Sequence[float]) -> tuple[int, int, int, int]:
     return red, green, blue, alpha
 
 
-def to_screen(colors: NDArray[Any]) -> Colors:
-    """Colours whose red, green and blue are proportional to light, 0 to 255, as a screen wants them (sRGB)."""
-    light = np.asarray(colors, np.float64) / 255
-    shown = np.where(light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055)
-    shown[..., 3] = light[..., 3]
-    return np.round(255 * np.clip(shown, 0, 1)).astype(np.uint8)
-
-
 def image_mean(image: Any) -> tuple[int, int, int, int]:
     """Mean colour of an image of pillow's."""
     red, green, blue, alpha = np.asarray(image.convert("RGBA"), np.float64).mean(axis=(0, 1)).round()
@@ -60,22 +52,22 @@ def file_mean(path: str | Path) -> tuple[int, int, int, int]:
         return image_mean(image)
 
 
-def from_texture(image: Any, uv: NDArray[Any], faces: NDArray[Any]) -> Colors:
+def from_texture(image: Any, uv: NDArray[Any]) -> Colors:
     """What a texture has where each face lies.
 
     Args:
         image: An image of pillow's, row 0 on top.
-        uv: Place of each vertex in it, (0, 0) bottom left, (1, 1) top right; it repeats beyond. ``(vertices, 2)``
-        faces: Corners of each face, ``(faces, 3)``.
+        uv: Places of each face's corners in it, (0, 0) bottom left, (1, 1) top right; it repeats beyond.
+            Shape ``(faces, 3, 2)``.
 
     Returns:
         Shape ``(faces, 4)``.
     """
     texels = np.asarray(image.convert("RGBA"))
     height, width = texels.shape[:2]
-    total = np.zeros((len(faces), 4))
+    total = np.zeros((len(uv), 4))
     for place in _PLACES:
-        across, up = np.einsum("c,fcd->df", place, np.asarray(uv, np.float64)[faces])
+        across, up = np.einsum("c,fcd->df", place, np.asarray(uv, np.float64))
         columns = np.minimum((np.mod(across, 1) * width).astype(int), width - 1)
         rows = np.minimum((np.mod(1 - up, 1) * height).astype(int), height - 1)
         total += texels[rows, columns]

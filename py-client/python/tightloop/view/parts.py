@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from tightloop import _core
 from tightloop.errors import SceneError
-from tightloop.view import mesh_files, paint
-from tightloop.view.surface import FACES_MAX, Surface, Unreadable, joined
+from tightloop.view import paint, visual_mesh
+from tightloop.view.visual_mesh import VisualMesh
 
 Kind = Literal["visual", "collision"]
 Color = tuple[int, int, int, int]
@@ -100,7 +100,7 @@ def parts(scene_toml: str, folder: str | PathLike[str], body_names: Sequence[str
 
     Raises:
         SceneError: The scene is not valid, or has other bodies.
-        MissingLibrary: What reads a visual's file is not installed.
+        MissingLibrary: What reads images of visuals is not installed.
     """
     text, surfaces = _core.parts(scene_toml, fspath(folder))
     told = json.loads(text)
@@ -113,7 +113,7 @@ class _Assembly:
     def __init__(self, surfaces: Sequence[tuple[Any, Any]], body_names: Sequence[str]) -> None:
         self._surfaces = surfaces
         self._places = {name: place for place, name in enumerate(body_names)}
-        self._files: dict[str, Surface | Unreadable] = {}
+        self._files: dict[str, VisualMesh | SceneError] = {}
         self._images: dict[str, Color | None] = {}
         self._meshes: dict[Any, Mesh] = {}
         self._notes: list[str] = []
@@ -128,7 +128,7 @@ class _Assembly:
         for entry in visuals:
             try:
                 part = self._visual(entry)
-            except Unreadable as error:
+            except SceneError as error:
                 instead = "the link's collision shapes are" if entry["body"] in touching else "nothing of the link is"
                 self._note(f"visual {entry['name']}: {error}; {instead} shown")
                 lost.add(entry["body"])
@@ -157,7 +157,7 @@ class _Assembly:
 
     def _visual(self, entry: dict[str, Any]) -> Part:
         if "problem" in entry:
-            raise Unreadable(entry["problem"])
+            raise SceneError(entry["problem"])
         own = self._material(entry)
         if "file" in entry:
             mesh = self._of_file(entry["file"], tuple(entry["scale"]), own or paint.PLAIN)
@@ -183,13 +183,13 @@ class _Assembly:
         found = self._files.get(file)
         if found is None:
             try:
-                found = mesh_files.read(file)
+                found = visual_mesh.read(file)
                 for note in found.notes:
                     self._note(f"visual mesh {Path(file).name} {note}")
-            except Unreadable as error:
-                found = Unreadable(f"{file}: {error}")
+            except SceneError as error:
+                found = error
             self._files[file] = found
-        if isinstance(found, Unreadable):
+        if isinstance(found, SceneError):
             raise found
         key = file, scale, None if found.painted.all() else color
         if key not in self._meshes:
@@ -201,12 +201,7 @@ class _Assembly:
         key = place, color
         if key not in self._meshes:
             vertices, faces = self._surfaces[place]
-            colors = np.tile(np.array(color, np.uint8), (len(faces), 1))
-            if len(faces) > FACES_MAX:
-                thin = joined([Surface(vertices, faces, colors, np.ones(len(faces), bool))])
-                self._notes.extend(f"a collision mesh {note}" for note in thin.notes)
-                vertices, faces, colors = thin.vertices, thin.faces, thin.colors
-            self._meshes[key] = Mesh(vertices, faces, colors)
+            self._meshes[key] = Mesh(vertices, faces, np.tile(np.array(color, np.uint8), (len(faces), 1)))
         return self._meshes[key]
 
     def _stand_in(self, entry: dict[str, Any], kind: Kind) -> Part:

@@ -13,16 +13,15 @@ from PIL import Image
 from sample_meshes import CORNERS, SIZE
 
 from tightloop import _core, optional_imports
-from tightloop.errors import MissingLibrary
-from tightloop.view import dependencies as needs
-from tightloop.view import mesh_files, surface
-from tightloop.view.surface import Surface, Unreadable
+from tightloop.errors import MissingLibrary, SceneError
+from tightloop.view import dependencies, visual_mesh
+from tightloop.view.visual_mesh import VisualMesh
 
 RED, GREEN = [255, 0, 0, 255], [0, 255, 0, 255]
 MTL = "newmtl red\nKd 1 0 0\nnewmtl green\nKd 0 1 0\nd 0.5\n"
 
 
-def extent(surface: Surface) -> np.ndarray:
+def extent(surface: VisualMesh) -> np.ndarray:
     return np.array([surface.vertices.min(axis=0), surface.vertices.max(axis=0)])
 
 
@@ -41,7 +40,7 @@ def test_a_box_is_a_box_in_every_format(tmp_path):
         (looks.collada(tmp_path / "box.dae"), [[0, 0, 0], SIZE]),
         (looks.glb(tmp_path / "box.glb"), turned),
     ):
-        found = mesh_files.read(path)
+        found = visual_mesh.read(path)
         assert len(found.vertices) == 8 and len(found.faces) == 12, path
         np.testing.assert_allclose(extent(found), expected, atol=1e-6)
         assert looks.volume(found.vertices, found.faces) == pytest.approx(6.0), f"{path}: inside out"
@@ -61,7 +60,7 @@ def test_a_box_is_a_box_in_every_format(tmp_path):
 def test_collada_lies_where_physics_has_it(tmp_path, asset, transform):
     path = looks.collada(tmp_path / "box.dae", asset=asset, transform=transform)
     told = json.loads(_core.read_mesh(str(path), (1.0, 1.0, 1.0), 64, False))
-    found = mesh_files.read(path)
+    found = visual_mesh.read(path)
     # float32 of what the other reads in float64
     np.testing.assert_allclose(extent(found), told["extent"], rtol=1e-6, atol=1e-6)
     assert looks.volume(found.vertices, found.faces) > 0
@@ -72,7 +71,7 @@ def test_a_skin_lies_where_physics_has_it(tmp_path):
     turned = "0 -1 0 5  1 0 0 6  0 0 2 7  0 0 0 1"
     path = looks.collada(tmp_path / "box.dae", skin=turned, transform="<translate>1 2 3</translate>")
     told = json.loads(_core.read_mesh(str(path), (1.0, 1.0, 1.0), 64, False))
-    found = mesh_files.read(path)
+    found = visual_mesh.read(path)
     np.testing.assert_allclose(extent(found), told["extent"], rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(extent(found), [[4, 8, 10], [6, 9, 16]], atol=1e-6)
     assert (found.colors == RED).all()
@@ -85,23 +84,23 @@ def test_gltf_lies_where_physics_has_it(tmp_path):
     ]
     path = looks.glb(tmp_path / "two.glb", nodes=nodes)
     told = json.loads(_core.read_mesh(str(path), (1.0, 1.0, 1.0), 64, False))
-    found = mesh_files.read(path)
+    found = visual_mesh.read(path)
     np.testing.assert_allclose(extent(found), told["extent"], rtol=1e-6, atol=1e-6)
     assert looks.volume(found.vertices, found.faces) == pytest.approx(12.0)
 
 
 def test_colours_of_materials(tmp_path):
-    obj = mesh_files.read(looks.obj(tmp_path / "box.obj", mtl=MTL))
+    obj = visual_mesh.read(looks.obj(tmp_path / "box.obj", mtl=MTL))
     assert obj.painted.all()
     # of a face by what it spans: the material of the lower and upper sides is red
     level = np.ptp(obj.vertices[obj.faces][:, :, 2], axis=1) == 0
     assert level.sum() == 4
     assert (obj.colors[level] == RED).all()
     assert (obj.colors[~level] == [0, 255, 0, 128]).all()
-    dae = mesh_files.read(looks.collada(tmp_path / "box.dae", diffuse="<color>0 0.2 1 1</color>"))
+    dae = visual_mesh.read(looks.collada(tmp_path / "box.dae", diffuse="<color>0 0.2 1 1</color>"))
     assert dae.painted.all() and (dae.colors == [0, 51, 255, 255]).all()
     # glTF's numbers are proportional to light; half the light is 188 of 255 on a screen
-    glb = mesh_files.read(
+    glb = visual_mesh.read(
         looks.glb(tmp_path / "box.glb", material={"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0, 1, 0.2]}})
     )
     assert glb.painted.all() and (glb.colors == [188, 0, 255, 51]).all()
@@ -121,17 +120,19 @@ def test_colours_of_materials(tmp_path):
     ],
 )
 def test_opacity_of_collada(tmp_path, more, opacity):
-    found = mesh_files.read(looks.collada(tmp_path / "box.dae", more=more))
+    found = visual_mesh.read(looks.collada(tmp_path / "box.dae", more=more))
     assert (found.colors == [255, 0, 0, opacity]).all()
 
 
 def test_textures_are_looked_up_where_a_face_lies(tmp_path):
     skin = texture(tmp_path / "skin.png")
-    obj = mesh_files.read(looks.obj(tmp_path / "box.obj", mtl="newmtl a\nKd 1 1 1\nmap_Kd skin.png\n", used=("a", "a")))
+    obj = visual_mesh.read(
+        looks.obj(tmp_path / "box.obj", mtl="newmtl a\nKd 1 1 1\nmap_Kd skin.png\n", used=("a", "a"))
+    )
     level = np.ptp(obj.vertices[obj.faces][:, :, 2], axis=1) == 0
     # (0.25, 0.25) is bottom left, (0.75, 0.75) top right
     assert (obj.colors[level] == [0, 0, 255, 255]).all() and (obj.colors[~level] == GREEN).all()
-    dae = mesh_files.read(
+    dae = visual_mesh.read(
         looks.collada(
             tmp_path / "box.dae",
             diffuse='<texture texture="sampler" texcoord="UV"/>',
@@ -140,7 +141,7 @@ def test_textures_are_looked_up_where_a_face_lies(tmp_path):
     )
     assert dae.painted.all() and (dae.colors == [0, 0, 255, 255]).all()
     # glTF counts from the top: (0.25, 0.25) is top left
-    glb = mesh_files.read(
+    glb = visual_mesh.read(
         looks.glb(
             tmp_path / "box.glb",
             material={"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}},
@@ -158,17 +159,17 @@ def test_what_has_no_material_is_left_unpainted(tmp_path):
         looks.collada(tmp_path / "box.dae", bind=False),
         looks.glb(tmp_path / "box.glb"),
     ):
-        assert not mesh_files.read(path).painted.any(), path
+        assert not visual_mesh.read(path).painted.any(), path
     # a material for some faces only
-    half = mesh_files.read(looks.obj(tmp_path / "half.obj", mtl="newmtl red\nKd 1 0 0\n"))
+    half = visual_mesh.read(looks.obj(tmp_path / "half.obj", mtl="newmtl red\nKd 1 0 0\n"))
     assert half.painted.sum() == 4
     filled = half.filled((1, 2, 3, 4))
     assert (filled[half.painted] == RED).all() and (filled[~half.painted] == [1, 2, 3, 4]).all()
 
 
 def test_broken_materials_leave_the_shape(tmp_path):
-    # an effect whose image is not in the file: pycollada drops the effect, its material, and all that has it
-    found = mesh_files.read(
+    # an effect whose image is not in the file: the effect is dropped with its material
+    found = visual_mesh.read(
         looks.collada(
             tmp_path / "box.dae", diffuse='<texture texture="sampler" texcoord="UV"/>', images="<library_images/>"
         )
@@ -177,7 +178,7 @@ def test_broken_materials_leave_the_shape(tmp_path):
     assert any("materials that are broken" in note for note in found.notes)
     # an image whose file is not there
     images = '<library_images><image id="i"><init_from>skin.png</init_from></image></library_images>'
-    found = mesh_files.read(
+    found = visual_mesh.read(
         looks.collada(tmp_path / "box.dae", diffuse='<texture texture="sampler" texcoord="UV"/>', images=images)
     )
     assert len(found.faces) == 12 and not found.painted.any()
@@ -186,36 +187,15 @@ def test_broken_materials_leave_the_shape(tmp_path):
 def test_vertices_that_no_face_has_take_no_room(tmp_path):
     path = looks.obj(tmp_path / "box.obj", mtl=None)
     path.write_text("v 100 100 100\n" + path.read_text().replace("f ", "g ") + "f 2 3 4\nf 3 5 4\n")
-    found = mesh_files.read(path)
+    found = visual_mesh.read(path)
     assert len(found.vertices) == 4 and found.faces.max() == 3
     np.testing.assert_allclose(extent(found), [[0, 0, 0], [1, 2, 0]])
 
 
 def test_a_mirror_keeps_the_outside_outside(tmp_path):
-    found = mesh_files.read(looks.stl(tmp_path / "box.stl")).scaled([1, -2, 0.5])
+    found = visual_mesh.read(looks.stl(tmp_path / "box.stl")).scaled([1, -2, 0.5])
     np.testing.assert_allclose(extent(found), [[0, -4, 0], [1, 0, 1.5]], atol=1e-6)
     assert looks.volume(found.vertices, found.faces) == pytest.approx(6.0)
-
-
-def test_too_many_faces_are_thinned_and_told():
-    # a wavy sheet of two million faces
-    count = 1000
-    x, y = np.meshgrid(np.linspace(0, 1, count + 1), np.linspace(0, 1, count + 1), indexing="ij")
-    vertices = np.stack([x, y, 0.02 * np.sin(40 * x)], axis=-1).reshape(-1, 3).astype(np.float32)
-    row, column = np.meshgrid(np.arange(count), np.arange(count), indexing="ij")
-    corner = (row * (count + 1) + column).ravel()
-    faces = np.stack([corner, corner + count + 1, corner + count + 2, corner, corner + count + 2, corner + 1], axis=-1)
-    faces = faces.reshape(-1, 3).astype(np.uint32)
-    red = np.tile(np.array(RED, np.uint8), (len(faces), 1))
-    found = surface.joined([Surface(vertices, faces, red, np.ones(len(faces), bool))])
-    assert surface.FACES_MAX / 2 < len(found.faces) <= surface.FACES_MAX
-    assert (found.colors == RED).all() and found.painted.all()
-    assert "2,000,000 triangles" in found.notes[0] and f"{len(found.faces):,}" in found.notes[0]
-    # no point is farther from where it was than the diagonal of a cell, whose edge is told
-    edge = float(found.notes[0].split("triangles and is shown with ")[1].split(", ")[1].split(" mm")[0]) / 1000
-    away = np.abs(found.vertices[:, 2] - 0.02 * np.sin(40 * found.vertices[:, 0]))
-    assert away.max() < edge
-    np.testing.assert_allclose(extent(found)[:, :2], [[0, 0], [1, 1]], atol=edge)
 
 
 @pytest.mark.parametrize("ending", ["dae", "obj", "stl", "glb", "gltf"])
@@ -223,11 +203,11 @@ def test_broken_files_say_so(tmp_path, ending):
     path = tmp_path / f"broken.{ending}"
     for content in (b"", b"\0" * 200, b"{", b"<COLLADA/>", b"solid x\nendsolid x\n", b"v 0 0 0\nf 1 2 3\n"):
         path.write_bytes(content)
-        with pytest.raises(Unreadable):
-            mesh_files.read(path)
+        with pytest.raises(SceneError):
+            visual_mesh.read(path)
     path.unlink()
-    with pytest.raises(Unreadable, match="cannot be read"):
-        mesh_files.read(path)
+    with pytest.raises(SceneError, match="cannot be read"):
+        visual_mesh.read(path)
 
 
 def test_cut_files_say_so_or_are_read(tmp_path):
@@ -241,8 +221,8 @@ def test_cut_files_say_so_or_are_read(tmp_path):
         for share in np.linspace(0.02, 0.98, 25):
             path.write_bytes(content[: int(share * len(content))])
             try:
-                found = mesh_files.read(path)
-            except Unreadable:
+                found = visual_mesh.read(path)
+            except SceneError:
                 continue
             assert np.isfinite(found.vertices).all() and found.faces.max() < len(found.vertices)
             assert extent(found)[1].max() <= max(SIZE)
@@ -251,30 +231,32 @@ def test_cut_files_say_so_or_are_read(tmp_path):
 def test_hostile_and_strange_files_are_refused(tmp_path):
     dae = looks.collada(tmp_path / "box.dae")
     dae.write_text(dae.read_text().replace("<COLLADA", '<!DOCTYPE x [<!ENTITY a "b">]>\n<COLLADA', 1))
-    with pytest.raises(Unreadable, match="document type"):
-        mesh_files.read(dae)
+    with pytest.raises(SceneError, match="DOCTYPE"):
+        visual_mesh.read(dae)
     (tmp_path / "box.blend").write_bytes(b"")
-    with pytest.raises(Unreadable, match="dae, obj, stl, glb or gltf"):
-        mesh_files.read(tmp_path / "box.blend")
-    with pytest.raises(Unreadable, match="positive number"):
-        mesh_files.read(looks.collada(dae, asset='<unit meter="-1"/>'))
+    with pytest.raises(SceneError, match="blend"):
+        visual_mesh.read(tmp_path / "box.blend")
+    with pytest.raises(SceneError, match="unit"):
+        visual_mesh.read(looks.collada(dae, asset='<unit meter="-1"/>'))
     stl = looks.stl(tmp_path / "nan.stl")
     content = bytearray(stl.read_bytes())
     content[84 + 12 : 84 + 16] = np.float32("nan").tobytes()
     stl.write_bytes(content)
-    with pytest.raises(Unreadable, match="not finite"):
-        mesh_files.read(stl)
+    with pytest.raises(SceneError, match="finite"):
+        visual_mesh.read(stl)
     for corners in (CORNERS[:3] * 0, CORNERS[:3]):
         text = "".join(f"v {x} {y} {z}\n" for x, y, z in corners)
         (tmp_path / "thin.obj").write_text(text + "f 1 1 2\n")
-        with pytest.raises(Unreadable, match=r"no area|no triangles"):
-            mesh_files.read(tmp_path / "thin.obj")
+        with pytest.raises(SceneError, match="area"):
+            visual_mesh.read(tmp_path / "thin.obj")
 
 
 def test_a_missing_library_is_named(monkeypatch, tmp_path):
-    with pytest.raises(MissingLibrary, match=re.escape(needs.INSTALL)):
-        needs.check("no_such_library_of_the_viewer")
-    missing = ModuleNotFoundError(name="trimesh")
+    with pytest.raises(MissingLibrary, match=re.escape(dependencies.INSTALL)):
+        dependencies.check("no_such_library_of_the_viewer")
+    plain, textured = looks.stl(tmp_path / "box.stl"), looks.obj(tmp_path / "box.obj", mtl="newmtl red\nmap_Kd a.png\n")
+    missing = ModuleNotFoundError(name="PIL")
     monkeypatch.setattr(optional_imports, "import_module", lambda _: (_ for _ in ()).throw(missing))
-    with pytest.raises(MissingLibrary, match="trimesh"):
-        mesh_files.read(looks.stl(tmp_path / "box.stl"))
+    assert len(visual_mesh.read(plain).faces) == 12
+    with pytest.raises(MissingLibrary, match="PIL"):
+        visual_mesh.read(textured)

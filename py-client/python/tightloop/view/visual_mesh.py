@@ -1,0 +1,81 @@
+"""Mesh files as they look: triangles of the compiled reader, in the colours of their materials and images."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from os import PathLike, fspath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop import _core
+from tightloop.view import dependencies, paint
+from tightloop.view.paint import Colors
+
+
+@dataclass(frozen=True, eq=False)
+class VisualMesh:
+    """Triangles, counter-clockwise from outside, in metres and z up.
+
+    Attributes:
+        vertices: Shape ``(vertices, 3)`` [m].
+        faces: Corners of each face, shape ``(faces, 3)``.
+        colors: Red, green, blue and opacity of each face, 0 to 255, shape ``(faces, 4)``.
+        painted: Which faces have a colour in the file; the others' colours mean nothing. Shape ``(faces,)``.
+        notes: What was done to it that its author may not expect, a sentence each without a subject.
+    """
+
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.uint32]
+    colors: Colors
+    painted: NDArray[np.bool_]
+    notes: list[str]
+
+    def scaled(self, scale: Sequence[float]) -> VisualMesh:
+        """The same with each axis multiplied; a mirror keeps the outside outside."""
+        faces = self.faces[:, ::-1] if np.prod(scale) < 0 else self.faces
+        vertices = (self.vertices * np.asarray(scale)).astype(np.float32)
+        return VisualMesh(vertices, np.ascontiguousarray(faces), self.colors, self.painted, self.notes)
+
+    def filled(self, color: tuple[int, int, int, int]) -> Colors:
+        """The colours, with this one where there is none."""
+        colors = self.colors.copy()
+        colors[~self.painted] = color
+        return colors
+
+
+def read(path: str | PathLike[str]) -> VisualMesh:
+    """Read a COLLADA, OBJ, STL or glTF file.
+
+    A face with an image has the colour that the image shows where the face lies. One whose image cannot be read has the
+    colour of its material.
+
+    Raises:
+        SceneError: The file cannot be read; the message says why.
+        MissingLibrary: The file has images, and pillow is not installed.
+    """
+    found = _core.visual_mesh(fspath(path))
+    colors, painted, notes = found["colors"], found["painted"], found["notes"]
+    if found["textures"]:
+        dependencies.check("PIL")
+    for texture in found["textures"]:
+        faces = texture["faces"]
+        try:
+            sampled = _sampled(texture["image"], texture["uv"])
+        except Exception as error:  # pillow's, of whatever is broken in it
+            name = "inside it" if isinstance(texture["image"], bytes) else texture["image"]
+            notes.append(f"has an image that cannot be read, {name}: {error}")
+            continue
+        colors[faces] = np.round(sampled * (texture["tints"] / 255.0)).astype(np.uint8)
+        painted[faces] = True
+    return VisualMesh(found["vertices"], found["faces"], colors, painted, notes)
+
+
+def _sampled(image: str | bytes, uv: NDArray[np.float32] | None) -> NDArray[Any]:
+    from PIL import Image
+
+    with Image.open(BytesIO(image) if isinstance(image, bytes) else image) as opened:
+        return np.array(paint.image_mean(opened)) if uv is None else paint.from_texture(opened, uv)
