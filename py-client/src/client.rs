@@ -52,10 +52,11 @@ impl Client {
         joint_f: Option<&Bound<'_, PyAny>>,
         joint_target_q: Option<&Bound<'_, PyAny>>,
         joint_target_qd: Option<&Bound<'_, PyAny>>,
+        ctrl: Option<&Bound<'_, PyAny>>,
         body_f: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
-        let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], body_f)?;
+        let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], ctrl, body_f)?;
         let commands = inputs.commands()?;
         frame(py, |hook| connection.step(&commands, hook))
     }
@@ -66,10 +67,11 @@ impl Client {
         joint_f: Option<&Bound<'_, PyAny>>,
         joint_target_q: Option<&Bound<'_, PyAny>>,
         joint_target_qd: Option<&Bound<'_, PyAny>>,
+        ctrl: Option<&Bound<'_, PyAny>>,
         body_f: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let connection = self.connection(py)?;
-        let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], body_f)?;
+        let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], ctrl, body_f)?;
         let commands = inputs.commands()?;
         waiting(py, |hook| connection.send(&commands, hook))
     }
@@ -193,6 +195,7 @@ impl Client {
     fn inputs<'py>(
         &self,
         by_dof: [Option<&Bound<'py, PyAny>>; 3],
+        ctrl: Option<&Bound<'py, PyAny>>,
         body_f: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Inputs<'_, 'py>> {
         let mut inputs = Inputs::new(&self.description);
@@ -205,6 +208,7 @@ impl Client {
         {
             inputs.add(field, Axis::Dofs, value)?;
         }
+        inputs.add("ctrl", Axis::Actuators, ctrl)?;
         Ok(inputs)
     }
 

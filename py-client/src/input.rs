@@ -14,6 +14,7 @@ use crate::errors::raise;
 pub(crate) enum Axis {
     Dofs,
     Coords,
+    Actuators,
 }
 
 /// The arrays of one command.
@@ -86,6 +87,7 @@ impl<'a, 'py> Inputs<'a, 'py> {
         let columns = match axis {
             Axis::Dofs => 0..self.description.dof_names.len(),
             Axis::Coords => 0..self.description.coord_names.len(),
+            Axis::Actuators => 0..self.description.actuator_names.len(),
         };
         if let Some(array) = self.ready(value, &columns) {
             self.arrays.push(Input {
@@ -135,6 +137,7 @@ impl<'a, 'py> Inputs<'a, 'py> {
         let [start, stop] = match axis {
             Axis::Dofs => robot.dofs,
             Axis::Coords => robot.coords,
+            Axis::Actuators => robot.actuators,
         };
         match self.ready(value, &(start..stop)) {
             Some(array) => self.arrays.push(Input {

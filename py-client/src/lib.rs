@@ -54,7 +54,7 @@ mod core {
     #[pymodule_export]
     use super::random::draw;
     #[pymodule_export]
-    use super::scene::{load_scene, read_mesh, read_urdf, save_scene, scene_to_toml};
+    use super::scene::{load_scene, read_mesh, read_mujoco, read_urdf, save_scene, scene_to_toml};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -52,6 +52,18 @@ pub(crate) fn read_mesh(
         .map_err(|error| scene_error(py, &error))
 }
 
+/// What an exported MuJoCo model is, as JSON.
+#[pyfunction]
+pub(crate) fn read_mujoco(
+    py: Python<'_>,
+    path: PathBuf,
+    max_hull_vertices: usize,
+) -> PyResult<String> {
+    py.detach(|| config::mujoco_summary(&path, max_hull_vertices))
+        .map(|summary| summary.to_string())
+        .map_err(|error| scene_error(py, &error))
+}
+
 /// A scene given as JSON, as TOML; paths stay as they are.
 #[pyfunction]
 pub(crate) fn scene_to_toml(py: Python<'_>, scene: &str) -> PyResult<String> {

@@ -49,10 +49,11 @@ pub(crate) fn description(
     info: RunInfo<'_>,
 ) -> protocol::Description {
     let real = real(options.precision);
+    let sizes = model.sizes();
     let input = |group| {
-        let rows = Field::ALL
-            .iter()
-            .filter(move |field| field.row().group == group);
+        let rows = Field::ALL.iter().filter(move |field| {
+            field.row().group == group && (**field != Field::Ctrl || sizes.actuators > 0)
+        });
         rows.map(|field| InputInfo {
             name: field.row().name.to_owned(),
             columns: field.elements(&model.sizes()),
@@ -84,6 +85,7 @@ pub(crate) fn description(
         body_names: model.body_names().to_vec(),
         shape_names: model.shape_names().to_vec(),
         site_names: model.site_names().to_vec(),
+        actuator_names: model.actuator_names().to_vec(),
         contact_sensor_names: {
             let sensors = model.contact_sensors().iter();
             sensors.map(|sensor| sensor.name.clone()).collect()
@@ -96,6 +98,7 @@ pub(crate) fn description(
                 dofs: [robot.dofs.start, robot.dofs.end],
                 coords: [robot.coords.start, robot.coords.end],
                 bodies: [robot.bodies.start, robot.bodies.end],
+                actuators: [robot.actuators.start, robot.actuators.end],
             })
             .collect(),
         fields: layout

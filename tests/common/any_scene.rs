@@ -129,6 +129,7 @@ fn any_collision(dice: &mut Dice, size: f64) -> Collision {
     let pose = any_pose(dice, size);
     Collision {
         surface: any_surface(dice),
+        geom: None,
         ..Collision::new(None, dice.pick(&every_kind(size)), pose)
     }
 }
@@ -171,6 +172,7 @@ fn any_robot(dice: &mut Dice, name: &str) -> Robot {
         notes: Vec::new(),
         warnings: Vec::new(),
         urdf: None,
+        mujoco: None,
     };
     for k in 0..links {
         let mut link = Link {

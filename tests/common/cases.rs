@@ -1,7 +1,9 @@
 //! Robots and shapes for tests of stages, and states that take every path through them.
 
 use super::shapes::shapes as every_shape;
-use sim_model::{Body, Collision, Cone, Description, Model, Pose, Shape, Site, UrdfOptions};
+use sim_model::{
+    Body, Collision, Cone, Description, Model, MujocoOptions, Pose, Shape, Site, UrdfOptions,
+};
 use sim_physics::arrays::Block;
 use sim_physics::constants::params::Param;
 use sim_physics::constants::{Constants, Motion};
@@ -33,7 +35,7 @@ struct Near {
 }
 
 /// All of them.
-pub fn cases() -> [Case; 7] {
+pub fn cases() -> [Case; 9] {
     [
         fr3(),
         every_joint(),
@@ -42,7 +44,32 @@ pub fn cases() -> [Case; 7] {
         shapes(Cone::Pyramidal, Some(5)),
         arm_and_cube(),
         every_param(),
+        mujoco("implicit"),
+        mujoco("runge_kutta"),
     ]
+}
+
+/// What only MuJoCo models have: an implicit step with elliptic cones, or a Runge-Kutta step with pyramidal ones.
+pub fn mujoco(name: &'static str) -> Case {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/record_stages")
+        .join(name)
+        .with_extension("safetensors");
+    let scene = Description::from_mujoco(path, MujocoOptions::named("every")).unwrap();
+    let model = scene.compile().unwrap();
+    let m = constants(&model);
+    assert!(m.contacts.classes.iter().any(|class| class.turns.is_some()));
+    assert!(m.mujoco.impedances.len() > 1 && !m.mujoco.springs.is_empty());
+    Case {
+        name,
+        m,
+        near: Some(Near {
+            joint_q: model.start().joint_q.clone(),
+            share: 1.2,
+            apart: 0.1,
+            turn: 1.0,
+        }),
+    }
 }
 
 /// The FR3 with drives and armatures of the usual size.
@@ -229,6 +256,9 @@ impl Case {
             block.joint_qdd[j] = number(20.0);
             block.joint_f[j] = number(30.0);
             block.joint_target_qd[j] = number(1.0);
+        }
+        for x in &mut block.ctrl {
+            *x = number(2.0);
         }
         for (x, (param, start)) in block.params.iter_mut().zip(m.varying.starts()) {
             *x = match param {

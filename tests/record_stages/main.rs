@@ -238,7 +238,14 @@ fn the_random_shapes_of_these_tests_touch_in_every_pair_of_kinds() {
 fn a_control_frame_is_recorded_as_a_loop_over_substeps() {
     use Array::*;
     // the searches of hulls are loops as deep as a text may have them: with those of a frame around them, too deep
-    for case in [fr3(), every_joint(), arm_and_cube(), every_param()] {
+    for case in [
+        fr3(),
+        every_joint(),
+        arm_and_cube(),
+        every_param(),
+        cases::mujoco("implicit"),
+        cases::mujoco("runge_kutta"),
+    ] {
         let m = &case.m;
         let reads = [
             JointQ,
@@ -254,6 +261,7 @@ fn a_control_frame_is_recorded_as_a_loop_over_substeps() {
             Substep,
             CommandHistory,
             CommandNoise,
+            Ctrl,
         ];
         let writes = [JointQ, JointQRest, JointQd, JointQdd, Unconverged, LeftOut];
         let start = Instant::now();
@@ -297,6 +305,8 @@ fn what_a_stage_does_not_name_it_neither_reads_nor_writes() {
         every_joint(),
         cases::shapes(Cone::Elliptic, None),
         arm_and_cube(),
+        cases::mujoco("implicit"),
+        cases::mujoco("runge_kutta"),
     ] {
         let m = &case.m;
         let mut random = toy::Random(3);

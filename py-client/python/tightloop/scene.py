@@ -6,10 +6,10 @@ import json
 import os
 import re
 import warnings
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, SupportsFloat, SupportsIndex
+from typing import TYPE_CHECKING, SupportsFloat, SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,10 @@ from tightloop import _core, checks
 from tightloop.body import Body
 from tightloop.checks import Triple, Vector
 from tightloop.errors import SceneError
+from tightloop.mujoco_model import MujocoModel
 from tightloop.robot import PER_DOF, Robot
+from tightloop.scene_mujoco import HULL_VERTICES, check_options, keep_beside, read_file, read_model
+from tightloop.scene_options import Cone, Solver, capacity
 from tightloop.scene_randomization import SceneRandomization
 from tightloop.shapes import ORIGIN, UPRIGHT, Shape, Surface, checked_surface
 
@@ -26,18 +29,7 @@ if TYPE_CHECKING:
     # typing has it from Python 3.11 on, the package runs on 3.10
     from typing_extensions import Unpack
 
-Cone = Literal["elliptic", "pyramidal"]
-
-
-@dataclass(frozen=True)
-class Solver:
-    """The options of the constraint solver; see `Scene.solver`."""
-
-    iterations: int = 20
-    ls_iterations: int = 100
-    tolerance: float = 1e-8
-    cone: Cone = "elliptic"
-    impratio: float = 1000.0
+    from tightloop.scene_mujoco import Model
 
 
 class Scene(SceneRandomization):
@@ -138,7 +130,7 @@ class Scene(SceneRandomization):
     @command_delay_max.setter
     def command_delay_max(self, command_delay_max: SupportsIndex | None) -> None:
         most = 1000 * self.substeps
-        self._command_delay_max = _capacity("command_delay_max", command_delay_max, most)
+        self._command_delay_max = capacity("command_delay_max", command_delay_max, most)
 
     @property
     def contacts_max(self) -> int | None:
@@ -147,7 +139,7 @@ class Scene(SceneRandomization):
 
     @contacts_max.setter
     def contacts_max(self, contacts_max: SupportsIndex | None) -> None:
-        self._contacts_max = _capacity("contacts_max", contacts_max, 4096)
+        self._contacts_max = capacity("contacts_max", contacts_max, 4096)
 
     @property
     def rows_max(self) -> int | None:
@@ -156,7 +148,7 @@ class Scene(SceneRandomization):
 
     @rows_max.setter
     def rows_max(self, rows_max: SupportsIndex | None) -> None:
-        self._rows_max = _capacity("rows_max", rows_max, 16384)
+        self._rows_max = capacity("rows_max", rows_max, 16384)
 
     def solver(
         self,
@@ -268,6 +260,76 @@ class Scene(SceneRandomization):
             warnings.warn(f"robot `{name}`: {warning}", stacklevel=2)
         return robot
 
+    @classmethod
+    def from_mujoco(
+        cls,
+        model: Model,
+        *,
+        name: str | None = None,
+        substeps: int = 1,
+        mesh_max_hull_vertices: int = HULL_VERTICES,
+    ) -> Scene:
+        """Make a scene of a MuJoCo model, with its time step, gravity and solver options.
+
+        MuJoCo reads and compiles the model. The result is kept in a file in the user's cache, and `save` copies it
+        beside the scene, so that the scene runs on machines without MuJoCo.
+
+        Args:
+            model: A path to MJCF, an ``mujoco.MjSpec`` or an ``mujoco.MjModel``.
+            name: Name of the model, which precedes the names of its joints, bodies and geoms; the model's own if left
+                out.
+            substeps: Physics steps per control frame.
+            mesh_max_hull_vertices: Largest number of vertices of the convex hull of a mesh, 8 to 1024.
+
+        Returns:
+            The scene; ``scene.models`` has the model.
+
+        Raises:
+            SceneError: MuJoCo cannot compile the model, or it has elements that are not supported, by their names.
+            MissingLibrary: The extra ``mujoco`` is not installed.
+        """
+        found = read_model(model, name, (), mesh_max_hull_vertices=mesh_max_hull_vertices)
+        options = found.options
+        scene = cls(dt=options["dt"], substeps=substeps, gravity=options["gravity"])
+        scene.solver(**options["solver"])
+        scene.models[found.name] = found
+        return scene
+
+    def add_mujoco(
+        self,
+        model: Model,
+        *,
+        name: str | None = None,
+        pos: Vector = ORIGIN,
+        quat: Vector = UPRIGHT,
+        mesh_max_hull_vertices: int = HULL_VERTICES,
+    ) -> MujocoModel:
+        """Add a MuJoCo model, beside robots from URDF and bodies of the scene.
+
+        Geoms of MuJoCo models touch each other by MuJoCo's rules. Against a geom, a shape of the scene counts as a geom
+        with its friction, ``solref`` (2/kd, kd/(2 √ke)) and MuJoCo's defaults.
+
+        Args:
+            model: A path to MJCF, an ``mujoco.MjSpec`` or an ``mujoco.MjModel``.
+            name: Unique name, which precedes the names of its joints, bodies and geoms; the model's own if left out.
+            pos: Position of the model's world in the scene [m].
+            quat: Orientation of the model's world in the scene (x, y, z, w).
+            mesh_max_hull_vertices: Largest number of vertices of the convex hull of a mesh, 8 to 1024.
+
+        Returns:
+            The model.
+
+        Raises:
+            SceneError: An option of the model contradicts the scene's, or as `from_mujoco`.
+            MissingLibrary: The extra ``mujoco`` is not installed.
+        """
+        found = read_model(
+            model, name, self._names(), pos=pos, quat=quat, mesh_max_hull_vertices=mesh_max_hull_vertices
+        )
+        check_options(found, {"dt": self.dt, "gravity": self.gravity, "solver": asdict(self._solver)})
+        self.models[found.name] = found
+        return found
+
     def add_body(
         self,
         *,
@@ -336,13 +398,17 @@ class Scene(SceneRandomization):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the scene as a TOML file. Paths in it are relative if they share a folder with the file.
 
+        MuJoCo models are copied into the folder ``NAME_models`` beside it.
+
         Args:
             path: The file.
 
         Raises:
             SceneError: The file cannot be written.
         """
-        _core.save_scene(self._json(), str(checks.path("save: path", path)))
+        file = checks.path("save: path", path)
+        kept = {model.name: keep_beside(file, model) for model in self.models.values()}
+        _core.save_scene(self._json(kept), str(file))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Scene:
@@ -371,6 +437,8 @@ class Scene(SceneRandomization):
             robot = scene.add_urdf(folder / table.pop("urdf"), package_dirs=packages, **table)
             for name, values in joints.items():
                 setattr(robot, name, values if name == "joint_target_mode" else np.array(values, dtype=float))
+        for table in data.get("mujoco", ()):
+            scene.models[table["name"]] = read_file(folder / table.pop("model"), **table)
         for table in data.get("body", ()):
             scene.add_body(**table)
         for shape in data.get("shape", ()):
@@ -391,10 +459,12 @@ class Scene(SceneRandomization):
         return _core.scene_to_toml(self._json())
 
     def __repr__(self) -> str:
-        parts = f"robots={[*self.robots]}, bodies={[*self.bodies]}, shapes={[*self.shapes]}"
+        parts = f"robots={[*self.robots]}, models={[*self.models]}, bodies={[*self.bodies]}, shapes={[*self.shapes]}"
         return f"Scene(dt={self.dt:.6g}, substeps={self.substeps}, {parts})"
 
-    def _json(self) -> str:
+    def _json(self, models: Mapping[str, Path] | None = None) -> str:
+        """Return the scene as JSON; ``models`` are files to name in the place of those of the models."""
+        files = {name: {"model": str(file)} for name, file in (models or {}).items()}
         return json.dumps(
             {
                 "dt": self.dt,
@@ -409,16 +479,8 @@ class Scene(SceneRandomization):
                 "randomize": self._offsets,
                 "shape": [shape.table() for shape in self.shapes.values()],
                 "robot": [robot.table() for robot in self.robots.values()],
+                "mujoco": [model.table() | files.get(model.name, {}) for model in self.models.values()],
                 "body": [body.table() for body in self.bodies.values()],
                 **self._sensor_tables(),
             }
         )
-
-
-def _capacity(what: str, value: SupportsIndex | None, most: int) -> int | None:
-    if value is None:
-        return None
-    checked = checks.integer(f"Scene: {what}", value)
-    if checked > most:
-        raise SceneError(f"Scene: {what} is {checked}; it must be at most {most}")
-    return checked

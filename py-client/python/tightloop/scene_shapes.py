@@ -11,6 +11,7 @@ from tightloop import _core, checks
 from tightloop.body import Body
 from tightloop.checks import Vector
 from tightloop.errors import SceneError
+from tightloop.mujoco_model import MujocoModel
 from tightloop.robot import Link, Robot
 from tightloop.shapes import ORIGIN, UPRIGHT, Shape, ShapeType, Surface, checked, checked_scale, checked_surface
 
@@ -24,10 +25,11 @@ Collidable = Shape | Robot | Body | Link | str
 class SceneShapes:
     """Mixin of `Scene` with its shapes."""
 
-    __slots__ = ("bodies", "filters", "robots", "shapes")
+    __slots__ = ("bodies", "filters", "models", "robots", "shapes")
 
     def __init__(self) -> None:
         self.robots: dict[str, Robot] = {}
+        self.models: dict[str, MujocoModel] = {}
         self.bodies: dict[str, Body] = {}
         self.shapes: dict[str, Shape] = {}
         self.filters: list[tuple[str, str]] = []
@@ -275,7 +277,7 @@ class SceneShapes:
         return thing
 
     def _names(self) -> list[str]:
-        return [*self.robots, *self.bodies, *self.shapes]
+        return [*self.robots, *self.models, *self.bodies, *self.shapes]
 
     def _free_name(self, kind: str) -> str:
         return free_name(kind, self._names())

@@ -46,6 +46,7 @@ class Sim:
             ``body/shape``.
         site_names: Name of each site, in the order of ``site_q`` and the other site fields.
         contact_sensor_names: Name of each contact sensor, in the order of ``contact_sensor``.
+        actuator_names: ``model/actuator`` of each actuator, in the order of ``ctrl``.
         dofs: Slice of each robot's dofs, by robot name.
         coords: Slice of each robot's coordinates.
         bodies: Slice of each robot's bodies.
@@ -76,6 +77,7 @@ class Sim:
         self.shape_names: list[str] = self.info["shape_names"]
         self.site_names: list[str] = self.info["site_names"]
         self.contact_sensor_names: list[str] = self.info["contact_sensor_names"]
+        self.actuator_names: list[str] = self.info["actuator_names"]
         self.dofs, self.coords, self.bodies = (
             {robot["name"]: slice(*robot[range_]) for robot in self.info["robots"]}
             for range_ in ("dofs", "coords", "bodies")
@@ -87,6 +89,7 @@ class Sim:
         joint_f: Command | None = None,
         joint_target_q: Command | None = None,
         joint_target_qd: Command | None = None,
+        ctrl: Command | None = None,
         body_f: Command | None = None,
     ) -> Frame:
         """Advance every world by one control frame. A command that is left out keeps its last value.
@@ -97,6 +100,8 @@ class Sim:
                 with the dofs of that robot.
             joint_target_q: Position targets of the drives [rad or m], same shapes.
             joint_target_qd: Velocity targets of the drives [rad/s or m/s], same shapes.
+            ctrl: Controls of the actuators of MuJoCo models, shape ``(worlds, actuators)`` or ``(actuators,)``, or a
+                dict by model. Each is clamped to its ``ctrlrange``.
             body_f: Force on each body at its centre of mass [N], then torque [N·m], in world axes, shape
                 ``(worlds, bodies, 6)`` or ``(bodies, 6)``. It needs ``launch(params=("body_f",))``.
 
@@ -110,7 +115,7 @@ class Sim:
             LeaseLost: This client lost control of the daemon.
             DaemonLost: The daemon went away; its state is lost.
         """
-        return self._client.step(*self._commands(joint_f, joint_target_q, joint_target_qd, body_f))
+        return self._client.step(*self._commands(joint_f, joint_target_q, joint_target_qd, ctrl, body_f))
 
     def send(
         self,
@@ -118,6 +123,7 @@ class Sim:
         joint_f: Command | None = None,
         joint_target_q: Command | None = None,
         joint_target_qd: Command | None = None,
+        ctrl: Command | None = None,
         body_f: Command | None = None,
     ) -> None:
         """Begin a step and return at once: the worlds advance while the caller continues, until `recv`.
@@ -129,13 +135,14 @@ class Sim:
             joint_f: As in `step`. The daemon's client copies all arrays, so you may overwrite them at once.
             joint_target_q: As in `step`.
             joint_target_qd: As in `step`.
+            ctrl: As in `step`.
             body_f: As in `step`.
 
         Raises:
             CommandRefused: A shape or dtype is wrong, or a step is in flight; nothing was sent. `recv` reports a wrong
                 value, such as NaN. Other errors are those of `step`.
         """
-        self._client.send(*self._commands(joint_f, joint_target_q, joint_target_qd, body_f))
+        self._client.send(*self._commands(joint_f, joint_target_q, joint_target_qd, ctrl, body_f))
 
     def recv(self) -> Frame:
         """Wait for the frame of the step that `send` began. After Ctrl-C it may be called again.
@@ -341,12 +348,13 @@ class Sim:
         joint_f: Command | None,
         joint_target_q: Command | None,
         joint_target_qd: Command | None,
+        ctrl: Command | None,
         body_f: Command | None,
-    ) -> tuple[Command | None, Command | None, Command | None, NDArray[np.float64] | None]:
+    ) -> tuple[Command | None, Command | None, Command | None, Command | None, NDArray[np.float64] | None]:
         """Return the commands of a step, in the order in which the client takes them."""
         # the client checks joint commands itself; `body_f` varies only where the run says so, which `Params` knows
         wrench = None if body_f is None else self.params.ready("body_f", body_f)
-        return joint_f, joint_target_q, joint_target_qd, wrench
+        return joint_f, joint_target_q, joint_target_qd, ctrl, wrench
 
     def __enter__(self) -> Sim:
         return self

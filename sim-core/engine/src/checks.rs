@@ -40,6 +40,7 @@ impl Simulation {
         self.check_shape(row.name, all, columns, values.len())?;
         let names = match field {
             Field::JointQ => self.model().coord_names(),
+            Field::Ctrl => self.model().actuator_names(),
             _ => self.model().dof_names(),
         };
         let row_of = |world: usize| world * columns.len()..(world + 1) * columns.len();

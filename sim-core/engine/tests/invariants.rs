@@ -86,6 +86,7 @@ fn tree(seed: u64, joints: usize, floating: bool) -> Robot {
         notes: Vec::new(),
         warnings: Vec::new(),
         urdf: None,
+        mujoco: None,
     };
     if floating {
         robot.float();

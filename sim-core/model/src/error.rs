@@ -428,6 +428,22 @@ pub enum ModelError {
         reason: String,
     },
 
+    /// A file that is no compiled MuJoCo model, or a broken one.
+    #[error("{}: {reason}", path.display())]
+    MujocoFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and the cure.
+        reason: String,
+    },
+
+    /// A MuJoCo model with elements that are not supported.
+    #[error("{reasons}")]
+    MujocoRefused {
+        /// What is refused, the first few of many.
+        reasons: String,
+    },
+
     /// A collision mesh that is not there.
     #[error(
         "robot `{robot}`: link `{link}`: collision mesh `{uri}` is missing: looked for {}; copy it there or mend the path",

@@ -9,10 +9,10 @@
 //! | `joint_kind`, `error`, `pose` | motions of joints, what can be wrong, frames |
 //! | `value_checks` | checks of one name or one value |
 //! | `inertia`, `geometry` | mass properties; shapes, meshes, convex hulls |
-//! | `distribution`, `surface` | what values are drawn from; how shapes touch |
+//! | `distribution`, `surface`, `softness`, `geom_contact` | what values are drawn from; how shapes touch, and MuJoCo's geoms |
 //! | `description` | scene, robots, joints, and what is named in them |
 //! | `validate` | checks of a description |
-//! | `urdf`, `rigid_body` | robots from files; bodies of one link |
+//! | `urdf`, `mujoco`, `rigid_body` | robots from files; bodies of one link |
 //! | `hull_tables`, `model` | the kernel source's tables of hulls; the result |
 //! | `compile` | from a description to a model |
 
@@ -20,30 +20,36 @@ mod compile;
 mod description;
 mod distribution;
 mod error;
+mod geom_contact;
 pub mod geometry;
 pub mod hull_tables;
 mod inertia;
 mod joint_kind;
 mod model;
+mod mujoco;
 mod pose;
 mod rigid_body;
+mod softness;
 mod surface;
 mod urdf;
 mod validate;
 mod value_checks;
 
 pub use description::{
-    Collision, ContactSensor, Description, Joint, JointDof, Link, Mimic, ParamDraw, Robot, Site,
-    Solver, StaticShape, TargetMode,
+    Actuator, Collision, ContactSensor, Description, Joint, JointDof, JointEquality, Link, Mimic,
+    MujocoJoint, MujocoParts, ParamDraw, Robot, Site, Solver, StaticShape, TargetMode,
 };
 pub use distribution::{Distribution, ParamRanges};
 pub use error::ModelError;
+pub use geom_contact::GeomContact;
 pub use geometry::Shape;
 pub use inertia::{Inertial, principal_moments};
 pub use joint_kind::JointKind;
 pub use model::{Model, RobotRange, SensedShapes, Start};
+pub use mujoco::MujocoOptions;
 pub use pose::Pose;
 pub use rigid_body::Body;
 pub use sim_physics::constants::contact::Cone;
+pub use softness::Softness;
 pub use surface::Surface;
 pub use urdf::{Look, UrdfOptions, Visual, Visuals};

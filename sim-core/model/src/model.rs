@@ -4,6 +4,8 @@ use crate::description::ParamDraw;
 use crate::distribution::Distribution;
 use sim_physics::constants::Constants;
 use sim_physics::constants::Sizes;
+use sim_physics::constants::mujoco::Mujoco;
+use sim_physics::lane::Fixed;
 use std::ops::Range;
 
 /// Where a robot's rows lie in the arrays of the scene.
@@ -17,6 +19,8 @@ pub struct RobotRange {
     pub coords: Range<usize>,
     /// Its columns of `(worlds, bodies, …)` arrays.
     pub bodies: Range<usize>,
+    /// Its columns of `(worlds, actuators)` arrays.
+    pub actuators: Range<usize>,
 }
 
 /// A scene that is ready to run: immutable, sorted, hashed.
@@ -29,6 +33,7 @@ pub struct Model {
     pub(crate) coord_names: Vec<String>,
     pub(crate) body_names: Vec<String>,
     pub(crate) shape_names: Vec<String>,
+    pub(crate) actuator_names: Vec<String>,
     pub(crate) site_names: Vec<String>,
     pub(crate) contact_sensors: Vec<SensedShapes>,
     pub(crate) command_delay_max: usize,
@@ -95,6 +100,10 @@ impl Model {
     pub fn shape_names(&self) -> &[String] {
         &self.shape_names
     }
+    /// Names of the actuators, `robot/actuator`.
+    pub fn actuator_names(&self) -> &[String] {
+        &self.actuator_names
+    }
     /// Names of the sites.
     pub fn site_names(&self) -> &[String] {
         &self.site_names
@@ -142,6 +151,7 @@ impl Model {
             shapes: self.shape_names.len(),
             sites: self.site_names.len(),
             contact_sensors: self.contact_sensors.len(),
+            actuators: self.actuator_names.len(),
         }
     }
     /// State and commands after a reset.
@@ -174,6 +184,11 @@ impl Model {
             self.contact_sensors,
             self.command_delay_max
         );
+        // recordings are older than what models from MuJoCo have
+        let text = text.replace(&format!(", mujoco: {:?}", Mujoco::<f64>::default()), "");
+        let text = text
+            .replace(", turns: None", "")
+            .replace(&format!(", turning: {:?}", Fixed::default()), "");
         text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| {
             (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
         })

@@ -122,6 +122,7 @@ impl Description {
             notes,
             warnings: Vec::new(),
             urdf: None,
+            mujoco: None,
         };
         if !body.fixed {
             robot.free_root("free");

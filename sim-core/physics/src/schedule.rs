@@ -2,13 +2,28 @@
 
 use crate::arrays::{Field, Source};
 use crate::constants::Constants;
+use crate::constants::mujoco::Integrator;
 use crate::lane::Real;
 use crate::step::{Runs, StageId};
 
 /// The stages of a step that a model needs, in order.
 pub fn step_stages<R: Real>(m: &Constants<R>) -> Vec<StageId> {
     let stages = StageId::all().filter(|stage| stage.row().runs != Runs::Evaluation);
-    stages.filter(|stage| stage.is_needed(m)).collect()
+    let stages: Vec<StageId> = stages.filter(|stage| stage.is_needed(m)).collect();
+    if m.mujoco.integrator != Integrator::RungeKutta {
+        return stages;
+    }
+    // a Runge-Kutta step evaluates its forces four times; commands come due once
+    let (ends, forces): (Vec<StageId>, Vec<StageId>) = stages
+        .into_iter()
+        .partition(|stage| stage.name().starts_with("runge_kutta"));
+    let mut all = Vec::new();
+    for (k, end) in ends.into_iter().enumerate() {
+        let again = |stage: &&StageId| k == 0 || stage.name() != "command";
+        all.extend(forces.iter().filter(again));
+        all.push(end);
+    }
+    all
 }
 
 /// The stages that evaluate outputs of a state, in order: those that complete what the outputs are made of, and those whose

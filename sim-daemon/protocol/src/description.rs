@@ -56,6 +56,9 @@ pub struct Description {
     pub site_names: Vec<String>,
     /// Contact sensors.
     pub contact_sensor_names: Vec<String>,
+    /// `robot/actuator` of each actuator. Older recordings have none.
+    #[serde(default)]
+    pub actuator_names: Vec<String>,
     /// The robots with their ranges in the lists above.
     pub robots: Vec<RobotRange>,
     /// Rows of the field table: what every frame carries, in this order.
@@ -118,6 +121,9 @@ pub struct RobotRange {
     pub coords: [usize; 2],
     /// Its bodies.
     pub bodies: [usize; 2],
+    /// Its actuators. Older recordings have none.
+    #[serde(default)]
+    pub actuators: [usize; 2],
 }
 
 /// One row of the field table.
@@ -167,6 +173,7 @@ impl Description {
         self.contact_sensor_names
             .iter()
             .for_each(|name| hash.text(name));
+        self.actuator_names.iter().for_each(|name| hash.text(name));
         for field in &self.fields {
             hash.text(&field.name);
             hash.number(field.dtype as u64);

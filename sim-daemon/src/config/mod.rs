@@ -4,6 +4,7 @@
 
 mod bodies;
 mod error;
+mod mujoco;
 mod number;
 mod parts;
 pub(crate) mod paths;
@@ -19,6 +20,7 @@ mod surface;
 
 pub use bodies::BodyTable;
 pub use error::ConfigError;
+pub use mujoco::{MujocoTable, mujoco_summary};
 pub use number::{Number, PerDof};
 pub use parts::Parts;
 pub(crate) use parts::hull_sides;

@@ -8,6 +8,7 @@ use sim_model::{Cone, Description, Solver};
 
 use super::bodies::BodyTable;
 use super::error::ConfigError;
+use super::mujoco::MujocoTable;
 use super::number::Number;
 use super::paths;
 use super::randomize::{RandomizeTable, param};
@@ -53,7 +54,10 @@ pub struct SceneFile {
     /// Robots, in the order of their dofs.
     #[serde(default, rename = "robot", skip_serializing_if = "Vec::is_empty")]
     pub robots: Vec<RobotTable>,
-    /// Rigid bodies, in the order of their dofs, after all robots.
+    /// MuJoCo models, in the order of their dofs, after all robots.
+    #[serde(default, rename = "mujoco", skip_serializing_if = "Vec::is_empty")]
+    pub mujoco: Vec<MujocoTable>,
+    /// Rigid bodies, in the order of their dofs, after all robots and models.
     #[serde(default, rename = "body", skip_serializing_if = "Vec::is_empty")]
     pub bodies: Vec<BodyTable>,
     /// Frames of interest.
@@ -181,6 +185,9 @@ impl SceneFile {
                 *path = paths::relative_to(folder, &base_dir.join(&*path));
             }
         }
+        for model in &mut scene.mujoco {
+            model.model = paths::relative_to(folder, &base_dir.join(&model.model));
+        }
         for path in scene
             .shapes
             .iter_mut()
@@ -232,6 +239,9 @@ impl SceneFile {
                 description.add_urdf(base_dir.join(&table.urdf), table.options(base_dir))?;
             table.set_surfaces(robot);
             table.set_joints(robot)?;
+        }
+        for table in &self.mujoco {
+            description.add_robot(table.robot(base_dir)?)?;
         }
         for (index, shape) in self.shapes.iter().enumerate() {
             if let Some((robot, link)) = shape.link() {

@@ -4,7 +4,7 @@ use sim_physics::arrays::{Field, Flat, Source, Workspace};
 use sim_physics::constants::Constants;
 use sim_physics::lane::{Cx, Num};
 use sim_physics::math::spatial::Spatial;
-use sim_physics::step::{BlockOf, ConstantsOf};
+use sim_physics::step::{BlockOf, ConstantsOf, mujoco_state};
 
 /// Gathers a field that is neither of contacts nor a counter, one number an element.
 #[inline(always)]
@@ -23,6 +23,9 @@ pub(super) fn gather<C: Cx>(
         },
         _ => match field {
             Field::MassMatrix => mass_matrix(m, w, to),
+            Field::Qpos => qpos(cx, m, b, to),
+            Field::Qvel => mujoco_state::velocities(cx, m, b, to),
+            Field::Qacc => mujoco_state::accelerations(cx, m, b, to),
             Field::BodyJacobian => body_jacobian(m, w, to),
             Field::SiteInverseJacobian => inverse_jacobian(m, w, to),
             Field::EfcJ => jacobian(cx, m, &b.efc_weight, &w.limit_side, to),
@@ -36,6 +39,15 @@ fn copy_cells<C: Cx>(cx: &C, cells: &[C::V], to: &mut [C::F]) {
     assert_eq!(cells.len(), to.len());
     for (x, cell) in to.iter_mut().zip(cells) {
         *x = cx.get(cell);
+    }
+}
+
+/// Positions with the scalar part of quaternions first.
+#[inline(always)]
+fn qpos<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
+    copy_cells(cx, &b.joint_q, to);
+    for first in m.quaternions() {
+        to[first..first + 4].rotate_right(1);
     }
 }
 

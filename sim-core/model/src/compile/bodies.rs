@@ -1,12 +1,13 @@
 //! Bodies, dofs and frames of a model, from the links and joints of robots.
 
 use super::carrier::Carrier;
-use super::constraint_rows::DofJoint;
-use crate::description::{Joint, Robot, TargetMode};
+use super::constraint_rows::{DofEquality, DofJoint, SoftJoint};
+use crate::description::{self, Joint, MujocoJoint, MujocoParts, Robot, TargetMode};
 use crate::inertia::{Inertial, merge};
 use crate::joint_kind::JointKind;
 use crate::model::{RobotRange, Start};
 use crate::pose::Pose;
+use sim_physics::constants::mujoco::{Actuator, ActuatorBound, Mujoco, Spring, Term};
 use sim_physics::constants::{Body, Dof, Frame, MassEntry, Motion, Tree};
 use sim_physics::math::factor::Pattern;
 
@@ -22,6 +23,9 @@ pub(super) struct BodyBuilder {
     pub coord_names: Vec<String>,
     pub body_names: Vec<String>,
     pub start: Start,
+    pub mujoco: Mujoco<f64>,
+    pub equalities: Vec<DofEquality>,
+    pub actuator_names: Vec<String>,
     couplings: Vec<(usize, usize)>,
     /// How each link of each robot is carried.
     pub carriers: Vec<Vec<Carrier>>,
@@ -31,6 +35,7 @@ impl BodyBuilder {
     pub fn add(&mut self, robot: &Robot) {
         let (first_dof, first_coord) = (self.dofs.len(), self.coord_names.len());
         let (first_frame, first_body) = (self.frames.len(), self.bodies.len());
+        let first_actuator = self.actuator_names.len();
         let named = |name: String| format!("{}/{name}", robot.name);
         self.dof_names
             .extend(robot.dof_names().into_iter().map(named));
@@ -52,16 +57,25 @@ impl BodyBuilder {
         let mut carriers = vec![base; robot.links.len()];
         let mut dof_of = vec![0; robot.joints.len()];
         for link in robot.link_order() {
-            let above = robot.joints.iter().position(|joint| joint.child == link);
-            if let Some(index) = above {
-                let joint = &robot.joints[index];
+            let own = robot.joints.iter().enumerate();
+            let mut first = true;
+            for (index, joint) in own.filter(|(_, joint)| joint.child == link) {
                 let parent = joint.parent.map_or(base, |parent| carriers[parent]);
-                let at = Carrier {
-                    pose: parent.pose.mul(&joint.origin),
-                    ..parent
+                let mut at = match first {
+                    true => Carrier {
+                        pose: parent.pose.mul(&joint.origin),
+                        ..parent
+                    },
+                    // further joints of a link from MuJoCo begin where the one before ends
+                    false => carriers[link],
                 };
+                first = false;
+                if robot.mujoco.is_some() && at.body.is_none() && joint.moves() {
+                    at = self.rooted(at);
+                }
                 dof_of[index] = self.dofs.len();
-                carriers[link] = self.add_joint(joint, at);
+                let own = robot.mujoco.as_ref().map(|parts| &parts.joints[index]);
+                carriers[link] = self.add_joint(joint, own, at);
             }
             let carrier = carriers[link];
             self.body_names.push(named(robot.links[link].name.clone()));
@@ -80,23 +94,60 @@ impl BodyBuilder {
         for joint in robot.moving_joints() {
             self.add_followers(robot, joint, &dof_of);
         }
+        if let Some(parts) = &robot.mujoco {
+            self.add_mujoco(robot, parts, &dof_of);
+        }
         self.carriers.push(carriers);
         self.robots.push(RobotRange {
             name: robot.name.clone(),
             dofs: first_dof..self.dofs.len(),
             coords: first_coord..self.coord_names.len(),
             bodies: first_frame..self.frames.len(),
+            actuators: first_actuator..self.actuator_names.len(),
         });
     }
 
-    /// The bodies of a joint whose frame is `at`; returns where they carry its link.
-    fn add_joint(&mut self, joint: &Joint, at: Carrier) -> Carrier {
+    /// The same place, carried by a tree of its own: its bodies are then relative to a point near them.
+    fn rooted(&mut self, at: Carrier) -> Carrier {
+        let below = self.trees[at.tree].base;
+        self.trees.push(Tree {
+            base: std::array::from_fn(|i| below[i] + at.pose.pos[i]),
+            free: None,
+        });
+        Carrier {
+            body: None,
+            tree: self.trees.len() - 1,
+            pose: Pose {
+                pos: [0.0; 3],
+                quat: at.pose.quat,
+            },
+        }
+    }
+
+    /// The bodies of a joint whose frame is `at`; returns where they carry its link. `own` is what only MuJoCo's joints have.
+    fn add_joint(&mut self, joint: &Joint, own: Option<&MujocoJoint>, at: Carrier) -> Carrier {
         let turn = z_to(joint.axis);
-        let back = turn.inverse();
-        let axis = Carrier {
+        let mut back = turn.inverse();
+        let mut at = at;
+        let mut axis = Carrier {
             pose: at.pose.mul(&turn),
             ..at
         };
+        if let Some(own) = own {
+            let there = Pose::at(own.anchor);
+            let away = Pose::at(own.anchor.map(|x| -x));
+            // at its reference the joint leaves its link where it is
+            let rest = match joint.kind {
+                JointKind::Revolute => Pose::about([0.0, 0.0, 1.0], -own.reference),
+                _ => Pose::at([0.0, 0.0, -own.reference]),
+            };
+            axis.pose = at.pose.mul(&there).mul(&turn).mul(&rest);
+            back = back.mul(&away);
+            at.pose = at.pose.mul(&there);
+            if joint.kind == JointKind::Ball {
+                return self.add_body(joint, 0, Motion::Ball, at, away);
+            }
+        }
         match joint.kind {
             JointKind::Fixed => at,
             JointKind::Revolute => self.add_body(joint, 0, Motion::Revolute, axis, back),
@@ -185,6 +236,7 @@ impl BodyBuilder {
                 range: joint.range,
                 friction: dof.friction,
                 mimic: None,
+                mujoco: None,
             });
         }
         Carrier {
@@ -199,6 +251,57 @@ impl BodyBuilder {
             let (dof, leader) = (dof_of[index], dof_of[mimic.joint]);
             self.couplings.push((dof, leader));
             self.joints[dof].mimic = Some((leader, mimic.multiplier, mimic.offset));
+        }
+    }
+
+    /// What only MuJoCo's robots have, by their dofs.
+    fn add_mujoco(&mut self, robot: &Robot, parts: &MujocoParts, dof_of: &[usize]) {
+        for index in robot.moving_joints() {
+            let (joint, own) = (&robot.joints[index], &parts.joints[index]);
+            let dofs = dof_of[index]..dof_of[index] + joint.dofs.len();
+            for dof in dofs.clone() {
+                self.joints[dof].mujoco = Some(SoftJoint {
+                    limit: own.limit,
+                    margin: own.margin,
+                    friction: own.friction,
+                    safe_references: parts.safe_references,
+                });
+            }
+            if own.stiffness != 0.0 {
+                self.mujoco.springs.push(Spring {
+                    dof: dofs.start,
+                    stiffness: own.stiffness,
+                    rest: own.spring_ref,
+                });
+            }
+            if let Some(range) = own.actuator_range {
+                let dof = dofs.start;
+                self.mujoco
+                    .actuator_bounds
+                    .push(ActuatorBound { dof, range });
+            }
+        }
+        for equality in &parts.equalities {
+            let (follower, leader) = (dof_of[equality.follower], dof_of[equality.leader]);
+            self.couplings.push((follower, leader));
+            self.equalities.push(DofEquality {
+                follower,
+                leader,
+                multiplier: equality.multiplier,
+                offset: equality.offset,
+                softness: equality.softness,
+                safe_references: parts.safe_references,
+            });
+        }
+        for actuator in &parts.actuators {
+            let terms = actuator.terms.iter().map(|&(joint, coefficient)| Term {
+                dof: dof_of[joint],
+                coefficient,
+            });
+            let terms: Vec<Term<f64>> = terms.collect();
+            self.actuator_names
+                .push(format!("{}/{}", robot.name, actuator.name));
+            self.mujoco.actuators.push(actuator_of(actuator, terms));
         }
     }
 
@@ -253,6 +356,16 @@ impl BodyBuilder {
             self.dofs[k].entries = (first, entries.len());
         }
         entries
+    }
+}
+
+fn actuator_of(actuator: &description::Actuator, terms: Vec<Term<f64>>) -> Actuator<f64> {
+    Actuator {
+        terms,
+        ctrl_range: actuator.ctrl_range,
+        force_range: actuator.force_range,
+        gain: actuator.gain,
+        bias: actuator.bias,
     }
 }
 

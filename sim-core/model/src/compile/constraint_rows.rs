@@ -1,5 +1,6 @@
 //! Constraint rows of a model: equalities, dry friction and limits, with softness from the mass at the reference pose.
 
+use crate::softness::Softness;
 use sim_physics::constants::{Constants, Equality, Friction, Impedance, Limit, Motion, Soft};
 
 /// MuJoCo's default `solimp` (0.9, 0.95, 0.001, 0.5, 2).
@@ -8,6 +9,7 @@ pub(super) const IMPEDANCE: Impedance<f64> = Impedance {
     d_max: 0.95,
     inverse_width: 1.0 / 0.001,
     midpoint: 0.5,
+    power: 2.0,
 };
 /// MuJoCo's default `solref`: time constant [s], damping ratio.
 const SOLREF: [f64; 2] = [0.02, 1.0];
@@ -21,16 +23,47 @@ pub(super) struct DofJoint {
     pub range: Option<[f64; 2]>,
     pub friction: f64,
     pub mimic: Option<(usize, f64, f64)>,
+    pub mujoco: Option<SoftJoint>,
+}
+
+/// Softness of the rows of a joint from MuJoCo.
+#[derive(Clone, Copy)]
+pub(super) struct SoftJoint {
+    pub limit: Softness,
+    pub margin: f64,
+    pub friction: Softness,
+    pub safe_references: bool,
+}
+
+/// An equality of two dofs from MuJoCo.
+pub(super) struct DofEquality {
+    pub follower: usize,
+    pub leader: usize,
+    pub multiplier: f64,
+    pub offset: f64,
+    pub softness: Softness,
+    pub safe_references: bool,
 }
 
 /// Constraint rows in MuJoCo's order.
 pub(super) fn add_rows(
     constants: &mut Constants<f64>,
     joints: &[DofJoint],
+    equalities: &[DofEquality],
     inverse_weight: &[f64],
     friction_varies: bool,
 ) {
     let dt = constants.dt;
+    for e in equalities {
+        let weight = inverse_weight[e.follower] + inverse_weight[e.leader];
+        constants.equalities.push(Equality {
+            follower: e.follower,
+            leader: e.leader,
+            multiplier: e.multiplier,
+            offset: e.offset,
+            soft: own_soft(&e.softness, weight, dt, e.safe_references),
+        });
+    }
     for (dof, joint) in joints.iter().enumerate() {
         let weight = inverse_weight[dof];
         if let Some((leader, multiplier, offset)) = joint.mimic {
@@ -45,9 +78,13 @@ pub(super) fn add_rows(
         }
         let moves_freely = constants.bodies[constants.dofs[dof].body].motion == Motion::Free;
         if joint.friction > 0.0 || friction_varies && !moves_freely {
-            let soft = soft(SOLREF, weight, dt);
+            let soft = match joint.mujoco {
+                Some(own) => own_soft(&own.friction, weight, dt, own.safe_references),
+                None => soft(SOLREF, weight, dt),
+            };
             // a friction row has no position: its impedance is d_min, its reference -b v
-            let regularizer = (1.0 - IMPEDANCE.d_min) / IMPEDANCE.d_min * weight;
+            let d_min = soft.impedance.d_min;
+            let regularizer = (1.0 - d_min) / d_min * weight;
             constants.frictions.push(Friction {
                 dof,
                 loss: joint.friction,
@@ -57,7 +94,22 @@ pub(super) fn add_rows(
                 zone: regularizer * joint.friction,
             });
         }
-        if let Some([lower, upper]) = joint.range {
+        if let (Some([lower, upper]), Some(own)) = (joint.range, joint.mujoco) {
+            let soft = own_soft(&own.limit, weight, dt, own.safe_references);
+            let (lower, upper) = (lower + own.margin, upper - own.margin);
+            // where both sides may act at once, each has a row of its own
+            let sides = match lower < upper {
+                true => vec![[lower, upper]],
+                false => vec![[lower, FAR], [-FAR, upper]],
+            };
+            let rows = sides.into_iter().map(|[lower, upper]| Limit {
+                dof,
+                lower,
+                upper,
+                soft: soft.clone(),
+            });
+            constants.limits.extend(rows);
+        } else if let Some([lower, upper]) = joint.range {
             let f = weight * (1.0 - IMPEDANCE.d_max);
             let solref = [
                 2.0 / (LIMIT_KD * f),
@@ -70,6 +122,20 @@ pub(super) fn add_rows(
                 soft: soft(solref, weight, dt),
             });
         }
+    }
+}
+
+/// An end of a range that no joint reaches [rad or m].
+const FAR: f64 = 1e18;
+
+/// Softness as a model from MuJoCo has it.
+fn own_soft(softness: &Softness, inverse_weight: f64, dt: f64, is_safe: bool) -> Soft<f64> {
+    let (stiffness, damping) = softness.reference(dt, is_safe);
+    Soft {
+        stiffness,
+        damping,
+        inverse_weight,
+        impedance: softness.impedance(),
     }
 }
 

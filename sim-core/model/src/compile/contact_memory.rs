@@ -3,7 +3,9 @@
 use super::contact_pairs::{ContactBuilder, rows_of};
 use super::contact_pieces::Piece;
 use sim_physics::constants::clip::Cut;
-use sim_physics::constants::contact::{COUNTS, Contacts, Handles, Kind, Memory, pair, row};
+use sim_physics::constants::contact::{
+    COUNTS, Contacts, Handles, Kind, Memory, pair, row, turning,
+};
 use sim_physics::constants::params::Param;
 use sim_physics::lane::{Fixed, Table};
 
@@ -13,7 +15,9 @@ const DEFAULT_CONTACTS_MAX: usize = 512;
 impl ContactBuilder<'_> {
     pub(super) fn capacities(&self, contacts: &mut Contacts<f64>, bounds: &[usize]) {
         let most: usize = bounds.iter().sum();
-        let of_a_contact = rows_of(self.scene.solver.cone, 3);
+        let geoms = self.shapes.iter().filter_map(|shape| shape.geom);
+        let condim = geoms.map(|geom| geom.condim).fold(3, usize::max);
+        let of_a_contact = rows_of(self.scene.solver.cone, condim);
         contacts.contacts_max = self
             .scene
             .contacts_max
@@ -32,7 +36,12 @@ impl ContactBuilder<'_> {
         stride: usize,
         widest: usize,
         rows: usize,
+        is_wide: bool,
     ) {
+        let row_len = match is_wide {
+            true => row::JACOBIAN + turning::JACOBIAN + 6 * widest,
+            false => row::JACOBIAN + 3 * widest,
+        };
         let pairs = contacts.pairs.len();
         let tables = &mut contacts.tables;
         let fixed = |base, stride, rows| Fixed { base, stride, rows };
@@ -70,7 +79,7 @@ impl ContactBuilder<'_> {
             poses: table(12, self.pieces.len()),
             origins: table(3, self.constants.trees.len() + 1),
             counts: table(1, contacts.classes.len() + COUNTS),
-            rows: table(row::JACOBIAN + 3 * widest, rows),
+            rows: table(row_len, rows),
             mu: match self.scene.params.contains(&Param::ShapeMu) {
                 true => table(1, self.pieces.len()),
                 false => contacts.memory.mu,

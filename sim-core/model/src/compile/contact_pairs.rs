@@ -2,11 +2,15 @@
 
 use super::clusters::Cluster;
 use super::constraint_rows::{IMPEDANCE, contact_damping};
-use super::contact_pieces::{Piece, PlacedShape, Rules};
+use super::contact_pieces::{Piece, PlacedShape, Rules, geom_of};
 use crate::description::Description;
+use crate::geom_contact::GeomContact;
 use crate::surface::Surface;
-use sim_physics::constants::Constants;
 use sim_physics::constants::contact::{Cone, Kind, MU_MIN, Pair, pair};
+use sim_physics::constants::{Constants, Impedance};
+
+/// Least inverse weight of a contact (MuJoCo: `mjMINVAL`) [1/kg].
+const WEIGHT_MIN: f64 = 1e-15;
 
 /// What the tables of contacts are built from.
 pub(super) struct ContactBuilder<'a> {
@@ -64,8 +68,12 @@ impl ContactBuilder<'_> {
         let (a, b) = (&self.pieces[a], &self.pieces[b]);
         let (x, y) = (&self.shapes[a.shape], &self.shapes[b.shape]);
         let (s, t) = (&x.surface, &y.surface);
-        let margin = s.margin + t.margin;
-        let reach = margin + s.gap + t.gap;
+        let geom = geom_pair(x, y);
+        let (margin, gap) = match &geom {
+            Some(geom) => (geom.margin, geom.gap),
+            None => (s.margin + t.margin, s.gap + t.gap),
+        };
+        let reach = margin + gap;
         row[pair::REACH] = reach;
         row[pair::RADIUS] = a.radius + b.radius + reach;
         row[pair::RADIUS_A] = a.radius + reach;
@@ -78,8 +86,13 @@ impl ContactBuilder<'_> {
         row[pair::SIZE_B..][..3].copy_from_slice(&b.size);
         row[pair::FLIP] = if sides.flipped { -1.0 } else { 1.0 };
         row[pair::MARGIN] = margin;
-        row[pair::MU] = s.mu.max(t.mu).max(MU_MIN);
-        let condim = s.condim.max(t.condim);
+        let mu = geom
+            .as_ref()
+            .map_or(s.mu.max(t.mu), |geom| geom.friction[0]);
+        row[pair::MU] = mu.max(MU_MIN);
+        let condim = geom
+            .as_ref()
+            .map_or(s.condim.max(t.condim), |geom| geom.condim);
         row[pair::RUBS] = if condim == 1 { 0.0 } else { 1.0 };
         row[pair::ROWS] = rows_of(self.scene.solver.cone, condim) as f64;
         let weight = |shape: &PlacedShape<'_>| {
@@ -87,8 +100,26 @@ impl ContactBuilder<'_> {
                 .link
                 .map_or(0.0, |link| self.rules.link_inverse_weight[link])
         };
-        let weight = weight(x) + weight(y);
+        let weight = (weight(x) + weight(y)).max(WEIGHT_MIN);
         row[pair::WEIGHT] = weight;
+        for (c, &(dof, _)) in columns.iter().enumerate() {
+            let moves = |body: usize| f64::from(u8::from(self.moves(dof, body)));
+            let lever = moves(sides.second) - sides.first.map_or(0.0, moves);
+            row[pair::LEVERS + c] = lever;
+        }
+        if let Some(geom) = geom {
+            let is_safe = self
+                .rules
+                .mujoco
+                .iter()
+                .flatten()
+                .all(|m| m.safe_references);
+            let (stiffness, damping) = geom.softness.reference(self.scene.dt, is_safe);
+            row[pair::STIFFNESS] = stiffness;
+            row[pair::DAMPING] = damping;
+            row[pair::SLIDING] = damping;
+            return;
+        }
         // MuJoCo mixes the parameters of two geoms half and half
         let mean = |f: fn(&Surface) -> f64| 0.5 * (f(s) + f(t));
         let time_constant = mean(|s| 2.0 / s.kd).max(2.0 * self.scene.dt);
@@ -102,11 +133,26 @@ impl ContactBuilder<'_> {
             self.scene.solver.impratio,
             self.scene.dt,
         );
-        for (c, &(dof, _)) in columns.iter().enumerate() {
-            let moves = |body: usize| f64::from(u8::from(self.moves(dof, body)));
-            let lever = moves(sides.second) - sides.first.map_or(0.0, moves);
-            row[pair::LEVERS + c] = lever;
+    }
+
+    /// Torsional and rolling friction of a pair over its sliding friction.
+    pub(super) fn turning(&self, (a, b): (usize, usize)) -> [f64; 2] {
+        let [x, y] = [a, b].map(|piece| &self.shapes[self.pieces[piece].shape]);
+        let Some(geom) = geom_pair(x, y) else {
+            return [0.0; 2];
+        };
+        let [slide, twist, roll] = geom.friction.map(|mu| mu.max(MU_MIN));
+        match geom.condim {
+            6 => [twist / slide, roll / slide],
+            4 => [twist / slide, 0.0],
+            _ => [0.0; 2],
         }
+    }
+
+    /// The impedance of a pair's contacts.
+    pub(super) fn impedance(&self, (a, b): (usize, usize)) -> Impedance<f64> {
+        let [x, y] = [a, b].map(|piece| &self.shapes[self.pieces[piece].shape]);
+        geom_pair(x, y).map_or(IMPEDANCE, |geom| geom.softness.impedance())
     }
 
     /// Whether a dof moves a body.
@@ -160,6 +206,11 @@ impl ContactBuilder<'_> {
             class,
         }
     }
+}
+
+/// What the contact of two shapes is like where one of them is a geom of MuJoCo's.
+fn geom_pair(x: &PlacedShape<'_>, y: &PlacedShape<'_>) -> Option<GeomContact> {
+    (x.geom.is_some() || y.geom.is_some()).then(|| geom_of(x).combined(&geom_of(y)))
 }
 
 /// Constraint rows of a contact.

@@ -1,7 +1,8 @@
 //! Convex pieces of the shapes of a scene, and the pairs of pieces that may touch.
 
 use super::carrier::Carrier;
-use crate::description::Description;
+use crate::description::{Description, MujocoParts};
+use crate::geom_contact::GeomContact;
 use crate::geometry::{Hull, Shape};
 use crate::hull_tables;
 use crate::pose::Pose;
@@ -18,6 +19,10 @@ pub(super) struct PlacedShape<'a> {
     pub shape: &'a Shape,
     /// How it touches.
     pub surface: Surface,
+    /// How it touches where it is a geom of MuJoCo's.
+    pub geom: Option<&'a GeomContact>,
+    /// The link of its robot.
+    pub own_link: usize,
     /// Its robot, if it is not static.
     pub robot: Option<usize>,
     /// Its link, as a frame.
@@ -38,6 +43,16 @@ pub(super) struct Rules<'a> {
     pub self_collisions: Vec<bool>,
     /// Translational inverse weight of each link.
     pub link_inverse_weight: &'a [f64],
+    /// Of each robot, what it has from MuJoCo.
+    pub mujoco: Vec<Option<&'a MujocoParts>>,
+}
+
+/// How a shape touches a geom of MuJoCo's.
+pub(super) fn geom_of(shape: &PlacedShape<'_>) -> GeomContact {
+    match shape.geom {
+        Some(geom) => *geom,
+        None => GeomContact::of(&shape.surface),
+    }
 }
 
 /// A convex piece of a shape.
@@ -84,6 +99,8 @@ pub(super) fn placed_shapes<'a>(
             number: all.len(),
             shape: &shape.shape,
             surface: shape.surface,
+            geom: None,
+            own_link: 0,
             robot: None,
             link: None,
             body: None,
@@ -106,6 +123,8 @@ pub(super) fn placed_shapes<'a>(
                     number: all.len(),
                     shape: &collision.shape,
                     surface: collision.surface,
+                    geom: collision.geom.as_ref(),
+                    own_link: link,
                     robot: Some(index),
                     link: Some(frame),
                     body: carrier.body,
@@ -248,8 +267,31 @@ pub(super) fn pairs(
     pairs
 }
 
+/// Whether two geoms of one robot from MuJoCo may touch, as MuJoCo filters them.
+fn geoms_may_touch(a: &PlacedShape<'_>, b: &PlacedShape<'_>, parts: &MujocoParts) -> bool {
+    let links = [a.own_link, b.own_link];
+    let welds = links.map(|link| parts.welds[link]);
+    let above = welds.map(|weld| parts.welds[parts.parents[weld]]);
+    // the world is no parent
+    let are_neighbours = !welds.contains(&0) && (welds[0] == above[1] || welds[1] == above[0]);
+    let are_excluded = parts
+        .excludes
+        .iter()
+        .any(|pair| *pair == links || *pair == [links[1], links[0]]);
+    welds[0] != welds[1] && (parts.touches_parent || !are_neighbours) && !are_excluded
+}
+
 fn may_touch(a: &PlacedShape<'_>, b: &PlacedShape<'_>, rules: &Rules<'_>) -> bool {
     let moves = a.body.is_some() || b.body.is_some();
+    if a.geom.is_some() || b.geom.is_some() {
+        let [first, second] = [a, b].map(|shape| geom_of(shape));
+        let filter = match (a.robot, b.robot) {
+            (Some(first), Some(second)) if first == second => rules.mujoco[first],
+            _ => None,
+        };
+        let passes = filter.is_none_or(|parts| geoms_may_touch(a, b, parts));
+        return moves && passes && first.meets(&second);
+    }
     let is_one = a.group == b.group;
     let of_one_robot = a.robot.is_some() && a.robot == b.robot;
     let may_self = a.robot.is_some_and(|robot| rules.self_collisions[robot]);

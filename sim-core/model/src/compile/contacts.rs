@@ -5,8 +5,9 @@ use super::contact_pairs::ContactBuilder;
 use super::contact_pieces::{PlacedShape, Rules, contacts_of, pairs, pieces};
 use crate::description::Description;
 use crate::error::ModelError;
-use sim_physics::constants::contact::{Class, Column, Contacts, Group, Pair, Run, pair};
-use sim_physics::constants::{Constants, Coupled};
+use sim_physics::constants::contact::{Class, Column, Contacts, Group, Pair, Run, pair, row};
+use sim_physics::constants::{Constants, Coupled, Impedance};
+use sim_physics::lane::Fixed;
 use sim_physics::math::factor::Pattern;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -36,11 +37,20 @@ pub(super) fn add_contacts(
         clusters: clusters(constants, shapes.iter().filter_map(|shape| shape.body)),
     };
     let coupled = builder.fill(&mut contacts, &pairs);
+    let softness = builder.softness(&mut contacts, &pairs);
     contacts.solids = pieces.iter().map(|piece| piece.solid.clone()).collect();
     constants.coupled = coupled;
     constants.contacts = contacts;
+    if let Some((impedances, of_pairs, of_classes)) = softness {
+        constants.mujoco.impedances = impedances;
+        constants.mujoco.pair_impedance = of_pairs;
+        constants.mujoco.class_impedances = of_classes;
+    }
     Ok(())
 }
+
+/// Impedances, each once; the table that says which one a pair has; those of each class.
+type PairSoftness = (Vec<Impedance<f64>>, Fixed, Vec<Vec<usize>>);
 
 impl ContactBuilder<'_> {
     fn fill(&self, contacts: &mut Contacts<f64>, pairs: &[(usize, usize)]) -> Coupled {
@@ -94,10 +104,20 @@ impl ContactBuilder<'_> {
             });
             first += capacity;
         }
+        let is_wide = self.add_turning(contacts, pairs);
         // a backend that knows only the largest size of each class must provide this many rows
         let [first_end, capacity_end] = contacts.row_ends();
         let rows = first_end + capacity_end - 2;
-        self.lay_out(contacts, numbers, indices, stride, widest, rows);
+        self.lay_out(contacts, numbers, indices, stride, widest, rows, is_wide);
+        let ratios: Vec<[f64; 2]> = pairs.iter().map(|&pair| self.turning(pair)).collect();
+        if is_wide {
+            contacts.turning = Fixed {
+                base: contacts.tables.numbers.len(),
+                stride: 2,
+                rows: pairs.len(),
+            };
+            contacts.tables.numbers.extend(ratios.as_flattened());
+        }
         let coupled = self.coupled(contacts);
         for class in &mut contacts.classes {
             let pattern = match class.couples {
@@ -124,6 +144,53 @@ impl ContactBuilder<'_> {
         }
         columns.sort_unstable();
         columns
+    }
+
+    /// Impedances of the pairs; `None` where all have the scene's.
+    fn softness(
+        &self,
+        contacts: &mut Contacts<f64>,
+        pairs: &[(usize, usize)],
+    ) -> Option<PairSoftness> {
+        let mut impedances: Vec<Impedance<f64>> = Vec::new();
+        let mut of_pairs = Vec::new();
+        for &pair in pairs {
+            let own = self.impedance(pair);
+            let place = impedances.iter().position(|known| *known == own);
+            of_pairs.push(place.unwrap_or(impedances.len()));
+            if place.is_none() {
+                impedances.push(own);
+            }
+        }
+        if impedances == [self.constants.contact_impedance] {
+            return None;
+        }
+        let of_class = |class| {
+            let own = contacts.pairs.iter().zip(&of_pairs);
+            let own = own.filter(|(pair, _)| pair.class == class);
+            let own: BTreeSet<usize> = own.map(|(_, &place)| place).collect();
+            own.into_iter().collect()
+        };
+        let of_classes = (0..contacts.classes.len()).map(of_class).collect();
+        let table = Fixed {
+            base: contacts.tables.numbers.len(),
+            stride: 1,
+            rows: pairs.len(),
+        };
+        let places = of_pairs.iter().map(|&place| place as f64);
+        contacts.tables.numbers.extend(places);
+        Some((impedances, table, of_classes))
+    }
+
+    /// Gives classes that have torsional friction a second block of rows. Returns whether there is any.
+    fn add_turning(&self, contacts: &mut Contacts<f64>, pairs: &[(usize, usize)]) -> bool {
+        for (pair, &of) in contacts.pairs.iter().zip(pairs) {
+            if self.turning(of)[0] > 0.0 {
+                let class = &mut contacts.classes[pair.class];
+                class.turns = Some(row::JACOBIAN + 3 * class.columns.len());
+            }
+        }
+        contacts.classes.iter().any(|class| class.turns.is_some())
     }
 
     fn bound(&self, (a, b): (usize, usize)) -> usize {
@@ -205,6 +272,7 @@ impl ContactBuilder<'_> {
             shared,
             first: 0,
             capacity: 0,
+            turns: None,
         }
     }
 

@@ -18,13 +18,15 @@ mod sites;
 
 use crate::description::{Description, Robot};
 use crate::error::ModelError;
-use crate::model::{Model, Start};
+use crate::model::{Model, RobotRange, Start};
 use bodies::BodyBuilder;
 use carrier::Carrier;
 use constraint_rows::{IMPEDANCE, add_rows};
 use contact_pieces::{Rules, connected, placed_shapes};
 use contacts::add_contacts;
+use inverse_weight::Reference;
 use sim_physics::constants::contact::Contacts;
+use sim_physics::constants::mujoco::{Actuator, Integrator, Mujoco};
 use sim_physics::constants::params::{Param, Varying};
 use sim_physics::constants::{Constants, Coupled, Delay, Newton, Part};
 use std::collections::BTreeSet;
@@ -89,8 +91,10 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         varying: Varying::default(),
         delay: Delay::default(),
         sites,
+        mujoco: Mujoco::default(),
     };
-    let reference = inverse_weight::at_reference(&constants, &builder.dof_names)?;
+    let mut reference = inverse_weight::at_reference(&constants, &builder.dof_names)?;
+    take_inverse_weights(scene, &builder.robots, &mut reference);
     // MuJoCo scales costs by 1 / (mean inertia × dofs)
     constants.solver.tolerance =
         scene.solver.tolerance * reference.mean_inertia * constants.dofs.len() as f64;
@@ -111,15 +115,22 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     add_rows(
         &mut constants,
         &builder.joints,
+        &builder.equalities,
         &reference.dof_inverse_weight,
         scene.params.contains(&Param::JointFriction),
     );
+    constants.mujoco = builder.mujoco;
+    if let Some(parts) = scene.robots.iter().find_map(|robot| robot.mujoco.as_ref()) {
+        constants.mujoco.integrator = parts.integrator;
+        constants.damped = is_damped(&constants, parts.implicit_damping);
+    }
     let shape_names = scene.shape_names();
     let placed = placed_shapes(scene, &builder.carriers, &constants);
     let rules = Rules {
         connected: connected(scene, &builder.carriers, &constants),
         self_collisions: scene.robots.iter().map(|r| r.self_collisions).collect(),
         link_inverse_weight: &reference.link_inverse_weight,
+        mujoco: scene.robots.iter().map(|r| r.mujoco.as_deref()).collect(),
     };
     add_contacts(&mut constants, scene, &placed, &rules)?;
     let surfaces: Vec<f64> = placed.iter().map(|shape| shape.surface.mu).collect();
@@ -152,6 +163,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         coord_names: builder.coord_names,
         body_names: builder.body_names,
         shape_names,
+        actuator_names: builder.actuator_names,
         site_names: scene.sites.iter().map(|site| site.name.clone()).collect(),
         contact_sensors: sensors,
         command_delay_max: scene.delay_max(),
@@ -165,6 +177,31 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     };
     model.hash = model.own_hash();
     Ok(model)
+}
+
+/// Puts MuJoCo's inverse weights in the place of ours, for the robots that it compiled.
+fn take_inverse_weights(scene: &Description, ranges: &[RobotRange], reference: &mut Reference) {
+    for (robot, range) in scene.robots.iter().zip(ranges) {
+        let Some(parts) = &robot.mujoco else { continue };
+        let links = &mut reference.link_inverse_weight[range.bodies.clone()];
+        links.copy_from_slice(&parts.link_inverse_weight);
+        let dofs = &mut reference.dof_inverse_weight[range.dofs.clone()];
+        dofs.copy_from_slice(&parts.dof_inverse_weight);
+        if scene.robots.len() == 1 {
+            reference.mean_inertia = parts.mean_inertia;
+        }
+    }
+}
+
+/// Whether a step of a scene with MuJoCo's options is implicit in any damping.
+fn is_damped(m: &Constants<f64>, implicit_damping: bool) -> bool {
+    let of_actuators =
+        |actuator: &Actuator<f64>| actuator.gain[2] != 0.0 || actuator.bias[2] != 0.0;
+    match m.mujoco.integrator {
+        Integrator::Euler => m.damped && implicit_damping,
+        Integrator::RungeKutta => false,
+        Integrator::ImplicitFast => m.damped || m.mujoco.actuators.iter().any(of_actuators),
+    }
 }
 
 /// Adds to each body of a robot the links that it carries, in body order. `first` is the number of the robot's first link.

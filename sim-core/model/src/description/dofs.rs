@@ -38,15 +38,15 @@ impl Robot {
 
     /// Joint indices of the moving joints in the order of their child links, which is that of their dofs.
     pub fn moving_joints(&self) -> Vec<usize> {
-        let mut joint_of = vec![None; self.links.len()];
+        let mut joints_of = vec![Vec::new(); self.links.len()];
         for (index, joint) in self.joints.iter().enumerate() {
-            if let Some(slot) = joint_of.get_mut(joint.child) {
-                *slot = Some(index);
+            if let Some(own) = joints_of.get_mut(joint.child) {
+                own.push(index);
             }
         }
         self.link_order()
             .into_iter()
-            .filter_map(|link| joint_of[link])
+            .flat_map(|link| std::mem::take(&mut joints_of[link]))
             .filter(|&joint| self.joints[joint].moves())
             .collect()
     }

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use super::joint::Joint;
+use super::mujoco::MujocoParts;
+use crate::geom_contact::GeomContact;
 use crate::geometry::Shape;
 use crate::inertia::Inertial;
 use crate::pose::Pose;
@@ -27,8 +29,10 @@ pub struct Robot {
     pub notes: Vec<String>,
     /// Notes that change what moves or what is seen, one sentence each. The user should see them at once.
     pub warnings: Vec<String>,
-    /// The file it was read from.
+    /// The URDF file it was read from.
     pub urdf: Option<PathBuf>,
+    /// What it has beyond links and joints, where MuJoCo compiled it.
+    pub mujoco: Option<Box<MujocoParts>>,
 }
 
 /// A rigid body of a robot.
@@ -53,6 +57,8 @@ pub struct Collision {
     pub shape: Shape,
     /// What it is like where it touches.
     pub surface: Surface,
+    /// What it is like instead where it is a geom of MuJoCo's.
+    pub geom: Option<GeomContact>,
 }
 
 impl Collision {
@@ -63,6 +69,7 @@ impl Collision {
             pose,
             shape,
             surface: Surface::default(),
+            geom: None,
         }
     }
 }

@@ -95,6 +95,25 @@ impl Mesh {
         if scale.iter().product::<f64>() < 0.0 {
             triangles.turn_over();
         }
+        Mesh::made(path, scale, triangles, notes, options)
+    }
+
+    /// A mesh by its name, of these triangles.
+    ///
+    /// # Errors
+    /// Why they cannot be used, by the name, with the cure.
+    pub fn of(name: &str, triangles: TriMesh, options: &MeshOptions) -> Result<Mesh, ModelError> {
+        options.validate()?;
+        Mesh::made(Path::new(name), [1.0; 3], triangles, Vec::new(), options)
+    }
+
+    fn made(
+        path: &Path,
+        scale: [f64; 3],
+        mut triangles: TriMesh,
+        notes: Vec<String>,
+        options: &MeshOptions,
+    ) -> Result<Mesh, ModelError> {
         let size = size(&triangles.vertices);
         if !(SIZE_MIN..=SIZE_MAX).contains(&size) {
             return Err(fault(

@@ -100,7 +100,8 @@ impl Robot {
             pose(&what, &collision.pose)?;
             shape_sizes(&what, &collision.shape)?;
             collision.surface.validate(&what)?;
-            if collision.shape == Shape::Plane {
+            // geoms of the world are shapes of link 0
+            if collision.shape == Shape::Plane && self.mujoco.is_none() {
                 return Err(ModelError::PlaneBorne { what });
             }
         }

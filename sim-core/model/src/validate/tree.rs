@@ -32,7 +32,10 @@ impl Robot {
                     }));
                 }
             }
-            if let Some(first) = parent_joint[joint.child].replace(joint) {
+            let before = parent_joint[joint.child].replace(joint);
+            // MuJoCo's links may have several joints, one after another
+            let is_next = |first: &&Joint| self.mujoco.is_some() && first.parent == joint.parent;
+            if let Some(first) = before.filter(|first| !is_next(first)) {
                 return Err(Culprit::Joint(index).blame(ModelError::TwoParents {
                     robot: robot(),
                     link: self.links[joint.child].name.clone(),

@@ -70,6 +70,8 @@ pub enum Axis {
     Sites,
     /// Contact sensors.
     ContactSensors,
+    /// Actuators.
+    Actuators,
     /// A fixed length.
     Size(usize),
 }
@@ -85,6 +87,7 @@ impl Axis {
             Axis::Contacts => sizes.contacts,
             Axis::Sites => sizes.sites,
             Axis::ContactSensors => sizes.contact_sensors,
+            Axis::Actuators => sizes.actuators,
             Axis::Size(n) => n,
         }
     }
@@ -99,6 +102,7 @@ impl Axis {
             Axis::Contacts => "contacts".into(),
             Axis::Sites => "sites".into(),
             Axis::ContactSensors => "contact_sensors".into(),
+            Axis::Actuators => "actuators".into(),
             Axis::Size(n) => n.to_string(),
         }
     }

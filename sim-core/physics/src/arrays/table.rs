@@ -10,6 +10,7 @@ use super::define::{Flat, arrays};
 use super::element::{self, Element};
 use super::fields::{Axis, F64, FieldDtype, FieldRow, Group, I32, REAL, U32, U64};
 use crate::constants::Constants;
+use crate::constants::mujoco::Integrator;
 use crate::lane::{Num, Real};
 
 /// Who writes an array.
@@ -81,6 +82,8 @@ arrays! { m;
             => "joint_target_q" Command [Dofs], "Position targets of the drives.";
         joint_target_qd: JointTargetQd [Scalar; m.dofs.len()] Command "rad/s or m/s"
             => "joint_target_qd" Command [Dofs], "Velocity targets of the drives.";
+        ctrl: Ctrl [Scalar; m.mujoco.actuators.len()] Command "–"
+            => "ctrl" Command [Actuators], "Controls of the actuators, as MuJoCo's `ctrl`, before they are clamped to their ranges.";
         // commands of the frames before, the last one first, each as joint_f, joint_target_q, joint_target_qd
         command_history: CommandHistory [Scalar; m.delay.frames * 3 * m.dofs.len()] Command "–";
         // parameters of the model that vary from world to world, see `constants::params::Varying`
@@ -106,10 +109,20 @@ arrays! { m;
             => "bias_force" [Dofs], "Coriolis, centrifugal and gravity forces: what holds the joints at zero acceleration.";
         smooth_force: SmoothForce [Scalar; m.dofs.len()] Stage "N·m or N"
             => "smooth_force" [Dofs], "Applied, drive and damping forces less the bias: all but constraint forces.";
+        actuator_force: ActuatorForce [Scalar; m.mujoco.actuators.len()] Stage "N or N·m"
+            => "actuator_force" [Actuators], "Force of each actuator along its length.";
+        qfrc_actuator: QfrcActuator [Scalar; if m.mujoco.actuators.is_empty() { 0 } else { m.dofs.len() }] Stage "N·m or N";
         // packed, see `math::factor::Pattern::at`
         mass_matrix: MassMatrix [Scalar; m.pattern.len()] Stage "kg·m², kg·m or kg";
         // +1 where the lower bound is the nearer, -1 where the upper is
         limit_side: LimitSide [Scalar; m.limits.len()] Stage "–";
+
+        // the Runge-Kutta step: where it began, and sums of velocities and accelerations
+        rk_q: RkQ [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.coords } else { 0 }] Stage "rad or m";
+        rk_q_rest: RkQRest [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.coords } else { 0 }] Stage "rad or m";
+        rk_velocity: RkVelocity [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s or m/s";
+        rk_velocity_sum: RkVelocitySum [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s or m/s";
+        rk_acceleration_sum: RkAccelerationSum [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s² or m/s²";
 
         // contacts are in the tables of `Contacts::memory`; these arrays have no entries and represent them in `READS` and `WRITES`
         shape_poses: ShapePoses [Scalar; 0] Stage "–";
@@ -192,6 +205,12 @@ arrays! { m;
             "What takes a small displacement of each site, of its origin, then of its rotation as a rotation vector, in the axes of site_qd, to one of the joints, as joint_qd has them: Jᵀ (J Jᵀ + λ² I)⁻¹, where J takes joint_qd to site_qd and λ is the site's damping. Zero for dofs that do not move the site.";
         ContactSensor "contact_sensor" Derived [ContactSensors, Size(3)] "N" REAL, Source::Contacts(&[ContactForces]),
             "Sum of the contact forces that each contact sensor is about, in world axes.";
+        Qpos "qpos" Derived [Coords] "rad or m" REAL, Source::Computed(&[JointQ]),
+            "Joint positions in MuJoCo's order: a quaternion is (w, x, y, z).";
+        Qvel "qvel" Derived [Dofs] "rad/s or m/s" REAL, Source::Computed(&[JointQd, Rotation, Origin]),
+            "Joint velocities as MuJoCo has them: of a free joint that of its frame's origin in world axes, then the angular velocity in its own axes.";
+        Qacc "qacc" Derived [Dofs] "rad/s² or m/s²" REAL, Source::Computed(&[JointQd, JointQdd, Rotation, Origin]),
+            "Joint accelerations as MuJoCo has them, under the commands held, constraints included.";
         Time "time" Counter [] "s" F64, Source::Counter,
             "Simulated time since the world's reset.";
         Step "step" Counter [] "–" U64, Source::Counter,

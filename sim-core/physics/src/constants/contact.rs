@@ -90,6 +90,8 @@ recast! {
         pub hulls: HullTables,
         /// Where the stages keep what they find.
         pub memory: Memory,
+        /// Of each pair, torsional and rolling friction over sliding friction; without rows where no pair has any.
+        pub turning: Fixed,
     }
 }
 
@@ -187,6 +189,8 @@ recast! {
         pub first: usize,
         /// Most contacts.
         pub capacity: usize,
+        /// Where the second block of a contact's row begins, if any of its pairs has torsional friction; see [`turning`].
+        pub turns: Option<usize>,
     }
 }
 
@@ -338,6 +342,22 @@ pub mod row {
     pub const JACOBIAN: usize = 35;
 }
 
+/// Places in the second block of a contact's row, of the rotation about the normal and about the tangents.
+pub mod turning {
+    /// Reference acceleration (3) [rad/s²], scaled as the Jacobian.
+    pub const AREF: usize = 0;
+    /// J a - aref (3).
+    pub const JAR: usize = 3;
+    /// The same somewhere else, or its change (3).
+    pub const AHEAD: usize = 6;
+    /// Torque over the scale (3) [N·m].
+    pub const FORCE: usize = 9;
+    /// 1 for each rotation that has friction, else 0 (3).
+    pub const EXISTS: usize = 12;
+    /// Jacobian.
+    pub const JACOBIAN: usize = 15;
+}
+
 /// Least coefficient of friction of a contact that has any (MuJoCo: `mjMINMU`) [–].
 pub const MU_MIN: f64 = 1e-5;
 
@@ -405,6 +425,7 @@ impl<R: Real> Contacts<R> {
                 },
                 len: 0,
             },
+            turning: Fixed::default(),
         }
     }
 
@@ -415,4 +436,4 @@ impl<R: Real> Contacts<R> {
     }
 }
 
-same! { Cone, Kind, Group, Pair, Column, Run, Handles, HullTables, Memory }
+same! { Fixed, Cone, Kind, Group, Pair, Column, Run, Handles, HullTables, Memory }

@@ -3,6 +3,7 @@
 pub mod clip;
 pub mod contact;
 pub mod hull;
+pub mod mujoco;
 pub mod params;
 mod recast;
 pub mod site;
@@ -12,6 +13,7 @@ pub use self::recast::Recast;
 pub use self::sizes::Sizes;
 
 use self::contact::Contacts;
+use self::mujoco::Mujoco;
 use self::params::{COMMAND_NOISES, Varying};
 use self::recast::{recast, same};
 use self::site::Site;
@@ -64,6 +66,8 @@ recast! {
         pub delay: Delay,
         /// Frames of interest.
         pub sites: Vec<Site<R>>,
+        /// What only models from MuJoCo have.
+        pub mujoco: Mujoco<R>,
     }
 }
 
@@ -255,8 +259,8 @@ recast! {
 }
 
 recast! {
-    /// MuJoCo's `solimp`: impedance rises from `d_min` at 0 to `d_max` at `width`, along two parabolas that meet at `midpoint`.
-    #[derive(Clone, Copy, Debug)]
+    /// MuJoCo's `solimp`: impedance rises from `d_min` at 0 to `d_max` at `width`, along two curves that meet at `midpoint`.
+    #[derive(Clone, Copy, PartialEq)]
     pub struct Impedance<R> {
         /// At the constraint's surface [–].
         pub d_min: R,
@@ -264,8 +268,26 @@ recast! {
         pub d_max: R,
         /// 1 / width, the position at which `d_max` is reached [1/m or 1/rad].
         pub inverse_width: R,
-        /// Where the parabolas meet, as a share of the width [–].
+        /// Where the curves meet, as a share of the width [–].
         pub midpoint: R,
+        /// Their exponent: 1 for a line, 2 for parabolas [–].
+        pub power: R,
+    }
+}
+
+impl<R: std::fmt::Debug> std::fmt::Debug for Impedance<R> {
+    /// Shows the exponent only where it is not 2: the text is part of the model's hash, which is older than the exponent.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut text = f.debug_struct("Impedance");
+        text.field("d_min", &self.d_min)
+            .field("d_max", &self.d_max)
+            .field("inverse_width", &self.inverse_width)
+            .field("midpoint", &self.midpoint);
+        let power = format!("{:?}", self.power);
+        if power != "2.0" {
+            text.field("power", &self.power);
+        }
+        text.finish()
     }
 }
 

@@ -19,4 +19,6 @@ pub struct Sizes {
     pub sites: usize,
     /// Contact sensors.
     pub contact_sensors: usize,
+    /// Actuators.
+    pub actuators: usize,
 }

@@ -77,6 +77,25 @@ fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     });
 }
 
+/// x ≥ 0 to a power of at least 1. The digits of a power that is no whole number become roots.
+#[inline(always)]
+fn powered<F: Num>(x: F, power: f64) -> F {
+    let mut product = x;
+    for _ in 1..power as usize {
+        product = product * x;
+    }
+    let (mut digits, mut root) = (power.fract(), x);
+    while digits > 0.0 {
+        root = root.sqrt();
+        digits *= 2.0;
+        if digits >= 1.0 {
+            product = product * root;
+            digits -= 1.0;
+        }
+    }
+    product
+}
+
 /// (D, aref) of a row at this position and velocity.
 #[inline(always)]
 fn soft_row<F: Num>(soft: &Soft<F::Real>, position: F, velocity: F) -> (F, F) {
@@ -86,14 +105,15 @@ fn soft_row<F: Num>(soft: &Soft<F::Real>, position: F, velocity: F) -> (F, F) {
     (weight, -velocity.fma(F::k(soft.damping), spring))
 }
 
-/// d(r): from `d_min` at 0 to `d_max` at `width`, along two parabolas (MuJoCo: `solimp` with power 2).
+/// d(r): from `d_min` at 0 to `d_max` at `width`, along two powers that meet at the midpoint (MuJoCo: `solimp`).
 #[inline(always)]
 pub(super) fn impedance<F: Num>(i: &Impedance<F::Real>, position: F) -> F {
     let (one, midpoint) = (F::c(1.0), i.midpoint.to_f64());
     let x = (position.abs() * F::k(i.inverse_width)).min(one);
     let rest = one - x;
-    let rising = x * x * F::c(1.0 / midpoint);
-    let falling = (rest * rest).fnma(F::c(1.0 / (1.0 - midpoint)), one);
+    let power = i.power.to_f64();
+    let rising = powered(x, power) * F::c(1.0 / midpoint.powf(power - 1.0));
+    let falling = powered(rest, power).fnma(F::c(1.0 / (1.0 - midpoint).powf(power - 1.0)), one);
     let y = F::select(x.lt(F::k(i.midpoint)), rising, falling);
     y.fma(F::k(i.d_max) - F::k(i.d_min), F::k(i.d_min))
 }

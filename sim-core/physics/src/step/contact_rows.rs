@@ -12,7 +12,7 @@ use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::contact::Cone;
-use crate::constants::contact::{COUNT_LEFT_OUT, Class, Contacts, pair, row};
+use crate::constants::contact::{COUNT_LEFT_OUT, Class, Contacts, pair, row, turning};
 use crate::each;
 use crate::lane::{Cx, Num, Real};
 use crate::math::spatial::Spatial;
@@ -52,8 +52,11 @@ fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
-            let contact = Contact::read(cx, t, class, r);
+            let contact = Contact::read(cx, t, k, r);
             let velocity = contact.write_jacobian(cx, b);
+            if let Some(block) = class.turns {
+                contact.write_turning(cx, b, block);
+            }
             let swing = swing_between(cx, m, b, class);
             contact.write_softness(cx, m, velocity, swing);
         });
@@ -64,6 +67,8 @@ fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
 struct Contact<'a, C: Cx> {
     t: &'a Contacts<<C::F as Num>::Real>,
     class: &'a Class<<C::F as Num>::Real>,
+    /// Place of the class in the list.
+    number: usize,
     row: C::I,
     /// Index of its pair.
     pair: C::F,
@@ -78,12 +83,8 @@ struct Contact<'a, C: Cx> {
 impl<'a, C: Cx> Contact<'a, C> {
     /// Reads what the narrow phase left, and chooses the tangents.
     #[inline(always)]
-    fn read(
-        cx: &mut C,
-        t: &'a Contacts<<C::F as Num>::Real>,
-        class: &'a Class<<C::F as Num>::Real>,
-        r: C::I,
-    ) -> Self {
+    fn read(cx: &mut C, t: &'a Contacts<<C::F as Num>::Real>, number: usize, r: C::I) -> Self {
+        let class = &t.classes[number];
         let normal = load_vec3(cx, t.memory.rows, r, row::NORMAL);
         let point = load_vec3(cx, t.memory.rows, r, row::POINT);
         let pair = cx.load(t.memory.rows, r, row::PAIR);
@@ -96,6 +97,7 @@ impl<'a, C: Cx> Contact<'a, C> {
         Contact {
             t,
             class,
+            number,
             row: r,
             pair,
             point,
@@ -145,6 +147,65 @@ impl<'a, C: Cx> Contact<'a, C> {
         velocity
     }
 
+    /// Writes the rows of rotations about the normal and the tangents, scaled by their friction over that of sliding.
+    #[inline(always)]
+    fn write_turning(&self, cx: &mut C, b: &BlockOf<C>, block: usize) {
+        let (t, zero, one) = (self.t, C::F::c(0.0), C::F::c(1.0));
+        let twist = cx.pick(t.turning, self.pair, 0) * self.rubs;
+        let roll = cx.pick(t.turning, self.pair, 1) * self.rubs;
+        let scales = [twist, roll, roll];
+        let mut velocity = [zero; 3];
+        for (c, column) in self.class.columns.iter().enumerate() {
+            let Spatial([_, angular]) = b.work.motion[column.dof];
+            let lever = self.of_pair(cx, column.lever);
+            let speed = cx.get(&b.joint_qd[column.dof]);
+            let mut jacobian = [zero; 3];
+            for i in 0..3 {
+                jacobian[i] = lever * scales[i] * angular.dot(self.frame[i]);
+                velocity[i] = jacobian[i].fma(speed, velocity[i]);
+            }
+            cx.fill_all(
+                t.memory.rows,
+                self.row,
+                block + turning::JACOBIAN + 3 * c,
+                jacobian,
+            );
+        }
+        let damping = match t.cone {
+            Cone::Elliptic => self.of_pair(cx, pair::SLIDING),
+            Cone::Pyramidal => self.of_pair(cx, pair::DAMPING),
+        };
+        let distance = cx.load(t.memory.rows, self.row, row::DISTANCE);
+        let position = distance - self.of_pair(cx, pair::MARGIN);
+        let smaller = self.of_pair(cx, pair::SMALLER);
+        let pushes = position.lt(contact_slack(smaller));
+        let mut aref = [zero; 3];
+        let mut exists = [zero; 3];
+        for i in 0..3 {
+            aref[i] = C::F::select(pushes, -(velocity[i] * damping), zero);
+            exists[i] = C::F::select(zero.lt(scales[i]), one, zero);
+        }
+        cx.fill_all(t.memory.rows, self.row, block + turning::AREF, aref);
+        cx.fill_all(t.memory.rows, self.row, block + turning::EXISTS, exists);
+    }
+
+    /// d(r) of the contact's pair.
+    #[inline(always)]
+    fn impedance(&self, cx: &mut C, m: &ConstantsOf<C>, position: C::F) -> C::F {
+        let Some(kinds) = m.mujoco.class_impedances.get(self.number) else {
+            return impedance(&m.contact_impedance, position);
+        };
+        let mut d = impedance(&m.mujoco.impedances[kinds[0]], position);
+        if let [_, others @ ..] = &kinds[..] {
+            let own = cx.pick(m.mujoco.pair_impedance, self.pair, 0);
+            for &kind in others {
+                let is_it = (own - C::F::c(kind as f64)).abs().lt(C::F::c(0.5));
+                d = C::F::select(is_it, impedance(&m.mujoco.impedances[kind], position), d);
+            }
+        }
+        d
+    }
+
     /// Writes D, aref and the coefficient of friction.
     #[inline(always)]
     fn write_softness(
@@ -158,7 +219,7 @@ impl<'a, C: Cx> Contact<'a, C> {
         let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
         let distance = cx.load(t.memory.rows, r, row::DISTANCE);
         let position = distance - self.of_pair(cx, pair::MARGIN);
-        let d = impedance(&m.contact_impedance, position);
+        let d = self.impedance(cx, m, position);
         let mu = match t.memory.mu.rows {
             0 => self.of_pair(cx, pair::MU),
             _ => cx.load(t.memory.rows, r, row::MU),

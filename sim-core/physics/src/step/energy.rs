@@ -1,7 +1,7 @@
 //! Energy of a world, for output (MuJoCo: `mj_energyVel`, `mj_energyPos`).
 //!
 //! ```text
-//! E_kin = ½ q̇ᵀ M q̇          E_pot = - Σ g · m c        c a body's centre of mass in the world
+//! E_kin = ½ q̇ᵀ M q̇          E_pot = - Σ g · m c + Σ ½ k (q - rest)²       c a body's centre of mass in the world
 //! ```
 //!
 //! After the mass matrix, a root's inertia is that of its whole tree: its first moment h = m (c - reference) has all bodies.
@@ -9,7 +9,7 @@
 
 use super::{BlockOf, ConstantsOf, Stage, gravity};
 use crate::arrays::Array as A;
-use crate::lane::{Cx, Num};
+use crate::lane::{Cx, Num, Real};
 use crate::math::factor::multiply;
 use crate::math::vec3::Vec3;
 
@@ -18,6 +18,7 @@ pub struct Energy;
 
 impl Stage for Energy {
     const READS: &'static [A] = &[
+        A::JointQ,
         A::JointQd,
         A::MassMatrix,
         A::Inertia,
@@ -48,6 +49,11 @@ impl Stage for Energy {
                 let moment = Vec3([mass.fma(x, hx), mass.fma(y, hy), mass.fma(z, hz)]);
                 potential = potential - gravity.dot(moment);
             }
+        }
+        for spring in &m.mujoco.springs {
+            let stretch = cx.get(&b.joint_q[m.dofs[spring.dof].coord]) - C::F::k(spring.rest);
+            let half = C::F::c(0.5 * spring.stiffness.to_f64());
+            potential = (stretch * half).fma(stretch, potential);
         }
         w.potential_energy[0] = potential;
     }

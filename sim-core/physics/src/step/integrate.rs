@@ -24,8 +24,9 @@
 //! ```
 
 use super::kinematics::read_quat;
-use super::{BlockOf, ConstantsOf, Stage, param};
+use super::{BlockOf, ConstantsOf, Stage, actuators, param};
 use crate::arrays::Array as A;
+use crate::constants::mujoco::Integrator;
 use crate::constants::params::Param;
 use crate::constants::{Body, Constants, Motion};
 use crate::lane::{Cx, Num, Real};
@@ -40,6 +41,8 @@ pub struct Integrate;
 impl Stage for Integrate {
     const READS: &'static [A] = &[
         A::Params,
+        A::Ctrl,
+        A::ActuatorForce,
         A::Rotation,
         A::JointQ,
         A::JointQRest,
@@ -51,6 +54,10 @@ impl Stage for Integrate {
     ];
     // the last stage of a step: the mass matrix is not read after it
     const WRITES: &'static [A] = &[A::JointQ, A::JointQRest, A::JointQd, A::MassMatrix];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        m.mujoco.integrator != Integrator::RungeKutta
+    }
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
@@ -64,7 +71,8 @@ impl Stage for Integrate {
         for (k, body) in m.bodies.iter().enumerate() {
             if body.motion == Motion::Free {
                 // a body that carries nothing is implicit in its gyroscopic force
-                if m.bodies.iter().all(|other| other.parent != Some(k)) {
+                let is_alone = m.bodies.iter().all(|other| other.parent != Some(k));
+                if is_alone && m.mujoco.integrator == Integrator::ImplicitFast {
                     gyroscopic(cx, m, b, k);
                 }
                 integrate_free(cx, m, b, k);
@@ -104,6 +112,10 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
             w.acceleration[j] = C::F::select(touching, w.joint_force[j], w.acceleration[j]);
         }
     }
+    if m.mujoco.integrator == Integrator::ImplicitFast {
+        actuators::add_damping::<C>(m, b);
+    }
+    let w = &mut b.work;
     solve(&m.pattern, &mut w.mass_matrix, &mut w.acceleration);
 }
 
@@ -131,7 +143,7 @@ fn integrate_joint<C: Cx>(
 
 /// q += h v, compensated in `f32`.
 #[inline(always)]
-fn add_compensated<C: Cx>(cx: &mut C, q: &mut C::V, rest: &mut C::V, v: C::F, dt: C::F) {
+pub(super) fn add_compensated<C: Cx>(cx: &mut C, q: &mut C::V, rest: &mut C::V, v: C::F, dt: C::F) {
     let before = cx.get(q);
     if <<C::F as Num>::Real as Real>::DOUBLE {
         cx.set(q, dt.fma(v, before));
@@ -257,7 +269,7 @@ fn integrate_free<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: 
 
 /// Writes the quaternion that begins at coordinate `c`.
 #[inline(always)]
-fn write_quat<C: Cx>(cx: &mut C, joint_q: &mut [C::V], c: usize, q: Quat<C::F>) {
+pub(super) fn write_quat<C: Cx>(cx: &mut C, joint_q: &mut [C::V], c: usize, q: Quat<C::F>) {
     for i in 0..4 {
         cx.set(&mut joint_q[c + i], q[i]);
     }

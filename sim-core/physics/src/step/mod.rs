@@ -4,6 +4,7 @@
 //! Every page is written once and runs on every execution backend of [`crate::lane`].
 
 pub mod actuation;
+pub mod actuators;
 pub mod bias;
 pub mod collide;
 pub mod command;
@@ -14,11 +15,14 @@ pub mod integrate;
 mod inverse_dynamics;
 pub mod kinematics;
 pub mod mass_matrix;
+pub mod mujoco_state;
 mod params;
 pub mod poses;
+pub mod runge_kutta;
 pub mod site_inverse;
 pub mod sites;
 pub mod solver;
+pub mod springs;
 mod stage;
 pub mod velocities;
 
@@ -37,6 +41,8 @@ macro_rules! every_stage {
             bias               [bias::Bias]                  Both;
             mass_matrix        [mass_matrix::MassMatrix]     Both;
             actuation          [actuation::Actuation]        Both;
+            springs            [springs::Springs]            Both;
+            actuators          [actuators::Actuators]        Both;
             constraint         [constraint::Constraint]      Both;
             // contacts: where shapes are, then one stage for each pair of kinds of shapes
             place              [collide::Place]              Both;
@@ -65,6 +71,11 @@ macro_rules! every_stage {
             solver             [solver::Solver]              Both;
             refine             [solver::Refine]              Both;
             integrate          [integrate::Integrate]        Step;
+            // in its place: all above four times, each time followed by one of these
+            runge_kutta_1      [runge_kutta::RungeKutta::<0>] Step;
+            runge_kutta_2      [runge_kutta::RungeKutta::<1>] Step;
+            runge_kutta_3      [runge_kutta::RungeKutta::<2>] Step;
+            runge_kutta_4      [runge_kutta::RungeKutta::<3>] Step;
             // outputs of a state
             accelerations      [solver::Accelerations]       Evaluation;
             energy             [energy::Energy]              Evaluation;

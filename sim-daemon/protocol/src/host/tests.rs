@@ -58,6 +58,7 @@ fn description() -> Description {
         shape_names: Vec::new(),
         site_names: Vec::new(),
         contact_sensor_names: Vec::new(),
+        actuator_names: Vec::new(),
         robots: Vec::new(),
         fields: Vec::new(),
         known_fields: Vec::new(),

@@ -6,8 +6,9 @@
 use super::cones::{
     ConeLaw, LineLaw, bend_along, elliptic, elliptic_along, is_curved, power, pyramidal,
 };
+use super::turning;
 use crate::constants::contact::Cone;
-use crate::constants::contact::{Class, Contacts, row};
+use crate::constants::contact::{Class, Contacts, row, turning as more};
 use crate::each;
 use crate::lane::{Cx, MaskOf, Num};
 use crate::step::contact_rows::class_list;
@@ -31,7 +32,13 @@ fn law_at<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, jar: [C::F; 3]) -> Cone
 
 /// The law of a contact at `alpha` of the line search. An elliptic cone has it from three products, kept by [`begin_line`].
 #[inline(always)]
-fn law_along<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, alpha: C::F) -> LineLaw<C::F> {
+fn law_along<C: Cx>(
+    cx: &mut C,
+    t: &ContactsOf<C>,
+    class: &ClassOf<C>,
+    r: C::I,
+    alpha: C::F,
+) -> LineLaw<C::F> {
     let rows = t.memory.rows;
     if t.cone == Cone::Elliptic {
         let normal = [cx.load(rows, r, row::JAR), cx.load(rows, r, row::AHEAD)];
@@ -44,6 +51,20 @@ fn law_along<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, alpha: C::F) -> Line
         return elliptic_along(t.impratio, normal, squares, alpha, scalars);
     }
     // a pyramid is evaluated at the point of the line
+    if let Some(block) = class.turns {
+        let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
+        let jv = turning::six(cx, t, r, row::AHEAD, block + more::AHEAD);
+        let mut there = jar;
+        for i in 0..6 {
+            there[i] = alpha.fma(jv[i], jar[i]);
+        }
+        let law = turning::law_at(cx, t, r, block, there);
+        return LineLaw {
+            power: turning::dot(law.force, jv),
+            bend: turning::dot(law.times(jv), jv),
+            state: law.state,
+        };
+    }
     let (jar, jv) = (cx.load3(rows, r, row::JAR), cx.load3(rows, r, row::AHEAD));
     let mut there = jar;
     for i in 0..3 {
@@ -109,7 +130,25 @@ pub(super) fn residual<C: Cx>(cx: &mut C, t: &ContactsOf<C>, a: &[C::F], place: 
                 jar = cx.sum_triples(t.memory.rows, r, first, &a[run.places()], jar);
             }
             cx.fill_all(t.memory.rows, r, place, jar);
+            if let Some(block) = class.turns {
+                let [x, y, z] = cx.load3(t.memory.rows, r, block + more::AREF);
+                let mut jar = [-x, -y, -z];
+                for run in &class.runs {
+                    let first = block + more::JACOBIAN + 3 * run.column;
+                    jar = cx.sum_triples(t.memory.rows, r, first, &a[run.places()], jar);
+                }
+                cx.fill_all(t.memory.rows, r, block + second(place), jar);
+            }
         });
+    }
+}
+
+/// Place in the second block of what is at a place of the first.
+fn second(place: usize) -> usize {
+    match place {
+        row::JAR => more::JAR,
+        row::AHEAD => more::AHEAD,
+        other => unreachable!("{other} has no place in the second block"),
     }
 }
 
@@ -125,6 +164,12 @@ pub(super) fn assemble<C: Cx>(
 ) {
     let class: &ClassOf<C> = &t.classes[k];
     let list = class_list(cx, t, k);
+    if let Some(block) = class.turns {
+        each!(cx, r in list, {
+            assemble_turning(cx, t, class, block, r, hessian, rhs, pulls);
+        });
+        return;
+    }
     each!(cx, r in list, {
         let jar = cx.load3(t.memory.rows, r, row::JAR);
         let law = law_at(cx, t, r, jar);
@@ -161,6 +206,64 @@ pub(super) fn assemble<C: Cx>(
     });
 }
 
+/// [`assemble`] of one contact with torsional friction.
+#[inline(always)]
+fn assemble_turning<C: Cx>(
+    cx: &mut C,
+    t: &ContactsOf<C>,
+    class: &ClassOf<C>,
+    block: usize,
+    r: C::I,
+    hessian: &mut [C::V],
+    rhs: &mut [C::V],
+    pulls: bool,
+) {
+    let rows = t.memory.rows;
+    let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
+    let law = turning::law_at(cx, t, r, block, jar);
+    cx.fill(rows, r, row::STATE, law.state);
+    if pulls {
+        add_turning(cx, t, class, block, r, law.force, rhs);
+    }
+    for (c, entries) in class.entries.iter().enumerate() {
+        let (first, other) = (row::JACOBIAN + 3 * c, block + more::JACOBIAN + 3 * c);
+        let own = turning::six(cx, t, r, first, other).map(|x| cx.only(x));
+        let [a, b, d, e, f, g] = law.times(own).map(|x| cx.only(x));
+        for run in entries {
+            let cells = &mut hessian[run.places()];
+            let (first, other) = (
+                row::JACOBIAN + 3 * run.column,
+                more::JACOBIAN + 3 * run.column,
+            );
+            cx.add_triples(rows, r, first, [a, b, d], cells);
+            cx.add_triples(rows, r, block + other, [e, f, g], cells);
+        }
+    }
+}
+
+/// Adds Jᵀ f of a contact with torsional friction.
+#[inline(always)]
+fn add_turning<C: Cx>(
+    cx: &mut C,
+    t: &ContactsOf<C>,
+    class: &ClassOf<C>,
+    block: usize,
+    r: C::I,
+    force: [C::F; 6],
+    to: &mut [C::V],
+) {
+    let [a, b, c, d, e, f] = force.map(|x| cx.only(x));
+    for run in &class.runs {
+        let (first, other) = (
+            row::JACOBIAN + 3 * run.column,
+            more::JACOBIAN + 3 * run.column,
+        );
+        let cells = &mut to[run.places()];
+        cx.add_triples(t.memory.rows, r, first, [a, b, c], cells);
+        cx.add_triples(t.memory.rows, r, block + other, [d, e, f], cells);
+    }
+}
+
 /// Adds to `sum` where a contact is on another piece of its cost at `AHEAD` than at `JAR`, or on a curved one at `AHEAD`. Adds
 /// to `curved` where it is on a curved piece at either.
 #[inline(always)]
@@ -170,8 +273,16 @@ pub(super) fn changes<C: Cx>(cx: &mut C, t: &ContactsOf<C>, sum: &mut C::V, curv
         each!(cx, r in list, {
             // the piece at `JAR` is that of the last assembly
             let before = cx.load(t.memory.rows, r, row::STATE);
-            let ahead = cx.load3(t.memory.rows, r, row::AHEAD);
-            let after = law_at(cx, t, r, ahead).state;
+            let after = match t.classes[k].turns {
+                None => {
+                    let ahead = cx.load3(t.memory.rows, r, row::AHEAD);
+                    law_at(cx, t, r, ahead).state
+                }
+                Some(block) => {
+                    let ahead = turning::six(cx, t, r, row::AHEAD, block + more::AHEAD);
+                    turning::law_at(cx, t, r, block, ahead).state
+                }
+            };
             let slides = is_curved(t.cone, after);
             let moved = (before - after).abs() + slides;
             let more = cx.get(sum) + cx.only(moved);
@@ -188,6 +299,14 @@ pub(super) fn forces<C: Cx>(cx: &mut C, t: &ContactsOf<C>, joint: &mut [C::V]) {
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
+            if let Some(block) = class.turns {
+                let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
+                let force = turning::law_at(cx, t, r, block, jar).force.map(|x| cx.only(x));
+                let [a, b, c, d, e, f] = force;
+                cx.fill_all(t.memory.rows, r, row::FORCE, [a, b, c]);
+                cx.fill_all(t.memory.rows, r, block + more::FORCE, [d, e, f]);
+                add_turning(cx, t, class, block, r, force, joint);
+            } else {
             // f = -s' at the accelerations found
             let jar = cx.load3(t.memory.rows, r, row::JAR);
             let law = law_at(cx, t, r, jar);
@@ -200,6 +319,7 @@ pub(super) fn forces<C: Cx>(cx: &mut C, t: &ContactsOf<C>, joint: &mut [C::V]) {
                 let first = row::JACOBIAN + 3 * run.column;
                 cx.add_triples(t.memory.rows, r, first, force, &mut joint[run.places()]);
             }
+            }
         });
     }
 }
@@ -210,10 +330,18 @@ pub(super) fn cost<C: Cx>(cx: &mut C, t: &ContactsOf<C>, place: usize, sum: &mut
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
-            let jar = cx.load3(t.memory.rows, r, place);
-            let law = law_at(cx, t, r, jar);
             // s at the residual of this place
-            let more = cx.get(sum) + cx.only(law.cost);
+            let cost = match t.classes[k].turns {
+                None => {
+                    let jar = cx.load3(t.memory.rows, r, place);
+                    law_at(cx, t, r, jar).cost
+                }
+                Some(block) => {
+                    let jar = turning::six(cx, t, r, place, block + second(place));
+                    turning::law_at(cx, t, r, block, jar).cost
+                }
+            };
+            let more = cx.get(sum) + cx.only(cost);
             cx.put(sum, more);
         });
     }
@@ -230,6 +358,12 @@ pub(super) fn begin_line<C: Cx>(
 ) {
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
+        if let Some(block) = t.classes[k].turns {
+            each!(cx, r in list, {
+                begin_turning_line(cx, t, block, r, descent, terms);
+            });
+            continue;
+        }
         each!(cx, r in list, {
             let (jar, ahead) = (cx.load3(t.memory.rows, r, row::JAR), cx.load3(t.memory.rows, r, row::AHEAD));
             let law = law_at(cx, t, r, jar);
@@ -262,6 +396,44 @@ pub(super) fn begin_line<C: Cx>(
     }
 }
 
+/// [`begin_line`] of one contact with torsional friction.
+#[inline(always)]
+fn begin_turning_line<C: Cx>(
+    cx: &mut C,
+    t: &ContactsOf<C>,
+    block: usize,
+    r: C::I,
+    descent: &mut C::V,
+    terms: &mut C::V,
+) {
+    let rows = t.memory.rows;
+    let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
+    let ahead = turning::six(cx, t, r, row::AHEAD, block + more::AHEAD);
+    let law = turning::law_at(cx, t, r, block, jar);
+    let mut jv = ahead;
+    for i in 0..6 {
+        jv[i] = cx.only(ahead[i] - jar[i]);
+    }
+    let [a, b, c, d, e, f] = jv;
+    cx.fill_all(rows, r, row::AHEAD, [a, b, c]);
+    cx.fill_all(rows, r, block + more::AHEAD, [d, e, f]);
+    let bend = turning::dot(law.times(jv), jv);
+    let sum = cx.get(descent) + cx.only(bend);
+    cx.put(descent, sum);
+    cx.fill_all(rows, r, row::POWER, [turning::dot(law.force, jv), bend]);
+    if t.cone == Cone::Elliptic {
+        cx.fill_all(rows, r, row::SQUARES, turning::squares(jar, jv));
+    }
+    let aref = turning::six(cx, t, r, row::AREF, block + more::AREF);
+    let mut all = C::F::c(0.0);
+    for (i, stiff) in law.diagonal().into_iter().enumerate() {
+        let rounded = (jar[i] + aref[i]).abs() + aref[i].abs();
+        all = (stiff * rounded).fma(rounded, all);
+    }
+    let sum = cx.get(terms) + cx.only(all);
+    cx.put(terms, sum);
+}
+
 /// Adds what contacts change in slope, curvature and size of terms of a line at `alpha`, against its quadratic model.
 #[inline(always)]
 pub(super) fn derivative<C: Cx>(
@@ -275,7 +447,7 @@ pub(super) fn derivative<C: Cx>(
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
-            let here = law_along(cx, t, r, alpha);
+            let here = law_along(cx, t, &t.classes[k], r, alpha);
             let [state, power, bend] = cx.load3(t.memory.rows, r, row::STATE);
             // -p' of the quadratic model, whose force is power at α = 0
             let model = power - alpha * bend;

@@ -48,6 +48,7 @@
 //! | `linear` | the system of an iteration |
 //! | `rows`, `cones` | laws of joint rows and of contacts: force, stiffness, cost |
 //! | `contacts` | sums over contacts |
+//! | `turning` | laws of contacts with torsional and rolling friction |
 //! | `line` | the line search |
 //! | `progress` | which worlds search, and which have arrived |
 //! | `refine` | corrections by inverse dynamics, in `f32` |
@@ -59,6 +60,7 @@ mod linear;
 mod progress;
 mod refine;
 mod rows;
+mod turning;
 
 pub use refine::{Accelerations, Refine};
 

@@ -1,0 +1,206 @@
+"""Compiled MuJoCo models as files that tightloop reads without MuJoCo.
+
+A file has the arrays of ``mjModel`` under their own names, as safetensors. It stores enumerations by the names of their
+members, because their numbers differ between versions of MuJoCo. `sim-core/model/src/mujoco` reads the file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop.errors import SceneError
+from tightloop.optional_imports import optional_import
+
+#: Version of the file; `sim-core/model/src/mujoco/format.rs` reads it.
+FORMAT = 1
+#: Versions of MuJoCo whose models are read: at least this one, and below the other.
+VERSIONS = ((3, 11), (4, 1))
+_INSTALL = (
+    'models from MuJoCo need `{}`: run `pip install "./py-client[mujoco]"` in the repository, or '
+    '`pip install "FILE.whl[mujoco]"` from a wheel'
+)
+
+# Arrays of `MjModel` that every supported version has.
+_ARRAYS = """
+    body_parentid body_weldid body_pos body_quat body_ipos body_iquat body_mass body_inertia body_invweight0
+    body_gravcomp jnt_bodyid jnt_dofadr jnt_qposadr jnt_pos jnt_axis jnt_limited jnt_range jnt_margin
+    jnt_stiffness jnt_solref jnt_solimp jnt_actfrclimited jnt_actfrcrange jnt_actgravcomp dof_armature
+    dof_damping dof_frictionloss dof_solref dof_solimp dof_invweight0 qpos0 qpos_spring geom_bodyid geom_pos
+    geom_quat geom_size geom_dataid geom_contype geom_conaffinity geom_condim geom_priority geom_solmix
+    geom_solref geom_solimp geom_friction geom_margin geom_gap geom_fluid geom_rgba geom_matid geom_group
+    mesh_vertadr mesh_vertnum mesh_vert mesh_faceadr mesh_facenum mesh_face mat_rgba exclude_signature
+    eq_obj1id eq_obj2id eq_active0 eq_data eq_solref eq_solimp tendon_adr tendon_num tendon_damping
+    tendon_stiffness tendon_frictionloss tendon_limited wrap_objid wrap_prm actuator_trnid actuator_gear
+    actuator_gainprm actuator_biasprm actuator_ctrllimited actuator_ctrlrange actuator_forcelimited
+    actuator_forcerange actuator_actlimited actuator_group key_qpos key_qvel key_ctrl key_time
+""".split()
+# Arrays of newer versions; where they are missing, no model has what they describe.
+_NEWER_ARRAYS = """
+    jnt_stiffnesspoly dof_dampingpoly geom_adhesion geom_surfacevel tendon_armature tendon_dampingpoly
+    tendon_stiffnesspoly tendon_actfrclimited actuator_delay actuator_armature actuator_damping
+    actuator_dampingpoly actuator_ctrlnum actuator_outnum
+""".split()
+# Enumerations: the array and its type.
+_KINDS = {
+    "jnt_type": "mjtJoint",
+    "geom_type": "mjtGeom",
+    "eq_type": "mjtEq",
+    "wrap_type": "mjtWrap",
+    "actuator_trntype": "mjtTrn",
+    "actuator_dyntype": "mjtDyn",
+    "actuator_gaintype": "mjtGain",
+    "actuator_biastype": "mjtBias",
+}
+# Elements with names, and what counts them.
+_NAMED = {
+    "body": "nbody",
+    "joint": "njnt",
+    "geom": "ngeom",
+    "mesh": "nmesh",
+    "equality": "neq",
+    "tendon": "ntendon",
+    "actuator": "nu",
+    "key": "nkey",
+}
+_REAL_OPTIONS = ("timestep", "gravity", "tolerance", "impratio", "density", "viscosity", "wind")
+_COUNT_OPTIONS = ("iterations", "ls_iterations", "noslip_iterations", "disableactuator")
+_COUNTS = ("nflex", "nplugin", "npair", "nmocap", "nsensor")
+
+
+def compiled(model: Any) -> Any:
+    """Return the ``MjModel`` of a path to XML, an ``MjSpec`` or an ``MjModel``.
+
+    Raises:
+        SceneError: MuJoCo cannot read or compile it; the message is MuJoCo's.
+        MissingLibrary: The package ``mujoco`` is not installed.
+    """
+    mujoco = optional_import("mujoco", _INSTALL)
+    optional_import("safetensors.numpy", _INSTALL)
+    version = tuple(int(part) for part in mujoco.__version__.split(".")[:2])
+    if not VERSIONS[0] <= version < VERSIONS[1]:
+        least, end = (".".join(map(str, version)) for version in VERSIONS)
+        raise SceneError(f"mujoco is {mujoco.__version__}; install a version from {least} to below {end}")
+    try:
+        if isinstance(model, mujoco.MjModel):
+            return model
+        if isinstance(model, mujoco.MjSpec):
+            return model.compile()
+        if isinstance(model, str | os.PathLike):
+            path = Path(model)
+            if not path.is_file():
+                raise SceneError(f"{path}: there is no such file; give the path of an MJCF file")
+            return mujoco.MjModel.from_xml_path(str(path))
+    except (ValueError, RuntimeError) as error:
+        where = f"{model}: " if isinstance(model, str | os.PathLike) else ""
+        raise SceneError(f"{where}MuJoCo cannot compile it: {error}") from error
+    raise SceneError(f"model is {type(model).__name__}; give a path to XML, an mujoco.MjSpec or an mujoco.MjModel")
+
+
+def arrays(model: Any) -> dict[str, NDArray[Any]]:
+    """Return what tightloop reads of an ``MjModel``: arrays by their names, as float64, int32 or uint8."""
+    import mujoco
+
+    found: dict[str, NDArray[Any]] = {"format": np.array([FORMAT], np.int32)}
+    found["mujoco_version"] = _texts([mujoco.__version__])
+    for name in _ARRAYS:
+        found[name] = _plain(getattr(model, name))
+    for name in _NEWER_ARRAYS:
+        if hasattr(model, name):
+            found[name] = _plain(getattr(model, name))
+    for name, kind in _KINDS.items():
+        members = {int(value): key for key, value in getattr(mujoco, kind).__members__.items()}
+        values = np.asarray(getattr(model, name)).astype(int)
+        used = sorted(set(values.tolist()))
+        found[name] = np.array([used.index(value) for value in values], np.int32)
+        found[f"{name}.names"] = _texts([members[value] for value in used])
+    text = bytes(model.names)
+    for kind, count in _NAMED.items():
+        short = {"joint": "jnt", "equality": "eq"}.get(kind, kind)
+        starts = getattr(model, f"name_{short}adr")
+        own = [text[start : text.index(b"\0", start)].decode() for start in starts]
+        assert len(own) == getattr(model, count)
+        found[f"names.{kind}"] = _texts(own)
+    for name in _REAL_OPTIONS:
+        found[f"opt.{name}"] = np.array(getattr(model.opt, name), np.float64).reshape(-1)
+    for name in _COUNT_OPTIONS:
+        found[f"opt.{name}"] = np.array([getattr(model.opt, name)], np.int32)
+    for name, kind in (("integrator", "mjtIntegrator"), ("cone", "mjtCone"), ("solver", "mjtSolver")):
+        found[f"opt.{name}"] = _texts([getattr(mujoco, kind)(getattr(model.opt, name)).name])
+    flags = [*_flags(mujoco.mjtDisableBit, model.opt.disableflags), *_flags(mujoco.mjtEnableBit, model.opt.enableflags)]
+    found["opt.flags"] = _texts(flags)
+    found["stat.meaninertia"] = np.array([model.stat.meaninertia])
+    for name in _COUNTS:
+        found[name] = np.array([getattr(model, name)], np.int32)
+    return found
+
+
+def export(model: Any, path: str | os.PathLike[str]) -> None:
+    """Write an ``MjModel`` to a file.
+
+    Args:
+        model: A path to XML, an ``mujoco.MjSpec`` or an ``mujoco.MjModel``.
+        path: The file.
+
+    Raises:
+        SceneError: MuJoCo cannot compile the model.
+        MissingLibrary: The package ``mujoco`` is not installed.
+    """
+    _save(arrays(compiled(model)), Path(path))
+
+
+def cached(model: Any) -> Path:
+    """Write an ``MjModel`` to a file in the user's cache, named by its content, and return the file.
+
+    The file stays, because recordings and running daemons refer to it.
+    """
+    found = arrays(compiled(model))
+    digest = hashlib.sha256()
+    for name in sorted(found):
+        digest.update(f"{name} {found[name].dtype} {found[name].shape}\n".encode())
+        digest.update(found[name].tobytes())
+    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    folder = Path(home) / "tightloop" / "mujoco"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / f"{digest.hexdigest()[:32]}.safetensors"
+        if not path.is_file():
+            # another process may write the same file
+            with tempfile.NamedTemporaryFile(dir=folder, delete=False) as file:
+                temporary = Path(file.name)
+            _save(found, temporary)
+            temporary.replace(path)
+    except OSError as error:
+        raise SceneError(
+            f"{folder}: the model cannot be kept there: {error}; set XDG_CACHE_HOME to a folder"
+        ) from error
+    return path
+
+
+def _save(found: dict[str, NDArray[Any]], path: Path) -> None:
+    from safetensors.numpy import save_file
+
+    save_file(found, str(path))
+
+
+def _plain(array: Any) -> NDArray[Any]:
+    """An array as float64 or int32."""
+    array = np.asarray(array)
+    return np.ascontiguousarray(array, dtype=np.float64 if array.dtype.kind == "f" else np.int32)
+
+
+def _texts(texts: list[str]) -> NDArray[np.uint8]:
+    """Texts as bytes, each with a 0 at its end."""
+    return np.frombuffer(b"".join(text.encode() + b"\0" for text in texts), np.uint8)
+
+
+def _flags(kind: Any, value: int) -> list[str]:
+    """Names of the flags that a number has set."""
+    members = [(int(bit), name) for name, bit in kind.__members__.items()]
+    return [name for bit, name in members if bit > 0 and bit & (bit - 1) == 0 and value & bit and "mjN" not in name]

@@ -1,0 +1,88 @@
+//! What a robot that MuJoCo compiled has beyond links and joints.
+
+use crate::softness::Softness;
+use sim_physics::constants::mujoco::Integrator;
+
+/// What a robot that MuJoCo compiled has beyond links and joints. Link 0 is the world, and links are in MuJoCo's order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MujocoParts {
+    /// Translational inverse weight of each link, `body_invweight0` [1/kg].
+    pub link_inverse_weight: Vec<f64>,
+    /// Inverse weight of each dof, `dof_invweight0` [1/(kg·m²) or 1/kg].
+    pub dof_inverse_weight: Vec<f64>,
+    /// Mean of the diagonal of the mass matrix, `stat.meaninertia`.
+    pub mean_inertia: f64,
+    /// What each joint has, in their order.
+    pub joints: Vec<MujocoJoint>,
+    /// Joints that follow others.
+    pub equalities: Vec<JointEquality>,
+    /// Actuators.
+    pub actuators: Vec<Actuator>,
+    /// The link that each link is welded to, or itself.
+    pub welds: Vec<usize>,
+    /// The parent of each link; that of the world is itself.
+    pub parents: Vec<usize>,
+    /// Pairs of links whose shapes do not touch.
+    pub excludes: Vec<[usize; 2]>,
+    /// Whether a link touches its parent.
+    pub touches_parent: bool,
+    /// How a step integrates velocities.
+    pub integrator: Integrator,
+    /// Whether Euler's step is implicit in the damping of joints.
+    pub implicit_damping: bool,
+    /// Whether time constants are at least two steps.
+    pub safe_references: bool,
+}
+
+/// What a joint from MuJoCo has beyond one from URDF.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MujocoJoint {
+    /// Its anchor in the frame of its link [m].
+    pub anchor: [f64; 3],
+    /// Its position in the pose that the model was built in [rad or m].
+    pub reference: f64,
+    /// Stiffness of its spring [N·m/rad or N/m].
+    pub stiffness: f64,
+    /// Position without force of the spring [rad or m].
+    pub spring_ref: f64,
+    /// Softness of its limits.
+    pub limit: Softness,
+    /// Distance at which a limit acts [rad or m].
+    pub margin: f64,
+    /// Softness of its dry friction.
+    pub friction: Softness,
+    /// Bounds of the sum of actuator forces, if it has any [N·m or N].
+    pub actuator_range: Option<[f64; 2]>,
+}
+
+/// A joint that follows another: q = offset + multiplier q of the leader.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointEquality {
+    /// Index of the joint that follows.
+    pub follower: usize,
+    /// Index of the joint that leads.
+    pub leader: usize,
+    /// [–]
+    pub multiplier: f64,
+    /// [rad or m]
+    pub offset: f64,
+    /// Softness.
+    pub softness: Softness,
+}
+
+/// An actuator, as [`sim_physics::constants::mujoco::Actuator`] has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Actuator {
+    /// Its name, unique in the robot.
+    pub name: String,
+    /// Indices of joints with one dof, each with its coefficient, gear included.
+    pub terms: Vec<(usize, f64)>,
+    /// Bounds of its control.
+    pub ctrl_range: Option<[f64; 2]>,
+    /// Bounds of its force [N or N·m].
+    pub force_range: Option<[f64; 2]>,
+    /// A constant, and factors of length and velocity.
+    pub gain: [f64; 3],
+    /// A constant, and factors of length and velocity.
+    pub bias: [f64; 3],
+}

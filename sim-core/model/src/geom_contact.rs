@@ -1,0 +1,87 @@
+//! How a MuJoCo geom touches, and how two of them combine.
+
+use crate::softness::Softness;
+use crate::surface::Surface;
+
+/// Least weight of a mixture that counts (MuJoCo: `mjMINVAL`).
+const WEIGHT_MIN: f64 = 1e-15;
+
+/// Contact parameters of a MuJoCo geom.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GeomContact {
+    /// Bits of what it is.
+    pub contype: u32,
+    /// Bits of what it touches.
+    pub conaffinity: u32,
+    /// Dimensions of the contact space: 1, 3, 4 or 6.
+    pub condim: usize,
+    /// Of two geoms, the one of the higher priority alone decides.
+    pub priority: i64,
+    /// Weight of its softness in a mixture.
+    pub solmix: f64,
+    /// Softness.
+    pub softness: Softness,
+    /// Sliding, torsional and rolling friction [–, m, m].
+    pub friction: [f64; 3],
+    /// Distance at which a contact acts [m]; those of two geoms are added.
+    pub margin: f64,
+    /// Extra distance at which a contact is listed [m]; those of two geoms are added.
+    pub gap: f64,
+}
+
+impl GeomContact {
+    /// A surface of ours as a geom, for contacts with one: its stiffness and damping as `solref`, and MuJoCo's defaults.
+    pub(crate) fn of(surface: &Surface) -> GeomContact {
+        let bits = u32::from(surface.group != 0);
+        GeomContact {
+            contype: bits,
+            conaffinity: bits,
+            condim: surface.condim,
+            priority: 0,
+            solmix: 1.0,
+            softness: Softness {
+                solref: [2.0 / surface.kd, 0.5 * surface.kd / surface.ke.sqrt()],
+                ..Softness::default()
+            },
+            friction: [surface.mu, 0.005, 0.0001],
+            margin: surface.margin,
+            gap: surface.gap,
+        }
+    }
+
+    /// Whether two geoms touch, as far as their bits say.
+    pub(crate) fn meets(&self, other: &GeomContact) -> bool {
+        self.contype & other.conaffinity != 0 || other.contype & self.conaffinity != 0
+    }
+
+    /// The parameters of a contact of two geoms (MuJoCo: `mj_contactParam`).
+    pub(crate) fn combined(&self, other: &GeomContact) -> GeomContact {
+        let decides = match self.priority.cmp(&other.priority) {
+            std::cmp::Ordering::Greater => Some(self),
+            std::cmp::Ordering::Less => Some(other),
+            std::cmp::Ordering::Equal => None,
+        };
+        let (margin, gap) = (self.margin + other.margin, self.gap + other.gap);
+        if let Some(one) = decides {
+            return GeomContact {
+                margin,
+                gap,
+                ..*one
+            };
+        }
+        let share = match (self.solmix >= WEIGHT_MIN, other.solmix >= WEIGHT_MIN) {
+            (true, true) => self.solmix / (self.solmix + other.solmix),
+            (false, false) => 0.5,
+            (true, false) => 1.0,
+            (false, true) => 0.0,
+        };
+        GeomContact {
+            condim: self.condim.max(other.condim),
+            softness: self.softness.mixed(&other.softness, share),
+            friction: std::array::from_fn(|i| self.friction[i].max(other.friction[i])),
+            margin,
+            gap,
+            ..*self
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Actuators of a model: forces along joints and fixed tendons.
+
+use super::format::ModelFile;
+use super::names::names;
+use super::options::has_flag;
+use super::tree::moving;
+use crate::description::{Actuator, Robot};
+use crate::error::ModelError;
+
+/// Adds the actuators; [`super::refusals`] has named those that are not supported.
+pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), ModelError> {
+    let count = file.rows("actuator_trntype");
+    let joints = moving(robot, file.rows("jnt_type"), file)?;
+    let names = names(file, "actuator", count)?;
+    let kinds = file.kinds("actuator_trntype", count)?;
+    let targets = file.vectors_of_integers::<2>("actuator_trnid", count)?;
+    let gears = file.vectors::<6>("actuator_gear", count)?;
+    let (gain_kinds, gains) = laws(file, "gain", count)?;
+    let (bias_kinds, biases) = laws(file, "bias", count)?;
+    let clamps = !has_flag(file, "mjDSBL_CLAMPCTRL")?;
+    let ctrl_ranges = ranges(file, "ctrl", count)?;
+    let force_ranges = ranges(file, "force", count)?;
+    let acts = !has_flag(file, "mjDSBL_ACTUATION")?;
+    let disabled = file.integer("opt.disableactuator")?;
+    let groups = file.integers("actuator_group", count)?;
+    let mut actuators = Vec::new();
+    for k in 0..count {
+        let target = usize::try_from(targets[k][0]).ok();
+        let terms = match kinds[k].as_str() {
+            "mjTRN_TENDON" => tendon(file, target)?,
+            _ => target.map(|joint| (joint, 1.0)).into_iter().collect(),
+        };
+        let terms = terms.into_iter().map(|(joint, coefficient)| {
+            let place = joints.get(joint).copied();
+            let place = place
+                .ok_or_else(|| file.fault(format!("has no joint for actuator `{}`", names[k])))?;
+            Ok((place, coefficient * gears[k][0]))
+        });
+        let is_on = acts && !((0..31).contains(&groups[k]) && disabled >> groups[k] & 1 == 1);
+        let on = |law: [f64; 3]| if is_on { law } else { [0.0; 3] };
+        actuators.push(Actuator {
+            name: names[k].clone(),
+            terms: terms.collect::<Result<_, _>>()?,
+            ctrl_range: ctrl_ranges[k].filter(|_| clamps),
+            force_range: force_ranges[k],
+            gain: on(match gain_kinds[k].as_str() {
+                "mjGAIN_AFFINE" => gains[k],
+                _ => [gains[k][0], 0.0, 0.0],
+            }),
+            bias: on(match bias_kinds[k].as_str() {
+                "mjBIAS_AFFINE" => biases[k],
+                _ => [0.0; 3],
+            }),
+        });
+    }
+    if let Some(parts) = &mut robot.mujoco {
+        parts.actuators = actuators;
+    }
+    Ok(())
+}
+
+type Laws = (Vec<String>, Vec<[f64; 3]>);
+
+/// Kinds of gains or biases, and their first three parameters.
+fn laws(file: &ModelFile, which: &str, count: usize) -> Result<Laws, ModelError> {
+    let kinds = file.kinds(&format!("actuator_{which}type"), count)?;
+    let parameters = file.vectors::<10>(&format!("actuator_{which}prm"), count)?;
+    let parameters = parameters.into_iter().map(|[a, b, c, ..]| [a, b, c]);
+    Ok((kinds, parameters.collect()))
+}
+
+fn ranges(
+    file: &ModelFile,
+    which: &str,
+    count: usize,
+) -> Result<Vec<Option<[f64; 2]>>, ModelError> {
+    let limited = file.integers(&format!("actuator_{which}limited"), count)?;
+    let ranges = file.vectors::<2>(&format!("actuator_{which}range"), count)?;
+    let both = limited.into_iter().zip(ranges);
+    Ok(both
+        .map(|(limited, range)| (limited != 0).then_some(range))
+        .collect())
+}
+
+/// The joints of a fixed tendon, by MuJoCo's numbers, with their coefficients.
+fn tendon(file: &ModelFile, tendon: Option<usize>) -> Result<Vec<(usize, f64)>, ModelError> {
+    let (tendons, wraps) = (file.rows("tendon_num"), file.rows("wrap_type"));
+    let firsts = file.integers("tendon_adr", tendons)?;
+    let counts = file.integers("tendon_num", tendons)?;
+    let joints = file.integers("wrap_objid", wraps)?;
+    let coefficients = file.reals("wrap_prm", wraps)?;
+    let own = tendon.filter(|&tendon| tendon < tendons).map(|tendon| {
+        let first = firsts[tendon].max(0) as usize;
+        first..first + counts[tendon].max(0) as usize
+    });
+    let own = own.filter(|own| own.end <= wraps);
+    let own = own.ok_or_else(|| file.fault("has an actuator without its tendon".to_owned()))?;
+    let terms = own.map(|wrap| {
+        let joint = usize::try_from(joints[wrap]).unwrap_or(usize::MAX);
+        (joint, coefficients[wrap])
+    });
+    Ok(terms.collect())
+}

@@ -1,0 +1,94 @@
+//! Models that MuJoCo compiled, from a file that `tightloop.mujoco` exports.
+//!
+//! The file holds arrays of `mjModel` under their own names (`format.rs` reads them). MuJoCo's defaults,
+//! includes and unit conversions are done then. What the physics does not have is refused by the element's name
+//! ([`refusals`]): a model never runs differently in silence.
+
+mod actuators;
+mod format;
+mod geoms;
+mod names;
+mod options;
+mod refusals;
+mod tree;
+
+use std::path::Path;
+
+use crate::description::{Description, Robot};
+use crate::error::ModelError;
+use crate::pose::Pose;
+use format::ModelFile;
+pub use options::MujocoOptions;
+
+impl Robot {
+    /// Reads a model that MuJoCo compiled as one robot. Its link 0 is the world, which `options.pose` places.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or whose elements are not supported, by their names.
+    pub fn from_mujoco(
+        path: impl AsRef<Path>,
+        options: MujocoOptions,
+    ) -> Result<Robot, ModelError> {
+        let path = path.as_ref();
+        let file = ModelFile::read(path)?;
+        let refused = refusals::refusals(&file)?;
+        if !refused.is_empty() {
+            let reasons = refusals::listed(&refused);
+            return Err(ModelError::MujocoRefused { reasons });
+        }
+        let mut robot = tree::robot(&file, &options)?;
+        robot.notes.extend(notes(&file)?);
+        geoms::add_geoms(&file, &options, &mut robot)?;
+        actuators::add_actuators(&file, &mut robot)?;
+        Ok(robot)
+    }
+}
+
+impl Description {
+    /// A scene with the options and the only robot of a model that MuJoCo compiled: its time step, gravity and solver, one
+    /// substep a control frame.
+    ///
+    /// # Errors
+    /// As [`Robot::from_mujoco`].
+    pub fn from_mujoco(
+        path: impl AsRef<Path>,
+        options: MujocoOptions,
+    ) -> Result<Description, ModelError> {
+        let file = ModelFile::read(path.as_ref())?;
+        let mut scene = options::scene(&file)?;
+        scene.add_robot(Robot::from_mujoco(path, options)?)?;
+        Ok(scene)
+    }
+}
+
+/// What a run does differently from what the model says, or leaves out.
+fn notes(file: &ModelFile) -> Result<Vec<String>, ModelError> {
+    let mut notes = Vec::new();
+    let solver = file.texts("opt.solver")?;
+    if let Some(solver) = solver.first().filter(|solver| *solver != "mjSOL_NEWTON") {
+        notes.push(format!("Newton's method takes the place of {solver}"));
+    }
+    let sensors = file.integer("nsensor")?;
+    if sensors > 0 {
+        notes.push(format!("its {sensors} sensors are not read"));
+    }
+    let keys = file.rows("key_time");
+    if keys > 0 {
+        notes.push(format!("its {keys} keyframes are not read"));
+    }
+    Ok(notes)
+}
+
+/// A quaternion of MuJoCo's, (w, x, y, z), in our order.
+fn quat([w, x, y, z]: [f64; 4]) -> [f64; 4] {
+    [x, y, z, w]
+}
+
+/// A frame by MuJoCo's position and quaternion.
+fn frame(pos: [f64; 3], mujoco: [f64; 4]) -> Pose {
+    Pose {
+        pos,
+        quat: quat(mujoco),
+    }
+    .normalized()
+}

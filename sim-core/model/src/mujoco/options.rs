@@ -1,0 +1,77 @@
+//! Options of a model: where it is placed, and what its `<option>` becomes in a scene.
+
+use super::format::ModelFile;
+use crate::description::{Description, Solver};
+use crate::error::ModelError;
+use crate::pose::Pose;
+use sim_physics::constants::contact::Cone;
+use sim_physics::constants::mujoco::Integrator;
+
+/// How a model is read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MujocoOptions {
+    /// Name of the robot.
+    pub name: String,
+    /// Frame of the model's world in the scene's.
+    pub pose: Pose,
+    /// Most vertices of a mesh's convex hull.
+    pub max_hull_vertices: usize,
+}
+
+impl MujocoOptions {
+    /// Vertices of a hull by default: more than nearly all published hulls have.
+    pub const HULL_VERTICES: usize = 1024;
+
+    /// A robot of this name at the origin.
+    pub fn named(name: &str) -> MujocoOptions {
+        MujocoOptions {
+            name: name.to_owned(),
+            pose: Pose::identity(),
+            max_hull_vertices: MujocoOptions::HULL_VERTICES,
+        }
+    }
+}
+
+/// Is this flag of `option/flag` set against its default? Flags that disable begin with `mjDSBL_`.
+pub(super) fn has_flag(file: &ModelFile, flag: &str) -> Result<bool, ModelError> {
+    Ok(file.texts("opt.flags")?.iter().any(|set| set == flag))
+}
+
+/// The integrator. Refusals have named the others.
+pub(super) fn integrator(file: &ModelFile) -> Result<Integrator, ModelError> {
+    Ok(
+        match file.texts("opt.integrator")?.first().map(String::as_str) {
+            Some("mjINT_IMPLICITFAST") => Integrator::ImplicitFast,
+            Some("mjINT_RK4") => Integrator::RungeKutta,
+            _ => Integrator::Euler,
+        },
+    )
+}
+
+/// An empty scene with the options of a model.
+pub(super) fn scene(file: &ModelFile) -> Result<Description, ModelError> {
+    let mut scene = Description::new(file.real("opt.timestep")?, 1);
+    let gravity = file.vectors::<3>("opt.gravity", 1)?[0];
+    scene.gravity = match has_flag(file, "mjDSBL_GRAVITY")? {
+        true => [0.0; 3],
+        false => gravity,
+    };
+    let count = |name: &str| -> Result<usize, ModelError> {
+        let value = file.integer(name)?;
+        usize::try_from(value)
+            .ok()
+            .filter(|&count| count > 0)
+            .ok_or_else(|| file.fault(format!("{name} is {value}; give at least 1")))
+    };
+    scene.solver = Solver {
+        iterations: count("opt.iterations")?,
+        ls_iterations: count("opt.ls_iterations")?,
+        tolerance: file.real("opt.tolerance")?,
+        cone: match file.texts("opt.cone")?.first().map(String::as_str) {
+            Some("mjCONE_PYRAMIDAL") => Cone::Pyramidal,
+            _ => Cone::Elliptic,
+        },
+        impratio: file.real("opt.impratio")?,
+    };
+    Ok(scene)
+}

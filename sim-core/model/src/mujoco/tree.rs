@@ -1,0 +1,342 @@
+//! Bodies and joints of a model as links and joints of one robot.
+
+use super::format::ModelFile;
+use super::frame;
+use super::names::names;
+use super::options::{MujocoOptions, has_flag, integrator};
+use crate::description::{
+    Inertial, Joint, JointDof, JointEquality, JointKind, Link, MujocoJoint, MujocoParts, Robot,
+};
+use crate::error::ModelError;
+use crate::pose::Pose;
+use crate::softness::Softness;
+
+/// Links and joints, without shapes and actuators.
+pub(super) fn robot(file: &ModelFile, options: &MujocoOptions) -> Result<Robot, ModelError> {
+    let bodies = file.rows("body_parentid");
+    if bodies == 0 {
+        return Err(file.fault("has no bodies".to_owned()));
+    }
+    let parents = file.indices("body_parentid", bodies, bodies)?;
+    if (1..bodies).any(|body| parents[body].is_none_or(|parent| parent >= body)) {
+        return Err(file.fault("has bodies before their parents".to_owned()));
+    }
+    let mut robot = Robot {
+        name: options.name.clone(),
+        pose: options.pose.normalized(),
+        floating: false,
+        self_collisions: true,
+        links: links(file, bodies)?,
+        joints: Vec::new(),
+        notes: Vec::new(),
+        warnings: Vec::new(),
+        urdf: None,
+        mujoco: None,
+    };
+    let mut parts = parts(file, bodies, &parents)?;
+    add_joints(file, options, &parents, &mut robot, &mut parts)?;
+    parts.equalities = equalities(file, &robot, &parts)?;
+    robot.mujoco = Some(Box::new(parts));
+    Ok(robot)
+}
+
+fn links(file: &ModelFile, bodies: usize) -> Result<Vec<Link>, ModelError> {
+    let names = names(file, "body", bodies)?;
+    let masses = file.reals("body_mass", bodies)?;
+    let centers = file.vectors::<3>("body_ipos", bodies)?;
+    let turns = file.vectors::<4>("body_iquat", bodies)?;
+    let moments = file.vectors::<3>("body_inertia", bodies)?;
+    let links = names.into_iter().enumerate().map(|(body, name)| {
+        let [x, y, z] = moments[body];
+        let principal = frame([0.0; 3], turns[body]);
+        let inertial = Inertial {
+            mass: masses[body],
+            pos: centers[body],
+            inertia: principal.rotate_tensor([[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]]),
+        };
+        Link {
+            name,
+            inertial: (masses[body] > 0.0).then_some(inertial),
+            collisions: Vec::new(),
+        }
+    });
+    Ok(links.collect())
+}
+
+fn parts(
+    file: &ModelFile,
+    bodies: usize,
+    parents: &[Option<usize>],
+) -> Result<MujocoParts, ModelError> {
+    let welds = file.indices("body_weldid", bodies, bodies)?;
+    let weights = file.vectors::<2>("body_invweight0", bodies)?;
+    let signatures = file.integers("exclude_signature", file.rows("exclude_signature"))?;
+    // two numbers of bodies in one
+    let excludes = signatures.into_iter().map(|signature| {
+        [signature >> 16, signature & 0xffff].map(|body| usize::try_from(body).unwrap_or(0))
+    });
+    Ok(MujocoParts {
+        link_inverse_weight: weights.into_iter().map(|[linear, _]| linear).collect(),
+        dof_inverse_weight: file.reals("dof_invweight0", file.rows("dof_armature"))?,
+        mean_inertia: file.real("stat.meaninertia")?,
+        joints: Vec::new(),
+        equalities: Vec::new(),
+        actuators: Vec::new(),
+        welds: welds.into_iter().map(|weld| weld.unwrap_or(0)).collect(),
+        parents: parents.iter().map(|parent| parent.unwrap_or(0)).collect(),
+        excludes: excludes.collect(),
+        touches_parent: has_flag(file, "mjDSBL_FILTERPARENT")?,
+        integrator: integrator(file)?,
+        implicit_damping: !has_flag(file, "mjDSBL_EULERDAMP")?,
+        safe_references: !has_flag(file, "mjDSBL_REFSAFE")?,
+    })
+}
+
+/// Arrays of joints and dofs.
+struct JointArrays {
+    names: Vec<String>,
+    kinds: Vec<JointKind>,
+    bodies: Vec<Option<usize>>,
+    dofs: Vec<Option<usize>>,
+    coords: Vec<Option<usize>>,
+    anchors: Vec<[f64; 3]>,
+    axes: Vec<[f64; 3]>,
+    is_limited: Vec<i64>,
+    ranges: Vec<[f64; 2]>,
+    margins: Vec<f64>,
+    stiffness: Vec<f64>,
+    limits: Vec<Softness>,
+    is_bounded: Vec<i64>,
+    bounds: Vec<[f64; 2]>,
+    damping: Vec<f64>,
+    armature: Vec<f64>,
+    friction: Vec<f64>,
+    frictions: Vec<Softness>,
+    qpos0: Vec<f64>,
+    qpos_spring: Vec<f64>,
+}
+
+impl JointArrays {
+    fn read(file: &ModelFile) -> Result<JointArrays, ModelError> {
+        let (joints, dofs) = (file.rows("jnt_type"), file.rows("dof_armature"));
+        let (coords, bodies) = (file.rows("qpos0"), file.rows("body_parentid"));
+        let kinds = file
+            .kinds("jnt_type", joints)?
+            .into_iter()
+            .map(|kind| match kind.as_str() {
+                "mjJNT_FREE" => Ok(JointKind::Free),
+                "mjJNT_BALL" => Ok(JointKind::Ball),
+                "mjJNT_SLIDE" => Ok(JointKind::Prismatic),
+                "mjJNT_HINGE" => Ok(JointKind::Revolute),
+                _ => Err(file.fault(format!("has joints of the unknown kind {kind}"))),
+            });
+        let none = has_flag(file, "mjDSBL_CONSTRAINT")?;
+        let off = |flag: &str| Ok::<bool, ModelError>(none || has_flag(file, flag)?);
+        let kept = |values: Vec<f64>, is_off: bool| match is_off {
+            true => vec![0.0; values.len()],
+            false => values,
+        };
+        let limits_off = off("mjDSBL_LIMIT")?;
+        let friction_off = off("mjDSBL_FRICTIONLOSS")?;
+        let springs_off = has_flag(file, "mjDSBL_SPRING")?;
+        let dampers_off = has_flag(file, "mjDSBL_DAMPER")?;
+        let is_limited = match limits_off {
+            true => vec![0; joints],
+            false => file.integers("jnt_limited", joints)?,
+        };
+        Ok(JointArrays {
+            names: names(file, "joint", joints)?,
+            kinds: kinds.collect::<Result<_, _>>()?,
+            bodies: file.indices("jnt_bodyid", joints, bodies)?,
+            dofs: file.indices("jnt_dofadr", joints, dofs)?,
+            coords: file.indices("jnt_qposadr", joints, coords)?,
+            anchors: file.vectors("jnt_pos", joints)?,
+            axes: file.vectors("jnt_axis", joints)?,
+            is_limited,
+            ranges: file.vectors("jnt_range", joints)?,
+            margins: file.reals("jnt_margin", joints)?,
+            stiffness: kept(file.reals("jnt_stiffness", joints)?, springs_off),
+            limits: softness(file, "jnt", joints)?,
+            is_bounded: file.integers("jnt_actfrclimited", joints)?,
+            bounds: file.vectors("jnt_actfrcrange", joints)?,
+            damping: kept(file.reals("dof_damping", dofs)?, dampers_off),
+            armature: file.reals("dof_armature", dofs)?,
+            friction: kept(file.reals("dof_frictionloss", dofs)?, friction_off),
+            frictions: softness(file, "dof", dofs)?,
+            qpos0: file.reals("qpos0", coords)?,
+            qpos_spring: file.reals("qpos_spring", coords)?,
+        })
+    }
+}
+
+/// `solref` and `solimp` of elements.
+pub(super) fn softness(
+    file: &ModelFile,
+    prefix: &str,
+    count: usize,
+) -> Result<Vec<Softness>, ModelError> {
+    let solref = file.vectors::<2>(&format!("{prefix}_solref"), count)?;
+    let solimp = file.vectors::<5>(&format!("{prefix}_solimp"), count)?;
+    let pairs = solref.into_iter().zip(solimp);
+    Ok(pairs
+        .map(|(solref, solimp)| Softness { solref, solimp })
+        .collect())
+}
+
+fn add_joints(
+    file: &ModelFile,
+    options: &MujocoOptions,
+    parents: &[Option<usize>],
+    robot: &mut Robot,
+    parts: &mut MujocoParts,
+) -> Result<(), ModelError> {
+    let bodies = robot.links.len();
+    let places = file.vectors::<3>("body_pos", bodies)?;
+    let turns = file.vectors::<4>("body_quat", bodies)?;
+    let all = JointArrays::read(file)?;
+    for body in 1..bodies {
+        let own: Vec<usize> = (0..all.kinds.len())
+            .filter(|&joint| all.bodies[joint] == Some(body))
+            .collect();
+        let origin = frame(places[body], turns[body]);
+        if own.is_empty() {
+            // a fixed joint has its link's name, which no joint needs to have
+            let name = format!("{} (fixed)", robot.links[body].name);
+            let mut joint = Joint::fixed(&name, parents[body].unwrap_or(0), body);
+            joint.origin = origin;
+            robot.joints.push(joint);
+            parts.joints.push(MujocoJoint::default());
+        }
+        for (place, joint) in own.into_iter().enumerate() {
+            let (mut joint, own) = all.joint(file, joint, body, parents[body].unwrap_or(0))?;
+            if place == 0 {
+                joint.origin = origin;
+            }
+            if joint.kind == JointKind::Free {
+                joint.parent = Some(0);
+                let start = options.pose.mul(&Pose {
+                    pos: [joint.q[0], joint.q[1], joint.q[2]],
+                    quat: [joint.q[3], joint.q[4], joint.q[5], joint.q[6]],
+                });
+                joint.q[..3].copy_from_slice(&start.pos);
+                joint.q[3..].copy_from_slice(&start.quat);
+            }
+            robot.joints.push(joint);
+            parts.joints.push(own);
+        }
+    }
+    Ok(())
+}
+
+impl JointArrays {
+    /// Joint number `k`, without the place of its link.
+    fn joint(
+        &self,
+        file: &ModelFile,
+        k: usize,
+        body: usize,
+        parent: usize,
+    ) -> Result<(Joint, MujocoJoint), ModelError> {
+        let kind = self.kinds[k];
+        let mut joint = Joint::new(kind, &self.names[k], Some(parent), body);
+        let (coords, dofs) = (kind.coord_names().len(), kind.dof_names().len());
+        let whole = |first: Option<usize>, count: usize, end: usize| {
+            let first = first.filter(|first| first + count <= end);
+            first.ok_or_else(|| file.fault(format!("has no dofs for joint `{}`", self.names[k])))
+        };
+        let dof = whole(self.dofs[k], dofs, self.armature.len())?;
+        let coord = whole(self.coords[k], coords, self.qpos0.len())?;
+        joint.q.copy_from_slice(&self.qpos0[coord..coord + coords]);
+        match kind {
+            JointKind::Ball => joint.q.rotate_left(1),
+            JointKind::Free => joint.q[3..].rotate_left(1),
+            _ => {
+                joint.axis = self.axes[k];
+                joint.range = (self.is_limited[k] != 0).then_some(self.ranges[k]);
+            }
+        }
+        joint.dofs = (dof..dof + dofs)
+            .map(|dof| JointDof {
+                damping: self.damping[dof],
+                friction: self.friction[dof],
+                armature: self.armature[dof],
+                target_q: Some(0.0),
+                ..JointDof::default()
+            })
+            .collect();
+        let is_scalar = dofs == 1;
+        let own = MujocoJoint {
+            anchor: if kind == JointKind::Free {
+                [0.0; 3]
+            } else {
+                self.anchors[k]
+            },
+            reference: if is_scalar { self.qpos0[coord] } else { 0.0 },
+            stiffness: self.stiffness[k],
+            spring_ref: if is_scalar {
+                self.qpos_spring[coord]
+            } else {
+                0.0
+            },
+            limit: self.limits[k],
+            margin: self.margins[k],
+            friction: self.frictions[dof],
+            actuator_range: (self.is_bounded[k] != 0).then_some(self.bounds[k]),
+        };
+        Ok((joint, own))
+    }
+}
+
+/// Equalities of two joints: q₁ - r₁ = c₀ + c₁ (q₂ - r₂), with the references r.
+fn equalities(
+    file: &ModelFile,
+    robot: &Robot,
+    parts: &MujocoParts,
+) -> Result<Vec<JointEquality>, ModelError> {
+    let is_off = has_flag(file, "mjDSBL_EQUALITY")? || has_flag(file, "mjDSBL_CONSTRAINT")?;
+    let count = if is_off { 0 } else { file.rows("eq_type") };
+    let joints = file.rows("jnt_type");
+    if count == 0 {
+        return Ok(Vec::new());
+    }
+    let firsts = file.indices("eq_obj1id", count, usize::MAX >> 1)?;
+    let seconds = file.indices("eq_obj2id", count, usize::MAX >> 1)?;
+    let softness = softness(file, "eq", count)?;
+    let width = file.width("eq_data");
+    let data = file.reals("eq_data", count * width)?;
+    let places = moving(robot, joints, file)?;
+    let own = (0..count).map(|k| {
+        let joint = |joint: Option<usize>| {
+            let place = joint.and_then(|joint| places.get(joint));
+            place
+                .copied()
+                .ok_or_else(|| file.fault("has an equality without joints".to_owned()))
+        };
+        let (follower, leader) = (joint(firsts[k])?, joint(seconds[k])?);
+        let reference = |joint: usize| parts.joints[joint].reference;
+        let (constant, multiplier) = (data[k * width], data[k * width + 1]);
+        Ok(JointEquality {
+            follower,
+            leader,
+            multiplier,
+            offset: reference(follower) + constant - multiplier * reference(leader),
+            softness: softness[k],
+        })
+    });
+    own.collect()
+}
+
+/// Where MuJoCo's joints are among the robot's.
+pub(super) fn moving(
+    robot: &Robot,
+    joints: usize,
+    file: &ModelFile,
+) -> Result<Vec<usize>, ModelError> {
+    let found: Vec<usize> = (0..robot.joints.len())
+        .filter(|&joint| robot.joints[joint].moves())
+        .collect();
+    match found.len() == joints {
+        true => Ok(found),
+        false => Err(file.fault("has joints without bodies".to_owned())),
+    }
+}

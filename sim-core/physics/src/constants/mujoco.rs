@@ -1,0 +1,106 @@
+//! What only models from MuJoCo have: springs, actuators, softness of each contact, and the choice of an integrator.
+
+use super::Impedance;
+use super::recast::{Recast, recast, same};
+use crate::lane::Fixed;
+
+/// How a step integrates velocities.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Integrator {
+    /// Implicit in damping of joints, drives and actuators, and in the gyroscopic force of free bodies.
+    #[default]
+    ImplicitFast,
+    /// Implicit in the damping of joints and drives alone.
+    Euler,
+    /// Runge-Kutta of fourth order.
+    RungeKutta,
+}
+
+recast! {
+    /// What only models from MuJoCo have; all empty for other models.
+    #[derive(Clone, Debug)]
+    pub struct Mujoco<R> {
+        /// How a step integrates velocities.
+        pub integrator: Integrator,
+        /// Springs of joints.
+        pub springs: Vec<Spring<R>>,
+        /// Actuators.
+        pub actuators: Vec<Actuator<R>>,
+        /// Bounds of the sum of actuator forces on a dof.
+        pub actuator_bounds: Vec<ActuatorBound<R>>,
+        /// Impedances of contacts, each once; empty where all have `Constants::contact_impedance`.
+        pub impedances: Vec<Impedance<R>>,
+        /// Of each pair of shapes, its place among the impedances: a table with one column.
+        pub pair_impedance: Fixed,
+        /// Of each class of contacts, the impedances that its pairs have.
+        pub class_impedances: Vec<Vec<usize>>,
+    }
+}
+
+impl<R> Default for Mujoco<R> {
+    fn default() -> Mujoco<R> {
+        Mujoco {
+            integrator: Integrator::default(),
+            springs: Vec::new(),
+            actuators: Vec::new(),
+            actuator_bounds: Vec::new(),
+            impedances: Vec::new(),
+            pair_impedance: Fixed::default(),
+            class_impedances: Vec::new(),
+        }
+    }
+}
+
+recast! {
+    /// A spring of a dof with one coordinate: the force is -stiffness (q - rest).
+    #[derive(Clone, Debug)]
+    pub struct Spring<R> {
+        /// The dof.
+        pub dof: usize,
+        /// [N·m/rad or N/m]
+        pub stiffness: R,
+        /// Position without force [rad or m].
+        pub rest: R,
+    }
+}
+
+recast! {
+    /// An actuator: a force along a length that is a linear function of coordinates (MuJoCo: `actuator/general`).
+    #[derive(Clone, Debug)]
+    pub struct Actuator<R> {
+        /// Its length is the sum of these coordinates times their coefficients, gear included.
+        pub terms: Vec<Term<R>>,
+        /// Bounds of its control, if it has any.
+        pub ctrl_range: Option<[R; 2]>,
+        /// Bounds of its force, if it has any [N or N·m].
+        pub force_range: Option<[R; 2]>,
+        /// What the control is multiplied with: a constant, and factors of length and velocity.
+        pub gain: [R; 3],
+        /// What is added to it: a constant, and factors of length and velocity.
+        pub bias: [R; 3],
+    }
+}
+
+recast! {
+    /// A dof with one coordinate, and a factor.
+    #[derive(Clone, Debug)]
+    pub struct Term<R> {
+        /// The dof.
+        pub dof: usize,
+        /// [–]
+        pub coefficient: R,
+    }
+}
+
+recast! {
+    /// Bounds of the sum of actuator forces on a dof (MuJoCo: `actuatorfrcrange`).
+    #[derive(Clone, Debug)]
+    pub struct ActuatorBound<R> {
+        /// The dof.
+        pub dof: usize,
+        /// [N·m or N]
+        pub range: [R; 2],
+    }
+}
+
+same! { Integrator }

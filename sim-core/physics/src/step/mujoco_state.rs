@@ -1,0 +1,60 @@
+//! Velocities and accelerations as MuJoCo has them.
+//!
+//! They differ for a free body: MuJoCo takes the velocity of its frame's origin in world axes and the angular velocity in the
+//! body's axes, where we take the velocity of the centre of mass c and the angular velocity in world axes. With r = R c:
+//!
+//! ```text
+//! v' = v - ω × r      ω' = Rᵀ ω      a' = a - α × r - ω × (ω × r)      α' = Rᵀ α
+//! ```
+
+use super::{BlockOf, ConstantsOf};
+use crate::constants::{Constants, Motion};
+use crate::lane::{Cx, Num};
+use crate::math::vec3::Vec3;
+
+/// Writes the velocities, `(dofs,)`.
+#[inline(always)]
+pub fn velocities<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
+    for (x, cell) in to.iter_mut().zip(&b.joint_qd) {
+        *x = cx.get(cell);
+    }
+    for (k, dof) in free_bodies(m) {
+        let [linear, angular] = halves(&to[dof..]);
+        // the reference point is the centre of mass, so the origin is -r
+        let linear = angular.cross_add(b.work.origin[k], linear);
+        to[dof..dof + 3].copy_from_slice(&linear.0);
+        let own = b.work.rotation[k].transpose_mul(angular);
+        to[dof + 3..dof + 6].copy_from_slice(&own.0);
+    }
+}
+
+/// Writes the accelerations, `(dofs,)`.
+#[inline(always)]
+pub fn accelerations<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
+    for (x, cell) in to.iter_mut().zip(&b.joint_qdd) {
+        *x = cx.get(cell);
+    }
+    for (k, dof) in free_bodies(m) {
+        let [linear, angular] = halves(&to[dof..]);
+        let origin = b.work.origin[k];
+        let spin = Vec3(std::array::from_fn(|i| cx.get(&b.joint_qd[dof + 3 + i])));
+        let swing = spin.cross_add(spin.cross(origin), linear);
+        let linear = angular.cross_add(origin, swing);
+        to[dof..dof + 3].copy_from_slice(&linear.0);
+        let own = b.work.rotation[k].transpose_mul(angular);
+        to[dof + 3..dof + 6].copy_from_slice(&own.0);
+    }
+}
+
+/// Free bodies, each with its first dof.
+pub fn free_bodies<R>(m: &Constants<R>) -> impl Iterator<Item = (usize, usize)> {
+    let bodies = m.bodies.iter().enumerate();
+    let free = bodies.filter(|(_, body)| body.motion == Motion::Free);
+    free.map(|(k, body)| (k, body.dof))
+}
+
+/// The linear and the angular part of six scalars.
+#[inline(always)]
+pub fn halves<F: Num>(six: &[F]) -> [Vec3<F>; 2] {
+    [0, 3].map(|first| Vec3(std::array::from_fn(|i| six[first + i])))
+}

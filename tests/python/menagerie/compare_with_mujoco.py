@@ -1,0 +1,103 @@
+"""Every MuJoCo model of the fetched wheels, or of given files, against MuJoCo C.
+
+The table goes to out/menagerie/table.md.
+
+A model is compared at random states under random controls: accelerations and one step, in double precision, both sides
+solved to the end. Worlds with contacts of pairs for which MuJoCo has no closed form are left out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from fetch import MODELS
+from live_model import Live, live
+
+from tightloop.errors import SceneError
+
+WORLDS = 8
+# Relative to the largest acceleration of a world; with contacts the second counts
+TOLERANCES = (1e-8, 1e-6)
+PRIMITIVES = ("PLANE", "SPHERE", "CAPSULE")
+
+
+@dataclass
+class Row:
+    """What became of a model."""
+
+    name: str
+    outcome: str
+    """``agrees``, ``differs``, ``refused``, ``not compared`` or ``not compiled`` (by MuJoCo)."""
+    detail: str
+
+
+def main() -> int:
+    """Compare all models, print the table's summary, and return 1 if any differs."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("models", nargs="*", type=Path, help="XML files; those of the fetched wheels if left out")
+    files = parser.parse_args().models or sorted(MODELS.rglob("*.xml"))
+    rows = []
+    for file in files:
+        rows.append(compare(file))
+        print(f"{rows[-1].outcome:<13}{rows[-1].name}: {rows[-1].detail}", flush=True)
+    write_table(rows)
+    counts = Counter(row.outcome for row in rows)
+    compiled = len(rows) - counts["not compiled"]
+    running = counts["agrees"] + counts["not compared"] + counts["differs"]
+    share = running / max(compiled, 1)
+    print(f"\n{len(rows)} files, {compiled} compiled by MuJoCo, {running} run ({share:.0%}); {dict(counts)}")
+    return 1 if counts["differs"] else 0
+
+
+def compare(file: Path) -> Row:
+    """Run a model beside MuJoCo."""
+    name = str(file.relative_to(MODELS) if file.is_relative_to(MODELS) else file)
+    try:
+        model = mujoco.MjModel.from_xml_path(str(file))
+    except ValueError as error:
+        return Row(name, "not compiled", str(error).split("\n")[0][:120])
+    try:
+        if model.nv == 0:
+            return Row(name, "not compared", "nothing moves")
+        with live(model, worlds=WORLDS) as case:
+            errors = list(differences(case))
+    except SceneError as error:
+        return Row(name, "refused", str(error).partition(": ")[2])
+    if not errors:
+        return Row(name, "not compared", "every state has contacts without a closed form")
+    worst = max(error / tolerance for error, tolerance in errors)
+    largest = max(error for error, _ in errors)
+    return Row(name, "agrees" if worst < 1 else "differs", f"{model.nv} dofs, {len(errors)} states, {largest:.1e}")
+
+
+def differences(case: Live):
+    """Relative difference of accelerations of each comparable world, and its tolerance."""
+    model = case.model
+    states = case.states(0)
+    frame = case.place(states)
+    for world, data in enumerate(case.data(states)):
+        mujoco.mj_forward(model, data)
+        kinds = {mujoco.mjtGeom(model.geom_type[geom]).name for contact in data.contact for geom in contact.geom}
+        if not all(kind.removeprefix("mjGEOM_") in PRIMITIVES for kind in kinds):
+            continue
+        scale = max(np.abs(data.qacc).max(), 1e-3)
+        error = float(np.abs(frame.qacc[world] - data.qacc).max() / scale)
+        yield (error if np.isfinite(error) else np.inf), TOLERANCES[data.ncon > 0]
+
+
+def write_table(rows: list[Row]) -> None:
+    """Write the rows as Markdown."""
+    lines = ["| model | outcome | detail |", "|---|---|---|"]
+    lines += [f"| {row.name} | {row.outcome} | {row.detail.replace('|', '/')} |" for row in rows]
+    MODELS.mkdir(parents=True, exist_ok=True)
+    (MODELS / "table.md").write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,99 @@
+"""A MuJoCo model and tightloop's reading of it, at the same states and controls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+import tightloop as tl
+
+Array = NDArray[np.float64]
+
+mujoco.set_mju_user_warning(lambda _: None)
+
+
+@dataclass
+class States:
+    """States and controls; worlds first, in MuJoCo's conventions."""
+
+    qpos: Array
+    qvel: Array
+    ctrl: Array
+
+
+@dataclass
+class Live:
+    """A running simulation beside the model."""
+
+    model: mujoco.MjModel
+    sim: tl.Sim
+
+    def states(self, seed: int, *, spread: float = 0.4, speed: float = 0.5) -> States:
+        """Draw a state per world around the model's start, and controls that reach beyond their ranges."""
+        rng, m, worlds = np.random.default_rng(seed), self.model, self.sim.worlds
+        qpos = np.tile(m.qpos0, (worlds, 1))
+        for row in qpos:
+            mujoco.mj_integratePos(m, row, rng.normal(0, spread, m.nv), 1.0)
+        return States(qpos, rng.normal(0, speed, (worlds, m.nv)), rng.normal(0, 1, (worlds, m.nu)))
+
+    def place(self, states: States) -> tl.Frame:
+        """Hold the controls and put the worlds into the states."""
+        if self.model.nu:
+            self.sim.step(ctrl=states.ctrl)
+        joint_q, joint_qd = to_joints(self.model, states.qpos, states.qvel)
+        return self.sim.write(joint_q=joint_q, joint_qd=joint_qd)
+
+    def data(self, states: States) -> Iterator[mujoco.MjData]:
+        """MuJoCo's data of each world, in its state."""
+        for qpos, qvel, ctrl in zip(states.qpos, states.qvel, states.ctrl, strict=True):
+            data = mujoco.MjData(self.model)
+            data.qpos[:], data.qvel[:], data.ctrl[:] = qpos, qvel, ctrl
+            yield data
+
+
+@contextmanager
+def live(
+    model: str | mujoco.MjModel, *, worlds: int = 8, precision: str = "f64", fields: tuple[str, ...] = ()
+) -> Iterator[Live]:
+    """Run a model, or that of an XML text; both sides solve to the end."""
+    model = mujoco.MjModel.from_xml_string(model) if isinstance(model, str) else model
+    model.opt.tolerance = model.opt.ls_tolerance = 0.0
+    model.opt.iterations = model.opt.ls_iterations = 100
+    model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    scene = tl.Scene.from_mujoco(model, name="m")
+    fields = ("qpos", "qvel", "qacc", "joint_q", "joint_qd", *fields)
+    with tl.launch(scene, worlds=worlds, precision=precision, fields=fields, device="cpu") as sim:
+        yield Live(model, sim)
+
+
+def to_joints(model: mujoco.MjModel, qpos: Array, qvel: Array) -> tuple[Array, Array]:
+    """Convert MuJoCo's positions and velocities to ``joint_q`` and ``joint_qd``."""
+    joint_q, joint_qd = qpos.copy(), qvel.copy()
+    for joint in range(model.njnt):
+        kind, body = model.jnt_type[joint], model.jnt_bodyid[joint]
+        q, d = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+        if kind == mujoco.mjtJoint.mjJNT_BALL:
+            joint_q[:, q : q + 4] = np.roll(qpos[:, q : q + 4], -1, axis=1)
+        elif kind == mujoco.mjtJoint.mjJNT_FREE:
+            joint_q[:, q + 3 : q + 7] = np.roll(qpos[:, q + 3 : q + 7], -1, axis=1)
+            for world in range(len(qpos)):
+                center, rotation = _center(model, qpos[world], body)
+                spin = rotation @ qvel[world, d + 3 : d + 6]
+                joint_qd[world, d : d + 3] += np.cross(spin, center - qpos[world, q : q + 3])
+                joint_qd[world, d + 3 : d + 6] = spin
+    return joint_q, joint_qd
+
+
+def _center(model: mujoco.MjModel, qpos: Array, body: int) -> tuple[Array, Array]:
+    """Centre of mass of a free body with all that is fixed to it, and its rotation."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    parts = np.flatnonzero(model.body_weldid == body)
+    mass = model.body_mass[parts]
+    return mass @ data.xipos[parts] / mass.sum(), data.xmat[body].reshape(3, 3)

@@ -1,0 +1,90 @@
+"""Random models against MuJoCo: accelerations, actuator forces and steps, feature by feature."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from live_model import Live, live
+from random_mjcf import Features, random_mjcf
+
+TREES = int(os.environ.get("TIGHTLOOP_LIVE_TREES", "48")) // 8
+JOINTS = Features(free=True, ball=True, several=True, reference=True)
+ACTUATED = replace(JOINTS, actuators=True, tendons=True)
+EVERYTHING = replace(
+    ACTUATED, springs=True, limits=True, friction=True, armature=True, damping=True, equalities=True, bounds=True
+)
+FEATURES = {
+    "joints": JOINTS,
+    "springs": replace(JOINTS, springs=True),
+    "armature": replace(JOINTS, armature=True),
+    "damping": replace(JOINTS, damping=True),
+    "explicit damping": replace(JOINTS, damping=True, flag='eulerdamp="disable"'),
+    "implicit damping": replace(JOINTS, damping=True, option='integrator="implicitfast"'),
+    "limits": replace(JOINTS, limits=True),
+    "friction": replace(JOINTS, friction=True),
+    "equalities": replace(JOINTS, equalities=True),
+    "actuators": ACTUATED,
+    "implicit actuators": replace(ACTUATED, bounds=True, option='integrator="implicitfast"'),
+    "bounds": replace(ACTUATED, bounds=True),
+    "unclamped": replace(ACTUATED, bounds=True, flag='clampctrl="disable"'),
+    "no actuation": replace(ACTUATED, flag='actuation="disable"'),
+    "no gravity": replace(JOINTS, flag='gravity="disable"'),
+    "unsafe references": replace(JOINTS, limits=True, flag='refsafe="disable"', option='timestep="0.004"'),
+    "everything": EVERYTHING,
+    "everything implicit": replace(EVERYTHING, option='integrator="implicitfast"'),
+}
+
+
+def relative(found: np.ndarray, expected: np.ndarray) -> float:
+    """Largest difference over the largest value of each row."""
+    scale = np.abs(expected).max(axis=-1, keepdims=True, initial=1e-3)
+    return float((np.abs(found - expected) / scale).max(initial=0.0))
+
+
+def assert_step(case: Live, seed: int, tolerance: float) -> None:
+    """Accelerations and actuator forces at random states, and the states after a step."""
+    states = case.states(seed)
+    frame = case.place(states)
+    moved = case.sim.step()
+    for world, data in enumerate(case.data(states)):
+        mujoco.mj_forward(case.model, data)
+        assert relative(frame.qacc[world], data.qacc) < tolerance, "qacc"
+        if case.model.nu:
+            assert relative(frame.actuator_force[world], data.actuator_force) < tolerance, "actuator_force"
+        mujoco.mj_step(case.model, data)
+        assert relative(moved.qvel[world], data.qvel) < tolerance, "qvel"
+        assert relative(moved.qpos[world], data.qpos) < tolerance, "qpos"
+
+
+@pytest.mark.parametrize("feature", FEATURES)
+@pytest.mark.parametrize("seed", range(TREES))
+def test_accelerations_and_steps_are_mujocos(feature: str, seed: int) -> None:
+    xml = random_mjcf(seed, 1 + seed % 6, FEATURES[feature])
+    with live(xml, fields=("actuator_force",)) as case:
+        assert_step(case, seed, 1e-8)
+
+
+@pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
+@pytest.mark.parametrize("seed", range(2 * TREES))
+def test_geoms_touch_as_mujocos(cone: str, seed: int) -> None:
+    xml = random_mjcf(seed, 2 + seed % 5, replace(JOINTS, geoms=True, option=f'cone="{cone}" impratio="2"'))
+    with live(xml, fields=("contact_count",)) as case:
+        states = case.states(seed)
+        frame = case.place(states)
+        for world, data in enumerate(case.data(states)):
+            mujoco.mj_forward(case.model, data)
+            assert relative(frame.qacc[world], data.qacc) < 1e-6, f"world {world}, {data.ncon} contacts"
+
+
+@pytest.mark.parametrize("seed", range(TREES))
+def test_single_precision_is_near(seed: int) -> None:
+    with live(random_mjcf(seed, 1 + seed % 6, EVERYTHING), precision="f32", fields=("actuator_force",)) as case:
+        states = case.states(seed)
+        frame = case.place(states)
+        for world, data in enumerate(case.data(states)):
+            mujoco.mj_forward(case.model, data)
+            assert relative(frame.qacc[world], data.qacc) < 1e-3
