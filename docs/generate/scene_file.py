@@ -63,6 +63,15 @@ TABLES = (
         "A list is in the order of the file's joints.",
     ),
     Table(
+        "[[mujoco]]",
+        "mujoco.rs",
+        "MujocoTable",
+        ("mujoco",),
+        '[[mujoco]]\nname = "m"\nmodel = "m.safetensors"\n',
+        '[[mujoco]]\nname = "cart"\nmodel = "examples/assets/cart/cart.safetensors"\n',
+        "`Scene.save` and `tightloop.mujoco.export` write such files. They do not set the options of the scene.",
+    ),
+    Table(
         "[[body]]",
         "bodies.rs",
         "BodyTable",

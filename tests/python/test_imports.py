@@ -28,12 +28,16 @@ LAYERS = (
     ("tightloop.errors",),
     ("tightloop.checks", "tightloop.frames", "tightloop.inputs", "tightloop.optional_imports"),
     ("tightloop._core",),
+    ("tightloop.mujoco",),
     # what a scene is made of
     (
         "tightloop.body",
         "tightloop.distributions",
         "tightloop.entity",
+        "tightloop.mujoco_model",
         "tightloop.robot",
+        "tightloop.scene_mujoco",
+        "tightloop.scene_options",
         "tightloop.scene_randomization",
         "tightloop.scene_sensors",
         "tightloop.scene_shapes",

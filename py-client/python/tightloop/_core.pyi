@@ -52,10 +52,14 @@ class Frame:
     """Position targets of the drives [rad or m], ``(worlds, dofs)``."""
     joint_target_qd: NDArray[Any]
     """Velocity targets of the drives [rad/s or m/s], ``(worlds, dofs)``."""
+    ctrl: NDArray[Any]
+    """Controls of the actuators of MuJoCo models, before they are clamped to their ranges, ``(worlds, actuators)``."""
     bias_force: NDArray[Any]
     """Coriolis, centrifugal and gravity forces [N·m or N], ``(worlds, dofs)``."""
     smooth_force: NDArray[Any]
     """All forces except constraint forces, minus the bias force [N·m or N], ``(worlds, dofs)``."""
+    actuator_force: NDArray[Any]
+    """Force of each actuator of MuJoCo models along its length [N or N·m], ``(worlds, actuators)``."""
     body_q: NDArray[Any]
     """Link frames in the world: position [m], then quaternion (x, y, z, w), ``(worlds, bodies, 7)``."""
     body_qd: NDArray[Any]
@@ -111,6 +115,14 @@ class Frame:
     includes the dofs of a floating base, and treats mimic joints as independent."""
     contact_sensor: NDArray[Any]
     """Sum of the contact forces of each contact sensor, in world axes [N], ``(worlds, contact_sensors, 3)``."""
+    qpos: NDArray[Any]
+    """Joint positions in MuJoCo's order [rad or m], ``(worlds, coords)``: a quaternion is (w, x, y, z)."""
+    qvel: NDArray[Any]
+    """Joint velocities as MuJoCo has them [rad/s or m/s], ``(worlds, dofs)``. A free joint has the velocity of its
+    frame's origin in world axes, then the angular velocity in its own axes."""
+    qacc: NDArray[Any]
+    """Joint accelerations as MuJoCo has them, at the current commands, with constraints [rad/s² or m/s²],
+    ``(worlds, dofs)``."""
     time: NDArray[np.float64]
     """Simulated time since the world's reset [s], ``(worlds,)``."""
     step: NDArray[np.uint64]

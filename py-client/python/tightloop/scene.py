@@ -306,8 +306,9 @@ class Scene(SceneRandomization):
     ) -> MujocoModel:
         """Add a MuJoCo model, beside robots from URDF and bodies of the scene.
 
-        Geoms of MuJoCo models touch each other by MuJoCo's rules. Against a geom, a shape of the scene counts as a geom
-        with its friction, ``solref`` (2/kd, kd/(2 √ke)) and MuJoCo's defaults.
+        The first model sets the integrator of the scene. Geoms of MuJoCo models touch each other by MuJoCo's rules.
+        Against a geom, a shape of the scene counts as a geom with its friction, ``solref`` (2/kd, kd/(2 √ke)) and
+        MuJoCo's defaults.
 
         Args:
             model: A path to MJCF, an ``mujoco.MjSpec`` or an ``mujoco.MjModel``.
@@ -326,7 +327,10 @@ class Scene(SceneRandomization):
         found = read_model(
             model, name, self._names(), pos=pos, quat=quat, mesh_max_hull_vertices=mesh_max_hull_vertices
         )
-        check_options(found, {"dt": self.dt, "gravity": self.gravity, "solver": asdict(self._solver)})
+        options = {"dt": self.dt, "gravity": self.gravity, "solver": asdict(self._solver)}
+        for model_before in self.models.values():
+            options["integrator"] = model_before.options["integrator"]
+        check_options(found, options)
         self.models[found.name] = found
         return found
 

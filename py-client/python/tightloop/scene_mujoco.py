@@ -57,7 +57,7 @@ def read_file(file: Path, name: str, *, pos: Vector, quat: Vector, mesh_max_hull
 
 
 def check_options(model: MujocoModel, scene: dict[str, Any]) -> None:
-    """Refuse a model whose options contradict the scene's.
+    """Refuse a model whose options contradict the scene's; ``scene`` has its integrator if another model set it.
 
     Raises:
         SceneError: The option, and both values.
@@ -65,6 +65,8 @@ def check_options(model: MujocoModel, scene: dict[str, Any]) -> None:
     own = model.options
     pairs = [("dt", own["dt"], scene["dt"]), ("gravity", list(own["gravity"]), list(scene["gravity"]))]
     pairs += [(f"solver {option}", value, scene["solver"][option]) for option, value in own["solver"].items()]
+    if "integrator" in scene:
+        pairs.append(("integrator", own["integrator"], scene["integrator"]))
     for option, value, other in pairs:
         if value != other:
             raise SceneError(

@@ -51,7 +51,11 @@ impl Softness {
     /// Reference stiffness [1/s²] and damping [1/s]. Where `is_safe`, a time constant is at least two steps of `dt` [s].
     pub(crate) fn reference(&self, dt: f64, is_safe: bool) -> (f64, f64) {
         let d_max = self.solimp[1].clamp(IMPEDANCE_MIN, IMPEDANCE_MAX);
-        let [first, second] = self.solref;
+        let [first, second] = match self.solref {
+            // as MuJoCo: one positive value alone has no meaning
+            [first, second] if (first > 0.0) != (second > 0.0) => Softness::default().solref,
+            both => both,
+        };
         if first <= 0.0 {
             return (-first / (d_max * d_max), -second / d_max);
         }

@@ -57,6 +57,7 @@ pub fn mujoco_summary(path: &Path, max_hull_vertices: usize) -> Result<Value, Co
         ..MujocoOptions::named("model")
     };
     let scene = Description::from_mujoco(path, options)?;
+    scene.validate()?;
     let robot = &scene.robots[0];
     let mut summary = robot_summary(robot);
     let actuators = robot.mujoco.iter().flat_map(|parts| &parts.actuators);
@@ -64,7 +65,21 @@ pub fn mujoco_summary(path: &Path, max_hull_vertices: usize) -> Result<Value, Co
     summary["actuator_names"] = actuators
         .map(|actuator| Value::from(actuator.name.as_str()))
         .collect();
+    let integrator = robot.mujoco.as_ref().map(|parts| {
+        let implicit = if parts.implicit_damping {
+            ""
+        } else {
+            ", eulerdamp off"
+        };
+        let safe = if parts.safe_references {
+            ""
+        } else {
+            ", refsafe off"
+        };
+        format!("{:?}{implicit}{safe}", parts.integrator)
+    });
     summary["options"] = json!({
+        "integrator": integrator,
         "dt": scene.dt,
         "gravity": scene.gravity,
         "solver": {

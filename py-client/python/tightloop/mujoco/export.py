@@ -31,15 +31,15 @@ _INSTALL = (
 _ARRAYS = """
     body_parentid body_weldid body_pos body_quat body_ipos body_iquat body_mass body_inertia body_invweight0
     body_gravcomp jnt_bodyid jnt_dofadr jnt_qposadr jnt_pos jnt_axis jnt_limited jnt_range jnt_margin
-    jnt_stiffness jnt_solref jnt_solimp jnt_actfrclimited jnt_actfrcrange jnt_actgravcomp dof_armature
+    jnt_stiffness jnt_solref jnt_solimp jnt_actfrclimited jnt_actfrcrange dof_armature
     dof_damping dof_frictionloss dof_solref dof_solimp dof_invweight0 qpos0 qpos_spring geom_bodyid geom_pos
     geom_quat geom_size geom_dataid geom_contype geom_conaffinity geom_condim geom_priority geom_solmix
-    geom_solref geom_solimp geom_friction geom_margin geom_gap geom_fluid geom_rgba geom_matid geom_group
-    mesh_vertadr mesh_vertnum mesh_vert mesh_faceadr mesh_facenum mesh_face mat_rgba exclude_signature
+    geom_solref geom_solimp geom_friction geom_margin geom_gap geom_fluid
+    mesh_vertadr mesh_vertnum mesh_vert mesh_faceadr mesh_facenum mesh_face exclude_signature
     eq_obj1id eq_obj2id eq_active0 eq_data eq_solref eq_solimp tendon_adr tendon_num tendon_damping
     tendon_stiffness tendon_frictionloss tendon_limited wrap_objid wrap_prm actuator_trnid actuator_gear
     actuator_gainprm actuator_biasprm actuator_ctrllimited actuator_ctrlrange actuator_forcelimited
-    actuator_forcerange actuator_actlimited actuator_group key_qpos key_qvel key_ctrl key_time
+    actuator_forcerange actuator_actlimited actuator_group key_time
 """.split()
 # Arrays of newer versions; where they are missing, no model has what they describe.
 _NEWER_ARRAYS = """
@@ -69,7 +69,7 @@ _NAMED = {
     "actuator": "nu",
     "key": "nkey",
 }
-_REAL_OPTIONS = ("timestep", "gravity", "tolerance", "impratio", "density", "viscosity", "wind")
+_REAL_OPTIONS = ("timestep", "gravity", "tolerance", "impratio", "density", "viscosity")
 _COUNT_OPTIONS = ("iterations", "ls_iterations", "noslip_iterations", "disableactuator")
 _COUNTS = ("nflex", "nplugin", "npair", "nmocap", "nsensor")
 
@@ -124,9 +124,10 @@ def arrays(model: Any) -> dict[str, NDArray[Any]]:
     for kind, count in _NAMED.items():
         short = {"joint": "jnt", "equality": "eq"}.get(kind, kind)
         starts = getattr(model, f"name_{short}adr")
-        own = [text[start : text.index(b"\0", start)].decode() for start in starts]
+        own = [text[start : text.index(b"\0", start)].decode(errors="replace") for start in starts]
         assert len(own) == getattr(model, count)
         found[f"names.{kind}"] = _texts(own)
+    found |= _hulls(model)
     for name in _REAL_OPTIONS:
         found[f"opt.{name}"] = np.array(getattr(model.opt, name), np.float64).reshape(-1)
     for name in _COUNT_OPTIONS:
@@ -172,10 +173,9 @@ def cached(model: Any) -> Path:
         path = folder / f"{digest.hexdigest()[:32]}.safetensors"
         if not path.is_file():
             # another process may write the same file
-            with tempfile.NamedTemporaryFile(dir=folder, delete=False) as file:
-                temporary = Path(file.name)
-            _save(found, temporary)
-            temporary.replace(path)
+            with tempfile.TemporaryDirectory(dir=folder) as temporary:
+                _save(found, Path(temporary) / path.name)
+                (Path(temporary) / path.name).replace(path)
     except OSError as error:
         raise SceneError(
             f"{folder}: the model cannot be kept there: {error}; set XDG_CACHE_HOME to a folder"
@@ -187,6 +187,20 @@ def _save(found: dict[str, NDArray[Any]], path: Path) -> None:
     from safetensors.numpy import save_file
 
     save_file(found, str(path))
+
+
+def _hulls(model: Any) -> dict[str, NDArray[Any]]:
+    """Vertices of the convex hull that MuJoCo made of each mesh; none where it made none."""
+    firsts, counts, corners = [], [], []
+    for mesh, start in enumerate(model.mesh_graphadr):
+        # the graph: numbers of vertices and faces, where the edges of each vertex begin, then the vertices
+        count = 0 if start < 0 else int(model.mesh_graph[start])
+        firsts.append(len(corners))
+        counts.append(count)
+        corners += (model.mesh_graph[start + 2 + count : start + 2 + 2 * count]).tolist()
+        assert all(0 <= corner < model.mesh_vertnum[mesh] for corner in corners[firsts[-1] :])
+    arrays = {"mesh_hulladr": firsts, "mesh_hullnum": counts, "mesh_hullvert": corners}
+    return {name: np.array(values, np.int32) for name, values in arrays.items()}
 
 
 def _plain(array: Any) -> NDArray[Any]:

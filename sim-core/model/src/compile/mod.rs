@@ -120,6 +120,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         scene.params.contains(&Param::JointFriction),
     );
     constants.mujoco = builder.mujoco;
+    check_models(scene)?;
     if let Some(parts) = scene.robots.iter().find_map(|robot| robot.mujoco.as_ref()) {
         constants.mujoco.integrator = parts.integrator;
         constants.damped = is_damped(&constants, parts.implicit_damping);
@@ -191,6 +192,44 @@ fn take_inverse_weights(scene: &Description, ranges: &[RobotRange], reference: &
             reference.mean_inertia = parts.mean_inertia;
         }
     }
+}
+
+/// Refuses models from MuJoCo that do not fit together, or that a parameter would change in silence.
+fn check_models(scene: &Description) -> Result<(), ModelError> {
+    let models = scene.robots.iter().filter(|robot| robot.mujoco.is_some());
+    let options = |robot: &Robot| {
+        let parts = robot.mujoco.as_ref()?;
+        Some((
+            parts.integrator,
+            parts.implicit_damping,
+            parts.safe_references,
+        ))
+    };
+    let models: Vec<&Robot> = models.collect();
+    if let Some(two) = models
+        .windows(2)
+        .find(|two| options(two[0]) != options(two[1]))
+    {
+        return Err(ModelError::MujocoRefused {
+            reasons: format!(
+                "models `{}` and `{}` have different integrators, eulerdamp or refsafe; make them equal",
+                two[0].name, two[1].name
+            ),
+        });
+    }
+    let geoms = models.iter().flat_map(|robot| &robot.links);
+    let geoms = geoms.flat_map(|link| &link.collisions);
+    let priorities: BTreeSet<i64> = geoms
+        .filter_map(|collision| Some(collision.geom.as_ref()?.priority))
+        .collect();
+    if priorities.len() > 1 && scene.params.contains(&Param::ShapeMu) {
+        return Err(ModelError::MujocoRefused {
+            reasons: "shape_mu cannot vary: geoms have different priorities, which decide whose friction counts; \
+                      make them equal"
+                .to_owned(),
+        });
+    }
+    Ok(())
 }
 
 /// Whether a step of a scene with MuJoCo's options is implicit in any damping.

@@ -95,22 +95,29 @@ impl Mesh {
         if scale.iter().product::<f64>() < 0.0 {
             triangles.turn_over();
         }
-        Mesh::made(path, scale, triangles, notes, options)
+        Mesh::made(path, scale, triangles, None, notes, options)
     }
 
-    /// A mesh by its name, of these triangles.
+    /// A mesh by its name, of these triangles; its hull is that of some of its vertices, or of all.
     ///
     /// # Errors
     /// Why they cannot be used, by the name, with the cure.
-    pub fn of(name: &str, triangles: TriMesh, options: &MeshOptions) -> Result<Mesh, ModelError> {
+    pub fn of(
+        name: &str,
+        triangles: TriMesh,
+        hull: Option<&[[f64; 3]]>,
+        options: &MeshOptions,
+    ) -> Result<Mesh, ModelError> {
         options.validate()?;
-        Mesh::made(Path::new(name), [1.0; 3], triangles, Vec::new(), options)
+        let path = Path::new(name);
+        Mesh::made(path, [1.0; 3], triangles, hull, Vec::new(), options)
     }
 
     fn made(
         path: &Path,
         scale: [f64; 3],
         mut triangles: TriMesh,
+        hull: Option<&[[f64; 3]]>,
         notes: Vec<String>,
         options: &MeshOptions,
     ) -> Result<Mesh, ModelError> {
@@ -134,13 +141,18 @@ impl Mesh {
             hulls: Vec::new(),
             notes,
         };
-        mesh.make_hulls(size, options)?;
+        mesh.make_hulls(size, hull, options)?;
         Ok(mesh)
     }
 
-    fn make_hulls(&mut self, size: f64, options: &MeshOptions) -> Result<(), ModelError> {
+    fn make_hulls(
+        &mut self,
+        size: f64,
+        hull: Option<&[[f64; 3]]>,
+        options: &MeshOptions,
+    ) -> Result<(), ModelError> {
         let most = options.max_hull_vertices;
-        let vertices = &self.triangles.vertices;
+        let vertices = hull.unwrap_or(&self.triangles.vertices);
         let whole = Hull::of(vertices, most)
             .map_err(|why| fault(&self.path, format!("{why}; give it an area, or mend it")))?;
         let flat = whole.flat;

@@ -32,8 +32,13 @@ pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), M
         };
         let terms = terms.into_iter().map(|(joint, coefficient)| {
             let place = joints.get(joint).copied();
-            let place = place
-                .ok_or_else(|| file.fault(format!("has no joint for actuator `{}`", names[k])))?;
+            let place = place.filter(|&place| robot.joints[place].dofs.len() == 1);
+            let place = place.ok_or_else(|| {
+                file.fault(format!(
+                    "has no joint of one dof for actuator `{}`",
+                    names[k]
+                ))
+            })?;
             Ok((place, coefficient * gears[k][0]))
         });
         let is_on = acts && !((0..31).contains(&groups[k]) && disabled >> groups[k] & 1 == 1);
@@ -42,7 +47,7 @@ pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), M
             name: names[k].clone(),
             terms: terms.collect::<Result<_, _>>()?,
             ctrl_range: ctrl_ranges[k].filter(|_| clamps),
-            force_range: force_ranges[k],
+            force_range: force_ranges[k].filter(|_| is_on),
             gain: on(match gain_kinds[k].as_str() {
                 "mjGAIN_AFFINE" => gains[k],
                 _ => [gains[k][0], 0.0, 0.0],
@@ -55,6 +60,11 @@ pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), M
     }
     if let Some(parts) = &mut robot.mujoco {
         parts.actuators = actuators;
+        if !acts {
+            for joint in &mut parts.joints {
+                joint.actuator_range = None;
+            }
+        }
     }
     Ok(())
 }

@@ -64,6 +64,14 @@ impl ModelFile {
                 Dtype::U8 => Entries::Integers(numbers(data, |[x]| i64::from(x))),
                 other => return Err(fault(format!("array `{name}` has the type {other:?}"))),
             };
+            if tensor.shape().is_empty() {
+                return Err(fault(format!("array `{name}` is a single number")));
+            }
+            if let Entries::Reals(all) = &entries
+                && all.iter().any(|x| x.is_nan())
+            {
+                return Err(fault(format!("array `{name}` has a NaN")));
+            }
             arrays.insert(name.to_owned(), (tensor.shape().to_vec(), entries));
         }
         let model = ModelFile {
@@ -183,6 +191,11 @@ impl ModelFile {
     /// One integer.
     pub fn integer(&self, name: &str) -> Result<i64, ModelError> {
         Ok(self.integers(name, 1)?[0])
+    }
+
+    /// Whether it has an array.
+    pub fn has(&self, name: &str) -> bool {
+        self.arrays.contains_key(name)
     }
 
     /// The first row of an array of which any entry differs from 0; none where this version of MuJoCo has no such array.

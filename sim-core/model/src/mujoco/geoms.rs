@@ -70,7 +70,7 @@ pub(super) fn add_geoms(
                 .notes()
                 .map(|note| format!("geom `{}`: {note}", geom_names[geom])),
         );
-        let link = bodies[geom].unwrap_or(0);
+        let link = bodies[geom].ok_or_else(|| file.fault("has geoms without bodies".to_owned()))?;
         robot.links[link].collisions.push(Collision {
             name: Some(geom_names[geom].clone()),
             pose: frame(places[geom], turns[geom]),
@@ -144,6 +144,17 @@ fn mesh_shape(file: &ModelFile, mesh: i64, options: &MujocoOptions) -> Result<Sh
     {
         return Err(file.fault("has a mesh with corners that are not there".to_owned()));
     }
+    // vertices of the hull that MuJoCo made, which `maxhullvert` may limit
+    let corners = file.rows("mesh_hullvert");
+    let own_hull = part("mesh_hulladr", "mesh_hullnum", corners)?;
+    let corners = &file.integers("mesh_hullvert", corners)?[own_hull];
+    let hull = corners.iter().map(|&corner| {
+        let place = usize::try_from(corner).ok();
+        place.and_then(|place| points.get(place)).copied()
+    });
+    let hull: Option<Vec<[f64; 3]>> = hull.collect();
+    let hull =
+        hull.ok_or_else(|| file.fault("has a hull with corners that are not there".to_owned()))?;
     let name = &names(file, "mesh", meshes)?[mesh];
     let mesh = Mesh::of(
         name,
@@ -151,6 +162,7 @@ fn mesh_shape(file: &ModelFile, mesh: i64, options: &MujocoOptions) -> Result<Sh
             vertices: points,
             triangles,
         },
+        (!hull.is_empty()).then_some(&hull[..]),
         &MeshOptions {
             max_hull_vertices: options.max_hull_vertices,
             convex_decomposition: false,

@@ -1,43 +1,41 @@
-//! What a model has that the physics does not: each by the name of its element, and why.
+//! What a model has that the physics does not: each by the name of its element.
 
 use super::format::ModelFile;
 use super::names::names;
+use super::options::has_flag;
 use crate::error::ModelError;
 use crate::softness::POWER_MAX;
 
-/// Arrays in which any entry other than 0 stands for a feature that is not supported: the kind of element, the array, and the
-/// feature.
+/// Arrays in which any entry other than 0 stands for a feature that is not supported: kind of element, array, feature.
 const MUST_BE_ZERO: &[(&str, &str, &str)] = &[
     ("body", "body_gravcomp", "gravity compensation"),
-    ("joint", "jnt_stiffnesspoly", "nonlinear stiffness"),
-    (
-        "joint",
-        "jnt_actgravcomp",
-        "gravity compensation by actuators",
-    ),
-    ("geom", "geom_adhesion", "adhesion"),
-    ("geom", "geom_surfacevel", "surface velocity"),
     ("geom", "geom_fluid", "the ellipsoid fluid model"),
-    ("tendon", "tendon_armature", "armature of a tendon"),
     ("tendon", "tendon_damping", "damping of a tendon"),
-    ("tendon", "tendon_dampingpoly", "damping of a tendon"),
     ("tendon", "tendon_stiffness", "stiffness of a tendon"),
-    ("tendon", "tendon_stiffnesspoly", "stiffness of a tendon"),
     ("tendon", "tendon_frictionloss", "dry friction of a tendon"),
     ("tendon", "tendon_limited", "limits of a tendon"),
+    ("actuator", "actuator_actlimited", "bounds of an activation"),
+];
+/// The same, of arrays that older versions of MuJoCo do not have.
+const NEWER_MUST_BE_ZERO: &[(&str, &str, &str)] = &[
+    ("joint", "jnt_stiffnesspoly", "nonlinear stiffness"),
+    ("geom", "geom_adhesion", "adhesion"),
+    ("geom", "geom_surfacevel", "surface velocity"),
+    ("tendon", "tendon_armature", "armature of a tendon"),
+    ("tendon", "tendon_dampingpoly", "damping of a tendon"),
+    ("tendon", "tendon_stiffnesspoly", "stiffness of a tendon"),
     (
         "tendon",
         "tendon_actfrclimited",
         "bounds of the actuator force on a tendon",
     ),
-    ("actuator", "actuator_delay", "delay of an actuator"),
+    ("actuator", "actuator_delay", "a delay"),
     ("actuator", "actuator_armature", "armature of an actuator"),
     ("actuator", "actuator_damping", "damping of an actuator"),
     ("actuator", "actuator_dampingpoly", "damping of an actuator"),
-    ("actuator", "actuator_actlimited", "bounds of an activation"),
 ];
 
-/// Flags that are not supported.
+/// Flags of `<option>` that are not supported.
 const FLAGS: &[&str] = &[
     "mjENBL_OVERRIDE",
     "mjENBL_INVDISCRETE",
@@ -49,13 +47,13 @@ const FLAGS: &[&str] = &[
 /// Most reasons in a message.
 const LISTED_MAX: usize = 8;
 
-/// Reasons in one message, the first few of many.
+/// Reasons in one message, the first few of many, and the cure.
 pub(super) fn listed(reasons: &[String]) -> String {
     let mut text = reasons[..reasons.len().min(LISTED_MAX)].join("; ");
     if reasons.len() > LISTED_MAX {
         text += &format!("; and {} more", reasons.len() - LISTED_MAX);
     }
-    text
+    text + "; remove what is named from the model"
 }
 
 /// Everything that keeps a model from running, a sentence each.
@@ -64,111 +62,110 @@ pub(super) fn listed(reasons: &[String]) -> String {
 /// A file that lacks arrays.
 pub(super) fn refusals(file: &ModelFile) -> Result<Vec<String>, ModelError> {
     let mut found = Vec::new();
-    for (kind, array, feature) in MUST_BE_ZERO {
+    if let Some((_, array, _)) = MUST_BE_ZERO.iter().find(|(_, array, _)| !file.has(array)) {
+        return Err(file.fault(format!("lacks the array `{array}`; save the scene again")));
+    }
+    for (kind, array, feature) in MUST_BE_ZERO.iter().chain(NEWER_MUST_BE_ZERO) {
         if let Some(row) = file.first_set(array) {
             let names = names(file, kind, file.rows(array))?;
-            found.push(format!(
-                "{kind} `{}`: {feature} is not supported yet",
-                names[row]
-            ));
+            found.push(no(kind, &names[row], feature));
         }
     }
     options(file, &mut found)?;
-    bodies(file, &mut found)?;
+    joints(file, &mut found)?;
     geoms(file, &mut found)?;
-    constraints(file, &mut found)?;
+    equalities(file, &mut found)?;
+    tendons(file, &mut found)?;
     actuators(file, &mut found)?;
     Ok(found)
+}
+
+/// A sentence about an element.
+fn no(kind: &str, name: &str, feature: &str) -> String {
+    format!("{kind} `{name}`: no support for {feature}")
 }
 
 fn options(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
     for flag in file.texts("opt.flags")? {
         if FLAGS.contains(&flag.as_str()) {
-            found.push(format!("option/flag: {flag} is not supported yet"));
+            found.push(no("option", "flag", &flag));
         }
     }
-    match file.texts("opt.integrator")?.first().map(String::as_str) {
+    let integrator = file.texts("opt.integrator")?;
+    match integrator.first().map(String::as_str) {
         Some("mjINT_EULER" | "mjINT_IMPLICITFAST" | "mjINT_RK4") => {}
         other => found.push(format!(
-            "option: the integrator {} is not supported; use Euler, implicitfast or RK4",
-            other.unwrap_or("–")
+            "option `integrator`: no support for {}, use Euler, implicitfast or RK4",
+            other.unwrap_or("none")
         )),
     }
     if file.integer("opt.noslip_iterations")? > 0 {
-        found.push("option: noslip_iterations is not supported; set it to 0".to_owned());
+        found.push("option `noslip_iterations`: no support for it, set it to 0".to_owned());
     }
-    for medium in ["opt.density", "opt.viscosity"] {
-        if file.real(medium)? != 0.0 {
-            found.push(format!("{medium}: fluid forces are not supported yet"));
+    for medium in ["density", "viscosity"] {
+        if file.real(&format!("opt.{medium}"))? != 0.0 {
+            found.push(no("option", medium, "fluid forces"));
         }
     }
     for (counted, what) in [
-        ("nflex", "flexes are"),
-        ("nplugin", "plugins are"),
-        ("npair", "contact pairs are"),
-        ("nmocap", "mocap bodies are"),
+        ("nflex", "flexes"),
+        ("nplugin", "plugins"),
+        ("npair", "contact pairs"),
+        ("nmocap", "mocap bodies"),
     ] {
         if file.integer(counted)? > 0 {
-            found.push(format!("{what} not supported yet"));
+            found.push(format!("model: no support for {what}"));
         }
     }
     Ok(())
 }
 
-fn bodies(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
+fn joints(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
     let joints = file.rows("jnt_type");
-    let joint_names = names(file, "joint", joints)?;
+    let names = names(file, "joint", joints)?;
     let kinds = file.kinds("jnt_type", joints)?;
     let firsts = file.integers("jnt_dofadr", joints)?;
     let dofs = file.rows("dof_armature");
     let armatures = file.reals("dof_armature", dofs)?;
     let dampings = file.reals("dof_damping", dofs)?;
     let losses = file.reals("dof_frictionloss", dofs)?;
+    let curved = file.first_set("dof_dampingpoly");
     let stiffness = file.reals("jnt_stiffness", joints)?;
     let limited = file.integers("jnt_limited", joints)?;
     let bounded = file.integers("jnt_actfrclimited", joints)?;
-    if let Some(dof) = file.first_set("dof_dampingpoly") {
-        found.push(format!("dof {dof}: nonlinear damping is not supported yet"));
-    }
+    let limits = file.vectors::<5>("jnt_solimp", joints)?;
+    let frictions = file.vectors::<5>("dof_solimp", dofs)?;
     for joint in 0..joints {
-        let kind = kinds[joint].as_str();
-        let count = match kind {
-            "mjJNT_FREE" => 6,
-            "mjJNT_BALL" => 3,
-            _ => continue,
-        };
-        let name = &joint_names[joint];
-        let mut refuse = |what: &str| {
-            found.push(format!(
-                "joint `{name}`: {what} of a ball or free joint is not supported yet"
-            ));
+        let name = &names[joint];
+        let (count, kind) = match kinds[joint].as_str() {
+            "mjJNT_FREE" => (6, "a free joint"),
+            "mjJNT_BALL" => (3, "a ball joint"),
+            _ => (1, "a joint"),
         };
         let first = usize::try_from(firsts[joint]).unwrap_or(dofs).min(dofs);
         let own = first..(first + count).min(dofs);
-        if stiffness[joint] != 0.0 {
-            refuse("stiffness");
-        }
-        if limited[joint] != 0 {
-            refuse("a limit");
-        }
-        if bounded[joint] != 0 {
-            refuse("a bound of actuator forces");
-        }
-        let is_free = kind == "mjJNT_FREE";
-        if is_free && armatures[own.clone()].iter().any(|&x| x != 0.0) {
-            refuse("armature");
-        }
-        if is_free && dampings[own.clone()].iter().any(|&x| x != 0.0) {
-            refuse("damping");
-        }
-        if losses[own].iter().any(|&x| x != 0.0) {
-            refuse("dry friction");
-        }
-    }
-    let softness = [("jnt_solimp", joints, "joint"), ("dof_solimp", dofs, "dof")];
-    for (array, count, kind) in softness {
-        for (row, solimp) in file.vectors::<5>(array, count)?.iter().enumerate() {
-            refuse_power(found, &format!("{kind} {row}"), solimp[4]);
+        let any = |values: &[f64]| values[own.clone()].iter().any(|&x| x != 0.0);
+        let is_free = count == 6;
+        let wrong = [
+            (count > 1 && stiffness[joint] != 0.0, "stiffness"),
+            (count > 1 && limited[joint] != 0, "limits"),
+            (
+                count > 1 && bounded[joint] != 0,
+                "bounds of actuator forces",
+            ),
+            (count > 1 && any(&losses), "dry friction"),
+            (is_free && any(&armatures), "armature"),
+            (is_free && any(&dampings), "damping"),
+            (
+                curved.is_some_and(|dof| own.contains(&dof)),
+                "nonlinear damping",
+            ),
+        ];
+        let wrong = wrong.iter().filter(|(is_wrong, _)| *is_wrong);
+        found.extend(wrong.map(|(_, what)| no("joint", name, &format!("{what} of {kind}"))));
+        let softness = std::iter::once(&limits[joint]).chain(&frictions[own.clone()]);
+        for solimp in softness {
+            refuse_power(found, "joint", name, solimp);
         }
     }
     Ok(())
@@ -176,87 +173,91 @@ fn bodies(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
 
 fn geoms(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
     let count = file.rows("geom_type");
-    let geom_names = names(file, "geom", count)?;
+    let names = names(file, "geom", count)?;
     let kinds = file.kinds("geom_type", count)?;
     let contypes = file.integers("geom_contype", count)?;
     let conaffinities = file.integers("geom_conaffinity", count)?;
+    let condims = file.integers("geom_condim", count)?;
     let solimps = file.vectors::<5>("geom_solimp", count)?;
+    let bodies = file.rows("body_weldid");
+    let welds = file.integers("body_weldid", bodies)?;
+    let bodies = file.indices("geom_bodyid", count, bodies)?;
     for geom in 0..count {
         if contypes[geom] == 0 && conaffinities[geom] == 0 {
             continue; // touches nothing
         }
-        let name = &geom_names[geom];
+        let name = &names[geom];
+        let moves = bodies[geom].is_some_and(|body| welds[body] != 0);
         let shape = match kinds[geom].as_str() {
-            "mjGEOM_ELLIPSOID" => Some("ellipsoids"),
-            "mjGEOM_HFIELD" => Some("height fields"),
-            "mjGEOM_SDF" => Some("signed distance fields"),
+            "mjGEOM_ELLIPSOID" => Some("contacts of ellipsoids"),
+            "mjGEOM_HFIELD" => Some("contacts of height fields"),
+            "mjGEOM_SDF" => Some("contacts of signed distance fields"),
+            "mjGEOM_PLANE" if moves => Some("planes on bodies that move"),
             _ => None,
         };
-        if let Some(shape) = shape {
-            found.push(format!(
-                "geom `{name}`: contacts of {shape} are not supported yet"
-            ));
+        found.extend(shape.map(|shape| no("geom", name, shape)));
+        if !matches!(condims[geom], 1 | 3 | 4 | 6) {
+            found.push(no("geom", name, &format!("condim {}", condims[geom])));
         }
-        refuse_power(found, &format!("geom `{name}`"), solimps[geom][4]);
+        refuse_power(found, "geom", name, &solimps[geom]);
     }
     Ok(())
 }
 
-fn refuse_power(found: &mut Vec<String>, owner: &str, power: f64) {
+fn refuse_power(found: &mut Vec<String>, kind: &str, name: &str, solimp: &[f64; 5]) {
+    let power = solimp[4];
     if power > POWER_MAX {
-        found.push(format!(
-            "{owner}: a solimp with the power {power} is not supported; use at most {POWER_MAX}"
-        ));
+        let most = format!("a solimp with the power {power}, above {POWER_MAX}");
+        found.push(no(kind, name, &most));
     }
 }
 
-fn constraints(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
+fn equalities(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
+    if has_flag(file, "mjDSBL_EQUALITY")? || has_flag(file, "mjDSBL_CONSTRAINT")? {
+        return Ok(());
+    }
     let count = file.rows("eq_type");
-    let equality_names = names(file, "equality", count)?;
+    let names = names(file, "equality", count)?;
     let kinds = file.kinds("eq_type", count)?;
     let width = file.width("eq_data");
     let data = file.reals("eq_data", count * width)?;
     let seconds = file.integers("eq_obj2id", count)?;
     let active = file.integers("eq_active0", count)?;
     let solimps = file.vectors::<5>("eq_solimp", count)?;
-    for equality in 0..count {
-        let name = &equality_names[equality];
-        let own = &data[equality * width..(equality + 1) * width];
-        let problem = match kinds[equality].as_str() {
-            "mjEQ_JOINT" if seconds[equality] < 0 => Some("one joint alone"),
-            "mjEQ_JOINT"
-                if own
-                    .get(2..5)
-                    .is_some_and(|rest| rest.iter().any(|&x| x != 0.0)) =>
-            {
-                Some("a polynomial beyond a line")
-            }
-            "mjEQ_JOINT" if active[equality] == 0 => Some("a start without it"),
+    for k in 0..count {
+        let own = &data[k * width..(k + 1) * width];
+        let bends = own
+            .get(2..5)
+            .is_some_and(|rest| rest.iter().any(|&x| x != 0.0));
+        let problem = match kinds[k].as_str() {
+            "mjEQ_JOINT" if seconds[k] < 0 => Some("an equality of one joint alone"),
+            "mjEQ_JOINT" if bends => Some("a polynomial beyond a line"),
+            "mjEQ_JOINT" if active[k] == 0 => Some("an equality that is not active at the start"),
             "mjEQ_JOINT" => None,
             "mjEQ_CONNECT" => Some("connect"),
             "mjEQ_WELD" => Some("weld"),
-            "mjEQ_TENDON" => Some("a tendon"),
-            _ => Some("this kind"),
+            "mjEQ_TENDON" => Some("equalities of tendons"),
+            "mjEQ_DISTANCE" => Some("distance"),
+            _ => Some("equalities of flexes"),
         };
-        if let Some(problem) = problem {
-            found.push(format!("equality `{name}`: {problem} is not supported yet"));
-        }
-        refuse_power(found, &format!("equality `{name}`"), solimps[equality][4]);
+        found.extend(problem.map(|problem| no("equality", &names[k], problem)));
+        refuse_power(found, "equality", &names[k], &solimps[k]);
     }
-    let tendons = file.rows("tendon_num");
-    let tendon_names = names(file, "tendon", tendons)?;
-    let firsts = file.integers("tendon_adr", tendons)?;
-    let counts = file.integers("tendon_num", tendons)?;
-    let wraps = file.rows("wrap_type");
-    let kinds = file.kinds("wrap_type", wraps)?;
-    for tendon in 0..tendons {
-        let own = firsts[tendon].max(0) as usize..(firsts[tendon] + counts[tendon]).max(0) as usize;
-        let own = kinds.get(own).unwrap_or_default();
+    Ok(())
+}
+
+fn tendons(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
+    let count = file.rows("tendon_num");
+    let names = names(file, "tendon", count)?;
+    let firsts = file.integers("tendon_adr", count)?;
+    let counts = file.integers("tendon_num", count)?;
+    let kinds = file.kinds("wrap_type", file.rows("wrap_type"))?;
+    for tendon in 0..count {
+        let first = firsts[tendon].max(0) as usize;
+        let end = firsts[tendon].saturating_add(counts[tendon]).max(0) as usize;
+        let own = kinds.get(first..end).unwrap_or_default();
         if own.iter().any(|kind| kind != "mjWRAP_JOINT") {
-            let name = &tendon_names[tendon];
-            found.push(format!(
-                "tendon `{name}`: spatial tendons are not supported yet"
-            ));
+            found.push(no("tendon", &names[tendon], "spatial tendons"));
         }
     }
     Ok(())
@@ -264,51 +265,44 @@ fn constraints(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelErr
 
 fn actuators(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
     let count = file.rows("actuator_trntype");
-    let actuator_names = names(file, "actuator", count)?;
+    let names = names(file, "actuator", count)?;
     let transmissions = file.kinds("actuator_trntype", count)?;
     let dynamics = file.kinds("actuator_dyntype", count)?;
     let gains = file.kinds("actuator_gaintype", count)?;
     let biases = file.kinds("actuator_biastype", count)?;
     let targets = file.vectors_of_integers::<2>("actuator_trnid", count)?;
-    let joints = file.rows("jnt_type");
-    let joint_kinds = file.kinds("jnt_type", joints)?;
+    let joint_kinds = file.kinds("jnt_type", file.rows("jnt_type"))?;
+    let controls = file.integers_or("actuator_ctrlnum", count, 1)?;
+    let outputs = file.integers_or("actuator_outnum", count, 1)?;
     for k in 0..count {
-        let name = &actuator_names[k];
-        let mut refuse = |what: &str| {
-            found.push(format!("actuator `{name}`: {what} is not supported yet"));
+        let joint = usize::try_from(targets[k][0]).ok();
+        let joint = joint.and_then(|joint| joint_kinds.get(joint));
+        let is_scalar = joint.is_some_and(|kind| kind == "mjJNT_HINGE" || kind == "mjJNT_SLIDE");
+        let transmission = match transmissions[k].as_str() {
+            "mjTRN_JOINT" | "mjTRN_JOINTINPARENT" if is_scalar => None,
+            "mjTRN_JOINT" | "mjTRN_JOINTINPARENT" => Some("a ball or free joint"),
+            "mjTRN_TENDON" => None,
+            "mjTRN_SITE" => Some("a site"),
+            "mjTRN_BODY" => Some("a body (adhesion)"),
+            "mjTRN_SLIDERCRANK" => Some("a slider-crank"),
+            other => Some(other),
         };
-        match transmissions[k].as_str() {
-            "mjTRN_JOINT" | "mjTRN_JOINTINPARENT" => {
-                let joint = usize::try_from(targets[k][0]).ok();
-                let kind = joint.and_then(|joint| joint_kinds.get(joint));
-                if kind.is_none_or(|kind| kind == "mjJNT_BALL" || kind == "mjJNT_FREE") {
-                    refuse("transmission to a ball or free joint");
-                }
+        let law = match (dynamics[k].as_str(), gains[k].as_str(), biases[k].as_str()) {
+            ("mjDYN_MUSCLE", ..) | (_, "mjGAIN_MUSCLE", _) => Some("muscles"),
+            ("mjDYN_INTEGRATOR", ..) => Some("activations that integrate"),
+            ("mjDYN_FILTER" | "mjDYN_FILTEREXACT", ..) => Some("filtered activations"),
+            ("mjDYN_NONE", "mjGAIN_FIXED" | "mjGAIN_AFFINE", "mjBIAS_NONE" | "mjBIAS_AFFINE") => {
+                None
             }
-            "mjTRN_TENDON" => {}
-            other => refuse(other),
-        }
-        if dynamics[k] != "mjDYN_NONE" {
-            refuse(&dynamics[k]);
-        }
-        if !matches!(gains[k].as_str(), "mjGAIN_FIXED" | "mjGAIN_AFFINE") {
-            refuse(&gains[k]);
-        }
-        if !matches!(biases[k].as_str(), "mjBIAS_NONE" | "mjBIAS_AFFINE") {
-            refuse(&biases[k]);
-        }
-    }
-    for (array, what) in [
-        ("actuator_ctrlnum", "control"),
-        ("actuator_outnum", "output"),
-    ] {
-        for (k, &own) in file.integers_or(array, count, 1)?.iter().enumerate() {
-            if own != 1 {
-                let name = &actuator_names[k];
-                found.push(format!(
-                    "actuator `{name}`: {own} {what}s are not supported yet"
-                ));
-            }
+            ("mjDYN_NONE", "mjGAIN_FIXED" | "mjGAIN_AFFINE", bias) => Some(bias),
+            ("mjDYN_NONE", gain, _) => Some(gain),
+            (dynamics, ..) => Some(dynamics),
+        };
+        let name = &names[k];
+        found.extend(transmission.map(|to| no("actuator", name, &format!("transmission to {to}"))));
+        found.extend(law.map(|law| no("actuator", name, law)));
+        if controls[k] != 1 || outputs[k] != 1 {
+            found.push(no("actuator", name, "several controls or outputs"));
         }
     }
     Ok(())

@@ -35,6 +35,10 @@ pub(super) fn robot(file: &ModelFile, options: &MujocoOptions) -> Result<Robot, 
     };
     let mut parts = parts(file, bodies, &parents)?;
     add_joints(file, options, &parents, &mut robot, &mut parts)?;
+    let dofs: usize = robot.joints.iter().map(|joint| joint.dofs.len()).sum();
+    if dofs != file.rows("dof_armature") {
+        return Err(file.fault("has dofs without joints".to_owned()));
+    }
     parts.equalities = equalities(file, &robot, &parts)?;
     robot.mujoco = Some(Box::new(parts));
     Ok(robot)
@@ -56,7 +60,7 @@ fn links(file: &ModelFile, bodies: usize) -> Result<Vec<Link>, ModelError> {
         };
         Link {
             name,
-            inertial: (masses[body] > 0.0).then_some(inertial),
+            inertial: (masses[body] > 0.0 || x + y + z > 0.0).then_some(inertial),
             collisions: Vec::new(),
         }
     });
@@ -200,8 +204,12 @@ fn add_joints(
             .collect();
         let origin = frame(places[body], turns[body]);
         if own.is_empty() {
-            // a fixed joint has its link's name, which no joint needs to have
-            let name = format!("{} (fixed)", robot.links[body].name);
+            let taken = |name: &String| all.names.contains(name);
+            let own = (1..).map(|count| format!("{} (fixed{count})", robot.links[body].name));
+            let name = own
+                .into_iter()
+                .find(|name| !taken(name))
+                .unwrap_or_default();
             let mut joint = Joint::fixed(&name, parents[body].unwrap_or(0), body);
             joint.origin = origin;
             robot.joints.push(joint);
@@ -303,14 +311,16 @@ fn equalities(
     let seconds = file.indices("eq_obj2id", count, usize::MAX >> 1)?;
     let softness = softness(file, "eq", count)?;
     let width = file.width("eq_data");
+    if width < 2 {
+        return Err(file.fault("array `eq_data` has too few columns".to_owned()));
+    }
     let data = file.reals("eq_data", count * width)?;
     let places = moving(robot, joints, file)?;
     let own = (0..count).map(|k| {
         let joint = |joint: Option<usize>| {
-            let place = joint.and_then(|joint| places.get(joint));
-            place
-                .copied()
-                .ok_or_else(|| file.fault("has an equality without joints".to_owned()))
+            let place = joint.and_then(|joint| places.get(joint)).copied();
+            let place = place.filter(|&place| robot.joints[place].dofs.len() == 1);
+            place.ok_or_else(|| file.fault("has an equality without joints of one dof".to_owned()))
         };
         let (follower, leader) = (joint(firsts[k])?, joint(seconds[k])?);
         let reference = |joint: usize| parts.joints[joint].reference;

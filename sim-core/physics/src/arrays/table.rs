@@ -141,7 +141,7 @@ arrays! { m;
         kinetic_energy: KineticEnergy [Scalar; 1] Stage "J"
             => "kinetic_energy" [], "Kinetic energy of the world, ½ q̇ᵀ M q̇, armature included.";
         potential_energy: PotentialEnergy [Scalar; 1] Stage "J"
-            => "potential_energy" [], "Potential energy of the bodies that move, in gravity: 0 at the height of the world's origin.";
+            => "potential_energy" [], "Potential energy of the bodies that move, in gravity, 0 at the height of the world's origin, and of springs.";
         joint_torque: JointTorque [Scalar; m.dofs.len()] Stage "N·m or N"
             => "joint_torque" [Dofs], "What joint_f and the drive, clamped by its effort limit, give; damping, friction and contacts are not in it.";
         site_q: SiteQ [Pose; m.sites.len()] Stage "m, –"

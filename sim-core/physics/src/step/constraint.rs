@@ -112,8 +112,17 @@ pub(super) fn impedance<F: Num>(i: &Impedance<F::Real>, position: F) -> F {
     let x = (position.abs() * F::k(i.inverse_width)).min(one);
     let rest = one - x;
     let power = i.power.to_f64();
-    let rising = powered(x, power) * F::c(1.0 / midpoint.powf(power - 1.0));
-    let falling = powered(rest, power).fnma(F::c(1.0 / (1.0 - midpoint).powf(power - 1.0)), one);
+    let (rising, falling) = if power == 2.0 {
+        let rising = x * x * F::c(1.0 / midpoint);
+        (
+            rising,
+            (rest * rest).fnma(F::c(1.0 / (1.0 - midpoint)), one),
+        )
+    } else {
+        let rising = powered(x, power) * F::c(1.0 / midpoint.powf(power - 1.0));
+        let scale = F::c(1.0 / (1.0 - midpoint).powf(power - 1.0));
+        (rising, powered(rest, power).fnma(scale, one))
+    };
     let y = F::select(x.lt(F::k(i.midpoint)), rising, falling);
     y.fma(F::k(i.d_max) - F::k(i.d_min), F::k(i.d_min))
 }

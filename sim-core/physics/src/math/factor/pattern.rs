@@ -248,8 +248,8 @@ impl Pattern {
         let (row, column) = (row.max(column), row.min(column));
         let block = &self.blocks[self.block_of[row]];
         let kept = match block.kind {
-            Kind::Dense | Kind::General => column >= block.first,
-            Kind::Tree => {
+            Kind::Dense => column >= block.first,
+            Kind::Tree | Kind::General => {
                 let bounds = self.path_bounds[row]..self.path_bounds[row + 1];
                 column == row
                     || (column >= block.first

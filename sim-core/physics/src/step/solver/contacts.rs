@@ -307,18 +307,14 @@ pub(super) fn forces<C: Cx>(cx: &mut C, t: &ContactsOf<C>, joint: &mut [C::V]) {
                 cx.fill_all(t.memory.rows, r, block + more::FORCE, [d, e, f]);
                 add_turning(cx, t, class, block, r, force, joint);
             } else {
-            // f = -s' at the accelerations found
-            let jar = cx.load3(t.memory.rows, r, row::JAR);
-            let law = law_at(cx, t, r, jar);
-            let mut force = law.force;
-            for x in &mut force {
-                *x = cx.only(*x);
-            }
-            cx.fill_all(t.memory.rows, r, row::FORCE, force);
-            for run in &class.runs {
-                let first = row::JACOBIAN + 3 * run.column;
-                cx.add_triples(t.memory.rows, r, first, force, &mut joint[run.places()]);
-            }
+                // f = -s' at the accelerations found
+                let jar = cx.load3(t.memory.rows, r, row::JAR);
+                let force = law_at(cx, t, r, jar).force.map(|x| cx.only(x));
+                cx.fill_all(t.memory.rows, r, row::FORCE, force);
+                for run in &class.runs {
+                    let first = row::JACOBIAN + 3 * run.column;
+                    cx.add_triples(t.memory.rows, r, first, force, &mut joint[run.places()]);
+                }
             }
         });
     }
