@@ -165,7 +165,7 @@ fn run_every_joint(seeds: &[usize], lanes: Lanes) -> Vec<Vec<u64>> {
         floating: true,
         ..UrdfOptions::named("r")
     };
-    let urdf = common::repo("tests/record_stages/every_joint.urdf");
+    let urdf = common::repo("sim-core/stages/recorded/tests/record_stages/every_joint.urdf");
     scene.add_urdf(urdf, options).unwrap();
     let model = scene.compile().unwrap();
     assert!(model.constants().solver.refinements > 0);

@@ -38,7 +38,7 @@ fn models() -> [Arc<Model>; 3] {
         floating: true,
         ..UrdfOptions::named("r")
     };
-    let urdf = common::repo("tests/record_stages/every_joint.urdf");
+    let urdf = common::repo("sim-core/stages/recorded/tests/record_stages/every_joint.urdf");
     joints.add_urdf(urdf, options).unwrap();
     let scenes = [
         lesson_with_table(Demo::Target, true),

@@ -9,6 +9,13 @@ use sim_physics::constants::params::Param;
 use sim_physics::constants::{Constants, Motion};
 use std::path::Path;
 
+/// The repository, whichever of its crates the test is of.
+fn repository() -> &'static Path {
+    let mut folders = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
+    let found = folders.find(|folder| folder.join("Cargo.lock").exists());
+    found.expect("a crate of the workspace")
+}
+
 /// Substeps of a frame.
 pub const SUBSTEPS: usize = 8;
 
@@ -51,8 +58,8 @@ pub fn cases() -> [Case; 9] {
 
 /// What only MuJoCo models have: an implicit step with elliptic cones, or a Runge-Kutta step with pyramidal ones.
 pub fn mujoco(name: &'static str) -> Case {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/record_stages")
+    let path = repository()
+        .join("sim-core/stages/recorded/tests/record_stages")
         .join(name)
         .with_extension("safetensors");
     let scene = Description::from_mujoco(path, MujocoOptions::named("every")).unwrap();
@@ -84,7 +91,11 @@ pub fn fr3() -> Case {
 
 /// Every kind of joint on a floating base, with accelerations refined.
 pub fn every_joint() -> Case {
-    let mut scene = robot("tests/record_stages/every_joint.urdf", 0.0, true);
+    let mut scene = robot(
+        "sim-core/stages/recorded/tests/record_stages/every_joint.urdf",
+        0.0,
+        true,
+    );
     add_sites(&mut scene);
     let m = constants(&scene.compile().unwrap());
     assert!(m.solver.refinements > 0);
@@ -205,7 +216,7 @@ fn constants(model: &Model) -> Constants<f32> {
 }
 
 fn robot(file: &str, armature: f64, floating: bool) -> Description {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+    let path = repository().join(file);
     let mut scene = Description::new(1.0 / 480.0, SUBSTEPS);
     let options = UrdfOptions {
         floating,

@@ -16,7 +16,7 @@ pub fn scene(times: f64) -> Description {
         floating: true,
         ..UrdfOptions::named("r")
     };
-    let urdf = repo("tests/record_stages/every_joint.urdf");
+    let urdf = repo("sim-core/stages/recorded/tests/record_stages/every_joint.urdf");
     scene.add_urdf(urdf, options).unwrap();
     let mut body = Body::new("ball", Pose::from_rpy([1.0, 2.0, 3.0], [0.1, 0.2, 0.3]));
     body.mass = Some(0.5);

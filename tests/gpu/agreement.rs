@@ -182,7 +182,10 @@ fn all_fields_of_every_joint_are_those_of_the_cpu() {
         ..UrdfOptions::named("r")
     };
     scene
-        .add_urdf(repo("tests/record_stages/every_joint.urdf"), options)
+        .add_urdf(
+            repo("sim-core/stages/recorded/tests/record_stages/every_joint.urdf"),
+            options,
+        )
         .unwrap();
     compare_fields(&scene.compile().unwrap(), "every joint");
 }

@@ -11,8 +11,8 @@ const WORLDS: usize = 3;
 const MIDDLE: [bool; WORLDS] = [false, true, false];
 
 fn simulation() -> Simulation {
-    let path =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/record_stages/every_joint.urdf");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../sim-core/stages/recorded/tests/record_stages/every_joint.urdf");
     let mut scene = Description::new(1e-3, 1);
     let options = UrdfOptions {
         floating: true,

@@ -1,11 +1,11 @@
 //! Every stage of a step, of robots and of shapes that touch: recorded, printed, validated, and run against the CPU.
 
 mod bits;
-#[path = "../common/cases.rs"]
+#[path = "../../../../../tests/common/cases.rs"]
 mod cases;
-#[path = "../common/shapes.rs"]
+#[path = "../../../../../tests/common/shapes.rs"]
 mod shapes;
-#[path = "../../sim-core/record/tests/toy/mod.rs"]
+#[path = "../../../../record/tests/toy/mod.rs"]
 mod toy;
 
 use cases::{Case, SUBSTEPS, Scalar, arm_and_cube, cases, every_joint, every_param, fr3};
