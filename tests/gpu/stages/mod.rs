@@ -48,7 +48,7 @@ fn tolerance(stage: StageId, part: &str) -> Tolerance {
     }
     match stage.name() {
         // forces of contacts are stiffness times what is left of accelerations that cancel
-        "solver" => of(2e-3, 4),
+        "solver" | "solver_turning" => of(2e-3, 4),
         "refine" | "accelerations" => of(1e-5, 0),
         // a matrix that is nearly singular where the arm is stretched
         "site_inverse" => of(1e-4, 0),

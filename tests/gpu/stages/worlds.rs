@@ -101,7 +101,7 @@ impl Worlds {
 
     /// Worlds whose accelerations `f32` leaves to `accelerations`: limits are all that could act, and none does.
     pub fn passed_over(&mut self, m: &Constants<f32>, stage: StageId) -> Vec<bool> {
-        let may_be = matches!(stage.name(), "solver" | "refine")
+        let may_be = matches!(stage.name(), "solver" | "solver_turning" | "refine")
             && m.equalities.is_empty()
             && m.frictions.is_empty()
             && m.contacts.classes.is_empty();

@@ -68,7 +68,8 @@ macro_rules! every_stage {
             hull_hull          [collide::HullHull]           Both;
             contact_rows       [contact_rows::ContactRows]   Both;
             // accelerations and constraint forces, then the next state
-            solver             [solver::Solver]              Both;
+            solver             [solver::Solver::<false>]     Both;
+            solver_turning     [solver::Solver::<true>]      Both;
             refine             [solver::Refine]              Both;
             integrate          [integrate::Integrate]        Step;
             // in its place: all above four times, each time followed by one of these

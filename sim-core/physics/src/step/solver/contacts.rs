@@ -16,6 +16,12 @@ use crate::step::contact_rows::class_list;
 type ContactsOf<C> = Contacts<<<C as Cx>::F as Num>::Real>;
 type ClassOf<C> = Class<<<C as Cx>::F as Num>::Real>;
 
+/// Where the second block of a contact's row begins. Where no class has one, it is compiled without.
+#[inline(always)]
+fn block_of<R, const TURNS: bool>(class: &Class<R>) -> Option<usize> {
+    if TURNS { class.turns } else { None }
+}
+
 /// The law of a contact at a residual `jar`.
 #[inline(always)]
 fn law_at<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, jar: [C::F; 3]) -> ConeLaw<C::F> {
@@ -32,7 +38,7 @@ fn law_at<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, jar: [C::F; 3]) -> Cone
 
 /// The law of a contact at `alpha` of the line search. An elliptic cone has it from three products, kept by [`begin_line`].
 #[inline(always)]
-fn law_along<C: Cx>(
+fn law_along<C: Cx, const TURNS: bool>(
     cx: &mut C,
     t: &ContactsOf<C>,
     class: &ClassOf<C>,
@@ -51,7 +57,7 @@ fn law_along<C: Cx>(
         return elliptic_along(t.impratio, normal, squares, alpha, scalars);
     }
     // a pyramid is evaluated at the point of the line
-    if let Some(block) = class.turns {
+    if let Some(block) = block_of::<_, TURNS>(class) {
         let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
         let jv = turning::six(cx, t, r, row::AHEAD, block + more::AHEAD);
         let mut there = jar;
@@ -118,7 +124,12 @@ pub(super) fn coupling<C: Cx>(cx: &mut C, t: &ContactsOf<C>) -> C::F {
 
 /// Writes jar = J a - aref of every contact, to `place` of its row.
 #[inline(always)]
-pub(super) fn residual<C: Cx>(cx: &mut C, t: &ContactsOf<C>, a: &[C::F], place: usize) {
+pub(super) fn residual<C: Cx, const TURNS: bool>(
+    cx: &mut C,
+    t: &ContactsOf<C>,
+    a: &[C::F],
+    place: usize,
+) {
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
@@ -130,7 +141,7 @@ pub(super) fn residual<C: Cx>(cx: &mut C, t: &ContactsOf<C>, a: &[C::F], place: 
                 jar = cx.sum_triples(t.memory.rows, r, first, &a[run.places()], jar);
             }
             cx.fill_all(t.memory.rows, r, place, jar);
-            if let Some(block) = class.turns {
+            if let Some(block) = block_of::<_, TURNS>(class) {
                 let [x, y, z] = cx.load3(t.memory.rows, r, block + more::AREF);
                 let mut jar = [-x, -y, -z];
                 for run in &class.runs {
@@ -154,7 +165,7 @@ fn second(place: usize) -> usize {
 
 /// Adds Jᵀ W J of a class to `hessian`, and Jᵀ f to `rhs` if `pulls`. Writes the pieces that its contacts are on.
 #[inline(always)]
-pub(super) fn assemble<C: Cx>(
+pub(super) fn assemble<C: Cx, const TURNS: bool>(
     cx: &mut C,
     t: &ContactsOf<C>,
     k: usize,
@@ -164,7 +175,7 @@ pub(super) fn assemble<C: Cx>(
 ) {
     let class: &ClassOf<C> = &t.classes[k];
     let list = class_list(cx, t, k);
-    if let Some(block) = class.turns {
+    if let Some(block) = block_of::<_, TURNS>(class) {
         each!(cx, r in list, {
             assemble_turning(cx, t, class, block, r, hessian, rhs, pulls);
         });
@@ -267,13 +278,18 @@ fn add_turning<C: Cx>(
 /// Adds to `sum` where a contact is on another piece of its cost at `AHEAD` than at `JAR`, or on a curved one at `AHEAD`. Adds
 /// to `curved` where it is on a curved piece at either.
 #[inline(always)]
-pub(super) fn changes<C: Cx>(cx: &mut C, t: &ContactsOf<C>, sum: &mut C::V, curved: &mut C::V) {
+pub(super) fn changes<C: Cx, const TURNS: bool>(
+    cx: &mut C,
+    t: &ContactsOf<C>,
+    sum: &mut C::V,
+    curved: &mut C::V,
+) {
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
             // the piece at `JAR` is that of the last assembly
             let before = cx.load(t.memory.rows, r, row::STATE);
-            let after = match t.classes[k].turns {
+            let after = match block_of::<_, TURNS>(&t.classes[k]) {
                 None => {
                     let ahead = cx.load3(t.memory.rows, r, row::AHEAD);
                     law_at(cx, t, r, ahead).state
@@ -295,11 +311,11 @@ pub(super) fn changes<C: Cx>(cx: &mut C, t: &ContactsOf<C>, sum: &mut C::V, curv
 
 /// Writes the forces of all contacts, and adds Jᵀ f to `joint`.
 #[inline(always)]
-pub(super) fn forces<C: Cx>(cx: &mut C, t: &ContactsOf<C>, joint: &mut [C::V]) {
+pub(super) fn forces<C: Cx, const TURNS: bool>(cx: &mut C, t: &ContactsOf<C>, joint: &mut [C::V]) {
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
-            if let Some(block) = class.turns {
+            if let Some(block) = block_of::<_, TURNS>(class) {
                 let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
                 let force = turning::law_at(cx, t, r, block, jar).force.map(|x| cx.only(x));
                 let [a, b, c, d, e, f] = force;
@@ -322,12 +338,17 @@ pub(super) fn forces<C: Cx>(cx: &mut C, t: &ContactsOf<C>, joint: &mut [C::V]) {
 
 /// Adds Σ s(jar) at `place` to `sum`.
 #[inline(always)]
-pub(super) fn cost<C: Cx>(cx: &mut C, t: &ContactsOf<C>, place: usize, sum: &mut C::V) {
+pub(super) fn cost<C: Cx, const TURNS: bool>(
+    cx: &mut C,
+    t: &ContactsOf<C>,
+    place: usize,
+    sum: &mut C::V,
+) {
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
             // s at the residual of this place
-            let cost = match t.classes[k].turns {
+            let cost = match block_of::<_, TURNS>(&t.classes[k]) {
                 None => {
                     let jar = cx.load3(t.memory.rows, r, place);
                     law_at(cx, t, r, jar).cost
@@ -346,7 +367,7 @@ pub(super) fn cost<C: Cx>(cx: &mut C, t: &ContactsOf<C>, place: usize, sum: &mut
 /// Replaces `AHEAD`, the residual at the end of a step, by its change jv. Adds Σ W jv² to `descent` and
 /// Σ W (|J a| + |aref|)² to `terms`: a force is stiffness times a small difference of J a and aref, so it has their rounding.
 #[inline(always)]
-pub(super) fn begin_line<C: Cx>(
+pub(super) fn begin_line<C: Cx, const TURNS: bool>(
     cx: &mut C,
     t: &ContactsOf<C>,
     descent: &mut C::V,
@@ -354,7 +375,7 @@ pub(super) fn begin_line<C: Cx>(
 ) {
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
-        if let Some(block) = t.classes[k].turns {
+        if let Some(block) = block_of::<_, TURNS>(&t.classes[k]) {
             each!(cx, r in list, {
                 begin_turning_line(cx, t, block, r, descent, terms);
             });
@@ -432,7 +453,7 @@ fn begin_turning_line<C: Cx>(
 
 /// Adds what contacts change in slope, curvature and size of terms of a line at `alpha`, against its quadratic model.
 #[inline(always)]
-pub(super) fn derivative<C: Cx>(
+pub(super) fn derivative<C: Cx, const TURNS: bool>(
     cx: &mut C,
     t: &ContactsOf<C>,
     alpha: C::F,
@@ -443,7 +464,7 @@ pub(super) fn derivative<C: Cx>(
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
-            let here = law_along(cx, t, &t.classes[k], r, alpha);
+            let here = law_along::<_, TURNS>(cx, t, &t.classes[k], r, alpha);
             let [state, power, bend] = cx.load3(t.memory.rows, r, row::STATE);
             // -p' of the quadratic model, whose force is power at α = 0
             let model = power - alpha * bend;

@@ -42,7 +42,7 @@ impl<'a, F: Num> Line<'a, F> {
     /// `curvature` is sᵀ M s, `power` is |τ a|, and `jar_minimum` has the change of `jar` over the segment. The worlds that
     /// `corrects` holds in have contacts; of these `AHEAD` becomes the change of `JAR`.
     #[inline(always)]
-    pub fn new<C: Cx<F = F>>(
+    pub fn new<C: Cx<F = F>, const TURNS: bool>(
         cx: &mut C,
         m: &Constants<F::Real>,
         params: &'a [F],
@@ -66,7 +66,7 @@ impl<'a, F: Num> Line<'a, F> {
         let mut noise = size * epsilon;
         if let Some(corrects) = corrects {
             let (mut sum, mut all) = (cx.var(descent), cx.var(terms));
-            contacts::begin_line(cx, &m.contacts, &mut sum, &mut all);
+            contacts::begin_line::<_, TURNS>(cx, &m.contacts, &mut sum, &mut all);
             descent = cx.get(&sum);
             noise = F::select(corrects, cx.get(&all) * (epsilon * epsilon), noise);
         }
@@ -82,7 +82,7 @@ impl<'a, F: Num> Line<'a, F> {
     }
 
     #[inline(always)]
-    fn derivative<C: Cx<F = F>>(
+    fn derivative<C: Cx<F = F>, const TURNS: bool>(
         &self,
         cx: &mut C,
         m: &Constants<F::Real>,
@@ -113,7 +113,7 @@ impl<'a, F: Num> Line<'a, F> {
             let mut curvature = cx.var(d.curvature);
             let mut size = cx.var(d.size);
             let t = &m.contacts;
-            contacts::derivative(cx, t, alpha, &mut slope, &mut curvature, &mut size);
+            contacts::derivative::<_, TURNS>(cx, t, alpha, &mut slope, &mut curvature, &mut size);
             d = Derivative {
                 slope: cx.get(&slope),
                 curvature: cx.get(&curvature),
@@ -149,7 +149,7 @@ const FAR: f64 = 1e10;
 /// The exact minimum on the segment or beyond it, p'(α) = 0: by Newton's method while its moves halve, otherwise by the chord
 /// of the bracket, with half the slope of an end that stays (Illinois method; Dowell and Jarratt 1971).
 #[inline(always)]
-pub(super) fn search<C: Cx>(
+pub(super) fn search<C: Cx, const TURNS: bool>(
     cx: &mut C,
     m: &ConstantsOf<C>,
     line: &Line<'_, C::F>,
@@ -171,7 +171,7 @@ pub(super) fn search<C: Cx>(
     let mut last_move = cx.var(one);
     times!(cx, m.solver.ls_iterations, {
         let alpha = cx.get(length);
-        let d = line.derivative(cx, m, alpha);
+        let d = line.derivative::<C, TURNS>(cx, m, alpha);
         let falls = d.slope.lt(zero);
         let below = C::F::select(falls, alpha, cx.get(&low));
         let above = C::F::select(falls, cx.get(&high), alpha);

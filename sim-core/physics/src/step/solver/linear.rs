@@ -19,7 +19,7 @@ pub(super) enum Unknown {
 ///
 /// A world whose contacts couple dofs that the mass matrix does not couple solves a larger system.
 #[inline(always)]
-pub(super) fn solve_system<C: Cx>(
+pub(super) fn solve_system<C: Cx, const TURNS: bool>(
     cx: &mut C,
     m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
@@ -73,7 +73,7 @@ pub(super) fn solve_system<C: Cx>(
         if touches {
             for k in 0..t.classes.len() {
                 if t.classes[k].couples == larger {
-                    contacts::assemble(cx, t, k, cells, &mut b.pull, pulls);
+                    contacts::assemble::<_, TURNS>(cx, t, k, cells, &mut b.pull, pulls);
                 }
             }
         }

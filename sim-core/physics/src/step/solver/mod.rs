@@ -66,6 +66,7 @@ pub use refine::{Accelerations, Refine};
 
 use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::Array as A;
+use crate::constants::Constants;
 use crate::constants::contact::row;
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::factor::{multiply, solve as solve_linear};
@@ -74,10 +75,11 @@ use line::{Line, search};
 use progress::{Found, Pieces, Plan, Progress};
 use rows::{assemble, cost, forces, residual};
 
-/// Accelerations and constraint forces.
-pub struct Solver;
+/// Accelerations and constraint forces. Where a contact has torsional friction, `TURNS` is true: other models run a
+/// solver without code for it.
+pub struct Solver<const TURNS: bool>;
 
-impl Stage for Solver {
+impl<const TURNS: bool> Stage for Solver<TURNS> {
     const READS: &'static [A] = &[
         A::JointQdd,
         A::Unconverged,
@@ -97,17 +99,22 @@ impl Stage for Solver {
         A::ContactForces,
     ];
 
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        let mut classes = m.contacts.classes.iter();
+        classes.any(|class| class.turns.is_some()) == TURNS
+    }
+
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        solve(cx, m, b);
+        solve::<C, TURNS>(cx, m, b);
     }
 }
 
 /// Newton's method, from the last step's accelerations to the minimum of the cost.
 #[inline(always)]
-fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     if <<C::F as Num>::Real as Real>::DOUBLE {
-        choose_start(cx, m, b);
+        choose_start::<C, TURNS>(cx, m, b);
     }
     let acts = acts(cx, m, &b.efc_weight);
     gather(cx, &b.efc_weight, &mut b.work.row_weight);
@@ -120,15 +127,15 @@ fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             break_if!(cx, !acts);
         }
         // the cost at a: residuals of the rows, H = M + Jᵀ W J and the right-hand side
-        model_cost(cx, m, b, corrects);
+        model_cost::<C, TURNS>(cx, m, b, corrects);
         // its minimum a⁺, and what bodies that touch gain by going there
-        let gain = minimize_model(cx, m, b, corrects);
+        let gain = minimize_model::<C, TURNS>(cx, m, b, corrects);
         // rows that are on another piece of their cost at a⁺
-        let pieces = Pieces::compare(cx, m, b, corrects);
+        let pieces = Pieces::compare::<TURNS>(cx, m, b, corrects);
         // the worlds that search the segment from a to a⁺
         let plan = progress.plan(cx, m, &pieces, gain, corrects);
         // where on it the cost is least
-        let found = search_segment(cx, m, b, &mut progress, &plan, corrects);
+        let found = search_segment::<C, TURNS>(cx, m, b, &mut progress, &plan, corrects);
         // the next a, and the worlds that have arrived
         advance(cx, b, &plan, &found);
         let done = progress.note(cx, &plan, &found, corrects);
@@ -142,17 +149,17 @@ fn solve<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             cx.set(force, C::F::c(0.0));
         }
         when!(cx, acts, {
-            constraint_forces(cx, m, b);
+            constraint_forces::<C, TURNS>(cx, m, b);
         });
     } else {
-        constraint_forces(cx, m, b);
+        constraint_forces::<C, TURNS>(cx, m, b);
     }
 }
 
 /// Writes H and the right-hand side at `a`: τ + Jᵀ (f + W J a), or τ + Jᵀ f - M a in worlds that solve for a correction.
 /// [`linear::solve_system`] adds the terms of contacts.
 #[inline(always)]
-fn model_cost<C: Cx>(
+fn model_cost<C: Cx, const TURNS: bool>(
     cx: &mut C,
     m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
@@ -174,19 +181,19 @@ fn model_cost<C: Cx>(
     residual(m, &w.limit_side, &w.row_aref, &w.start, &mut w.jar);
     assemble(m, &b.params, w, corrects);
     if corrects.is_some() {
-        contacts::residual(cx, &m.contacts, &w.start, row::JAR);
+        contacts::residual::<_, TURNS>(cx, &m.contacts, &w.start, row::JAR);
     }
 }
 
 /// Solves for the minimum a⁺ of the model. Returns the gain of bodies in contact, where it is known.
 #[inline(always)]
-fn minimize_model<C: Cx>(
+fn minimize_model<C: Cx, const TURNS: bool>(
     cx: &mut C,
     m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
     corrects: Option<MaskOf<C>>,
 ) -> C::F {
-    linear::solve_system(cx, m, b, linear::Unknown::Minimum, corrects);
+    linear::solve_system::<_, TURNS>(cx, m, b, linear::Unknown::Minimum, corrects);
     let gain = match corrects {
         Some(corrects) if !<<C::F as Num>::Real as Real>::DOUBLE => {
             C::F::select(corrects, linear::touched_gain(cx, m, b), C::F::c(UNKNOWN))
@@ -215,7 +222,7 @@ fn advance<C: Cx>(cx: &mut C, b: &mut BlockOf<C>, plan: &Plan<C>, found: &Found<
 
 /// Searches the segment from a to a⁺ for the least cost, and judges whether that ends the solve.
 #[inline(always)]
-fn search_segment<C: Cx>(
+fn search_segment<C: Cx, const TURNS: bool>(
     cx: &mut C,
     m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
@@ -242,8 +249,8 @@ fn search_segment<C: Cx>(
         for r in 0..m.rows() {
             w.jar_minimum[r] = w.jar_minimum[r] - w.jar[r];
         }
-        let line = Line::new(cx, m, &b.params, curvature, power, &b.work, corrects);
-        search::<C>(cx, m, &line, &mut found.length);
+        let line = Line::new::<C, TURNS>(cx, m, &b.params, curvature, power, &b.work, corrects);
+        search::<C, TURNS>(cx, m, &line, &mut found.length);
         progress.judge(cx, m, &line, &mut found, plan, corrects);
     });
     found
@@ -257,7 +264,7 @@ pub(super) fn touching<C: Cx>(cx: &mut C, m: &ConstantsOf<C>) -> Option<MaskOf<C
 
 /// Forces of the rows at the accelerations found.
 #[inline(always)]
-fn constraint_forces<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+fn constraint_forces<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let w = &mut b.work;
     let (a, joint) = (&mut w.start, &mut w.joint_force);
     let (jar, force) = (&mut w.jar, &mut w.row_force);
@@ -274,8 +281,8 @@ fn constraint_forces<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) 
     for j in 0..m.dofs.len() {
         cx.set(&mut b.constraint_force[j], joint[j]);
     }
-    contacts::residual(cx, &m.contacts, a, row::JAR);
-    contacts::forces(cx, &m.contacts, &mut b.constraint_force);
+    contacts::residual::<_, TURNS>(cx, &m.contacts, a, row::JAR);
+    contacts::forces::<_, TURNS>(cx, &m.contacts, &mut b.constraint_force);
 }
 
 /// A gain that is not known [J/s²]: larger than any.
@@ -321,7 +328,7 @@ fn acts<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, weight: &[C::V]) -> MaskOf<C> {
 /// reference must reproduce. In `f32` it is not worth a factorisation and extra iterations: from a start without constraints
 /// more rows change their piece.
 #[inline(always)]
-fn choose_start<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+fn choose_start<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let n = m.dofs.len();
     let w = &mut b.work;
     gather(cx, &b.efc_weight, &mut w.row_weight);
@@ -345,10 +352,10 @@ fn choose_start<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     }
     let mut cost_warm = cx.var(gauss.fma(C::F::c(0.5), cost(m, &b.params, weight, jar)));
     let mut cost_smooth = cx.var(cost(m, &b.params, weight, jar_smooth));
-    contacts::residual(cx, &m.contacts, warm, row::JAR);
-    contacts::residual(cx, &m.contacts, smooth, row::AHEAD);
-    contacts::cost(cx, &m.contacts, row::JAR, &mut cost_warm);
-    contacts::cost(cx, &m.contacts, row::AHEAD, &mut cost_smooth);
+    contacts::residual::<_, TURNS>(cx, &m.contacts, warm, row::JAR);
+    contacts::residual::<_, TURNS>(cx, &m.contacts, smooth, row::AHEAD);
+    contacts::cost::<_, TURNS>(cx, &m.contacts, row::JAR, &mut cost_warm);
+    contacts::cost::<_, TURNS>(cx, &m.contacts, row::AHEAD, &mut cost_smooth);
     let cheaper = cx.get(&cost_smooth).lt(cx.get(&cost_warm));
     for j in 0..n {
         cx.set(

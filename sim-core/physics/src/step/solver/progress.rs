@@ -63,7 +63,7 @@ fn trusted_iterations<F: Num>() -> f64 {
 impl<C: Cx> Pieces<C> {
     /// Residuals at a⁺, and how their rows differ from those at a.
     #[inline(always)]
-    pub fn compare(
+    pub fn compare<const TURNS: bool>(
         cx: &mut C,
         m: &ConstantsOf<C>,
         b: &mut BlockOf<C>,
@@ -80,8 +80,8 @@ impl<C: Cx> Pieces<C> {
         let [sum, turned] = changes(m, &b.params, &w.row_weight, &w.jar, &w.jar_minimum);
         let (mut moved, mut curved) = (cx.var(sum), cx.var(turned));
         if corrects.is_some() {
-            contacts::residual(cx, &m.contacts, &w.minimum, row::AHEAD);
-            contacts::changes(cx, &m.contacts, &mut moved, &mut curved);
+            contacts::residual::<_, TURNS>(cx, &m.contacts, &w.minimum, row::AHEAD);
+            contacts::changes::<_, TURNS>(cx, &m.contacts, &mut moved, &mut curved);
         }
         Pieces {
             changed: half.lt(cx.get(&moved)),

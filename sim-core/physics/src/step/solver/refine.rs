@@ -138,9 +138,9 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     w.hessian.copy_from_slice(&w.mass_matrix);
     residual(m, &w.limit_side, &w.row_aref, &w.start, &mut w.jar);
     assemble(m, &b.params, w, None);
-    contacts::residual(cx, &m.contacts, &w.start, row::JAR);
+    contacts::residual::<_, true>(cx, &m.contacts, &w.start, row::JAR);
     let touching = contacts::touching(cx, &m.contacts);
-    solve_system(cx, m, b, Unknown::Missing, touching);
+    solve_system::<_, true>(cx, m, b, Unknown::Missing, touching);
     // the corrected accelerations, and the forces of joint rows and contacts at them
     let w = &mut b.work;
     let (missing, a, joint) = (&w.missing, &mut w.start, &mut w.joint_force);
@@ -159,6 +159,6 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     for j in 0..n {
         cx.set(&mut b.constraint_force[j], joint[j]);
     }
-    contacts::residual(cx, &m.contacts, a, row::JAR);
-    contacts::forces(cx, &m.contacts, &mut b.constraint_force);
+    contacts::residual::<_, true>(cx, &m.contacts, a, row::JAR);
+    contacts::forces::<_, true>(cx, &m.contacts, &mut b.constraint_force);
 }

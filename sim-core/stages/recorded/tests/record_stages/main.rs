@@ -133,7 +133,9 @@ fn every_stage_is_recorded_and_its_program_is_valid() {
                 statements.total()
             );
             let most = match stage.name() {
-                "solver" if !m.contacts.classes.is_empty() => SOLVER_STATEMENTS_MAX,
+                "solver" | "solver_turning" if !m.contacts.classes.is_empty() => {
+                    SOLVER_STATEMENTS_MAX
+                }
                 _ => STATEMENTS_MAX,
             };
             assert!(
