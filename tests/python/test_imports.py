@@ -60,7 +60,7 @@ LAYERS = (
     ("tightloop.view",),
     ("tightloop.env",),
     ("tightloop.tasks", "tightloop.adapters"),
-    ("tightloop.demo",),
+    ("tightloop.demo", "tightloop.mujoco.serve"),
     ("tightloop.__main__",),
 )
 

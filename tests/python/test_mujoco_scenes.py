@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import mujoco
 import numpy as np
 import pytest
@@ -92,6 +96,25 @@ def test_what_is_left_out_is_noted():
         "its 1 sensors are not read",
         "its 1 keyframes are not read",
     ]
+
+
+def test_a_model_is_served_from_the_command_line(tmp_path):
+    path = tmp_path / "cart.xml"
+    path.write_text(CART)
+    name = f"cart-{os.getpid()}"
+    command = [sys.executable, "-m", "tightloop", "serve", str(path), "--worlds=3", f"--name={name}"]
+    daemon = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        assert daemon.stdout is not None and daemon.stdout.readline()
+        with tl.attach(name) as sim:
+            assert sim.actuator_names == ["cart/push", "cart/actuator1"]
+            assert sim.step(ctrl=[1, 0]).joint_q.shape == (3, 9)
+    finally:
+        daemon.terminate()
+        daemon.wait(10)
+    path.write_text("<mujoco><worldbody><nonsense/></worldbody></mujoco>")
+    failed = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert failed.returncode == 1 and "MuJoCo cannot compile it" in failed.stderr
 
 
 def test_models_stand_beside_robots_and_bodies(model):

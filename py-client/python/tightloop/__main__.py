@@ -28,9 +28,21 @@ def main() -> int:
         return code
     from tightloop import _core
 
+    arguments = sys.argv[1:]
+    if arguments[:1] == ["serve"]:
+        arguments = [_scene_file(argument) for argument in arguments]
     # Rust does the work and never returns to the interpreter in between: Python's own handler would only set a flag.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    return _core.command_line(["tightloop", *sys.argv[1:]])
+    return _core.command_line(["tightloop", *arguments])
+
+
+def _scene_file(argument: str) -> str:
+    """Return the scene file of an MJCF file; any other argument stays as it is."""
+    if not argument.endswith(".xml") or not Path(argument).is_file():
+        return argument
+    from tightloop.mujoco import serve
+
+    return serve.scene_file(argument)
 
 
 if __name__ == "__main__":
