@@ -245,7 +245,7 @@ impl ContactBuilder<'_> {
                         place: 0,
                         len: 1,
                     });
-                    couples |= self.constants.pattern.find(row, column).is_none();
+                    couples |= !self.constants.pattern.has(row, column);
                 }
             }
         }

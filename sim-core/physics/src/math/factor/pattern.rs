@@ -243,20 +243,23 @@ impl Pattern {
         self.starts[row] + self.places[column]
     }
 
-    /// Where entry (row, column) of either triangle is kept, if it is.
+    /// Where entry (row, column) of either triangle is kept, if it is. A general block keeps its zeros, too.
     pub fn find(&self, row: usize, column: usize) -> Option<usize> {
         let (row, column) = (row.max(column), row.min(column));
         let block = &self.blocks[self.block_of[row]];
         let kept = match block.kind {
-            Kind::Dense => column >= block.first,
-            Kind::Tree | Kind::General => {
-                let bounds = self.path_bounds[row]..self.path_bounds[row + 1];
-                column == row
-                    || (column >= block.first
-                        && self.path_rows[bounds].contains(&(column - block.first)))
-            }
+            Kind::Dense | Kind::General => column >= block.first,
+            Kind::Tree => self.has(row, column),
         };
         kept.then(|| self.at(row, column))
+    }
+
+    /// May entry (row, column) of either triangle differ from zero? A factorisation visits no other.
+    pub fn has(&self, row: usize, column: usize) -> bool {
+        let (row, column) = (row.max(column), row.min(column));
+        let block = &self.blocks[self.block_of[row]];
+        let path = &self.path_rows[self.path_bounds[row]..self.path_bounds[row + 1]];
+        column == row || (column >= block.first && path.contains(&(column - block.first)))
     }
 
     #[inline(always)]
