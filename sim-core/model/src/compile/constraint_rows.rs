@@ -106,7 +106,7 @@ pub(super) fn add_rows(
                 dof,
                 lower,
                 upper,
-                soft: soft.clone(),
+                soft,
             });
             constants.limits.extend(rows);
         } else if let Some([lower, upper]) = joint.range {

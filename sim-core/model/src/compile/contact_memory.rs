@@ -36,8 +36,8 @@ impl ContactBuilder<'_> {
         stride: usize,
         widest: usize,
         rows: usize,
-        is_wide: bool,
     ) {
+        let is_wide = contacts.classes.iter().any(|class| class.turns.is_some());
         let row_len = match is_wide {
             true => row::JACOBIAN + turning::JACOBIAN + 6 * widest,
             false => row::JACOBIAN + 3 * widest,

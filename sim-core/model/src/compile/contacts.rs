@@ -108,7 +108,7 @@ impl ContactBuilder<'_> {
         // a backend that knows only the largest size of each class must provide this many rows
         let [first_end, capacity_end] = contacts.row_ends();
         let rows = first_end + capacity_end - 2;
-        self.lay_out(contacts, numbers, indices, stride, widest, rows, is_wide);
+        self.lay_out(contacts, numbers, indices, stride, widest, rows);
         let ratios: Vec<[f64; 2]> = pairs.iter().map(|&pair| self.turning(pair)).collect();
         if is_wide {
             contacts.turning = Fixed {

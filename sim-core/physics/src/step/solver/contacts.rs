@@ -177,7 +177,7 @@ pub(super) fn assemble<C: Cx, const TURNS: bool>(
     let list = class_list(cx, t, k);
     if let Some(block) = block_of::<_, TURNS>(class) {
         each!(cx, r in list, {
-            assemble_turning(cx, t, class, block, r, hessian, rhs, pulls);
+            assemble_turning(cx, t, (class, block), r, hessian, rhs, pulls);
         });
         return;
     }
@@ -222,8 +222,7 @@ pub(super) fn assemble<C: Cx, const TURNS: bool>(
 fn assemble_turning<C: Cx>(
     cx: &mut C,
     t: &ContactsOf<C>,
-    class: &ClassOf<C>,
-    block: usize,
+    (class, block): (&ClassOf<C>, usize),
     r: C::I,
     hessian: &mut [C::V],
     rhs: &mut [C::V],
