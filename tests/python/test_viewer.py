@@ -10,24 +10,27 @@ import sys
 import time
 import urllib.request
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
+import viser
 
 import tightloop as tl
 from processes import alive, wait_until
 from tightloop.view import cameras, dependencies, grid
 from tightloop.view.batched_meshes import batched_meshes
 from tightloop.view.command import main
+from tightloop.view.display_options import DisplayOptions
 from tightloop.view.drag_spring import drag_spring
 from tightloop.view.frame_stream import FIELDS
-from tightloop.view.joints import at_targets, joints
+from tightloop.view.joints import Joint, at_targets, joints
 from tightloop.view.live_driver import LiveDriver
 from tightloop.view.parts import Mesh, Part
 from tightloop.view.player import Player
 from tightloop.view.plots import choices
 from tightloop.view.poses import IDENTITY
+from tightloop.view.sliders import Sliders
 from tightloop.view.source import Live
 
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float32)
@@ -334,3 +337,19 @@ def test_a_simulation_that_is_looked_at_steps_to_the_same_bits(lesson, torques):
                 sim.step(joint_f=torques(frame))
             runs.append(sim.forward().copy().joint_q)
     assert np.array_equal(*runs)
+
+
+def test_a_slider_that_a_user_moves_keeps_its_position_until_its_event_was_handled():
+    server = viser.ViserServer(host="127.0.0.1", port=8700, verbose=False)
+    try:
+        driven = [Joint(0, "r/a", -1.0, 1.0), Joint(1, "r/b", -1.0, 1.0)]
+        sliders = Sliders(server.gui, driven, cast(LiveDriver, None), DisplayOptions(), worlds=1)
+        moved, still = sliders._handles
+        sliders.update(np.array([0.1, 0.2]), disabled=False)
+        assert (moved.value, still.value) == (0.1, 0.2)
+        # what viser does with a page's message before it starts callbacks
+        moved._impl.value = 0.5
+        sliders.update(np.array([0.1, 0.3]), disabled=False)
+        assert (moved.value, still.value) == (0.5, 0.3)
+    finally:
+        server.stop()

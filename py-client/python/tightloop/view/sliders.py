@@ -34,6 +34,8 @@ class Sliders:
     ) -> None:
         self._driven = driven
         self._moved_at = dict.fromkeys((joint.dof for joint in driven), 0.0)
+        # values that `update` has seen or written: another value is a user's, whose event may still be on its way
+        self._known: dict[int, float] = {}
         self._handles: list[viser.GuiSliderHandle[float]] = []
         if not driven:
             gui.add_markdown("No joint has a drive: `joint_target_ke` is 0 in all of them.")
@@ -49,6 +51,7 @@ class Sliders:
                 joint.lower,
             )
             self._handles.append(handle)
+            self._known[joint.dof] = handle.value
 
             @handle.on_update
             def _(event: Any, joint: Joint = joint, handle: Any = handle) -> None:
@@ -63,6 +66,9 @@ class Sliders:
         for joint, handle in zip(self._driven, self._handles, strict=True):
             handle.disabled = disabled
             value = min(max(float(targets[joint.dof]), joint.lower), joint.upper)
+            if handle.value != self._known[joint.dof]:
+                self._known[joint.dof] = handle.value
+                self._moved_at[joint.dof] = now
             held = now - self._moved_at[joint.dof] < _HELD_SECONDS
             if not held and abs(value - handle.value) > (joint.upper - joint.lower) / _STEPS:
-                handle.value = value
+                handle.value = self._known[joint.dof] = value
