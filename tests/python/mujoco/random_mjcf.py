@@ -22,8 +22,14 @@ class Features:
     armature: bool = False
     damping: bool = False
     equalities: bool = False
+    polynomials: bool = False
+    """Equalities of one joint, and of higher than first degree."""
+    connections: bool = False
+    """Points of bodies that are connected, and bodies and sites that are welded."""
     actuators: bool = False
     tendons: bool = False
+    pulls: bool = False
+    """Springs, dampers, limits, dry friction and equalities of tendons."""
     bounds: bool = False
     """Bounds of controls, actuator forces and sums of them on a joint."""
     geoms: bool = False
@@ -42,7 +48,7 @@ class _Model:
     def __init__(self, rng: np.random.Generator, features: Features) -> None:
         self.rng, self.features = rng, features
         self.scalars: list[str] = []
-        self.joints = 0
+        self.joints = self.bodies = 0
 
     def has(self, feature: str, share: float = 0.5) -> bool:
         return getattr(self.features, feature) and self.rng.random() < share
@@ -80,7 +86,7 @@ class _Model:
     def body(self, size: int, *, root: bool = False) -> str:
         joints = ""
         if root and self.has("free"):
-            joints = f'<freejoint name="j{self._next()}"/>'
+            joints = f'<joint type="free" name="j{self._next()}" {self.dry()}/>'
         elif self.has("ball", 0.3):
             joints = self.ball()
         elif self.rng.random() > 0.1:
@@ -98,7 +104,10 @@ class _Model:
             inside += self.body(own)
             size -= own
         pose = f'pos="{self.numbers(3, -0.6, 0.6)}" quat="{self.numbers(4)}"'
-        return f"<body {pose}>{joints}{inertial}{self.geom()}{inside}</body>"
+        self.bodies += 1
+        name = f'name="b{self.bodies}"'
+        site = f'<site name="s{self.bodies}" pos="{self.numbers(3, -0.2, 0.2)}" quat="{self.numbers(4)}"/>'
+        return f"<body {name} {pose}>{joints}{inertial}{site}{self.geom()}{inside}</body>"
 
     def _next(self) -> int:
         self.joints += 1
@@ -113,7 +122,18 @@ class _Model:
         return text
 
     def ball(self) -> str:
-        return f'<joint name="j{self._next()}" type="ball" pos="{self.numbers(3, -0.2, 0.2)}"{self.passive()}/>'
+        text = f'<joint name="j{self._next()}" type="ball" pos="{self.numbers(3, -0.2, 0.2)}"{self.passive()}'
+        if self.has("limits"):
+            text += f' range="0 {self.rng.uniform(0.2, 1.5):.17g}" margin="{self.rng.choice([0.0, 0.3])}"'
+            text += f" {self.softness(('solreflimit', 'solimplimit'))}"
+        return f"{text} {self.dry()}/>"
+
+    def dry(self) -> str:
+        """Dry friction of a joint."""
+        if not self.has("friction"):
+            return ""
+        soft = self.softness(("solreffriction", "solimpfriction"))
+        return f'frictionloss="{self.rng.uniform(0.05, 1):.17g}" {soft}'
 
     def scalar(self) -> str:
         name = f"j{self._next()}"
@@ -130,9 +150,7 @@ class _Model:
             low, high = np.sort(self.rng.uniform(-0.6, 0.6, 2))
             margin = self.rng.choice([0.0, 0.05, 0.5])
             text += f' range="{low:.17g} {high:.17g}" margin="{margin}" {self.softness(("solreflimit", "solimplimit"))}'
-        if self.has("friction"):
-            text += f' frictionloss="{self.rng.uniform(0.05, 1):.17g}"'
-            text += f" {self.softness(('solreffriction', 'solimpfriction'))}"
+        text += f" {self.dry()}"
         if self.has("bounds", 0.3):
             text += ' actuatorfrcrange="-0.5 0.7"'
         return text + "/>"
@@ -157,16 +175,57 @@ class _Model:
         for k in range(2):
             own = self.rng.choice(self.scalars, min(len(self.scalars), 2 + k), replace=False)
             terms = "".join(f'<joint joint="{name}" coef="{self.rng.uniform(-1, 1):.17g}"/>' for name in own)
-            text += f'<fixed name="t{k}">{terms}</fixed>'
+            text += f'<fixed name="t{k}" {self.pulls()}>{terms}</fixed>'
         return f"<tendon>{text}</tendon>"
 
+    def pulls(self) -> str:
+        """What acts along a tendon."""
+        text, rng = "", self.rng
+        if self.has("pulls"):
+            text += f'stiffness="{rng.uniform(0.5, 20):.17g}" damping="{rng.uniform(0.05, 2):.17g}" '
+        if self.has("pulls"):
+            low, high = np.sort(rng.uniform(-0.5, 0.5, 2))
+            text += f'springlength="{low:.17g} {high:.17g}" '
+        if self.has("pulls"):
+            low, high = np.sort(rng.uniform(-0.4, 0.4, 2))
+            text += f'range="{low:.17g} {high:.17g}" margin="{rng.choice([0.0, 0.3])}" '
+            text += self.softness(("solreflimit", "solimplimit"))
+        if self.has("pulls"):
+            text += f' frictionloss="{rng.uniform(0.05, 1):.17g}" {self.softness(("solreffriction", "solimpfriction"))}'
+        return text
+
     def equalities(self) -> str:
-        if not self.features.equalities or len(self.scalars) < 2:
-            return ""
-        first, second = self.rng.choice(self.scalars, 2, replace=False)
-        line = f'polycoef="{self.rng.uniform(-0.2, 0.2):.17g} {self.rng.uniform(-1, 1):.17g} 0 0 0"'
-        soft = self.softness(("solref", "solimp"))
-        return f'<equality><joint joint1="{first}" joint2="{second}" {line} {soft}/></equality>'
+        rng, text = self.rng, ""
+        if self.features.equalities and len(self.scalars) >= 2:
+            first, second = rng.choice(self.scalars, 2, replace=False)
+            line = f'polycoef="{rng.uniform(-0.2, 0.2):.17g} {rng.uniform(-1, 1):.17g} 0 0 0"'
+            text += f'<joint joint1="{first}" joint2="{second}" {line} {self.equality()}/>'
+        if self.features.polynomials and len(self.scalars) >= 2:
+            first, second = rng.choice(self.scalars, 2, replace=False)
+            other = f'joint2="{second}"' if rng.random() < 0.7 else ""
+            text += f'<joint joint1="{first}" {other} polycoef="{self.numbers(5, -0.5, 0.5)}" {self.equality()}/>'
+        if self.features.pulls and len(self.scalars) >= 2:
+            other = 'tendon2="t1"' if rng.random() < 0.7 else ""
+            text += f'<tendon tendon1="t0" {other} polycoef="{self.numbers(5, -0.5, 0.5)}" {self.equality()}/>'
+        if self.has("connections", 0.7):
+            text += self.connection("connect") + self.connection("weld")
+        return f"<equality>{text}</equality>"
+
+    def equality(self) -> str:
+        return self.softness(("solref", "solimp"))
+
+    def connection(self, kind: str) -> str:
+        """Two bodies or sites that are held together, or a body and the world."""
+        rng = self.rng
+        first, second = int(rng.integers(1, self.bodies + 1)), int(rng.integers(0, self.bodies + 1))
+        scale = f'torquescale="{rng.uniform(0.2, 2):.17g}"' if kind == "weld" else ""
+        if second and rng.random() < 0.5:
+            return f'<{kind} site1="s{first}" site2="s{second}" {scale} {self.equality()}/>'
+        place = f'anchor="{self.numbers(3, -0.3, 0.3)}"'
+        if kind == "weld" and rng.random() < 0.5:
+            place += f' relpose="{self.numbers(7, -0.5, 0.5)}"'
+        other = f'body2="b{second}"' if second else ""
+        return f'<{kind} body1="b{first}" {other} {place} {scale} {self.equality()}/>'
 
     def actuators(self) -> str:
         if not self.features.actuators or not self.scalars:

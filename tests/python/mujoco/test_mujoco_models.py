@@ -15,7 +15,17 @@ TREES = int(os.environ.get("TIGHTLOOP_LIVE_TREES", "48")) // 8
 JOINTS = Features(free=True, ball=True, several=True, reference=True)
 ACTUATED = replace(JOINTS, actuators=True, tendons=True)
 EVERYTHING = replace(
-    ACTUATED, springs=True, limits=True, friction=True, armature=True, damping=True, equalities=True, bounds=True
+    ACTUATED,
+    springs=True,
+    limits=True,
+    friction=True,
+    armature=True,
+    damping=True,
+    equalities=True,
+    polynomials=True,
+    connections=True,
+    pulls=True,
+    bounds=True,
 )
 FEATURES = {
     "joints": JOINTS,
@@ -27,6 +37,11 @@ FEATURES = {
     "limits": replace(JOINTS, limits=True),
     "friction": replace(JOINTS, friction=True),
     "equalities": replace(JOINTS, equalities=True),
+    "polynomials": replace(JOINTS, polynomials=True),
+    "connections": replace(JOINTS, connections=True),
+    "tendons": replace(JOINTS, tendons=True, pulls=True),
+    "tendons of actuators": replace(ACTUATED, pulls=True, option='integrator="implicitfast"'),
+    "explicit tendons": replace(JOINTS, tendons=True, pulls=True, flag='eulerdamp="disable"'),
     "actuators": ACTUATED,
     "implicit actuators": replace(ACTUATED, bounds=True, option='integrator="implicitfast"'),
     "bounds": replace(ACTUATED, bounds=True),

@@ -36,8 +36,10 @@ _ARRAYS = """
     geom_quat geom_size geom_dataid geom_contype geom_conaffinity geom_condim geom_priority geom_solmix
     geom_solref geom_solimp geom_friction geom_margin geom_gap geom_fluid
     mesh_vertadr mesh_vertnum mesh_vert mesh_faceadr mesh_facenum mesh_face exclude_signature
-    eq_obj1id eq_obj2id eq_active0 eq_data eq_solref eq_solimp tendon_adr tendon_num tendon_damping
-    tendon_stiffness tendon_frictionloss tendon_limited wrap_objid wrap_prm actuator_trnid actuator_gear
+    eq_obj1id eq_obj2id eq_active0 eq_data eq_solref eq_solimp site_bodyid site_pos site_quat
+    tendon_adr tendon_num tendon_damping tendon_stiffness tendon_lengthspring tendon_frictionloss tendon_limited
+    tendon_range tendon_margin tendon_length0 tendon_invweight0 tendon_solref_lim tendon_solimp_lim
+    tendon_solref_fri tendon_solimp_fri wrap_objid wrap_prm actuator_trnid actuator_gear
     actuator_gainprm actuator_biasprm actuator_ctrllimited actuator_ctrlrange actuator_forcelimited
     actuator_forcerange actuator_actlimited actuator_group key_time
 """.split()
@@ -52,6 +54,7 @@ _KINDS = {
     "jnt_type": "mjtJoint",
     "geom_type": "mjtGeom",
     "eq_type": "mjtEq",
+    "eq_objtype": "mjtObj",
     "wrap_type": "mjtWrap",
     "actuator_trntype": "mjtTrn",
     "actuator_dyntype": "mjtDyn",

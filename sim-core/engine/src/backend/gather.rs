@@ -28,7 +28,7 @@ pub(super) fn gather<C: Cx>(
             Field::Qacc => mujoco_state::accelerations(cx, m, b, to),
             Field::BodyJacobian => body_jacobian(m, w, to),
             Field::SiteInverseJacobian => inverse_jacobian(m, w, to),
-            Field::EfcJ => jacobian(cx, m, &b.efc_weight, &w.limit_side, to),
+            Field::EfcJ => jacobian(cx, m, &b.efc_weight, [&w.limit_side, &w.row_jacobian], to),
             _ => unreachable!("`{}` is not gathered", field.row().name),
         },
     }
@@ -103,7 +103,13 @@ fn inverse_jacobian<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, to: &mut [
 
 /// The constraint Jacobian in full, `(rows, dofs)`.
 #[inline(always)]
-fn jacobian<C: Cx>(cx: &C, m: &ConstantsOf<C>, weight: &[C::V], side: &[C::F], to: &mut [C::F]) {
+fn jacobian<C: Cx>(
+    cx: &C,
+    m: &ConstantsOf<C>,
+    weight: &[C::V],
+    [side, ties]: [&[C::F]; 2],
+    to: &mut [C::F],
+) {
     let (dofs, zero, one) = (m.dofs.len(), C::F::c(0.0), C::F::c(1.0));
     to.fill(zero);
     let mut row = 0;
@@ -119,5 +125,14 @@ fn jacobian<C: Cx>(cx: &C, m: &ConstantsOf<C>, weight: &[C::V], side: &[C::F], t
     for (l, side) in m.limits.iter().zip(side) {
         to[row * dofs + l.dof] = C::F::select(zero.lt(cx.get(&weight[row])), *side, zero);
         row += 1;
+    }
+    for tie in &m.mujoco.ties {
+        for own in 0..tie.rows {
+            let active = zero.lt(cx.get(&weight[row]));
+            for (entry, &dof) in ties[tie.jacobian(own)].iter().zip(&tie.dofs) {
+                to[row * dofs + dof] = C::F::select(active, *entry, zero);
+            }
+            row += 1;
+        }
     }
 }

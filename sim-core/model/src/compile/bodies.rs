@@ -2,12 +2,13 @@
 
 use super::carrier::Carrier;
 use super::constraint_rows::{DofEquality, DofJoint, SoftJoint};
+use super::ties::{DofConstraint, terms};
 use crate::description::{self, Joint, MujocoJoint, MujocoParts, Robot, TargetMode};
 use crate::inertia::{Inertial, merge};
 use crate::joint_kind::JointKind;
 use crate::model::{RobotRange, Start};
 use crate::pose::Pose;
-use sim_physics::constants::mujoco::{Actuator, ActuatorBound, Mujoco, Spring, Term};
+use sim_physics::constants::mujoco::{Actuator, ActuatorBound, Mujoco, Spring, Tendon, Term};
 use sim_physics::constants::{Body, Dof, Frame, MassEntry, Motion, Tree};
 use sim_physics::math::factor::Pattern;
 
@@ -25,6 +26,7 @@ pub(super) struct BodyBuilder {
     pub start: Start,
     pub mujoco: Mujoco<f64>,
     pub equalities: Vec<DofEquality>,
+    pub constraints: Vec<DofConstraint>,
     pub actuator_names: Vec<String>,
     couplings: Vec<(usize, usize)>,
     /// How each link of each robot is carried.
@@ -95,7 +97,7 @@ impl BodyBuilder {
             self.add_followers(robot, joint, &dof_of);
         }
         if let Some(parts) = &robot.mujoco {
-            self.add_mujoco(robot, parts, &dof_of);
+            self.add_mujoco(robot, parts, &dof_of, &carriers);
         }
         self.carriers.push(carriers);
         self.robots.push(RobotRange {
@@ -255,7 +257,13 @@ impl BodyBuilder {
     }
 
     /// What only MuJoCo's robots have, by their dofs.
-    fn add_mujoco(&mut self, robot: &Robot, parts: &MujocoParts, dof_of: &[usize]) {
+    fn add_mujoco(
+        &mut self,
+        robot: &Robot,
+        parts: &MujocoParts,
+        dof_of: &[usize],
+        carriers: &[Carrier],
+    ) {
         for index in robot.moving_joints() {
             let (joint, own) = (&robot.joints[index], &parts.joints[index]);
             let dofs = dof_of[index]..dof_of[index] + joint.dofs.len();
@@ -293,12 +301,23 @@ impl BodyBuilder {
                 safe_references: parts.safe_references,
             });
         }
-        for actuator in &parts.actuators {
-            let terms = actuator.terms.iter().map(|&(joint, coefficient)| Term {
-                dof: dof_of[joint],
-                coefficient,
+        for constraint in &parts.constraints {
+            let bodies = &self.bodies;
+            let own =
+                DofConstraint::new(constraint, dof_of, carriers, bodies, parts.safe_references);
+            self.couplings.extend(own.couplings());
+            self.constraints.push(own);
+        }
+        for tendon in &parts.tendons {
+            self.mujoco.tendons.push(Tendon {
+                terms: terms(&tendon.terms, dof_of),
+                stiffness: tendon.stiffness,
+                rest: tendon.rest,
+                damping: tendon.damping,
             });
-            let terms: Vec<Term<f64>> = terms.collect();
+        }
+        for actuator in &parts.actuators {
+            let terms = terms(&actuator.terms, dof_of);
             self.actuator_names
                 .push(format!("{}/{}", robot.name, actuator.name));
             self.mujoco.actuators.push(actuator_of(actuator, terms));

@@ -77,7 +77,7 @@ pub(super) fn add_rows(
             });
         }
         let moves_freely = constants.bodies[constants.dofs[dof].body].motion == Motion::Free;
-        if joint.friction > 0.0 || friction_varies && !moves_freely {
+        if (joint.friction > 0.0 || friction_varies) && !moves_freely {
             let soft = match joint.mujoco {
                 Some(own) => own_soft(&own.friction, weight, dt, own.safe_references),
                 None => soft(SOLREF, weight, dt),
@@ -126,10 +126,10 @@ pub(super) fn add_rows(
 }
 
 /// An end of a range that no joint reaches [rad or m].
-const FAR: f64 = 1e18;
+pub(super) const FAR: f64 = 1e18;
 
 /// Softness as a model from MuJoCo has it.
-fn own_soft(softness: &Softness, inverse_weight: f64, dt: f64, is_safe: bool) -> Soft<f64> {
+pub(super) fn own_soft(softness: &Softness, inverse_weight: f64, dt: f64, is_safe: bool) -> Soft<f64> {
     let (stiffness, damping) = softness.reference(dt, is_safe);
     Soft {
         stiffness,

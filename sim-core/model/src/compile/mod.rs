@@ -15,6 +15,7 @@ mod contact_pieces;
 mod contacts;
 mod inverse_weight;
 mod sites;
+mod ties;
 
 use crate::description::{Description, Robot};
 use crate::error::ModelError;
@@ -120,6 +121,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         scene.params.contains(&Param::JointFriction),
     );
     constants.mujoco = builder.mujoco;
+    ties::add_ties(&mut constants, builder.constraints);
     check_models(scene)?;
     if let Some(parts) = scene.robots.iter().find_map(|robot| robot.mujoco.as_ref()) {
         constants.mujoco.integrator = parts.integrator;
@@ -239,7 +241,12 @@ fn is_damped(m: &Constants<f64>, implicit_damping: bool) -> bool {
     match m.mujoco.integrator {
         Integrator::Euler => m.damped && implicit_damping,
         Integrator::RungeKutta => false,
-        Integrator::ImplicitFast => m.damped || m.mujoco.actuators.iter().any(of_actuators),
+        Integrator::ImplicitFast => {
+            let tendons = &m.mujoco.tendons;
+            m.damped
+                || m.mujoco.actuators.iter().any(of_actuators)
+                || tendons.iter().any(|tendon| tendon.damping != 0.0)
+        }
     }
 }
 

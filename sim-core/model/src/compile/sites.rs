@@ -68,7 +68,7 @@ fn columns(bodies: &[Body<f64>], own: Option<usize>, other: Option<usize>) -> Ve
     columns
 }
 
-fn mounted(body: Option<usize>, tree: Option<usize>, pose: &Pose) -> Mount<f64> {
+pub(super) fn mounted(body: Option<usize>, tree: Option<usize>, pose: &Pose) -> Mount<f64> {
     let pose = pose.normalized();
     let rows = pose.rotation();
     Mount {

@@ -1,5 +1,6 @@
 //! What a robot that MuJoCo compiled has beyond links and joints.
 
+use super::mujoco_constraints::{Constraint, Tendon};
 use crate::softness::Softness;
 use sim_physics::constants::mujoco::Integrator;
 
@@ -16,6 +17,10 @@ pub struct MujocoParts {
     pub joints: Vec<MujocoJoint>,
     /// Joints that follow others.
     pub equalities: Vec<JointEquality>,
+    /// Other constraints.
+    pub constraints: Vec<Constraint>,
+    /// Springs and dampers of tendons.
+    pub tendons: Vec<Tendon>,
     /// Actuators.
     pub actuators: Vec<Actuator>,
     /// The link that each link is welded to, or itself.

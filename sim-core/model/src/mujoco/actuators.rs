@@ -3,7 +3,7 @@
 use super::format::ModelFile;
 use super::names::names;
 use super::options::has_flag;
-use super::tree::moving;
+use super::tendons::{Tendons, moving};
 use crate::description::{Actuator, Robot};
 use crate::error::ModelError;
 
@@ -23,29 +23,29 @@ pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), M
     let acts = !has_flag(file, "mjDSBL_ACTUATION")?;
     let disabled = file.integer("opt.disableactuator")?;
     let groups = file.integers("actuator_group", count)?;
+    let tendons = Tendons::read(file, robot)?;
     let mut actuators = Vec::new();
     for k in 0..count {
-        let target = usize::try_from(targets[k][0]).ok();
         let terms = match kinds[k].as_str() {
-            "mjTRN_TENDON" => tendon(file, target)?,
-            _ => target.map(|joint| (joint, 1.0)).into_iter().collect(),
+            "mjTRN_TENDON" => tendons.of(file, targets[k][0])?.to_vec(),
+            _ => {
+                let joint = usize::try_from(targets[k][0]).ok();
+                let place = joint.and_then(|joint| joints.get(joint)).copied();
+                let place = place.filter(|&place| robot.joints[place].dofs.len() == 1);
+                let place = place.ok_or_else(|| {
+                    let name = &names[k];
+                    file.fault(format!("has no joint of one dof for actuator `{name}`"))
+                })?;
+                vec![(place, 1.0)]
+            }
         };
-        let terms = terms.into_iter().map(|(joint, coefficient)| {
-            let place = joints.get(joint).copied();
-            let place = place.filter(|&place| robot.joints[place].dofs.len() == 1);
-            let place = place.ok_or_else(|| {
-                file.fault(format!(
-                    "has no joint of one dof for actuator `{}`",
-                    names[k]
-                ))
-            })?;
-            Ok((place, coefficient * gears[k][0]))
-        });
+        let terms = terms.into_iter();
+        let terms = terms.map(|(joint, coefficient)| (joint, coefficient * gears[k][0]));
         let is_on = acts && !((0..31).contains(&groups[k]) && disabled >> groups[k] & 1 == 1);
         let on = |law: [f64; 3]| if is_on { law } else { [0.0; 3] };
         actuators.push(Actuator {
             name: names[k].clone(),
-            terms: terms.collect::<Result<_, _>>()?,
+            terms: terms.collect(),
             ctrl_range: ctrl_ranges[k].filter(|_| clamps),
             force_range: force_ranges[k].filter(|_| is_on),
             gain: on(match gain_kinds[k].as_str() {
@@ -90,24 +90,4 @@ fn ranges(
     Ok(both
         .map(|(limited, range)| (limited != 0).then_some(range))
         .collect())
-}
-
-/// The joints of a fixed tendon, by MuJoCo's numbers, with their coefficients.
-fn tendon(file: &ModelFile, tendon: Option<usize>) -> Result<Vec<(usize, f64)>, ModelError> {
-    let (tendons, wraps) = (file.rows("tendon_num"), file.rows("wrap_type"));
-    let firsts = file.integers("tendon_adr", tendons)?;
-    let counts = file.integers("tendon_num", tendons)?;
-    let joints = file.integers("wrap_objid", wraps)?;
-    let coefficients = file.reals("wrap_prm", wraps)?;
-    let own = tendon.filter(|&tendon| tendon < tendons).map(|tendon| {
-        let first = firsts[tendon].max(0) as usize;
-        first..first + counts[tendon].max(0) as usize
-    });
-    let own = own.filter(|own| own.end <= wraps);
-    let own = own.ok_or_else(|| file.fault("has an actuator without its tendon".to_owned()))?;
-    let terms = own.map(|wrap| {
-        let joint = usize::try_from(joints[wrap]).unwrap_or(usize::MAX);
-        (joint, coefficients[wrap])
-    });
-    Ok(terms.collect())
 }

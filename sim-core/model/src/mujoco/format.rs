@@ -101,12 +101,6 @@ impl ModelFile {
         shape.and_then(|shape| shape.first().copied()).unwrap_or(0)
     }
 
-    /// Entries of a row of an array.
-    pub fn width(&self, name: &str) -> usize {
-        let shape = self.arrays.get(name).map(|(shape, _)| shape);
-        shape.map_or(0, |shape| shape.iter().skip(1).product())
-    }
-
     fn entries(&self, name: &str, count: usize) -> Result<&Entries, ModelError> {
         let Some((shape, entries)) = self.arrays.get(name) else {
             return Err(self.fault(format!("lacks the array `{name}`; save the scene again")));

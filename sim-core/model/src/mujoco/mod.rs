@@ -5,11 +5,13 @@
 //! ([`refusals`]): a model never runs differently in silence.
 
 mod actuators;
+mod constraints;
 mod format;
 mod geoms;
 mod names;
 mod options;
 mod refusals;
+mod tendons;
 mod tree;
 
 use std::path::Path;
@@ -67,6 +69,20 @@ fn notes(file: &ModelFile) -> Result<Vec<String>, ModelError> {
     let solver = file.texts("opt.solver")?;
     if let Some(solver) = solver.first().filter(|solver| *solver != "mjSOL_NEWTON") {
         notes.push(format!("Newton's method takes the place of {solver}"));
+    }
+    let spatial = refusals::spatial_tendons(file)?;
+    let spatial = spatial.iter().filter(|&&is_spatial| is_spatial).count();
+    if spatial > 0 {
+        notes.push(format!(
+            "its {spatial} spatial tendons, on which nothing acts, are not read"
+        ));
+    }
+    let active = file.integers("eq_active0", file.rows("eq_type"))?;
+    let idle = active.iter().filter(|&&active| active == 0).count();
+    if idle > 0 {
+        notes.push(format!(
+            "its {idle} equalities that are not active at the start are not read"
+        ));
     }
     let sensors = file.integer("nsensor")?;
     if sensors > 0 {

@@ -10,10 +10,6 @@ use crate::softness::POWER_MAX;
 const MUST_BE_ZERO: &[(&str, &str, &str)] = &[
     ("body", "body_gravcomp", "gravity compensation"),
     ("geom", "geom_fluid", "the ellipsoid fluid model"),
-    ("tendon", "tendon_damping", "damping of a tendon"),
-    ("tendon", "tendon_stiffness", "stiffness of a tendon"),
-    ("tendon", "tendon_frictionloss", "dry friction of a tendon"),
-    ("tendon", "tendon_limited", "limits of a tendon"),
     ("actuator", "actuator_actlimited", "bounds of an activation"),
 ];
 /// The same, of arrays that older versions of MuJoCo do not have.
@@ -128,10 +124,8 @@ fn joints(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
     let dofs = file.rows("dof_armature");
     let armatures = file.reals("dof_armature", dofs)?;
     let dampings = file.reals("dof_damping", dofs)?;
-    let losses = file.reals("dof_frictionloss", dofs)?;
     let curved = file.first_set("dof_dampingpoly");
     let stiffness = file.reals("jnt_stiffness", joints)?;
-    let limited = file.integers("jnt_limited", joints)?;
     let bounded = file.integers("jnt_actfrclimited", joints)?;
     let limits = file.vectors::<5>("jnt_solimp", joints)?;
     let frictions = file.vectors::<5>("dof_solimp", dofs)?;
@@ -148,12 +142,10 @@ fn joints(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
         let is_free = count == 6;
         let wrong = [
             (count > 1 && stiffness[joint] != 0.0, "stiffness"),
-            (count > 1 && limited[joint] != 0, "limits"),
             (
                 count > 1 && bounded[joint] != 0,
                 "bounds of actuator forces",
             ),
-            (count > 1 && any(&losses), "dry friction"),
             (is_free && any(&armatures), "armature"),
             (is_free && any(&dampings), "damping"),
             (
@@ -219,24 +211,11 @@ fn equalities(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelErro
     let count = file.rows("eq_type");
     let names = names(file, "equality", count)?;
     let kinds = file.kinds("eq_type", count)?;
-    let width = file.width("eq_data");
-    let data = file.reals("eq_data", count * width)?;
-    let seconds = file.integers("eq_obj2id", count)?;
     let active = file.integers("eq_active0", count)?;
     let solimps = file.vectors::<5>("eq_solimp", count)?;
-    for k in 0..count {
-        let own = &data[k * width..(k + 1) * width];
-        let bends = own
-            .get(2..5)
-            .is_some_and(|rest| rest.iter().any(|&x| x != 0.0));
+    for k in (0..count).filter(|&k| active[k] != 0) {
         let problem = match kinds[k].as_str() {
-            "mjEQ_JOINT" if seconds[k] < 0 => Some("an equality of one joint alone"),
-            "mjEQ_JOINT" if bends => Some("a polynomial beyond a line"),
-            "mjEQ_JOINT" if active[k] == 0 => Some("an equality that is not active at the start"),
-            "mjEQ_JOINT" => None,
-            "mjEQ_CONNECT" => Some("connect"),
-            "mjEQ_WELD" => Some("weld"),
-            "mjEQ_TENDON" => Some("equalities of tendons"),
+            "mjEQ_JOINT" | "mjEQ_TENDON" | "mjEQ_CONNECT" | "mjEQ_WELD" => None,
             "mjEQ_DISTANCE" => Some("distance"),
             _ => Some("equalities of flexes"),
         };
@@ -249,18 +228,64 @@ fn equalities(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelErro
 fn tendons(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
     let count = file.rows("tendon_num");
     let names = names(file, "tendon", count)?;
-    let firsts = file.integers("tendon_adr", count)?;
-    let counts = file.integers("tendon_num", count)?;
-    let kinds = file.kinds("wrap_type", file.rows("wrap_type"))?;
-    for tendon in 0..count {
-        let first = firsts[tendon].max(0) as usize;
-        let end = firsts[tendon].saturating_add(counts[tendon]).max(0) as usize;
-        let own = kinds.get(first..end).unwrap_or_default();
-        if own.iter().any(|kind| kind != "mjWRAP_JOINT") {
+    let spatial = spatial_tendons(file)?;
+    for tendon in (0..count).filter(|&tendon| spatial[tendon]) {
+        if acts(file, tendon, count)? {
             found.push(no("tendon", &names[tendon], "spatial tendons"));
         }
     }
+    for which in ["lim", "fri"] {
+        let solimps = file.vectors::<5>(&format!("tendon_solimp_{which}"), count)?;
+        for (name, solimp) in names.iter().zip(&solimps) {
+            refuse_power(found, "tendon", name, solimp);
+        }
+    }
     Ok(())
+}
+
+/// Which tendons are made of other things than joints.
+pub(super) fn spatial_tendons(file: &ModelFile) -> Result<Vec<bool>, ModelError> {
+    let count = file.rows("tendon_num");
+    let firsts = file.integers("tendon_adr", count)?;
+    let counts = file.integers("tendon_num", count)?;
+    let kinds = file.kinds("wrap_type", file.rows("wrap_type"))?;
+    let spatial = firsts.into_iter().zip(counts).map(|(first, count)| {
+        let end = first.saturating_add(count).max(0) as usize;
+        let own = kinds.get(first.max(0) as usize..end).unwrap_or_default();
+        own.iter().any(|kind| kind != "mjWRAP_JOINT")
+    });
+    Ok(spatial.collect())
+}
+
+/// Does a tendon do anything but show its length?
+fn acts(file: &ModelFile, tendon: usize, count: usize) -> Result<bool, ModelError> {
+    for array in [
+        "tendon_damping",
+        "tendon_stiffness",
+        "tendon_frictionloss",
+        "tendon_armature",
+    ] {
+        if file.has(array) && file.reals(array, count)?[tendon] != 0.0 {
+            return Ok(true);
+        }
+    }
+    if file.integers("tendon_limited", count)?[tendon] != 0 {
+        return Ok(true);
+    }
+    let is_it = |&id: &i64| usize::try_from(id) == Ok(tendon);
+    let actuators = file.rows("actuator_trntype");
+    let kinds = file.kinds("actuator_trntype", actuators)?;
+    let targets = file.vectors_of_integers::<2>("actuator_trnid", actuators)?;
+    let mut moved = kinds.iter().zip(&targets);
+    if moved.any(|(kind, target)| kind == "mjTRN_TENDON" && is_it(&target[0])) {
+        return Ok(true);
+    }
+    let equalities = file.rows("eq_type");
+    let kinds = file.kinds("eq_type", equalities)?;
+    let firsts = file.integers("eq_obj1id", equalities)?;
+    let seconds = file.integers("eq_obj2id", equalities)?;
+    let mut tied = kinds.iter().zip(firsts.iter().zip(&seconds));
+    Ok(tied.any(|(kind, (first, second))| kind == "mjEQ_TENDON" && (is_it(first) || is_it(second))))
 }
 
 fn actuators(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {

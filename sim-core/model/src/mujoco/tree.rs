@@ -1,11 +1,12 @@
 //! Bodies and joints of a model as links and joints of one robot.
 
+use super::constraints;
 use super::format::ModelFile;
 use super::frame;
 use super::names::names;
 use super::options::{MujocoOptions, has_flag, integrator};
 use crate::description::{
-    Inertial, Joint, JointDof, JointEquality, JointKind, Link, MujocoJoint, MujocoParts, Robot,
+    Inertial, Joint, JointDof, JointKind, Link, MujocoJoint, MujocoParts, Robot,
 };
 use crate::error::ModelError;
 use crate::pose::Pose;
@@ -39,7 +40,7 @@ pub(super) fn robot(file: &ModelFile, options: &MujocoOptions) -> Result<Robot, 
     if dofs != file.rows("dof_armature") {
         return Err(file.fault("has dofs without joints".to_owned()));
     }
-    parts.equalities = equalities(file, &robot, &parts)?;
+    constraints::add_constraints(file, &robot, &mut parts)?;
     robot.mujoco = Some(Box::new(parts));
     Ok(robot)
 }
@@ -85,6 +86,8 @@ fn parts(
         mean_inertia: file.real("stat.meaninertia")?,
         joints: Vec::new(),
         equalities: Vec::new(),
+        constraints: Vec::new(),
+        tendons: Vec::new(),
         actuators: Vec::new(),
         welds: welds.into_iter().map(|weld| weld.unwrap_or(0)).collect(),
         parents: parents.iter().map(|parent| parent.unwrap_or(0)).collect(),
@@ -292,61 +295,5 @@ impl JointArrays {
             actuator_range: (self.is_bounded[k] != 0).then_some(self.bounds[k]),
         };
         Ok((joint, own))
-    }
-}
-
-/// Equalities of two joints: q₁ - r₁ = c₀ + c₁ (q₂ - r₂), with the references r.
-fn equalities(
-    file: &ModelFile,
-    robot: &Robot,
-    parts: &MujocoParts,
-) -> Result<Vec<JointEquality>, ModelError> {
-    let is_off = has_flag(file, "mjDSBL_EQUALITY")? || has_flag(file, "mjDSBL_CONSTRAINT")?;
-    let count = if is_off { 0 } else { file.rows("eq_type") };
-    let joints = file.rows("jnt_type");
-    if count == 0 {
-        return Ok(Vec::new());
-    }
-    let firsts = file.indices("eq_obj1id", count, usize::MAX >> 1)?;
-    let seconds = file.indices("eq_obj2id", count, usize::MAX >> 1)?;
-    let softness = softness(file, "eq", count)?;
-    let width = file.width("eq_data");
-    if width < 2 {
-        return Err(file.fault("array `eq_data` has too few columns".to_owned()));
-    }
-    let data = file.reals("eq_data", count * width)?;
-    let places = moving(robot, joints, file)?;
-    let own = (0..count).map(|k| {
-        let joint = |joint: Option<usize>| {
-            let place = joint.and_then(|joint| places.get(joint)).copied();
-            let place = place.filter(|&place| robot.joints[place].dofs.len() == 1);
-            place.ok_or_else(|| file.fault("has an equality without joints of one dof".to_owned()))
-        };
-        let (follower, leader) = (joint(firsts[k])?, joint(seconds[k])?);
-        let reference = |joint: usize| parts.joints[joint].reference;
-        let (constant, multiplier) = (data[k * width], data[k * width + 1]);
-        Ok(JointEquality {
-            follower,
-            leader,
-            multiplier,
-            offset: reference(follower) + constant - multiplier * reference(leader),
-            softness: softness[k],
-        })
-    });
-    own.collect()
-}
-
-/// Where MuJoCo's joints are among the robot's.
-pub(super) fn moving(
-    robot: &Robot,
-    joints: usize,
-    file: &ModelFile,
-) -> Result<Vec<usize>, ModelError> {
-    let found: Vec<usize> = (0..robot.joints.len())
-        .filter(|&joint| robot.joints[joint].moves())
-        .collect();
-    match found.len() == joints {
-        true => Ok(found),
-        false => Err(file.fault("has joints without bodies".to_owned())),
     }
 }

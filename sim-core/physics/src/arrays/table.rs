@@ -117,6 +117,9 @@ arrays! { m;
         // +1 where the lower bound is the nearer, -1 where the upper is
         limit_side: LimitSide [Scalar; m.limits.len()] Stage "–";
 
+        // Jacobians of ties, see `Tie::jacobian`
+        row_jacobian: RowJacobian [Scalar; m.mujoco.ties.iter().map(|tie| tie.rows * tie.dofs.len()).sum::<usize>()] Stage "–";
+
         // the Runge-Kutta step: where it began, and sums of velocities and accelerations
         rk_q: RkQ [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.coords } else { 0 }] Stage "rad or m";
         rk_q_rest: RkQRest [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.coords } else { 0 }] Stage "rad or m";
@@ -181,8 +184,8 @@ arrays! { m;
             "What takes joint_qd to body_qd.";
         MassMatrix "mass_matrix" Derived [Dofs, Dofs] "kg·m², kg·m or kg" REAL, Source::Computed(&[MassMatrix]),
             "Joint-space inertia, armature included.";
-        EfcJ "efc_J" Derived [Rows, Dofs] "–" REAL, Source::Computed(&[EfcD, LimitSide]),
-            "Constraint Jacobian: equalities, frictions, limits; zero in a row that is not active.";
+        EfcJ "efc_J" Derived [Rows, Dofs] "–" REAL, Source::Computed(&[EfcD, LimitSide, RowJacobian]),
+            "Constraint Jacobian: equalities, frictions, limits of joints, then the other constraints of MuJoCo models; zero in a row that is not active.";
         ContactCount "contact_count" Derived [] "–" I32, Source::Contacts(&[ContactRows]),
             "Contacts of the world: how many rows of the other contact fields are in use.";
         ContactPos "contact_pos" Derived [Contacts, Size(3)] "m" REAL, Source::Contacts(&[ContactRows, Reference]),

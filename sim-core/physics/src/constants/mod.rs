@@ -8,6 +8,7 @@ pub mod params;
 mod recast;
 pub mod site;
 mod sizes;
+pub mod ties;
 
 pub use self::recast::Recast;
 pub use self::sizes::Sizes;
@@ -389,9 +390,15 @@ impl<R: Real> Constants<R> {
         })
     }
 
-    /// Constraint rows: equalities, then frictions, then limits (MuJoCo's order).
+    /// Constraint rows: equalities, then frictions, then limits (MuJoCo's order), then those of ties.
     #[inline(always)]
     pub fn rows(&self) -> usize {
+        self.joint_rows() + self.mujoco.tie_of_row.len()
+    }
+
+    /// The rows before those of ties.
+    #[inline(always)]
+    pub fn joint_rows(&self) -> usize {
         self.equalities.len() + self.frictions.len() + self.limits.len()
     }
 }

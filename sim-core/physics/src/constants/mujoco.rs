@@ -2,6 +2,7 @@
 
 use super::Impedance;
 use super::recast::{Recast, recast, same};
+use super::ties::Tie;
 use crate::lane::Fixed;
 
 /// How a step integrates velocities.
@@ -24,6 +25,12 @@ recast! {
         pub integrator: Integrator,
         /// Springs of joints.
         pub springs: Vec<Spring<R>>,
+        /// Springs and dampers of tendons.
+        pub tendons: Vec<Tendon<R>>,
+        /// Constraints whose Jacobians are found at run time.
+        pub ties: Vec<Tie<R>>,
+        /// Of each of their rows, its tie.
+        pub tie_of_row: Vec<usize>,
         /// Actuators.
         pub actuators: Vec<Actuator<R>>,
         /// Bounds of the sum of actuator forces on a dof.
@@ -42,6 +49,9 @@ impl<R> Default for Mujoco<R> {
         Mujoco {
             integrator: Integrator::default(),
             springs: Vec::new(),
+            tendons: Vec::new(),
+            ties: Vec::new(),
+            tie_of_row: Vec::new(),
             actuators: Vec::new(),
             actuator_bounds: Vec::new(),
             impedances: Vec::new(),
@@ -61,6 +71,21 @@ recast! {
         pub stiffness: R,
         /// Position without force [rad or m].
         pub rest: R,
+    }
+}
+
+recast! {
+    /// A fixed tendon that acts as a spring and a damper: its length is the sum of coordinates times coefficients.
+    #[derive(Clone, Debug)]
+    pub struct Tendon<R> {
+        /// The terms of its length.
+        pub terms: Vec<Term<R>>,
+        /// [N/m or N·m/rad]
+        pub stiffness: R,
+        /// Lengths between which its spring has no force [m or rad].
+        pub rest: [R; 2],
+        /// [N·s/m or N·m·s/rad]
+        pub damping: R,
     }
 }
 

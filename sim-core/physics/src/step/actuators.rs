@@ -9,7 +9,7 @@
 use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
-use crate::constants::mujoco::Actuator;
+use crate::constants::mujoco::{Actuator, Term};
 use crate::lane::{Cx, MaskOf, Num, Real};
 
 /// Forces of the actuators.
@@ -97,8 +97,8 @@ pub(super) fn is_damped<R: Real>(actuator: &Actuator<R>) -> bool {
     actuator.gain[2].to_f64() != 0.0 || actuator.bias[2].to_f64() != 0.0
 }
 
-/// Adds -h ∂force/∂v of the actuators to the mass matrix, Jᵀ (-h ∂f/∂v) J, where their forces are not at their bounds (MuJoCo:
-/// `mjd_actuator_vel`).
+/// Adds -h ∂force/∂v of actuators and tendons to the mass matrix, Jᵀ (-h ∂f/∂v) J, where actuator forces are not at their
+/// bounds (MuJoCo: `mjd_actuator_vel`, `mjd_passive_vel`).
 #[inline(always)]
 pub(super) fn add_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let dt = C::F::k(m.dt);
@@ -117,19 +117,34 @@ pub(super) fn add_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             let within: MaskOf<C> = C::F::k(least).lt(force) & force.lt(C::F::k(most));
             damping = C::F::select(within, damping, C::F::c(0.0));
         }
-        for (i, first) in actuator.terms.iter().enumerate() {
-            let scaled = damping * C::F::k(first.coefficient);
-            for second in &actuator.terms[..i + 1] {
-                let (lower, upper) = (first.dof.max(second.dof), first.dof.min(second.dof));
-                // as there, dofs of different branches do not damp each other
-                let (start, end) = m.dofs[lower].entries;
-                let met = m.mass_entries[start..end]
-                    .iter()
-                    .find(|met| met.other == upper);
-                if let Some(met) = met {
-                    let entry = &mut b.work.mass_matrix[met.place];
-                    *entry = scaled.fma(C::F::k(second.coefficient), *entry);
-                }
+        add_product(m, &mut b.work.mass_matrix, &actuator.terms, damping);
+    }
+    for tendon in &m.mujoco.tendons {
+        let damping = C::F::k(tendon.damping) * dt;
+        add_product(m, &mut b.work.mass_matrix, &tendon.terms, damping);
+    }
+}
+
+/// Adds Jᵀ x J to the mass matrix, J with the coefficients of a length.
+#[inline(always)]
+fn add_product<F: Num>(
+    m: &Constants<F::Real>,
+    mass_matrix: &mut [F],
+    terms: &[Term<F::Real>],
+    x: F,
+) {
+    for (i, first) in terms.iter().enumerate() {
+        let scaled = x * F::k(first.coefficient);
+        for second in &terms[..i + 1] {
+            let (lower, upper) = (first.dof.max(second.dof), first.dof.min(second.dof));
+            // as in MuJoCo, dofs of different branches do not damp each other
+            let (start, end) = m.dofs[lower].entries;
+            let met = m.mass_entries[start..end]
+                .iter()
+                .find(|met| met.other == upper);
+            if let Some(met) = met {
+                let entry = &mut mass_matrix[met.place];
+                *entry = scaled.fma(F::k(second.coefficient), *entry);
             }
         }
     }

@@ -24,6 +24,7 @@ pub mod sites;
 pub mod solver;
 pub mod springs;
 mod stage;
+pub mod ties;
 pub mod velocities;
 
 use params::{gravity, param};
@@ -44,6 +45,7 @@ macro_rules! every_stage {
             springs            [springs::Springs]            Both;
             actuators          [actuators::Actuators]        Both;
             constraint         [constraint::Constraint]      Both;
+            ties               [ties::Ties]                  Both;
             // contacts: where shapes are, then one stage for each pair of kinds of shapes
             place              [collide::Place]              Both;
             plane_sphere       [collide::PlaneSphere]        Both;

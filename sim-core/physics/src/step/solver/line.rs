@@ -3,6 +3,7 @@
 use super::super::ConstantsOf;
 use super::contacts;
 use super::rows::{Law, bounds, dry_friction, equality, one_sided};
+use super::ties;
 use crate::arrays::Workspace;
 use crate::constants::Constants;
 use crate::lane::{Cx, Num, Real};
@@ -135,8 +136,10 @@ fn law<F: Num>(m: &Constants<F::Real>, params: &[F], r: usize, jar: F, weight: F
         let friction = &m.frictions[r - frictions];
         let [zone, loss] = bounds(m, params, friction);
         dry_friction(jar, weight, zone, loss)
-    } else {
+    } else if r < m.joint_rows() {
         one_sided(jar, weight)
+    } else {
+        ties::law(ties::law_of(m, r - m.joint_rows()), jar, weight)
     }
 }
 

@@ -20,7 +20,7 @@
 //! # Rows
 //!
 //! Rows of joints (equalities, dry friction, limits) are known when the model is compiled. Their Jacobians have one or two
-//! entries and run unrolled ([`rows`]). Contacts are found at run time and lie in lists, one for each class of bodies that
+//! entries and run unrolled ([`rows`]). Those of ties, which only models from MuJoCo have, follow them ([`ties`]). Contacts are found at run time and lie in lists, one for each class of bodies that
 //! the same dofs move ([`contacts`]). The solver needs a law (force, stiffness, piece of the cost) and a Jacobian of each row.
 //!
 //! # Precision
@@ -47,6 +47,7 @@
 //! |---|---|
 //! | `linear` | the system of an iteration |
 //! | `rows`, `cones` | laws of joint rows and of contacts: force, stiffness, cost |
+//! | `ties` | sums over constraints with Jacobians found at run time |
 //! | `contacts` | sums over contacts |
 //! | `turning` | laws of contacts with torsional and rolling friction |
 //! | `line` | the line search |
@@ -60,6 +61,7 @@ mod linear;
 mod progress;
 mod refine;
 mod rows;
+mod ties;
 mod turning;
 
 pub use refine::{Accelerations, Refine};
@@ -68,12 +70,13 @@ use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::contact::row;
+use crate::constants::ties::TieLaw;
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::factor::{multiply, solve as solve_linear};
 use crate::{break_if, times, when};
 use line::{Line, search};
 use progress::{Found, Pieces, Plan, Progress};
-use rows::{assemble, cost, forces, residual};
+use rows::{Jacobian, assemble, cost, forces, residual};
 
 /// Accelerations and constraint forces. Where a contact has torsional friction, `TURNS` is true: other models run a
 /// solver without code for it.
@@ -89,6 +92,7 @@ impl<const TURNS: bool> Stage for Solver<TURNS> {
         A::EfcD,
         A::EfcAref,
         A::LimitSide,
+        A::RowJacobian,
         A::ContactRows,
     ];
     const WRITES: &'static [A] = &[
@@ -178,7 +182,7 @@ fn model_cost<C: Cx, const TURNS: bool>(
         }
     }
     w.hessian.copy_from_slice(&w.mass_matrix);
-    residual(m, &w.limit_side, &w.row_aref, &w.start, &mut w.jar);
+    residual(m, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, &w.row_aref, &w.start, &mut w.jar);
     assemble(m, &b.params, w, corrects);
     if corrects.is_some() {
         contacts::residual::<_, TURNS>(cx, &m.contacts, &w.start, row::JAR);
@@ -273,8 +277,8 @@ fn constraint_forces<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b
         a[j] = cx.get(&b.joint_qdd[j]);
         joint[j] = C::F::c(0.0);
     }
-    residual(m, &w.limit_side, aref, a, jar);
-    forces(m, &b.params, &w.limit_side, weight, jar, force, joint);
+    residual(m, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, aref, a, jar);
+    forces(m, &b.params, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, [weight, jar], force, joint);
     for r in 0..m.rows() {
         cx.set(&mut b.efc_force[r], force[r]);
     }
@@ -302,7 +306,10 @@ fn gather<C: Cx>(cx: &mut C, cells: &[C::V], to: &mut [C::F]) {
 /// solve may start from anywhere. A block of worlds inside their limits then saves the solver, a quarter of its step. `f64` does
 /// not skip: its start is MuJoCo's.
 fn may_idle<C: Cx>(m: &ConstantsOf<C>) -> bool {
-    let only_limits = m.equalities.is_empty() && m.frictions.is_empty();
+    let mut ties = m.mujoco.ties.iter();
+    let only_limits = m.equalities.is_empty()
+        && m.frictions.is_empty()
+        && ties.all(|tie| matches!(tie.law, TieLaw::Range(_)));
     !<<C::F as Num>::Real as Real>::DOUBLE && only_limits && m.damped
 }
 
@@ -343,8 +350,8 @@ fn choose_start<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mu
         warm[j] = cx.get(&b.joint_qdd[j]);
         ahead[j] = warm[j] - smooth[j];
     }
-    residual(m, &w.limit_side, aref, warm, jar);
-    residual(m, &w.limit_side, aref, smooth, jar_smooth);
+    residual(m, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, aref, warm, jar);
+    residual(m, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, aref, smooth, jar_smooth);
     multiply(&m.pattern, &w.mass_matrix, ahead, &mut w.joint_force);
     let mut gauss = C::F::c(0.0);
     for j in 0..n {

@@ -1,7 +1,7 @@
 //! Progress of Newton's method: which worlds search the segment, and which have arrived.
 
 use super::line::Line;
-use super::rows::{changes, residual};
+use super::rows::{Jacobian, changes, residual};
 use super::{UNKNOWN, contacts};
 use crate::constants::contact::{Cone, row};
 use crate::lane::{Cx, MaskOf, Num, Real};
@@ -72,7 +72,7 @@ impl<C: Cx> Pieces<C> {
         let (w, half) = (&mut b.work, C::F::c(0.5));
         residual(
             m,
-            &w.limit_side,
+            Jacobian { side: &w.limit_side, ties: &w.row_jacobian },
             &w.row_aref,
             &w.minimum,
             &mut w.jar_minimum,

@@ -10,7 +10,7 @@
 //! `Newton::refinements` is the count of passes that a model needs.
 
 use super::linear::{Unknown, solve_system};
-use super::rows::{assemble, forces, residual};
+use super::rows::{Jacobian, assemble, forces, residual};
 use super::{acts, contacts, gather, may_idle};
 use crate::arrays::Array as A;
 use crate::constants::contact::row;
@@ -36,6 +36,7 @@ impl Stage for Refine {
         A::EfcD,
         A::EfcAref,
         A::LimitSide,
+        A::RowJacobian,
         A::EfcForce,
         A::ConstraintForce,
         A::ContactRows,
@@ -71,6 +72,7 @@ impl Stage for Accelerations {
         A::EfcD,
         A::EfcAref,
         A::LimitSide,
+        A::RowJacobian,
         A::EfcForce,
         A::ConstraintForce,
         A::ContactRows,
@@ -136,7 +138,7 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         w.minimum[j] = C::F::c(0.0);
     }
     w.hessian.copy_from_slice(&w.mass_matrix);
-    residual(m, &w.limit_side, &w.row_aref, &w.start, &mut w.jar);
+    residual(m, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, &w.row_aref, &w.start, &mut w.jar);
     assemble(m, &b.params, w, None);
     contacts::residual::<_, true>(cx, &m.contacts, &w.start, row::JAR);
     let touching = contacts::touching(cx, &m.contacts);
@@ -151,8 +153,8 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         cx.set(&mut b.joint_qdd[j], a[j]);
         joint[j] = C::F::c(0.0);
     }
-    residual(m, &w.limit_side, aref, a, jar);
-    forces(m, &b.params, &w.limit_side, weight, jar, force, joint);
+    residual(m, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, aref, a, jar);
+    forces(m, &b.params, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, [weight, jar], force, joint);
     for r in 0..m.rows() {
         cx.set(&mut b.efc_force[r], force[r]);
     }

@@ -1,13 +1,23 @@
 //! Laws of the constraint rows of joints, and sums over them (Todorov 2014; MuJoCo: `mj_constraintUpdate`).
 //!
 //! A row has a cost s of its residual jar = J a - aref, piecewise quadratic: force -s', stiffness s''. Rows are in MuJoCo's
-//! order: equalities, frictions, limits. J has one or two entries per row, so no row is stored.
+//! order: equalities, frictions, limits. J has one or two entries per row, so no row is stored. Rows of ties follow.
 
 use crate::arrays::Workspace;
 use crate::constants::params::Param;
 use crate::constants::{Constants, Friction};
 use crate::lane::Num;
 use crate::step::param;
+use crate::step::solver::ties;
+
+/// What is known of J at run time only.
+#[derive(Clone, Copy)]
+pub(super) struct Jacobian<'a, F> {
+    /// Sign of each limit.
+    pub side: &'a [F],
+    /// Entries of the rows of ties.
+    pub ties: &'a [F],
+}
 
 /// The law of a row at a residual `jar`: force -s', stiffness s'', and which piece of s it is on.
 pub(super) struct Law<F> {
@@ -57,6 +67,15 @@ pub(super) fn bounds<F: Num>(
     [loss * F::k(friction.regularizer), loss]
 }
 
+/// The cost of [`dry_friction`] (Huber 1964): quadratic inside the zone, linear outside.
+#[inline(always)]
+pub(super) fn dry_cost<F: Num>(jar: F, weight: F, zone: F, loss: F) -> F {
+    let (half, size) = (F::c(0.5), jar.abs());
+    let inside = half * weight * jar * jar;
+    let outside = loss * half.fnma(zone, size);
+    F::select(zone.lt(size), outside, inside)
+}
+
 /// s = ½ D jar² where jar < 0, else 0. A row of weight 0 is never active.
 #[inline(always)]
 pub(super) fn one_sided<F: Num>(jar: F, weight: F) -> Law<F> {
@@ -74,7 +93,7 @@ pub(super) fn one_sided<F: Num>(jar: F, weight: F) -> Law<F> {
 #[inline(always)]
 pub(super) fn residual<F: Num>(
     m: &Constants<F::Real>,
-    side: &[F],
+    jacobian: Jacobian<'_, F>,
     aref: &[F],
     a: &[F],
     jar: &mut [F],
@@ -88,10 +107,11 @@ pub(super) fn residual<F: Num>(
         jar[r] = a[f.dof] - aref[r];
         r += 1;
     }
-    for (l, side) in m.limits.iter().zip(side) {
+    for (l, side) in m.limits.iter().zip(jacobian.side) {
         jar[r] = side.fma(a[l.dof], -aref[r]);
         r += 1;
     }
+    ties::residual(m, jacobian.ties, aref, a, jar);
 }
 
 /// f + W J a, or f alone where the solver `corrects`.
@@ -148,6 +168,8 @@ pub(super) fn assemble<F: Num>(
         rhs[l.dof] = side.fma(pull, rhs[l.dof]);
         r += 1;
     }
+    let pull = |law: &Law<F>, r: usize| pull(law, jar[r], aref[r], corrects);
+    ties::assemble(m, &w.row_jacobian, [weight, jar], hessian, rhs, pull);
 }
 
 /// The count of rows on another piece of their cost, and of dry frictions that slide the other way.
@@ -179,6 +201,16 @@ pub(super) fn changes<F: Num>(
         sum = sum + (before - after).abs();
         r += 1;
     }
+    for tie in &m.mujoco.ties {
+        for _ in 0..tie.rows {
+            let before = ties::law(&tie.law, jar[r], weight[r]).state;
+            let after = ties::law(&tie.law, other[r], weight[r]).state;
+            let moved = (before - after).abs();
+            sum = sum + moved;
+            turned = turned + F::select(one.lt(moved), one, zero);
+            r += 1;
+        }
+    }
     [sum, turned]
 }
 
@@ -187,9 +219,8 @@ pub(super) fn changes<F: Num>(
 pub(super) fn forces<F: Num>(
     m: &Constants<F::Real>,
     params: &[F],
-    side: &[F],
-    weight: &[F],
-    jar: &[F],
+    jacobian: Jacobian<'_, F>,
+    [weight, jar]: [&[F]; 2],
     force: &mut [F],
     joint: &mut [F],
 ) {
@@ -206,11 +237,12 @@ pub(super) fn forces<F: Num>(
         joint[f.dof] = joint[f.dof] + force[r];
         r += 1;
     }
-    for (l, side) in m.limits.iter().zip(side) {
+    for (l, side) in m.limits.iter().zip(jacobian.side) {
         force[r] = one_sided(jar[r], weight[r]).force;
         joint[l.dof] = side.fma(force[r], joint[l.dof]);
         r += 1;
     }
+    ties::forces(m, jacobian.ties, [weight, jar], force, joint);
 }
 
 /// Σ s(jar)
@@ -224,11 +256,8 @@ pub(super) fn cost<F: Num>(m: &Constants<F::Real>, params: &[F], weight: &[F], j
         r += 1;
     }
     for f in &m.frictions {
-        let ([zone, loss], size) = (bounds(m, params, f), jar[r].abs());
-        // Huber: quadratic inside the zone, linear outside
-        let inside = half * weight[r] * jar[r] * jar[r];
-        let outside = loss * half.fnma(zone, size);
-        sum = sum + F::select(zone.lt(size), outside, inside);
+        let [zone, loss] = bounds(m, params, f);
+        sum = sum + dry_cost(jar[r], weight[r], zone, loss);
         r += 1;
     }
     for _ in &m.limits {
@@ -236,6 +265,12 @@ pub(super) fn cost<F: Num>(m: &Constants<F::Real>, params: &[F], weight: &[F], j
         let push = one_sided(jar[r], weight[r]).force;
         sum = (half * push).fnma(jar[r], sum);
         r += 1;
+    }
+    for tie in &m.mujoco.ties {
+        for _ in 0..tie.rows {
+            sum = sum + ties::cost(&tie.law, jar[r], weight[r]);
+            r += 1;
+        }
     }
     sum
 }

@@ -1,0 +1,165 @@
+//! Constraints of MuJoCo models whose Jacobians are found at run time.
+
+use super::carrier::Carrier;
+use super::clusters::path;
+use super::constraint_rows::{FAR, own_soft};
+use super::sites::mounted;
+use crate::description::{Constraint, ConstraintLaw, Measure};
+use sim_physics::constants::mujoco::Term;
+use sim_physics::constants::ties::{self, Frames, Lengths, Tie, TieLaw};
+use sim_physics::constants::{Body, Constants, Motion};
+
+/// A constraint by the dofs of the model.
+pub(super) struct DofConstraint {
+    pub measure: ties::Measure<f64>,
+    pub dofs: Vec<usize>,
+    pub constraint: Constraint,
+    pub safe_references: bool,
+}
+
+impl DofConstraint {
+    /// `dof_of` has the first dof of each joint of the robot, `carriers` an entry for each of its links.
+    pub fn new(
+        constraint: &Constraint,
+        dof_of: &[usize],
+        carriers: &[Carrier],
+        bodies: &[Body<f64>],
+        safe_references: bool,
+    ) -> DofConstraint {
+        let body_of = |dof: usize| {
+            let body = bodies.iter().position(|body| body.dofs().contains(&dof));
+            body.expect("every dof has a body")
+        };
+        let (measure, mut dofs): (_, Vec<usize>) = match &constraint.measure {
+            Measure::Lengths {
+                first,
+                second,
+                offsets,
+                polynomial,
+            } => {
+                let lengths = Lengths {
+                    first: terms(first, dof_of),
+                    second: terms(second, dof_of),
+                    offsets: *offsets,
+                    polynomial: *polynomial,
+                };
+                let both = lengths.first.iter().chain(&lengths.second);
+                let dofs = both.map(|term| term.dof).collect();
+                (ties::Measure::Lengths(lengths), dofs)
+            }
+            Measure::Angle { joint } => {
+                let body = &bodies[body_of(dof_of[*joint])];
+                let measure = ties::Measure::Angle(body.coord, body.dof);
+                (measure, body.dofs().collect())
+            }
+            Measure::Free { joint } => {
+                let body = body_of(dof_of[*joint]);
+                (ties::Measure::Free(body), bodies[body].dofs().collect())
+            }
+            Measure::Frames {
+                links,
+                poses,
+                torque_scale,
+            } => {
+                let mount = |k: usize| {
+                    let carrier = &carriers[links[k]];
+                    mounted(carrier.body, Some(carrier.tree), &carrier.pose.mul(&poses[k]))
+                };
+                let (first, second) = (mount(0), mount(1));
+                let moved = [&first, &second].map(|mount| mount.body);
+                let dofs = moved.into_iter().flatten();
+                let dofs = dofs.flat_map(|body| path(bodies, body)).collect();
+                let frames = Frames {
+                    first,
+                    second,
+                    torque_scale: *torque_scale,
+                };
+                (ties::Measure::Frames(frames), dofs)
+            }
+        };
+        dofs.sort_unstable();
+        dofs.dedup();
+        DofConstraint {
+            measure,
+            dofs,
+            constraint: constraint.clone(),
+            safe_references,
+        }
+    }
+
+    /// Pairs of dofs that it couples.
+    pub fn couplings(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let rising = self.dofs.iter().enumerate();
+        rising.flat_map(|(i, &dof)| self.dofs[..i].iter().map(move |&other| (dof, other)))
+    }
+}
+
+/// Joints with one dof and their coefficients as dofs, each once.
+pub(super) fn terms(joints: &[(usize, f64)], dof_of: &[usize]) -> Vec<Term<f64>> {
+    let all = joints.iter().map(|&(joint, coefficient)| Term {
+        dof: dof_of[joint],
+        coefficient,
+    });
+    all.collect()
+}
+
+/// Adds the rows of constraints, after those of joints.
+pub(super) fn add_ties(constants: &mut Constants<f64>, all: Vec<DofConstraint>) {
+    let mut first = 0;
+    for own in all {
+        let DofConstraint {
+            measure,
+            dofs,
+            constraint,
+            safe_references,
+        } = own;
+        let rows = match &measure {
+            ties::Measure::Lengths(_) | ties::Measure::Angle(..) => 1,
+            ties::Measure::Free(body) => {
+                debug_assert_eq!(constants.bodies[*body].motion, Motion::Free);
+                6
+            }
+            ties::Measure::Frames(frames) if frames.torque_scale.is_some() => 6,
+            ties::Measure::Frames(_) => 3,
+        };
+        let [along, about] = constraint.inverse_weight;
+        let soft = own_soft(&constraint.softness, along, constants.dt, safe_references);
+        let law = match constraint.law {
+            ConstraintLaw::Equality => TieLaw::Equality,
+            ConstraintLaw::Friction(loss) => TieLaw::Friction(loss),
+            ConstraintLaw::Range { bounds, margin } => {
+                TieLaw::Range([bounds[0] + margin, bounds[1] - margin])
+            }
+        };
+        // where both bounds may act at once, each has a row of its own
+        let laws = match law {
+            TieLaw::Range([lower, upper]) if lower >= upper => {
+                vec![TieLaw::Range([lower, FAR]), TieLaw::Range([-FAR, upper])]
+            }
+            law => vec![law],
+        };
+        let places: Vec<usize> = dofs
+            .iter()
+            .enumerate()
+            .flat_map(|(i, &dof)| dofs[..=i].iter().map(move |&other| (dof, other)))
+            .map(|(dof, other)| constants.pattern.at(dof, other))
+            .collect();
+        for law in laws {
+            let ties = &mut constants.mujoco.ties;
+            let number = ties.len();
+            ties.push(Tie {
+                measure: measure.clone(),
+                law,
+                soft,
+                turning_weight: about,
+                rows,
+                dofs: dofs.clone(),
+                first,
+                places: places.clone(),
+            });
+            first += rows * dofs.len();
+            let tie_of_row = &mut constants.mujoco.tie_of_row;
+            tie_of_row.extend(std::iter::repeat_n(number, rows));
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! Constraints of a robot that MuJoCo compiled, beyond limits and frictions of single dofs.
+
+use crate::pose::Pose;
+use crate::softness::Softness;
+
+/// One constraint: what it measures, what it allows, and how soft it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Constraint {
+    /// What it measures.
+    pub measure: Measure,
+    /// What it allows.
+    pub law: ConstraintLaw,
+    /// Softness.
+    pub softness: Softness,
+    /// Approximate inverse inertia that its rows see, `invweight0` of MuJoCo: along lengths, about axes [1/kg, 1/(kg·m²)].
+    pub inverse_weight: [f64; 2],
+}
+
+/// What a constraint measures.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Measure {
+    /// l₁ - o₁ - p(l₂ - o₂), where l are sums of positions of joints with one dof times coefficients.
+    Lengths {
+        /// Joints of l₁ and their coefficients.
+        first: Vec<(usize, f64)>,
+        /// Joints of l₂ and their coefficients.
+        second: Vec<(usize, f64)>,
+        /// o₁ and o₂ [rad or m].
+        offsets: [f64; 2],
+        /// Coefficients of p, the constant first.
+        polynomial: [f64; 5],
+    },
+    /// How far a ball joint has turned [rad].
+    Angle {
+        /// The joint.
+        joint: usize,
+    },
+    /// The dofs of a free joint.
+    Free {
+        /// The joint.
+        joint: usize,
+    },
+    /// The position of a frame less that of another one.
+    Frames {
+        /// Links with the frames on them.
+        links: [usize; 2],
+        /// The frames on their links.
+        poses: [Pose; 2],
+        /// What the rotation between them is multiplied with [m/rad]; `None` ties positions alone.
+        torque_scale: Option<f64>,
+    },
+}
+
+/// What a constraint allows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ConstraintLaw {
+    /// Nothing but 0.
+    Equality,
+    /// Motion against a dry friction of this bound [N or N·m].
+    Friction(f64),
+    /// What lies between two bounds, and how near to them it acts.
+    Range {
+        /// [rad or m]
+        bounds: [f64; 2],
+        /// [rad or m]
+        margin: f64,
+    },
+}
+
+/// A fixed tendon that acts as a spring and a damper.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tendon {
+    /// Indices of joints with one dof, each with its coefficient.
+    pub terms: Vec<(usize, f64)>,
+    /// [N/m or N·m/rad]
+    pub stiffness: f64,
+    /// Lengths between which its spring has no force [m or rad].
+    pub rest: [f64; 2],
+    /// [N·s/m or N·m·s/rad]
+    pub damping: f64,
+}

@@ -1,0 +1,350 @@
+//! Constraints of a model: equalities, tendons, limits of balls, and dry friction of free joints.
+
+use super::format::ModelFile;
+use super::frame;
+use super::options::has_flag;
+use super::tendons::{Tendons, moving};
+use super::tree::softness;
+use crate::description::{
+    Constraint, ConstraintLaw, JointEquality, JointKind, Measure, MujocoParts, Robot, Tendon,
+};
+use crate::error::ModelError;
+use crate::pose::Pose;
+use crate::softness::Softness;
+
+/// Adds all of them; [`super::refusals`] has named those that are not supported.
+pub(super) fn add_constraints(
+    file: &ModelFile,
+    robot: &Robot,
+    parts: &mut MujocoParts,
+) -> Result<(), ModelError> {
+    let tendons = Tendons::read(file, robot)?;
+    let none = has_flag(file, "mjDSBL_CONSTRAINT")?;
+    let is_on = |flag: &str| Ok::<bool, ModelError>(!none && !has_flag(file, flag)?);
+    if is_on("mjDSBL_EQUALITY")? {
+        add_equalities(file, robot, &tendons, parts)?;
+    }
+    if is_on("mjDSBL_FRICTIONLOSS")? {
+        add_frictions(file, robot, &tendons, parts)?;
+    }
+    if is_on("mjDSBL_LIMIT")? {
+        add_limits(file, robot, &tendons, parts)?;
+    }
+    add_springs(file, &tendons, parts)
+}
+
+/// Inverse weights of lengths alone.
+fn along(weight: f64) -> [f64; 2] {
+    [weight, weight]
+}
+
+fn add_equalities(
+    file: &ModelFile,
+    robot: &Robot,
+    tendons: &Tendons,
+    parts: &mut MujocoParts,
+) -> Result<(), ModelError> {
+    let count = file.rows("eq_type");
+    if count == 0 {
+        return Ok(());
+    }
+    let equalities = Equalities {
+        file,
+        robot,
+        tendons,
+        joints: moving(robot, file.rows("jnt_type"), file)?,
+        of_sites: file.kinds("eq_objtype", count)?,
+        seconds: file.integers("eq_obj2id", count)?,
+        firsts: file.integers("eq_obj1id", count)?,
+        data: file.vectors::<11>("eq_data", count)?,
+        softness: softness(file, "eq", count)?,
+    };
+    let kinds = file.kinds("eq_type", count)?;
+    let active = file.integers("eq_active0", count)?;
+    for k in (0..count).filter(|&k| active[k] != 0) {
+        match kinds[k].as_str() {
+            "mjEQ_JOINT" => equalities.add_joint(k, parts)?,
+            "mjEQ_TENDON" => equalities.add_tendon(k, parts)?,
+            kind => equalities.add_frames(k, kind == "mjEQ_WELD", parts)?,
+        }
+    }
+    Ok(())
+}
+
+/// Arrays of equalities.
+struct Equalities<'a> {
+    file: &'a ModelFile,
+    robot: &'a Robot,
+    tendons: &'a Tendons,
+    joints: Vec<usize>,
+    of_sites: Vec<String>,
+    firsts: Vec<i64>,
+    seconds: Vec<i64>,
+    data: Vec<[f64; 11]>,
+    softness: Vec<Softness>,
+}
+
+impl Equalities<'_> {
+    /// q₁ - r₁ = p(q₂ - r₂), with the references r.
+    fn add_joint(&self, k: usize, parts: &mut MujocoParts) -> Result<(), ModelError> {
+        let joint = |joint: i64| {
+            let place = usize::try_from(joint).ok();
+            let place = place.and_then(|joint| self.joints.get(joint)).copied();
+            let place = place.filter(|&place| self.robot.joints[place].dofs.len() == 1);
+            place.ok_or_else(|| {
+                let fault = "has an equality without joints of one dof".to_owned();
+                self.file.fault(fault)
+            })
+        };
+        let reference = |parts: &MujocoParts, joint: usize| parts.joints[joint].reference;
+        let weight = |parts: &MujocoParts, joint: usize| {
+            let before = &self.robot.joints[..joint];
+            let dof: usize = before.iter().map(|joint| joint.dofs.len()).sum();
+            parts.dof_inverse_weight[dof]
+        };
+        let [constant, multiplier, c2, c3, c4, ..] = self.data[k];
+        let follower = joint(self.firsts[k])?;
+        let own = reference(parts, follower);
+        let leads = self.seconds[k] >= 0;
+        if leads && [c2, c3, c4] == [0.0; 3] {
+            let leader = joint(self.seconds[k])?;
+            parts.equalities.push(JointEquality {
+                follower,
+                leader,
+                multiplier,
+                offset: own + constant - multiplier * reference(parts, leader),
+                softness: self.softness[k],
+            });
+            return Ok(());
+        }
+        let mut inverse_weight = weight(parts, follower);
+        let (mut second, mut other, mut polynomial) = (Vec::new(), 0.0, [0.0; 5]);
+        polynomial[0] = constant;
+        if leads {
+            let leader = joint(self.seconds[k])?;
+            second.push((leader, 1.0));
+            other = reference(parts, leader);
+            inverse_weight += weight(parts, leader);
+            polynomial = [constant, multiplier, c2, c3, c4];
+        }
+        parts.constraints.push(Constraint {
+            measure: Measure::Lengths {
+                first: vec![(follower, 1.0)],
+                second,
+                offsets: [own, other],
+                polynomial,
+            },
+            law: ConstraintLaw::Equality,
+            softness: self.softness[k],
+            inverse_weight: along(inverse_weight),
+        });
+        Ok(())
+    }
+
+    /// The same of the lengths of tendons.
+    fn add_tendon(&self, k: usize, parts: &mut MujocoParts) -> Result<(), ModelError> {
+        let count = self.tendons.names.len();
+        let lengths = self.file.reals("tendon_length0", count)?;
+        let weights = self.file.reals("tendon_invweight0", count)?;
+        let first = self.tendons.of(self.file, self.firsts[k])?.to_vec();
+        let own = self.firsts[k] as usize;
+        let [constant, rest @ ..] = self.data[k];
+        let mut polynomial = [constant, 0.0, 0.0, 0.0, 0.0];
+        let mut inverse_weight = weights[own];
+        let (mut second, mut other) = (Vec::new(), 0.0);
+        if self.seconds[k] >= 0 {
+            second = self.tendons.of(self.file, self.seconds[k])?.to_vec();
+            other = lengths[self.seconds[k] as usize];
+            inverse_weight += weights[self.seconds[k] as usize];
+            polynomial[1..].copy_from_slice(&rest[..4]);
+        }
+        parts.constraints.push(Constraint {
+            measure: Measure::Lengths {
+                first,
+                second,
+                offsets: [lengths[own], other],
+                polynomial,
+            },
+            law: ConstraintLaw::Equality,
+            softness: self.softness[k],
+            inverse_weight: along(inverse_weight),
+        });
+        Ok(())
+    }
+
+    /// Points that are connected, or frames that are welded.
+    fn add_frames(
+        &self,
+        k: usize,
+        is_weld: bool,
+        parts: &mut MujocoParts,
+    ) -> Result<(), ModelError> {
+        let file = self.file;
+        let [x, y, z, a, b, c, qw, qx, qy, qz, torque_scale] = self.data[k];
+        let mut links = [0; 2];
+        let mut poses = match is_weld {
+            true => [frame([a, b, c], [qw, qx, qy, qz]), Pose::at([x, y, z])],
+            false => [Pose::at([x, y, z]), Pose::at([a, b, c])],
+        };
+        let sites = file.rows("site_bodyid");
+        let bodies = file.indices("site_bodyid", sites, self.robot.links.len())?;
+        for (side, object) in [self.firsts[k], self.seconds[k]].into_iter().enumerate() {
+            let fault = || file.fault("has an equality without its bodies".to_owned());
+            let object = usize::try_from(object).map_err(|_| fault())?;
+            links[side] = object;
+            if self.of_sites[k] == "mjOBJ_SITE" {
+                links[side] = bodies.get(object).copied().flatten().ok_or_else(fault)?;
+                let places = file.vectors::<3>("site_pos", sites)?;
+                let turns = file.vectors::<4>("site_quat", sites)?;
+                poses[side] = frame(places[object], turns[object]);
+            }
+            if links[side] >= self.robot.links.len() {
+                return Err(fault());
+            }
+        }
+        let weights = file.vectors::<2>("body_invweight0", self.robot.links.len())?;
+        let [first, second] = links.map(|link| weights[link]);
+        parts.constraints.push(Constraint {
+            measure: Measure::Frames {
+                links,
+                poses,
+                torque_scale: is_weld.then_some(torque_scale),
+            },
+            law: ConstraintLaw::Equality,
+            softness: self.softness[k],
+            inverse_weight: [first[0] + second[0], first[1] + second[1]],
+        });
+        Ok(())
+    }
+}
+
+/// Dry friction of free joints and of tendons; that of other joints is in their dofs.
+fn add_frictions(
+    file: &ModelFile,
+    robot: &Robot,
+    tendons: &Tendons,
+    parts: &mut MujocoParts,
+) -> Result<(), ModelError> {
+    let mut dof = 0;
+    for (place, joint) in robot.joints.iter().enumerate() {
+        let loss = joint.dofs.first().map_or(0.0, |first| first.friction);
+        if joint.kind == JointKind::Free && loss > 0.0 {
+            let weights = &parts.dof_inverse_weight;
+            parts.constraints.push(Constraint {
+                measure: Measure::Free { joint: place },
+                law: ConstraintLaw::Friction(loss),
+                softness: parts.joints[place].friction,
+                inverse_weight: [weights[dof], weights[dof + 3]],
+            });
+        }
+        dof += joint.dofs.len();
+    }
+    let count = tendons.names.len();
+    let losses = file.reals("tendon_frictionloss", count)?;
+    let softness = of_tendons(file, "fri", count)?;
+    let weights = file.reals("tendon_invweight0", count)?;
+    for k in (0..count).filter(|&k| losses[k] > 0.0) {
+        parts.constraints.push(Constraint {
+            measure: length(tendons.of(file, k as i64)?),
+            law: ConstraintLaw::Friction(losses[k]),
+            softness: softness[k],
+            inverse_weight: along(weights[k]),
+        });
+    }
+    Ok(())
+}
+
+/// Limits of balls and of tendons; those of other joints are their ranges.
+fn add_limits(
+    file: &ModelFile,
+    robot: &Robot,
+    tendons: &Tendons,
+    parts: &mut MujocoParts,
+) -> Result<(), ModelError> {
+    let joints = file.rows("jnt_type");
+    let limited = file.integers("jnt_limited", joints)?;
+    let ranges = file.vectors::<2>("jnt_range", joints)?;
+    let mut dof = 0;
+    let places = moving(robot, joints, file)?;
+    for (k, &place) in places.iter().enumerate() {
+        let joint = &robot.joints[place];
+        if joint.kind == JointKind::Ball && limited[k] != 0 {
+            let own = &parts.joints[place];
+            parts.constraints.push(Constraint {
+                measure: Measure::Angle { joint: place },
+                law: ConstraintLaw::Range {
+                    bounds: [f64::NEG_INFINITY, ranges[k][0].max(ranges[k][1])],
+                    margin: own.margin,
+                },
+                softness: own.limit,
+                inverse_weight: along(parts.dof_inverse_weight[dof]),
+            });
+        }
+        dof += joint.dofs.len();
+    }
+    let count = tendons.names.len();
+    let limited = file.integers("tendon_limited", count)?;
+    let ranges = file.vectors::<2>("tendon_range", count)?;
+    let margins = file.reals("tendon_margin", count)?;
+    let softness = of_tendons(file, "lim", count)?;
+    let weights = file.reals("tendon_invweight0", count)?;
+    for k in (0..count).filter(|&k| limited[k] != 0) {
+        parts.constraints.push(Constraint {
+            measure: length(tendons.of(file, k as i64)?),
+            law: ConstraintLaw::Range {
+                bounds: ranges[k],
+                margin: margins[k],
+            },
+            softness: softness[k],
+            inverse_weight: along(weights[k]),
+        });
+    }
+    Ok(())
+}
+
+/// Springs and dampers of tendons.
+fn add_springs(
+    file: &ModelFile,
+    tendons: &Tendons,
+    parts: &mut MujocoParts,
+) -> Result<(), ModelError> {
+    let count = tendons.names.len();
+    let kept = |name: &str, flag: &str| -> Result<Vec<f64>, ModelError> {
+        match has_flag(file, flag)? {
+            true => Ok(vec![0.0; count]),
+            false => file.reals(name, count),
+        }
+    };
+    let stiffness = kept("tendon_stiffness", "mjDSBL_SPRING")?;
+    let damping = kept("tendon_damping", "mjDSBL_DAMPER")?;
+    let rests = file.vectors::<2>("tendon_lengthspring", count)?;
+    for k in (0..count).filter(|&k| stiffness[k] != 0.0 || damping[k] != 0.0) {
+        parts.tendons.push(Tendon {
+            terms: tendons.of(file, k as i64)?.to_vec(),
+            stiffness: stiffness[k],
+            rest: rests[k],
+            damping: damping[k],
+        });
+    }
+    Ok(())
+}
+
+/// The length of a tendon.
+fn length(terms: &[(usize, f64)]) -> Measure {
+    Measure::Lengths {
+        first: terms.to_vec(),
+        second: Vec::new(),
+        offsets: [0.0; 2],
+        polynomial: [0.0; 5],
+    }
+}
+
+/// Softness of limits (`lim`) or frictions (`fri`) of tendons.
+fn of_tendons(file: &ModelFile, which: &str, count: usize) -> Result<Vec<Softness>, ModelError> {
+    let solref = file.vectors::<2>(&format!("tendon_solref_{which}"), count)?;
+    let solimp = file.vectors::<5>(&format!("tendon_solimp_{which}"), count)?;
+    let pairs = solref.into_iter().zip(solimp);
+    Ok(pairs
+        .map(|(solref, solimp)| Softness { solref, solimp })
+        .collect())
+}
