@@ -217,7 +217,8 @@ class _Model:
     def connection(self, kind: str) -> str:
         """Two bodies or sites that are held together, or a body and the world."""
         rng = self.rng
-        first, second = int(rng.integers(1, self.bodies + 1)), int(rng.integers(0, self.bodies + 1))
+        first, second = rng.choice(self.bodies + 1, 2, replace=False)
+        first, second = max(first, second), min(first, second)
         scale = f'torquescale="{rng.uniform(0.2, 2):.17g}"' if kind == "weld" else ""
         if second and rng.random() < 0.5:
             return f'<{kind} site1="s{first}" site2="s{second}" {scale} {self.equality()}/>'

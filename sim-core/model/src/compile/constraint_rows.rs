@@ -129,7 +129,12 @@ pub(super) fn add_rows(
 pub(super) const FAR: f64 = 1e18;
 
 /// Softness as a model from MuJoCo has it.
-pub(super) fn own_soft(softness: &Softness, inverse_weight: f64, dt: f64, is_safe: bool) -> Soft<f64> {
+pub(super) fn own_soft(
+    softness: &Softness,
+    inverse_weight: f64,
+    dt: f64,
+    is_safe: bool,
+) -> Soft<f64> {
     let (stiffness, damping) = softness.reference(dt, is_safe);
     Soft {
         stiffness,

@@ -63,7 +63,11 @@ impl DofConstraint {
             } => {
                 let mount = |k: usize| {
                     let carrier = &carriers[links[k]];
-                    mounted(carrier.body, Some(carrier.tree), &carrier.pose.mul(&poses[k]))
+                    mounted(
+                        carrier.body,
+                        Some(carrier.tree),
+                        &carrier.pose.mul(&poses[k]),
+                    )
                 };
                 let (first, second) = (mount(0), mount(1));
                 let moved = [&first, &second].map(|mount| mount.body);

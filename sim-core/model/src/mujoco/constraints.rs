@@ -56,7 +56,7 @@ fn add_equalities(
         of_sites: file.kinds("eq_objtype", count)?,
         seconds: file.integers("eq_obj2id", count)?,
         firsts: file.integers("eq_obj1id", count)?,
-        data: file.vectors::<11>("eq_data", count)?,
+        data: file.first_columns::<11>("eq_data", count)?,
         softness: softness(file, "eq", count)?,
     };
     let kinds = file.kinds("eq_type", count)?;

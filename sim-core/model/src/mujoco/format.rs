@@ -154,6 +154,23 @@ impl ModelFile {
         Ok(all.as_chunks::<N>().0.to_vec())
     }
 
+    /// The first columns of an array whose rows differ in length between versions of MuJoCo.
+    pub fn first_columns<const N: usize>(
+        &self,
+        name: &str,
+        count: usize,
+    ) -> Result<Vec<[f64; N]>, ModelError> {
+        let width = self.arrays.get(name).and_then(|(shape, _)| shape.get(1));
+        let width = width.copied().unwrap_or(0);
+        if width < N {
+            let fault = format!("array `{name}` has {width} columns, fewer than {N}");
+            return Err(self.fault(fault));
+        }
+        let all = self.reals(name, count * width)?;
+        let rows = all.chunks_exact(width);
+        Ok(rows.filter_map(|row| row.first_chunk().copied()).collect())
+    }
+
     /// An array of rows of integers.
     pub fn vectors_of_integers<const N: usize>(
         &self,

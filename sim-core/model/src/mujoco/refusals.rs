@@ -285,7 +285,11 @@ fn acts(file: &ModelFile, tendon: usize, count: usize) -> Result<bool, ModelErro
     let firsts = file.integers("eq_obj1id", equalities)?;
     let seconds = file.integers("eq_obj2id", equalities)?;
     let mut tied = kinds.iter().zip(firsts.iter().zip(&seconds));
-    Ok(tied.any(|(kind, (first, second))| kind == "mjEQ_TENDON" && (is_it(first) || is_it(second))))
+    Ok(
+        tied.any(|(kind, (first, second))| {
+            kind == "mjEQ_TENDON" && (is_it(first) || is_it(second))
+        }),
+    )
 }
 
 fn actuators(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {

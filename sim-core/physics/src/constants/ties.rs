@@ -112,5 +112,3 @@ impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for TieLaw<R> {
         }
     }
 }
-
-

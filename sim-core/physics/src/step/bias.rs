@@ -24,25 +24,8 @@ impl Stage for Bias {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        let base = Spatial([-gravity(m, &b.params), Vec3::zero()]);
         // `force` holds the acceleration of a body until the backward pass
-        for (k, body) in m.bodies.iter().enumerate() {
-            let own = joint_velocity(cx, b, body);
-            let w = &mut b.work;
-            let (velocity, acceleration) = match (body.parent, body.motion) {
-                (_, Motion::Free) => {
-                    let swing = own[LINEAR].cross_add(own[ANGULAR], base[LINEAR]);
-                    (own, Spatial([swing, base[ANGULAR]]))
-                }
-                (Some(parent), _) => {
-                    let v = w.velocity[parent];
-                    (v + own, w.force[parent] + v.cross_motion(own))
-                }
-                (None, _) => (own, base),
-            };
-            w.velocity[k] = velocity;
-            w.force[k] = acceleration;
-        }
+        accelerations_at_rest(cx, m, b, -gravity(m, &b.params));
         let w = &mut b.work;
         for k in 0..m.bodies.len() {
             let v = w.velocity[k];
@@ -63,6 +46,34 @@ impl Stage for Bias {
                 w.force[parent] = w.force[parent] + force;
             }
         }
+    }
+}
+
+/// Writes the velocity of each body, and to `force` its acceleration at zero joint acceleration over a base that has `base`.
+#[inline(always)]
+pub(super) fn accelerations_at_rest<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    base: Vec3<C::F>,
+) {
+    let base = Spatial([base, Vec3::zero()]);
+    for (k, body) in m.bodies.iter().enumerate() {
+        let own = joint_velocity(cx, b, body);
+        let w = &mut b.work;
+        let (velocity, acceleration) = match (body.parent, body.motion) {
+            (_, Motion::Free) => {
+                let swing = own[LINEAR].cross_add(own[ANGULAR], base[LINEAR]);
+                (own, Spatial([swing, base[ANGULAR]]))
+            }
+            (Some(parent), _) => {
+                let v = w.velocity[parent];
+                (v + own, w.force[parent] + v.cross_motion(own))
+            }
+            (None, _) => (own, base),
+        };
+        w.velocity[k] = velocity;
+        w.force[k] = acceleration;
     }
 }
 

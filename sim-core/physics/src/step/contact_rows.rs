@@ -302,7 +302,7 @@ fn swing_between<C: Cx>(
 
 /// ω × (ω × r) of a tree's free body, with its centre of mass at r from its frame's origin.
 #[inline(always)]
-pub(super) fn swing<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, tree: usize) -> Option<Vec3<C::F>> {
+fn swing<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, tree: usize) -> Option<Vec3<C::F>> {
     let free = m.trees[tree].free?;
     let body = &m.bodies[free];
     if body.center.iter().all(|x| x.to_f64() == 0.0) {

@@ -24,6 +24,7 @@ pub mod sites;
 pub mod solver;
 pub mod springs;
 mod stage;
+mod tied_frames;
 pub mod ties;
 pub mod velocities;
 

@@ -182,7 +182,16 @@ fn model_cost<C: Cx, const TURNS: bool>(
         }
     }
     w.hessian.copy_from_slice(&w.mass_matrix);
-    residual(m, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, &w.row_aref, &w.start, &mut w.jar);
+    residual(
+        m,
+        Jacobian {
+            side: &w.limit_side,
+            ties: &w.row_jacobian,
+        },
+        &w.row_aref,
+        &w.start,
+        &mut w.jar,
+    );
     assemble(m, &b.params, w, corrects);
     if corrects.is_some() {
         contacts::residual::<_, TURNS>(cx, &m.contacts, &w.start, row::JAR);
@@ -277,8 +286,27 @@ fn constraint_forces<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b
         a[j] = cx.get(&b.joint_qdd[j]);
         joint[j] = C::F::c(0.0);
     }
-    residual(m, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, aref, a, jar);
-    forces(m, &b.params, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, [weight, jar], force, joint);
+    residual(
+        m,
+        Jacobian {
+            side: &w.limit_side,
+            ties: &w.row_jacobian,
+        },
+        aref,
+        a,
+        jar,
+    );
+    forces(
+        m,
+        &b.params,
+        Jacobian {
+            side: &w.limit_side,
+            ties: &w.row_jacobian,
+        },
+        [weight, jar],
+        force,
+        joint,
+    );
     for r in 0..m.rows() {
         cx.set(&mut b.efc_force[r], force[r]);
     }
@@ -350,8 +378,26 @@ fn choose_start<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mu
         warm[j] = cx.get(&b.joint_qdd[j]);
         ahead[j] = warm[j] - smooth[j];
     }
-    residual(m, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, aref, warm, jar);
-    residual(m, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, aref, smooth, jar_smooth);
+    residual(
+        m,
+        Jacobian {
+            side: &w.limit_side,
+            ties: &w.row_jacobian,
+        },
+        aref,
+        warm,
+        jar,
+    );
+    residual(
+        m,
+        Jacobian {
+            side: &w.limit_side,
+            ties: &w.row_jacobian,
+        },
+        aref,
+        smooth,
+        jar_smooth,
+    );
     multiply(&m.pattern, &w.mass_matrix, ahead, &mut w.joint_force);
     let mut gauss = C::F::c(0.0);
     for j in 0..n {

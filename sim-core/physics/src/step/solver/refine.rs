@@ -138,7 +138,16 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         w.minimum[j] = C::F::c(0.0);
     }
     w.hessian.copy_from_slice(&w.mass_matrix);
-    residual(m, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, &w.row_aref, &w.start, &mut w.jar);
+    residual(
+        m,
+        Jacobian {
+            side: &w.limit_side,
+            ties: &w.row_jacobian,
+        },
+        &w.row_aref,
+        &w.start,
+        &mut w.jar,
+    );
     assemble(m, &b.params, w, None);
     contacts::residual::<_, true>(cx, &m.contacts, &w.start, row::JAR);
     let touching = contacts::touching(cx, &m.contacts);
@@ -153,8 +162,27 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         cx.set(&mut b.joint_qdd[j], a[j]);
         joint[j] = C::F::c(0.0);
     }
-    residual(m, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, aref, a, jar);
-    forces(m, &b.params, Jacobian { side: &w.limit_side, ties: &w.row_jacobian }, [weight, jar], force, joint);
+    residual(
+        m,
+        Jacobian {
+            side: &w.limit_side,
+            ties: &w.row_jacobian,
+        },
+        aref,
+        a,
+        jar,
+    );
+    forces(
+        m,
+        &b.params,
+        Jacobian {
+            side: &w.limit_side,
+            ties: &w.row_jacobian,
+        },
+        [weight, jar],
+        force,
+        joint,
+    );
     for r in 0..m.rows() {
         cx.set(&mut b.efc_force[r], force[r]);
     }
