@@ -9,6 +9,12 @@ use sim_physics::constants::mujoco::Term;
 use sim_physics::constants::ties::{self, Frames, Lengths, Tie, TieLaw};
 use sim_physics::constants::{Body, Constants, Motion};
 
+/// Smallest inverse weight of a row (MuJoCo: `mjMINVAL`).
+const WEIGHT_MIN: f64 = 1e-15;
+/// Inverse weight of rotations of what cannot turn. Their rows have no Jacobian; stiff ones would only lose the cost of the
+/// others in rounding.
+const WITHOUT_EFFECT: f64 = 1e30;
+
 /// A constraint by the dofs of the model.
 pub(super) struct DofConstraint {
     pub measure: ties::Measure<f64>,
@@ -126,7 +132,17 @@ pub(super) fn add_ties(constants: &mut Constants<f64>, all: Vec<DofConstraint>) 
             ties::Measure::Frames(frames) if frames.torque_scale.is_some() => 6,
             ties::Measure::Frames(_) => 3,
         };
-        let [along, about] = constraint.inverse_weight;
+        let mut turning = dofs.iter().map(|&dof| {
+            let mut bodies = constants.bodies.iter();
+            let body = bodies.find(|body| body.dofs().contains(&dof));
+            body.is_some_and(|body| body.motion != Motion::Prismatic)
+        });
+        let [along, mut about] = constraint
+            .inverse_weight
+            .map(|weight| weight.max(WEIGHT_MIN));
+        if !turning.any(|turns| turns) {
+            about = WITHOUT_EFFECT;
+        }
         let soft = own_soft(&constraint.softness, along, constants.dt, safe_references);
         let law = match constraint.law {
             ConstraintLaw::Equality => TieLaw::Equality,

@@ -19,10 +19,16 @@ use crate::constants::mujoco::Term;
 use crate::constants::ties::{Lengths, Measure, Tie, TieLaw};
 use crate::lane::{Cx, Num, Real};
 use crate::math::quat;
+use crate::math::spatial::ANGULAR;
 use crate::math::vec3::Vec3;
 
 /// Most rows of a tie.
 const ROWS_MAX: usize = 6;
+
+/// Largest D of a row in `f32` [kg or kg·m²].
+///
+/// Where a body's inverse weight is 0, as that of a body whose centre of mass is on its hinge, MuJoCo's is 1e15.
+const WEIGHT_MAX: f64 = 1e8;
 
 /// Constraint rows of ties.
 pub struct Ties;
@@ -111,10 +117,7 @@ fn measure<C: Cx>(
             }
             Found::at(&[angle])
         }
-        Measure::Free(body) => {
-            of_free(m, &mut b.work, tie, *body);
-            Found::at(&[])
-        }
+        Measure::Free(body) => of_free(m, &mut b.work, tie, *body),
         Measure::Frames(frames) => of_frames::<C>(m, b, tie, frames),
     }
 }
@@ -166,9 +169,14 @@ fn of_lengths<C: Cx>(
     own - value
 }
 
-/// MuJoCo's velocities of a free body from ours.
+/// MuJoCo's velocities of a free body from ours, and the acceleration of its frame's origin that our J q̈ lacks.
 #[inline(always)]
-fn of_free<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>, tie: &Tie<F::Real>, body: usize) {
+fn of_free<F: Num>(
+    m: &Constants<F::Real>,
+    w: &mut Workspace<F>,
+    tie: &Tie<F::Real>,
+    body: usize,
+) -> Found<F> {
     debug_assert_eq!(tie.dofs[0], m.bodies[body].dof);
     // the frame's origin is kept relative to the centre of mass
     let (arm, rotation) = (w.origin[body], w.rotation[body]);
@@ -183,6 +191,10 @@ fn of_free<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>, tie: &Tie<F::Re
             w.row_jacobian[angular + 3 + k] = rotation[i][k];
         }
     }
+    let omega = w.velocity[body][ANGULAR];
+    let mut found = Found::at(&[]);
+    found.swing[..3].copy_from_slice(&*omega.cross(omega.cross(arm)));
+    found
 }
 
 /// Writes D and aref of the rows of a tie, and gives the Jacobian of a range the sign of the bound that is nearer.
@@ -225,6 +237,9 @@ fn write_rows<C: Cx>(
             _ => tie.turning_weight,
         };
         let mut weight = d.div((one - d) * C::F::k(inverse_weight));
+        if !<<C::F as Num>::Real as Real>::DOUBLE {
+            weight = weight.min(C::F::c(WEIGHT_MAX));
+        }
         let spring = C::F::k(tie.soft.stiffness) * d * position[k];
         let mut aref = -velocity.fma(C::F::k(tie.soft.damping), spring) - found.swing[k];
         if let Some(active) = active {
