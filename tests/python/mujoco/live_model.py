@@ -58,7 +58,12 @@ class Live:
 
 @contextmanager
 def live(
-    model: str | mujoco.MjModel, *, worlds: int = 8, precision: str = "f64", fields: tuple[str, ...] = ()
+    model: str | mujoco.MjModel,
+    *,
+    worlds: int = 8,
+    precision: str = "f64",
+    device: str = "cpu",
+    fields: tuple[str, ...] = (),
 ) -> Iterator[Live]:
     """Run a model, or that of an XML text; both sides solve to the end."""
     model = mujoco.MjModel.from_xml_string(model) if isinstance(model, str) else model
@@ -67,7 +72,7 @@ def live(
     model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
     scene = tl.Scene.from_mujoco(model, name="m")
     fields = ("qpos", "qvel", "qacc", "joint_q", "joint_qd", *fields)
-    with tl.launch(scene, worlds=worlds, precision=precision, fields=fields, device="cpu") as sim:
+    with tl.launch(scene, worlds=worlds, precision=precision, fields=fields, device=device) as sim:
         yield Live(model, sim)
 
 

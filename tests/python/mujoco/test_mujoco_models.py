@@ -111,3 +111,20 @@ def test_single_precision_is_near(seed: int) -> None:
         for world, data in enumerate(case.data(states)):
             mujoco.mj_forward(case.model, data)
             assert relative(frame.qacc[world], data.qacc) < 1e-3
+
+
+@pytest.mark.parametrize("seed", range(TREES))
+def test_a_gpu_and_lanes_step_as_one_world(seed: int) -> None:
+    """Recorded programs on lavapipe and worlds in SIMD lanes, beside f64."""
+    xml = random_mjcf(seed, 1 + seed % 6, EVERYTHING)
+    found = {}
+    for device, precision in (("cpu", "f64"), ("cpu", "f32"), ("gpu", "f32")):
+        with live(xml, worlds=20, device=device, precision=precision, fields=("actuator_force",)) as case:
+            frame = case.place(case.states(seed))
+            found[device, precision] = [frame.qacc, frame.actuator_force, case.sim.step().qvel]
+    for device in ("cpu", "gpu"):
+        for name, single, double in zip(
+            ("qacc", "actuator_force", "qvel"), found[device, "f32"], found["cpu", "f64"], strict=True
+        ):
+            if double.size:
+                assert relative(single, double) < 1e-3, f"{name} on {device}"
