@@ -248,7 +248,8 @@ class _Model:
                 f'<position {target} {gear} kp="{rng.uniform(1, 50):.17g}" kv="{rng.uniform(0.1, 5):.17g}"{bounds}/>',
                 f'<velocity {target} {gear} kv="{rng.uniform(0.1, 5):.17g}"{bounds}/>',
                 f'<damper {target} {gear} kv="{rng.uniform(0.1, 5):.17g}" ctrlrange="0 1"/>',
-                f'<general {target} {gear} gaintype="affine" gainprm="{self.numbers(2)} {rng.uniform(-0.1, 0.1):.17g}" biastype="affine" '
+                f'<general {target} {gear} gaintype="affine" gainprm="{self.numbers(2)} {self.numbers(1, -0.1, 0.1)}" '
+                'biastype="affine" '
                 f'biasprm="{self.numbers(3, -1, 0)}"{bounds}/>',
             ][kind]
         return f"<actuator>{text}</actuator>"

@@ -41,12 +41,15 @@ _ARRAYS = """
     tendon_range tendon_margin tendon_length0 tendon_invweight0 tendon_solref_lim tendon_solimp_lim
     tendon_solref_fri tendon_solimp_fri wrap_objid wrap_prm actuator_trnid actuator_gear
     actuator_gainprm actuator_biasprm actuator_ctrllimited actuator_ctrlrange actuator_forcelimited
-    actuator_forcerange actuator_actlimited actuator_group key_time
+    actuator_forcerange actuator_actlimited actuator_actrange actuator_actadr actuator_actnum actuator_actearly
+    actuator_dynprm actuator_group jnt_actgravcomp body_mocapid pair_dim pair_geom1 pair_geom2 pair_solref
+    pair_solreffriction pair_solimp pair_margin pair_gap pair_friction
+    key_time key_qpos key_qvel key_act key_ctrl key_mpos key_mquat
 """.split()
 # Arrays of newer versions; where they are missing, no model has what they describe.
 _NEWER_ARRAYS = """
     jnt_stiffnesspoly dof_dampingpoly geom_adhesion geom_surfacevel tendon_armature tendon_dampingpoly
-    tendon_stiffnesspoly tendon_actfrclimited actuator_delay actuator_armature actuator_damping
+    tendon_stiffnesspoly tendon_actfrclimited tendon_actfrcrange actuator_delay actuator_armature actuator_damping
     actuator_dampingpoly actuator_ctrlnum actuator_outnum
 """.split()
 # Enumerations: the array and its type.
@@ -72,7 +75,7 @@ _NAMED = {
     "actuator": "nu",
     "key": "nkey",
 }
-_REAL_OPTIONS = ("timestep", "gravity", "tolerance", "impratio", "density", "viscosity")
+_REAL_OPTIONS = ("timestep", "gravity", "tolerance", "impratio", "density", "viscosity", "wind")
 _COUNT_OPTIONS = ("iterations", "ls_iterations", "noslip_iterations", "disableactuator")
 _COUNTS = ("nflex", "nplugin", "npair", "nmocap", "nsensor")
 
