@@ -53,10 +53,10 @@ impl Client {
         joint_target_q: Option<&Bound<'_, PyAny>>,
         joint_target_qd: Option<&Bound<'_, PyAny>>,
         ctrl: Option<&Bound<'_, PyAny>>,
-        body_f: Option<&Bound<'_, PyAny>>,
+        more: &Bound<'_, PyDict>,
     ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
-        let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], ctrl, body_f)?;
+        let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], ctrl, more)?;
         let commands = inputs.commands()?;
         frame(py, |hook| connection.step(&commands, hook))
     }
@@ -68,10 +68,10 @@ impl Client {
         joint_target_q: Option<&Bound<'_, PyAny>>,
         joint_target_qd: Option<&Bound<'_, PyAny>>,
         ctrl: Option<&Bound<'_, PyAny>>,
-        body_f: Option<&Bound<'_, PyAny>>,
+        more: &Bound<'_, PyDict>,
     ) -> PyResult<()> {
         let connection = self.connection(py)?;
-        let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], ctrl, body_f)?;
+        let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], ctrl, more)?;
         let commands = inputs.commands()?;
         waiting(py, |hook| connection.send(&commands, hook))
     }
@@ -86,10 +86,14 @@ impl Client {
         py: Python<'_>,
         joint_q: Option<&Bound<'_, PyAny>>,
         joint_qd: Option<&Bound<'_, PyAny>>,
+        more: &Bound<'_, PyDict>,
         mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
         let mut inputs = Inputs::new(&self.description);
+        for (name, value) in more {
+            inputs.add_ready(name.extract()?, &value)?;
+        }
         inputs.add("joint_q", Axis::Coords, joint_q)?;
         inputs.add("joint_qd", Axis::Dofs, joint_qd)?;
         let mask = Mask::new("mask", mask, self.description.worlds)?;
@@ -196,11 +200,11 @@ impl Client {
         &self,
         by_dof: [Option<&Bound<'py, PyAny>>; 3],
         ctrl: Option<&Bound<'py, PyAny>>,
-        body_f: Option<&Bound<'py, PyAny>>,
+        more: &Bound<'py, PyDict>,
     ) -> PyResult<Inputs<'_, 'py>> {
         let mut inputs = Inputs::new(&self.description);
-        if let Some(body_f) = body_f {
-            inputs.add_ready("body_f", body_f)?;
+        for (name, value) in more {
+            inputs.add_ready(name.extract()?, &value)?;
         }
         for (field, value) in ["joint_f", "joint_target_q", "joint_target_qd"]
             .into_iter()

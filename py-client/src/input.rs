@@ -56,14 +56,15 @@ impl<'a, 'py> Inputs<'a, 'py> {
         }
     }
 
-    /// Takes a parameter of every world that needs no conversion.
+    /// Takes a parameter, a part of the state or a command of every world that needs no conversion.
     pub(crate) fn add_ready(&mut self, name: &str, value: &Bound<'py, PyAny>) -> PyResult<()> {
-        let params = self.description.params.iter();
+        let params = self.description.params.iter().map(|param| &param.info);
         let known = params
-            .map(|param| &param.info)
+            .chain(&self.description.writes)
+            .chain(&self.description.commands)
             .find(|info| info.name == name);
         let refused = |reason: String| raise(value.py(), "CommandRefused", reason);
-        let info = known.ok_or_else(|| refused(format!("there is no parameter `{name}`")))?;
+        let info = known.ok_or_else(|| refused(format!("this scene has no `{name}`")))?;
         let array = value.cast::<PyArrayDyn<f64>>()?;
         if !array.is_c_contiguous() {
             return Err(refused(format!("{name}: its rows are not contiguous")));

@@ -2,7 +2,7 @@
 
 use sim_engine::backend::{Input, Values};
 use sim_engine::simulation::{Options, Precision, Simulation};
-use sim_model::{Description as Scene, Model};
+use sim_model::{Description as Scene, KeyState, Model};
 use sim_physics::arrays::{Dtype, Field, FieldDtype, FieldRow, Group, Layout};
 use sim_physics::constants::params::Param;
 use sim_protocol::host::{Inbox, Numbers};
@@ -41,6 +41,20 @@ pub(crate) fn frame_table(layout: &Layout) -> Table {
     Table::over_arena(slots, layout.bytes)
 }
 
+/// A keyframe, as clients see it.
+fn keyframe(state: &KeyState) -> protocol::KeyframeInfo {
+    let state = state.clone();
+    protocol::KeyframeInfo {
+        name: state.name,
+        joint_q: state.joint_q,
+        joint_qd: state.joint_qd,
+        act: state.act,
+        ctrl: state.ctrl,
+        mocap_pos: state.mocap_pos,
+        mocap_quat: state.mocap_quat,
+    }
+}
+
 /// The description for clients; the host adds name, session and process.
 pub(crate) fn description(
     model: &Model,
@@ -50,9 +64,13 @@ pub(crate) fn description(
 ) -> protocol::Description {
     let real = real(options.precision);
     let sizes = model.sizes();
-    let input = |group| {
+    let input = |is_one: fn(Field) -> bool| {
         let rows = Field::ALL.iter().filter(move |field| {
-            field.row().group == group && (**field != Field::Ctrl || sizes.actuators > 0)
+            let of_models = matches!(
+                field,
+                Field::Ctrl | Field::Act | Field::MocapPos | Field::MocapQuat
+            );
+            is_one(**field) && (!of_models || field.elements(&sizes) > 0)
         });
         rows.map(|field| InputInfo {
             name: field.row().name.to_owned(),
@@ -86,6 +104,9 @@ pub(crate) fn description(
         shape_names: model.shape_names().to_vec(),
         site_names: model.site_names().to_vec(),
         actuator_names: model.actuator_names().to_vec(),
+        activation_names: model.activation_names().to_vec(),
+        mocap_names: model.mocap_names().to_vec(),
+        keyframes: model.keyframes().iter().map(keyframe).collect(),
         contact_sensor_names: {
             let sensors = model.contact_sensors().iter();
             sensors.map(|sensor| sensor.name.clone()).collect()
@@ -118,14 +139,14 @@ pub(crate) fn description(
             })
             .collect(),
         commands: {
-            let mut commands: Vec<InputInfo> = input(Group::Command);
+            let mut commands: Vec<InputInfo> = input(|field| field.row().group == Group::Command);
             let loads = model.constants().varying.params();
             let loads = loads.filter(|param| param.is_load());
             commands.extend(loads.map(|param| param_info(model, param)));
             commands
         },
         writes: {
-            let mut writes: Vec<InputInfo> = input(Group::State);
+            let mut writes: Vec<InputInfo> = input(Field::is_written);
             let varying = model.constants().varying.params();
             writes.extend(varying.map(|param| param_info(model, param)));
             writes

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import _core, checks
+from tightloop import _core, checks, keyframes
 from tightloop._core import Frame
 from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
 from tightloop.errors import ArgumentError, CommandRefused
+from tightloop.inputs import as_array
 from tightloop.params import Params
 from tightloop.snapshot import Snapshot, transfer_file
 from tightloop.viewer_process import Viewer
@@ -78,6 +79,9 @@ class Sim:
         self.site_names: list[str] = self.info["site_names"]
         self.contact_sensor_names: list[str] = self.info["contact_sensor_names"]
         self.actuator_names: list[str] = self.info["actuator_names"]
+        self.activation_names: list[str] = self.info["activation_names"]
+        self.mocap_names: list[str] = self.info["mocap_names"]
+        self.keyframe_names: list[str] = [known["name"] for known in self.info["keyframes"]]
         self.dofs, self.coords, self.bodies = (
             {robot["name"]: slice(*robot[range_]) for robot in self.info["robots"]}
             for range_ in ("dofs", "coords", "bodies")
@@ -90,6 +94,8 @@ class Sim:
         joint_target_q: Command | None = None,
         joint_target_qd: Command | None = None,
         ctrl: Command | None = None,
+        mocap_pos: ArrayLike | None = None,
+        mocap_quat: ArrayLike | None = None,
         body_f: Command | None = None,
     ) -> Frame:
         """Advance every world by one control frame. A command that is left out keeps its last value.
@@ -102,6 +108,9 @@ class Sim:
             joint_target_qd: Velocity targets of the drives [rad/s or m/s], same shapes.
             ctrl: Controls of the actuators of MuJoCo models, shape ``(worlds, actuators)`` or ``(actuators,)``, or a
                 dict by model. Each is clamped to its ``ctrlrange``.
+            mocap_pos: Where the mocap bodies of MuJoCo models are [m], shape ``(worlds, mocaps, 3)`` or
+                ``(mocaps, 3)``, in the order of `mocap_names`.
+            mocap_quat: Their quaternions (w, x, y, z), shape ``(worlds, mocaps, 4)`` or ``(mocaps, 4)``.
             body_f: Force on each body at its centre of mass [N], then torque [N·m], in world axes, shape
                 ``(worlds, bodies, 6)`` or ``(bodies, 6)``. It needs ``launch(params=("body_f",))``.
 
@@ -115,7 +124,8 @@ class Sim:
             LeaseLost: This client lost control of the daemon.
             DaemonLost: The daemon went away; its state is lost.
         """
-        return self._client.step(*self._commands(joint_f, joint_target_q, joint_target_qd, ctrl, body_f))
+        more = self._arrays("commands", mocap_pos=mocap_pos, mocap_quat=mocap_quat, body_f=body_f)
+        return self._client.step(joint_f, joint_target_q, joint_target_qd, ctrl, more)
 
     def send(
         self,
@@ -124,6 +134,8 @@ class Sim:
         joint_target_q: Command | None = None,
         joint_target_qd: Command | None = None,
         ctrl: Command | None = None,
+        mocap_pos: ArrayLike | None = None,
+        mocap_quat: ArrayLike | None = None,
         body_f: Command | None = None,
     ) -> None:
         """Begin a step and return at once: the worlds advance while the caller continues, until `recv`.
@@ -136,13 +148,16 @@ class Sim:
             joint_target_q: As in `step`.
             joint_target_qd: As in `step`.
             ctrl: As in `step`.
+            mocap_pos: As in `step`.
+            mocap_quat: As in `step`.
             body_f: As in `step`.
 
         Raises:
             CommandRefused: A shape or dtype is wrong, or a step is in flight; nothing was sent. `recv` reports a wrong
                 value, such as NaN. Other errors are those of `step`.
         """
-        self._client.send(*self._commands(joint_f, joint_target_q, joint_target_qd, ctrl, body_f))
+        more = self._arrays("commands", mocap_pos=mocap_pos, mocap_quat=mocap_quat, body_f=body_f)
+        self._client.send(joint_f, joint_target_q, joint_target_qd, ctrl, more)
 
     def recv(self) -> Frame:
         """Wait for the frame of the step that `send` began. After Ctrl-C it may be called again.
@@ -162,8 +177,9 @@ class Sim:
         *,
         mask: ArrayLike | None = None,
         seed: int | Sequence[int] | NDArray[np.integer[Any]] | None = None,
+        keyframe: str | int | None = None,
     ) -> Frame:
-        """Reset worlds to the scene's start: state, ``time``, drive targets, and ``joint_f`` = 0.
+        """Reset worlds to the scene's start or to a keyframe: state, ``time``, drive targets, and ``joint_f`` = 0.
 
         A reset also clears the fault of a faulted world (bits 1 and 8 of ``status``).
 
@@ -177,32 +193,55 @@ class Sim:
             seed: New seed of these worlds, which start its episode 0: an int from 0 to 2**64 - 1 for all of them, or a
                 sequence with one seed per world. With one int, worlds draw different values, except with
                 ``draws="seed"``. If left out, the worlds start their next episode.
+            keyframe: Keyframe of a MuJoCo model to write after the reset: its name, ``model/name``, or its place in
+                `keyframe_names`. It sets positions, velocities, ``act``, ``ctrl`` and mocap bodies; ``time`` begins at
+                0.
 
         Returns:
-            A frame at the new state. Raises as `step` does.
+            A frame at the new state.
+
+        Raises:
+            ArgumentError: There is no such keyframe, or several models have one of that name.
+            TightloopError: As `step`.
         """
-        return self._client.reset(mask, seed)
+        if keyframe is None:
+            return self._client.reset(mask, seed)
+        state = keyframes.find(self.info["keyframes"], keyframe)
+        self._client.reset(mask, seed)
+        return self.write(**keyframes.arrays(state), mask=mask)
 
     def write(
         self,
         *,
         joint_q: Command | None = None,
         joint_qd: Command | None = None,
+        act: ArrayLike | None = None,
+        ctrl: ArrayLike | None = None,
+        mocap_pos: ArrayLike | None = None,
+        mocap_quat: ArrayLike | None = None,
         mask: ArrayLike | None = None,
     ) -> Frame:
-        """Set joint positions and velocities. Values that are left out and worlds outside the mask do not change.
+        """Set joint positions and velocities, and what else MuJoCo models begin with.
+
+        Values that are left out and worlds outside the mask do not change.
 
         A faulted world stays faulted.
 
         Args:
             joint_q: Joint positions [rad or m], shape ``(worlds, coords)`` or ``(coords,)``, or a dict by robot.
             joint_qd: Joint velocities [rad/s or m/s], shape ``(worlds, dofs)`` or ``(dofs,)``, or a dict by robot.
+            act: Activations of the actuators that `activation_names` lists, shape ``(worlds, activations)`` or
+                ``(activations,)``.
+            ctrl: Controls, which hold until the next `step` that gives others; as there.
+            mocap_pos: Positions of mocap bodies, likewise.
+            mocap_quat: Quaternions of mocap bodies, likewise.
             mask: Worlds to write, bool, shape ``(worlds,)``; all if left out.
 
         Returns:
             A frame at the new state. Raises as `step` does.
         """
-        return self._client.write(joint_q, joint_qd, mask)
+        more = self._arrays("writes", act=act, ctrl=ctrl, mocap_pos=mocap_pos, mocap_quat=mocap_quat)
+        return self._client.write(joint_q, joint_qd, more, mask)
 
     def forward(self) -> Frame:
         """Return a frame at the current state and commands without a step. Raises as `step` does."""
@@ -343,18 +382,28 @@ class Sim:
         """
         self._end()
 
-    def _commands(
-        self,
-        joint_f: Command | None,
-        joint_target_q: Command | None,
-        joint_target_qd: Command | None,
-        ctrl: Command | None,
-        body_f: Command | None,
-    ) -> tuple[Command | None, Command | None, Command | None, Command | None, NDArray[np.float64] | None]:
-        """Return the commands of a step, in the order in which the client takes them."""
-        # the client checks joint commands itself; `body_f` varies only where the run says so, which `Params` knows
-        wrench = None if body_f is None else self.params.ready("body_f", body_f)
-        return joint_f, joint_target_q, joint_target_qd, ctrl, wrench
+    def _arrays(self, group: str, **given: ArrayLike | None) -> dict[str, NDArray[np.float64]]:
+        """Return what is given as arrays, by the number of columns that ``info[group]`` lists."""
+        found = {}
+        for name, value in given.items():
+            if value is None:
+                continue
+            if name == "body_f":  # varies only where the run says so, which `Params` knows
+                found[name] = self.params.ready(name, value)
+                continue
+            columns = {known["name"]: known["columns"] for known in self.info[group]}
+            if name not in columns:
+                raise CommandRefused(f"{name}: no model of this scene has any")
+            found[name] = as_array(name, None, self._flat(name, value), self.worlds, columns[name])
+        return found
+
+    def _flat(self, name: str, value: ArrayLike) -> ArrayLike:
+        """Return an array of mocap bodies with the entries of all of them in a row."""
+        width = {"mocap_pos": 3, "mocap_quat": 4}.get(name)
+        given = np.asarray(value)
+        if width is None or given.shape[-2:] != (len(self.mocap_names), width):
+            return value
+        return given.reshape(*given.shape[:-2], -1)
 
     def __enter__(self) -> Sim:
         return self

@@ -41,6 +41,8 @@ impl Simulation {
         let names = match field {
             Field::JointQ => self.model().coord_names(),
             Field::Ctrl => self.model().actuator_names(),
+            Field::Act => self.model().activation_names(),
+            Field::MocapPos | Field::MocapQuat => self.model().mocap_names(),
             _ => self.model().dof_names(),
         };
         let row_of = |world: usize| world * columns.len()..(world + 1) * columns.len();
@@ -55,7 +57,8 @@ impl Simulation {
             return Err(BackendError::NotFinite {
                 field: row.name,
                 world: place / columns.len(),
-                name: names[columns.start + place % columns.len()].clone(),
+                // a mocap body has several columns
+                name: names[(columns.start + place % columns.len()) * names.len() / all].clone(),
                 value: self.precision().round(values.at(place)),
             });
         }

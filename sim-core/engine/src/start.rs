@@ -172,6 +172,7 @@ impl DrawnJoint {
                 let turned = rotation(&self.q).mul(&turn(std::array::from_fn(offset)));
                 (0..4).for_each(|k| set(k, turned.quat[k]));
             }
+            Motion::Mocap => {}
             Motion::Free => {
                 (0..3).for_each(|k| set(k, self.q[k] + offset(k)));
                 if varies(3) {

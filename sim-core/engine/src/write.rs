@@ -6,7 +6,7 @@ use sim_physics::arrays::Group;
 use std::ops::Range;
 
 impl Simulation {
-    /// Sets columns of a state or of a parameter in the worlds of the mask (none = all). A written state clears the warm start.
+    /// Sets columns of a state, of a command of a model from MuJoCo, or of a parameter in the worlds of the mask (none = all). A written state clears the warm start.
     ///
     /// `values` is `(worlds, columns)`, world-major. Rows of other worlds are ignored. Quaternions are normalized. Parameters
     /// count from the next step on.
@@ -39,7 +39,13 @@ impl Simulation {
         mask: Option<&[bool]>,
     ) -> Result<(), BackendError> {
         match input.into() {
-            Input::Field(field) => self.check_field(field, Group::State, columns, values, mask),
+            Input::Field(field) => {
+                let group = match field.is_written() {
+                    true => field.row().group,
+                    false => Group::State,
+                };
+                self.check_field(field, group, columns, values, mask)
+            }
             Input::Param(param) => self.check_param(param, columns, values, mask),
         }
     }

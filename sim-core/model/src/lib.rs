@@ -45,7 +45,7 @@ pub use geom_contact::GeomContact;
 pub use geometry::Shape;
 pub use inertia::{Inertial, principal_moments};
 pub use joint_kind::JointKind;
-pub use model::{Model, RobotRange, SensedShapes, Start};
+pub use model::{KeyState, Model, RobotRange, SensedShapes, Start};
 pub use mujoco::MujocoOptions;
 pub use pose::Pose;
 pub use rigid_body::Body;

@@ -34,6 +34,9 @@ pub struct Model {
     pub(crate) body_names: Vec<String>,
     pub(crate) shape_names: Vec<String>,
     pub(crate) actuator_names: Vec<String>,
+    pub(crate) activation_names: Vec<String>,
+    pub(crate) mocap_names: Vec<String>,
+    pub(crate) keyframes: Vec<KeyState>,
     pub(crate) site_names: Vec<String>,
     pub(crate) contact_sensors: Vec<SensedShapes>,
     pub(crate) command_delay_max: usize,
@@ -63,12 +66,35 @@ pub struct Start {
     pub joint_target_q: Vec<f64>,
     /// [rad/s or m/s]
     pub joint_target_qd: Vec<f64>,
+    /// Positions of mocap bodies, three each [m].
+    pub mocap_pos: Vec<f64>,
+    /// Their quaternions (w, x, y, z).
+    pub mocap_quat: Vec<f64>,
     /// What a reset draws and adds to the positions, as [`crate::JointDof::offset_q`] has it.
     pub joint_q_offset: Vec<Option<Distribution>>,
     /// What a reset draws and adds to the velocities, which are 0.
     pub joint_qd_offset: Vec<Option<Distribution>>,
     /// What a reset draws of the parameters.
     pub params: Vec<ParamDraw>,
+}
+
+/// A keyframe: a state of the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KeyState {
+    /// `model/keyframe`.
+    pub name: String,
+    /// Positions of all joints [rad or m].
+    pub joint_q: Vec<f64>,
+    /// Velocities [rad/s or m/s].
+    pub joint_qd: Vec<f64>,
+    /// Activations.
+    pub act: Vec<f64>,
+    /// Controls.
+    pub ctrl: Vec<f64>,
+    /// Positions of mocap bodies, three each [m].
+    pub mocap_pos: Vec<f64>,
+    /// Their quaternions (w, x, y, z).
+    pub mocap_quat: Vec<f64>,
 }
 
 impl Model {
@@ -99,6 +125,18 @@ impl Model {
     /// Names of the shapes, as [`crate::Description::shape_names`] has them.
     pub fn shape_names(&self) -> &[String] {
         &self.shape_names
+    }
+    /// Names of the actuators that have an activation, in the order of `act`.
+    pub fn activation_names(&self) -> &[String] {
+        &self.activation_names
+    }
+    /// Keyframes of the models from MuJoCo.
+    pub fn keyframes(&self) -> &[KeyState] {
+        &self.keyframes
+    }
+    /// Names of the bodies that clients place, `robot/body`, in the order of `mocap_pos`.
+    pub fn mocap_names(&self) -> &[String] {
+        &self.mocap_names
     }
     /// Names of the actuators, `robot/actuator`.
     pub fn actuator_names(&self) -> &[String] {
@@ -152,6 +190,8 @@ impl Model {
             sites: self.site_names.len(),
             contact_sensors: self.contact_sensors.len(),
             actuators: self.actuator_names.len(),
+            activations: self.constants.mujoco.activations,
+            mocaps: self.constants.mujoco.mocaps,
         }
     }
     /// State and commands after a reset.

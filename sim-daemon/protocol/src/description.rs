@@ -59,6 +59,15 @@ pub struct Description {
     /// `robot/actuator` of each actuator. Older recordings have none.
     #[serde(default)]
     pub actuator_names: Vec<String>,
+    /// Of them, those that have an activation. Older recordings have none.
+    #[serde(default)]
+    pub activation_names: Vec<String>,
+    /// `robot/body` of each body that clients place. Older recordings have none.
+    #[serde(default)]
+    pub mocap_names: Vec<String>,
+    /// Keyframes of the models from MuJoCo. Older recordings have none.
+    #[serde(default)]
+    pub keyframes: Vec<KeyframeInfo>,
     /// The robots with their ranges in the lists above.
     pub robots: Vec<RobotRange>,
     /// Rows of the field table: what every frame carries, in this order.
@@ -108,6 +117,25 @@ pub struct ParamInfo {
     pub place: Option<usize>,
     /// What it is.
     pub info: InputInfo,
+}
+
+/// A keyframe: a state of the scene, in the order of the names.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KeyframeInfo {
+    /// `model/keyframe`.
+    pub name: String,
+    /// Positions of all joints [rad or m].
+    pub joint_q: Vec<f64>,
+    /// Velocities [rad/s or m/s].
+    pub joint_qd: Vec<f64>,
+    /// Activations.
+    pub act: Vec<f64>,
+    /// Controls.
+    pub ctrl: Vec<f64>,
+    /// Positions of mocap bodies, three each [m].
+    pub mocap_pos: Vec<f64>,
+    /// Their quaternions (w, x, y, z).
+    pub mocap_quat: Vec<f64>,
 }
 
 /// Ranges of one robot, each `[start, stop)`.
@@ -173,7 +201,11 @@ impl Description {
         self.contact_sensor_names
             .iter()
             .for_each(|name| hash.text(name));
-        self.actuator_names.iter().for_each(|name| hash.text(name));
+        let actuators = self.actuator_names.iter();
+        let all = actuators
+            .chain(&self.activation_names)
+            .chain(&self.mocap_names);
+        all.for_each(|name| hash.text(name));
         for field in &self.fields {
             hash.text(&field.name);
             hash.number(field.dtype as u64);

@@ -56,7 +56,7 @@ mod waiter;
 pub use client::Client;
 pub use command::{Command, Values};
 pub use daemon_lock::{cleanup_after_death, sweep};
-pub use description::{Description, FieldInfo, InputInfo, ParamInfo, RobotRange};
+pub use description::{Description, FieldInfo, InputInfo, KeyframeInfo, ParamInfo, RobotRange};
 pub use discovery::{AttachOptions, find};
 pub use error::ProtocolError;
 pub use frame::{Entry, Frame, View};

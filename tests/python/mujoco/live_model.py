@@ -17,6 +17,10 @@ Array = NDArray[np.float64]
 mujoco.set_mju_user_warning(lambda _: None)
 
 
+# What a world holds besides positions and velocities.
+HELD = ("ctrl", "act", "mocap_pos", "mocap_quat")
+
+
 @dataclass
 class States:
     """States and controls; worlds first, in MuJoCo's conventions."""
@@ -24,6 +28,9 @@ class States:
     qpos: Array
     qvel: Array
     ctrl: Array
+    act: Array
+    mocap_pos: Array
+    mocap_quat: Array
 
 
 @dataclass
@@ -39,20 +46,24 @@ class Live:
         qpos = np.tile(m.qpos0, (worlds, 1))
         for row in qpos:
             mujoco.mj_integratePos(m, row, rng.normal(0, spread, m.nv), 1.0)
-        return States(qpos, rng.normal(0, speed, (worlds, m.nv)), rng.normal(0, 1, (worlds, m.nu)))
+        qvel, ctrl = rng.normal(0, speed, (worlds, m.nv)), rng.normal(0, 1, (worlds, m.nu))
+        act = rng.normal(0, 0.5, (worlds, m.na))
+        return States(
+            qpos, qvel, ctrl, act, rng.normal(0, 0.5, (worlds, m.nmocap, 3)), rng.normal(0, 1, (worlds, m.nmocap, 4))
+        )
 
     def place(self, states: States) -> tl.Frame:
         """Hold the controls and put the worlds into the states."""
-        if self.model.nu:
-            self.sim.step(ctrl=states.ctrl)
         joint_q, joint_qd = to_joints(self.model, states.qpos, states.qvel)
-        return self.sim.write(joint_q=joint_q, joint_qd=joint_qd)
+        more = {name: getattr(states, name) for name in HELD if getattr(states, name).size}
+        return self.sim.write(joint_q=joint_q, joint_qd=joint_qd, **more)
 
     def data(self, states: States) -> Iterator[mujoco.MjData]:
         """MuJoCo's data of each world, in its state."""
-        for qpos, qvel, ctrl in zip(states.qpos, states.qvel, states.ctrl, strict=True):
+        for world in range(len(states.qpos)):
             data = mujoco.MjData(self.model)
-            data.qpos[:], data.qvel[:], data.ctrl[:] = qpos, qvel, ctrl
+            for name in ("qpos", "qvel", *HELD):
+                getattr(data, name)[:] = getattr(states, name)[world]
             yield data
 
 
@@ -71,7 +82,7 @@ def live(
     model.opt.iterations = model.opt.ls_iterations = 100
     model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
     scene = tl.Scene.from_mujoco(model, name="m")
-    fields = ("qpos", "qvel", "qacc", "joint_q", "joint_qd", *fields)
+    fields = ("qpos", "qvel", "qacc", "joint_q", "joint_qd", *(("act",) if model.na else ()), *fields)
     with tl.launch(scene, worlds=worlds, precision=precision, fields=fields, device=device) as sim:
         yield Live(model, sim)
 

@@ -26,7 +26,13 @@ class Features:
     """Equalities of one joint, and of higher than first degree."""
     connections: bool = False
     """Points of bodies that are connected, and bodies and sites that are welded."""
+    mocap: bool = False
+    """A body that is placed, with a body on it, a geom, and a weld to another one."""
     actuators: bool = False
+    activations: bool = False
+    """Actuators with a state."""
+    transmissions: bool = False
+    """Actuators on balls, free joints and sites."""
     tendons: bool = False
     pulls: bool = False
     """Springs, dampers, limits, dry friction and equalities of tendons."""
@@ -48,6 +54,8 @@ class _Model:
     def __init__(self, rng: np.random.Generator, features: Features) -> None:
         self.rng, self.features = rng, features
         self.scalars: list[str] = []
+        self.balls: list[str] = []
+        self.frees: list[str] = []
         self.joints = self.bodies = 0
 
     def has(self, feature: str, share: float = 0.5) -> bool:
@@ -71,7 +79,7 @@ class _Model:
 
     def xml(self, bodies: int) -> str:
         f = self.features
-        trees = ""
+        trees = self.mocap()
         while bodies > 0:
             size = int(self.rng.integers(1, bodies + 1))
             trees += self.body(size, root=True)
@@ -83,10 +91,17 @@ class _Model:
 {self.tendons()}{self.equalities()}{self.actuators()}
 </mujoco>"""
 
+    def mocap(self) -> str:
+        if not self.features.mocap:
+            return ""
+        pose = f'pos="{self.numbers(3, -0.6, 0.6)}" quat="{self.numbers(4)}"'
+        return f'<body name="placed" mocap="true" {pose}>{self.geom()}{self.body(1)}</body>'
+
     def body(self, size: int, *, root: bool = False) -> str:
         joints = ""
         if root and self.has("free"):
-            joints = f'<joint type="free" name="j{self._next()}" {self.dry()}/>'
+            self.frees.append(f"j{self._next()}")
+            joints = f'<joint type="free" name="{self.frees[-1]}" {self.dry()}/>'
         elif self.has("ball", 0.3):
             joints = self.ball()
         elif self.rng.random() > 0.1:
@@ -122,7 +137,8 @@ class _Model:
         return text
 
     def ball(self) -> str:
-        text = f'<joint name="j{self._next()}" type="ball" pos="{self.numbers(3, -0.2, 0.2)}"{self.passive()}'
+        self.balls.append(f"j{self._next()}")
+        text = f'<joint name="{self.balls[-1]}" type="ball" pos="{self.numbers(3, -0.2, 0.2)}"{self.passive()}'
         if self.has("limits"):
             text += f' range="0 {self.rng.uniform(0.2, 1.5):.17g}" margin="{self.rng.choice([0.0, 0.3])}"'
             text += f" {self.softness(('solreflimit', 'solimplimit'))}"
@@ -209,6 +225,9 @@ class _Model:
             text += f'<tendon tendon1="t0" {other} polycoef="{self.numbers(5, -0.5, 0.5)}" {self.equality()}/>'
         if self.has("connections", 0.7):
             text += self.connection("connect") + self.connection("weld")
+        if self.features.mocap:
+            second = self.rng.integers(1, self.bodies + 1)
+            text += f'<weld body1="placed" body2="b{second}" {self.equality()}/>'
         return f"<equality>{text}</equality>"
 
     def equality(self) -> str:
@@ -229,27 +248,55 @@ class _Model:
         return f'<{kind} body1="b{first}" {other} {place} {scale} {self.equality()}/>'
 
     def actuators(self) -> str:
-        if not self.features.actuators or not self.scalars:
+        if not self.features.actuators:
             return ""
         rng, text = self.rng, ""
-        targets = [f'joint="{name}"' for name in self.scalars]
+        targets = [f'joint="{name}" gear="{self.numbers(1, -3, 3)}"' for name in self.scalars]
         if self.features.tendons and len(self.scalars) >= 2:
-            targets += ['tendon="t0"', 'tendon="t1"']
+            targets += [f'tendon="t{k}" gear="{self.numbers(1, -3, 3)}"' for k in range(2)]
+        if self.features.transmissions:
+            targets += self.transmissions()
         for target in targets:
-            gear = f'gear="{rng.uniform(-3, 3):.17g}"'
             bounds = ""
             if self.has("bounds"):
                 bounds += ' ctrlrange="-0.5 0.8"'
             if self.has("bounds"):
                 bounds += ' forcerange="-1 1.5"'
+            if self.has("activations", 0.7):
+                text += self.with_activation(target, bounds)
+                continue
             kind = rng.integers(5)
             text += [
-                f"<motor {target} {gear}{bounds}/>",
-                f'<position {target} {gear} kp="{rng.uniform(1, 50):.17g}" kv="{rng.uniform(0.1, 5):.17g}"{bounds}/>',
-                f'<velocity {target} {gear} kv="{rng.uniform(0.1, 5):.17g}"{bounds}/>',
-                f'<damper {target} {gear} kv="{rng.uniform(0.1, 5):.17g}" ctrlrange="0 1"/>',
-                f'<general {target} {gear} gaintype="affine" gainprm="{self.numbers(2)} {self.numbers(1, -0.1, 0.1)}" '
-                'biastype="affine" '
-                f'biasprm="{self.numbers(3, -1, 0)}"{bounds}/>',
+                f"<motor {target}{bounds}/>",
+                f'<position {target} kp="{rng.uniform(1, 50):.17g}" kv="{rng.uniform(0.1, 5):.17g}"{bounds}/>',
+                f'<velocity {target} kv="{rng.uniform(0.1, 5):.17g}"{bounds}/>',
+                f'<damper {target} kv="{rng.uniform(0.1, 5):.17g}" ctrlrange="0 1"/>',
+                f"<general {target} {self.law()}{bounds}/>",
             ][kind]
         return f"<actuator>{text}</actuator>"
+
+    def law(self) -> str:
+        """An affine gain and bias. Gains that grow fast with the velocity would throw bodies off."""
+        gain = f'gaintype="affine" gainprm="{self.numbers(2)} {self.numbers(1, -0.1, 0.1)}"'
+        return f'{gain} biastype="affine" biasprm="{self.numbers(3, -1, 0)}"'
+
+    def transmissions(self) -> list[str]:
+        """One actuator on each ball and free joint, on some sites, and on sites relative to others."""
+        kinds = self.rng.choice(["joint", "jointinparent"], len(self.balls) + len(self.frees))
+        targets = [
+            f'{kind}="{name}" gear="{self.numbers(6, -3, 3)}"'
+            for kind, name in zip(kinds, self.balls + self.frees, strict=True)
+        ]
+        for _ in range(2):
+            first, second = self.rng.integers(1, self.bodies + 1, 2)
+            other = f'refsite="s{second}"' if self.rng.random() < 0.6 else ""
+            targets.append(f'site="s{first}" {other} gear="{self.numbers(6, -1, 1)}"')
+        return targets
+
+    def with_activation(self, target: str, bounds: str) -> str:
+        rng = self.rng
+        kind = rng.choice(["integrator", "filter", "filterexact"])
+        early = f'actearly="{rng.choice(["true", "false"])}"'
+        limits = 'actrange="-0.4 0.3"' if rng.random() < 0.5 else ""
+        time = f'dynprm="{rng.uniform(0.005, 0.5):.17g}"'
+        return f'<general {target} dyntype="{kind}" {time} {early} {limits} {self.law()}{bounds}/>'

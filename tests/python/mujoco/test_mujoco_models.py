@@ -25,6 +25,9 @@ EVERYTHING = replace(
     polynomials=True,
     connections=True,
     pulls=True,
+    activations=True,
+    transmissions=True,
+    mocap=True,
     bounds=True,
 )
 FEATURES = {
@@ -42,11 +45,17 @@ FEATURES = {
     "tendons": replace(JOINTS, tendons=True, pulls=True),
     "tendons of actuators": replace(ACTUATED, pulls=True, option='integrator="implicitfast"'),
     "explicit tendons": replace(JOINTS, tendons=True, pulls=True, flag='eulerdamp="disable"'),
+    "mocap bodies": replace(JOINTS, mocap=True),
     "actuators": ACTUATED,
     "implicit actuators": replace(ACTUATED, bounds=True, option='integrator="implicitfast"'),
     "bounds": replace(ACTUATED, bounds=True),
+    "activations": replace(ACTUATED, activations=True, bounds=True),
+    "implicit activations": replace(ACTUATED, activations=True, option='integrator="implicitfast"'),
+    "activations by Runge-Kutta": replace(ACTUATED, activations=True, option='integrator="RK4"'),
+    "transmissions": replace(ACTUATED, transmissions=True),
+    "implicit transmissions": replace(ACTUATED, transmissions=True, option='integrator="implicitfast"'),
     "unclamped": replace(ACTUATED, bounds=True, flag='clampctrl="disable"'),
-    "no actuation": replace(ACTUATED, flag='actuation="disable"'),
+    "no actuation": replace(ACTUATED, activations=True, flag='actuation="disable"'),
     "no gravity": replace(JOINTS, flag='gravity="disable"'),
     "unsafe references": replace(JOINTS, limits=True, flag='refsafe="disable"', option='timestep="0.004"'),
     "everything": EVERYTHING,
@@ -73,6 +82,8 @@ def assert_step(case: Live, seed: int, tolerance: float) -> None:
         mujoco.mj_step(case.model, data)
         assert relative(moved.qvel[world], data.qvel) < tolerance, "qvel"
         assert relative(moved.qpos[world], data.qpos) < tolerance, "qpos"
+        if case.model.na:
+            assert relative(moved.act[world], data.act) < tolerance, "act"
 
 
 @pytest.mark.parametrize("feature", FEATURES)
@@ -93,7 +104,9 @@ def has_closed_form(model: mujoco.MjModel, contact: mujoco.MjContact) -> bool:
 @pytest.mark.parametrize("seed", range(2 * TREES))
 def test_geoms_touch_as_mujocos(cone: str, seed: int) -> None:
     option = f'cone="{cone}" impratio="2"'
-    xml = random_mjcf(seed, 2 + seed % 5, replace(JOINTS, geoms=True, equalities=seed % 2 == 0, option=option))
+    xml = random_mjcf(
+        seed, 2 + seed % 5, replace(JOINTS, geoms=True, equalities=seed % 2 == 0, mocap=seed % 3 == 0, option=option)
+    )
     with live(xml, fields=("contact_count",)) as case:
         states = case.states(seed)
         frame = case.place(states)

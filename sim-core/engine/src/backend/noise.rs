@@ -139,6 +139,7 @@ fn add_to_joint<R: Real>(motion: Motion, q: &mut [R], noise: impl Fn(usize) -> f
     match motion {
         Motion::Revolute | Motion::Prismatic => add(&mut q[0], noise(0)),
         Motion::Ball => turn(&mut q[..4], [noise(0), noise(1), noise(2)], false),
+        Motion::Mocap => {}
         Motion::Free => {
             (0..3).for_each(|k| add(&mut q[k], noise(k)));
             turn(&mut q[3..7], [noise(3), noise(4), noise(5)], true);

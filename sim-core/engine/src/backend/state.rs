@@ -8,7 +8,7 @@ use sim_physics::step::StageId;
 
 /// The arrays of a record in their order, which is that of a snapshot's file: arrays with an entry for each dof first, the
 /// parameters last.
-pub(in crate::backend) const RECORD: [Array; 10] = [
+pub(in crate::backend) const RECORD: [Array; 13] = [
     Array::JointQd,
     Array::JointQdd,
     Array::JointF,
@@ -16,8 +16,11 @@ pub(in crate::backend) const RECORD: [Array; 10] = [
     Array::JointTargetQd,
     Array::JointQ,
     Array::JointQRest,
+    Array::Act,
     Array::CommandHistory,
     Array::Ctrl,
+    Array::MocapPos,
+    Array::MocapQuat,
     Array::Params,
 ];
 
@@ -91,6 +94,8 @@ pub(in crate::backend) fn start<R: Real>(model: &Model) -> Vec<R> {
         (Array::JointQ, &start.joint_q),
         (Array::JointTargetQ, &start.joint_target_q),
         (Array::JointTargetQd, &start.joint_target_qd),
+        (Array::MocapPos, &start.mocap_pos),
+        (Array::MocapQuat, &start.mocap_quat),
     ] {
         for (to, from) in reset[shape.start(array)..].iter_mut().zip(values) {
             *to = R::of(*from);

@@ -1,19 +1,22 @@
 //! Bodies, dofs and frames of a model, from the links and joints of robots.
 
+use super::actuators;
 use super::carrier::Carrier;
 use super::constraint_rows::{DofEquality, DofJoint, SoftJoint};
 use super::ties::{DofConstraint, terms};
-use crate::description::{self, Joint, MujocoJoint, MujocoParts, Robot, TargetMode};
+use crate::description::{Joint, MujocoJoint, MujocoParts, Robot, TargetMode};
 use crate::inertia::{Inertial, merge};
 use crate::joint_kind::JointKind;
 use crate::model::{RobotRange, Start};
 use crate::pose::Pose;
-use sim_physics::constants::mujoco::{Actuator, ActuatorBound, Mujoco, Spring, Tendon, Term};
+use sim_physics::constants::mujoco::{ActuatorBound, Mujoco, Spring, Tendon};
 use sim_physics::constants::{Body, Dof, Frame, MassEntry, Motion, Tree};
 use sim_physics::math::factor::Pattern;
 
 #[derive(Default)]
 pub(super) struct BodyBuilder {
+    /// Length of a step [s].
+    pub dt: f64,
     pub bodies: Vec<Body<f64>>,
     pub dofs: Vec<Dof<f64>>,
     pub trees: Vec<Tree<f64>>,
@@ -28,6 +31,7 @@ pub(super) struct BodyBuilder {
     pub equalities: Vec<DofEquality>,
     pub constraints: Vec<DofConstraint>,
     pub actuator_names: Vec<String>,
+    pub mocap_names: Vec<String>,
     couplings: Vec<(usize, usize)>,
     /// How each link of each robot is carried.
     pub carriers: Vec<Vec<Carrier>>,
@@ -79,8 +83,15 @@ impl BodyBuilder {
                 let own = robot.mujoco.as_ref().map(|parts| &parts.joints[index]);
                 carriers[link] = self.add_joint(joint, own, at);
             }
+            let mocaps = robot.mujoco.as_ref().map(|parts| &parts.mocaps);
+            if mocaps.is_some_and(|mocaps| mocaps.contains(&link)) {
+                carriers[link] = self.add_mocap(carriers[link]);
+            }
             let carrier = carriers[link];
             self.body_names.push(named(robot.links[link].name.clone()));
+            if mocaps.is_some_and(|mocaps| mocaps.contains(&link)) {
+                self.mocap_names.push(named(robot.links[link].name.clone()));
+            }
             self.frames.push(Frame {
                 body: carrier.body,
                 tree: carrier.tree,
@@ -123,6 +134,42 @@ impl BodyBuilder {
                 pos: [0.0; 3],
                 quat: at.pose.quat,
             },
+        }
+    }
+
+    /// A body that clients place, and that begins at `at`; in a tree of its own.
+    fn add_mocap(&mut self, at: Carrier) -> Carrier {
+        let base = self.trees[at.tree].base;
+        let [x, y, z, w] = at.pose.quat;
+        let start = &mut self.start;
+        start
+            .mocap_pos
+            .extend(base.iter().zip(at.pose.pos).map(|(base, x)| base + x));
+        start.mocap_quat.extend([w, x, y, z]);
+        self.trees.push(Tree {
+            base: [0.0; 3],
+            free: None,
+        });
+        self.bodies.push(Body {
+            motion: Motion::Mocap,
+            parent: None,
+            tree: self.trees.len() - 1,
+            dof: self.dofs.len(),
+            coord: self.mujoco.mocaps,
+            rotation: columns(Pose::identity().rotation()),
+            exchange: None,
+            quat: Pose::identity().quat,
+            position: [0.0; 3],
+            mass: 0.0,
+            center: [0.0; 3],
+            inertia: [0.0; 6],
+            parts: Vec::new(),
+        });
+        self.mujoco.mocaps += 1;
+        Carrier {
+            body: Some(self.bodies.len() - 1),
+            tree: self.trees.len() - 1,
+            pose: Pose::identity(),
         }
     }
 
@@ -226,7 +273,7 @@ impl BodyBuilder {
             let start = match motion {
                 Motion::Revolute | Motion::Prismatic => coords[0],
                 Motion::Ball => rotation_vector(coords)[k],
-                Motion::Free => 0.0,
+                Motion::Free | Motion::Mocap => 0.0,
             };
             self.start
                 .joint_target_q
@@ -317,10 +364,15 @@ impl BodyBuilder {
             });
         }
         for actuator in &parts.actuators {
-            let terms = terms(&actuator.terms, dof_of);
             self.actuator_names
                 .push(format!("{}/{}", robot.name, actuator.name));
-            self.mujoco.actuators.push(actuator_of(actuator, terms));
+            let scene = actuators::Scene {
+                dof_of,
+                carriers,
+                bodies: &self.bodies,
+                dt: self.dt,
+            };
+            actuators::add(&mut self.mujoco, actuator, &scene);
         }
     }
 
@@ -375,16 +427,6 @@ impl BodyBuilder {
             self.dofs[k].entries = (first, entries.len());
         }
         entries
-    }
-}
-
-fn actuator_of(actuator: &description::Actuator, terms: Vec<Term<f64>>) -> Actuator<f64> {
-    Actuator {
-        terms,
-        ctrl_range: actuator.ctrl_range,
-        force_range: actuator.force_range,
-        gain: actuator.gain,
-        bias: actuator.bias,
     }
 }
 

@@ -140,6 +140,7 @@ fn mass_matrix(constants: &Constants<f64>) -> (faer::Mat<f64>, Frames, Vec<Spati
         let turn = |axis| Spatial([origin.cross(axis), axis]);
         let z = rotation[2];
         match body.motion {
+            Motion::Mocap => {}
             Motion::Revolute => motions.push(turn(z)),
             Motion::Prismatic => motions.push(Spatial([z, Vec3::zero()])),
             Motion::Ball => motions.extend(rotation.0.map(turn)),

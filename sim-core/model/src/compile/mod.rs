@@ -5,6 +5,7 @@
 //! - A planar joint becomes two slides and a hinge.
 //! - Constraint parameters that derive from mass are evaluated at the reference pose q = 0.
 
+mod actuators;
 mod bodies;
 mod carrier;
 mod clusters;
@@ -14,6 +15,7 @@ mod contact_pairs;
 mod contact_pieces;
 mod contacts;
 mod inverse_weight;
+mod keyframes;
 mod sites;
 mod ties;
 
@@ -53,6 +55,7 @@ const LOCKED_OVER_FREE_MAX: f64 = 100.0;
 
 fn compile(scene: &Description) -> Result<Model, ModelError> {
     let mut builder = BodyBuilder::default();
+    builder.dt = scene.dt;
     for robot in &scene.robots {
         builder.add(robot);
     }
@@ -120,6 +123,11 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         &reference.dof_inverse_weight,
         scene.params.contains(&Param::JointFriction),
     );
+    let of_activations = builder.actuator_names.iter().zip(&builder.mujoco.actuators);
+    let activation_names = of_activations
+        .filter(|(_, actuator)| actuator.activation.is_some())
+        .map(|(name, _)| name.clone())
+        .collect();
     constants.mujoco = builder.mujoco;
     ties::add_ties(&mut constants, builder.constraints);
     check_models(scene)?;
@@ -158,6 +166,14 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         }
     }
 
+    let activations = constants.mujoco.activations;
+    let keyframes = keyframes::states(
+        &scene.robots,
+        &builder.robots,
+        &constants.bodies,
+        &builder.start,
+        [builder.actuator_names.len(), activations],
+    );
     let mut model = Model {
         constants,
         dt: scene.dt,
@@ -166,6 +182,9 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         coord_names: builder.coord_names,
         body_names: builder.body_names,
         shape_names,
+        activation_names,
+        keyframes,
+        mocap_names: builder.mocap_names,
         actuator_names: builder.actuator_names,
         site_names: scene.sites.iter().map(|site| site.name.clone()).collect(),
         contact_sensors: sensors,

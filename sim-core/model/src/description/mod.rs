@@ -16,7 +16,9 @@ pub(crate) use crate::inertia::Inertial;
 pub(crate) use crate::joint_kind::JointKind;
 pub(crate) use frames::Bearer;
 pub use joint::{Joint, JointDof, Mimic, TargetMode};
-pub use mujoco::{Actuator, JointEquality, MujocoJoint, MujocoParts};
+pub use mujoco::{
+    Actuator, ActuatorActivation, ActuatorLength, JointEquality, Keyframe, MujocoJoint, MujocoParts,
+};
 pub use mujoco_constraints::{Constraint, ConstraintLaw, Measure, Tendon};
 pub use param_draws::ParamDraw;
 pub(crate) use robot::BODY_LINK;

@@ -1,7 +1,9 @@
 //! What a robot that MuJoCo compiled has beyond links and joints.
 
 use super::mujoco_constraints::{Constraint, Tendon};
+use crate::pose::Pose;
 use crate::softness::Softness;
+use sim_physics::constants::actuator::ActivationRate;
 use sim_physics::constants::mujoco::Integrator;
 
 /// What a robot that MuJoCo compiled has beyond links and joints. Link 0 is the world, and links are in MuJoCo's order.
@@ -23,6 +25,10 @@ pub struct MujocoParts {
     pub tendons: Vec<Tendon>,
     /// Actuators.
     pub actuators: Vec<Actuator>,
+    /// Named states.
+    pub keyframes: Vec<Keyframe>,
+    /// Links that clients place, in the order of `mocap_pos`.
+    pub mocaps: Vec<usize>,
     /// The link that each link is welded to, or itself.
     pub welds: Vec<usize>,
     /// The parent of each link; that of the world is itself.
@@ -80,8 +86,10 @@ pub struct JointEquality {
 pub struct Actuator {
     /// Its name, unique in the robot.
     pub name: String,
-    /// Indices of joints with one dof, each with its coefficient, gear included.
-    pub terms: Vec<(usize, f64)>,
+    /// Along which it acts.
+    pub length: ActuatorLength,
+    /// What its control drives, if that is not its force.
+    pub activation: Option<ActuatorActivation>,
     /// Bounds of its control.
     pub ctrl_range: Option<[f64; 2]>,
     /// Bounds of its force [N or N·m].
@@ -90,4 +98,70 @@ pub struct Actuator {
     pub gain: [f64; 3],
     /// A constant, and factors of length and velocity.
     pub bias: [f64; 3],
+}
+
+/// Along which an actuator acts.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ActuatorLength {
+    /// Indices of joints with one dof, each with its coefficient, gear included.
+    Joints(Vec<(usize, f64)>),
+    /// A ball joint.
+    Ball {
+        /// The joint.
+        joint: usize,
+        /// Factors of its rotation vector.
+        gear: [f64; 3],
+        /// Whether these are in the axes of the parent.
+        in_parent: bool,
+    },
+    /// A free joint.
+    Free {
+        /// The joint.
+        joint: usize,
+        /// Force in the axes of the model's world, then torque.
+        gear: [f64; 6],
+        /// Whether the torque is in those axes too, instead of those of the link.
+        in_parent: bool,
+    },
+    /// A site: its link and its frame there.
+    Site {
+        /// The site.
+        site: (usize, Pose),
+        /// The site that it is relative to.
+        reference: Option<(usize, Pose)>,
+        /// Force, then torque.
+        gear: [f64; 6],
+    },
+}
+
+/// The state of an actuator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ActuatorActivation {
+    /// How fast it changes.
+    pub rate: ActivationRate<f64>,
+    /// Whether its filter is solved exactly over a step, instead of by Euler's method.
+    pub exact: bool,
+    /// Its bounds.
+    pub range: Option<[f64; 2]>,
+    /// Whether the force is that of the next activation.
+    pub early: bool,
+}
+
+/// A named state, in MuJoCo's conventions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Keyframe {
+    /// Its name, unique in the model.
+    pub name: String,
+    /// Positions [rad or m].
+    pub qpos: Vec<f64>,
+    /// Velocities [rad/s or m/s].
+    pub qvel: Vec<f64>,
+    /// Activations.
+    pub act: Vec<f64>,
+    /// Controls.
+    pub ctrl: Vec<f64>,
+    /// Positions of mocap bodies, three each [m].
+    pub mocap_pos: Vec<f64>,
+    /// Their quaternions (w, x, y, z).
+    pub mocap_quat: Vec<f64>,
 }

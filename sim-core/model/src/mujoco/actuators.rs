@@ -1,20 +1,19 @@
-//! Actuators of a model: forces along joints and fixed tendons.
+//! Actuators of a model: their laws and activations.
 
 use super::format::ModelFile;
 use super::names::names;
 use super::options::has_flag;
-use super::tendons::{Tendons, moving};
-use crate::description::{Actuator, Robot};
+use super::transmissions::Transmissions;
+use crate::description::{Actuator, ActuatorActivation, Robot};
 use crate::error::ModelError;
+use sim_physics::constants::actuator::ActivationRate;
 
 /// Adds the actuators; [`super::refusals`] has named those that are not supported.
 pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), ModelError> {
     let count = file.rows("actuator_trntype");
-    let joints = moving(robot, file.rows("jnt_type"), file)?;
     let names = names(file, "actuator", count)?;
-    let kinds = file.kinds("actuator_trntype", count)?;
-    let targets = file.vectors_of_integers::<2>("actuator_trnid", count)?;
-    let gears = file.vectors::<6>("actuator_gear", count)?;
+    let transmissions = Transmissions::read(file, robot, count)?;
+    let activations = Activations::read(file, count)?;
     let (gain_kinds, gains) = laws(file, "gain", count)?;
     let (bias_kinds, biases) = laws(file, "bias", count)?;
     let clamps = !has_flag(file, "mjDSBL_CLAMPCTRL")?;
@@ -23,29 +22,15 @@ pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), M
     let acts = !has_flag(file, "mjDSBL_ACTUATION")?;
     let disabled = file.integer("opt.disableactuator")?;
     let groups = file.integers("actuator_group", count)?;
-    let tendons = Tendons::read(file, robot)?;
     let mut actuators = Vec::new();
     for k in 0..count {
-        let terms = match kinds[k].as_str() {
-            "mjTRN_TENDON" => tendons.of(file, targets[k][0])?.to_vec(),
-            _ => {
-                let joint = usize::try_from(targets[k][0]).ok();
-                let place = joint.and_then(|joint| joints.get(joint)).copied();
-                let place = place.filter(|&place| robot.joints[place].dofs.len() == 1);
-                let place = place.ok_or_else(|| {
-                    let name = &names[k];
-                    file.fault(format!("has no joint of one dof for actuator `{name}`"))
-                })?;
-                vec![(place, 1.0)]
-            }
-        };
-        let terms = terms.into_iter();
-        let terms = terms.map(|(joint, coefficient)| (joint, coefficient * gears[k][0]));
+        let length = transmissions.of(k)?;
         let is_on = acts && !((0..31).contains(&groups[k]) && disabled >> groups[k] & 1 == 1);
         let on = |law: [f64; 3]| if is_on { law } else { [0.0; 3] };
         actuators.push(Actuator {
             name: names[k].clone(),
-            terms: terms.collect(),
+            length,
+            activation: activations.of(k, is_on, acts),
             ctrl_range: ctrl_ranges[k].filter(|_| clamps),
             force_range: force_ranges[k].filter(|_| is_on),
             gain: on(match gain_kinds[k].as_str() {
@@ -91,3 +76,50 @@ fn ranges(
         .map(|(limited, range)| (limited != 0).then_some(range))
         .collect())
 }
+
+/// Arrays of activations.
+struct Activations {
+    kinds: Vec<String>,
+    parameters: Vec<[f64; 10]>,
+    ranges: Vec<Option<[f64; 2]>>,
+    early: Vec<i64>,
+}
+
+impl Activations {
+    fn read(file: &ModelFile, count: usize) -> Result<Activations, ModelError> {
+        let counts = file.integers("actuator_actnum", count)?;
+        let firsts = file.integers("actuator_actadr", count)?;
+        let mut next = 0;
+        for (count, first) in counts.iter().zip(firsts) {
+            if *count > 0 && first != next {
+                return Err(file.fault("has activations in another order".to_owned()));
+            }
+            next += count;
+        }
+        Ok(Activations {
+            kinds: file.kinds("actuator_dyntype", count)?,
+            parameters: file.vectors::<10>("actuator_dynprm", count)?,
+            ranges: ranges(file, "act", count)?,
+            early: file.integers("actuator_actearly", count)?,
+        })
+    }
+
+    /// The activation of actuator `k`. Where it is switched off it is held; within its bounds, unless all are off.
+    fn of(&self, k: usize, is_on: bool, acts: bool) -> Option<ActuatorActivation> {
+        let time = self.parameters[k][0].max(TIME_MIN);
+        let rate = match self.kinds[k].as_str() {
+            "mjDYN_NONE" => return None,
+            "mjDYN_INTEGRATOR" => ActivationRate::Control,
+            _ => ActivationRate::Filter(time),
+        };
+        Some(ActuatorActivation {
+            rate: if is_on { rate } else { ActivationRate::Held },
+            exact: self.kinds[k] == "mjDYN_FILTEREXACT",
+            range: self.ranges[k].filter(|_| acts),
+            early: self.early[k] != 0,
+        })
+    }
+}
+
+/// Smallest time constant of a filter [s] (MuJoCo: `mjMINVAL`).
+const TIME_MIN: f64 = 1e-15;

@@ -8,10 +8,12 @@ mod actuators;
 mod constraints;
 mod format;
 mod geoms;
+mod keyframes;
 mod names;
 mod options;
 mod refusals;
 mod tendons;
+mod transmissions;
 mod tree;
 
 use std::path::Path;

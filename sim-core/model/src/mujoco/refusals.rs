@@ -10,7 +10,6 @@ use crate::softness::POWER_MAX;
 const MUST_BE_ZERO: &[(&str, &str, &str)] = &[
     ("body", "body_gravcomp", "gravity compensation"),
     ("geom", "geom_fluid", "the ellipsoid fluid model"),
-    ("actuator", "actuator_actlimited", "bounds of an activation"),
 ];
 /// The same, of arrays that older versions of MuJoCo do not have.
 const NEWER_MUST_BE_ZERO: &[(&str, &str, &str)] = &[
@@ -107,7 +106,6 @@ fn options(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> 
         ("nflex", "flexes"),
         ("nplugin", "plugins"),
         ("npair", "contact pairs"),
-        ("nmocap", "mocap bodies"),
     ] {
         if file.integer(counted)? > 0 {
             found.push(format!("model: no support for {what}"));
@@ -299,39 +297,34 @@ fn actuators(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError
     let dynamics = file.kinds("actuator_dyntype", count)?;
     let gains = file.kinds("actuator_gaintype", count)?;
     let biases = file.kinds("actuator_biastype", count)?;
-    let targets = file.vectors_of_integers::<2>("actuator_trnid", count)?;
-    let joint_kinds = file.kinds("jnt_type", file.rows("jnt_type"))?;
+    let states = file.integers("actuator_actnum", count)?;
     let controls = file.integers_or("actuator_ctrlnum", count, 1)?;
     let outputs = file.integers_or("actuator_outnum", count, 1)?;
     for k in 0..count {
-        let joint = usize::try_from(targets[k][0]).ok();
-        let joint = joint.and_then(|joint| joint_kinds.get(joint));
-        let is_scalar = joint.is_some_and(|kind| kind == "mjJNT_HINGE" || kind == "mjJNT_SLIDE");
         let transmission = match transmissions[k].as_str() {
-            "mjTRN_JOINT" | "mjTRN_JOINTINPARENT" if is_scalar => None,
-            "mjTRN_JOINT" | "mjTRN_JOINTINPARENT" => Some("a ball or free joint"),
-            "mjTRN_TENDON" => None,
-            "mjTRN_SITE" => Some("a site"),
+            "mjTRN_JOINT" | "mjTRN_JOINTINPARENT" | "mjTRN_TENDON" | "mjTRN_SITE" => None,
             "mjTRN_BODY" => Some("a body (adhesion)"),
             "mjTRN_SLIDERCRANK" => Some("a slider-crank"),
             other => Some(other),
         };
         let law = match (dynamics[k].as_str(), gains[k].as_str(), biases[k].as_str()) {
             ("mjDYN_MUSCLE", ..) | (_, "mjGAIN_MUSCLE", _) => Some("muscles"),
-            ("mjDYN_INTEGRATOR", ..) => Some("activations that integrate"),
-            ("mjDYN_FILTER" | "mjDYN_FILTEREXACT", ..) => Some("filtered activations"),
-            ("mjDYN_NONE", "mjGAIN_FIXED" | "mjGAIN_AFFINE", "mjBIAS_NONE" | "mjBIAS_AFFINE") => {
-                None
+            (
+                "mjDYN_NONE" | "mjDYN_INTEGRATOR" | "mjDYN_FILTER" | "mjDYN_FILTEREXACT",
+                "mjGAIN_FIXED" | "mjGAIN_AFFINE",
+                bias,
+            ) => (!matches!(bias, "mjBIAS_NONE" | "mjBIAS_AFFINE")).then_some(bias),
+            ("mjDYN_NONE" | "mjDYN_INTEGRATOR" | "mjDYN_FILTER" | "mjDYN_FILTEREXACT", gain, _) => {
+                Some(gain)
             }
-            ("mjDYN_NONE", "mjGAIN_FIXED" | "mjGAIN_AFFINE", bias) => Some(bias),
-            ("mjDYN_NONE", gain, _) => Some(gain),
             (dynamics, ..) => Some(dynamics),
         };
         let name = &names[k];
         found.extend(transmission.map(|to| no("actuator", name, &format!("transmission to {to}"))));
         found.extend(law.map(|law| no("actuator", name, law)));
-        if controls[k] != 1 || outputs[k] != 1 {
-            found.push(no("actuator", name, "several controls or outputs"));
+        if controls[k] != 1 || outputs[k] != 1 || states[k] > 1 {
+            let several = "several controls, outputs or activations";
+            found.push(no("actuator", name, several));
         }
     }
     Ok(())

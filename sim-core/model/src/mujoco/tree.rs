@@ -80,7 +80,20 @@ fn parts(
     let excludes = signatures.into_iter().map(|signature| {
         [signature >> 16, signature & 0xffff].map(|body| usize::try_from(body).unwrap_or(0))
     });
+    let numbers = file.indices("body_mocapid", bodies, bodies)?;
+    let mut mocaps: Vec<(usize, usize)> = numbers
+        .into_iter()
+        .enumerate()
+        .filter_map(|(body, number)| Some((number?, body)))
+        .collect();
+    mocaps.sort_unstable();
+    let bodies = mocaps.iter().map(|&(_, body)| body);
+    if !bodies.clone().is_sorted() {
+        return Err(file.fault("has mocap bodies in another order than its bodies".to_owned()));
+    }
     Ok(MujocoParts {
+        keyframes: super::keyframes::keyframes(file)?,
+        mocaps: bodies.collect(),
         link_inverse_weight: weights.into_iter().map(|[linear, _]| linear).collect(),
         dof_inverse_weight: file.reals("dof_invweight0", file.rows("dof_armature"))?,
         mean_inertia: file.real("stat.meaninertia")?,

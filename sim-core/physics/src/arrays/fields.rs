@@ -72,6 +72,10 @@ pub enum Axis {
     ContactSensors,
     /// Actuators.
     Actuators,
+    /// Bodies that clients place.
+    Mocaps,
+    /// Activations of actuators.
+    Activations,
     /// A fixed length.
     Size(usize),
 }
@@ -88,6 +92,8 @@ impl Axis {
             Axis::Sites => sizes.sites,
             Axis::ContactSensors => sizes.contact_sensors,
             Axis::Actuators => sizes.actuators,
+            Axis::Mocaps => sizes.mocaps,
+            Axis::Activations => sizes.activations,
             Axis::Size(n) => n,
         }
     }
@@ -103,6 +109,8 @@ impl Axis {
             Axis::Sites => "sites".into(),
             Axis::ContactSensors => "contact_sensors".into(),
             Axis::Actuators => "actuators".into(),
+            Axis::Mocaps => "mocaps".into(),
+            Axis::Activations => "activations".into(),
             Axis::Size(n) => n.to_string(),
         }
     }
@@ -142,6 +150,12 @@ impl Field {
             .iter()
             .copied()
             .find(|field| field.row().name == name)
+    }
+
+    /// Whether a write may set it: a state, or a command that begins with the state of a world, as MuJoCo's do.
+    pub fn is_written(self) -> bool {
+        let is_command = matches!(self, Field::Ctrl | Field::MocapPos | Field::MocapQuat);
+        self.row().group == Group::State || is_command
     }
 
     /// Elements per world.

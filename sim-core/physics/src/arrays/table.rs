@@ -54,6 +54,8 @@ arrays! { m;
         // the solver's result, and its next start
         joint_qdd: JointQdd [m.dofs.len()] Motion "rad/s² or m/s²"
             => "joint_qdd" Derived [Dofs], "Joint accelerations under the commands held, constraints included.";
+        act: Act [m.mujoco.activations] Motion "–"
+            => "act" State [Activations], "Activations of the actuators that have one, in their order, as MuJoCo's `act`.";
         // substeps since the start of the control frame
         substep: Substep [1] Counter "–";
         // 1 where the solver used up its iterations since this was cleared
@@ -84,6 +86,10 @@ arrays! { m;
             => "joint_target_qd" Command [Dofs], "Velocity targets of the drives.";
         ctrl: Ctrl [Scalar; m.mujoco.actuators.len()] Command "–"
             => "ctrl" Command [Actuators], "Controls of the actuators, as MuJoCo's `ctrl`, before they are clamped to their ranges.";
+        mocap_pos: MocapPos [Scalar; 3 * m.mujoco.mocaps] Command "m"
+            => "mocap_pos" Command [Mocaps, Size(3)], "Where the mocap bodies of MuJoCo models are, in the world.";
+        mocap_quat: MocapQuat [Scalar; 4 * m.mujoco.mocaps] Command "–"
+            => "mocap_quat" Command [Mocaps, Size(4)], "How they are turned: quaternions (w, x, y, z) of any length.";
         // commands of the frames before, the last one first, each as joint_f, joint_target_q, joint_target_qd
         command_history: CommandHistory [Scalar; m.delay.frames * 3 * m.dofs.len()] Command "–";
         // parameters of the model that vary from world to world, see `constants::params::Varying`
@@ -111,6 +117,9 @@ arrays! { m;
             => "smooth_force" [Dofs], "Applied, drive and damping forces less the bias: all but constraint forces.";
         actuator_force: ActuatorForce [Scalar; m.mujoco.actuators.len()] Stage "N or N·m"
             => "actuator_force" [Actuators], "Force of each actuator along its length.";
+        act_dot: ActDot [Scalar; m.mujoco.activations] Stage "1/s";
+        // moments of turning lengths, see `TurningLength::first`
+        actuator_moment: ActuatorMoment [Scalar; m.mujoco.actuators.iter().filter_map(|actuator| actuator.turning.as_ref()).map(|length| length.dofs.len()).sum::<usize>()] Stage "–";
         qfrc_actuator: QfrcActuator [Scalar; if m.mujoco.actuators.is_empty() { 0 } else { m.dofs.len() }] Stage "N·m or N";
         // packed, see `math::factor::Pattern::at`
         mass_matrix: MassMatrix [Scalar; m.pattern.len()] Stage "kg·m², kg·m or kg";
@@ -126,6 +135,10 @@ arrays! { m;
         rk_velocity: RkVelocity [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s or m/s";
         rk_velocity_sum: RkVelocitySum [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s or m/s";
         rk_acceleration_sum: RkAccelerationSum [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s² or m/s²";
+
+        // the same of activations: where they began, and sums of their rates
+        rk_act: RkAct [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.mujoco.activations } else { 0 }] Stage "–";
+        rk_act_rate_sum: RkActRateSum [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.mujoco.activations } else { 0 }] Stage "1/s";
 
         // contacts are in the tables of `Contacts::memory`; these arrays have no entries and represent them in `READS` and `WRITES`
         shape_poses: ShapePoses [Scalar; 0] Stage "–";

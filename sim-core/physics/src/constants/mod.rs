@@ -1,5 +1,6 @@
 //! Constants of a model as physics code reads them, in the precision of the run.
 
+pub mod actuator;
 pub mod clip;
 pub mod contact;
 pub mod hull;
@@ -102,6 +103,8 @@ pub enum Motion {
     /// Moves freely in the world: position and quaternion of its frame; velocity of its centre of mass,
     /// then angular velocity, in world axes.
     Free,
+    /// Where clients put it: no coordinate and no dof. [`Body::coord`] is its place among these.
+    Mocap,
 }
 
 impl Motion {
@@ -111,6 +114,7 @@ impl Motion {
             Motion::Revolute | Motion::Prismatic => 1,
             Motion::Ball => 4,
             Motion::Free => 7,
+            Motion::Mocap => 0,
         }
     }
 
@@ -120,6 +124,7 @@ impl Motion {
             Motion::Revolute | Motion::Prismatic => 1,
             Motion::Ball => 3,
             Motion::Free => 6,
+            Motion::Mocap => 0,
         }
     }
 }
@@ -386,7 +391,7 @@ impl<R: Real> Constants<R> {
         self.bodies.iter().filter_map(|body| match body.motion {
             Motion::Ball => Some(body.coord),
             Motion::Free => Some(body.coord + 3),
-            Motion::Revolute | Motion::Prismatic => None,
+            Motion::Revolute | Motion::Prismatic | Motion::Mocap => None,
         })
     }
 

@@ -1,6 +1,7 @@
 //! What only models from MuJoCo have: springs, actuators, softness of each contact, and the choice of an integrator.
 
 use super::Impedance;
+use super::actuator::{Activation, TurningLength};
 use super::recast::{Recast, recast, same};
 use super::ties::Tie;
 use crate::lane::Fixed;
@@ -33,6 +34,10 @@ recast! {
         pub tie_of_row: Vec<usize>,
         /// Actuators.
         pub actuators: Vec<Actuator<R>>,
+        /// How many of them have an activation.
+        pub activations: usize,
+        /// Bodies that clients place.
+        pub mocaps: usize,
         /// Bounds of the sum of actuator forces on a dof.
         pub actuator_bounds: Vec<ActuatorBound<R>>,
         /// Impedances of contacts, each once; empty where all have `Constants::contact_impedance`.
@@ -53,6 +58,8 @@ impl<R> Default for Mujoco<R> {
             ties: Vec::new(),
             tie_of_row: Vec::new(),
             actuators: Vec::new(),
+            activations: 0,
+            mocaps: 0,
             actuator_bounds: Vec::new(),
             impedances: Vec::new(),
             pair_impedance: Fixed::default(),
@@ -90,16 +97,20 @@ recast! {
 }
 
 recast! {
-    /// An actuator: a force along a length that is a linear function of coordinates (MuJoCo: `actuator/general`).
+    /// An actuator: a force along a length (MuJoCo: `actuator/general`).
     #[derive(Clone, Debug)]
     pub struct Actuator<R> {
         /// Its length is the sum of these coordinates times their coefficients, gear included.
         pub terms: Vec<Term<R>>,
+        /// In place of that, a length whose moments are found at run time.
+        pub turning: Option<TurningLength<R>>,
+        /// What its control drives, if that is not its force.
+        pub activation: Option<Activation<R>>,
         /// Bounds of its control, if it has any.
         pub ctrl_range: Option<[R; 2]>,
         /// Bounds of its force, if it has any [N or N·m].
         pub force_range: Option<[R; 2]>,
-        /// What the control is multiplied with: a constant, and factors of length and velocity.
+        /// What the control or the activation is multiplied with: a constant, and factors of length and velocity.
         pub gain: [R; 3],
         /// What is added to it: a constant, and factors of length and velocity.
         pub bias: [R; 3],

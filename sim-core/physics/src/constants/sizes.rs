@@ -21,4 +21,8 @@ pub struct Sizes {
     pub contact_sensors: usize,
     /// Actuators.
     pub actuators: usize,
+    /// Bodies that clients place.
+    pub mocaps: usize,
+    /// Actuators with an activation.
+    pub activations: usize,
 }

@@ -119,6 +119,7 @@ fn torques<C: Cx>(
                 torques[k] = command_of::<C>(m, b, Kind::Force, first + k);
             }
         }
+        Motion::Mocap => {}
     }
     torques
 }

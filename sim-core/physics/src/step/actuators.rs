@@ -2,22 +2,42 @@
 //!
 //! ```text
 //! l = Σ c q      v = Σ c q̇                                              c: gear times coefficient
-//! force = clamp((g₀ + g₁ l + g₂ v) clamp(ctrl) + b₀ + b₁ l + b₂ v)      g: gain, b: bias
+//! force = clamp((g₀ + g₁ l + g₂ v) input + b₀ + b₁ l + b₂ v)            g: gain, b: bias
+//! input = clamp(ctrl), or an activation a:  ȧ = clamp(ctrl)  or  (clamp(ctrl) - a) / T
 //! smooth += clamp(Σ c force)                                            over the actuators of a dof
 //! ```
 
+use super::transmission::measure;
 use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::Array as A;
-use crate::constants::Constants;
+use crate::constants::actuator::{Activation, ActivationRate, TurningLength};
 use crate::constants::mujoco::{Actuator, Term};
+use crate::constants::{Constants, Motion};
 use crate::lane::{Cx, MaskOf, Num, Real};
+use crate::math::vec3::Vec3;
 
 /// Forces of the actuators.
 pub struct Actuators;
 
 impl Stage for Actuators {
-    const READS: &'static [A] = &[A::JointQ, A::JointQd, A::Ctrl, A::SmoothForce];
-    const WRITES: &'static [A] = &[A::SmoothForce, A::ActuatorForce, A::QfrcActuator];
+    const READS: &'static [A] = &[
+        A::JointQ,
+        A::JointQd,
+        A::Ctrl,
+        A::Act,
+        A::Rotation,
+        A::Origin,
+        A::Reference,
+        A::Motion,
+        A::SmoothForce,
+    ];
+    const WRITES: &'static [A] = &[
+        A::SmoothForce,
+        A::ActuatorForce,
+        A::QfrcActuator,
+        A::ActuatorMoment,
+        A::ActDot,
+    ];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
         !m.mujoco.actuators.is_empty()
@@ -27,14 +47,22 @@ impl Stage for Actuators {
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         b.work.qfrc_actuator.fill(C::F::c(0.0));
         for (k, actuator) in m.mujoco.actuators.iter().enumerate() {
-            let force = bounded(
-                force(cx, m, b, actuator, control(b, actuator, k)),
-                actuator.force_range,
-            );
+            if let Some(activation) = &actuator.activation {
+                b.work.act_dot[activation.place] = rate(cx, b, actuator, activation, k);
+            }
+            let input = input(cx, b, actuator, k);
+            let force = bounded(force(cx, m, b, actuator, input), actuator.force_range);
             b.work.actuator_force[k] = force;
             for term in &actuator.terms {
                 let joint = &mut b.work.qfrc_actuator[term.dof];
                 *joint = force.fma(C::F::k(term.coefficient), *joint);
+            }
+            if let Some(length) = &actuator.turning {
+                let w = &mut b.work;
+                for (k, &dof) in length.dofs.iter().enumerate() {
+                    let moment = w.actuator_moment[length.first + k];
+                    w.qfrc_actuator[dof] = force.fma(moment, w.qfrc_actuator[dof]);
+                }
             }
         }
         for bound in &m.mujoco.actuator_bounds {
@@ -53,16 +81,66 @@ fn control<F: Num, V>(b: &crate::arrays::Block<F, V>, actuator: &Actuator<F::Rea
     bounded(b.ctrl[k], actuator.ctrl_range)
 }
 
-/// Force of an actuator before it is clamped.
+/// How fast an activation changes.
+#[inline(always)]
+fn rate<C: Cx>(
+    cx: &mut C,
+    b: &BlockOf<C>,
+    actuator: &Actuator<<C::F as Num>::Real>,
+    activation: &Activation<<C::F as Num>::Real>,
+    k: usize,
+) -> C::F {
+    match activation.rate {
+        ActivationRate::Held => C::F::c(0.0),
+        ActivationRate::Control => control(b, actuator, k),
+        ActivationRate::Filter(time) => {
+            let off = control(b, actuator, k) - cx.get(&b.act[activation.place]);
+            off.div(C::F::k(time))
+        }
+    }
+}
+
+/// An activation after a step that begins at `act`.
+#[inline(always)]
+pub(super) fn next<F: Num>(activation: &Activation<F::Real>, act: F, rate: F) -> F {
+    bounded(rate.fma(F::k(activation.reach), act), activation.range)
+}
+
+/// What the force of actuator `k` follows: its control or its activation.
+#[inline(always)]
+fn input<C: Cx>(
+    cx: &mut C,
+    b: &BlockOf<C>,
+    actuator: &Actuator<<C::F as Num>::Real>,
+    k: usize,
+) -> C::F {
+    let Some(activation) = &actuator.activation else {
+        return control(b, actuator, k);
+    };
+    let act = cx.get(&b.act[activation.place]);
+    match activation.early {
+        true => next(activation, act, b.work.act_dot[activation.place]),
+        false => act,
+    }
+}
+
+/// Force of an actuator before it is clamped; `input` is its control or activation.
 #[inline(always)]
 fn force<C: Cx>(
     cx: &mut C,
     m: &ConstantsOf<C>,
-    b: &BlockOf<C>,
+    b: &mut BlockOf<C>,
     actuator: &Actuator<<C::F as Num>::Real>,
-    control: C::F,
+    input: C::F,
 ) -> C::F {
     let (mut length, mut velocity) = (C::F::c(0.0), C::F::c(0.0));
+    if let Some(turning) = &actuator.turning {
+        length = measure(cx, m, b, turning);
+        for (k, &dof) in turning.dofs.iter().enumerate() {
+            let moment = b.work.actuator_moment[turning.first + k];
+            velocity = cx.get(&b.joint_qd[dof]).fma(moment, velocity);
+        }
+    }
     for term in &actuator.terms {
         let coefficient = C::F::k(term.coefficient);
         length = cx
@@ -81,7 +159,7 @@ fn force<C: Cx>(
         }
         sum
     };
-    law(actuator.gain).fma(control, law(actuator.bias))
+    law(actuator.gain).fma(input, law(actuator.bias))
 }
 
 #[inline(always)]
@@ -98,19 +176,14 @@ pub(super) fn is_damped<R: Real>(actuator: &Actuator<R>) -> bool {
 }
 
 /// Adds -h ∂force/∂v of actuators and tendons to the mass matrix, Jᵀ (-h ∂f/∂v) J, where actuator forces are not at their
-/// bounds (MuJoCo: `mjd_actuator_vel`, `mjd_passive_vel`).
+/// bounds (MuJoCo: `mjd_actuator_vel`, `mjd_passive_vel`), and what that has on the right-hand side in `acceleration`.
 #[inline(always)]
-pub(super) fn add_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+pub(super) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let dt = C::F::k(m.dt);
-    for (k, actuator) in m
-        .mujoco
-        .actuators
-        .iter()
-        .enumerate()
-        .filter(|(_, a)| is_damped(a))
-    {
-        let slope =
-            C::F::k(actuator.gain[2]).fma(control(b, actuator, k), C::F::k(actuator.bias[2]));
+    let actuators = m.mujoco.actuators.iter().enumerate();
+    for (k, actuator) in actuators.filter(|(_, actuator)| is_damped(actuator)) {
+        let input = input(cx, b, actuator, k);
+        let slope = C::F::k(actuator.gain[2]).fma(input, C::F::k(actuator.bias[2]));
         let mut damping = -(slope * dt);
         if let Some([least, most]) = actuator.force_range {
             let force = b.work.actuator_force[k];
@@ -118,11 +191,48 @@ pub(super) fn add_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             damping = C::F::select(within, damping, C::F::c(0.0));
         }
         add_product(m, &mut b.work.mass_matrix, &actuator.terms, damping);
+        if let Some(length) = &actuator.turning {
+            let swing = swing(cx, m, b, length);
+            let w = &mut b.work;
+            let moments = &w.actuator_moment[length.first..];
+            add_moments(m, &mut w.mass_matrix, &length.dofs, moments, damping);
+            for (&dof, moment) in length.dofs.iter().zip(moments) {
+                w.acceleration[dof] = (damping * swing).fnma(*moment, w.acceleration[dof]);
+            }
+        }
     }
     for tendon in &m.mujoco.tendons {
         let damping = C::F::k(tendon.damping) * dt;
         add_product(m, &mut b.work.mass_matrix, &tendon.terms, damping);
     }
+}
+
+/// What MuJoCo's J q̈ of a length has beyond ours: its acceleration of a free joint is that of the frame's origin, which
+/// differs from that of the centre of mass by ω × (ω × r).
+#[inline(always)]
+fn swing<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    length: &TurningLength<<C::F as Num>::Real>,
+) -> C::F {
+    let mut sum = C::F::c(0.0);
+    for (k, body) in m.bodies.iter().enumerate() {
+        let first = length.dofs.iter().position(|&dof| dof == body.dof);
+        let (Motion::Free, Some(first)) = (body.motion, first) else {
+            continue;
+        };
+        let omega = Vec3(std::array::from_fn(|i| {
+            cx.get(&b.joint_qd[body.dof + 3 + i])
+        }));
+        let arm = Vec3::zero() - b.work.rotation[k] * Vec3::constant(body.center);
+        let swing = omega.cross(omega.cross(arm));
+        for i in 0..3 {
+            let moment = b.work.actuator_moment[length.first + first + i];
+            sum = moment.fma(swing[i], sum);
+        }
+    }
+    sum
 }
 
 /// Adds Jᵀ x J to the mass matrix, J with the coefficients of a length.
@@ -136,16 +246,38 @@ fn add_product<F: Num>(
     for (i, first) in terms.iter().enumerate() {
         let scaled = x * F::k(first.coefficient);
         for second in &terms[..i + 1] {
-            let (lower, upper) = (first.dof.max(second.dof), first.dof.min(second.dof));
-            // as in MuJoCo, dofs of different branches do not damp each other
-            let (start, end) = m.dofs[lower].entries;
-            let met = m.mass_entries[start..end]
-                .iter()
-                .find(|met| met.other == upper);
-            if let Some(met) = met {
-                let entry = &mut mass_matrix[met.place];
+            if let Some(place) = shared(m, first.dof, second.dof) {
+                let entry = &mut mass_matrix[place];
                 *entry = scaled.fma(F::k(second.coefficient), *entry);
             }
         }
     }
+}
+
+/// The same of a length with moments, one for each of its dofs.
+#[inline(always)]
+fn add_moments<F: Num>(
+    m: &Constants<F::Real>,
+    mass_matrix: &mut [F],
+    dofs: &[usize],
+    moments: &[F],
+    x: F,
+) {
+    for (i, first) in dofs.iter().enumerate() {
+        let scaled = x * moments[i];
+        for (second, moment) in dofs[..i + 1].iter().zip(moments) {
+            if let Some(place) = shared(m, *first, *second) {
+                mass_matrix[place] = scaled.fma(*moment, mass_matrix[place]);
+            }
+        }
+    }
+}
+
+/// Place of two dofs in the mass matrix; as in MuJoCo, dofs of different branches do not damp each other.
+#[inline(always)]
+fn shared<R>(m: &Constants<R>, first: usize, second: usize) -> Option<usize> {
+    let (lower, upper) = (first.max(second), first.min(second));
+    let (start, end) = m.dofs[lower].entries;
+    let mut met = m.mass_entries[start..end].iter();
+    met.find(|met| met.other == upper).map(|met| met.place)
 }

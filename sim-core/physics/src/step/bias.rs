@@ -62,6 +62,7 @@ pub(super) fn accelerations_at_rest<C: Cx>(
         let own = joint_velocity(cx, b, body);
         let w = &mut b.work;
         let (velocity, acceleration) = match (body.parent, body.motion) {
+            (_, Motion::Mocap) => (own, base),
             (_, Motion::Free) => {
                 let swing = own[LINEAR].cross_add(own[ANGULAR], base[LINEAR]);
                 (own, Spatial([swing, base[ANGULAR]]))
@@ -92,6 +93,9 @@ fn joint_velocity<C: Cx>(
             angular[i] = cx.get(&qd[3 + i]);
         }
         return Spatial([linear, angular]);
+    }
+    if body.motion == Motion::Mocap {
+        return Spatial::zero();
     }
     let motion = &b.work.motion[body.dofs()];
     let mut own = motion[0] * cx.get(&qd[0]);

@@ -26,6 +26,7 @@
 use super::kinematics::read_quat;
 use super::{BlockOf, ConstantsOf, Stage, actuators, param};
 use crate::arrays::Array as A;
+use crate::constants::actuator::Activation;
 use crate::constants::mujoco::Integrator;
 use crate::constants::params::Param;
 use crate::constants::{Body, Constants, Motion};
@@ -42,6 +43,9 @@ impl Stage for Integrate {
     const READS: &'static [A] = &[
         A::Params,
         A::Ctrl,
+        A::Act,
+        A::ActDot,
+        A::ActuatorMoment,
         A::ActuatorForce,
         A::Rotation,
         A::JointQ,
@@ -53,7 +57,7 @@ impl Stage for Integrate {
         A::ConstraintForce,
     ];
     // the last stage of a step: the mass matrix is not read after it
-    const WRITES: &'static [A] = &[A::JointQ, A::JointQRest, A::JointQd, A::MassMatrix];
+    const WRITES: &'static [A] = &[A::JointQ, A::JointQRest, A::JointQd, A::Act, A::MassMatrix];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
         m.mujoco.integrator != Integrator::RungeKutta
@@ -76,11 +80,22 @@ impl Stage for Integrate {
                     gyroscopic(cx, m, b, k);
                 }
                 integrate_free(cx, m, b, k);
-            } else {
+            } else if body.motion != Motion::Mocap {
                 integrate_joint(cx, m, b, body);
             }
         }
+        for activation in activations(m) {
+            let act = cx.get(&b.act[activation.place]);
+            let act = actuators::next(activation, act, b.work.act_dot[activation.place]);
+            cx.set(&mut b.act[activation.place], act);
+        }
     }
+}
+
+/// The activations of actuators.
+pub(super) fn activations<R>(m: &Constants<R>) -> impl Iterator<Item = &Activation<R>> {
+    let actuators = m.mujoco.actuators.iter();
+    actuators.filter_map(|actuator| actuator.activation.as_ref())
 }
 
 /// (M + h D) a = τ + Jᵀ f, with the damping D of joints and drives on the diagonal.
@@ -113,7 +128,7 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
         }
     }
     if m.mujoco.integrator == Integrator::ImplicitFast {
-        actuators::add_damping::<C>(m, b);
+        actuators::add_damping(cx, m, b);
     }
     let w = &mut b.work;
     solve(&m.pattern, &mut w.mass_matrix, &mut w.acceleration);

@@ -67,6 +67,7 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
                 torque[d..d + 3].copy_from_slice(&*force);
                 torque[d + 3..d + 6].copy_from_slice(&*(moment - center.cross(force)));
             }
+            Motion::Mocap => {}
         }
         if let Some(parent) = body.parent {
             let carried = Spatial([force, arm.cross_add(force, moment)]);
@@ -125,6 +126,7 @@ pub(super) fn proper_accelerations<C: Cx>(
                 let omega = w.velocity[k][ANGULAR];
                 [point_acceleration(center, omega, back), angular]
             }
+            Motion::Mocap => base.0,
         });
     }
     base[LINEAR]
@@ -176,7 +178,7 @@ fn arm<C: Cx>(
     };
     match body.motion {
         Motion::Prismatic => w.rotation[k][2].scale_add(cx.get(&b.joint_q[body.coord]), rest),
-        Motion::Revolute | Motion::Ball | Motion::Free => rest,
+        Motion::Revolute | Motion::Ball | Motion::Free | Motion::Mocap => rest,
     }
 }
 

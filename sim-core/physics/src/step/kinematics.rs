@@ -5,6 +5,7 @@
 //! R(b) = R(parent) E(b)           p(b) = … + z q                        prismatic
 //! R(b) = R(parent) E(b) R(q)      p(b) = …                              ball
 //! R(b) = R(q)                     p(b) = -R(b) c                        free
+//! R(b), p(b) as clients set them                                        mocap
 //! S = (p × z, z)  or  (z, 0)      linear, angular, at the robot's reference point
 //! ```
 //!
@@ -23,7 +24,7 @@ use crate::math::vec3::{Mat3, Vec3};
 pub struct Kinematics;
 
 impl Stage for Kinematics {
-    const READS: &'static [A] = &[A::JointQ, A::Params];
+    const READS: &'static [A] = &[A::JointQ, A::Params, A::MocapPos, A::MocapQuat];
     const WRITES: &'static [A] = &[A::Rotation, A::Origin, A::Reference, A::Motion, A::Inertia];
 
     #[inline(always)]
@@ -102,7 +103,20 @@ fn moved<C: Cx>(
             }
             (rotation, Vec3::zero() - center)
         }
+        Motion::Mocap => {
+            w.reference[body.tree] = Vec3(std::array::from_fn(|i| b.mocap_pos[3 * c + i]));
+            (quat::matrix(mocap_quat(&b.mocap_quat, c)), Vec3::zero())
+        }
     }
+}
+
+/// The orientation that clients gave to mocap body `k`, as a quaternion (x, y, z, w).
+#[inline(always)]
+pub(super) fn mocap_quat<F: Num>(all: &[F], k: usize) -> quat::Quat<F> {
+    let [w, x, y, z] = std::array::from_fn(|i| all[4 * k + i]);
+    let square = w.fma(w, x.fma(x, y.fma(y, z * z)));
+    let scale = F::c(1.0).div(square.sqrt());
+    [x * scale, y * scale, z * scale, w * scale]
 }
 
 /// Inertia of a body about the reference point; where masses vary, the sum of those of its links.

@@ -26,6 +26,7 @@ pub mod springs;
 mod stage;
 mod tied_frames;
 pub mod ties;
+mod transmission;
 pub mod velocities;
 
 use params::{gravity, param};

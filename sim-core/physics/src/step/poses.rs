@@ -3,7 +3,7 @@
 //! Orientations are quaternions along the chain of joints: they stay unit up to rounding, and need no case distinction, which
 //! a conversion from matrices needs.
 
-use super::kinematics::read_quat;
+use super::kinematics::{mocap_quat, read_quat};
 use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::Array as A;
 use crate::constants::Motion;
@@ -15,7 +15,13 @@ use crate::math::vec3::Vec3;
 pub struct Poses;
 
 impl Stage for Poses {
-    const READS: &'static [A] = &[A::JointQ, A::Rotation, A::Origin, A::Reference];
+    const READS: &'static [A] = &[
+        A::JointQ,
+        A::MocapQuat,
+        A::Rotation,
+        A::Origin,
+        A::Reference,
+    ];
     const WRITES: &'static [A] = &[A::BodyQ, A::Orientation];
 
     #[inline(always)]
@@ -36,6 +42,7 @@ impl Stage for Poses {
                 Motion::Prismatic => carried,
                 Motion::Ball => mul(carried, read_quat(cx, &b.joint_q, body.coord)),
                 Motion::Free => read_quat(cx, &b.joint_q, body.coord + 3),
+                Motion::Mocap => mocap_quat(&b.mocap_quat, body.coord),
             };
         }
         for (k, frame) in m.frames.iter().enumerate() {

@@ -8,7 +8,8 @@
 //! Velocities v are MuJoCo's ([`super::mujoco_state`]). ⊕ turns a quaternion by h v in the body's axes. All stages of a step run
 //! before each of the four, at xₖ.
 
-use super::integrate::{add_compensated, write_quat};
+use super::actuators::next;
+use super::integrate::{activations, add_compensated, write_quat};
 use super::kinematics::read_quat;
 use super::mujoco_state::{accelerations, free_bodies, halves, velocities};
 use super::{BlockOf, ConstantsOf, Stage};
@@ -35,6 +36,8 @@ const READS: &[A] = &[
     A::JointQdd,
     A::Rotation,
     A::Origin,
+    A::Act,
+    A::ActDot,
 ];
 /// What those after it read.
 const READS_LATER: &[A] = &[
@@ -49,6 +52,10 @@ const READS_LATER: &[A] = &[
     A::RkVelocity,
     A::RkVelocitySum,
     A::RkAccelerationSum,
+    A::Act,
+    A::ActDot,
+    A::RkAct,
+    A::RkActRateSum,
 ];
 
 impl<const K: usize> Stage for RungeKutta<K> {
@@ -62,6 +69,9 @@ impl<const K: usize> Stage for RungeKutta<K> {
         A::RkVelocity,
         A::RkVelocitySum,
         A::RkAccelerationSum,
+        A::Act,
+        A::RkAct,
+        A::RkActRateSum,
     ];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
@@ -96,6 +106,7 @@ impl<const K: usize> Stage for RungeKutta<K> {
                 (velocity[j], acceleration[j]) = (w.rk_velocity_sum[j], w.rk_acceleration_sum[j]);
             }
         }
+        go_on_acting::<C, K>(cx, m, b);
         let reach = C::F::c(m.dt.to_f64() * REACHES.get(K).copied().unwrap_or(1.0));
         for body in &m.bodies {
             go(cx, b, body, &velocity, reach, K == 3);
@@ -112,6 +123,27 @@ impl<const K: usize> Stage for RungeKutta<K> {
     }
 }
 
+/// Activations at the next point, or in the next state.
+#[inline(always)]
+fn go_on_acting<C: Cx, const K: usize>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let share = C::F::c(SHARES[K]);
+    for activation in activations(m) {
+        let (place, w) = (activation.place, &mut b.work);
+        if K == 0 {
+            w.rk_act[place] = cx.get(&b.act[place]);
+            w.rk_act_rate_sum[place] = C::F::c(0.0);
+        }
+        let (start, rate) = (w.rk_act[place], w.act_dot[place]);
+        let sum = rate.fma(share, w.rk_act_rate_sum[place]);
+        w.rk_act_rate_sum[place] = sum;
+        let act = match REACHES.get(K) {
+            Some(reach) => rate.fma(C::F::c(m.dt.to_f64() * reach), start),
+            None => next(activation, start, sum),
+        };
+        cx.set(&mut b.act[place], act);
+    }
+}
+
 /// Positions of a body's joint from where the step began, moved by a velocity for a time.
 #[inline(always)]
 fn go<C: Cx>(
@@ -125,7 +157,7 @@ fn go<C: Cx>(
     let (c, d) = (body.coord, body.dof);
     let lines = match body.motion {
         Motion::Revolute | Motion::Prismatic => 1,
-        Motion::Ball => 0,
+        Motion::Ball | Motion::Mocap => 0,
         Motion::Free => 3,
     };
     for i in 0..body.motion.coords() {

@@ -20,17 +20,17 @@ use crate::math::spatial::{ANGULAR, LINEAR, Spatial};
 use crate::math::vec3::{Mat3, Vec3};
 
 /// Where a frame is, and how it is turned.
-struct Placed<F> {
+pub(super) struct Placed<F> {
     /// From the reference point of its tree [m].
-    point: Vec3<F>,
+    pub point: Vec3<F>,
     /// In the world [m].
-    reference: Vec3<F>,
+    pub reference: Vec3<F>,
     /// By columns [–].
-    rotation: Mat3<F>,
+    pub rotation: Mat3<F>,
 }
 
 #[inline(always)]
-fn placed<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Placed<F> {
+pub(super) fn placed<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Placed<F> {
     let own = Mat3::constant(mount.rotation);
     Placed {
         point: sites::position(w, mount),
@@ -139,7 +139,7 @@ fn turning<F: Num>(axes: &Mat3<F>, one: &Moving<F>, other: &Moving<F>, quat: [F;
 }
 
 /// Does a dof move a body?
-fn carries<R>(m: &Constants<R>, body: Option<usize>, dof: usize) -> bool {
+pub(super) fn carries<R>(m: &Constants<R>, body: Option<usize>, dof: usize) -> bool {
     let mut next = body;
     while let Some(body) = next {
         if m.bodies[body].dofs().contains(&dof) {
@@ -154,7 +154,7 @@ fn carries<R>(m: &Constants<R>, body: Option<usize>, dof: usize) -> bool {
 ///
 /// Of the four ways to divide by one of its entries, the one with the largest is taken (Shepperd 1978).
 #[inline(always)]
-fn between<F: Num>(a: &Mat3<F>, b: &Mat3<F>) -> [F; 4] {
+pub(super) fn between<F: Num>(a: &Mat3<F>, b: &Mat3<F>) -> [F; 4] {
     let r = |i: usize, j: usize| b[i].dot(a[j]);
     let (one, two) = (F::c(1.0), F::c(2.0));
     let [xx, yy, zz] = [r(0, 0), r(1, 1), r(2, 2)];

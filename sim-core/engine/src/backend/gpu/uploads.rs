@@ -24,18 +24,25 @@ pub(super) enum Rows {
     Counters,
 }
 
-/// The commands of a model, with their columns: those of the joints, of the actuators, and the loads that vary.
+/// The commands of a model, with their columns: those of the joints, of models from MuJoCo, and the loads that vary.
 pub(super) fn commands(m: &Constants<f32>) -> impl Iterator<Item = (Input, usize)> {
     let joints = [Field::JointF, Field::JointTargetQ, Field::JointTargetQd];
     let joints = joints.map(|field| (Input::Field(field), m.dofs.len()));
     let actuators = m.mujoco.actuators.len();
-    let ctrl = (actuators > 0).then_some((Input::Field(Field::Ctrl), actuators));
+    let mocaps = m.mujoco.mocaps;
+    let models = [
+        (Field::Ctrl, actuators),
+        (Field::MocapPos, 3 * mocaps),
+        (Field::MocapQuat, 4 * mocaps),
+    ];
+    let models = models.into_iter().filter(|&(_, columns)| columns > 0);
+    let models = models.map(|(field, columns)| (Input::Field(field), columns));
     let loads = m.varying.params().filter(|param| param.is_load());
     let loads = loads.map(|param| {
         let columns = m.varying.range(param).map_or(0, |range| range.len());
         (Input::Param(param), columns)
     });
-    joints.into_iter().chain(ctrl).chain(loads)
+    joints.into_iter().chain(models).chain(loads)
 }
 
 /// A command of all worlds that waits for the next frame.

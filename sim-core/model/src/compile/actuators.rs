@@ -1,0 +1,141 @@
+//! Actuators of MuJoCo models, by the dofs of the scene.
+
+use super::carrier::Carrier;
+use super::clusters::path;
+use super::sites::mounted;
+use super::ties::terms;
+use crate::description::{self, ActuatorActivation, ActuatorLength};
+use crate::pose::Pose;
+use sim_physics::constants::Body;
+use sim_physics::constants::actuator::{
+    Activation, ActivationRate, LengthKind, Sites, TurningLength,
+};
+use sim_physics::constants::mujoco::{Actuator, Mujoco, Term};
+
+/// What an actuator refers to.
+pub(super) struct Scene<'a> {
+    /// The first dof of each joint of the robot.
+    pub dof_of: &'a [usize],
+    /// An entry for each of its links.
+    pub carriers: &'a [Carrier],
+    pub bodies: &'a [Body<f64>],
+    pub dt: f64,
+}
+
+/// Adds an actuator to those before it.
+pub(super) fn add(to: &mut Mujoco<f64>, own: &description::Actuator, scene: &Scene<'_>) {
+    let (terms, turning) = length(&own.length, scene, moments(to));
+    let activation = own.activation.map(|own| {
+        let place = to.activations;
+        to.activations += 1;
+        activation(&own, place, scene.dt)
+    });
+    to.actuators.push(Actuator {
+        terms,
+        turning,
+        activation,
+        ctrl_range: own.ctrl_range,
+        force_range: own.force_range,
+        gain: own.gain,
+        bias: own.bias,
+    });
+}
+
+/// Moments of the actuators so far.
+fn moments(of: &Mujoco<f64>) -> usize {
+    let turning = of.actuators.iter().filter_map(|own| own.turning.as_ref());
+    turning.map(|length| length.dofs.len()).sum()
+}
+
+fn activation(own: &ActuatorActivation, place: usize, dt: f64) -> Activation<f64> {
+    Activation {
+        place,
+        rate: own.rate,
+        reach: match own.rate {
+            // ȧ T (1 - exp(-h/T))
+            ActivationRate::Filter(time) if own.exact => -time * (-dt / time).exp_m1(),
+            _ => dt,
+        },
+        range: own.range,
+        early: own.early,
+    }
+}
+
+type Length = (Vec<Term<f64>>, Option<TurningLength<f64>>);
+
+fn length(own: &ActuatorLength, scene: &Scene<'_>, first: usize) -> Length {
+    let turning = |kind, gear, dofs| TurningLength {
+        kind,
+        gear,
+        dofs,
+        first,
+    };
+    // forces of free joints are in the axes of the model's world, which is link 0
+    let placed = |v: [f64; 3]| scene.carriers[0].pose.rotate(v);
+    let turning = match own {
+        ActuatorLength::Joints(joints) => return (terms(joints, scene.dof_of), None),
+        ActuatorLength::Ball {
+            joint,
+            gear: [x, y, z],
+            in_parent,
+        } => {
+            let body = &scene.bodies[body_of(scene, *joint)];
+            let kind = LengthKind::Ball {
+                coord: body.coord,
+                in_parent: *in_parent,
+            };
+            turning(kind, [*x, *y, *z, 0.0, 0.0, 0.0], body.dofs().collect())
+        }
+        ActuatorLength::Free {
+            joint,
+            gear: [x, y, z, u, v, w],
+            in_parent,
+        } => {
+            let body = body_of(scene, *joint);
+            let [x, y, z] = placed([*x, *y, *z]);
+            let [u, v, w] = match in_parent {
+                true => placed([*u, *v, *w]),
+                false => [*u, *v, *w],
+            };
+            let kind = LengthKind::Free {
+                body,
+                in_parent: *in_parent,
+            };
+            let dofs = scene.bodies[body].dofs().collect();
+            turning(kind, [x, y, z, u, v, w], dofs)
+        }
+        ActuatorLength::Site {
+            site,
+            reference,
+            gear,
+        } => {
+            let mount = |(link, pose): &(usize, Pose)| {
+                let carrier = &scene.carriers[*link];
+                let pose = carrier.pose.mul(pose);
+                mounted(carrier.body, Some(carrier.tree), &pose)
+            };
+            let (site, reference) = (mount(site), reference.as_ref().map(mount));
+            let moved = |body: Option<usize>| {
+                let dofs = body.map(|body| path(scene.bodies, body));
+                dofs.into_iter().flatten().collect::<Vec<_>>()
+            };
+            let own = moved(site.body);
+            let other = moved(reference.as_ref().and_then(|mount| mount.body));
+            let mut dofs: Vec<usize> = own.iter().chain(&other).copied().collect();
+            dofs.retain(|dof| own.contains(dof) != other.contains(dof));
+            dofs.sort_unstable();
+            turning(LengthKind::Site(Sites { site, reference }), *gear, dofs)
+        }
+    };
+    (Vec::new(), Some(turning))
+}
+
+/// The body that a joint moves.
+fn body_of(scene: &Scene<'_>, joint: usize) -> usize {
+    let dof = scene.dof_of[joint];
+    let found = scene
+        .bodies
+        .iter()
+        .position(|body| body.dofs().contains(&dof));
+    found.expect("every dof has a body")
+}
