@@ -120,6 +120,7 @@ fn quaternions_are_unit_and_turn_as_documented() {
             Motion::Revolute | Motion::Prismatic => {
                 assert_eq!(q[at].to_bits(), start[at].to_bits());
             }
+            Motion::Mocap => panic!("the scene has no mocap body"),
         }
     }
     assert_eq!(seen, 3);

@@ -173,6 +173,7 @@ impl Case {
             let (c, d) = (body.coord, body.dof);
             let three = |at: usize| std::array::from_fn::<f64, 3, _>(|i| self.qd[at + i] * seconds);
             match body.motion {
+                Motion::Mocap => {}
                 Motion::Revolute | Motion::Prismatic => q[c] += self.qd[d] * seconds,
                 Motion::Ball => {
                     let turned = mul(self.quat(c), exp(three(d)));
