@@ -165,9 +165,9 @@ def test_commands_are_checked(model):
             ["geom0", "ellipsoid"],
         ),
         (
-            '<worldbody><body name="b" gravcomp="1"><joint name="j" range="-9 9"/><geom size=".1"/></body></worldbody>'
+            '<worldbody><body><joint name="j" range="-9 9"/><geom name="g" size=".1" fluidshape="ellipsoid"/></body></worldbody>'
             '<actuator><muscle name="m" joint="j"/></actuator>',
-            ["body `b`: no support for gravity compensation", "actuator `m`: no support for muscles"],
+            ["geom `g`: no support for the ellipsoid fluid model", "actuator `m`: no support for muscles"],
         ),
         ('<option integrator="implicit"/><worldbody><body><joint/><geom size=".1"/></body></worldbody>', ["implicit"]),
     ],

@@ -36,6 +36,8 @@ class Features:
     tendons: bool = False
     pulls: bool = False
     """Springs, dampers, limits, dry friction and equalities of tendons."""
+    compensation: bool = False
+    """Bodies that are held against gravity, passively or by the actuators of joints."""
     bounds: bool = False
     """Bounds of controls, actuator forces and sums of them on a joint."""
     geoms: bool = False
@@ -101,7 +103,8 @@ class _Model:
         joints = ""
         if root and self.has("free"):
             self.frees.append(f"j{self._next()}")
-            joints = f'<joint type="free" name="{self.frees[-1]}" {self.dry()}/>'
+            own = self.passive() + self.spring()
+            joints = f'<joint type="free" name="{self.frees[-1]}"{own} {self.dry()}/>'
         elif self.has("ball", 0.3):
             joints = self.ball()
         elif self.rng.random() > 0.1:
@@ -122,6 +125,7 @@ class _Model:
         self.bodies += 1
         name = f'name="b{self.bodies}"'
         site = f'<site name="s{self.bodies}" pos="{self.numbers(3, -0.2, 0.2)}" quat="{self.numbers(4)}"/>'
+        name += self.compensation()
         return f"<body {name} {pose}>{joints}{inertial}{site}{self.geom()}{inside}</body>"
 
     def _next(self) -> int:
@@ -136,9 +140,21 @@ class _Model:
             text += f' damping="{self.rng.uniform(0.05, 2):.17g}"'
         return text
 
+    def spring(self) -> str:
+        """A spring of a ball or a free joint, which rests at the start."""
+        return f' stiffness="{self.rng.uniform(0.5, 20):.17g}"' if self.has("springs") else ""
+
+    def compensation(self) -> str:
+        return f' gravcomp="{self.rng.uniform(-0.5, 1.5):.17g}"' if self.has("compensation") else ""
+
+    def held(self) -> str:
+        """Whether the actuators of a joint hold its bodies against gravity."""
+        return ' actuatorgravcomp="true"' if self.has("compensation") else ""
+
     def ball(self) -> str:
         self.balls.append(f"j{self._next()}")
         text = f'<joint name="{self.balls[-1]}" type="ball" pos="{self.numbers(3, -0.2, 0.2)}"{self.passive()}'
+        text += self.spring() + self.held()
         if self.has("limits"):
             text += f' range="0 {self.rng.uniform(0.2, 1.5):.17g}" margin="{self.rng.choice([0.0, 0.3])}"'
             text += f" {self.softness(('solreflimit', 'solimplimit'))}"
@@ -156,7 +172,7 @@ class _Model:
         self.scalars.append(name)
         kind = "hinge" if self.rng.random() < 0.6 else "slide"
         text = f'<joint name="{name}" type="{kind}" pos="{self.numbers(3, -0.2, 0.2)}" axis="{self.numbers(3)}"'
-        text += self.passive()
+        text += self.passive() + self.held()
         if self.has("reference"):
             text += f' ref="{self.rng.uniform(-1, 1):.17g}"'
         if self.has("springs"):

@@ -28,6 +28,7 @@ EVERYTHING = replace(
     activations=True,
     transmissions=True,
     mocap=True,
+    compensation=True,
     bounds=True,
 )
 # A free body that carries nothing is implicit in its gyroscopic force. The damping of actuators is left out there; that
@@ -37,9 +38,17 @@ FEATURES = {
     "joints": JOINTS,
     "springs": replace(JOINTS, springs=True),
     "armature": replace(JOINTS, armature=True),
+    "free joints in Runge-Kutta": replace(JOINTS, damping=True, armature=True, springs=True, option='integrator="RK4"'),
     "damping": replace(JOINTS, damping=True),
     "explicit damping": replace(JOINTS, damping=True, flag='eulerdamp="disable"'),
     "implicit damping": replace(JOINTS, damping=True, option='integrator="implicitfast"'),
+    "implicit armature": replace(JOINTS, armature=True, damping=True, option='integrator="implicitfast"'),
+    "gravity compensation": replace(JOINTS, compensation=True),
+    "gravity compensation by actuators": replace(ACTUATED, compensation=True, bounds=True),
+    "no springs and dampers": replace(
+        ACTUATED, compensation=True, springs=True, flag='spring="disable" damper="disable"'
+    ),
+    "compensation without actuation": replace(ACTUATED, compensation=True, flag='actuation="disable"'),
     "limits": replace(JOINTS, limits=True),
     "friction": replace(JOINTS, friction=True),
     "equalities": replace(JOINTS, equalities=True),
@@ -96,6 +105,35 @@ def test_accelerations_and_steps_are_mujocos(feature: str, seed: int) -> None:
     xml = random_mjcf(seed, 1 + seed % 6, FEATURES[feature])
     with live(xml, fields=("actuator_force",)) as case:
         assert_step(case, seed, 1e-3 if feature == FREE_AND_DAMPED else 1e-8)
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+@pytest.mark.parametrize("seed", range(TREES))
+def test_free_joints_and_balls_are_passive_as_mujocos(integrator: str, seed: int) -> None:
+    """Springs that rest away from the start, axes that differ in armature and damping, and the energy of springs."""
+    features = replace(JOINTS, springs=True, armature=True, damping=True, option=f'integrator="{integrator}"')
+    model = mujoco.MjModel.from_xml_string(random_mjcf(seed, 1 + seed % 4, features))
+    rng = np.random.default_rng(seed)
+    mujoco.mj_integratePos(model, model.qpos_spring, rng.normal(0, 0.5, model.nv), 1.0)
+    model.dof_armature[:] = rng.uniform(0, 0.3, model.nv)
+    model.dof_damping[:] = rng.uniform(0, 2, model.nv)
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    with live(model, fields=("kinetic_energy", "potential_energy")) as case:
+        assert_step(case, seed, 1e-8)
+        states = case.states(seed)
+        frame = case.place(states)
+        for world, data in enumerate(case.data(states)):
+            mujoco.mj_forward(model, data)
+            mujoco.mj_energyVel(model, data)
+            mujoco.mj_energyPos(model, data)
+            static = -sum(model.body_mass[b] * data.xipos[b] @ model.opt.gravity for b in static_bodies(model))
+            np.testing.assert_allclose(frame.kinetic_energy[world], data.energy[1], rtol=1e-10)
+            np.testing.assert_allclose(frame.potential_energy[world], data.energy[0] - static, rtol=1e-10, atol=1e-9)
+
+
+def static_bodies(model: mujoco.MjModel) -> list[int]:
+    """Bodies that stand still, which have no part in our potential energy."""
+    return np.flatnonzero(model.body_weldid == 0).tolist()
 
 
 def has_closed_form(model: mujoco.MjModel, contact: mujoco.MjContact) -> bool:

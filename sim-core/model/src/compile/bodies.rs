@@ -9,7 +9,7 @@ use crate::inertia::{Inertial, merge};
 use crate::joint_kind::JointKind;
 use crate::model::{RobotRange, Start};
 use crate::pose::Pose;
-use sim_physics::constants::mujoco::{ActuatorBound, Mujoco, Spring, Tendon};
+use sim_physics::constants::mujoco::{ActuatorBound, Mujoco, Tendon};
 use sim_physics::constants::{Body, Dof, Frame, MassEntry, Motion, Tree};
 use sim_physics::math::factor::Pattern;
 
@@ -322,13 +322,7 @@ impl BodyBuilder {
                     safe_references: parts.safe_references,
                 });
             }
-            if own.stiffness != 0.0 {
-                self.mujoco.springs.push(Spring {
-                    dof: dofs.start,
-                    stiffness: own.stiffness,
-                    rest: own.spring_ref,
-                });
-            }
+            self.add_passive(joint, own, dofs.clone());
             if let Some(range) = own.actuator_range {
                 let dof = dofs.start;
                 self.mujoco
@@ -336,6 +330,7 @@ impl BodyBuilder {
                     .push(ActuatorBound { dof, range });
             }
         }
+        self.add_compensations(robot, parts, carriers);
         for equality in &parts.equalities {
             let (follower, leader) = (dof_of[equality.follower], dof_of[equality.leader]);
             self.couplings.push((follower, leader));

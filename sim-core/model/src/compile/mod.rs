@@ -16,6 +16,7 @@ mod contact_pieces;
 mod contacts;
 mod inverse_weight;
 mod keyframes;
+mod passive;
 mod sites;
 mod ties;
 
@@ -129,6 +130,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         .map(|(name, _)| name.clone())
         .collect();
     constants.mujoco = builder.mujoco;
+    passive::keep_acting(&mut constants, scene);
     ties::add_ties(&mut constants, builder.constraints);
     check_models(scene)?;
     if let Some(parts) = scene.robots.iter().find_map(|robot| robot.mujoco.as_ref()) {
@@ -263,6 +265,7 @@ fn is_damped(m: &Constants<f64>, implicit_damping: bool) -> bool {
         Integrator::ImplicitFast => {
             let tendons = &m.mujoco.tendons;
             m.damped
+                || !m.mujoco.free_joints.is_empty()
                 || m.mujoco.actuators.iter().any(of_actuators)
                 || tendons.iter().any(|tendon| tendon.damping != 0.0)
         }

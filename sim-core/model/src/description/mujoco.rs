@@ -21,6 +21,8 @@ pub struct MujocoParts {
     pub equalities: Vec<JointEquality>,
     /// Other constraints.
     pub constraints: Vec<Constraint>,
+    /// Links that are held against gravity, each with its share of compensation.
+    pub compensations: Vec<(usize, f64)>,
     /// Springs and dampers of tendons.
     pub tendons: Vec<Tendon>,
     /// Actuators.
@@ -56,6 +58,10 @@ pub struct MujocoJoint {
     pub stiffness: f64,
     /// Position without force of the spring [rad or m].
     pub spring_ref: f64,
+    /// Pose without force of the spring of a ball or a free joint.
+    pub spring_pose: Pose,
+    /// What compensates gravity along it.
+    pub compensator: Compensator,
     /// Softness of its limits.
     pub limit: Softness,
     /// Distance at which a limit acts [rad or m].
@@ -64,6 +70,18 @@ pub struct MujocoJoint {
     pub friction: Softness,
     /// Bounds of the sum of actuator forces, if it has any [N·m or N].
     pub actuator_range: Option<[f64; 2]>,
+}
+
+/// What compensates gravity along a joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Compensator {
+    /// A passive force.
+    #[default]
+    Passive,
+    /// A force that counts as one of its actuators.
+    Actuators,
+    /// Nothing, since the model has no actuators that could.
+    Nothing,
 }
 
 /// A joint that follows another: q = offset + multiplier q of the leader.

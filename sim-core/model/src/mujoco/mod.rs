@@ -11,6 +11,7 @@ mod geoms;
 mod keyframes;
 mod names;
 mod options;
+mod passive;
 mod refusals;
 mod tendons;
 mod transmissions;

@@ -7,10 +7,7 @@ use crate::error::ModelError;
 use crate::softness::POWER_MAX;
 
 /// Arrays in which any entry other than 0 stands for a feature that is not supported: kind of element, array, feature.
-const MUST_BE_ZERO: &[(&str, &str, &str)] = &[
-    ("body", "body_gravcomp", "gravity compensation"),
-    ("geom", "geom_fluid", "the ellipsoid fluid model"),
-];
+const MUST_BE_ZERO: &[(&str, &str, &str)] = &[("geom", "geom_fluid", "the ellipsoid fluid model")];
 /// The same, of arrays that older versions of MuJoCo do not have.
 const NEWER_MUST_BE_ZERO: &[(&str, &str, &str)] = &[
     ("joint", "jnt_stiffnesspoly", "nonlinear stiffness"),
@@ -120,10 +117,7 @@ fn joints(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
     let kinds = file.kinds("jnt_type", joints)?;
     let firsts = file.integers("jnt_dofadr", joints)?;
     let dofs = file.rows("dof_armature");
-    let armatures = file.reals("dof_armature", dofs)?;
-    let dampings = file.reals("dof_damping", dofs)?;
     let curved = file.first_set("dof_dampingpoly");
-    let stiffness = file.reals("jnt_stiffness", joints)?;
     let bounded = file.integers("jnt_actfrclimited", joints)?;
     let limits = file.vectors::<5>("jnt_solimp", joints)?;
     let frictions = file.vectors::<5>("dof_solimp", dofs)?;
@@ -136,16 +130,11 @@ fn joints(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
         };
         let first = usize::try_from(firsts[joint]).unwrap_or(dofs).min(dofs);
         let own = first..(first + count).min(dofs);
-        let any = |values: &[f64]| values[own.clone()].iter().any(|&x| x != 0.0);
-        let is_free = count == 6;
         let wrong = [
-            (count > 1 && stiffness[joint] != 0.0, "stiffness"),
             (
                 count > 1 && bounded[joint] != 0,
                 "bounds of actuator forces",
             ),
-            (is_free && any(&armatures), "armature"),
-            (is_free && any(&dampings), "damping"),
             (
                 curved.is_some_and(|dof| own.contains(&dof)),
                 "nonlinear damping",

@@ -5,8 +5,9 @@ use super::format::ModelFile;
 use super::frame;
 use super::names::names;
 use super::options::{MujocoOptions, has_flag, integrator};
+use super::passive;
 use crate::description::{
-    Inertial, Joint, JointDof, JointKind, Link, MujocoJoint, MujocoParts, Robot,
+    Compensator, Inertial, Joint, JointDof, JointKind, Link, MujocoJoint, MujocoParts, Robot,
 };
 use crate::error::ModelError;
 use crate::pose::Pose;
@@ -87,19 +88,20 @@ fn parts(
         .filter_map(|(body, number)| Some((number?, body)))
         .collect();
     mocaps.sort_unstable();
-    let bodies = mocaps.iter().map(|&(_, body)| body);
-    if !bodies.clone().is_sorted() {
+    let mocaps = mocaps.iter().map(|&(_, body)| body);
+    if !mocaps.clone().is_sorted() {
         return Err(file.fault("has mocap bodies in another order than its bodies".to_owned()));
     }
     Ok(MujocoParts {
         keyframes: super::keyframes::keyframes(file)?,
-        mocaps: bodies.collect(),
+        mocaps: mocaps.collect(),
         link_inverse_weight: weights.into_iter().map(|[linear, _]| linear).collect(),
         dof_inverse_weight: file.reals("dof_invweight0", file.rows("dof_armature"))?,
         mean_inertia: file.real("stat.meaninertia")?,
         joints: Vec::new(),
         equalities: Vec::new(),
         constraints: Vec::new(),
+        compensations: passive::compensations(file, bodies)?,
         tendons: Vec::new(),
         actuators: Vec::new(),
         welds: welds.into_iter().map(|weld| weld.unwrap_or(0)).collect(),
@@ -134,6 +136,7 @@ struct JointArrays {
     frictions: Vec<Softness>,
     qpos0: Vec<f64>,
     qpos_spring: Vec<f64>,
+    compensators: Vec<Compensator>,
 }
 
 impl JointArrays {
@@ -185,6 +188,7 @@ impl JointArrays {
             frictions: softness(file, "dof", dofs)?,
             qpos0: file.reals("qpos0", coords)?,
             qpos_spring: file.reals("qpos_spring", coords)?,
+            compensators: passive::compensators(file, joints)?,
         })
     }
 }
@@ -232,7 +236,7 @@ fn add_joints(
             parts.joints.push(MujocoJoint::default());
         }
         for (place, joint) in own.into_iter().enumerate() {
-            let (mut joint, own) = all.joint(file, joint, body, parents[body].unwrap_or(0))?;
+            let (mut joint, mut own) = all.joint(file, joint, body, parents[body].unwrap_or(0))?;
             if place == 0 {
                 joint.origin = origin;
             }
@@ -244,6 +248,7 @@ fn add_joints(
                 });
                 joint.q[..3].copy_from_slice(&start.pos);
                 joint.q[3..].copy_from_slice(&start.quat);
+                own.spring_pose = options.pose.mul(&own.spring_pose);
             }
             robot.joints.push(joint);
             parts.joints.push(own);
@@ -302,6 +307,8 @@ impl JointArrays {
             } else {
                 0.0
             },
+            spring_pose: spring_pose(kind, &self.qpos_spring[coord..coord + coords]),
+            compensator: self.compensators[k],
             limit: self.limits[k],
             margin: self.margins[k],
             friction: self.frictions[dof],
@@ -309,4 +316,14 @@ impl JointArrays {
         };
         Ok((joint, own))
     }
+}
+
+/// The pose without force of the spring of a ball or a free joint.
+fn spring_pose(kind: JointKind, coords: &[f64]) -> Pose {
+    let [x, y, z, w, a, b, c] = match (kind, coords) {
+        (JointKind::Ball, &[w, a, b, c]) => [0.0, 0.0, 0.0, w, a, b, c],
+        (JointKind::Free, &[x, y, z, w, a, b, c]) => [x, y, z, w, a, b, c],
+        _ => return Pose::identity(),
+    };
+    frame([x, y, z], [w, a, b, c])
 }

@@ -121,6 +121,8 @@ arrays! { m;
         // moments of turning lengths, see `TurningLength::first`
         actuator_moment: ActuatorMoment [Scalar; m.mujoco.actuators.iter().filter_map(|actuator| actuator.turning.as_ref()).map(|length| length.dofs.len()).sum::<usize>()] Stage "–";
         qfrc_actuator: QfrcActuator [Scalar; if m.mujoco.actuators.is_empty() { 0 } else { m.dofs.len() }] Stage "N·m or N";
+        // compensation of gravity, where it counts as a force of actuators
+        qfrc_gravcomp: QfrcGravcomp [Scalar; if m.mujoco.compensated_by_actuators.is_empty() { 0 } else { m.dofs.len() }] Stage "N·m or N";
         // packed, see `math::factor::Pattern::at`
         mass_matrix: MassMatrix [Scalar; m.pattern.len()] Stage "kg·m², kg·m or kg";
         // +1 where the lower bound is the nearer, -1 where the upper is

@@ -26,6 +26,16 @@ recast! {
         pub integrator: Integrator,
         /// Springs of joints.
         pub springs: Vec<Spring<R>>,
+        /// Springs of balls and free joints.
+        pub pose_springs: Vec<PoseSpring<R>>,
+        /// Bodies of free joints whose armature and damping belong to MuJoCo's velocities.
+        pub free_joints: Vec<usize>,
+        /// Links that are held against gravity.
+        pub compensations: Vec<Compensation<R>>,
+        /// Dofs that this moves, except those of the next list.
+        pub compensated: Vec<usize>,
+        /// Dofs of which it counts as a force of actuators.
+        pub compensated_by_actuators: Vec<usize>,
         /// Springs and dampers of tendons.
         pub tendons: Vec<Tendon<R>>,
         /// Constraints whose Jacobians are found at run time.
@@ -54,6 +64,11 @@ impl<R> Default for Mujoco<R> {
         Mujoco {
             integrator: Integrator::default(),
             springs: Vec::new(),
+            pose_springs: Vec::new(),
+            free_joints: Vec::new(),
+            compensations: Vec::new(),
+            compensated: Vec::new(),
+            compensated_by_actuators: Vec::new(),
             tendons: Vec::new(),
             ties: Vec::new(),
             tie_of_row: Vec::new(),
@@ -78,6 +93,36 @@ recast! {
         pub stiffness: R,
         /// Position without force [rad or m].
         pub rest: R,
+    }
+}
+
+recast! {
+    /// A spring of a ball or a free joint: forces along the axes of its position, and a torque along its rotation vector.
+    #[derive(Clone, Debug)]
+    pub struct PoseSpring<R> {
+        /// The body of the joint.
+        pub body: usize,
+        /// Of its position [N/m] and of its rotation [N·m/rad].
+        pub stiffness: R,
+        /// Position without force of a free joint, in the world [m].
+        pub position: [R; 3],
+        /// Rotation without torque, (x, y, z, w) [–].
+        pub quat: [R; 4],
+    }
+}
+
+recast! {
+    /// A link that is held against gravity.
+    #[derive(Clone, Debug)]
+    pub struct Compensation<R> {
+        /// The body that carries it.
+        pub body: usize,
+        /// Its index among the links.
+        pub link: usize,
+        /// Its mass times its share of compensation [kg].
+        pub mass: R,
+        /// Its centre of mass in the body's frame [m].
+        pub center: [R; 3],
     }
 }
 

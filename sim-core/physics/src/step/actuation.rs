@@ -9,13 +9,12 @@
 
 use super::command::{Kind, command_of};
 use super::kinematics::read_quat;
-use super::{BlockOf, ConstantsOf, Stage, param};
+use super::{BlockOf, ConstantsOf, Stage, free_joints, link_forces, param};
 use crate::arrays::{Array as A, Workspace};
 use crate::constants::params::Param;
 use crate::constants::{Body, Constants, Motion};
 use crate::lane::{Cx, Num};
 use crate::math::quat::{self, conjugate, mul};
-use crate::math::spatial::Spatial;
 use crate::math::vec3::Vec3;
 
 /// Applied, drive and damping forces.
@@ -68,8 +67,15 @@ impl Stage for JointTorque {
 #[inline(always)]
 fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     // damping of joints is passive: the effort limit does not clamp it
-    for body in &m.bodies {
+    for (k, body) in m.bodies.iter().enumerate() {
         let torques = torques(cx, m, b, body);
+        if free_joints::has(m, k) {
+            // `springs` has their damping
+            for (j, torque) in body.dofs().zip(torques) {
+                b.work.smooth_force[j] = torque - b.work.bias_force[j];
+            }
+            continue;
+        }
         for (j, torque) in body.dofs().zip(torques) {
             let damping = param(m, &b.params, Param::JointDamping, j, m.dofs[j].damping);
             let applied = cx.get(&b.joint_qd[j]).fnma(damping, torque);
@@ -164,32 +170,19 @@ fn add_link_forces<F: Num>(
     first: usize,
     w: &mut Workspace<F>,
 ) {
-    for force in &mut w.force {
-        *force = Spatial::zero();
-    }
+    link_forces::clear(w);
     for (link, frame) in m.frames.iter().enumerate() {
         if let Some(body) = frame.body {
             let given = &params[first + 6 * link..first + 6 * link + 6];
             let force = Vec3([given[0], given[1], given[2]]);
             let torque = Vec3([given[3], given[4], given[5]]);
             let point = w.rotation[body].mul_add(Vec3::constant(frame.center), w.origin[body]);
-            // moved to the reference point: n + p × f
-            let wrench = Spatial([force, point.cross_add(force, torque)]);
-            w.force[body] = w.force[body] + wrench;
+            link_forces::add(w, body, point, force, torque);
         }
     }
-    for (k, body) in m.bodies.iter().enumerate().rev() {
-        let force = w.force[k];
-        for (axis, d) in body.dofs().enumerate() {
-            let projected = match body.motion {
-                Motion::Free => force.scalars()[axis],
-                _ => w.motion[d].dot(force),
-            };
-            w.smooth_force[d] = w.smooth_force[d] + projected;
-        }
-        if let Some(parent) = body.parent {
-            w.force[parent] = w.force[parent] + force;
-        }
+    link_forces::project(m, w);
+    for (smooth, projected) in w.smooth_force.iter_mut().zip(&w.joint_force) {
+        *smooth = *smooth + *projected;
     }
 }
 

@@ -30,6 +30,7 @@ impl Stage for Actuators {
         A::Reference,
         A::Motion,
         A::SmoothForce,
+        A::QfrcGravcomp,
     ];
     const WRITES: &'static [A] = &[
         A::SmoothForce,
@@ -64,6 +65,10 @@ impl Stage for Actuators {
                     w.qfrc_actuator[dof] = force.fma(moment, w.qfrc_actuator[dof]);
                 }
             }
+        }
+        for &dof in &m.mujoco.compensated_by_actuators {
+            let joint = &mut b.work.qfrc_actuator[dof];
+            *joint = *joint + b.work.qfrc_gravcomp[dof];
         }
         for bound in &m.mujoco.actuator_bounds {
             let joint = &mut b.work.qfrc_actuator[bound.dof];

@@ -7,7 +7,7 @@
 //! After the mass matrix, a root's inertia is that of its whole tree: its first moment h = m (c - reference) has all bodies.
 //! What stands still has no part in either, as where MuJoCo fuses static bodies.
 
-use super::springs::stretch;
+use super::springs::{pose_stretch, stretch};
 use super::{BlockOf, ConstantsOf, Stage, gravity};
 use crate::arrays::Array as A;
 use crate::lane::{Cx, Num, Real};
@@ -60,6 +60,12 @@ impl Stage for Energy {
             let stretch = stretch(cx, m, b, tendon);
             let half = C::F::c(0.5 * tendon.stiffness.to_f64());
             potential = (stretch * half).fma(stretch, potential);
+        }
+        for spring in &m.mujoco.pose_springs {
+            let half = C::F::c(0.5 * spring.stiffness.to_f64());
+            for stretch in pose_stretch(cx, m, b, spring) {
+                potential = half.fma(stretch.dot(stretch), potential);
+            }
         }
         b.work.potential_energy[0] = potential;
     }

@@ -24,7 +24,7 @@
 //! ```
 
 use super::kinematics::read_quat;
-use super::{BlockOf, ConstantsOf, Stage, actuators, param};
+use super::{BlockOf, ConstantsOf, Stage, actuators, free_joints, param};
 use crate::arrays::Array as A;
 use crate::constants::actuator::Activation;
 use crate::constants::mujoco::Integrator;
@@ -48,6 +48,8 @@ impl Stage for Integrate {
         A::ActuatorMoment,
         A::ActuatorForce,
         A::Rotation,
+        A::Origin,
+        A::Inertia,
         A::JointQ,
         A::JointQRest,
         A::JointQd,
@@ -76,7 +78,8 @@ impl Stage for Integrate {
             if body.motion == Motion::Free {
                 // a body that carries nothing is implicit in its gyroscopic force
                 let is_alone = m.bodies.iter().all(|other| other.parent != Some(k));
-                if is_alone && m.mujoco.integrator == Integrator::ImplicitFast {
+                let is_implicit = m.mujoco.integrator == Integrator::ImplicitFast;
+                if is_alone && is_implicit && !free_joints::is_solved(m, k) {
                     gyroscopic(cx, m, b, k);
                 }
                 integrate_free(cx, m, b, k);
@@ -114,14 +117,17 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
         multiply(&m.pattern, &w.mass_matrix, &w.start, &mut w.joint_force);
     }
     for (j, dof) in m.dofs.iter().enumerate() {
+        let is_mujocos = free_joints::has(m, dof.body);
         // a clamped drive keeps its damping here, as under MuJoCo's `actfrcrange`
         let mut damping = param(m, &b.params, Param::JointDamping, j, dof.damping);
         // nothing drives a free body
         if m.bodies[dof.body].motion != Motion::Free {
             damping = damping + param(m, &b.params, Param::JointTargetKd, j, dof.kd);
         }
-        let diagonal = m.pattern.at(j, j);
-        w.mass_matrix[diagonal] = dt.fma(damping, w.mass_matrix[diagonal]);
+        if !is_mujocos {
+            let diagonal = m.pattern.at(j, j);
+            w.mass_matrix[diagonal] = dt.fma(damping, w.mass_matrix[diagonal]);
+        }
         w.acceleration[j] = w.smooth_force[j] + cx.get(&b.constraint_force[j]);
         if let Some(touching) = rounded {
             w.acceleration[j] = C::F::select(touching, w.joint_force[j], w.acceleration[j]);
@@ -130,8 +136,15 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
     if m.mujoco.integrator == Integrator::ImplicitFast {
         actuators::add_damping(cx, m, b);
     }
+    free_joints::add_damping(cx, m, b);
+    for body in free_joints::solved(m) {
+        free_joints::solve(cx, m, b, body);
+    }
     let w = &mut b.work;
     solve(&m.pattern, &mut w.mass_matrix, &mut w.acceleration);
+    for body in free_joints::solved(m) {
+        free_joints::take(m, b, body);
+    }
 }
 
 /// Velocity first, then the position by the new velocity.

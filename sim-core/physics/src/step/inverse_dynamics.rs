@@ -9,7 +9,7 @@
 //! τ = z · n  or  z · f
 //! ```
 
-use super::{BlockOf, ConstantsOf, gravity, param};
+use super::{BlockOf, ConstantsOf, free_joints, gravity, param};
 use crate::constants::params::Param;
 use crate::constants::{Body, Motion};
 use crate::lane::{Cx, Num};
@@ -76,9 +76,13 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
     }
     // the rotor of a drive
     for (j, dof) in m.dofs.iter().enumerate() {
+        if free_joints::has(m, dof.body) {
+            continue;
+        }
         let armature = param(m, &b.params, Param::JointArmature, j, dof.armature);
         b.work.missing[j] = armature.fma(cx.get(&b.joint_qdd[j]), b.work.missing[j]);
     }
+    free_joints::add_armature_forces(cx, m, b);
 }
 
 /// Writes the accelerations of all body origins less gravity, and the angular ones, to `force`. Returns that of a static body.

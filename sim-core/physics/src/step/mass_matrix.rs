@@ -6,7 +6,7 @@
 //!
 //! For a free body S = 1: its columns are the momentum Iᶜ S(i) itself, its own block is Iᶜ.
 
-use super::{BlockOf, ConstantsOf, Stage, param};
+use super::{BlockOf, ConstantsOf, Stage, free_joints, param};
 use crate::arrays::Array as A;
 use crate::constants::Motion;
 use crate::constants::params::Param;
@@ -17,7 +17,7 @@ use crate::math::spatial::Inertia;
 pub struct MassMatrix;
 
 impl Stage for MassMatrix {
-    const READS: &'static [A] = &[A::Motion, A::Inertia, A::Params];
+    const READS: &'static [A] = &[A::Motion, A::Inertia, A::Params, A::Rotation, A::Origin];
     const WRITES: &'static [A] = &[A::MassMatrix, A::Inertia];
 
     #[inline(always)]
@@ -52,8 +52,13 @@ impl Stage for MassMatrix {
                     }
                     diagonal = w.motion[i].dot(force);
                 }
-                w.mass_matrix[own.place] =
-                    diagonal + param(m, params, Param::JointArmature, i, dof.armature);
+                w.mass_matrix[own.place] = match free_joints::has(m, k) {
+                    true => diagonal,
+                    false => diagonal + param(m, params, Param::JointArmature, i, dof.armature),
+                };
+            }
+            if free_joints::has(m, k) {
+                free_joints::add_armature(m, params, w, k);
             }
             if let Some(parent) = body.parent {
                 w.inertia[parent] = w.inertia[parent] + composite;

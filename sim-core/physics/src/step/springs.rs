@@ -1,26 +1,47 @@
-//! Springs of joints, and springs and dampers of tendons (MuJoCo: `mj_passive`).
+//! Springs of joints, springs and dampers of tendons, and dampers of free joints (MuJoCo: `mj_passive`).
 //!
 //! ```text
 //! smooth -= stiffness (q - rest)                       of a joint
+//! smooth -= stiffness log(rest⁻¹ q)                    of a ball, and of the rotation of a free joint
 //! smooth -= c (stiffness (l - rest) + damping v)       of a tendon with the coefficients c; no spring force between its rests
 //! ```
+//!
+//! A free joint's spring acts at the origin of its frame ([`super::free_joints`]).
 
+use super::kinematics::read_quat;
 use super::ties::length;
-use super::{BlockOf, ConstantsOf, Stage};
+use super::{BlockOf, ConstantsOf, Stage, free_joints};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
-use crate::constants::mujoco::Tendon;
+use crate::constants::Motion;
+use crate::constants::mujoco::{PoseSpring, Tendon};
 use crate::lane::{Cx, Num, Real};
+use crate::math::quat::{self, conjugate, mul};
+use crate::math::vec3::Vec3;
 
 /// Forces of springs and dampers.
 pub struct Springs;
 
 impl Stage for Springs {
-    const READS: &'static [A] = &[A::JointQ, A::JointQd, A::SmoothForce];
+    const READS: &'static [A] = &[
+        A::JointQ,
+        A::JointQd,
+        A::Params,
+        A::Rotation,
+        A::Origin,
+        A::SmoothForce,
+    ];
     const WRITES: &'static [A] = &[A::SmoothForce];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        !m.mujoco.springs.is_empty() || !m.mujoco.tendons.is_empty()
+        let parts = &m.mujoco;
+        let are_there = [
+            !parts.springs.is_empty(),
+            !parts.tendons.is_empty(),
+            !parts.pose_springs.is_empty(),
+            !parts.free_joints.is_empty(),
+        ];
+        are_there.contains(&true)
     }
 
     #[inline(always)]
@@ -44,7 +65,44 @@ impl Stage for Springs {
                 *force = pull.fnma(C::F::k(term.coefficient), *force);
             }
         }
+        for spring in &m.mujoco.pose_springs {
+            let body = &m.bodies[spring.body];
+            let stiffness = C::F::k(spring.stiffness);
+            let [slide, turn] = pose_stretch(cx, m, b, spring).map(|x| x * stiffness);
+            let (rotation, origin) = (b.work.rotation[spring.body], b.work.origin[spring.body]);
+            let force = &mut b.work.smooth_force[body.dofs()];
+            if body.motion == Motion::Free {
+                free_joints::subtract(force, [slide, turn], rotation, origin);
+                continue;
+            }
+            for i in 0..3 {
+                force[i] = force[i] - turn[i];
+            }
+        }
+        free_joints::add_forces(cx, m, b);
     }
+}
+
+/// How far a ball or a free joint is from its rest: its position, 0 of a ball, and a rotation vector in the body's axes.
+#[inline(always)]
+pub(super) fn pose_stretch<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    spring: &PoseSpring<<C::F as Num>::Real>,
+) -> [Vec3<C::F>; 2] {
+    let body = &m.bodies[spring.body];
+    let mut slide = Vec3::zero();
+    let mut first = body.coord;
+    if body.motion == Motion::Free {
+        for i in 0..3 {
+            slide[i] = cx.get(&b.joint_q[first + i]) - C::F::k(spring.position[i]);
+        }
+        first += 3;
+    }
+    let here = read_quat(cx, &b.joint_q, first);
+    let rest = quat::constant(spring.quat);
+    [slide, quat::log(mul(conjugate(rest), here))]
 }
 
 /// How far a tendon is beyond its rests.

@@ -1,0 +1,85 @@
+//! Passive forces of MuJoCo's robots: springs, free joints, compensation of gravity.
+
+use super::bodies::BodyBuilder;
+use super::carrier::Carrier;
+use crate::description::{Compensator, Description, Joint, MujocoJoint, MujocoParts, Robot};
+use crate::joint_kind::JointKind;
+use sim_physics::constants::Constants;
+use sim_physics::constants::mujoco::{Compensation, PoseSpring, Spring};
+use sim_physics::constants::params::Param;
+use std::ops::Range;
+
+impl BodyBuilder {
+    /// What acts on a joint by itself. `dofs` are its own.
+    pub(super) fn add_passive(&mut self, joint: &Joint, own: &MujocoJoint, dofs: Range<usize>) {
+        let body = self.dofs[dofs.start].body;
+        let has_pose = matches!(joint.kind, JointKind::Ball | JointKind::Free);
+        if own.stiffness != 0.0 && has_pose {
+            self.mujoco.pose_springs.push(PoseSpring {
+                body,
+                stiffness: own.stiffness,
+                position: own.spring_pose.pos,
+                quat: own.spring_pose.quat,
+            });
+        } else if own.stiffness != 0.0 {
+            self.mujoco.springs.push(Spring {
+                dof: dofs.start,
+                stiffness: own.stiffness,
+                rest: own.spring_ref,
+            });
+        }
+        if joint.kind == JointKind::Free {
+            self.mujoco.free_joints.push(body);
+        }
+        match own.compensator {
+            Compensator::Passive => self.mujoco.compensated.extend(dofs),
+            Compensator::Actuators => self.mujoco.compensated_by_actuators.extend(dofs),
+            Compensator::Nothing => {}
+        }
+    }
+
+    /// Links that are held against gravity.
+    pub(super) fn add_compensations(
+        &mut self,
+        robot: &Robot,
+        parts: &MujocoParts,
+        carriers: &[Carrier],
+    ) {
+        let first = self.frames.len() - robot.links.len();
+        // frames are in the order of links
+        for (place, link) in robot.link_order().into_iter().enumerate() {
+            let share = parts.compensations.iter().find(|(own, _)| *own == link);
+            let Some((&(_, share), inertial)) = share.zip(robot.links[link].inertial.as_ref())
+            else {
+                continue;
+            };
+            let Some(body) = carriers[link].body else {
+                continue;
+            };
+            self.mujoco.compensations.push(Compensation {
+                body,
+                link: first + place,
+                mass: share * inertial.mass,
+                center: carriers[link].pose.transform(inertial.pos),
+            });
+        }
+    }
+}
+
+/// Keeps of the lists of passive parts what acts: free joints with armature or damping, and compensation where there is any.
+pub(super) fn keep_acting(m: &mut Constants<f64>, scene: &Description) {
+    let varies = [Param::JointArmature, Param::JointDamping];
+    let varies = varies.iter().any(|param| scene.params.contains(param));
+    let (bodies, dofs) = (&m.bodies, &m.dofs);
+    m.mujoco.free_joints.retain(|&body| {
+        let own = &dofs[bodies[body].dofs()];
+        varies
+            || own
+                .iter()
+                .any(|dof| dof.armature != 0.0 || dof.damping != 0.0)
+    });
+    if m.mujoco.compensations.is_empty() {
+        m.mujoco.compensated.clear();
+        m.mujoco.compensated_by_actuators.clear();
+    }
+}

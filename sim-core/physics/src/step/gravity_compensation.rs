@@ -1,0 +1,47 @@
+//! Compensation of gravity (MuJoCo: `gravcomp`).
+//!
+//! ```text
+//! τ = Σ Jᵀ (-s m g)      at the centre of mass of each link, s its share of compensation
+//! ```
+//!
+//! The force of joints with `actuatorgravcomp` counts as one of their actuators ([`super::actuators`]).
+
+use super::{BlockOf, ConstantsOf, Stage, gravity, link_forces, param};
+use crate::arrays::Array as A;
+use crate::constants::Constants;
+use crate::constants::params::Param;
+use crate::lane::{Cx, Num, Real};
+use crate::math::vec3::Vec3;
+
+/// Forces that hold links against gravity.
+pub struct GravityCompensation;
+
+impl Stage for GravityCompensation {
+    const READS: &'static [A] = &[A::Params, A::Rotation, A::Origin, A::Motion, A::SmoothForce];
+    const WRITES: &'static [A] = &[A::SmoothForce, A::QfrcGravcomp];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        !m.mujoco.compensations.is_empty()
+    }
+
+    #[inline(always)]
+    fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        let up = -gravity(m, &b.params);
+        let (w, params, one) = (&mut b.work, &b.params, <C::F as Num>::Real::of(1.0));
+        link_forces::clear(w);
+        for held in &m.mujoco.compensations {
+            let center = Vec3::constant(held.center);
+            let point = w.rotation[held.body].mul_add(center, w.origin[held.body]);
+            let scale = param(m, params, Param::BodyMassScale, held.link, one);
+            let force = up * (scale * C::F::k(held.mass));
+            link_forces::add(w, held.body, point, force, Vec3::zero());
+        }
+        link_forces::project(m, w);
+        for &d in &m.mujoco.compensated {
+            w.smooth_force[d] = w.smooth_force[d] + w.joint_force[d];
+        }
+        if !m.mujoco.compensated_by_actuators.is_empty() {
+            w.qfrc_gravcomp.copy_from_slice(&w.joint_force);
+        }
+    }
+}
