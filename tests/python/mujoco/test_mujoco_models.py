@@ -11,6 +11,7 @@ import pytest
 from live_model import Live, live
 from random_mjcf import Features, random_mjcf
 
+MEDIUM = 'density="900" viscosity="0.7" wind="0.3 -0.5 0.2"'
 TREES = int(os.environ.get("TIGHTLOOP_LIVE_TREES", "48")) // 8
 JOINTS = Features(free=True, ball=True, several=True, reference=True)
 ACTUATED = replace(JOINTS, actuators=True, tendons=True)
@@ -30,6 +31,7 @@ EVERYTHING = replace(
     mocap=True,
     compensation=True,
     bounds=True,
+    option=MEDIUM,
 )
 # A free body that carries nothing is implicit in its gyroscopic force. The damping of actuators is left out there; that
 # moves velocities by up to 1.2e-4 of their largest.
@@ -43,6 +45,12 @@ FEATURES = {
     "explicit damping": replace(JOINTS, damping=True, flag='eulerdamp="disable"'),
     "implicit damping": replace(JOINTS, damping=True, option='integrator="implicitfast"'),
     "implicit armature": replace(JOINTS, armature=True, damping=True, option='integrator="implicitfast"'),
+    "fluid": replace(JOINTS, option=MEDIUM),
+    "viscosity in Runge-Kutta": replace(JOINTS, option='viscosity="0.7" integrator="RK4"'),
+    "implicit fluid": replace(JOINTS, option=f'{MEDIUM} integrator="implicitfast"'),
+    "implicit fluid and free joints": replace(
+        JOINTS, armature=True, damping=True, option=f'{MEDIUM} integrator="implicitfast"'
+    ),
     "gravity compensation": replace(JOINTS, compensation=True),
     "gravity compensation by actuators": replace(ACTUATED, compensation=True, bounds=True),
     "no springs and dampers": replace(
@@ -72,7 +80,7 @@ FEATURES = {
     "no gravity": replace(JOINTS, flag='gravity="disable"'),
     "unsafe references": replace(JOINTS, limits=True, flag='refsafe="disable"', option='timestep="0.004"'),
     "everything": EVERYTHING,
-    "everything implicit": replace(EVERYTHING, free=False, option='integrator="implicitfast"'),
+    "everything implicit": replace(EVERYTHING, free=False, option=f'{MEDIUM} integrator="implicitfast"'),
 }
 
 

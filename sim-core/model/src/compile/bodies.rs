@@ -331,6 +331,7 @@ impl BodyBuilder {
             }
         }
         self.add_compensations(robot, parts, carriers);
+        self.add_drags(parts, carriers);
         for equality in &parts.equalities {
             let (follower, leader) = (dof_of[equality.follower], dof_of[equality.leader]);
             self.couplings.push((follower, leader));
@@ -437,7 +438,7 @@ fn rotation_vector(quat: &[f64]) -> [f64; 3] {
     [x * scale, y * scale, z * scale]
 }
 
-fn columns(rows: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+pub(super) fn columns(rows: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     std::array::from_fn(|c| std::array::from_fn(|r| rows[r][c]))
 }
 

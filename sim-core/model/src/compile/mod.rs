@@ -266,6 +266,7 @@ fn is_damped(m: &Constants<f64>, implicit_damping: bool) -> bool {
             let tendons = &m.mujoco.tendons;
             m.damped
                 || !m.mujoco.free_joints.is_empty()
+                || !m.mujoco.drags.is_empty()
                 || m.mujoco.actuators.iter().any(of_actuators)
                 || tendons.iter().any(|tendon| tendon.damping != 0.0)
         }

@@ -1,11 +1,11 @@
-//! Passive forces of MuJoCo's robots: springs, free joints, compensation of gravity.
+//! Passive forces of MuJoCo's robots: springs, free joints, the medium, compensation of gravity.
 
-use super::bodies::BodyBuilder;
+use super::bodies::{BodyBuilder, columns};
 use super::carrier::Carrier;
 use crate::description::{Compensator, Description, Joint, MujocoJoint, MujocoParts, Robot};
 use crate::joint_kind::JointKind;
 use sim_physics::constants::Constants;
-use sim_physics::constants::mujoco::{Compensation, PoseSpring, Spring};
+use sim_physics::constants::mujoco::{Compensation, Drag, PoseSpring, Spring};
 use sim_physics::constants::params::Param;
 use std::ops::Range;
 
@@ -35,6 +35,24 @@ impl BodyBuilder {
             Compensator::Passive => self.mujoco.compensated.extend(dofs),
             Compensator::Actuators => self.mujoco.compensated_by_actuators.extend(dofs),
             Compensator::Nothing => {}
+        }
+    }
+
+    /// What the medium does to links.
+    pub(super) fn add_drags(&mut self, parts: &MujocoParts, carriers: &[Carrier]) {
+        for drag in &parts.drags {
+            let carrier = &carriers[drag.link];
+            let inertial = carrier.pose.mul(&drag.inertial);
+            if let Some(body) = carrier.body {
+                self.mujoco.drags.push(Drag {
+                    body,
+                    center: inertial.pos,
+                    axes: columns(inertial.rotation()),
+                    viscous: drag.viscous,
+                    quadratic: drag.quadratic,
+                    wind: drag.wind,
+                });
+            }
         }
     }
 

@@ -17,7 +17,7 @@ pub(crate) use crate::joint_kind::JointKind;
 pub(crate) use frames::Bearer;
 pub use joint::{Joint, JointDof, Mimic, TargetMode};
 pub use mujoco::{
-    Actuator, ActuatorActivation, ActuatorLength, Compensator, JointEquality, Keyframe,
+    Actuator, ActuatorActivation, ActuatorLength, Compensator, Drag, JointEquality, Keyframe,
     MujocoJoint, MujocoParts,
 };
 pub use mujoco_constraints::{Constraint, ConstraintLaw, Measure, Tendon};

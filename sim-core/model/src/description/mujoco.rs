@@ -21,6 +21,8 @@ pub struct MujocoParts {
     pub equalities: Vec<JointEquality>,
     /// Other constraints.
     pub constraints: Vec<Constraint>,
+    /// What the medium does to links.
+    pub drags: Vec<Drag>,
     /// Links that are held against gravity, each with its share of compensation.
     pub compensations: Vec<(usize, f64)>,
     /// Springs and dampers of tendons.
@@ -70,6 +72,21 @@ pub struct MujocoJoint {
     pub friction: Softness,
     /// Bounds of the sum of actuator forces, if it has any [N·m or N].
     pub actuator_range: Option<[f64; 2]>,
+}
+
+/// Resistance of the medium to a link's motion, as [`sim_physics::constants::mujoco::Drag`] has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drag {
+    /// The link.
+    pub link: usize,
+    /// Centre of mass and axes of inertia in its frame.
+    pub inertial: Pose,
+    /// [N·s/m, N·m·s/rad]
+    pub viscous: [f64; 2],
+    /// [N·s²/m², N·m·s²/rad²]
+    pub quadratic: [[f64; 3]; 2],
+    /// [m/s]
+    pub wind: [f64; 3],
 }
 
 /// What compensates gravity along a joint.

@@ -94,11 +94,6 @@ fn options(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> 
     if file.integer("opt.noslip_iterations")? > 0 {
         found.push("option `noslip_iterations`: no support for it, set it to 0".to_owned());
     }
-    for medium in ["density", "viscosity"] {
-        if file.real(&format!("opt.{medium}"))? != 0.0 {
-            found.push(no("option", medium, "fluid forces"));
-        }
-    }
     for (counted, what) in [
         ("nflex", "flexes"),
         ("nplugin", "plugins"),

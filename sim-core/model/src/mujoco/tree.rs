@@ -101,6 +101,7 @@ fn parts(
         joints: Vec::new(),
         equalities: Vec::new(),
         constraints: Vec::new(),
+        drags: passive::drags(file, bodies)?,
         compensations: passive::compensations(file, bodies)?,
         tendons: Vec::new(),
         actuators: Vec::new(),

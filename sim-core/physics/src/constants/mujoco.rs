@@ -30,6 +30,8 @@ recast! {
         pub pose_springs: Vec<PoseSpring<R>>,
         /// Bodies of free joints whose armature and damping belong to MuJoCo's velocities.
         pub free_joints: Vec<usize>,
+        /// What the medium does to links.
+        pub drags: Vec<Drag<R>>,
         /// Links that are held against gravity.
         pub compensations: Vec<Compensation<R>>,
         /// Dofs that this moves, except those of the next list.
@@ -66,6 +68,7 @@ impl<R> Default for Mujoco<R> {
             springs: Vec::new(),
             pose_springs: Vec::new(),
             free_joints: Vec::new(),
+            drags: Vec::new(),
             compensations: Vec::new(),
             compensated: Vec::new(),
             compensated_by_actuators: Vec::new(),
@@ -108,6 +111,25 @@ recast! {
         pub position: [R; 3],
         /// Rotation without torque, (x, y, z, w) [–].
         pub quat: [R; 4],
+    }
+}
+
+recast! {
+    /// Resistance of the medium to a link's motion, along and about its axes of inertia.
+    #[derive(Clone, Debug)]
+    pub struct Drag<R> {
+        /// The body that carries the link.
+        pub body: usize,
+        /// Its centre of mass in the body's frame [m].
+        pub center: [R; 3],
+        /// Its axes of inertia in the body's frame: columns [–].
+        pub axes: [[R; 3]; 3],
+        /// Force over velocity [N·s/m], then torque over angular velocity [N·m·s/rad].
+        pub viscous: [R; 2],
+        /// Of each axis, force over the square of velocity [N·s²/m²], then torque over that of angular velocity [N·m·s²/rad²].
+        pub quadratic: [[R; 3]; 2],
+        /// Velocity of the medium in the world [m/s].
+        pub wind: [R; 3],
     }
 }
 

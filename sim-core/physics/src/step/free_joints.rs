@@ -18,9 +18,9 @@
 
 use super::{BlockOf, ConstantsOf, param};
 use crate::arrays::{Block, Workspace};
-use crate::constants::Constants;
 use crate::constants::mujoco::Integrator;
 use crate::constants::params::Param;
+use crate::constants::{Constants, Motion};
 use crate::lane::{Cx, Num};
 use crate::math::spatial::Inertia;
 use crate::math::vec3::Vec3;
@@ -196,7 +196,9 @@ pub(super) fn solved<R: Copy>(m: &Constants<R>) -> impl Iterator<Item = usize> +
 
 /// Is a body one of [`solved`], where the integrator is implicit?
 pub(super) fn is_solved<R>(m: &Constants<R>, body: usize) -> bool {
-    has(m, body) && m.bodies.iter().all(|other| other.parent != Some(body))
+    let is_alone = m.bodies.iter().all(|other| other.parent != Some(body));
+    let drags = m.mujoco.drags.iter().any(|drag| drag.body == body);
+    is_alone && (has(m, body) || drags && m.bodies[body].motion == Motion::Free)
 }
 
 /// Solves (H + h N) a = b for a free body, H its block of the mass matrix and b its part of `acceleration`; leaves a in `minimum`.

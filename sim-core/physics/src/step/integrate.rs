@@ -24,7 +24,7 @@
 //! ```
 
 use super::kinematics::read_quat;
-use super::{BlockOf, ConstantsOf, Stage, actuators, free_joints, param};
+use super::{BlockOf, ConstantsOf, Stage, actuators, fluid, free_joints, param};
 use crate::arrays::Array as A;
 use crate::constants::actuator::Activation;
 use crate::constants::mujoco::Integrator;
@@ -50,6 +50,8 @@ impl Stage for Integrate {
         A::Rotation,
         A::Origin,
         A::Inertia,
+        A::Motion,
+        A::Velocity,
         A::JointQ,
         A::JointQRest,
         A::JointQd,
@@ -135,6 +137,7 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
     }
     if m.mujoco.integrator == Integrator::ImplicitFast {
         actuators::add_damping(cx, m, b);
+        fluid::add_damping::<C>(m, b);
     }
     free_joints::add_damping(cx, m, b);
     for body in free_joints::solved(m) {

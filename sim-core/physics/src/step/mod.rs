@@ -11,6 +11,7 @@ pub mod command;
 pub mod constraint;
 pub mod contact_rows;
 pub mod energy;
+pub mod fluid;
 mod free_joints;
 pub mod gravity_compensation;
 pub mod integrate;
@@ -48,6 +49,7 @@ macro_rules! every_stage {
             mass_matrix        [mass_matrix::MassMatrix]     Both;
             actuation          [actuation::Actuation]        Both;
             springs            [springs::Springs]            Both;
+            fluid              [fluid::Fluid]                Both;
             gravity_compensation [gravity_compensation::GravityCompensation] Both;
             actuators          [actuators::Actuators]        Both;
             constraint         [constraint::Constraint]      Both;
