@@ -39,7 +39,7 @@ class Features:
     compensation: bool = False
     """Bodies that are held against gravity, passively or by the actuators of joints."""
     bounds: bool = False
-    """Bounds of controls, actuator forces and sums of them on a joint."""
+    """Bounds of controls, actuator forces and sums of them on a joint or a tendon."""
     geoms: bool = False
     option: str = ""
     """Attributes of ``<option>``."""
@@ -213,6 +213,8 @@ class _Model:
     def pulls(self) -> str:
         """What acts along a tendon."""
         text, rng = "", self.rng
+        if self.features.actuators and self.has("bounds"):
+            text += 'actuatorfrcrange="-0.6 0.9" '
         if self.has("pulls"):
             text += f'stiffness="{rng.uniform(0.5, 20):.17g}" damping="{rng.uniform(0.05, 2):.17g}" '
         if self.has("pulls"):
@@ -269,7 +271,8 @@ class _Model:
         rng, text = self.rng, ""
         targets = [f'joint="{name}" gear="{self.numbers(1, -3, 3)}"' for name in self.scalars]
         if self.features.tendons and len(self.scalars) >= 2:
-            targets += [f'tendon="t{k}" gear="{self.numbers(1, -3, 3)}"' for k in range(2)]
+            tendons = [f"t{k}" for k in range(2)] * (2 if self.features.bounds else 1)
+            targets += [f'tendon="{name}" gear="{self.numbers(1, -3, 3)}"' for name in tendons]
         if self.features.transmissions:
             targets += self.transmissions()
         for target in targets:

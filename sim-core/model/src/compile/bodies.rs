@@ -9,7 +9,7 @@ use crate::inertia::{Inertial, merge};
 use crate::joint_kind::JointKind;
 use crate::model::{RobotRange, Start};
 use crate::pose::Pose;
-use sim_physics::constants::mujoco::{ActuatorBound, Mujoco, Tendon};
+use sim_physics::constants::mujoco::{ActuatorBound, Mujoco, Tendon, TendonBound};
 use sim_physics::constants::{Body, Dof, Frame, MassEntry, Motion, Tree};
 use sim_physics::math::factor::Pattern;
 
@@ -357,6 +357,13 @@ impl BodyBuilder {
                 stiffness: tendon.stiffness,
                 rest: tendon.rest,
                 damping: tendon.damping,
+            });
+        }
+        let first = self.mujoco.actuators.len();
+        for (actuators, range) in &parts.tendon_bounds {
+            self.mujoco.tendon_bounds.push(TendonBound {
+                actuators: actuators.iter().map(|k| first + k).collect(),
+                range: *range,
             });
         }
         for actuator in &parts.actuators {

@@ -33,6 +33,8 @@ pub struct MujocoParts {
     pub keyframes: Vec<Keyframe>,
     /// Links that clients place, in the order of `mocap_pos`.
     pub mocaps: Vec<usize>,
+    /// Bounds of the sum of actuator forces along a tendon: the places of its actuators, and the range [N or N·m].
+    pub tendon_bounds: Vec<(Vec<usize>, [f64; 2])>,
     /// The link that each link is welded to, or itself.
     pub welds: Vec<usize>,
     /// The parent of each link; that of the world is itself.

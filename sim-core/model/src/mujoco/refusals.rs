@@ -16,11 +16,6 @@ const NEWER_MUST_BE_ZERO: &[(&str, &str, &str)] = &[
     ("tendon", "tendon_armature", "armature of a tendon"),
     ("tendon", "tendon_dampingpoly", "damping of a tendon"),
     ("tendon", "tendon_stiffnesspoly", "stiffness of a tendon"),
-    (
-        "tendon",
-        "tendon_actfrclimited",
-        "bounds of the actuator force on a tendon",
-    ),
     ("actuator", "actuator_delay", "a delay"),
     ("actuator", "actuator_armature", "armature of an actuator"),
     ("actuator", "actuator_damping", "damping of an actuator"),

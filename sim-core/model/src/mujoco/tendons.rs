@@ -62,6 +62,25 @@ impl Tendons {
     }
 }
 
+/// Bounds of the sum of actuator forces along a tendon: the places of its actuators, and the range.
+pub(super) fn bounds(file: &ModelFile) -> Result<Vec<(Vec<usize>, [f64; 2])>, ModelError> {
+    let (count, actuators) = (file.rows("tendon_num"), file.rows("actuator_trntype"));
+    if file.first_set("tendon_actfrclimited").is_none() {
+        return Ok(Vec::new());
+    }
+    let limited = file.integers("tendon_actfrclimited", count)?;
+    let ranges = file.vectors::<2>("tendon_actfrcrange", count)?;
+    let kinds = file.kinds("actuator_trntype", actuators)?;
+    let targets = file.vectors_of_integers::<2>("actuator_trnid", actuators)?;
+    let own = |tendon: usize| {
+        let is_own = |&k: &usize| kinds[k] == "mjTRN_TENDON" && targets[k][0] == tendon as i64;
+        (0..actuators).filter(is_own).collect::<Vec<usize>>()
+    };
+    let limited = (0..count).filter(|&tendon| limited[tendon] != 0);
+    let bounds = limited.map(|tendon| (own(tendon), ranges[tendon]));
+    Ok(bounds.filter(|(own, _)| !own.is_empty()).collect())
+}
+
 /// Where MuJoCo's joints are among the robot's.
 pub(super) fn moving(
     robot: &Robot,

@@ -5,7 +5,7 @@ use super::format::ModelFile;
 use super::frame;
 use super::names::names;
 use super::options::{MujocoOptions, has_flag, integrator};
-use super::passive;
+use super::{passive, tendons};
 use crate::description::{
     Compensator, Inertial, Joint, JointDof, JointKind, Link, MujocoJoint, MujocoParts, Robot,
 };
@@ -105,6 +105,7 @@ fn parts(
         compensations: passive::compensations(file, bodies)?,
         tendons: Vec::new(),
         actuators: Vec::new(),
+        tendon_bounds: tendons::bounds(file)?,
         welds: welds.into_iter().map(|weld| weld.unwrap_or(0)).collect(),
         parents: parents.iter().map(|parent| parent.unwrap_or(0)).collect(),
         excludes: excludes.collect(),

@@ -52,6 +52,8 @@ recast! {
         pub mocaps: usize,
         /// Bounds of the sum of actuator forces on a dof.
         pub actuator_bounds: Vec<ActuatorBound<R>>,
+        /// Bounds of the sum of actuator forces along a tendon.
+        pub tendon_bounds: Vec<TendonBound<R>>,
         /// Impedances of contacts, each once; empty where all have `Constants::contact_impedance`.
         pub impedances: Vec<Impedance<R>>,
         /// Of each pair of shapes, its place among the impedances: a table with one column.
@@ -79,6 +81,7 @@ impl<R> Default for Mujoco<R> {
             activations: 0,
             mocaps: 0,
             actuator_bounds: Vec::new(),
+            tendon_bounds: Vec::new(),
             impedances: Vec::new(),
             pair_impedance: Fixed::default(),
             class_impedances: Vec::new(),
@@ -202,6 +205,17 @@ recast! {
         /// The dof.
         pub dof: usize,
         /// [N·m or N]
+        pub range: [R; 2],
+    }
+}
+
+recast! {
+    /// Bounds of the sum of actuator forces along a tendon (MuJoCo: `tendon/fixed/actuatorfrcrange`).
+    #[derive(Clone, Debug)]
+    pub struct TendonBound<R> {
+        /// Places of its actuators.
+        pub actuators: Vec<usize>,
+        /// [N or N·m]
         pub range: [R; 2],
     }
 }

@@ -6,12 +6,15 @@
 //! input = clamp(ctrl), or an activation a:  ȧ = clamp(ctrl)  or  (clamp(ctrl) - a) / T
 //! smooth += clamp(Σ c force)                                            over the actuators of a dof
 //! ```
+//!
+//! Where a tendon bounds the sum of its actuators' forces, each is scaled by what keeps the sum in its range, before it is
+//! clamped. The derivatives of forces with velocity are those before that, as MuJoCo's.
 
 use super::transmission::measure;
 use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::Array as A;
 use crate::constants::actuator::{Activation, ActivationRate, TurningLength};
-use crate::constants::mujoco::{Actuator, Term};
+use crate::constants::mujoco::{Actuator, TendonBound, Term};
 use crate::constants::{Constants, Motion};
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::vec3::Vec3;
@@ -51,8 +54,21 @@ impl Stage for Actuators {
             if let Some(activation) = &actuator.activation {
                 b.work.act_dot[activation.place] = rate(cx, b, actuator, activation, k);
             }
+        }
+        for bound in &m.mujoco.tendon_bounds {
+            let scale = tendon_scale(cx, m, b, bound);
+            for &k in &bound.actuators {
+                b.work.actuator_force[k] = scale;
+            }
+        }
+        for (k, actuator) in m.mujoco.actuators.iter().enumerate() {
             let input = input(cx, b, actuator, k);
-            let force = bounded(force(cx, m, b, actuator, input), actuator.force_range);
+            let mut force = force(cx, m, b, actuator, input);
+            let mut bounds = m.mujoco.tendon_bounds.iter();
+            if bounds.any(|bound| bound.actuators.contains(&k)) {
+                force = force * b.work.actuator_force[k];
+            }
+            let force = bounded(force, actuator.force_range);
             b.work.actuator_force[k] = force;
             for term in &actuator.terms {
                 let joint = &mut b.work.qfrc_actuator[term.dof];
@@ -78,6 +94,27 @@ impl Stage for Actuators {
             *smooth = *smooth + *joint;
         }
     }
+}
+
+/// What the forces of a tendon's actuators are multiplied with, so that their sum is in its range.
+#[inline(always)]
+fn tendon_scale<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    bound: &TendonBound<<C::F as Num>::Real>,
+) -> C::F {
+    let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+    let mut sum = zero;
+    for &k in &bound.actuators {
+        let actuator = &m.mujoco.actuators[k];
+        let input = input(cx, b, actuator, k);
+        sum = sum + force(cx, m, b, actuator, input);
+    }
+    // a sum of 0 stays, whatever the range is
+    let acts = zero.lt(sum.abs());
+    let within = bounded(sum, Some(bound.range));
+    C::F::select(acts, within.div(C::F::select(acts, sum, one)), one)
 }
 
 /// The control of actuator `k`, in its range.
