@@ -41,6 +41,8 @@ class Features:
     bounds: bool = False
     """Bounds of controls, actuator forces and sums of them on a joint or a tendon."""
     geoms: bool = False
+    pairs: bool = False
+    """Pairs of geoms that touch by rules of their own, and bodies that are excluded."""
     option: str = ""
     """Attributes of ``<option>``."""
     flag: str = ""
@@ -59,6 +61,7 @@ class _Model:
         self.balls: list[str] = []
         self.frees: list[str] = []
         self.joints = self.bodies = 0
+        self.geoms: list[tuple[str, int]] = []
 
     def has(self, feature: str, share: float = 0.5) -> bool:
         return getattr(self.features, feature) and self.rng.random() < share
@@ -89,8 +92,8 @@ class _Model:
         return f"""<mujoco>
 <compiler angle="radian" autolimits="true"/>
 <option {f.option}><flag {f.flag}/></option>
-<worldbody>{'<geom type="plane" size="5 5 .1" pos="0 0 -1"/>' if f.geoms else ""}{trees}</worldbody>
-{self.tendons()}{self.equalities()}{self.actuators()}
+<worldbody>{'<geom name="floor" type="plane" size="5 5 .1" pos="0 0 -1"/>' if f.geoms else ""}{trees}</worldbody>
+{self.tendons()}{self.equalities()}{self.actuators()}{self.pairs()}
 </mujoco>"""
 
     def mocap(self) -> str:
@@ -192,12 +195,39 @@ class _Model:
             return ""
         kind, size = [("sphere", 1), ("capsule", 2), ("box", 3)][self.rng.integers(3)]
         rng = self.rng
-        text = f'<geom type="{kind}" size="{self.numbers(size, 0.05, 0.2)}" pos="{self.numbers(3, -0.1, 0.1)}" mass="0"'
+        self.geoms.append((f"g{len(self.geoms)}", self.bodies))
+        name = self.geoms[-1][0]
+        text = f'<geom name="{name}" type="{kind}" size="{self.numbers(size, 0.05, 0.2)}" mass="0"'
+        text += f' pos="{self.numbers(3, -0.1, 0.1)}"'
         text += f' friction="{self.numbers(3, 0.1, 1.5)}" condim="{rng.choice([1, 3, 4, 6])}"'
         text += f' priority="{rng.choice([0, 0, 1])}" solmix="{rng.uniform(0, 2):.17g}"'
         text += f" {self.softness(('solref', 'solimp'))}"
         text += f' margin="{rng.choice([0, 0.01])}" gap="{rng.choice([0, 0.01])}"'
-        text += f' contype="{rng.choice([1, 2, 3])}" conaffinity="{rng.choice([1, 2, 3])}"'
+        bits = [0, 0, 1] if self.features.pairs else [1, 2, 3]
+        text += f' contype="{rng.choice(bits)}" conaffinity="{rng.choice(bits)}"'
+        return text + "/>"
+
+    def pairs(self) -> str:
+        if not self.features.pairs or len(self.geoms) < 1:
+            return ""
+        rng, text = self.rng, ""
+        known = [("floor", 0), *self.geoms]
+        for i, (first, body) in enumerate(known):
+            for second, other in known[:i]:
+                if rng.random() < 0.4:
+                    text += self.pair(first, second)
+                if min(body, other) and body != other and rng.random() < 0.3:
+                    text += f'<exclude body1="b{body}" body2="b{other}"/>'
+        return f"<contact>{text}</contact>"
+
+    def pair(self, first: str, second: str) -> str:
+        rng = self.rng
+        slide, twist, roll = rng.uniform(0.1, 1.5, 3)
+        text = f'<pair geom1="{first}" geom2="{second}" condim="{rng.choice([1, 3, 4, 6])}"'
+        text += f' friction="{slide:.17g} {slide:.17g} {twist:.17g} {roll:.17g} {roll:.17g}"'
+        text += f' margin="{rng.choice([0, 0.02])}" gap="{rng.choice([0, 0.01])}" {self.softness(("solref", "solimp"))}'
+        if rng.random() < 0.5:
+            text += f' solreffriction="{rng.uniform(0.005, 0.05):.17g} {rng.uniform(0.3, 1.5):.17g}"'
         return text + "/>"
 
     def tendons(self) -> str:

@@ -150,13 +150,15 @@ def has_closed_form(model: mujoco.MjModel, contact: mujoco.MjContact) -> bool:
     return not ("mjGEOM_BOX" in kinds and kinds <= {"mjGEOM_BOX", "mjGEOM_CAPSULE"})
 
 
+@pytest.mark.parametrize("pairs", [False, True])
 @pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
 @pytest.mark.parametrize("seed", range(2 * TREES))
-def test_geoms_touch_as_mujocos(cone: str, seed: int) -> None:
+def test_geoms_touch_as_mujocos(cone: str, pairs: bool, seed: int) -> None:
     option = f'cone="{cone}" impratio="2"'
-    xml = random_mjcf(
-        seed, 2 + seed % 5, replace(JOINTS, geoms=True, equalities=seed % 2 == 0, mocap=seed % 3 == 0, option=option)
+    features = replace(
+        JOINTS, geoms=True, pairs=pairs, equalities=seed % 2 == 0, mocap=seed % 3 == 0, option=option
     )
+    xml = random_mjcf(seed, 2 + seed % 5, features)
     with live(xml, fields=("contact_count",)) as case:
         states = case.states(seed)
         frame = case.place(states)

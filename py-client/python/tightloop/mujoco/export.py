@@ -70,6 +70,7 @@ _NAMED = {
     "joint": "njnt",
     "geom": "ngeom",
     "mesh": "nmesh",
+    "pair": "npair",
     "equality": "neq",
     "tendon": "ntendon",
     "actuator": "nu",

@@ -2,9 +2,10 @@
 
 use super::clusters::Cluster;
 use super::constraint_rows::{IMPEDANCE, contact_damping};
-use super::contact_pieces::{Piece, PlacedShape, Rules, geom_of};
+use super::contact_pieces::{Piece, PlacedShape, Rules, geom_of, named_pair};
 use crate::description::Description;
 use crate::geom_contact::GeomContact;
+use crate::softness::Softness;
 use crate::surface::Surface;
 use sim_physics::constants::contact::{Cone, Kind, MU_MIN, Pair, pair};
 use sim_physics::constants::{Constants, Impedance};
@@ -68,7 +69,7 @@ impl ContactBuilder<'_> {
         let (a, b) = (&self.pieces[a], &self.pieces[b]);
         let (x, y) = (&self.shapes[a.shape], &self.shapes[b.shape]);
         let (s, t) = (&x.surface, &y.surface);
-        let geom = geom_pair(x, y);
+        let geom = self.geom_pair(x, y);
         let (margin, gap) = match &geom {
             Some(geom) => (geom.margin, geom.gap),
             None => (s.margin + t.margin, s.gap + t.gap),
@@ -117,7 +118,13 @@ impl ContactBuilder<'_> {
             let (stiffness, damping) = geom.softness.reference(self.scene.dt, is_safe);
             row[pair::STIFFNESS] = stiffness;
             row[pair::DAMPING] = damping;
-            row[pair::SLIDING] = damping;
+            let sliding = named_pair(x, y, self.rules).and_then(|pair| pair.sliding);
+            let sliding = sliding.map(|solref| Softness {
+                solref,
+                ..geom.softness
+            });
+            let sliding = sliding.map(|own| own.reference(self.scene.dt, is_safe).1);
+            row[pair::SLIDING] = sliding.unwrap_or(damping);
             return;
         }
         // MuJoCo mixes the parameters of two geoms half and half
@@ -135,10 +142,18 @@ impl ContactBuilder<'_> {
         );
     }
 
+    /// What the contact of two shapes is like where one of them is a geom of MuJoCo's.
+    fn geom_pair(&self, x: &PlacedShape<'_>, y: &PlacedShape<'_>) -> Option<GeomContact> {
+        if let Some(pair) = named_pair(x, y, self.rules) {
+            return Some(pair.contact);
+        }
+        (x.geom.is_some() || y.geom.is_some()).then(|| geom_of(x).combined(&geom_of(y)))
+    }
+
     /// Torsional and rolling friction of a pair over its sliding friction.
     pub(super) fn turning(&self, (a, b): (usize, usize)) -> [f64; 2] {
         let [x, y] = [a, b].map(|piece| &self.shapes[self.pieces[piece].shape]);
-        let Some(geom) = geom_pair(x, y) else {
+        let Some(geom) = self.geom_pair(x, y) else {
             return [0.0; 2];
         };
         let [slide, twist, roll] = geom.friction.map(|mu| mu.max(MU_MIN));
@@ -152,7 +167,8 @@ impl ContactBuilder<'_> {
     /// The impedance of a pair's contacts.
     pub(super) fn impedance(&self, (a, b): (usize, usize)) -> Impedance<f64> {
         let [x, y] = [a, b].map(|piece| &self.shapes[self.pieces[piece].shape]);
-        geom_pair(x, y).map_or(IMPEDANCE, |geom| geom.softness.impedance())
+        self.geom_pair(x, y)
+            .map_or(IMPEDANCE, |geom| geom.softness.impedance())
     }
 
     /// Whether a dof moves a body.
@@ -206,11 +222,6 @@ impl ContactBuilder<'_> {
             class,
         }
     }
-}
-
-/// What the contact of two shapes is like where one of them is a geom of MuJoCo's.
-fn geom_pair(x: &PlacedShape<'_>, y: &PlacedShape<'_>) -> Option<GeomContact> {
-    (x.geom.is_some() || y.geom.is_some()).then(|| geom_of(x).combined(&geom_of(y)))
 }
 
 /// Constraint rows of a contact.

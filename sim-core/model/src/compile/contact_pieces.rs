@@ -1,7 +1,7 @@
 //! Convex pieces of the shapes of a scene, and the pairs of pieces that may touch.
 
 use super::carrier::Carrier;
-use crate::description::{Description, MujocoParts};
+use crate::description::{ContactPair, Description, MujocoParts};
 use crate::geom_contact::GeomContact;
 use crate::geometry::{Hull, Shape};
 use crate::hull_tables;
@@ -23,6 +23,8 @@ pub(super) struct PlacedShape<'a> {
     pub geom: Option<&'a GeomContact>,
     /// The link of its robot.
     pub own_link: usize,
+    /// Its place among the shapes of that link.
+    pub place: usize,
     /// Its robot, if it is not static.
     pub robot: Option<usize>,
     /// Its link, as a frame.
@@ -101,6 +103,7 @@ pub(super) fn placed_shapes<'a>(
             surface: shape.surface,
             geom: None,
             own_link: 0,
+            place: 0,
             robot: None,
             link: None,
             body: None,
@@ -112,7 +115,7 @@ pub(super) fn placed_shapes<'a>(
     for (index, robot) in scene.robots.iter().enumerate() {
         for link in robot.link_order() {
             let carrier = &carriers[index][link];
-            for collision in &robot.links[link].collisions {
+            for (place, collision) in robot.links[link].collisions.iter().enumerate() {
                 let mut pose = carrier.pose.mul(&collision.pose);
                 if carrier.body.is_none() {
                     for (x, base) in pose.pos.iter_mut().zip(constants.trees[carrier.tree].base) {
@@ -125,6 +128,7 @@ pub(super) fn placed_shapes<'a>(
                     surface: collision.surface,
                     geom: collision.geom.as_ref(),
                     own_link: link,
+                    place,
                     robot: Some(index),
                     link: Some(frame),
                     body: carrier.body,
@@ -281,9 +285,24 @@ fn geoms_may_touch(a: &PlacedShape<'_>, b: &PlacedShape<'_>, parts: &MujocoParts
     welds[0] != welds[1] && (parts.touches_parent || !are_neighbours) && !are_excluded
 }
 
+/// The rules of two geoms that MuJoCo's model names as a pair.
+pub(super) fn named_pair<'a>(
+    a: &PlacedShape<'_>,
+    b: &PlacedShape<'_>,
+    rules: &Rules<'a>,
+) -> Option<&'a ContactPair> {
+    let parts = rules.mujoco[a.robot.filter(|_| a.robot == b.robot)?]?;
+    let geoms = [a, b].map(|shape| (shape.own_link, shape.place));
+    let mut pairs = parts.pairs.iter();
+    pairs.find(|pair| pair.geoms == geoms || pair.geoms == [geoms[1], geoms[0]])
+}
+
 fn may_touch(a: &PlacedShape<'_>, b: &PlacedShape<'_>, rules: &Rules<'_>) -> bool {
     let moves = a.body.is_some() || b.body.is_some();
     if a.geom.is_some() || b.geom.is_some() {
+        if named_pair(a, b, rules).is_some() {
+            return a.body != b.body;
+        }
         let [first, second] = [a, b].map(|shape| geom_of(shape));
         let filter = match (a.robot, b.robot) {
             (Some(first), Some(second)) if first == second => rules.mujoco[first],

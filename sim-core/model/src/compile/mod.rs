@@ -240,6 +240,20 @@ fn check_models(scene: &Description) -> Result<(), ModelError> {
             ),
         });
     }
+    let has_pairs = |robot: &&Robot| {
+        let parts = robot.mujoco.as_ref();
+        parts.is_some_and(|parts| !parts.pairs.is_empty())
+    };
+    if let Some(robot) = models.iter().copied().find(has_pairs)
+        && scene.params.contains(&Param::ShapeMu)
+    {
+        return Err(ModelError::MujocoRefused {
+            reasons: format!(
+                "shape_mu cannot vary: pairs of model `{}` have friction of their own; remove the pairs",
+                robot.name
+            ),
+        });
+    }
     let geoms = models.iter().flat_map(|robot| &robot.links);
     let geoms = geoms.flat_map(|link| &link.collisions);
     let priorities: BTreeSet<i64> = geoms

@@ -17,8 +17,8 @@ pub(crate) use crate::joint_kind::JointKind;
 pub(crate) use frames::Bearer;
 pub use joint::{Joint, JointDof, Mimic, TargetMode};
 pub use mujoco::{
-    Actuator, ActuatorActivation, ActuatorLength, Compensator, Drag, JointEquality, Keyframe,
-    MujocoJoint, MujocoParts,
+    Actuator, ActuatorActivation, ActuatorLength, Compensator, ContactPair, Drag, JointEquality,
+    Keyframe, MujocoJoint, MujocoParts,
 };
 pub use mujoco_constraints::{Constraint, ConstraintLaw, Measure, Tendon};
 pub use param_draws::ParamDraw;

@@ -1,6 +1,7 @@
 //! What a robot that MuJoCo compiled has beyond links and joints.
 
 use super::mujoco_constraints::{Constraint, Tendon};
+use crate::geom_contact::GeomContact;
 use crate::pose::Pose;
 use crate::softness::Softness;
 use sim_physics::constants::actuator::ActivationRate;
@@ -41,6 +42,8 @@ pub struct MujocoParts {
     pub parents: Vec<usize>,
     /// Pairs of links whose shapes do not touch.
     pub excludes: Vec<[usize; 2]>,
+    /// Pairs of geoms that touch by rules of their own.
+    pub pairs: Vec<ContactPair>,
     /// Whether a link touches its parent.
     pub touches_parent: bool,
     /// How a step integrates velocities.
@@ -89,6 +92,17 @@ pub struct Drag {
     pub quadratic: [[f64; 3]; 2],
     /// [m/s]
     pub wind: [f64; 3],
+}
+
+/// Two geoms that touch whatever else says that they do not (MuJoCo: `contact/pair`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactPair {
+    /// Their links, each with the place of the geom among the link's shapes.
+    pub geoms: [(usize, usize); 2],
+    /// How they touch.
+    pub contact: GeomContact,
+    /// `solref` of friction where the cone is elliptic; none where it is that of the contact.
+    pub sliding: Option<[f64; 2]>,
 }
 
 /// What compensates gravity along a joint.

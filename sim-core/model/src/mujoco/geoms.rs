@@ -6,6 +6,7 @@ use super::format::ModelFile;
 use super::frame;
 use super::names::names;
 use super::options::{MujocoOptions, has_flag};
+use super::pairs::paired;
 use super::tree::softness;
 use crate::description::{Collision, Robot, Shape};
 use crate::error::ModelError;
@@ -13,16 +14,18 @@ use crate::geom_contact::GeomContact;
 use crate::geometry::{Mesh, MeshOptions, TriMesh};
 use crate::surface::Surface;
 
-/// Adds the geoms that may touch something.
+/// Adds the geoms that may touch something. Returns of each geom its link, and its place among the link's shapes.
 pub(super) fn add_geoms(
     file: &ModelFile,
     options: &MujocoOptions,
     robot: &mut Robot,
-) -> Result<(), ModelError> {
+) -> Result<Vec<Option<(usize, usize)>>, ModelError> {
     if has_flag(file, "mjDSBL_CONTACT")? || has_flag(file, "mjDSBL_CONSTRAINT")? {
-        return Ok(());
+        return Ok(Vec::new());
     }
     let count = file.rows("geom_type");
+    let paired = paired(file, count)?;
+    let mut all = vec![None; count];
     let geom_names = names(file, "geom", count)?;
     let kinds = file.kinds("geom_type", count)?;
     let bodies = file.indices("geom_bodyid", count, robot.links.len())?;
@@ -34,7 +37,7 @@ pub(super) fn add_geoms(
     let mut known: Vec<(i64, Shape)> = Vec::new();
     for geom in 0..count {
         let contact = contacts[geom];
-        if contact.contype == 0 && contact.conaffinity == 0 {
+        if contact.contype == 0 && contact.conaffinity == 0 && !paired[geom] {
             continue;
         }
         let [a, b, c] = sizes[geom];
@@ -71,6 +74,7 @@ pub(super) fn add_geoms(
                 .map(|note| format!("geom `{}`: {note}", geom_names[geom])),
         );
         let link = bodies[geom].ok_or_else(|| file.fault("has geoms without bodies".to_owned()))?;
+        all[geom] = Some((link, robot.links[link].collisions.len()));
         robot.links[link].collisions.push(Collision {
             name: Some(geom_names[geom].clone()),
             pose: frame(places[geom], turns[geom]),
@@ -85,7 +89,7 @@ pub(super) fn add_geoms(
             geom: Some(contact),
         });
     }
-    Ok(())
+    Ok(all)
 }
 
 fn contacts(file: &ModelFile, count: usize) -> Result<Vec<GeomContact>, ModelError> {

@@ -11,6 +11,7 @@ mod geoms;
 mod keyframes;
 mod names;
 mod options;
+mod pairs;
 mod passive;
 mod refusals;
 mod tendons;
@@ -43,7 +44,8 @@ impl Robot {
         }
         let mut robot = tree::robot(&file, &options)?;
         robot.notes.extend(notes(&file)?);
-        geoms::add_geoms(&file, &options, &mut robot)?;
+        let places = geoms::add_geoms(&file, &options, &mut robot)?;
+        pairs::add_pairs(&file, &places, &mut robot)?;
         actuators::add_actuators(&file, &mut robot)?;
         Ok(robot)
     }

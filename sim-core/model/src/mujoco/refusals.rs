@@ -3,6 +3,7 @@
 use super::format::ModelFile;
 use super::names::names;
 use super::options::has_flag;
+use super::pairs;
 use crate::error::ModelError;
 use crate::softness::POWER_MAX;
 
@@ -61,6 +62,7 @@ pub(super) fn refusals(file: &ModelFile) -> Result<Vec<String>, ModelError> {
     options(file, &mut found)?;
     joints(file, &mut found)?;
     geoms(file, &mut found)?;
+    pairs::refuse(file, &mut found)?;
     equalities(file, &mut found)?;
     tendons(file, &mut found)?;
     actuators(file, &mut found)?;
@@ -68,7 +70,7 @@ pub(super) fn refusals(file: &ModelFile) -> Result<Vec<String>, ModelError> {
 }
 
 /// A sentence about an element.
-fn no(kind: &str, name: &str, feature: &str) -> String {
+pub(super) fn no(kind: &str, name: &str, feature: &str) -> String {
     format!("{kind} `{name}`: no support for {feature}")
 }
 
@@ -89,11 +91,7 @@ fn options(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> 
     if file.integer("opt.noslip_iterations")? > 0 {
         found.push("option `noslip_iterations`: no support for it, set it to 0".to_owned());
     }
-    for (counted, what) in [
-        ("nflex", "flexes"),
-        ("nplugin", "plugins"),
-        ("npair", "contact pairs"),
-    ] {
+    for (counted, what) in [("nflex", "flexes"), ("nplugin", "plugins")] {
         if file.integer(counted)? > 0 {
             found.push(format!("model: no support for {what}"));
         }
@@ -144,6 +142,7 @@ fn geoms(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
     let count = file.rows("geom_type");
     let names = names(file, "geom", count)?;
     let kinds = file.kinds("geom_type", count)?;
+    let paired = pairs::paired(file, count)?;
     let contypes = file.integers("geom_contype", count)?;
     let conaffinities = file.integers("geom_conaffinity", count)?;
     let condims = file.integers("geom_condim", count)?;
@@ -152,7 +151,7 @@ fn geoms(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
     let welds = file.integers("body_weldid", bodies)?;
     let bodies = file.indices("geom_bodyid", count, bodies)?;
     for geom in 0..count {
-        if contypes[geom] == 0 && conaffinities[geom] == 0 {
+        if contypes[geom] == 0 && conaffinities[geom] == 0 && !paired[geom] {
             continue; // touches nothing
         }
         let name = &names[geom];
@@ -173,7 +172,7 @@ fn geoms(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
     Ok(())
 }
 
-fn refuse_power(found: &mut Vec<String>, kind: &str, name: &str, solimp: &[f64; 5]) {
+pub(super) fn refuse_power(found: &mut Vec<String>, kind: &str, name: &str, solimp: &[f64; 5]) {
     let power = solimp[4];
     if power > POWER_MAX {
         let most = format!("a solimp with the power {power}, above {POWER_MAX}");

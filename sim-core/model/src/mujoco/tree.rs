@@ -109,6 +109,7 @@ fn parts(
         welds: welds.into_iter().map(|weld| weld.unwrap_or(0)).collect(),
         parents: parents.iter().map(|parent| parent.unwrap_or(0)).collect(),
         excludes: excludes.collect(),
+        pairs: Vec::new(),
         touches_parent: has_flag(file, "mjDSBL_FILTERPARENT")?,
         integrator: integrator(file)?,
         implicit_damping: !has_flag(file, "mjDSBL_EULERDAMP")?,
