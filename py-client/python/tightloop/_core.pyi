@@ -82,6 +82,32 @@ class Frame:
     """Angular velocity of each site, in its own axes [rad/s], ``(worlds, sites, 3)``."""
     accelerometer: NDArray[Any]
     """Acceleration of each site minus gravity, in its own axes [m/s²], ``(worlds, sites, 3)``; 9.81 upwards at rest."""
+    xpos: NDArray[Any]
+    """Origin of each body of MuJoCo models in the world [m], the world of each model first, ``(worlds, nbody, 3)``."""
+    xquat: NDArray[Any]
+    """Orientation of each body of MuJoCo models in the world, (w, x, y, z), ``(worlds, nbody, 4)``."""
+    xmat: NDArray[Any]
+    """Orientation of each body of MuJoCo models in the world, a matrix row by row, ``(worlds, nbody, 9)``."""
+    xipos: NDArray[Any]
+    """Centre of mass of each body of MuJoCo models in the world [m], ``(worlds, nbody, 3)``."""
+    ximat: NDArray[Any]
+    """Principal axes of inertia of each body of MuJoCo models in the world, a matrix row by row,
+    ``(worlds, nbody, 9)``."""
+    site_xpos: NDArray[Any]
+    """Origin of each site of MuJoCo models in the world [m], ``(worlds, nsite, 3)``."""
+    site_xmat: NDArray[Any]
+    """Orientation of each site of MuJoCo models in the world, a matrix row by row, ``(worlds, nsite, 9)``."""
+    geom_xpos: NDArray[Any]
+    """Centre of each geom of MuJoCo models in the world [m], ``(worlds, ngeom, 3)``, also of geoms that touch
+    nothing."""
+    geom_xmat: NDArray[Any]
+    """Orientation of each geom of MuJoCo models in the world, a matrix row by row, ``(worlds, ngeom, 9)``."""
+    subtree_com: NDArray[Any]
+    """Centre of mass of each body of MuJoCo models with all bodies below it, in the world [m],
+    ``(worlds, nbody, 3)``."""
+    cvel: NDArray[Any]
+    """Velocity of each body of MuJoCo models in world axes, ``(worlds, nbody, 6)``: angular [rad/s], then that of the
+    point of the body at the centre of mass of its tree [m/s], as MuJoCo's ``cvel``."""
     body_jacobian: NDArray[Any]
     """Jacobian J of the bodies, ``body_qd = J @ joint_qd``, ``(worlds, bodies, 6, dofs)``."""
     mass_matrix: NDArray[Any]
@@ -123,6 +149,15 @@ class Frame:
     qacc: NDArray[Any]
     """Joint accelerations as MuJoCo has them, at the current commands, with constraints [rad/s² or m/s²],
     ``(worlds, dofs)``."""
+    qfrc_actuator: NDArray[Any]
+    """Forces of the actuators of MuJoCo models in joint space, as MuJoCo has them [N·m or N], ``(worlds, dofs)``."""
+    qfrc_constraint: NDArray[Any]
+    """Constraint forces in joint space, as MuJoCo has them [N·m or N], ``(worlds, dofs)``."""
+    qfrc_bias: NDArray[Any]
+    """Coriolis, centrifugal and gravity forces in joint space, as MuJoCo has them [N·m or N], ``(worlds, dofs)``."""
+    qfrc_passive: NDArray[Any]
+    """Forces of springs and dampers in joint space, as MuJoCo has them [N·m or N], ``(worlds, dofs)``. Drives are not
+    in it."""
     time: NDArray[np.float64]
     """Simulated time since the world's reset [s], ``(worlds,)``."""
     step: NDArray[np.uint64]

@@ -192,6 +192,9 @@ impl Model {
             actuators: self.actuator_names.len(),
             activations: self.constants.mujoco.activations,
             mocaps: self.constants.mujoco.mocaps,
+            mujoco_bodies: self.constants.mujoco.frames.bodies.len(),
+            mujoco_sites: self.constants.mujoco.frames.sites.len(),
+            mujoco_geoms: self.constants.mujoco.frames.geoms.len(),
         }
     }
     /// State and commands after a reset.

@@ -155,9 +155,7 @@ def has_closed_form(model: mujoco.MjModel, contact: mujoco.MjContact) -> bool:
 @pytest.mark.parametrize("seed", range(2 * TREES))
 def test_geoms_touch_as_mujocos(cone: str, pairs: bool, seed: int) -> None:
     option = f'cone="{cone}" impratio="2"'
-    features = replace(
-        JOINTS, geoms=True, pairs=pairs, equalities=seed % 2 == 0, mocap=seed % 3 == 0, option=option
-    )
+    features = replace(JOINTS, geoms=True, pairs=pairs, equalities=seed % 2 == 0, mocap=seed % 3 == 0, option=option)
     xml = random_mjcf(seed, 2 + seed % 5, features)
     with live(xml, fields=("contact_count",)) as case:
         states = case.states(seed)

@@ -69,6 +69,7 @@ _NAMED = {
     "body": "nbody",
     "joint": "njnt",
     "geom": "ngeom",
+    "site": "nsite",
     "mesh": "nmesh",
     "pair": "npair",
     "equality": "neq",

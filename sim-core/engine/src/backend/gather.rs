@@ -26,6 +26,13 @@ pub(super) fn gather<C: Cx>(
             Field::Qpos => qpos(cx, m, b, to),
             Field::Qvel => mujoco_state::velocities(cx, m, b, to),
             Field::Qacc => mujoco_state::accelerations(cx, m, b, to),
+            Field::QfrcActuator => joint_forces(m, w, &w.qfrc_actuator, to),
+            Field::QfrcPassive => joint_forces(m, w, &w.passive_force, to),
+            Field::QfrcBias => mujoco_state::bias(cx, m, b, to),
+            Field::QfrcConstraint => {
+                copy_cells(cx, &b.constraint_force, to);
+                mujoco_state::turn_forces(m, w, to);
+            }
             Field::BodyJacobian => body_jacobian(m, w, to),
             Field::SiteInverseJacobian => inverse_jacobian(m, w, to),
             Field::EfcJ => jacobian(cx, m, &b.efc_weight, [&w.limit_side, &w.row_jacobian], to),
@@ -48,6 +55,17 @@ fn qpos<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
     copy_cells(cx, &b.joint_q, to);
     for first in m.quaternions() {
         to[first..first + 4].rotate_right(1);
+    }
+}
+
+/// Forces of dofs as MuJoCo has them; an array without entries is 0.
+#[inline(always)]
+fn joint_forces<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, from: &[F], to: &mut [F]) {
+    if from.is_empty() {
+        to.fill(F::c(0.0));
+    } else {
+        to.copy_from_slice(from);
+        mujoco_state::turn_forces(m, w, to);
     }
 }
 

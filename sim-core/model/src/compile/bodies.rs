@@ -3,6 +3,7 @@
 use super::actuators;
 use super::carrier::Carrier;
 use super::constraint_rows::{DofEquality, DofJoint, SoftJoint};
+use super::mujoco_frames::add_frames;
 use super::ties::{DofConstraint, terms};
 use crate::description::{Joint, MujocoJoint, MujocoParts, Robot, TargetMode};
 use crate::inertia::{Inertial, merge};
@@ -311,6 +312,8 @@ impl BodyBuilder {
         dof_of: &[usize],
         carriers: &[Carrier],
     ) {
+        let first_link = self.frames.len() - robot.links.len();
+        add_frames(&mut self.mujoco.frames, parts, carriers, first_link);
         for index in robot.moving_joints() {
             let (joint, own) = (&robot.joints[index], &parts.joints[index]);
             let dofs = dof_of[index]..dof_of[index] + joint.dofs.len();

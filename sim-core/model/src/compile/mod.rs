@@ -16,6 +16,7 @@ mod contact_pieces;
 mod contacts;
 mod inverse_weight;
 mod keyframes;
+mod mujoco_frames;
 mod passive;
 mod sites;
 mod ties;

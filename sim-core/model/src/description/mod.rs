@@ -6,6 +6,7 @@ mod frames;
 mod joint;
 mod mujoco;
 mod mujoco_constraints;
+mod mujoco_frames;
 mod param_draws;
 mod robot;
 mod scene;
@@ -21,6 +22,7 @@ pub use mujoco::{
     Keyframe, MujocoJoint, MujocoParts,
 };
 pub use mujoco_constraints::{Constraint, ConstraintLaw, Measure, Tendon};
+pub use mujoco_frames::{FrameParts, Inertia, OnLink};
 pub use param_draws::ParamDraw;
 pub(crate) use robot::BODY_LINK;
 pub use robot::{Collision, Link, Robot};

@@ -1,6 +1,7 @@
 //! What a robot that MuJoCo compiled has beyond links and joints.
 
 use super::mujoco_constraints::{Constraint, Tendon};
+use super::mujoco_frames::FrameParts;
 use crate::geom_contact::GeomContact;
 use crate::pose::Pose;
 use crate::softness::Softness;
@@ -52,6 +53,8 @@ pub struct MujocoParts {
     pub implicit_damping: bool,
     /// Whether time constants are at least two steps.
     pub safe_references: bool,
+    /// Frames that only outputs have.
+    pub frames: FrameParts,
 }
 
 /// What a joint from MuJoCo has beyond one from URDF.

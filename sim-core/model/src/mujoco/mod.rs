@@ -7,6 +7,7 @@
 mod actuators;
 mod constraints;
 mod format;
+mod frames;
 mod geoms;
 mod keyframes;
 mod names;

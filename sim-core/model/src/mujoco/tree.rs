@@ -3,6 +3,7 @@
 use super::constraints;
 use super::format::ModelFile;
 use super::frame;
+use super::frames;
 use super::names::names;
 use super::options::{MujocoOptions, has_flag, integrator};
 use super::{passive, tendons};
@@ -114,6 +115,7 @@ fn parts(
         integrator: integrator(file)?,
         implicit_damping: !has_flag(file, "mjDSBL_EULERDAMP")?,
         safe_references: !has_flag(file, "mjDSBL_REFSAFE")?,
+        frames: frames::frames(file, bodies)?,
     })
 }
 

@@ -29,6 +29,10 @@ pub type Spatial<F> = spatial::Spatial<F>;
 pub type Inertia<F> = spatial::Inertia<F>;
 /// x, y, z, w
 pub type Quat<F> = [F; 4];
+/// w, x, y, z
+pub type MujocoQuat<F> = [F; 4];
+/// A rotation matrix, row by row.
+pub type MujocoMat<F> = [F; 9];
 /// A displacement: linear part, then angular part.
 pub type Row6<F> = [F; 6];
 /// Position, then quaternion (x, y, z, w).

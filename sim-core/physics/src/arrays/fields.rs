@@ -76,6 +76,12 @@ pub enum Axis {
     Mocaps,
     /// Activations of actuators.
     Activations,
+    /// Bodies of MuJoCo models.
+    MujocoBodies,
+    /// Sites of MuJoCo models.
+    MujocoSites,
+    /// Geoms of MuJoCo models.
+    MujocoGeoms,
     /// A fixed length.
     Size(usize),
 }
@@ -94,6 +100,9 @@ impl Axis {
             Axis::Actuators => sizes.actuators,
             Axis::Mocaps => sizes.mocaps,
             Axis::Activations => sizes.activations,
+            Axis::MujocoBodies => sizes.mujoco_bodies,
+            Axis::MujocoSites => sizes.mujoco_sites,
+            Axis::MujocoGeoms => sizes.mujoco_geoms,
             Axis::Size(n) => n,
         }
     }
@@ -111,6 +120,9 @@ impl Axis {
             Axis::Actuators => "actuators".into(),
             Axis::Mocaps => "mocaps".into(),
             Axis::Activations => "activations".into(),
+            Axis::MujocoBodies => "nbody".into(),
+            Axis::MujocoSites => "nsite".into(),
+            Axis::MujocoGeoms => "ngeom".into(),
             Axis::Size(n) => n.to_string(),
         }
     }

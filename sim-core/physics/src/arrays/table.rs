@@ -173,6 +173,34 @@ arrays! { m;
         // a row for each dof that moves a site, in the order of `Site::columns`
         site_inverse: SiteInverse [Row6; m.sites.iter().map(|site| site.columns.len()).sum::<usize>()] Stage "rad or m per m or rad";
 
+        passive_force: PassiveForce [Scalar; m.dofs.len()] Stage "N·m or N";
+        // frames of MuJoCo models, in MuJoCo's order, frames and conventions
+        xpos: Xpos [Vec3; m.mujoco.frames.bodies.len()] Stage "m"
+            => "xpos" [MujocoBodies, Size(3)], "Origin of each body of MuJoCo models in the world, the world of each model first.";
+        xquat: Xquat [MujocoQuat; m.mujoco.frames.bodies.len()] Stage "–"
+            => "xquat" [MujocoBodies, Size(4)], "Orientation of each body of MuJoCo models in the world, (w, x, y, z).";
+        xmat: Xmat [MujocoMat; m.mujoco.frames.bodies.len()] Stage "–"
+            => "xmat" [MujocoBodies, Size(9)], "Orientation of each body of MuJoCo models in the world, a matrix row by row.";
+        xipos: Xipos [Vec3; m.mujoco.frames.bodies.len()] Stage "m"
+            => "xipos" [MujocoBodies, Size(3)], "Centre of mass of each body of MuJoCo models in the world.";
+        ximat: Ximat [MujocoMat; m.mujoco.frames.bodies.len()] Stage "–"
+            => "ximat" [MujocoBodies, Size(9)], "Principal axes of inertia of each body of MuJoCo models in the world, a matrix row by row.";
+        site_xpos: SiteXpos [Vec3; m.mujoco.frames.sites.len()] Stage "m"
+            => "site_xpos" [MujocoSites, Size(3)], "Origin of each site of MuJoCo models in the world.";
+        site_xmat: SiteXmat [MujocoMat; m.mujoco.frames.sites.len()] Stage "–"
+            => "site_xmat" [MujocoSites, Size(9)], "Orientation of each site of MuJoCo models in the world, a matrix row by row.";
+        geom_xpos: GeomXpos [Vec3; m.mujoco.frames.geoms.len()] Stage "m"
+            => "geom_xpos" [MujocoGeoms, Size(3)], "Centre of each geom of MuJoCo models in the world, also of geoms that touch nothing.";
+        geom_xmat: GeomXmat [MujocoMat; m.mujoco.frames.geoms.len()] Stage "–"
+            => "geom_xmat" [MujocoGeoms, Size(9)], "Orientation of each geom of MuJoCo models in the world, a matrix row by row.";
+        // from the reference point of the body's tree
+        subtree_center: SubtreeCenter [Vec3; m.mujoco.frames.bodies.len()] Stage "m";
+        subtree_mass: SubtreeMass [Scalar; m.mujoco.frames.bodies.len()] Stage "kg";
+        subtree_com: SubtreeCom [Vec3; m.mujoco.frames.bodies.len()] Stage "m"
+            => "subtree_com" [MujocoBodies, Size(3)], "Centre of mass of each body of MuJoCo models with all bodies below it, in the world.";
+        cvel: Cvel [Row6; m.mujoco.frames.bodies.len()] Stage "rad/s, m/s"
+            => "cvel" [MujocoBodies, Size(6)], "Velocity of each body of MuJoCo models in world axes: angular, then that of the point of the body at the centre of mass of its tree, as MuJoCo's `cvel`.";
+
         // body by body: acceleration, then force
         force: Force [Spatial; m.bodies.len()] Scratch "–";
         // copies that are factored in place
@@ -229,6 +257,14 @@ arrays! { m;
             "Joint velocities as MuJoCo has them: of a free joint that of its frame's origin in world axes, then the angular velocity in its own axes.";
         Qacc "qacc" Derived [Dofs] "rad/s² or m/s²" REAL, Source::Computed(&[JointQd, JointQdd, Rotation, Origin]),
             "Joint accelerations as MuJoCo has them, under the commands held, constraints included.";
+        QfrcActuator "qfrc_actuator" Derived [Dofs] "N·m or N" REAL, Source::Computed(&[QfrcActuator, Rotation, Origin]),
+            "Forces of the actuators of MuJoCo models in joint space, as MuJoCo has them.";
+        QfrcConstraint "qfrc_constraint" Derived [Dofs] "N·m or N" REAL, Source::Computed(&[ConstraintForce, Rotation, Origin]),
+            "Constraint forces in joint space, as MuJoCo has them.";
+        QfrcBias "qfrc_bias" Derived [Dofs] "N·m or N" REAL, Source::Computed(&[BiasForce, MassMatrix, JointQd, Rotation, Origin]),
+            "Coriolis, centrifugal and gravity forces in joint space, as MuJoCo has them.";
+        QfrcPassive "qfrc_passive" Derived [Dofs] "N·m or N" REAL, Source::Computed(&[PassiveForce, Rotation, Origin]),
+            "Forces of springs and dampers in joint space, as MuJoCo has them. Drives are not in it.";
         Time "time" Counter [] "s" F64, Source::Counter,
             "Simulated time since the world's reset.";
         Step "step" Counter [] "–" U64, Source::Counter,

@@ -5,6 +5,7 @@ pub mod clip;
 pub mod contact;
 pub mod hull;
 pub mod mujoco;
+pub mod mujoco_frames;
 pub mod params;
 mod recast;
 pub mod site;

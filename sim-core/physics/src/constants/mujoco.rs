@@ -2,6 +2,7 @@
 
 use super::Impedance;
 use super::actuator::{Activation, TurningLength};
+use super::mujoco_frames::MujocoFrames;
 use super::recast::{Recast, recast, same};
 use super::ties::Tie;
 use crate::lane::Fixed;
@@ -60,6 +61,8 @@ recast! {
         pub pair_impedance: Fixed,
         /// Of each class of contacts, the impedances that its pairs have.
         pub class_impedances: Vec<Vec<usize>>,
+        /// Frames of bodies, sites and geoms.
+        pub frames: MujocoFrames<R>,
     }
 }
 
@@ -85,6 +88,7 @@ impl<R> Default for Mujoco<R> {
             impedances: Vec::new(),
             pair_impedance: Fixed::default(),
             class_impedances: Vec::new(),
+            frames: MujocoFrames::default(),
         }
     }
 }

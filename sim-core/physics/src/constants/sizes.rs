@@ -25,4 +25,10 @@ pub struct Sizes {
     pub mocaps: usize,
     /// Actuators with an activation.
     pub activations: usize,
+    /// Bodies of MuJoCo models, the world of each included.
+    pub mujoco_bodies: usize,
+    /// Sites of MuJoCo models.
+    pub mujoco_sites: usize,
+    /// Geoms of MuJoCo models.
+    pub mujoco_geoms: usize,
 }

@@ -40,23 +40,29 @@ impl Stage for Fluid {
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let w = &mut b.work;
-        link_forces::clear(w);
-        for drag in &m.mujoco.drags {
-            let flow = Flow::of(w, drag);
-            let (mut force, mut torque) = (Vec3::zero(), Vec3::zero());
-            for i in 0..3 {
-                let pull = flow.resistance(drag, LINEAR, i, 1.0) * flow.speed[LINEAR][i];
-                let turn = flow.resistance(drag, ANGULAR, i, 1.0) * flow.speed[ANGULAR][i];
-                force = flow.axes[i].scale_add(-pull, force);
-                torque = flow.axes[i].scale_add(-turn, torque);
-            }
-            link_forces::add(w, drag.body, flow.point, force, torque);
-        }
-        link_forces::project(m, w);
+        forces(m, w);
         for (smooth, projected) in w.smooth_force.iter_mut().zip(&w.joint_force) {
             *smooth = *smooth + *projected;
         }
     }
+}
+
+/// Writes the forces of the medium to `joint_force`.
+#[inline(always)]
+pub(super) fn forces<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
+    link_forces::clear(w);
+    for drag in &m.mujoco.drags {
+        let flow = Flow::of(w, drag);
+        let (mut force, mut torque) = (Vec3::zero(), Vec3::zero());
+        for i in 0..3 {
+            let pull = flow.resistance(drag, LINEAR, i, 1.0) * flow.speed[LINEAR][i];
+            let turn = flow.resistance(drag, ANGULAR, i, 1.0) * flow.speed[ANGULAR][i];
+            force = flow.axes[i].scale_add(-pull, force);
+            torque = flow.axes[i].scale_add(-turn, torque);
+        }
+        link_forces::add(w, drag.body, flow.point, force, torque);
+    }
+    link_forces::project(m, w);
 }
 
 /// How the medium flows around a link.

@@ -82,9 +82,14 @@ fn spin<C: Cx>(cx: &C, b: &BlockOf<C>, dof: usize) -> Vec3<C::F> {
     spin
 }
 
-/// Subtracts Tᵀ (A c + D T v) from the smooth force.
+/// Subtracts the damping of free joints.
 #[inline(always)]
-pub(super) fn add_forces<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+pub(super) fn add_damping_forces<C: Cx>(
+    cx: &C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    to: &mut [C::F],
+) {
     for &body in &m.mujoco.free_joints {
         let first = m.bodies[body].dof;
         let (rotation, origin) = (b.work.rotation[body], b.work.origin[body]);
@@ -94,13 +99,24 @@ pub(super) fn add_forces<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) 
             velocity[i] = cx.get(&b.joint_qd[first + i]);
         }
         let velocity = spin.cross_add(origin, velocity);
+        let [linear, angular] = of_dofs(m, &b.params, Param::JointDamping, body);
+        let force = scaled(linear, velocity);
+        let torque = scaled(angular, rotation.transpose_mul(spin));
+        subtract(&mut to[first..first + 6], [force, torque], rotation, origin);
+    }
+}
+
+/// Subtracts what their armature needs for the part of MuJoCo's acceleration that ours does not have.
+#[inline(always)]
+pub(super) fn add_swing_forces<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
+    for &body in &m.mujoco.free_joints {
+        let first = m.bodies[body].dof;
+        let (rotation, origin) = (b.work.rotation[body], b.work.origin[body]);
+        let spin = spin(cx, b, first);
         let swing = spin.cross(spin.cross(origin));
         let [armature, _] = of_dofs(m, &b.params, Param::JointArmature, body);
-        let [linear, angular] = of_dofs(m, &b.params, Param::JointDamping, body);
-        let force = scaled(linear, velocity) + scaled(armature, swing);
-        let torque = scaled(angular, rotation.transpose_mul(spin));
-        let to = &mut b.work.smooth_force[first..first + 6];
-        subtract(to, [force, torque], rotation, origin);
+        let force = [scaled(armature, swing), Vec3::zero()];
+        subtract(&mut to[first..first + 6], force, rotation, origin);
     }
 }
 

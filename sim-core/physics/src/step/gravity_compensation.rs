@@ -26,17 +26,8 @@ impl Stage for GravityCompensation {
 
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        let up = -gravity(m, &b.params);
-        let (w, params, one) = (&mut b.work, &b.params, <C::F as Num>::Real::of(1.0));
-        link_forces::clear(w);
-        for held in &m.mujoco.compensations {
-            let center = Vec3::constant(held.center);
-            let point = w.rotation[held.body].mul_add(center, w.origin[held.body]);
-            let scale = param(m, params, Param::BodyMassScale, held.link, one);
-            let force = up * (scale * C::F::k(held.mass));
-            link_forces::add(w, held.body, point, force, Vec3::zero());
-        }
-        link_forces::project(m, w);
+        forces::<C>(m, b);
+        let w = &mut b.work;
         for &d in &m.mujoco.compensated {
             w.smooth_force[d] = w.smooth_force[d] + w.joint_force[d];
         }
@@ -44,4 +35,20 @@ impl Stage for GravityCompensation {
             w.qfrc_gravcomp.copy_from_slice(&w.joint_force);
         }
     }
+}
+
+/// Writes the forces that hold bodies against gravity to `joint_force`.
+#[inline(always)]
+pub(super) fn forces<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let up = -gravity(m, &b.params);
+    let (w, params, one) = (&mut b.work, &b.params, <C::F as Num>::Real::of(1.0));
+    link_forces::clear(w);
+    for held in &m.mujoco.compensations {
+        let center = Vec3::constant(held.center);
+        let point = w.rotation[held.body].mul_add(center, w.origin[held.body]);
+        let scale = param(m, params, Param::BodyMassScale, held.link, one);
+        let force = up * (scale * C::F::k(held.mass));
+        link_forces::add(w, held.body, point, force, Vec3::zero());
+    }
+    link_forces::project(m, w);
 }

@@ -19,7 +19,9 @@ mod inverse_dynamics;
 pub mod kinematics;
 mod link_forces;
 pub mod mass_matrix;
+pub mod mujoco_frames;
 pub mod mujoco_state;
+pub mod mujoco_subtrees;
 mod params;
 pub mod poses;
 pub mod runge_kutta;
@@ -96,6 +98,11 @@ macro_rules! every_stage {
             sites              [sites::Sites]                Evaluation;
             imu                [sites::Imu]                  Evaluation;
             site_inverse       [site_inverse::SiteInverse]   Evaluation;
+            passive            [springs::Passive]            Evaluation;
+            mujoco_bodies      [mujoco_frames::Bodies]       Evaluation;
+            mujoco_sites       [mujoco_frames::Sites]        Evaluation;
+            mujoco_geoms       [mujoco_frames::Geoms]        Evaluation;
+            mujoco_subtrees    [mujoco_subtrees::Subtrees]   Evaluation;
         }
     };
 }

@@ -1,13 +1,15 @@
-//! Velocities and accelerations as MuJoCo has them.
+//! Velocities, accelerations and forces as MuJoCo has them.
 //!
 //! They differ for a free body: MuJoCo takes the velocity of its frame's origin in world axes and the angular velocity in the
 //! body's axes, where we take the velocity of the centre of mass c and the angular velocity in world axes. With r = R c:
 //!
 //! ```text
 //! v' = v - ω × r      ω' = Rᵀ ω      a' = a - α × r - ω × (ω × r)      α' = Rᵀ α
+//! f' = f              τ' = Rᵀ (τ + r × f)      c' = T (c + M s),  s = ω × (ω × r): what a has at a' = 0
 //! ```
 
 use super::{BlockOf, ConstantsOf};
+use crate::arrays::Workspace;
 use crate::constants::{Constants, Motion};
 use crate::lane::{Cx, Num};
 use crate::math::vec3::Vec3;
@@ -44,6 +46,37 @@ pub fn accelerations<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut
         let own = b.work.rotation[k].transpose_mul(angular);
         to[dof + 3..dof + 6].copy_from_slice(&own.0);
     }
+}
+
+/// Converts forces of dofs, `(dofs,)`.
+#[inline(always)]
+pub fn turn_forces<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, forces: &mut [F]) {
+    for (k, dof) in free_bodies(m) {
+        let [force, torque] = halves(&forces[dof..]);
+        // the reference point is the centre of mass, so the origin is -r
+        let moved = torque - w.origin[k].cross(force);
+        let own = w.rotation[k].transpose_mul(moved);
+        forces[dof + 3..dof + 6].copy_from_slice(&own.0);
+    }
+}
+
+/// Writes the bias forces, `(dofs,)`.
+#[inline(always)]
+pub fn bias<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
+    let w = &b.work;
+    to.copy_from_slice(&w.bias_force);
+    for (k, dof) in free_bodies(m) {
+        let spin = Vec3(std::array::from_fn(|i| cx.get(&b.joint_qd[dof + 3 + i])));
+        let swing = spin.cross(w.origin[k].cross(spin));
+        for (row, force) in to.iter_mut().enumerate() {
+            for i in 0..3 {
+                if let Some(place) = m.pattern.find(row, dof + i) {
+                    *force = w.mass_matrix[place].fma(swing[i], *force);
+                }
+            }
+        }
+    }
+    turn_forces(m, w, to);
 }
 
 /// Free bodies, each with its first dof.

@@ -139,7 +139,7 @@ pub(super) fn reference<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec
 
 /// Orientation of a mount in the world.
 #[inline(always)]
-fn orientation<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Quat<F> {
+pub(super) fn orientation<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Quat<F> {
     let own = quat::constant(mount.quat);
     match mount.body {
         Some(body) => mul(w.orientation[body], own),
@@ -149,13 +149,30 @@ fn orientation<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Quat<F> {
 
 /// Velocity of a mount in world axes, at its own position.
 #[inline(always)]
-fn velocity<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>, position: Vec3<F>) -> Spatial<F> {
+pub(super) fn velocity<F: Num>(
+    w: &Workspace<F>,
+    mount: &Mount<F::Real>,
+    position: Vec3<F>,
+) -> Spatial<F> {
     match mount.body {
         Some(body) => {
             let Spatial([linear, angular]) = w.velocity[body];
             Spatial([linear + angular.cross(position), angular])
         }
         None => Spatial::zero(),
+    }
+}
+
+/// Axes of a mount in the world, by columns.
+#[inline(always)]
+pub(super) fn axes<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Mat3<F> {
+    let own = Mat3::constant(mount.rotation);
+    match mount.body {
+        Some(body) => {
+            let carrier = &w.rotation[body];
+            Mat3([carrier * own[0], carrier * own[1], carrier * own[2]])
+        }
+        None => own,
     }
 }
 

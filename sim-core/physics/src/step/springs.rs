@@ -4,17 +4,19 @@
 //! smooth -= stiffness (q - rest)                       of a joint
 //! smooth -= stiffness log(rest⁻¹ q)                    of a ball, and of the rotation of a free joint
 //! smooth -= c (stiffness (l - rest) + damping v)       of a tendon with the coefficients c; no spring force between its rests
+//! passive = the same - damping q̇                       for output
 //! ```
 //!
 //! A free joint's spring acts at the origin of its frame ([`super::free_joints`]).
 
 use super::kinematics::read_quat;
 use super::ties::length;
-use super::{BlockOf, ConstantsOf, Stage, free_joints};
+use super::{BlockOf, ConstantsOf, Stage, fluid, free_joints, gravity_compensation, param};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::Motion;
 use crate::constants::mujoco::{PoseSpring, Tendon};
+use crate::constants::params::Param;
 use crate::lane::{Cx, Num, Real};
 use crate::math::quat::{self, conjugate, mul};
 use crate::math::vec3::Vec3;
@@ -46,40 +48,92 @@ impl Stage for Springs {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        for spring in &m.mujoco.springs {
-            let stretch = cx.get(&b.joint_q[m.dofs[spring.dof].coord]) - C::F::k(spring.rest);
-            let force = &mut b.work.smooth_force[spring.dof];
-            *force = stretch.fnma(C::F::k(spring.stiffness), *force);
+        let mut smooth = std::mem::take(&mut b.work.smooth_force);
+        add_springs(cx, m, b, &mut smooth);
+        free_joints::add_damping_forces(cx, m, b, &mut smooth);
+        free_joints::add_swing_forces(cx, m, b, &mut smooth);
+        b.work.smooth_force = smooth;
+    }
+}
+
+/// Passive forces alone, for output: of springs and dampers, of a medium, and those that hold bodies against gravity.
+pub struct Passive;
+
+impl Stage for Passive {
+    const READS: &'static [A] = &[
+        A::JointQ,
+        A::JointQd,
+        A::Params,
+        A::Rotation,
+        A::Origin,
+        A::Motion,
+        A::Velocity,
+    ];
+    const WRITES: &'static [A] = &[A::PassiveForce];
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        let mut passive = std::mem::take(&mut b.work.passive_force);
+        for (j, force) in passive.iter_mut().enumerate() {
+            let damping = param(m, &b.params, Param::JointDamping, j, m.dofs[j].damping);
+            *force = match m.mujoco.free_joints.contains(&m.dofs[j].body) {
+                true => C::F::c(0.0),
+                false => -(cx.get(&b.joint_qd[j]) * damping),
+            };
         }
-        for tendon in &m.mujoco.tendons {
-            let stretch = stretch(cx, m, b, tendon);
-            let mut velocity = C::F::c(0.0);
-            for term in &tendon.terms {
-                let qd = cx.get(&b.joint_qd[term.dof]);
-                velocity = qd.fma(C::F::k(term.coefficient), velocity);
-            }
-            let damped = velocity * C::F::k(tendon.damping);
-            let pull = stretch.fma(C::F::k(tendon.stiffness), damped);
-            for term in &tendon.terms {
-                let force = &mut b.work.smooth_force[term.dof];
-                *force = pull.fnma(C::F::k(term.coefficient), *force);
+        add_springs(cx, m, b, &mut passive);
+        free_joints::add_damping_forces(cx, m, b, &mut passive);
+        if !m.mujoco.compensations.is_empty() {
+            gravity_compensation::forces::<C>(m, b);
+            for &d in &m.mujoco.compensated {
+                passive[d] = passive[d] + b.work.joint_force[d];
             }
         }
-        for spring in &m.mujoco.pose_springs {
-            let body = &m.bodies[spring.body];
-            let stiffness = C::F::k(spring.stiffness);
-            let [slide, turn] = pose_stretch(cx, m, b, spring).map(|x| x * stiffness);
-            let (rotation, origin) = (b.work.rotation[spring.body], b.work.origin[spring.body]);
-            let force = &mut b.work.smooth_force[body.dofs()];
-            if body.motion == Motion::Free {
-                free_joints::subtract(force, [slide, turn], rotation, origin);
-                continue;
-            }
-            for i in 0..3 {
-                force[i] = force[i] - turn[i];
+        if !m.mujoco.drags.is_empty() {
+            fluid::forces(m, &mut b.work);
+            for (force, own) in passive.iter_mut().zip(&b.work.joint_force) {
+                *force = *force + *own;
             }
         }
-        free_joints::add_forces(cx, m, b);
+        b.work.passive_force = passive;
+    }
+}
+
+/// Adds the forces of springs, and of springs and dampers of tendons.
+#[inline(always)]
+fn add_springs<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
+    for spring in &m.mujoco.springs {
+        let stretch = cx.get(&b.joint_q[m.dofs[spring.dof].coord]) - C::F::k(spring.rest);
+        let force = &mut to[spring.dof];
+        *force = stretch.fnma(C::F::k(spring.stiffness), *force);
+    }
+    for tendon in &m.mujoco.tendons {
+        let stretch = stretch(cx, m, b, tendon);
+        let mut velocity = C::F::c(0.0);
+        for term in &tendon.terms {
+            let qd = cx.get(&b.joint_qd[term.dof]);
+            velocity = qd.fma(C::F::k(term.coefficient), velocity);
+        }
+        let damped = velocity * C::F::k(tendon.damping);
+        let pull = stretch.fma(C::F::k(tendon.stiffness), damped);
+        for term in &tendon.terms {
+            let force = &mut to[term.dof];
+            *force = pull.fnma(C::F::k(term.coefficient), *force);
+        }
+    }
+    for spring in &m.mujoco.pose_springs {
+        let body = &m.bodies[spring.body];
+        let stiffness = C::F::k(spring.stiffness);
+        let [slide, turn] = pose_stretch(cx, m, b, spring).map(|x| x * stiffness);
+        let (rotation, origin) = (b.work.rotation[spring.body], b.work.origin[spring.body]);
+        let force = &mut to[body.dofs()];
+        if body.motion == Motion::Free {
+            free_joints::subtract(force, [slide, turn], rotation, origin);
+            continue;
+        }
+        for i in 0..3 {
+            force[i] = force[i] - turn[i];
+        }
     }
 }
 

@@ -1,0 +1,51 @@
+//! Frames of MuJoCo models on the bodies that carry them.
+
+use super::carrier::Carrier;
+use super::sites::mounted;
+use crate::description::{MujocoParts, OnLink};
+use sim_physics::constants::mujoco_frames::{MujocoBody, MujocoFrames};
+use sim_physics::constants::site::Mount;
+
+/// Adds the frames of a model. `carriers` has an entry for each of its links, `first_link` is the number of the first.
+pub(super) fn add_frames(
+    frames: &mut MujocoFrames<f64>,
+    parts: &MujocoParts,
+    carriers: &[Carrier],
+    first_link: usize,
+) {
+    let first = frames.bodies.len();
+    let mount = |on: &OnLink| mounted_on(carriers, on);
+    for (link, inertia) in parts.frames.inertias.iter().enumerate() {
+        let own = |pose| mounted_on(carriers, &OnLink { link, pose });
+        frames.bodies.push(MujocoBody {
+            link: first_link + link,
+            parent: first + parts.parents[link],
+            root: first + root(&parts.parents, link),
+            frame: own(crate::Pose::identity()),
+            inertial: own(inertia.pose),
+            mass: inertia.mass,
+            moments: inertia.moments,
+        });
+    }
+    frames.sites.extend(parts.frames.sites.iter().map(mount));
+    frames.geoms.extend(parts.frames.geoms.iter().map(mount));
+}
+
+/// A frame on a link as the kernel source reads it.
+pub(super) fn mounted_on(carriers: &[Carrier], on: &OnLink) -> Mount<f64> {
+    let carrier = &carriers[on.link];
+    mounted(
+        carrier.body,
+        Some(carrier.tree),
+        &carrier.pose.mul(&on.pose),
+    )
+}
+
+/// The ancestor of a link that is a child of the world, link 0, or the link itself.
+fn root(parents: &[usize], link: usize) -> usize {
+    let mut link = link;
+    while parents[link] != 0 {
+        link = parents[link];
+    }
+    link
+}

@@ -1,0 +1,48 @@
+//! Frames of MuJoCo models in MuJoCo's order, model after model: also those that no physics needs.
+
+use super::recast::{Recast, recast};
+use super::site::Mount;
+
+recast! {
+    /// Frames of bodies, sites and geoms; all empty for other models.
+    #[derive(Clone, Debug)]
+    pub struct MujocoFrames<R> {
+        /// Bodies, the world of each model first, parents before children.
+        pub bodies: Vec<MujocoBody<R>>,
+        /// Sites.
+        pub sites: Vec<Mount<R>>,
+        /// Geoms, also those that touch nothing.
+        pub geoms: Vec<Mount<R>>,
+    }
+}
+
+impl<R> Default for MujocoFrames<R> {
+    fn default() -> MujocoFrames<R> {
+        MujocoFrames {
+            bodies: Vec::new(),
+            sites: Vec::new(),
+            geoms: Vec::new(),
+        }
+    }
+}
+
+recast! {
+    /// A body of a MuJoCo model.
+    #[derive(Clone, Debug)]
+    pub struct MujocoBody<R> {
+        /// Its index among the links.
+        pub link: usize,
+        /// Its parent in this list; a world's is itself.
+        pub parent: usize,
+        /// Its ancestor below the world, or itself: velocities and forces of MuJoCo are about the centre of mass of that subtree.
+        pub root: usize,
+        /// Its frame.
+        pub frame: Mount<R>,
+        /// Its inertial frame: origin at the centre of mass, along the principal axes.
+        pub inertial: Mount<R>,
+        /// [kg]
+        pub mass: R,
+        /// Principal moments of inertia [kg·m²].
+        pub moments: [R; 3],
+    }
+}
