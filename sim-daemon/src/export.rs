@@ -107,6 +107,14 @@ pub(crate) fn description(
         activation_names: model.activation_names().to_vec(),
         mocap_names: model.mocap_names().to_vec(),
         keyframes: model.keyframes().iter().map(keyframe).collect(),
+        sensor_names: {
+            let sensors = model.sensors().iter();
+            sensors.map(|sensor| sensor.name.clone()).collect()
+        },
+        sensors: {
+            let places = model.sensors().iter().map(|sensor| &sensor.place);
+            places.map(|place| [place.start, place.end]).collect()
+        },
         contact_sensor_names: {
             let sensors = model.contact_sensors().iter();
             sensors.map(|sensor| sensor.name.clone()).collect()

@@ -108,6 +108,24 @@ class Frame:
     cvel: NDArray[Any]
     """Velocity of each body of MuJoCo models in world axes, ``(worlds, nbody, 6)``: angular [rad/s], then that of the
     point of the body at the centre of mass of its tree [m/s], as MuJoCo's ``cvel``."""
+    subtree_linvel: NDArray[Any]
+    """Velocity of the centre of mass of each body of MuJoCo models with all bodies below it, in world axes [m/s],
+    ``(worlds, nbody, 3)``."""
+    subtree_angmom: NDArray[Any]
+    """Angular momentum of each body of MuJoCo models with all bodies below it, about their centre of mass, in world
+    axes [kg·m²/s], ``(worlds, nbody, 3)``."""
+    cacc: NDArray[Any]
+    """Acceleration of each body of MuJoCo models minus gravity, as MuJoCo's ``cacc``: angular [rad/s²], then linear
+    [m/s²], ``(worlds, nbody, 6)``."""
+    cfrc_int: NDArray[Any]
+    """Torque [N·m], then force [N], from the parent on each body of MuJoCo models, as MuJoCo's ``cfrc_int``,
+    ``(worlds, nbody, 6)``."""
+    cfrc_ext: NDArray[Any]
+    """Torque [N·m], then force [N], of contacts, ``body_f``, connects and welds on each body of MuJoCo models, as
+    MuJoCo's ``cfrc_ext``, ``(worlds, nbody, 6)``."""
+    sensordata: NDArray[Any]
+    """Sensors of MuJoCo models, in MuJoCo's order, ``(worlds, nsensordata)``; ``sim.sensors`` has the columns of
+    each."""
     body_jacobian: NDArray[Any]
     """Jacobian J of the bodies, ``body_qd = J @ joint_qd``, ``(worlds, bodies, 6, dofs)``."""
     mass_matrix: NDArray[Any]

@@ -48,6 +48,8 @@ class Sim:
         site_names: Name of each site, in the order of ``site_q`` and the other site fields.
         contact_sensor_names: Name of each contact sensor, in the order of ``contact_sensor``.
         actuator_names: ``model/actuator`` of each actuator, in the order of ``ctrl``.
+        sensor_names: ``model/sensor`` of each sensor of MuJoCo models, in MuJoCo's order.
+        sensors: Columns of each sensor in ``sensordata``, by its name, and by ``sensor`` alone where one model has it.
         dofs: Slice of each robot's dofs, by robot name.
         coords: Slice of each robot's coordinates.
         bodies: Slice of each robot's bodies.
@@ -82,6 +84,8 @@ class Sim:
         self.activation_names: list[str] = self.info["activation_names"]
         self.mocap_names: list[str] = self.info["mocap_names"]
         self.keyframe_names: list[str] = [known["name"] for known in self.info["keyframes"]]
+        self.sensor_names: list[str] = self.info["sensor_names"]
+        self.sensors: dict[str, slice] = _by_name(self.sensor_names, self.info["sensors"])
         self.dofs, self.coords, self.bodies = (
             {robot["name"]: slice(*robot[range_]) for robot in self.info["robots"]}
             for range_ in ("dofs", "coords", "bodies")
@@ -414,6 +418,14 @@ class Sim:
     def __repr__(self) -> str:
         state = "" if self._end.alive else ", closed"
         return f"Sim({self.name!r}, worlds={self.worlds}, device={self.device!r}, pid={self.pid}{state})"
+
+
+def _by_name(names: list[str], places: list[list[int]]) -> dict[str, slice]:
+    """Slices of sensors by their names, and by the part after the model's name where it is unique."""
+    slices = {name: slice(*place) for name, place in zip(names, places, strict=True)}
+    short = [name.split("/", 1)[-1] for name in names]
+    alone = {name: slices[whole] for name, whole in zip(short, names, strict=True) if short.count(name) == 1}
+    return slices | {name: place for name, place in alone.items() if name not in slices}
 
 
 def _end(client: _core.Client, daemon: Daemon | None, name: str, owner: int, viewers: list[Viewer]) -> None:

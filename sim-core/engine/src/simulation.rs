@@ -8,7 +8,7 @@ use crate::backend::{Backend, BackendError};
 use crate::options::{backends, check_memory, memory_of};
 use crate::snapshot::{self, Head, SnapshotError};
 use sim_model::Model;
-use sim_physics::arrays::{Dtype, Layout};
+use sim_physics::arrays::{Dtype, Field, Layout};
 use std::sync::Arc;
 
 /// Many worlds of one model.
@@ -58,6 +58,12 @@ impl Simulation {
             if value <= 0.0 || value.is_nan() {
                 return Err(BackendError::Bound { bound, value });
             }
+        }
+        let refused = model.refused_sensors();
+        if options.fields.contains(&Field::Sensordata) && !refused.is_empty() {
+            return Err(BackendError::Sensors {
+                reasons: refused.join("; "),
+            });
         }
         check_memory(&model, options, groups)?;
         let layout = Simulation::layout_of(&model, options);

@@ -37,6 +37,8 @@ pub struct Model {
     pub(crate) activation_names: Vec<String>,
     pub(crate) mocap_names: Vec<String>,
     pub(crate) keyframes: Vec<KeyState>,
+    pub(crate) sensors: Vec<SensorInfo>,
+    pub(crate) refused_sensors: Vec<String>,
     pub(crate) site_names: Vec<String>,
     pub(crate) contact_sensors: Vec<SensedShapes>,
     pub(crate) command_delay_max: usize,
@@ -44,6 +46,15 @@ pub struct Model {
     pub(crate) start: Start,
     pub(crate) dof_inverse_weight: Vec<f64>,
     pub(crate) hash: u64,
+}
+
+/// A sensor of a MuJoCo model.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SensorInfo {
+    /// `robot/sensor`.
+    pub name: String,
+    /// Its scalars in `sensordata`.
+    pub place: Range<usize>,
 }
 
 /// What a contact sensor adds up: forces on some shapes, from some.
@@ -142,6 +153,14 @@ impl Model {
     pub fn actuator_names(&self) -> &[String] {
         &self.actuator_names
     }
+    /// The sensors of MuJoCo models, in MuJoCo's order.
+    pub fn sensors(&self) -> &[SensorInfo] {
+        &self.sensors
+    }
+    /// Sensors of MuJoCo models that are not supported, a sentence each.
+    pub fn refused_sensors(&self) -> &[String] {
+        &self.refused_sensors
+    }
     /// Names of the sites.
     pub fn site_names(&self) -> &[String] {
         &self.site_names
@@ -195,6 +214,7 @@ impl Model {
             mujoco_bodies: self.constants.mujoco.frames.bodies.len(),
             mujoco_sites: self.constants.mujoco.frames.sites.len(),
             mujoco_geoms: self.constants.mujoco.frames.geoms.len(),
+            sensordata: self.constants.mujoco.sensors.scalars,
         }
     }
     /// State and commands after a reset.

@@ -68,6 +68,12 @@ pub struct Description {
     /// Keyframes of the models from MuJoCo. Older recordings have none.
     #[serde(default)]
     pub keyframes: Vec<KeyframeInfo>,
+    /// `robot/sensor` of each sensor of MuJoCo models. Older recordings have none.
+    #[serde(default)]
+    pub sensor_names: Vec<String>,
+    /// Its scalars in `sensordata`, `[start, stop)`.
+    #[serde(default)]
+    pub sensors: Vec<[usize; 2]>,
     /// The robots with their ranges in the lists above.
     pub robots: Vec<RobotRange>,
     /// Rows of the field table: what every frame carries, in this order.
@@ -204,7 +210,8 @@ impl Description {
         let actuators = self.actuator_names.iter();
         let all = actuators
             .chain(&self.activation_names)
-            .chain(&self.mocap_names);
+            .chain(&self.mocap_names)
+            .chain(&self.sensor_names);
         all.for_each(|name| hash.text(name));
         for field in &self.fields {
             hash.text(&field.name);

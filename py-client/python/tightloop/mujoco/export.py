@@ -45,12 +45,14 @@ _ARRAYS = """
     actuator_dynprm actuator_group jnt_actgravcomp body_mocapid pair_dim pair_geom1 pair_geom2 pair_solref
     pair_solreffriction pair_solimp pair_margin pair_gap pair_friction
     key_time key_qpos key_qvel key_act key_ctrl key_mpos key_mquat
+    cam_bodyid cam_pos cam_quat site_size sensor_adr sensor_dim sensor_objid sensor_refid sensor_cutoff
 """.split()
 # Arrays of newer versions; where they are missing, no model has what they describe.
 _NEWER_ARRAYS = """
     jnt_stiffnesspoly dof_dampingpoly geom_adhesion geom_surfacevel tendon_armature tendon_dampingpoly
     tendon_stiffnesspoly tendon_actfrclimited tendon_actfrcrange actuator_delay actuator_armature actuator_damping
     actuator_dampingpoly actuator_ctrlnum actuator_outnum
+    sensor_delay sensor_interval sensor_intprm
 """.split()
 # Enumerations: the array and its type.
 _KINDS = {
@@ -63,6 +65,12 @@ _KINDS = {
     "actuator_dyntype": "mjtDyn",
     "actuator_gaintype": "mjtGain",
     "actuator_biastype": "mjtBias",
+    "site_type": "mjtGeom",
+    "cam_mode": "mjtCamLight",
+    "sensor_type": "mjtSensor",
+    "sensor_datatype": "mjtDataType",
+    "sensor_objtype": "mjtObj",
+    "sensor_reftype": "mjtObj",
 }
 # Elements with names, and what counts them.
 _NAMED = {
@@ -76,10 +84,11 @@ _NAMED = {
     "tendon": "ntendon",
     "actuator": "nu",
     "key": "nkey",
+    "sensor": "nsensor",
 }
-_REAL_OPTIONS = ("timestep", "gravity", "tolerance", "impratio", "density", "viscosity", "wind")
+_REAL_OPTIONS = ("timestep", "gravity", "tolerance", "impratio", "density", "viscosity", "wind", "magnetic")
 _COUNT_OPTIONS = ("iterations", "ls_iterations", "noslip_iterations", "disableactuator")
-_COUNTS = ("nflex", "nplugin", "npair", "nmocap", "nsensor")
+_COUNTS = ("nflex", "nplugin", "npair", "nmocap", "nsensor", "nsensordata")
 
 
 def compiled(model: Any) -> Any:

@@ -49,6 +49,14 @@ pub enum BackendError {
         /// Fields that are.
         choices: String,
     },
+    /// Sensors of MuJoCo models that cannot be shown.
+    #[error(
+        "field `sensordata` cannot be shown: {reasons}; remove them from the model, or leave the field out"
+    )]
+    Sensors {
+        /// A sentence per sensor.
+        reasons: String,
+    },
     /// Columns outside of a field.
     #[error("field `{field}` has {columns} columns; {start}..{end} is outside")]
     Columns {

@@ -1,5 +1,6 @@
 //! Backends: they keep the worlds, run the physics code, and move fields in and out.
 
+mod clocks;
 pub mod cpu;
 mod error;
 mod frozen;

@@ -4,11 +4,12 @@ use super::actuators;
 use super::carrier::Carrier;
 use super::constraint_rows::{DofEquality, DofJoint, SoftJoint};
 use super::mujoco_frames::add_frames;
+use super::mujoco_sensors::{Scope, add_sensors};
 use super::ties::{DofConstraint, terms};
 use crate::description::{Joint, MujocoJoint, MujocoParts, Robot, TargetMode};
 use crate::inertia::{Inertial, merge};
 use crate::joint_kind::JointKind;
-use crate::model::{RobotRange, Start};
+use crate::model::{RobotRange, SensorInfo, Start};
 use crate::pose::Pose;
 use sim_physics::constants::mujoco::{ActuatorBound, Mujoco, Tendon, TendonBound};
 use sim_physics::constants::{Body, Dof, Frame, MassEntry, Motion, Tree};
@@ -33,6 +34,10 @@ pub(super) struct BodyBuilder {
     pub constraints: Vec<DofConstraint>,
     pub actuator_names: Vec<String>,
     pub mocap_names: Vec<String>,
+    pub sensors: Vec<SensorInfo>,
+    pub refused_sensors: Vec<String>,
+    /// First moment of what stands still in MuJoCo models [kg·m].
+    pub static_moment: [f64; 3],
     couplings: Vec<(usize, usize)>,
     /// How each link of each robot is carried.
     pub carriers: Vec<Vec<Carrier>>,
@@ -313,6 +318,9 @@ impl BodyBuilder {
         carriers: &[Carrier],
     ) {
         let first_link = self.frames.len() - robot.links.len();
+        let first_body = self.mujoco.frames.bodies.len();
+        let (first_actuator, first_constraint) =
+            (self.actuator_names.len(), self.constraints.len());
         add_frames(&mut self.mujoco.frames, parts, carriers, first_link);
         for index in robot.moving_joints() {
             let (joint, own) = (&robot.joints[index], &parts.joints[index]);
@@ -348,9 +356,14 @@ impl BodyBuilder {
             });
         }
         for constraint in &parts.constraints {
-            let bodies = &self.bodies;
-            let own =
-                DofConstraint::new(constraint, dof_of, carriers, bodies, parts.safe_references);
+            let own = DofConstraint::new(
+                constraint,
+                dof_of,
+                carriers,
+                &self.bodies,
+                first_body,
+                parts.safe_references,
+            );
             self.couplings.extend(own.couplings());
             self.constraints.push(own);
         }
@@ -380,6 +393,30 @@ impl BodyBuilder {
             };
             actuators::add(&mut self.mujoco, actuator, &scene);
         }
+        let first = self.mujoco.sensors.scalars;
+        let refused = parts.sensors.refused.iter();
+        self.sensors
+            .extend(parts.sensors.all.iter().map(|sensor| SensorInfo {
+                name: format!("{}/{}", robot.name, sensor.name),
+                place: first + sensor.place.start..first + sensor.place.end,
+            }));
+        self.refused_sensors
+            .extend(refused.map(|what| format!("model `{}`: {what}", robot.name)));
+        let scope = Scope {
+            dof_of,
+            carriers,
+            dofs: &self.dofs,
+            trees: &self.trees,
+            frames: &self.mujoco.frames,
+            first_body,
+            first_actuator,
+            first_constraint,
+        };
+        let moment = scope.static_moment();
+        for (sum, x) in self.static_moment.iter_mut().zip(moment) {
+            *sum += x;
+        }
+        add_sensors(&mut self.mujoco.sensors, &parts.sensors, &scope);
     }
 
     /// Mass, centre and inertia of all links that move with each body of a robot.

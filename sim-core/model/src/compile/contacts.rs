@@ -3,6 +3,7 @@
 use super::clusters::clusters;
 use super::contact_pairs::ContactBuilder;
 use super::contact_pieces::{PlacedShape, Rules, contacts_of, pairs, pieces};
+use super::mujoco_contacts::add_touched_bodies;
 use crate::description::Description;
 use crate::error::ModelError;
 use sim_physics::constants::contact::{Class, Column, Contacts, Group, Pair, Run, pair, row};
@@ -46,6 +47,7 @@ pub(super) fn add_contacts(
         constants.mujoco.pair_impedance = of_pairs;
         constants.mujoco.class_impedances = of_classes;
     }
+    add_touched_bodies(constants);
     Ok(())
 }
 

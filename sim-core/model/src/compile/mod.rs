@@ -16,7 +16,9 @@ mod contact_pieces;
 mod contacts;
 mod inverse_weight;
 mod keyframes;
+mod mujoco_contacts;
 mod mujoco_frames;
+mod mujoco_sensors;
 mod passive;
 mod sites;
 mod ties;
@@ -132,7 +134,12 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         .collect();
     constants.mujoco = builder.mujoco;
     passive::keep_acting(&mut constants, scene);
-    ties::add_ties(&mut constants, builder.constraints);
+    let constraint_of_tie = ties::add_ties(&mut constants, builder.constraints);
+    mujoco_sensors::finish_sensors(
+        &mut constants.mujoco.sensors,
+        builder.static_moment,
+        &constraint_of_tie,
+    );
     check_models(scene)?;
     if let Some(parts) = scene.robots.iter().find_map(|robot| robot.mujoco.as_ref()) {
         constants.mujoco.integrator = parts.integrator;
@@ -147,6 +154,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         mujoco: scene.robots.iter().map(|r| r.mujoco.as_deref()).collect(),
     };
     add_contacts(&mut constants, scene, &placed, &rules)?;
+    mujoco_contacts::add_contact_sensors(&mut constants, scene, &placed);
     let surfaces: Vec<f64> = placed.iter().map(|shape| shape.surface.mu).collect();
     let sensors = scene.sensed_shapes()?;
     for &param in &scene.params {
@@ -189,6 +197,8 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         keyframes,
         mocap_names: builder.mocap_names,
         actuator_names: builder.actuator_names,
+        sensors: builder.sensors,
+        refused_sensors: builder.refused_sensors,
         site_names: scene.sites.iter().map(|site| site.name.clone()).collect(),
         contact_sensors: sensors,
         command_delay_max: scene.delay_max(),

@@ -24,12 +24,14 @@ pub(super) struct DofConstraint {
 }
 
 impl DofConstraint {
-    /// `dof_of` has the first dof of each joint of the robot, `carriers` an entry for each of its links.
+    /// `dof_of` has the first dof of each joint of the robot, `carriers` an entry for each of its links, and `first_body` is
+    /// the first of its bodies among those of MuJoCo models.
     pub fn new(
         constraint: &Constraint,
         dof_of: &[usize],
         carriers: &[Carrier],
         bodies: &[Body<f64>],
+        first_body: usize,
         safe_references: bool,
     ) -> DofConstraint {
         let body_of = |dof: usize| {
@@ -83,6 +85,7 @@ impl DofConstraint {
                     first,
                     second,
                     torque_scale: *torque_scale,
+                    bodies: links.map(|link| first_body + link),
                 };
                 (ties::Measure::Frames(frames), dofs)
             }
@@ -113,10 +116,11 @@ pub(super) fn terms(joints: &[(usize, f64)], dof_of: &[usize]) -> Vec<Term<f64>>
     all.collect()
 }
 
-/// Adds the rows of constraints, after those of joints.
-pub(super) fn add_ties(constants: &mut Constants<f64>, all: Vec<DofConstraint>) {
+/// Adds the rows of constraints, after those of joints, and returns the constraint of each tie.
+pub(super) fn add_ties(constants: &mut Constants<f64>, all: Vec<DofConstraint>) -> Vec<usize> {
     let mut first = 0;
-    for own in all {
+    let mut constraint_of_tie = Vec::new();
+    for (index, own) in all.into_iter().enumerate() {
         let DofConstraint {
             measure,
             dofs,
@@ -167,6 +171,7 @@ pub(super) fn add_ties(constants: &mut Constants<f64>, all: Vec<DofConstraint>) 
         for law in laws {
             let ties = &mut constants.mujoco.ties;
             let number = ties.len();
+            constraint_of_tie.push(index);
             ties.push(Tie {
                 measure: measure.clone(),
                 law,
@@ -182,4 +187,5 @@ pub(super) fn add_ties(constants: &mut Constants<f64>, all: Vec<DofConstraint>) 
             tie_of_row.extend(std::iter::repeat_n(number, rows));
         }
     }
+    constraint_of_tie
 }

@@ -7,6 +7,7 @@ mod joint;
 mod mujoco;
 mod mujoco_constraints;
 mod mujoco_frames;
+mod mujoco_sensors;
 mod param_draws;
 mod robot;
 mod scene;
@@ -23,6 +24,10 @@ pub use mujoco::{
 };
 pub use mujoco_constraints::{Constraint, ConstraintLaw, Measure, Tendon};
 pub use mujoco_frames::{FrameParts, Inertia, OnLink};
+pub use mujoco_sensors::{
+    FramePart, LimitPart, Reduction, Sense, Sensor, SensorParts, SubtreePart, Touching, ZoneKind,
+    ZonePart,
+};
 pub use param_draws::ParamDraw;
 pub(crate) use robot::BODY_LINK;
 pub use robot::{Collision, Link, Robot};

@@ -2,6 +2,7 @@
 
 use super::mujoco_constraints::{Constraint, Tendon};
 use super::mujoco_frames::FrameParts;
+use super::mujoco_sensors::SensorParts;
 use crate::geom_contact::GeomContact;
 use crate::pose::Pose;
 use crate::softness::Softness;
@@ -55,6 +56,8 @@ pub struct MujocoParts {
     pub safe_references: bool,
     /// Frames that only outputs have.
     pub frames: FrameParts,
+    /// Sensors.
+    pub sensors: SensorParts,
 }
 
 /// What a joint from MuJoCo has beyond one from URDF.

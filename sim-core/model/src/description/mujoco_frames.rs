@@ -11,6 +11,8 @@ pub struct FrameParts {
     pub sites: Vec<OnLink>,
     /// Geoms, also those that touch nothing.
     pub geoms: Vec<OnLink>,
+    /// Of each geom, its place among the shapes of its link, if it may touch something.
+    pub collisions: Vec<Option<usize>>,
     /// Names of the sites.
     pub site_names: Vec<String>,
     /// Names of the geoms.

@@ -21,13 +21,18 @@ pub(super) fn frames(file: &ModelFile, bodies: usize) -> Result<FrameParts, Mode
         inertias: inertias.collect(),
         sites: on_links(file, "site", bodies)?,
         geoms: on_links(file, "geom", bodies)?,
+        collisions: vec![None; file.rows("geom_bodyid")],
         site_names: all_names(file, "site")?,
         geom_names: all_names(file, "geom")?,
     })
 }
 
 /// Frames of all elements of a kind, `site`, `geom` or `cam`.
-fn on_links(file: &ModelFile, kind: &str, bodies: usize) -> Result<Vec<OnLink>, ModelError> {
+pub(super) fn on_links(
+    file: &ModelFile,
+    kind: &str,
+    bodies: usize,
+) -> Result<Vec<OnLink>, ModelError> {
     let links = format!("{kind}_bodyid");
     let count = file.rows(&links);
     let links = file.indices(&links, count, bodies)?;

@@ -75,6 +75,9 @@ pub(super) fn add_geoms(
         );
         let link = bodies[geom].ok_or_else(|| file.fault("has geoms without bodies".to_owned()))?;
         all[geom] = Some((link, robot.links[link].collisions.len()));
+        if let Some(parts) = &mut robot.mujoco {
+            parts.frames.collisions[geom] = Some(robot.links[link].collisions.len());
+        }
         robot.links[link].collisions.push(Collision {
             name: Some(geom_names[geom].clone()),
             pose: frame(places[geom], turns[geom]),

@@ -15,6 +15,7 @@ mod options;
 mod pairs;
 mod passive;
 mod refusals;
+mod sensors;
 mod tendons;
 mod transmissions;
 mod tree;
@@ -48,6 +49,8 @@ impl Robot {
         let places = geoms::add_geoms(&file, &options, &mut robot)?;
         pairs::add_pairs(&file, &places, &mut robot)?;
         actuators::add_actuators(&file, &mut robot)?;
+        sensors::add_sensors(&file, &mut robot)?;
+        robot.notes.extend(sensor_notes(&file, &robot)?);
         Ok(robot)
     }
 }
@@ -90,15 +93,30 @@ fn notes(file: &ModelFile) -> Result<Vec<String>, ModelError> {
             "its {idle} equalities that are not active at the start are not read"
         ));
     }
-    let sensors = file.integer("nsensor")?;
-    if sensors > 0 {
-        notes.push(format!("its {sensors} sensors are not read"));
-    }
     let keys = file.rows("key_time");
     if keys > 0 {
         notes.push(format!("its {keys} keyframes are not read"));
     }
     Ok(notes)
+}
+
+/// Sensors that are not there.
+fn sensor_notes(file: &ModelFile, robot: &Robot) -> Result<Vec<String>, ModelError> {
+    let sensors = file.integer("nsensor")?;
+    if sensors > 0 && !file.has("sensor_type") {
+        return Ok(vec![format!(
+            "its {sensors} sensors are not read; save the scene again"
+        )]);
+    }
+    let parts = robot.mujoco.as_ref().map(|parts| &parts.sensors);
+    let refused = parts.map_or(&[][..], |sensors| &sensors.refused);
+    Ok(match refused.is_empty() {
+        true => Vec::new(),
+        false => vec![format!(
+            "`sensordata` cannot be shown: {}",
+            refusals::listed(refused)
+        )],
+    })
 }
 
 /// A quaternion of MuJoCo's, (w, x, y, z), in our order.

@@ -9,6 +9,7 @@ use super::options::{MujocoOptions, has_flag, integrator};
 use super::{passive, tendons};
 use crate::description::{
     Compensator, Inertial, Joint, JointDof, JointKind, Link, MujocoJoint, MujocoParts, Robot,
+    SensorParts,
 };
 use crate::error::ModelError;
 use crate::pose::Pose;
@@ -116,6 +117,7 @@ fn parts(
         implicit_damping: !has_flag(file, "mjDSBL_EULERDAMP")?,
         safe_references: !has_flag(file, "mjDSBL_REFSAFE")?,
         frames: frames::frames(file, bodies)?,
+        sensors: SensorParts::default(),
     })
 }
 

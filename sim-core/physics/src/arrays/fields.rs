@@ -82,6 +82,8 @@ pub enum Axis {
     MujocoSites,
     /// Geoms of MuJoCo models.
     MujocoGeoms,
+    /// Scalars of the sensors of MuJoCo models.
+    Sensordata,
     /// A fixed length.
     Size(usize),
 }
@@ -103,6 +105,7 @@ impl Axis {
             Axis::MujocoBodies => sizes.mujoco_bodies,
             Axis::MujocoSites => sizes.mujoco_sites,
             Axis::MujocoGeoms => sizes.mujoco_geoms,
+            Axis::Sensordata => sizes.sensordata,
             Axis::Size(n) => n,
         }
     }
@@ -123,6 +126,7 @@ impl Axis {
             Axis::MujocoBodies => "nbody".into(),
             Axis::MujocoSites => "nsite".into(),
             Axis::MujocoGeoms => "ngeom".into(),
+            Axis::Sensordata => "nsensordata".into(),
             Axis::Size(n) => n.to_string(),
         }
     }

@@ -76,6 +76,10 @@ arrays! { m;
         coupled_system: CoupledSystem [m.coupled.pattern.len()] Scratch "–";
         pull: Pull [if m.contacts.classes.is_empty() { 0 } else { m.dofs.len() }] Scratch "–";
         solution: Solution [m.dofs.len()] Scratch "–";
+        // contacts that a sensor shows
+        contact_records: ContactRecords [17 * m.mujoco.sensors.records] Scratch "–";
+        // torque, then force, of the contacts of each body of MuJoCo models
+        contact_wrench: ContactWrench [6 * m.mujoco.frames.bodies.len()] Scratch "N·m, N";
     }
     values {
         joint_f: JointF [Scalar; m.dofs.len()] Command "N·m or N"
@@ -200,6 +204,18 @@ arrays! { m;
             => "subtree_com" [MujocoBodies, Size(3)], "Centre of mass of each body of MuJoCo models with all bodies below it, in the world.";
         cvel: Cvel [Row6; m.mujoco.frames.bodies.len()] Stage "rad/s, m/s"
             => "cvel" [MujocoBodies, Size(6)], "Velocity of each body of MuJoCo models in world axes: angular, then that of the point of the body at the centre of mass of its tree, as MuJoCo's `cvel`.";
+        subtree_linvel: SubtreeLinvel [Vec3; m.mujoco.frames.bodies.len()] Stage "m/s"
+            => "subtree_linvel" [MujocoBodies, Size(3)], "Velocity of the centre of mass of each body of MuJoCo models with all bodies below it, in world axes.";
+        subtree_angmom: SubtreeAngmom [Vec3; m.mujoco.frames.bodies.len()] Stage "kg·m²/s"
+            => "subtree_angmom" [MujocoBodies, Size(3)], "Angular momentum of each body of MuJoCo models with all bodies below it, about their centre of mass, in world axes.";
+        cacc: Cacc [Row6; m.mujoco.frames.bodies.len()] Stage "rad/s², m/s²"
+            => "cacc" [MujocoBodies, Size(6)], "Acceleration of each body of MuJoCo models less gravity, as MuJoCo's `cacc`: angular, then linear, as a spatial vector at the point that `cvel` is about.";
+        cfrc_int: CfrcInt [Row6; m.mujoco.frames.bodies.len()] Stage "N·m, N"
+            => "cfrc_int" [MujocoBodies, Size(6)], "Torque, then force, from the parent on each body of MuJoCo models, about the point that `cvel` is about, as MuJoCo's `cfrc_int`.";
+        cfrc_ext: CfrcExt [Row6; m.mujoco.frames.bodies.len()] Stage "N·m, N"
+            => "cfrc_ext" [MujocoBodies, Size(6)], "Torque, then force, of contacts, body_f, connects and welds on each body of MuJoCo models, about the point that `cvel` is about, as MuJoCo's `cfrc_ext`.";
+        sensordata: Sensordata [Scalar; m.mujoco.sensors.scalars] Stage "–"
+            => "sensordata" [Sensordata], "Sensors of MuJoCo models, in MuJoCo's order.";
 
         // body by body: acceleration, then force
         force: Force [Spatial; m.bodies.len()] Scratch "–";

@@ -8,6 +8,7 @@ pub mod mujoco;
 pub mod mujoco_frames;
 pub mod params;
 mod recast;
+pub mod sensors;
 pub mod site;
 mod sizes;
 pub mod ties;

@@ -4,6 +4,7 @@ use super::Impedance;
 use super::actuator::{Activation, TurningLength};
 use super::mujoco_frames::MujocoFrames;
 use super::recast::{Recast, recast, same};
+use super::sensors::Sensors;
 use super::ties::Tie;
 use crate::lane::Fixed;
 
@@ -63,6 +64,12 @@ recast! {
         pub class_impedances: Vec<Vec<usize>>,
         /// Frames of bodies, sites and geoms.
         pub frames: MujocoFrames<R>,
+        /// Sensors.
+        pub sensors: Sensors<R>,
+        /// Of each pair of shapes, the bodies of its two sides as places in the list of its class, from 1; 0 for none.
+        pub pair_bodies: Fixed,
+        /// Of each class of contacts, the bodies of MuJoCo models that its contacts act on.
+        pub class_bodies: Vec<Vec<usize>>,
     }
 }
 
@@ -89,6 +96,9 @@ impl<R> Default for Mujoco<R> {
             pair_impedance: Fixed::default(),
             class_impedances: Vec::new(),
             frames: MujocoFrames::default(),
+            sensors: Sensors::default(),
+            pair_bodies: Fixed::default(),
+            class_bodies: Vec::new(),
         }
     }
 }

@@ -31,4 +31,6 @@ pub struct Sizes {
     pub mujoco_sites: usize,
     /// Geoms of MuJoCo models.
     pub mujoco_geoms: usize,
+    /// Scalars of the sensors of MuJoCo models.
+    pub sensordata: usize,
 }

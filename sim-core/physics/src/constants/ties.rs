@@ -67,6 +67,8 @@ recast! {
         pub second: Mount<R>,
         /// What rotations are multiplied with [m/rad]; none where only positions are tied.
         pub torque_scale: Option<R>,
+        /// Their bodies, among those of MuJoCo models.
+        pub bodies: [usize; 2],
     }
 }
 

@@ -335,7 +335,7 @@ fn note_overflow<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, most: &mu
 
 /// The list of a class's contacts.
 #[inline(always)]
-pub(super) fn class_list<C: Cx>(
+pub(crate) fn class_list<C: Cx>(
     cx: &mut C,
     t: &Contacts<<C::F as Num>::Real>,
     class: usize,

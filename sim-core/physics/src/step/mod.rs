@@ -19,12 +19,15 @@ mod inverse_dynamics;
 pub mod kinematics;
 mod link_forces;
 pub mod mass_matrix;
+pub mod mujoco_forces;
 pub mod mujoco_frames;
+pub mod mujoco_momenta;
 pub mod mujoco_state;
 pub mod mujoco_subtrees;
 mod params;
 pub mod poses;
 pub mod runge_kutta;
+pub mod sensors;
 pub mod site_inverse;
 pub mod sites;
 pub mod solver;
@@ -103,6 +106,15 @@ macro_rules! every_stage {
             mujoco_sites       [mujoco_frames::Sites]        Evaluation;
             mujoco_geoms       [mujoco_frames::Geoms]        Evaluation;
             mujoco_subtrees    [mujoco_subtrees::Subtrees]   Evaluation;
+            mujoco_momenta     [mujoco_momenta::Momenta]     Evaluation;
+            mujoco_forces      [mujoco_forces::Forces]       Evaluation;
+            sensor_states      [sensors::States]             Evaluation;
+            sensor_subtrees    [sensors::Subtrees]           Evaluation;
+            sensor_energies    [sensors::Energies]           Evaluation;
+            sensor_forces      [sensors::Forces]             Evaluation;
+            sensor_imu         [sensors::Accelerations]      Evaluation;
+            sensor_wrenches    [sensors::Wrenches]           Evaluation;
+            sensor_contacts    [sensors::Contacts]           Evaluation;
         }
     };
 }

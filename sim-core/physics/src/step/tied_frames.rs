@@ -138,6 +138,20 @@ fn turning<F: Num>(axes: &Mat3<F>, one: &Moving<F>, other: &Moving<F>, quat: [F;
     Vec3([x, y, z]).scale_add(-(spin.dot(spin) * half), twice) * half
 }
 
+/// Torque on the first of two frames from the forces of their rows of rotation, Jᵀ f: R₂ ½ s (w f + v × f).
+#[inline(always)]
+pub(super) fn torque<F: Num>(
+    w: &Workspace<F>,
+    frames: &Frames<F::Real>,
+    scale: F::Real,
+    force: Vec3<F>,
+) -> Vec3<F> {
+    let [first, second] = [&frames.first, &frames.second].map(|mount| sites::axes(w, mount));
+    let [x, y, z, real] = between(&first, &second);
+    let own = Vec3([x, y, z]).cross_add(force, force * real);
+    second.mul_add(own * (F::k(scale) * F::c(0.5)), Vec3::zero())
+}
+
 /// Does a dof move a body?
 pub(super) fn carries<R>(m: &Constants<R>, body: Option<usize>, dof: usize) -> bool {
     let mut next = body;

@@ -62,6 +62,8 @@ fn description() -> Description {
         activation_names: Vec::new(),
         mocap_names: Vec::new(),
         keyframes: Vec::new(),
+        sensor_names: Vec::new(),
+        sensors: Vec::new(),
         robots: Vec::new(),
         fields: Vec::new(),
         known_fields: Vec::new(),

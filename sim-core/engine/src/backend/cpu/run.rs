@@ -3,6 +3,7 @@
 use super::chunk::{Chunk, Job};
 use super::contacts;
 use super::transfer::{self, Arena};
+use crate::backend::clocks;
 use sim_physics::arrays::{Field, Slot, Source};
 use sim_physics::lane::Lane;
 
@@ -69,6 +70,14 @@ impl<F: Lane> Chunk<F> {
                         contacts::export(self, job, slot, block, arena);
                     } else {
                         transfer::export(self, &job.constants, slot, block, arena);
+                    }
+                    if slot.field == Field::Sensordata {
+                        for lane in self.lanes_of(block) {
+                            let world = self.assignment.world(lane);
+                            let row = arena.row(slot, self.worlds.start + world);
+                            let time = self.steps[world] as f64 * job.frame_s;
+                            clocks::put(&job.constants, time, row);
+                        }
                     }
                     if let Some(noise) = job.noise.of(slot.field) {
                         for lane in self.lanes_of(block) {

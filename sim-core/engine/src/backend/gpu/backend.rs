@@ -33,6 +33,8 @@ pub(super) struct Gpu {
     pub imported: Vec<(usize, Imported)>,
     pub device: Device,
     pub constants: Constants<f32>,
+    /// Duration of a frame [s].
+    pub frame_s: f64,
     pub layout: Layout,
     pub places: Places,
     /// The place of each value of a world's record.

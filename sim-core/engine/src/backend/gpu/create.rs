@@ -165,6 +165,7 @@ impl Gpu {
             layout: layout.clone(),
             places,
             constants,
+            frame_s,
             lost: OnceLock::new(),
             copied: 0,
         };

@@ -4,6 +4,7 @@ use super::backend::Gpu;
 use super::tile::Tile;
 use super::uploads::Rows;
 use super::words;
+use crate::backend::clocks;
 use crate::backend::noise::sample;
 use crate::backend::{BackendError, FirstFrozen};
 use crate::random::{Draw, Stream};
@@ -80,6 +81,19 @@ impl Gpu {
         slot.expect("counters are part of every frame").offset
     }
 
+    /// Writes the clocks among the sensors.
+    fn put_clocks(&self, arena: &mut [u64]) {
+        let slot = self.layout.slots.iter();
+        let Some(slot) = slot.clone().find(|slot| slot.field == Field::Sensordata) else {
+            return;
+        };
+        let width: usize = slot.shape[1..].iter().product();
+        let rows: &mut [f32] = words::array(arena, slot.offset, slot.bytes);
+        for (row, &steps) in rows.chunks_exact_mut(width.max(1)).zip(&self.mirror.steps) {
+            clocks::put(&self.constants, steps as f64 * self.frame_s, row);
+        }
+    }
+
     /// Reads the counters of a frame and counts the worlds that were frozen in it.
     fn read_counters(&mut self, arena: &mut [u64], counts: bool) {
         let worlds = self.mirror.seeds.len();
@@ -130,6 +144,7 @@ impl Gpu {
             self.copied += bytes as u64;
         }
         self.read_counters(arena, steps);
+        self.put_clocks(arena);
         self.add_noise(arena);
         if steps && self.faults.resets {
             let frozen = |world: &usize| self.mirror.status[*world] & status::FROZEN != 0;

@@ -1,0 +1,216 @@
+//! Which bodies of MuJoCo models contacts act on, and which sensors they are of.
+
+use super::contact_pieces::PlacedShape;
+use crate::description::{Description, MujocoParts, Sense, Shape, Touching};
+use sim_physics::constants::Constants;
+use sim_physics::constants::sensors::SensorKind;
+use sim_physics::lane::Fixed;
+use std::collections::BTreeSet;
+
+/// Gives each class of contacts the bodies of MuJoCo models that it acts on, and each pair their places in that list.
+pub(super) fn add_touched_bodies(constants: &mut Constants<f64>) {
+    let bodies = &constants.mujoco.frames.bodies;
+    if bodies.is_empty() {
+        return;
+    }
+    // the worlds of models take no forces
+    let body_of = |link: usize| {
+        let place = bodies.iter().position(|body| body.link == link);
+        place.filter(|&place| bodies[place].parent != place)
+    };
+    let contacts = &mut constants.contacts;
+    let mut of_classes: Vec<Vec<usize>> = vec![Vec::new(); contacts.classes.len()];
+    let mut places = Vec::with_capacity(2 * contacts.pairs.len());
+    for pair in &contacts.pairs {
+        let own = &mut of_classes[pair.class];
+        for link in pair.links {
+            let body = link.and_then(body_of);
+            let place = body.map(|body| match own.iter().position(|other| *other == body) {
+                Some(place) => place,
+                None => {
+                    own.push(body);
+                    own.len() - 1
+                }
+            });
+            places.push(place.map_or(0.0, |place| (place + 1) as f64));
+        }
+    }
+    constants.mujoco.class_bodies = of_classes;
+    constants.mujoco.pair_bodies = Fixed {
+        base: contacts.tables.numbers.len(),
+        stride: 2,
+        rows: contacts.pairs.len(),
+    };
+    contacts.tables.numbers.extend(places);
+}
+
+/// A shape as sensors of contacts of a model see it.
+#[derive(Clone, Copy)]
+struct Side {
+    /// The robot, the link and the geom that it is.
+    of: Option<(usize, usize, usize)>,
+    /// MuJoCo orders the geoms of a contact by kind, then by number.
+    rank: usize,
+}
+
+/// Gives sensors of contacts the pairs of shapes that they are of.
+pub(super) fn add_contact_sensors(
+    constants: &mut Constants<f64>,
+    scene: &Description,
+    shapes: &[PlacedShape<'_>],
+) {
+    let sides = sides(scene, shapes);
+    let pairs = &constants.contacts.pairs;
+    let both: Vec<[Side; 2]> = pairs
+        .iter()
+        .map(|pair| pair.shapes.map(|shape| sides[shape]))
+        .collect();
+    let orders = both.iter().map(|[a, b]| match a.rank <= b.rank {
+        true => 1.0,
+        false => -1.0,
+    });
+    let mut columns: Vec<Vec<f64>> = vec![orders.collect()];
+    let mut sensors = constants.mujoco.sensors.all.iter_mut();
+    let mut records = 0;
+    for (robot, robot_parts) in scene.robots.iter().enumerate() {
+        let Some(parts) = &robot_parts.mujoco else {
+            continue;
+        };
+        for sense in parts
+            .sensors
+            .all
+            .iter()
+            .filter_map(|sensor| sensor.sense.as_ref())
+        {
+            let Some(sensor) = sensors.next() else { break };
+            let senses: Vec<f64> = match sense {
+                Sense::Touch(zone) => {
+                    let own = |side: &Side| matches!(side.of, Some((other, link, _)) if (other, link) == (robot, zone.site.link));
+                    let sense = |[a, b]: &[Side; 2]| match (own(a), own(b)) {
+                        (true, _) => 1.0,
+                        (_, true) => -1.0,
+                        _ => 0.0,
+                    };
+                    both.iter().map(sense).collect()
+                }
+                Sense::Contact { first, second, .. } => {
+                    let own = |side: &Side, what: Touching| is_of(parts, robot, side, what);
+                    let sense = |[a, b]: &[Side; 2]| {
+                        let (one, two) = if a.rank <= b.rank { (a, b) } else { (b, a) };
+                        let order = if a.rank <= b.rank { 1.0 } else { -1.0 };
+                        let found = [one, two].map(|side| (own(side, *first), own(side, *second)));
+                        order * direction(*first, *second, found)
+                    };
+                    both.iter().map(sense).collect()
+                }
+                _ => continue,
+            };
+            let classes: BTreeSet<usize> = pairs
+                .iter()
+                .zip(&senses)
+                .filter(|(_, sense)| **sense != 0.0)
+                .map(|(pair, _)| pair.class)
+                .collect();
+            match &mut sensor.kind {
+                SensorKind::Touch(touch) => {
+                    (touch.column, touch.classes) = (columns.len(), classes.into_iter().collect());
+                }
+                SensorKind::Contact(contact) => {
+                    (contact.column, contact.classes) =
+                        (columns.len(), classes.into_iter().collect());
+                    records = records.max(contact.records);
+                }
+                _ => {}
+            }
+            columns.push(senses);
+        }
+    }
+    if columns.len() == 1 {
+        return;
+    }
+    let table = Fixed {
+        base: constants.contacts.tables.numbers.len(),
+        stride: columns.len(),
+        rows: both.len(),
+    };
+    let numbers = (0..both.len()).flat_map(|pair| columns.iter().map(move |column| column[pair]));
+    constants.contacts.tables.numbers.extend(numbers);
+    constants.mujoco.sensors.pairs = table;
+    constants.mujoco.sensors.records = records;
+}
+
+/// The shapes of a scene, by their numbers.
+fn sides(scene: &Description, shapes: &[PlacedShape<'_>]) -> Vec<Side> {
+    let mut place = (None, 0, 0);
+    let sides = shapes.iter().map(|shape| {
+        place = match place {
+            (robot, link, count) if (robot, link) == (shape.robot, shape.own_link) => {
+                (robot, link, count + 1)
+            }
+            _ => (shape.robot, shape.own_link, 1),
+        };
+        let collision = place.2 - 1;
+        let geom = shape.robot.and_then(|robot| {
+            let parts = scene.robots[robot].mujoco.as_ref()?;
+            let geoms = parts.frames.geoms.iter().zip(&parts.frames.collisions);
+            geoms.enumerate().find_map(|(geom, (on, own))| {
+                (on.link == shape.own_link && *own == Some(collision)).then_some(geom)
+            })
+        });
+        let kind = match shape.shape {
+            Shape::Plane => 0,
+            Shape::Sphere { .. } => 1,
+            Shape::Capsule { .. } => 2,
+            Shape::Cylinder { .. } => 3,
+            Shape::Box { .. } => 4,
+            Shape::Mesh(_) => 5,
+        };
+        Side {
+            of: shape
+                .robot
+                .zip(geom)
+                .map(|(robot, geom)| (robot, shape.own_link, geom)),
+            rank: kind * shapes.len() + shape.number,
+        }
+    });
+    sides.collect()
+}
+
+/// Is a shape of an object of a model?
+fn is_of(parts: &MujocoParts, robot: usize, side: &Side, what: Touching) -> bool {
+    let Some((_, link, geom)) = side.of.filter(|(other, ..)| *other == robot) else {
+        return matches!(what, Touching::Anything | Touching::InZone);
+    };
+    match what {
+        Touching::Anything | Touching::InZone => true,
+        Touching::Geom(own) => own == geom,
+        Touching::Link(own) => own == link,
+        Touching::Subtree(own) => {
+            let mut next = link;
+            while next > own {
+                next = parts.parents[next];
+            }
+            next == own
+        }
+    }
+}
+
+/// 1 where a contact goes from the first object of a sensor to the second, -1 where it is the other way, 0 for none. Of each
+/// shape: whether it is of the first, and of the second object.
+fn direction(first: Touching, second: Touching, [one, two]: [(bool, bool); 2]) -> f64 {
+    if !(one.0 || two.0) || !(one.1 || two.1) {
+        return 0.0;
+    }
+    let (has_first, has_second) = (first != Touching::Anything, second != Touching::Anything);
+    let is_regular = match (has_first, has_second) {
+        (true, true) => match (one.0 && two.1, two.0 && one.1) {
+            (true, _) => true,
+            (_, true) => false,
+            _ => return 0.0,
+        },
+        (true, false) => one.0,
+        (false, true) => two.1,
+        (false, false) => true,
+    };
+    if is_regular { 1.0 } else { -1.0 }
+}

@@ -1,0 +1,177 @@
+//! Sensors of MuJoCo models by the dofs and bodies of the scene.
+
+use super::carrier::Carrier;
+use super::mujoco_frames::mounted_on;
+use super::ties::terms;
+use crate::description::{Sense, SensorParts, ZonePart};
+use sim_physics::constants::mujoco_frames::MujocoFrames;
+use sim_physics::constants::sensors::{
+    AccelerationSensor, ContactSensor, Cutoff, FrameSensor, Sensor, SensorKind, Sensors,
+    TouchSensor, WrenchSensor, Zone,
+};
+use sim_physics::constants::{Dof, Tree};
+
+/// What a model's sensors refer to.
+pub(super) struct Scope<'a> {
+    /// The first dof of each joint of the robot.
+    pub dof_of: &'a [usize],
+    /// Of each link of the robot.
+    pub carriers: &'a [Carrier],
+    pub dofs: &'a [Dof<f64>],
+    pub trees: &'a [Tree<f64>],
+    pub frames: &'a MujocoFrames<f64>,
+    /// Its first body among those of MuJoCo models.
+    pub first_body: usize,
+    /// Its first actuator.
+    pub first_actuator: usize,
+    /// Its first constraint.
+    pub first_constraint: usize,
+}
+
+/// Adds the sensors of a model. Until ties are known, limits name constraints.
+pub(super) fn add_sensors(sensors: &mut Sensors<f64>, parts: &SensorParts, scope: &Scope<'_>) {
+    let first = sensors.scalars;
+    for sensor in &parts.all {
+        let Some(sense) = &sensor.sense else { continue };
+        sensors.all.push(Sensor {
+            kind: scope.kind(sense),
+            first: first + sensor.place.start,
+            cutoff: sensor
+                .cutoff
+                .map(|(most, is_two_sided)| Cutoff { most, is_two_sided }),
+        });
+    }
+    sensors.scalars += parts.scalars;
+}
+
+impl Scope<'_> {
+    fn kind(&self, sense: &Sense) -> SensorKind<f64> {
+        let mount = |on| mounted_on(self.carriers, on);
+        match sense {
+            Sense::Vector(site, vector) => SensorKind::Vector(mount(site), *vector),
+            Sense::Length {
+                terms: own,
+                is_rate,
+            } => match is_rate {
+                true => SensorKind::Rate(terms(own, self.dof_of)),
+                false => SensorKind::Length(terms(own, self.dof_of)),
+            },
+            Sense::Actuator { actuator, is_rate } => match is_rate {
+                true => SensorKind::ActuatorRate(self.first_actuator + actuator),
+                false => SensorKind::ActuatorLength(self.first_actuator + actuator),
+            },
+            Sense::Ball { joint, is_rate } => {
+                let dof = self.dof_of[*joint];
+                match is_rate {
+                    true => SensorKind::BallRate(dof),
+                    false => SensorKind::BallQuat(self.dofs[dof].coord),
+                }
+            }
+            Sense::Frame {
+                part,
+                of,
+                from,
+                is_local,
+            } => SensorKind::Frame(FrameSensor {
+                part: *part,
+                of: mount(of),
+                from: from.as_ref().map(mount),
+                is_local: *is_local,
+            }),
+            Sense::Acceleration {
+                of,
+                is_angular,
+                is_local,
+            } => SensorKind::Acceleration(AccelerationSensor {
+                of: mount(of),
+                is_angular: *is_angular,
+                is_local: *is_local,
+            }),
+            Sense::Subtree(link, part) => SensorKind::Subtree(self.first_body + link, *part),
+            Sense::Wrench { site, is_torque } => SensorKind::Wrench(WrenchSensor {
+                site: mount(site),
+                body: self.first_body + site.link,
+                is_torque: *is_torque,
+            }),
+            Sense::ActuatorForces(actuators) => {
+                let own = actuators
+                    .iter()
+                    .map(|actuator| self.first_actuator + actuator);
+                SensorKind::ActuatorForces(own.collect())
+            }
+            Sense::JointActuatorForce(joint) => SensorKind::DofActuatorForce(self.dof_of[*joint]),
+            Sense::JointLimit(joint, part) => SensorKind::DofLimit(self.dof_of[*joint], *part),
+            Sense::ConstraintLimit(constraint, part) => {
+                let own = constraint
+                    .iter()
+                    .map(|constraint| self.first_constraint + constraint);
+                SensorKind::TieLimit(own.collect(), *part)
+            }
+            Sense::Touch(zone) => SensorKind::Touch(TouchSensor {
+                zone: self.zone(zone),
+                column: 0,
+                classes: Vec::new(),
+            }),
+            Sense::Contact {
+                zone,
+                reduction,
+                records,
+                shows,
+                ..
+            } => SensorKind::Contact(ContactSensor {
+                zone: zone.as_ref().map(|zone| self.zone(zone)),
+                column: 0,
+                classes: Vec::new(),
+                reduction: *reduction,
+                records: *records,
+                shows: *shows,
+            }),
+            Sense::PotentialEnergy => SensorKind::PotentialEnergy([0.0; 3]),
+            Sense::KineticEnergy => SensorKind::KineticEnergy,
+            Sense::Clock => SensorKind::Clock,
+        }
+    }
+
+    fn zone(&self, zone: &ZonePart) -> Zone<f64> {
+        Zone {
+            site: mounted_on(self.carriers, &zone.site),
+            kind: zone.kind,
+            size: zone.size,
+        }
+    }
+
+    /// First moment of what stands still [kg·m].
+    pub fn static_moment(&self) -> [f64; 3] {
+        let own = &self.frames.bodies[self.first_body..];
+        let fixed = own.iter().filter(|body| body.frame.body.is_none());
+        fixed.fold([0.0; 3], |sum, body| {
+            let base = body
+                .inertial
+                .tree
+                .map_or([0.0; 3], |tree| self.trees[tree].base);
+            std::array::from_fn(|i| sum[i] + body.mass * (base[i] + body.inertial.position[i]))
+        })
+    }
+}
+
+/// Gives potential energies the first moment of what stands still in all models, and limits their ties.
+///
+/// `constraint_of_tie` has the constraint of each tie.
+pub(super) fn finish_sensors(
+    sensors: &mut Sensors<f64>,
+    static_moment: [f64; 3],
+    constraint_of_tie: &[usize],
+) {
+    for sensor in &mut sensors.all {
+        match &mut sensor.kind {
+            SensorKind::PotentialEnergy(moment) => *moment = static_moment,
+            SensorKind::TieLimit(ties, _) => {
+                let constraints = std::mem::take(ties);
+                let own = constraint_of_tie.iter().enumerate();
+                let own = own.filter(|(_, constraint)| constraints.contains(constraint));
+                ties.extend(own.map(|(tie, _)| tie));
+            }
+            _ => {}
+        }
+    }
+}

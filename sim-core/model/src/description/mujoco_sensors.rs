@@ -1,0 +1,142 @@
+//! Sensors of a robot that MuJoCo compiled.
+
+use super::mujoco_frames::OnLink;
+pub use sim_physics::constants::sensors::{FramePart, LimitPart, Reduction, SubtreePart, ZoneKind};
+
+/// The sensors of a robot, in MuJoCo's order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SensorParts {
+    /// All of them.
+    pub all: Vec<Sensor>,
+    /// What is not supported, a sentence each.
+    pub refused: Vec<String>,
+    /// Scalars of all.
+    pub scalars: usize,
+}
+
+/// A sensor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sensor {
+    /// Its name, unique in the robot.
+    pub name: String,
+    /// Its scalars in the robot's `sensordata`.
+    pub place: std::ops::Range<usize>,
+    /// What it measures; none of one that is not supported.
+    pub sense: Option<Sense>,
+    /// Upper bound of its scalars, and whether its negative is the lower one.
+    pub cutoff: Option<(f64, bool)>,
+}
+
+/// What a sensor measures, as [`sim_physics::constants::sensors::SensorKind`] has it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sense {
+    /// A vector of the world in the axes of a frame.
+    Vector(OnLink, [f64; 3]),
+    /// A sum of positions of joints with one dof times coefficients, or its rate of change.
+    Length {
+        /// Indices of joints, each with its coefficient.
+        terms: Vec<(usize, f64)>,
+        /// Is it the rate of change?
+        is_rate: bool,
+    },
+    /// Length of an actuator, or its rate of change.
+    Actuator {
+        /// Its index.
+        actuator: usize,
+        /// Is it the rate of change?
+        is_rate: bool,
+    },
+    /// Quaternion of a ball joint, or its angular velocity.
+    Ball {
+        /// The joint.
+        joint: usize,
+        /// Is it the angular velocity?
+        is_rate: bool,
+    },
+    /// A property of a frame, seen from another one if there is one.
+    Frame {
+        /// Which.
+        part: FramePart,
+        /// The frame.
+        of: OnLink,
+        /// The frame that it is seen from.
+        from: Option<OnLink>,
+        /// Is it given in the axes of the frame itself?
+        is_local: bool,
+    },
+    /// The acceleration of a frame.
+    Acceleration {
+        /// The frame.
+        of: OnLink,
+        /// Is it the angular one?
+        is_angular: bool,
+        /// Is it given in the axes of the frame itself?
+        is_local: bool,
+    },
+    /// A property of a link with all links below it.
+    Subtree(usize, SubtreePart),
+    /// Force or torque between a link and its parent.
+    Wrench {
+        /// Where, and in whose axes.
+        site: OnLink,
+        /// Is it the torque?
+        is_torque: bool,
+    },
+    /// Sum of the forces of actuators.
+    ActuatorForces(Vec<usize>),
+    /// Force of all actuators on a joint with one dof.
+    JointActuatorForce(usize),
+    /// A property of the limit of a joint with one dof.
+    JointLimit(usize, LimitPart),
+    /// A property of a constraint that is the limit of a ball or a tendon; none if it has no limit.
+    ConstraintLimit(Option<usize>, LimitPart),
+    /// Normal forces of the contacts of a link in a zone.
+    Touch(ZonePart),
+    /// Records of the contacts between two objects.
+    Contact {
+        /// Where contacts count, if not everywhere.
+        zone: Option<ZonePart>,
+        /// The first object.
+        first: Touching,
+        /// The second object.
+        second: Touching,
+        /// Which contacts it shows.
+        reduction: Reduction,
+        /// Most contacts that it shows.
+        records: usize,
+        /// What it shows of a contact: count, force, torque, distance, position, normal, tangent.
+        shows: [bool; 7],
+    },
+    /// Potential energy.
+    PotentialEnergy,
+    /// Kinetic energy.
+    KineticEnergy,
+    /// Simulated time.
+    Clock,
+}
+
+/// A solid at a site.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ZonePart {
+    /// The site.
+    pub site: OnLink,
+    /// Its shape.
+    pub kind: ZoneKind,
+    /// As MuJoCo's `site_size` [m].
+    pub size: [f64; 3],
+}
+
+/// What a contact is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Touching {
+    /// Whatever.
+    Anything,
+    /// Whatever is in the zone.
+    InZone,
+    /// A geom.
+    Geom(usize),
+    /// A link.
+    Link(usize),
+    /// A link with all links below it.
+    Subtree(usize),
+}

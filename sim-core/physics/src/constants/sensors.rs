@@ -1,0 +1,284 @@
+//! Sensors of MuJoCo models.
+
+use super::mujoco::Term;
+use super::recast::{Recast, recast, same};
+use super::site::Mount;
+use crate::lane::{Fixed, Real};
+
+recast! {
+    /// Sensors of MuJoCo models in MuJoCo's order, model after model; none for other models.
+    #[derive(Clone, Debug)]
+    pub struct Sensors<R> {
+        /// Those that the physics evaluates.
+        pub all: Vec<Sensor<R>>,
+        /// Scalars of all sensors.
+        pub scalars: usize,
+        /// Most records of a sensor of contacts.
+        pub records: usize,
+        /// Of each pair of shapes: 1 where MuJoCo's normal is ours, else -1; then of each sensor of contacts 1 where our normal
+        /// points from its first object to its second, -1 where it is the other way, 0 where the pair is not of the sensor.
+        pub pairs: Fixed,
+    }
+}
+
+impl<R> Default for Sensors<R> {
+    fn default() -> Sensors<R> {
+        Sensors {
+            all: Vec::new(),
+            scalars: 0,
+            records: 0,
+            pairs: Fixed::default(),
+        }
+    }
+}
+
+recast! {
+    /// A sensor.
+    #[derive(Clone, Debug)]
+    pub struct Sensor<R> {
+        /// What it measures.
+        pub kind: SensorKind<R>,
+        /// Its first scalar.
+        pub first: usize,
+        /// Bounds of its scalars, if it has any.
+        pub cutoff: Option<Cutoff<R>>,
+    }
+}
+
+recast! {
+    /// Bounds of the scalars of a sensor (MuJoCo: `cutoff`).
+    #[derive(Clone, Debug)]
+    pub struct Cutoff<R> {
+        /// Upper bound.
+        pub most: R,
+        /// Is its negative the lower bound?
+        pub is_two_sided: bool,
+    }
+}
+
+/// What a sensor measures.
+#[derive(Clone, Debug)]
+pub enum SensorKind<R> {
+    /// A vector of the world in the axes of a frame (MuJoCo: `magnetometer`).
+    Vector(Mount<R>, [R; 3]),
+    /// A sum of coordinates times coefficients [rad or m].
+    Length(Vec<Term<R>>),
+    /// Its rate of change [rad/s or m/s].
+    Rate(Vec<Term<R>>),
+    /// Length of an actuator [rad or m].
+    ActuatorLength(usize),
+    /// Its rate of change [rad/s or m/s].
+    ActuatorRate(usize),
+    /// The quaternion at a coordinate.
+    BallQuat(usize),
+    /// The angular velocity at a dof [rad/s].
+    BallRate(usize),
+    /// A property of a frame.
+    Frame(FrameSensor<R>),
+    /// The acceleration of a frame, gravity included.
+    Acceleration(AccelerationSensor<R>),
+    /// A property of a body with all bodies below it.
+    Subtree(usize, SubtreePart),
+    /// Force or torque between a body and its parent.
+    Wrench(WrenchSensor<R>),
+    /// Sum of the forces of actuators [N or N·m].
+    ActuatorForces(Vec<usize>),
+    /// Force of all actuators on a dof [N or N·m].
+    DofActuatorForce(usize),
+    /// A property of the limit of a dof.
+    DofLimit(usize, LimitPart),
+    /// A property of the ties that are the limit of a ball or a tendon.
+    TieLimit(Vec<usize>, LimitPart),
+    /// Normal forces of the contacts of a body in a zone [N].
+    Touch(TouchSensor<R>),
+    /// Records of contacts.
+    Contact(ContactSensor<R>),
+    /// Potential energy [J]; the first moment of what stands still [kg·m].
+    PotentialEnergy([R; 3]),
+    /// Kinetic energy [J].
+    KineticEnergy,
+    /// Simulated time [s], which backends write.
+    Clock,
+}
+
+recast! {
+    /// A property of a frame, as seen from another one if there is one.
+    #[derive(Clone, Debug)]
+    pub struct FrameSensor<R> {
+        /// Which property.
+        pub part: FramePart,
+        /// The frame.
+        pub of: Mount<R>,
+        /// The frame that it is seen from, and in whose axes it is given; none for the world.
+        pub from: Option<Mount<R>>,
+        /// Is it given in the axes of the frame itself?
+        pub is_local: bool,
+    }
+}
+
+recast! {
+    /// The acceleration of a frame, gravity included.
+    #[derive(Clone, Debug)]
+    pub struct AccelerationSensor<R> {
+        /// The frame.
+        pub of: Mount<R>,
+        /// Is it the angular one [rad/s²], or that of the origin [m/s²]?
+        pub is_angular: bool,
+        /// Is it given in the axes of the frame itself, or in those of the world?
+        pub is_local: bool,
+    }
+}
+
+recast! {
+    /// Force or torque between a body and its parent, at a site and in its axes.
+    #[derive(Clone, Debug)]
+    pub struct WrenchSensor<R> {
+        /// The site.
+        pub site: Mount<R>,
+        /// The body, among those of MuJoCo models.
+        pub body: usize,
+        /// Is it the torque [N·m], or the force [N]?
+        pub is_torque: bool,
+    }
+}
+
+recast! {
+    /// Normal forces of the contacts of a body whose rays outwards meet a zone.
+    #[derive(Clone, Debug)]
+    pub struct TouchSensor<R> {
+        /// The zone.
+        pub zone: Zone<R>,
+        /// Its column of the table of pairs.
+        pub column: usize,
+        /// Classes of contacts that have any of its pairs.
+        pub classes: Vec<usize>,
+    }
+}
+
+recast! {
+    /// Records of the contacts between two objects.
+    #[derive(Clone, Debug)]
+    pub struct ContactSensor<R> {
+        /// Where contacts count, if not everywhere.
+        pub zone: Option<Zone<R>>,
+        /// Its column of the table of pairs.
+        pub column: usize,
+        /// Classes of contacts that have any of its pairs.
+        pub classes: Vec<usize>,
+        /// Which contacts it shows.
+        pub reduction: Reduction,
+        /// Most contacts that it shows.
+        pub records: usize,
+        /// What it shows of a contact: count, force, torque, distance, position, normal, tangent.
+        pub shows: [bool; 7],
+    }
+}
+
+recast! {
+    /// A solid at a site.
+    #[derive(Clone, Debug)]
+    pub struct Zone<R> {
+        /// The site.
+        pub site: Mount<R>,
+        /// Its shape.
+        pub kind: ZoneKind,
+        /// As MuJoCo's `site_size` [m].
+        pub size: [R; 3],
+    }
+}
+
+/// Shapes of zones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ZoneKind {
+    /// Around the origin.
+    Sphere,
+    /// Along z.
+    Capsule,
+    /// Along the axes.
+    Ellipsoid,
+    /// Along z.
+    Cylinder,
+    /// Along the axes.
+    Box,
+}
+
+/// Which contacts a sensor shows (MuJoCo: `reduce`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reduction {
+    /// The first that are found.
+    First,
+    /// The deepest.
+    LeastDistance,
+    /// Those with the largest forces.
+    LargestForce,
+    /// The sum of all.
+    NetForce,
+}
+
+/// A property of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FramePart {
+    /// Origin [m].
+    Position,
+    /// Orientation, (w, x, y, z).
+    Quat,
+    /// One of its axes.
+    Axis(usize),
+    /// Velocity of the origin [m/s].
+    Velocity,
+    /// Angular velocity [rad/s].
+    Spin,
+}
+
+/// A property of a body with all bodies below it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SubtreePart {
+    /// Centre of mass [m].
+    Center,
+    /// Its velocity [m/s].
+    Velocity,
+    /// Angular momentum about it [kg·m²/s].
+    AngularMomentum,
+}
+
+/// A property of a limit; 0 where it does not act.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LimitPart {
+    /// Distance to where it acts [rad or m].
+    Position,
+    /// Its rate of change [rad/s or m/s].
+    Velocity,
+    /// Force [N·m or N].
+    Force,
+}
+
+impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for SensorKind<R> {
+    type Out = SensorKind<S>;
+    fn recast(&self) -> SensorKind<S> {
+        use SensorKind::*;
+        match self {
+            Vector(mount, vector) => Vector(mount.recast(), vector.recast()),
+            Length(terms) => Length(terms.recast()),
+            Rate(terms) => Rate(terms.recast()),
+            ActuatorLength(actuator) => ActuatorLength(*actuator),
+            ActuatorRate(actuator) => ActuatorRate(*actuator),
+            BallQuat(coord) => BallQuat(*coord),
+            BallRate(dof) => BallRate(*dof),
+            Frame(frame) => Frame(frame.recast()),
+            Acceleration(frame) => Acceleration(frame.recast()),
+            Subtree(body, part) => Subtree(*body, *part),
+            Wrench(wrench) => Wrench(wrench.recast()),
+            ActuatorForces(actuators) => ActuatorForces(actuators.clone()),
+            DofActuatorForce(dof) => DofActuatorForce(*dof),
+            DofLimit(dof, part) => DofLimit(*dof, *part),
+            TieLimit(ties, part) => TieLimit(ties.clone(), *part),
+            Touch(touch) => Touch(touch.recast()),
+            Contact(contact) => Contact(contact.recast()),
+            PotentialEnergy(moment) => PotentialEnergy(moment.recast()),
+            KineticEnergy => KineticEnergy,
+            Clock => Clock,
+        }
+    }
+}
+
+same! { FramePart, SubtreePart, LimitPart, ZoneKind, Reduction }

@@ -1,0 +1,84 @@
+//! Momenta of subtrees of MuJoCo models, for output (MuJoCo: `mj_subtreeVel`).
+//!
+//! ```text
+//! p(b) = m v(x) + Σ p(child)        v(b) = p(b) / M(b)
+//! L(b) = R I Rᵀ ω + m (x - c) × (v(x) - v(b)) + Σ (L(child) + M (c(child) - c) × (v(child) - v(b)))
+//! ```
+//!
+//! x is the body's own centre of mass, c that of its subtree.
+
+use super::mujoco_subtrees::mass;
+use super::sites::{axes, position, reference, velocity};
+use super::{BlockOf, ConstantsOf, Stage};
+use crate::arrays::Array as A;
+use crate::constants::Constants;
+use crate::lane::{Cx, Num, Real};
+use crate::math::spatial::{ANGULAR, LINEAR};
+use crate::math::vec3::Vec3;
+
+/// Mass below which a subtree does not move (MuJoCo: `mjMINVAL`) [kg].
+const MASS_MIN: f64 = 1e-15;
+
+/// Momenta of subtrees.
+pub struct Momenta;
+
+impl Stage for Momenta {
+    const READS: &'static [A] = &[
+        A::Params,
+        A::Rotation,
+        A::Origin,
+        A::Reference,
+        A::Velocity,
+        A::SubtreeCenter,
+        A::SubtreeMass,
+    ];
+    const WRITES: &'static [A] = &[A::SubtreeLinvel, A::SubtreeAngmom];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        !m.mujoco.frames.bodies.is_empty()
+    }
+
+    #[inline(always)]
+    fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        let bodies = &m.mujoco.frames.bodies;
+        // momenta, until the subtree is complete
+        for (k, body) in bodies.iter().enumerate() {
+            let own = velocity(&b.work, &body.inertial, position(&b.work, &body.inertial));
+            b.work.subtree_linvel[k] = own[LINEAR] * mass(m, b, body);
+            // the spin itself turns the body about its centre of mass
+            let turned = axes(&b.work, &body.inertial);
+            let Vec3(spin) = turned.transpose_mul(own[ANGULAR]);
+            let moment = Vec3(std::array::from_fn(|i| spin[i] * C::F::k(body.moments[i])));
+            b.work.subtree_angmom[k] = turned.mul_add(moment, Vec3::zero());
+        }
+        for (k, body) in bodies.iter().enumerate().rev() {
+            let momentum = b.work.subtree_linvel[k];
+            if body.parent != k {
+                let above = b.work.subtree_linvel[body.parent];
+                b.work.subtree_linvel[body.parent] = above + momentum;
+            }
+            let whole = b.work.subtree_mass[k].max(C::F::c(MASS_MIN));
+            b.work.subtree_linvel[k] = momentum * C::F::c(1.0).div(whole);
+        }
+        for (k, body) in bodies.iter().enumerate().rev() {
+            let own = position(&b.work, &body.inertial);
+            let moving = velocity(&b.work, &body.inertial, own)[LINEAR];
+            let mass = mass(m, b, body);
+            let w = &mut b.work;
+            let (center, carried) = (w.subtree_center[k], w.subtree_linvel[k]);
+            let own = (own - center).cross((moving - carried) * mass);
+            w.subtree_angmom[k] = w.subtree_angmom[k] + own;
+            let parent = body.parent;
+            if parent != k {
+                let mut apart = center - w.subtree_center[parent];
+                let above = &bodies[parent].frame;
+                if above.tree != body.frame.tree {
+                    apart = apart + (reference(w, &body.frame) - reference(w, above));
+                }
+                let relative = (carried - w.subtree_linvel[parent]) * w.subtree_mass[k];
+                let whole = w.subtree_angmom[k] + apart.cross(relative);
+                w.subtree_angmom[parent] = w.subtree_angmom[parent] + whole;
+            }
+        }
+    }
+}

@@ -1,0 +1,135 @@
+"""Sensors of random models against MuJoCo's `sensordata`."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from live_model import Live, live
+from random_mjcf import Features, random_mjcf
+from random_sensors import KINDS, add_sensors
+
+import tightloop as tl
+
+TREES = int(os.environ.get("TIGHTLOOP_LIVE_TREES", "48")) // 4
+FORCES = ("cacc", "cfrc_int", "cfrc_ext", "subtree_linvel", "subtree_angmom")
+EVERYTHING = Features(
+    free=True,
+    ball=True,
+    several=True,
+    reference=True,
+    springs=True,
+    limits=True,
+    friction=True,
+    armature=True,
+    damping=True,
+    equalities=True,
+    connections=True,
+    actuators=True,
+    tendons=True,
+    pulls=True,
+    bounds=True,
+)
+TOUCHING = replace(EVERYTHING, geoms=True, equalities=False, connections=False)
+
+
+def model_of(seed: int, features: Features) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(add_sensors(random_mjcf(seed, 2 + seed % 6, features), seed, 3))
+
+
+def kind_of(model: mujoco.MjModel, sensor: int) -> str:
+    return mujoco.mjtSensor(model.sensor_type[sensor]).name
+
+
+def assert_sensors(case: Live, seed: int, tolerance: float) -> set[str]:
+    """Compare all sensors at random states, relative to the largest value of the type; return the types that were not 0."""
+    states = case.states(seed)
+    frame = case.place(states)
+    model, shown = case.model, set()
+    for world, data in enumerate(case.data(states)):
+        data.time = frame.time[world]
+        mujoco.mj_forward(model, data)
+        kinds = np.repeat(model.sensor_type, model.sensor_dim)
+        assert frame.sensordata[world].shape == data.sensordata.shape
+        for sensor in range(model.nsensor):
+            own = slice(model.sensor_adr[sensor], model.sensor_adr[sensor] + model.sensor_dim[sensor])
+            expected, found = data.sensordata[own], frame.sensordata[world, own]
+            alike = data.sensordata[kinds == model.sensor_type[sensor]]
+            scale = max(1.0, np.abs(alike).max())
+            error = np.abs(found - expected).max() / scale
+            name = kind_of(model, sensor)
+            assert error < tolerance, f"world {world}, {name} {sensor}: {found}, not {expected}"
+            if expected.any():
+                shown.add(name)
+    return shown
+
+
+@pytest.mark.parametrize("seed", range(TREES))
+def test_sensors_are_mujocos(seed: int) -> None:
+    with live(model_of(seed, EVERYTHING), fields=("sensordata", *FORCES)) as case:
+        assert_sensors(case, seed, 1e-8)
+
+
+@pytest.mark.parametrize("seed", range(TREES))
+def test_forces_between_bodies_are_mujocos(seed: int) -> None:
+    with live(random_mjcf(seed, 2 + seed % 6, EVERYTHING), fields=FORCES) as case:
+        states = case.states(seed)
+        frame = case.place(states)
+        for world, data in enumerate(case.data(states)):
+            mujoco.mj_forward(case.model, data)
+            mujoco.mj_rnePostConstraint(case.model, data)
+            mujoco.mj_subtreeVel(case.model, data)
+            for name in FORCES:
+                expected, found = getattr(data, name), getattr(frame, name)[world]
+                error = np.abs(found - expected).max() / max(1.0, np.abs(expected).max())
+                assert error < 1e-8, f"{name}: {error}"
+
+
+@pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
+@pytest.mark.parametrize("seed", range(TREES // 2))
+def test_sensors_feel_contacts(seed: int, cone: str) -> None:
+    model = model_of(seed, replace(TOUCHING, option=f'cone="{cone}"'))
+    with live(model, fields=("sensordata", "contact_count")) as case:
+        assert_sensors(case, seed, 1e-6)
+
+
+@pytest.mark.parametrize("seed", range(TREES // 2))
+def test_sensors_in_single_precision_are_near(seed: int) -> None:
+    with live(model_of(seed, EVERYTHING), fields=("sensordata",), precision="f32") as case:
+        assert_sensors(case, seed, 1e-3)
+
+
+def test_every_type_of_sensor_appears_and_is_not_zero() -> None:
+    shown: set[str] = set()
+    for seed in range(8):
+        with live(model_of(seed, EVERYTHING), fields=("sensordata",)) as case:
+            case.sim.step()
+            shown |= assert_sensors(case, seed, 1e-8)
+    names = {name.removeprefix("mjSENS_").lower() for name in shown}
+    wanted = {kind.replace("actuatorfrc", "actfrc") for kind in KINDS if kind != "actuatorfrc"} | {"actuatorfrc"}
+    assert wanted <= names, wanted - names
+
+
+def test_sensors_have_names_and_columns() -> None:
+    xml = """<mujoco model="arm"><worldbody><body name="b"><joint name="j"/><geom size=".1"/><site name="s"/></body>
+    </worldbody><sensor><gyro name="imu" site="s"/><jointpos joint="j"/></sensor></mujoco>"""
+    scene = tl.Scene.from_mujoco(mujoco.MjModel.from_xml_string(xml))
+    with tl.launch(scene, worlds=2, fields=("sensordata",)) as sim:
+        assert sim.sensor_names == ["arm/imu", "arm/sensor1"]
+        assert sim.sensors["arm/imu"] == sim.sensors["imu"] == slice(0, 3)
+        assert sim.sensors["sensor1"] == slice(3, 4)
+        assert sim.step().sensordata.shape == (2, 4)
+
+
+def test_sensors_that_are_not_supported_are_named_where_their_field_is_wanted() -> None:
+    xml = """<mujoco model="arm"><worldbody><geom name="g" size=".1"/><body><joint name="j"/><geom name="h" size=".1"/>
+    </body></worldbody><sensor><jointpos joint="j"/><user name="own" dim="2"/></sensor></mujoco>"""
+    scene = tl.Scene.from_mujoco(mujoco.MjModel.from_xml_string(xml))
+    assert any("sensor `own`: no support for user" in note for note in scene.models["arm"].notes)
+    with tl.launch(scene, worlds=1, fields=("qpos",)) as sim:
+        sim.step()
+    with pytest.raises(tl.TightloopError, match=r"sensordata.*sensor `own`: no support for user"):
+        tl.launch(scene, worlds=1, fields=("sensordata",))
