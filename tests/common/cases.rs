@@ -42,7 +42,7 @@ struct Near {
 }
 
 /// All of them.
-pub fn cases() -> [Case; 9] {
+pub fn cases() -> [Case; 10] {
     [
         fr3(),
         every_joint(),
@@ -53,23 +53,36 @@ pub fn cases() -> [Case; 9] {
         every_param(),
         mujoco("implicit"),
         mujoco("runge_kutta"),
+        sensors(),
     ]
 }
 
 /// What only MuJoCo models have: an implicit step with elliptic cones, or a Runge-Kutta step with pyramidal ones.
 pub fn mujoco(name: &'static str) -> Case {
+    let case = of_mujoco(name);
+    let m = &case.m;
+    assert!(m.contacts.classes.iter().any(|class| class.turns.is_some()));
+    assert!(m.mujoco.impedances.len() > 1 && !m.mujoco.springs.is_empty());
+    case
+}
+
+/// A sensor of every type.
+pub fn sensors() -> Case {
+    let case = of_mujoco("sensors");
+    assert!(case.m.mujoco.sensors.all.len() > 40 && case.m.mujoco.sensors.records > 1);
+    case
+}
+
+fn of_mujoco(name: &'static str) -> Case {
     let path = repository()
         .join("sim-core/stages/recorded/tests/record_stages")
         .join(name)
         .with_extension("safetensors");
     let scene = Description::from_mujoco(path, MujocoOptions::named("every")).unwrap();
     let model = scene.compile().unwrap();
-    let m = constants(&model);
-    assert!(m.contacts.classes.iter().any(|class| class.turns.is_some()));
-    assert!(m.mujoco.impedances.len() > 1 && !m.mujoco.springs.is_empty());
     Case {
         name,
-        m,
+        m: constants(&model),
         near: Some(Near {
             joint_q: model.start().joint_q.clone(),
             share: 1.2,

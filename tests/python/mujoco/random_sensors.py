@@ -8,7 +8,7 @@ import numpy as np
 
 FRAMES = ("framepos", "framequat", "framexaxis", "frameyaxis", "framezaxis", "framelinvel", "frameangvel")
 ACCELERATIONS = ("framelinacc", "frameangacc")
-ON_SITES = ("accelerometer", "velocimeter", "gyro", "force", "torque", "magnetometer")
+ON_SITES = ("rangefinder", "accelerometer", "velocimeter", "gyro", "force", "torque", "magnetometer")
 ON_BODIES = ("subtreecom", "subtreelinvel", "subtreeangmom")
 LIMITS = ("limitpos", "limitvel", "limitfrc")
 #: Types that `add_sensors` may add.
@@ -22,10 +22,39 @@ KINDS = (
     *"actuatorpos actuatorvel actuatorfrc clock e_potential e_kinetic".split(),
 )
 
+#: Types that it adds where geoms touch.
+TOUCHES = ("touch", "contact")
+_DATA = ("found", "force", "torque", "dist", "pos", "normal", "tangent")
 
-def add_sensors(text: str, seed: int, count: int) -> str:
+
+def add_sensors(text: str, seed: int, count: int, kinds: tuple[str, ...] = (*KINDS, *TOUCHES)) -> str:
     """Return the XML of a model with sensors of every kind that fits it, ``count`` of each, and two cameras."""
-    return _Sensors(text, seed).text(count)
+    return _Sensors(text, seed).text(count, kinds)
+
+
+def heap(seed: int, option: str) -> str:
+    """Return the XML of bodies with spheres and capsules that overlap each other and a plane."""
+    rng = np.random.default_rng(seed)
+
+    def numbers(count: int, low: float, high: float) -> str:
+        return " ".join(map(repr, rng.uniform(low, high, count).tolist()))
+
+    def geoms() -> str:
+        text = ""
+        for _ in range(2):
+            kind, size = (("sphere", 1), ("capsule", 2))[rng.integers(2)]
+            text += f'<geom type="{kind}" size="{numbers(size, 0.08, 0.2)}" pos="{numbers(3, -0.15, 0.15)}" '
+            text += f'condim="{rng.choice([1, 3, 4, 6])}" friction="{numbers(3, 0.2, 1)}" margin="0.02"/>'
+        return text
+
+    bodies = ""
+    for k in range(4):
+        site = f'<site name="s{k}" pos="{numbers(3, -0.2, 0.2)}" quat="{numbers(4, -1, 1)}"/>'
+        arm = f'<body name="arm{k}" pos="{numbers(3, -0.2, 0.2)}"><joint axis="{numbers(3, -1, 1)}"/>{geoms()}</body>'
+        pos = f'pos="{numbers(3, -0.2, 0.2)}"'
+        bodies += f'<body name="b{k}" {pos}><freejoint name="j{k}"/>{geoms()}{site}{arm}</body>'
+    plane = '<geom type="plane" size="5 5 .1" pos="0 0 -.1"/>'
+    return f"<mujoco><option {option}/><worldbody>{plane}{bodies}</worldbody></mujoco>"
 
 
 class _Sensors:
@@ -40,10 +69,16 @@ class _Sensors:
             self.place(ET.SubElement(body, "camera", name=f"cam{k}"))
         if world.find("geom") is None:
             for k, body in enumerate(bodies):
-                self.place(ET.SubElement(body, "geom", name=f"look{k}", size=".05", contype="0", conaffinity="0", mass="0"))
+                self.place(
+                    ET.SubElement(body, "geom", name=f"look{k}", size=".05", contype="0", conaffinity="0", mass="0")
+                )
+        self.touches = any(geom.get("contype") != "0" for geom in world.iter("geom"))
         for k, geom in enumerate(world.iter("geom")):
             geom.set("name", geom.get("name", f"geom{k}"))
         self.place(ET.SubElement(world, "site", name="here"))
+        for site in world.iter("site"):
+            site.set("type", str(self.rng.choice(["sphere", "capsule", "ellipsoid", "cylinder", "box"])))
+            site.set("size", " ".join(map(repr, self.rng.uniform(0.1, 0.5, 3).tolist())))
         option = self.root.find("option")
         assert option is not None
         option.set("magnetic", "0.1 -0.2 0.4")
@@ -68,15 +103,15 @@ class _Sensors:
         element.set("pos", " ".join(map(repr, self.rng.uniform(-0.3, 0.3, 3).tolist())))
         element.set("quat", " ".join(map(repr, self.rng.uniform(-1, 1, 4).tolist())))
 
-    def text(self, count: int) -> str:
+    def text(self, count: int, kinds: tuple[str, ...]) -> str:
         section = ET.SubElement(self.root, "sensor")
-        for kind in KINDS:
+        for kind in kinds if self.touches else (kind for kind in kinds if kind not in TOUCHES):
             for _ in range(count):
                 attributes = self.attributes(kind)
                 if attributes is not None:
                     self.added += 1
                     element = ET.SubElement(section, kind, name=f"x{self.added}", **attributes)
-                    if not kind.endswith(("axis", "quat")) and self.rng.random() < 0.2:
+                    if kind != "contact" and not kind.endswith(("axis", "quat")) and self.rng.random() < 0.2:
                         element.set("cutoff", repr(self.rng.uniform(0.01, 1.0)))
         return ET.tostring(self.root, encoding="unicode")
 
@@ -89,7 +124,9 @@ class _Sensors:
         if kind in FRAMES or kind in ACCELERATIONS:
             seen = kind in FRAMES and self.rng.random() < 0.6
             return self.object("obj") | (self.object("ref") if seen else {})
-        if kind in ON_SITES:
+        if kind == "contact":
+            return self.contact()
+        if kind in ON_SITES or kind == "touch":
             return {"site": str(self.rng.choice(self.names["site"]))}
         if kind in ON_BODIES:
             return {"body": str(self.rng.choice(self.names["body"]))}
@@ -103,6 +140,21 @@ class _Sensors:
             ("actuator", self.actuators),
         ):
             if kind.startswith(what):
-                what = "joint" if what == "ball" else what.removesuffix("limit")
-                return {what: str(self.rng.choice(names))} if names else None
+                own = "joint" if what == "ball" else what.removesuffix("limit")
+                return {own: str(self.rng.choice(names))} if names else None
         raise AssertionError(kind)
+
+    def contact(self) -> dict[str, str]:
+        """Attributes of a sensor of contacts."""
+        rng = self.rng
+        attributes = {}
+        for number, kinds in ((1, ("site", "body", "subtree", "geom", "")), (2, ("body", "subtree", "geom", "", ""))):
+            kind = str(rng.choice(kinds))
+            if kind:
+                names = self.names["body" if kind == "subtree" else kind]
+                attributes["site" if kind == "site" else f"{kind}{number}"] = str(rng.choice(names))
+        reduction = str(rng.choice(["none", "mindist", "maxforce", "netforce"]))
+        # the order of the first contacts is not MuJoCo's: there the count says whether all are shown
+        chosen = [part for part in _DATA if rng.random() < 0.6 or (part, reduction) == ("found", "none")]
+        number = rng.integers(1, 5) if reduction != "none" else 6
+        return attributes | {"data": " ".join(chosen or ["found"]), "num": str(number), "reduce": reduction}

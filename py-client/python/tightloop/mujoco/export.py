@@ -45,7 +45,8 @@ _ARRAYS = """
     actuator_dynprm actuator_group jnt_actgravcomp body_mocapid pair_dim pair_geom1 pair_geom2 pair_solref
     pair_solreffriction pair_solimp pair_margin pair_gap pair_friction
     key_time key_qpos key_qvel key_act key_ctrl key_mpos key_mquat
-    cam_bodyid cam_pos cam_quat site_size sensor_adr sensor_dim sensor_objid sensor_refid sensor_cutoff
+    cam_bodyid cam_pos cam_quat geom_matid geom_rgba mat_rgba site_size sensor_adr sensor_dim sensor_objid
+    sensor_refid sensor_cutoff
 """.split()
 # Arrays of newer versions; where they are missing, no model has what they describe.
 _NEWER_ARRAYS = """

@@ -411,6 +411,7 @@ impl BodyBuilder {
             first_body,
             first_actuator,
             first_constraint,
+            first_ray_geom: self.mujoco.sensors.geoms.len(),
         };
         let moment = scope.static_moment();
         for (sum, x) in self.static_moment.iter_mut().zip(moment) {

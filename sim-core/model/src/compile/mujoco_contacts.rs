@@ -3,6 +3,7 @@
 use super::contact_pieces::PlacedShape;
 use crate::description::{Description, MujocoParts, Sense, Shape, Touching};
 use sim_physics::constants::Constants;
+use sim_physics::constants::contact::{Contacts, Kind};
 use sim_physics::constants::sensors::SensorKind;
 use sim_physics::lane::Fixed;
 use std::collections::BTreeSet;
@@ -119,6 +120,7 @@ pub(super) fn add_contact_sensors(
                     (contact.column, contact.classes) =
                         (columns.len(), classes.into_iter().collect());
                     records = records.max(contact.records);
+                    contact.capsules = capsules(&constants.contacts, &senses);
                 }
                 _ => {}
             }
@@ -137,6 +139,20 @@ pub(super) fn add_contact_sensors(
     constants.contacts.tables.numbers.extend(numbers);
     constants.mujoco.sensors.pairs = table;
     constants.mujoco.sensors.records = records;
+}
+
+/// Pairs of a plane and a capsule that a sensor is of, each with the capsule among the solids.
+fn capsules(contacts: &Contacts<f64>, senses: &[f64]) -> Vec<(usize, usize)> {
+    let Some(group) = contacts.group((Kind::Plane, Kind::Capsule)) else {
+        return Vec::new();
+    };
+    let own = (group.first..group.end).filter(|&pair| senses[pair] != 0.0);
+    let solid = |pair: usize| {
+        let shapes = contacts.pairs[pair].shapes;
+        let mut solids = contacts.solids.iter();
+        solids.position(|solid| solid.kind == Kind::Capsule && shapes.contains(&solid.shape))
+    };
+    own.filter_map(|pair| Some((pair, solid(pair)?))).collect()
 }
 
 /// The shapes of a scene, by their numbers.

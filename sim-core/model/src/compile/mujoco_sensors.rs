@@ -6,7 +6,7 @@ use super::ties::terms;
 use crate::description::{Sense, SensorParts, ZonePart};
 use sim_physics::constants::mujoco_frames::MujocoFrames;
 use sim_physics::constants::sensors::{
-    AccelerationSensor, ContactSensor, Cutoff, FrameSensor, Sensor, SensorKind, Sensors,
+    AccelerationSensor, ContactSensor, Cutoff, FrameSensor, RayGeom, Sensor, SensorKind, Sensors,
     TouchSensor, WrenchSensor, Zone,
 };
 use sim_physics::constants::{Dof, Tree};
@@ -26,11 +26,18 @@ pub(super) struct Scope<'a> {
     pub first_actuator: usize,
     /// Its first constraint.
     pub first_constraint: usize,
+    /// Its first geom among those that rangefinders see.
+    pub first_ray_geom: usize,
 }
 
 /// Adds the sensors of a model. Until ties are known, limits name constraints.
 pub(super) fn add_sensors(sensors: &mut Sensors<f64>, parts: &SensorParts, scope: &Scope<'_>) {
     let first = sensors.scalars;
+    sensors.geoms.extend(parts.geoms.iter().map(|geom| RayGeom {
+        at: mounted_on(scope.carriers, &geom.on),
+        kind: geom.kind,
+        size: geom.size,
+    }));
     for sensor in &parts.all {
         let Some(sense) = &sensor.sense else { continue };
         sensors.all.push(Sensor {
@@ -125,7 +132,12 @@ impl Scope<'_> {
                 reduction: *reduction,
                 records: *records,
                 shows: *shows,
+                capsules: Vec::new(),
             }),
+            Sense::Range(site, geoms) => {
+                let own = geoms.iter().map(|geom| self.first_ray_geom + geom);
+                SensorKind::Range(mount(site), own.collect())
+            }
             Sense::PotentialEnergy => SensorKind::PotentialEnergy([0.0; 3]),
             Sense::KineticEnergy => SensorKind::KineticEnergy,
             Sense::Clock => SensorKind::Clock,

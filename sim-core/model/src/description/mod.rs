@@ -25,8 +25,8 @@ pub use mujoco::{
 pub use mujoco_constraints::{Constraint, ConstraintLaw, Measure, Tendon};
 pub use mujoco_frames::{FrameParts, Inertia, OnLink};
 pub use mujoco_sensors::{
-    FramePart, LimitPart, Reduction, Sense, Sensor, SensorParts, SubtreePart, Touching, ZoneKind,
-    ZonePart,
+    FramePart, LimitPart, RayPart, Reduction, Sense, Sensor, SensorParts, SubtreePart, Touching,
+    ZoneKind, ZonePart,
 };
 pub use param_draws::ParamDraw;
 pub(crate) use robot::BODY_LINK;

@@ -12,6 +12,8 @@ pub struct SensorParts {
     pub refused: Vec<String>,
     /// Scalars of all.
     pub scalars: usize,
+    /// Geoms that rangefinders see.
+    pub geoms: Vec<RayPart>,
 }
 
 /// A sensor.
@@ -107,6 +109,8 @@ pub enum Sense {
         /// What it shows of a contact: count, force, torque, distance, position, normal, tangent.
         shows: [bool; 7],
     },
+    /// Distance from a site along its z axis to the nearest of some of [`SensorParts::geoms`].
+    Range(OnLink, Vec<usize>),
     /// Potential energy.
     PotentialEnergy,
     /// Kinetic energy.
@@ -123,6 +127,17 @@ pub struct ZonePart {
     /// Its shape.
     pub kind: ZoneKind,
     /// As MuJoCo's `site_size` [m].
+    pub size: [f64; 3],
+}
+
+/// A geom that rangefinders see.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayPart {
+    /// Its frame.
+    pub on: OnLink,
+    /// Its shape; none for a plane.
+    pub kind: Option<ZoneKind>,
+    /// As MuJoCo's `geom_size` [m].
     pub size: [f64; 3],
 }
 

@@ -18,6 +18,21 @@ recast! {
         /// Of each pair of shapes: 1 where MuJoCo's normal is ours, else -1; then of each sensor of contacts 1 where our normal
         /// points from its first object to its second, -1 where it is the other way, 0 where the pair is not of the sensor.
         pub pairs: Fixed,
+        /// What rangefinders see.
+        pub geoms: Vec<RayGeom<R>>,
+    }
+}
+
+recast! {
+    /// A geom that rangefinders see.
+    #[derive(Clone, Debug)]
+    pub struct RayGeom<R> {
+        /// Its frame.
+        pub at: Mount<R>,
+        /// Its shape; none for a plane.
+        pub kind: Option<ZoneKind>,
+        /// As MuJoCo's `geom_size` [m].
+        pub size: [R; 3],
     }
 }
 
@@ -28,6 +43,7 @@ impl<R> Default for Sensors<R> {
             scalars: 0,
             records: 0,
             pairs: Fixed::default(),
+            geoms: Vec::new(),
         }
     }
 }
@@ -93,6 +109,8 @@ pub enum SensorKind<R> {
     Touch(TouchSensor<R>),
     /// Records of contacts.
     Contact(ContactSensor<R>),
+    /// Distance from a site along its z axis to the nearest of some geoms, or -1 [m].
+    Range(Mount<R>, Vec<usize>),
     /// Potential energy [J]; the first moment of what stands still [kg·m].
     PotentialEnergy([R; 3]),
     /// Kinetic energy [J].
@@ -171,6 +189,8 @@ recast! {
         pub records: usize,
         /// What it shows of a contact: count, force, torque, distance, position, normal, tangent.
         pub shows: [bool; 7],
+        /// Its pairs of a plane and a capsule, each with the capsule among the solids: their first tangent is along it.
+        pub capsules: Vec<(usize, usize)>,
     }
 }
 
@@ -274,6 +294,7 @@ impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for SensorKind<R> {
             TieLimit(ties, part) => TieLimit(ties.clone(), *part),
             Touch(touch) => Touch(touch.recast()),
             Contact(contact) => Contact(contact.recast()),
+            Range(site, geoms) => Range(site.recast(), geoms.clone()),
             PotentialEnergy(moment) => PotentialEnergy(moment.recast()),
             KineticEnergy => KineticEnergy,
             Clock => Clock,

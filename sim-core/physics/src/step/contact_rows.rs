@@ -363,7 +363,7 @@ fn shared<C: Cx>(
 /// Two unit vectors across the normal, as MuJoCo's `mju_makeFrame` chooses them: the first is along a direction if one is
 /// given, else along y, or along z where the normal is near y.
 #[inline(always)]
-fn tangents<F: Num>(normal: Vec3<F>, along: Option<Vec3<F>>) -> [Vec3<F>; 2] {
+pub(super) fn tangents<F: Num>(normal: Vec3<F>, along: Option<Vec3<F>>) -> [Vec3<F>; 2] {
     let (zero, one) = (F::c(0.0), F::c(1.0));
     let steep = normal[1].abs().lt(F::c(0.5));
     let axis = Vec3([

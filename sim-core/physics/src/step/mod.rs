@@ -115,6 +115,7 @@ macro_rules! every_stage {
             sensor_imu         [sensors::Accelerations]      Evaluation;
             sensor_wrenches    [sensors::Wrenches]           Evaluation;
             sensor_contacts    [sensors::Contacts]           Evaluation;
+            sensor_rays        [sensors::Rays]               Evaluation;
         }
     };
 }

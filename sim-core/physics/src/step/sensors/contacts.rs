@@ -10,6 +10,8 @@
 //! ```text
 //! force = (n · F, s t₁ · F, d t₂ · F)
 //! ```
+//!
+//! Tangents are MuJoCo's: with elliptic cones the solver has others, and none without friction.
 
 use super::zone::{holds, meets};
 use super::{has, put, put_at};
@@ -20,7 +22,7 @@ use crate::constants::sensors::{ContactSensor, Reduction, Sensor, SensorKind, To
 use crate::each;
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
-use crate::step::contact_rows::class_list;
+use crate::step::contact_rows::{class_list, tangents};
 use crate::step::sites::{position, reference, to_local};
 use crate::step::{BlockOf, ConstantsOf, Stage};
 
@@ -154,6 +156,37 @@ fn touched<C: Cx>(
     cx.get(&sum)
 }
 
+/// Gives a contact MuJoCo's tangents.
+#[inline(always)]
+fn turn<F: Num, V>(
+    m: &Constants<F::Real>,
+    b: &crate::arrays::Block<F, V>,
+    sensor: &ContactSensor<F::Real>,
+    pair: F,
+    own: &mut Contact<F>,
+) {
+    let mut along = None;
+    for &(number, solid) in &sensor.capsules {
+        let solid = &m.contacts.solids[solid];
+        let axis = Vec3::constant(solid.axes[2]);
+        let axis = match solid.body {
+            Some(body) => b.work.rotation[body] * axis,
+            None => axis,
+        };
+        let is_it = (pair - F::c(number as f64)).abs().lt(F::c(0.5));
+        let before = along.unwrap_or(Vec3::zero());
+        along = Some(Vec3(std::array::from_fn(|i| {
+            F::select(is_it, axis[i], before[i])
+        })));
+    }
+    let normal = own.frame[0];
+    let [first, second] = tangents(normal, along);
+    let frame = Mat3([normal, first, second]);
+    let turned = |v: Vec3<F>| frame.transpose_mul(own.frame.mul_add(v, Vec3::zero()));
+    (own.force, own.torque) = (turned(own.force), turned(own.torque));
+    own.frame = frame;
+}
+
 /// The worlds in which a contact is one of a sensor's.
 #[inline(always)]
 fn matches<C: Cx>(
@@ -208,7 +241,9 @@ fn records<C: Cx>(
     for &class in &own.classes {
         let list = class_list(cx, &m.contacts, class);
         each!(cx, r in list, {
-            let contact = contact(cx, m, b, (class, own.column), r);
+            let mut contact = contact(cx, m, b, (class, own.column), r);
+            let pair = cx.load(m.contacts.memory.rows, r, row::PAIR);
+            turn(m, b, own, pair, &mut contact);
             let is_found = matches::<C>(b, own, &contact);
             let key = match own.reduction {
                 Reduction::LeastDistance => contact.distance,

@@ -5,11 +5,13 @@
 
 pub mod contacts;
 mod forces;
+mod rays;
 mod states;
 mod zone;
 
 pub use contacts::Contacts;
 pub use forces::{Accelerations, Energies, Forces, Wrenches};
+pub use rays::Rays;
 pub use states::{States, Subtrees};
 
 use crate::constants::Constants;

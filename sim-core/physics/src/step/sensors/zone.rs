@@ -1,6 +1,6 @@
-//! Zones of touch and contact sensors: the solids of sites (MuJoCo: `mju_rayGeom`, `mju_insideGeom`).
+//! Rays and solids: zones of sensors at sites, and geoms that rangefinders see (MuJoCo: `mju_rayGeom`, `mju_insideGeom`).
 //!
-//! A ray p + t d, t ≥ 0, meets a solid where the intervals of t in its parts have a common point.
+//! A ray p + t d, t ≥ 0, is in a solid for an interval of t: the part that those of its slabs and quadrics share.
 
 use crate::constants::sensors::{Zone, ZoneKind};
 use crate::lane::Num;
@@ -28,6 +28,23 @@ impl<F: Num> Span<F> {
         }
     }
 
+    /// The least interval that has both, one of which may be empty.
+    #[inline(always)]
+    fn or(self, other: Span<F>) -> Span<F> {
+        let (far, none) = (F::c(FAR), F::c(-FAR));
+        let [one, two] = [self, other].map(|span| {
+            let is_empty = span.last.lt(span.first);
+            Span {
+                first: F::select(is_empty, far, span.first),
+                last: F::select(is_empty, none, span.last),
+            }
+        });
+        Span {
+            first: one.first.min(two.first),
+            last: one.last.max(two.last),
+        }
+    }
+
     /// Has it a point at t ≥ 0?
     #[inline(always)]
     fn is_ahead(self) -> F::Mask {
@@ -38,23 +55,43 @@ impl<F: Num> Span<F> {
 /// Does a ray meet the zone? Both in its axes, the direction of length 1.
 #[inline(always)]
 pub(super) fn meets<F: Num>(zone: &Zone<F::Real>, point: Vec3<F>, along: Vec3<F>) -> F::Mask {
-    let [a, b, c] = zone.size.map(F::k);
-    match zone.kind {
-        ZoneKind::Sphere => ball(point, along, a).is_ahead(),
+    inside(zone.kind, zone.size, point, along).is_ahead()
+}
+
+/// Distance along a ray to a solid, both in its axes, the direction of length 1: to where the ray enters it or, from inside,
+/// leaves it; -1 where it does not meet it.
+#[inline(always)]
+pub(super) fn distance<F: Num>(
+    kind: ZoneKind,
+    size: [F::Real; 3],
+    point: Vec3<F>,
+    along: Vec3<F>,
+) -> F {
+    let Span { first, last } = inside(kind, size, point, along);
+    let ahead = Span { first, last }.is_ahead();
+    let nearest = F::select(first.lt(F::c(0.0)), last, first);
+    F::select(ahead, nearest, F::c(-1.0))
+}
+
+/// The interval in which a ray is in a solid.
+#[inline(always)]
+fn inside<F: Num>(kind: ZoneKind, size: [F::Real; 3], point: Vec3<F>, along: Vec3<F>) -> Span<F> {
+    let [a, b, c] = size.map(F::k);
+    match kind {
+        ZoneKind::Sphere => ball(point, along, a),
         ZoneKind::Ellipsoid => {
             let scale = |v: Vec3<F>| Vec3([v[0].div(a), v[1].div(b), v[2].div(c)]);
-            ball(scale(point), scale(along), F::c(1.0)).is_ahead()
+            ball(scale(point), scale(along), F::c(1.0))
         }
         ZoneKind::Box => {
             let [x, y, z] = [(0, a), (1, b), (2, c)].map(|(i, h)| slab(point[i], along[i], h));
-            x.and(y).and(z).is_ahead()
+            x.and(y).and(z)
         }
-        ZoneKind::Cylinder => tube(point, along, a, b).is_ahead(),
+        ZoneKind::Cylinder => tube(point, along, a, b),
         ZoneKind::Capsule => {
-            let end = |sign: f64| Vec3([point[0], point[1], point[2] - b * F::c(sign)]);
-            tube(point, along, a, b).is_ahead()
-                | ball(end(1.0), along, a).is_ahead()
-                | ball(end(-1.0), along, a).is_ahead()
+            let end = |sign: f64| Vec3([point[0], point[1], b.fnma(F::c(sign), point[2])]);
+            let ends = [1.0, -1.0].map(|sign| ball(end(sign), along, a));
+            tube(point, along, a, b).or(ends[0]).or(ends[1])
         }
     }
 }

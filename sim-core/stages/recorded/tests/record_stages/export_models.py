@@ -19,3 +19,5 @@ for name, (integrator, cone) in OPTIONS.items():
     model.opt.integrator = mujoco.mjtIntegrator.__members__[integrator]
     model.opt.cone = mujoco.mjtCone.__members__[cone]
     export.export(model, FOLDER / f"{name}.safetensors")
+
+export.export(FOLDER / "every_sensor.xml", FOLDER / "sensors.safetensors")

@@ -309,6 +309,7 @@ fn what_a_stage_does_not_name_it_neither_reads_nor_writes() {
         arm_and_cube(),
         cases::mujoco("implicit"),
         cases::mujoco("runge_kutta"),
+        cases::sensors(),
     ] {
         let m = &case.m;
         let mut random = toy::Random(3);

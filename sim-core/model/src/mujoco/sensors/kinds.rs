@@ -1,0 +1,136 @@
+//! What sensors measure, by their types.
+
+use super::{Reader, Sensed};
+use crate::description::{FramePart, LimitPart, Sense, SubtreePart};
+
+impl Reader<'_> {
+    /// What sensor `k` measures.
+    pub(super) fn sense(&self, k: usize) -> Sensed {
+        if self.late[k] {
+            return Ok(Err("a delay or an interval".to_owned()));
+        }
+        let kind = self.kinds[k].strip_prefix("mjSENS_").unwrap_or("");
+        let sense = match kind {
+            "MAGNETOMETER" => {
+                let vector = self.file.vectors::<3>("opt.magnetic", 1)?[0];
+                Sense::Vector(self.site(k)?, vector)
+            }
+            "JOINTPOS" | "JOINTVEL" => Sense::Length {
+                terms: vec![(self.scalar_joint(k)?, 1.0)],
+                is_rate: kind == "JOINTVEL",
+            },
+            "TENDONPOS" | "TENDONVEL" => match self.tendon(k)? {
+                Some(terms) => Sense::Length {
+                    terms: terms.to_vec(),
+                    is_rate: kind == "TENDONVEL",
+                },
+                None => return Ok(Err("spatial tendons".to_owned())),
+            },
+            "ACTUATORPOS" | "ACTUATORVEL" => Sense::Actuator {
+                actuator: self.actuator(k)?,
+                is_rate: kind == "ACTUATORVEL",
+            },
+            "ACTUATORFRC" => Sense::ActuatorForces(vec![self.actuator(k)?]),
+            "JOINTACTFRC" => Sense::JointActuatorForce(self.scalar_joint(k)?),
+            "TENDONACTFRC" => Sense::ActuatorForces(self.actuators_of_tendon(k)?),
+            "BALLQUAT" | "BALLANGVEL" => Sense::Ball {
+                joint: self.joint(k)?,
+                is_rate: kind == "BALLANGVEL",
+            },
+            "E_POTENTIAL" => Sense::PotentialEnergy,
+            "E_KINETIC" => Sense::KineticEnergy,
+            "CLOCK" => Sense::Clock,
+            "FORCE" | "TORQUE" => Sense::Wrench {
+                site: self.site(k)?,
+                is_torque: kind == "TORQUE",
+            },
+            "VELOCIMETER" | "GYRO" => Sense::Frame {
+                part: match kind {
+                    "GYRO" => FramePart::Spin,
+                    _ => FramePart::Velocity,
+                },
+                of: self.site(k)?,
+                from: None,
+                is_local: true,
+            },
+            "TOUCH" => Sense::Touch(self.zone(k)?),
+            "CONTACT" => self.contact(k)?,
+            "RANGEFINDER" => return self.range(k),
+            "ACCELEROMETER" => Sense::Acceleration {
+                of: self.site(k)?,
+                is_angular: false,
+                is_local: true,
+            },
+            _ => match (limit_part(kind), subtree_part(kind)) {
+                (Some((part, false)), _) => self.joint_limit(k, part)?,
+                (Some((part, true)), _) => self.tendon_limit(k, part)?,
+                (_, Some(part)) => Sense::Subtree(self.index(k, self.robot.links.len())?, part),
+                _ => return self.frame_sense(k, kind),
+            },
+        };
+        Ok(Ok(sense))
+    }
+
+    /// Sensors of frames, by their name without its prefix.
+    fn frame_sense(&self, k: usize, kind: &str) -> Sensed {
+        let part = match kind {
+            "FRAMEPOS" => Some(FramePart::Position),
+            "FRAMEQUAT" => Some(FramePart::Quat),
+            "FRAMEXAXIS" => Some(FramePart::Axis(0)),
+            "FRAMEYAXIS" => Some(FramePart::Axis(1)),
+            "FRAMEZAXIS" => Some(FramePart::Axis(2)),
+            "FRAMELINVEL" => Some(FramePart::Velocity),
+            "FRAMEANGVEL" => Some(FramePart::Spin),
+            "FRAMELINACC" | "FRAMEANGACC" => None,
+            other => return Ok(Err(other.to_lowercase())),
+        };
+        let of = match self.object(k, 0)? {
+            Ok(of) => of,
+            Err(what) => return Ok(Err(what)),
+        };
+        let Some(part) = part else {
+            return Ok(Ok(Sense::Acceleration {
+                of,
+                is_angular: kind == "FRAMEANGACC",
+                is_local: false,
+            }));
+        };
+        let from = match self.ids[1][k] >= 0 {
+            true => match self.object(k, 1)? {
+                Ok(from) => Some(from),
+                Err(what) => return Ok(Err(what)),
+            },
+            false => None,
+        };
+        Ok(Ok(Sense::Frame {
+            part,
+            of,
+            from,
+            is_local: false,
+        }))
+    }
+}
+
+/// The property of a limit that a sensor measures, and whether it is that of a tendon.
+fn limit_part(kind: &str) -> Option<(LimitPart, bool)> {
+    let (rest, is_of_tendon) = match kind.strip_prefix("JOINTLIMIT") {
+        Some(rest) => (rest, false),
+        None => (kind.strip_prefix("TENDONLIMIT")?, true),
+    };
+    let part = match rest {
+        "POS" => LimitPart::Position,
+        "VEL" => LimitPart::Velocity,
+        "FRC" => LimitPart::Force,
+        _ => return None,
+    };
+    Some((part, is_of_tendon))
+}
+
+fn subtree_part(kind: &str) -> Option<SubtreePart> {
+    match kind {
+        "SUBTREECOM" => Some(SubtreePart::Center),
+        "SUBTREELINVEL" => Some(SubtreePart::Velocity),
+        "SUBTREEANGMOM" => Some(SubtreePart::AngularMomentum),
+        _ => None,
+    }
+}

@@ -1,0 +1,148 @@
+//! Sensors of a model. Those that are not supported are named; a model runs without them.
+
+mod contacts;
+mod kinds;
+mod objects;
+
+use super::format::ModelFile;
+use super::frame;
+use super::frames::on_links;
+use super::names::names;
+use super::options::has_flag;
+use super::tendons::{Tendons, moving};
+use crate::description::{OnLink, RayPart, Robot, Sense, Sensor, SensorParts};
+use crate::error::ModelError;
+use crate::pose::Pose;
+
+/// Adds the sensors. `robot` has its joints, constraints and actuators.
+///
+/// # Errors
+/// A file that lacks arrays, or whose arrays point beyond each other.
+pub(super) fn add_sensors(file: &ModelFile, robot: &mut Robot) -> Result<(), ModelError> {
+    let count = file.rows("sensor_type");
+    if !file.has("sensor_type") || count == 0 {
+        return Ok(());
+    }
+    let reader = Reader::read(file, robot, count)?;
+    let names = names(file, "sensor", count)?;
+    let firsts = file.integers("sensor_adr", count)?;
+    let sizes = file.integers("sensor_dim", count)?;
+    let cutoffs = file.reals("sensor_cutoff", count)?;
+    let datatypes = file.kinds("sensor_datatype", count)?;
+    let scalars = usize::try_from(file.integer("nsensordata")?).unwrap_or(0);
+    let mut parts = SensorParts {
+        scalars,
+        ..SensorParts::default()
+    };
+    let is_off = has_flag(file, "mjDSBL_SENSOR")?;
+    for (k, name) in names.into_iter().enumerate() {
+        let place = usize::try_from(firsts[k])
+            .ok()
+            .zip(usize::try_from(sizes[k]).ok());
+        let place = place.map(|(first, size)| first..first.saturating_add(size));
+        let place = place.filter(|place| place.end <= scalars);
+        let place = place.ok_or_else(|| file.fault(format!("has no data for sensor `{name}`")))?;
+        let sense = match reader.sense(k)? {
+            // they stay 0
+            Ok(_) if is_off => None,
+            Ok(sense) => Some(sense),
+            Err(what) => {
+                parts
+                    .refused
+                    .push(format!("sensor `{name}`: no support for {what}"));
+                None
+            }
+        };
+        let is_two_sided = datatypes[k] == "mjDATATYPE_REAL";
+        let is_bounded = is_two_sided || datatypes[k] == "mjDATATYPE_POSITIVE";
+        parts.all.push(Sensor {
+            name,
+            place,
+            sense,
+            cutoff: (is_bounded && cutoffs[k] > 0.0).then_some((cutoffs[k], is_two_sided)),
+        });
+    }
+    // meshes have no part: no ray that is asked for may meet one
+    let unseen = |on: &OnLink| RayPart {
+        on: *on,
+        kind: None,
+        size: [0.0; 3],
+    };
+    let rays = reader.geoms.iter().zip(&reader.rays);
+    parts.geoms = rays
+        .map(|(on, ray)| ray.unwrap_or_else(|| unseen(on)))
+        .collect();
+    if let Some(own) = &mut robot.mujoco {
+        own.sensors = parts;
+    }
+    Ok(())
+}
+
+/// Arrays of sensors, and what they are about.
+struct Reader<'a> {
+    file: &'a ModelFile,
+    robot: &'a Robot,
+    kinds: Vec<String>,
+    objects: [Vec<String>; 2],
+    ids: [Vec<i64>; 2],
+    late: Vec<bool>,
+    joints: Vec<usize>,
+    tendons: Tendons,
+    bodies: Vec<Pose>,
+    geoms: Vec<OnLink>,
+    sites: Vec<OnLink>,
+    is_visible: Vec<bool>,
+    /// Of each geom, what a ray meets; none of a mesh and the like.
+    rays: Vec<Option<RayPart>>,
+    site_kinds: Vec<String>,
+    site_sizes: Vec<[f64; 3]>,
+    cameras: Vec<OnLink>,
+    camera_modes: Vec<String>,
+}
+
+/// What a sensor measures, or what is not supported.
+type Sensed = Result<Result<Sense, String>, ModelError>;
+
+impl<'a> Reader<'a> {
+    fn read(file: &'a ModelFile, robot: &'a Robot, count: usize) -> Result<Self, ModelError> {
+        let bodies = robot.links.len();
+        let centers = file.vectors::<3>("body_ipos", bodies)?;
+        let turns = file.vectors::<4>("body_iquat", bodies)?;
+        let inertial = centers.into_iter().zip(turns);
+        let cameras = file.rows("cam_bodyid");
+        let mut late = vec![false; count];
+        for (array, width) in [("sensor_delay", 1), ("sensor_interval", 2)] {
+            if file.has(array) {
+                let all = file.reals(array, count * width)?;
+                for (is_late, own) in late.iter_mut().zip(all.chunks_exact(width)) {
+                    *is_late |= own[0] > 0.0;
+                }
+            }
+        }
+        Ok(Reader {
+            kinds: file.kinds("sensor_type", count)?,
+            objects: [
+                file.kinds("sensor_objtype", count)?,
+                file.kinds("sensor_reftype", count)?,
+            ],
+            ids: [
+                file.integers("sensor_objid", count)?,
+                file.integers("sensor_refid", count)?,
+            ],
+            late,
+            joints: moving(robot, file.rows("jnt_type"), file)?,
+            tendons: Tendons::read(file, robot)?,
+            bodies: inertial.map(|(pos, quat)| frame(pos, quat)).collect(),
+            geoms: on_links(file, "geom", bodies)?,
+            sites: on_links(file, "site", bodies)?,
+            is_visible: contacts::visible(file)?,
+            rays: contacts::rays(file, bodies)?,
+            site_kinds: file.kinds("site_type", file.rows("site_bodyid"))?,
+            site_sizes: file.vectors("site_size", file.rows("site_bodyid"))?,
+            cameras: on_links(file, "cam", bodies)?,
+            camera_modes: file.kinds("cam_mode", cameras)?,
+            file,
+            robot,
+        })
+    }
+}

@@ -1,0 +1,124 @@
+//! What sensors are about: frames, joints, tendons, actuators and limits.
+
+use super::Reader;
+use crate::description::{ConstraintLaw, LimitPart, Measure, OnLink, Sense};
+use crate::error::ModelError;
+use crate::pose::Pose;
+
+impl Reader<'_> {
+    /// The frame of a sensor (0), or that it is seen from (1).
+    pub(super) fn object(
+        &self,
+        k: usize,
+        which: usize,
+    ) -> Result<Result<OnLink, String>, ModelError> {
+        let id = self.ids[which][k];
+        let place = |frames: &[OnLink]| {
+            let own = usize::try_from(id).ok().and_then(|id| frames.get(id));
+            own.copied().ok_or_else(|| self.fault(k))
+        };
+        let body = |pose: fn(&Reader<'_>, usize) -> Pose| {
+            let link = usize::try_from(id)
+                .ok()
+                .filter(|&id| id < self.bodies.len());
+            let link = link.ok_or_else(|| self.fault(k))?;
+            Ok::<OnLink, ModelError>(OnLink {
+                link,
+                pose: pose(self, link),
+            })
+        };
+        Ok(Ok(match self.objects[which][k].as_str() {
+            "mjOBJ_BODY" => body(|reader, link| reader.bodies[link])?,
+            "mjOBJ_XBODY" => body(|_, _| Pose::identity())?,
+            "mjOBJ_GEOM" => place(&self.geoms)?,
+            "mjOBJ_SITE" => place(&self.sites)?,
+            "mjOBJ_CAMERA" => {
+                let camera = place(&self.cameras)?;
+                if self.camera_modes[id as usize] != "mjCAMLIGHT_FIXED" {
+                    return Ok(Err("cameras that track or target".to_owned()));
+                }
+                camera
+            }
+            other => return Ok(Err(other.to_owned())),
+        }))
+    }
+
+    pub(super) fn fault(&self, k: usize) -> ModelError {
+        self.file.fault(format!("has no object for sensor {k}"))
+    }
+
+    /// The object of a sensor as an index below `end`.
+    pub(super) fn index(&self, k: usize, end: usize) -> Result<usize, ModelError> {
+        let id = usize::try_from(self.ids[0][k]).ok();
+        id.filter(|&id| id < end).ok_or_else(|| self.fault(k))
+    }
+
+    pub(super) fn site(&self, k: usize) -> Result<OnLink, ModelError> {
+        Ok(self.sites[self.index(k, self.sites.len())?])
+    }
+
+    /// A joint among the robot's.
+    pub(super) fn joint(&self, k: usize) -> Result<usize, ModelError> {
+        Ok(self.joints[self.index(k, self.joints.len())?])
+    }
+
+    pub(super) fn scalar_joint(&self, k: usize) -> Result<usize, ModelError> {
+        let joint = self.joint(k)?;
+        match self.robot.joints[joint].dofs.len() {
+            1 => Ok(joint),
+            _ => Err(self.fault(k)),
+        }
+    }
+
+    pub(super) fn actuator(&self, k: usize) -> Result<usize, ModelError> {
+        self.index(k, self.file.rows("actuator_trntype"))
+    }
+
+    /// The terms of a tendon; none of a spatial one.
+    pub(super) fn tendon(&self, k: usize) -> Result<Option<&[(usize, f64)]>, ModelError> {
+        let tendon = self.index(k, self.tendons.terms.len())?;
+        Ok(self.tendons.terms[tendon].as_deref())
+    }
+
+    pub(super) fn actuators_of_tendon(&self, k: usize) -> Result<Vec<usize>, ModelError> {
+        let count = self.file.rows("actuator_trntype");
+        let kinds = self.file.kinds("actuator_trntype", count)?;
+        let targets = self
+            .file
+            .vectors_of_integers::<2>("actuator_trnid", count)?;
+        let all = (0..count).filter(|&actuator| {
+            kinds[actuator] == "mjTRN_TENDON" && targets[actuator][0] == self.ids[0][k]
+        });
+        Ok(all.collect())
+    }
+
+    pub(super) fn joint_limit(&self, k: usize, part: LimitPart) -> Result<Sense, ModelError> {
+        let joint = self.joint(k)?;
+        if self.robot.joints[joint].dofs.len() == 1 {
+            return Ok(Sense::JointLimit(joint, part));
+        }
+        let own = Measure::Angle { joint };
+        Ok(Sense::ConstraintLimit(
+            self.limit(|measure| *measure == own),
+            part,
+        ))
+    }
+
+    pub(super) fn tendon_limit(&self, k: usize, part: LimitPart) -> Result<Sense, ModelError> {
+        let terms = self.tendon(k)?;
+        // several tendons may have the same terms: limits are in the order of tendons
+        let is_own = |measure: &Measure| match measure {
+            Measure::Lengths { first, .. } => terms == Some(&first[..]),
+            _ => false,
+        };
+        Ok(Sense::ConstraintLimit(self.limit(is_own), part))
+    }
+
+    /// The constraint that is a limit of this measure.
+    pub(super) fn limit(&self, is_own: impl Fn(&Measure) -> bool) -> Option<usize> {
+        let parts = self.robot.mujoco.as_ref()?;
+        parts.constraints.iter().position(|constraint| {
+            matches!(constraint.law, ConstraintLaw::Range { .. }) && is_own(&constraint.measure)
+        })
+    }
+}
