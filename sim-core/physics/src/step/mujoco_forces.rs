@@ -207,7 +207,7 @@ fn contact_wrenches<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         each!(cx, r in list, {
             let pair = cx.load(t.memory.rows, r, row::PAIR);
             let sides = [0, 1].map(|side| cx.pick(m.mujoco.pair_bodies, pair, side));
-            let (point, force, torque) = contact_force(cx, m, number, r);
+            let [point, force, torque] = contact_force(cx, m, number, r);
             let there = b.work.reference[class.trees.1];
             for (place, &k) in bodies.iter().enumerate() {
                 let body = &m.mujoco.frames.bodies[k];
@@ -233,12 +233,7 @@ fn contact_wrenches<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
 
 /// Point of a contact from the reference point of its class's second tree, and force and torque on the second shape.
 #[inline(always)]
-pub(super) fn contact_force<C: Cx>(
-    cx: &mut C,
-    m: &ConstantsOf<C>,
-    number: usize,
-    r: C::I,
-) -> (Vec3<C::F>, Vec3<C::F>, Vec3<C::F>) {
+fn contact_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, number: usize, r: C::I) -> [Vec3<C::F>; 3] {
     let t = &m.contacts;
     let rows = t.memory.rows;
     let point = load_vec3(cx, rows, r, row::POINT);
@@ -256,5 +251,5 @@ pub(super) fn contact_force<C: Cx>(
             Vec3::zero(),
         );
     }
-    (point, frame.mul_add(force, Vec3::zero()), torque)
+    [point, frame.mul_add(force, Vec3::zero()), torque]
 }
