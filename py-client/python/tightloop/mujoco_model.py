@@ -56,6 +56,21 @@ class MujocoModel(Entity):
         return list(self._summary["link_names"])
 
     @property
+    def site_names(self) -> list[str]:
+        """Names of the sites, in the order of ``site_xpos``."""
+        return list(self._summary["site_names"])
+
+    @property
+    def geom_names(self) -> list[str]:
+        """Names of the geoms, in the order of ``geom_xpos``."""
+        return list(self._summary["geom_names"])
+
+    @property
+    def sensor_names(self) -> list[str]:
+        """Names of the sensors, in the order of ``sensordata``."""
+        return list(self._summary["sensor_names"])
+
+    @property
     def notes(self) -> list[str]:
         """What was changed when the model was read, a sentence each."""
         return list(self._summary["notes"])

@@ -46,8 +46,8 @@ impl MujocoTable {
     }
 }
 
-/// What a client wants to know of an exported model: the keys of [`robot_summary`], `actuator_names`, and `options` with the keys
-/// of a scene.
+/// What a client wants to know of an exported model: the keys of [`robot_summary`], names of actuators, sites, geoms and sensors,
+/// and `options` with the keys of a scene.
 ///
 /// # Errors
 /// What is wrong with the file, or not supported, by name.
@@ -65,6 +65,12 @@ pub fn mujoco_summary(path: &Path, max_hull_vertices: usize) -> Result<Value, Co
     summary["actuator_names"] = actuators
         .map(|actuator| Value::from(actuator.name.as_str()))
         .collect();
+    if let Some(parts) = &robot.mujoco {
+        let sensors = parts.sensors.all.iter().map(|sensor| &sensor.name);
+        summary["site_names"] = json!(parts.frames.site_names);
+        summary["geom_names"] = json!(parts.frames.geom_names);
+        summary["sensor_names"] = sensors.map(|name| json!(name)).collect();
+    }
     let integrator = robot.mujoco.as_ref().map(|parts| {
         let implicit = if parts.implicit_damping {
             ""

@@ -176,6 +176,8 @@ def test_sensors_have_names_and_columns() -> None:
     xml = """<mujoco model="arm"><worldbody><body name="b"><joint name="j"/><geom size=".1"/><site name="s"/></body>
     </worldbody><sensor><gyro name="imu" site="s"/><jointpos joint="j"/></sensor></mujoco>"""
     scene = tl.Scene.from_mujoco(mujoco.MjModel.from_xml_string(xml))
+    arm = scene.models["arm"]
+    assert (arm.sensor_names, arm.site_names, arm.geom_names) == (["imu", "sensor1"], ["s"], ["geom0"])
     with tl.launch(scene, worlds=2, fields=("sensordata",)) as sim:
         assert sim.sensor_names == ["arm/imu", "arm/sensor1"]
         assert sim.sensors["arm/imu"] == sim.sensors["imu"] == slice(0, 3)
