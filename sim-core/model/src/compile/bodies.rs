@@ -4,7 +4,6 @@ use super::actuators;
 use super::carrier::Carrier;
 use super::constraint_rows::{DofEquality, DofJoint, SoftJoint};
 use super::mujoco_frames::add_frames;
-use super::mujoco_sensors::{Scope, add_sensors};
 use super::ties::{DofConstraint, terms};
 use crate::description::{Joint, MujocoJoint, MujocoParts, Robot, TargetMode};
 use crate::inertia::{Inertial, merge};
@@ -393,31 +392,12 @@ impl BodyBuilder {
             };
             actuators::add(&mut self.mujoco, actuator, &scene);
         }
-        let first = self.mujoco.sensors.scalars;
-        let refused = parts.sensors.refused.iter();
-        self.sensors
-            .extend(parts.sensors.all.iter().map(|sensor| SensorInfo {
-                name: format!("{}/{}", robot.name, sensor.name),
-                place: first + sensor.place.start..first + sensor.place.end,
-            }));
-        self.refused_sensors
-            .extend(refused.map(|what| format!("model `{}`: {what}", robot.name)));
-        let scope = Scope {
+        self.add_sensors(
+            robot,
             dof_of,
             carriers,
-            dofs: &self.dofs,
-            trees: &self.trees,
-            frames: &self.mujoco.frames,
-            first_body,
-            first_actuator,
-            first_constraint,
-            first_ray_geom: self.mujoco.sensors.geoms.len(),
-        };
-        let moment = scope.static_moment();
-        for (sum, x) in self.static_moment.iter_mut().zip(moment) {
-            *sum += x;
-        }
-        add_sensors(&mut self.mujoco.sensors, &parts.sensors, &scope);
+            [first_body, first_actuator, first_constraint],
+        );
     }
 
     /// Mass, centre and inertia of all links that move with each body of a robot.

@@ -1,9 +1,11 @@
 //! Sensors of MuJoCo models by the dofs and bodies of the scene.
 
+use super::bodies::BodyBuilder;
 use super::carrier::Carrier;
 use super::mujoco_frames::mounted_on;
 use super::ties::terms;
-use crate::description::{Sense, SensorParts, ZonePart};
+use crate::description::{Robot, Sense, SensorParts, ZonePart};
+use crate::model::SensorInfo;
 use sim_physics::constants::mujoco_frames::MujocoFrames;
 use sim_physics::constants::sensors::{
     AccelerationSensor, ContactSensor, Cutoff, FrameSensor, RayGeom, Sensor, SensorKind, Sensors,
@@ -12,26 +14,64 @@ use sim_physics::constants::sensors::{
 use sim_physics::constants::{Dof, Tree};
 
 /// What a model's sensors refer to.
-pub(super) struct Scope<'a> {
+struct Scope<'a> {
     /// The first dof of each joint of the robot.
-    pub dof_of: &'a [usize],
+    dof_of: &'a [usize],
     /// Of each link of the robot.
-    pub carriers: &'a [Carrier],
-    pub dofs: &'a [Dof<f64>],
-    pub trees: &'a [Tree<f64>],
-    pub frames: &'a MujocoFrames<f64>,
+    carriers: &'a [Carrier],
+    dofs: &'a [Dof<f64>],
+    trees: &'a [Tree<f64>],
+    frames: &'a MujocoFrames<f64>,
     /// Its first body among those of MuJoCo models.
-    pub first_body: usize,
+    first_body: usize,
     /// Its first actuator.
-    pub first_actuator: usize,
+    first_actuator: usize,
     /// Its first constraint.
-    pub first_constraint: usize,
+    first_constraint: usize,
     /// Its first geom among those that rangefinders see.
-    pub first_ray_geom: usize,
+    first_ray_geom: usize,
+}
+
+impl BodyBuilder {
+    /// Adds the sensors of a robot whose first body, actuator and constraint are given.
+    pub(super) fn add_sensors(
+        &mut self,
+        robot: &Robot,
+        dof_of: &[usize],
+        carriers: &[Carrier],
+        [first_body, first_actuator, first_constraint]: [usize; 3],
+    ) {
+        let Some(parts) = &robot.mujoco else { return };
+        let first = self.mujoco.sensors.scalars;
+        let refused = parts.sensors.refused.iter();
+        self.sensors
+            .extend(parts.sensors.all.iter().map(|sensor| SensorInfo {
+                name: format!("{}/{}", robot.name, sensor.name),
+                place: first + sensor.place.start..first + sensor.place.end,
+            }));
+        self.refused_sensors
+            .extend(refused.map(|what| format!("model `{}`: {what}", robot.name)));
+        let scope = Scope {
+            dof_of,
+            carriers,
+            dofs: &self.dofs,
+            trees: &self.trees,
+            frames: &self.mujoco.frames,
+            first_body,
+            first_actuator,
+            first_constraint,
+            first_ray_geom: self.mujoco.sensors.geoms.len(),
+        };
+        let moment = scope.static_moment();
+        for (sum, x) in self.static_moment.iter_mut().zip(moment) {
+            *sum += x;
+        }
+        add_sensors(&mut self.mujoco.sensors, &parts.sensors, &scope);
+    }
 }
 
 /// Adds the sensors of a model. Until ties are known, limits name constraints.
-pub(super) fn add_sensors(sensors: &mut Sensors<f64>, parts: &SensorParts, scope: &Scope<'_>) {
+fn add_sensors(sensors: &mut Sensors<f64>, parts: &SensorParts, scope: &Scope<'_>) {
     let first = sensors.scalars;
     sensors.geoms.extend(parts.geoms.iter().map(|geom| RayGeom {
         at: mounted_on(scope.carriers, &geom.on),
@@ -153,7 +193,7 @@ impl Scope<'_> {
     }
 
     /// First moment of what stands still [kg·m].
-    pub fn static_moment(&self) -> [f64; 3] {
+    fn static_moment(&self) -> [f64; 3] {
         let own = &self.frames.bodies[self.first_body..];
         let fixed = own.iter().filter(|body| body.frame.body.is_none());
         fixed.fold([0.0; 3], |sum, body| {
