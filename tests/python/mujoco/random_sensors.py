@@ -32,7 +32,7 @@ def add_sensors(text: str, seed: int, count: int, kinds: tuple[str, ...] = (*KIN
     return _Sensors(text, seed).text(count, kinds)
 
 
-def heap(seed: int, option: str) -> str:
+def heap(seed: int, option: str, bodies: int = 4) -> str:
     """Return the XML of bodies with spheres and capsules that overlap each other and a plane."""
     rng = np.random.default_rng(seed)
 
@@ -40,21 +40,21 @@ def heap(seed: int, option: str) -> str:
         return " ".join(map(repr, rng.uniform(low, high, count).tolist()))
 
     def geoms() -> str:
-        text = ""
+        own = ""
         for _ in range(2):
             kind, size = (("sphere", 1), ("capsule", 2))[rng.integers(2)]
-            text += f'<geom type="{kind}" size="{numbers(size, 0.08, 0.2)}" pos="{numbers(3, -0.15, 0.15)}" '
-            text += f'condim="{rng.choice([1, 3, 4, 6])}" friction="{numbers(3, 0.2, 1)}" margin="0.02"/>'
-        return text
+            own += f'<geom type="{kind}" size="{numbers(size, 0.08, 0.2)}" pos="{numbers(3, -0.15, 0.15)}" '
+            own += f'condim="{rng.choice([1, 3, 4, 6])}" friction="{numbers(3, 0.2, 1)}" margin="0.02"/>'
+        return own
 
-    bodies = ""
-    for k in range(4):
+    text = ""
+    for k in range(bodies):
         site = f'<site name="s{k}" pos="{numbers(3, -0.2, 0.2)}" quat="{numbers(4, -1, 1)}"/>'
         arm = f'<body name="arm{k}" pos="{numbers(3, -0.2, 0.2)}"><joint axis="{numbers(3, -1, 1)}"/>{geoms()}</body>'
         pos = f'pos="{numbers(3, -0.2, 0.2)}"'
-        bodies += f'<body name="b{k}" {pos}><freejoint name="j{k}"/>{geoms()}{site}{arm}</body>'
+        text += f'<body name="b{k}" {pos}><freejoint name="j{k}"/>{geoms()}{site}{arm}</body>'
     plane = '<geom type="plane" size="5 5 .1" pos="0 0 -.1"/>'
-    return f"<mujoco><option {option}/><worldbody>{plane}{bodies}</worldbody></mujoco>"
+    return f"<mujoco><option {option}/><worldbody>{plane}{text}</worldbody></mujoco>"
 
 
 class _Sensors:
@@ -154,7 +154,8 @@ class _Sensors:
                 names = self.names["body" if kind == "subtree" else kind]
                 attributes["site" if kind == "site" else f"{kind}{number}"] = str(rng.choice(names))
         reduction = str(rng.choice(["none", "mindist", "maxforce", "netforce"]))
-        # the order of the first contacts is not MuJoCo's: there the count says whether all are shown
-        chosen = [part for part in _DATA if rng.random() < 0.6 or (part, reduction) == ("found", "none")]
-        number = rng.integers(1, 5) if reduction != "none" else 6
+        # tests of these need the count and the force
+        always = {"none": ("found",), "maxforce": ("found", "force")}.get(reduction, ())
+        chosen = [part for part in _DATA if rng.random() < 0.6 or part in always]
+        number = {"none": 6, "maxforce": 1}.get(reduction, rng.integers(1, 5))
         return attributes | {"data": " ".join(chosen or ["found"]), "num": str(number), "reduce": reduction}
