@@ -11,6 +11,7 @@ use sim_physics::constants::sensors::{
     AccelerationSensor, ContactSensor, Cutoff, FrameSensor, RayGeom, Sensor, SensorKind, Sensors,
     TouchSensor, WrenchSensor, Zone,
 };
+use sim_physics::constants::site::Mount;
 use sim_physics::constants::{Dof, Tree};
 
 /// What a model's sensors refer to.
@@ -19,6 +20,8 @@ struct Scope<'a> {
     dof_of: &'a [usize],
     /// Of each link of the robot.
     carriers: &'a [Carrier],
+    /// The link that each is welded to, or itself.
+    welds: &'a [usize],
     dofs: &'a [Dof<f64>],
     trees: &'a [Tree<f64>],
     frames: &'a MujocoFrames<f64>,
@@ -54,6 +57,7 @@ impl BodyBuilder {
         let scope = Scope {
             dof_of,
             carriers,
+            welds: &parts.welds,
             dofs: &self.dofs,
             trees: &self.trees,
             frames: &self.mujoco.frames,
@@ -130,7 +134,14 @@ impl Scope<'_> {
                 is_angular,
                 is_local,
             } => SensorKind::Acceleration(AccelerationSensor {
-                of: mount(of),
+                of: match self.welds[of.link] {
+                    // what MuJoCo welds to the world feels nothing, wherever it is put
+                    0 => Mount {
+                        body: None,
+                        ..mount(of)
+                    },
+                    _ => mount(of),
+                },
                 is_angular: *is_angular,
                 is_local: *is_local,
             }),
