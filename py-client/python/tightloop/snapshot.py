@@ -24,8 +24,8 @@ from tightloop.errors import SnapshotError
 # magic, version, checksum, model hash, worlds, values per world, bytes per value; little endian
 _HEAD = struct.Struct("<8sIIQQII")
 _MAGIC, _VERSION = b"tlsnap\r\n", 1
-# offset from which the checksum covers the bytes; bytes of a world's counters, which precede its values
-_COVERED, _COUNTERS = 16, 28
+# offset of the checksum; offset from which it covers the bytes; bytes of a world's counters, which precede its values
+_CHECKSUM, _COVERED, _COUNTERS = 12, 16, 28
 _SHARED_MEMORY = Path("/dev/shm")
 
 
@@ -80,8 +80,27 @@ class Snapshot:
     def numbers(self) -> NDArray[Any]:
         """State, commands and parameters of each world, ``(worlds, values)``, read-only, in the daemon's layout."""
         real = int(self.precision[1:]) // 8
-        records = np.frombuffer(self._data, np.uint8, offset=_HEAD.size).reshape(self.worlds, -1)
-        return np.ascontiguousarray(records[:, _COUNTERS:]).view(f"<f{real}")
+        return np.ascontiguousarray(self._records()[:, _COUNTERS:]).view(f"<f{real}")
+
+    def with_numbers(self, numbers: NDArray[Any]) -> Snapshot:
+        """Return a snapshot with other `numbers`, of the same shape and dtype."""
+        records = self._records().copy()
+        records[:, _COUNTERS:] = np.ascontiguousarray(numbers, self.numbers.dtype).view(np.uint8)
+        return self._with(records)
+
+    def with_worlds(self, other: Snapshot, worlds: NDArray[np.bool_]) -> Snapshot:
+        """Return a snapshot whose worlds of a mask are those of another snapshot of the same simulation."""
+        records = self._records().copy()
+        records[worlds] = other._records()[worlds]
+        return self._with(records)
+
+    def _records(self) -> NDArray[np.uint8]:
+        return np.frombuffer(self._data, np.uint8, offset=_HEAD.size).reshape(self.worlds, -1)
+
+    def _with(self, records: NDArray[np.uint8]) -> Snapshot:
+        data = bytearray(self._data[: _HEAD.size]) + records.tobytes()
+        struct.pack_into("<I", data, _CHECKSUM, zlib.crc32(memoryview(data)[_COVERED:]))
+        return Snapshot(bytes(data), "snapshot")
 
     def to_bytes(self) -> bytes:
         """Return the snapshot as bytes, for `from_bytes`."""

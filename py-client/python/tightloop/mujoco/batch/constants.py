@@ -1,0 +1,77 @@
+"""Constants that MuJoCo derives from a model, for each simulation."""
+
+from __future__ import annotations
+
+import copy
+import warnings
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop.mujoco.batch.expansions import CONSTANTS, Expansions
+
+#: Constants that make constraints soft; simulations keep those of the model.
+_SOFTNESS = ("body_invweight0", "dof_invweight0", "tendon_invweight0")
+
+
+def set_const(model: Any, expansions: Expansions, ids: NDArray[np.int64], num_sims: int) -> None:
+    """Run ``mj_setConst`` for simulations and expand what it changed.
+
+    Args:
+        model: The batch's own copy of the model; it does not change.
+        expansions: Its expanded fields.
+        ids: Indices of the simulations.
+        num_sims: Number of all simulations. If a field is expanded here, it is computed for all of them.
+
+    Raises:
+        RuntimeError: MuJoCo refuses a simulation's values; the first such simulation. The others are done.
+    """
+    scratch = copy.copy(model)
+    data = mujoco.MjData(scratch)
+    inputs = [name for name in expansions.names if name not in CONSTANTS and hasattr(model, name)]
+    failed: str | None = None
+    found: dict[int, dict[str, NDArray[Any]]] = {}
+    todo = list(ids)
+    while todo:
+        sim = int(todo.pop(0))
+        for name in inputs:
+            getattr(scratch, name)[:] = expansions.of(name)[sim]
+        try:
+            mujoco.mj_setConst(scratch, data)
+        except Exception as error:
+            failed = failed or f"sim {sim}: {error}"
+            continue
+        found[sim] = {name: getattr(scratch, name).copy() for name in CONSTANTS if hasattr(scratch, name)}
+        changed = [name for name, value in found[sim].items() if not np.array_equal(value, getattr(model, name))]
+        fresh = [name for name in changed if name not in expansions.names]
+        if fresh:
+            for name in fresh:
+                expansions.get(name, None)
+            # what was never expanded is consistent for all simulations at once
+            todo += [other for other in range(num_sims) if other not in found and other not in todo]
+    for sim, values in found.items():
+        for name, value in values.items():
+            if name in expansions.names:
+                expansions.of(name)[sim] = value
+    if any(name in expansions.names for name in _SOFTNESS) and _has_constraints(model):
+        warnings.warn(
+            "set_const: limits, contacts, equalities and dry friction keep the softness of the model, "
+            "since tightloop does not vary body_invweight0, dof_invweight0 and tendon_invweight0",
+            stacklevel=3,
+        )
+    if failed:
+        raise RuntimeError(failed)
+
+
+def _has_constraints(model: Any) -> bool:
+    touching = np.asarray(model.geom_contype) | np.asarray(model.geom_conaffinity)
+    bounded = [
+        model.jnt_limited,
+        model.tendon_limited,
+        model.dof_frictionloss,
+        model.tendon_frictionloss,
+        model.eq_type,
+    ]
+    return bool(touching.any()) or any(len(array) and np.any(array) for array in bounded) or model.neq > 0

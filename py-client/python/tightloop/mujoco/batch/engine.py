@@ -1,0 +1,251 @@
+"""The simulation under a batch: its launch, and the way of states, controls and parameters into it.
+
+The rows of a batch are the truth. A world of the simulation is in one of three conditions:
+
+- current: it holds its row as the last call left it, and goes on with the solver's last accelerations;
+- stale: it holds something else, and its row is written before it runs;
+- parked: a step of other worlds has moved it, and a snapshot has its record, which comes back before it runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop._core import Frame
+from tightloop.frames import FAULTED
+from tightloop.launching import launch
+from tightloop.mujoco.batch.bindings import Bindings
+from tightloop.mujoco.batch.joints import JointMap
+from tightloop.mujoco.batch.layout import StateLayout
+from tightloop.scene import Scene
+from tightloop.sim import Sim
+from tightloop.snapshot import Snapshot
+
+Array = NDArray[Any]
+Mask = NDArray[np.bool_]
+
+#: Name of the model in the scene.
+MODEL = "model"
+#: Fields that simulations of this release have; filled by the first launch.
+_known_fields: set[str] = set()
+
+
+class Engine:
+    """Launches the simulation when it is needed, and again when fields or parameters are added.
+
+    Args:
+        model: The model.
+        layout: Its state.
+        bindings: The rows.
+        options: ``threads``, ``precision`` and ``device`` of the launch.
+
+    Attributes:
+        frame: The newest frame, or None before the first one of a launch.
+        writes_rows: Whether each call starts from the rows alone.
+        params: Names of the parameters that vary.
+        silenced: Simulations whose controls count as 0, ``(num_sims,)``.
+    """
+
+    def __init__(self, model: Any, layout: StateLayout, bindings: Bindings, options: dict[str, Any]) -> None:
+        self._scene = Scene.from_mujoco(model, name=MODEL)
+        self._layout, self._bindings, self._options = layout, bindings, options
+        self._joints = JointMap(model)
+        self._sims, self._nu, self._nv = len(bindings.rows), model.nu, model.nv
+        self._fields = {"qpos", "qvel"} | ({"act"} if model.na else set())
+        self.params: set[str] = set()
+        self._sim: Sim | None = None
+        self._snapshot: Snapshot | None = None
+        self._stale, self._parked = np.ones(self._sims, bool), np.zeros(self._sims, bool)
+        self._ctrl, self._force = np.zeros((self._sims, self._nu)), np.zeros((self._sims, self._nv))
+        self._sent: dict[str, Array] = {}
+        # columns of a row that a write of the state sets: positions to warm start
+        self._motion = slice(layout.at("qpos").start, layout.at("qacc_warmstart").stop)
+        self.frame: Frame | None = None
+        self.writes_rows = False
+        self.silenced = np.zeros(self._sims, bool)
+
+    @property
+    def sim(self) -> Sim:
+        """The simulation, launched with all that is required."""
+        sim = self._sim
+        if sim is None or not (self._fields <= set(sim.fields) and self.params <= set(sim.params.names)):
+            sim = self._launched()
+        return sim
+
+    @property
+    def known_fields(self) -> set[str]:
+        """Names of the fields that simulations of this release have."""
+        if not _known_fields:
+            _known_fields.update(field["name"] for field in self.sim.info["known_fields"])
+        return _known_fields
+
+    def require(self, *, fields: Iterable[str] = (), params: Iterable[str] = ()) -> None:
+        """Let the next access of `sim` have fields and varying parameters."""
+        self._fields.update(fields)
+        self.params.update(params)
+
+    def close(self) -> None:
+        """End the simulation."""
+        self.frame = None
+        if self._sim is not None:
+            self._sim.close()
+
+    def _launched(self) -> Sim:
+        old, kept = self._sim, None
+        if old is not None:
+            # with other parameters a snapshot does not fit
+            if self.params == set(old.params.names):
+                kept = old.snapshot()
+            self.close()
+        self._sim = sim = launch(
+            self._scene,
+            worlds=self._sims,
+            fields=sorted(self._fields),
+            params=sorted(self.params),
+            watch_worlds=1,
+            **self._options,
+        )
+        if kept is not None:
+            self.frame = sim.restore(kept)
+        else:
+            self._stale[:], self._parked[:], self._sent = True, False, {}
+            self._ctrl[:], self._force[:] = 0.0, 0.0
+        return sim
+
+    def mark_stale(self, ids: Any) -> None:
+        """Let the rows of simulations be written before they run."""
+        self._stale[ids] = True
+        self._parked[ids] = False
+
+    def sync(self, mask: Mask, params: dict[str, Array]) -> Frame:
+        """Bring rows and parameters of the simulations of a mask into their worlds; return a frame of it.
+
+        Args:
+            mask: The simulations, ``(num_sims,)``.
+            params: Parameters by name, ``(num_sims, ...)``; other rows than those of the mask do not matter.
+        """
+        sim = self.sim
+        back = self._parked & mask
+        if back.any() and self._snapshot is not None:
+            self.frame = sim.restore(self._snapshot, worlds=back)
+            self._parked &= ~mask
+        for name, values in params.items():
+            self._send(name, values, mask)
+        rows, last = self._bindings.rows[:, self._motion], self._bindings.last[:, self._motion]
+        changed = mask if self.writes_rows else mask & (self._stale | (rows != last).any(axis=1))
+        if changed.any():
+            self._revive(changed)
+            self.frame = self._write(changed)
+        self._stale &= ~mask
+        if self.frame is None:
+            self.frame = sim.forward()
+        return self.frame
+
+    def _send(self, name: str, values: Array, mask: Mask) -> None:
+        flat = values.reshape(self._sims, -1)
+        sent = self._sent.get(name)
+        if sent is None:
+            sent = self._sent[name] = np.full(flat.shape, np.nan)
+        changed = mask & (flat != sent).any(axis=1)
+        if changed.any():
+            safe = np.where(changed[:, None], flat, flat[changed][:1])
+            self.frame = self.sim.params.write(mask=changed, **{name: safe.reshape(values.shape)})
+            sent[changed] = flat[changed]
+
+    def _revive(self, changed: Mask) -> None:
+        """A faulted world takes no writes."""
+        if self.frame is None:
+            return
+        frozen = changed & ((self.frame.status & FAULTED) != 0)
+        if frozen.any():
+            self.frame = self.sim.reset(mask=frozen)
+            self._ctrl[frozen], self._force[frozen] = 0.0, 0.0
+            if "body_f" in self._sent:
+                self._sent["body_f"][frozen] = 0.0
+
+    def _write(self, changed: Mask) -> Frame:
+        rows = self._bindings.rows[changed]
+        qpos, qvel = rows[:, self._layout.at("qpos")], rows[:, self._layout.at("qvel")]
+        parts = {"joint_q": self._joints.positions(qpos), "joint_qd": self._joints.velocities(qpos, qvel)}
+        act = rows[:, self._layout.at("act")]
+        if act.size:
+            parts["act"] = act
+        if changed.all():
+            return self.sim.write(**parts)
+        whole = {}
+        for name, values in parts.items():
+            whole[name] = np.zeros((self._sims, values.shape[1]))
+            whole[name][changed] = values
+        return self.sim.write(**whole, mask=changed)
+
+    def _commands(self, mask: Mask) -> tuple[Array, Array]:
+        """Controls and joint forces: of the rows in the mask, elsewhere what the worlds hold."""
+        rows = self._bindings.rows
+        ctrl = np.where(mask[:, None], rows[:, self._layout.at("ctrl")], self._ctrl)
+        if self.silenced.any():
+            ctrl[mask & self.silenced] = 0.0
+        force = self._force
+        applied = rows[:, self._layout.at("qfrc_applied")]
+        if applied.any() or force.any():
+            turned = self._joints.forces(rows[:, self._layout.at("qpos")], applied)
+            force = np.where(mask[:, None], turned, force)
+        return ctrl, force
+
+    def park(self, mask: Mask) -> None:
+        """Keep the worlds outside a mask, which the steps of the others are going to move."""
+        others = ~mask & ~self._parked & ~self._stale
+        if not others.any():
+            return
+        if self.writes_rows:
+            self._stale |= others
+            return
+        taken = self.sim.snapshot()
+        if self._snapshot is not None and self._parked.any():
+            taken = taken.with_worlds(self._snapshot, self._parked)
+        self._snapshot = taken
+        self._parked |= others
+
+    def hold(self, mask: Mask) -> Frame:
+        """Let the worlds of a mask hold the controls and forces of their rows, without a step."""
+        ctrl, force = self._commands(mask)
+        differs = (ctrl != self._ctrl).any(axis=1) | (force != self._force).any(axis=1)
+        if differs.any():
+            taken = self.sim.snapshot()
+            numbers = taken.numbers.copy()
+            # a record begins with three arrays of dofs, the third is joint_f; ctrl precedes the parameters at its end
+            numbers[differs, 2 * self._nv : 3 * self._nv] = force[differs]
+            end = numbers.shape[1] - sum(_columns(self.sim))
+            numbers[differs, end - self._nu : end] = ctrl[differs]
+            self.frame = self.sim.restore(taken.with_numbers(numbers), worlds=differs)
+            if self._nu and not np.array_equal(self.frame.ctrl[differs], ctrl[differs].astype(numbers.dtype)):
+                raise AssertionError("a record of a snapshot has its controls elsewhere")
+            self._ctrl, self._force = ctrl, force
+        assert self.frame is not None
+        return self.frame
+
+    def step(self, mask: Mask) -> Frame:
+        """Step all worlds, those of a mask with the controls and forces of their rows."""
+        ctrl, force = self._commands(mask)
+        commands: dict[str, Array] = {}
+        if not np.array_equal(ctrl, self._ctrl):
+            commands["ctrl"] = ctrl
+        if not np.array_equal(force, self._force):
+            commands["joint_f"] = force
+        self.frame = None
+        self.frame = self.sim.step(**commands)
+        self._ctrl, self._force = ctrl, force
+        return self.frame
+
+    @property
+    def forces_turn(self) -> bool:
+        """Whether joint forces must be sent before each step: those of free joints depend on the positions."""
+        return self._joints.has_free and bool(self._bindings.rows[:, self._layout.at("qfrc_applied")].any())
+
+
+def _columns(sim: Sim) -> list[int]:
+    """Numbers per world of each parameter that varies."""
+    return [param["info"]["columns"] for param in sim.info["params"] if param["place"] is not None]

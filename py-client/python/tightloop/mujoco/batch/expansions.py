@@ -1,0 +1,171 @@
+"""Model fields with a value per simulation: which there are, and the parameters of a simulation that they become."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from tightloop.errors import ArgumentError
+from tightloop.mujoco.batch.masses import Masses
+
+Array = NDArray[Any]
+
+#: Model fields that are a parameter of the simulation with the same values and order.
+_SAME = {
+    "gravity": "gravity",
+    "dof_armature": "joint_armature",
+    "dof_damping": "joint_damping",
+    "dof_frictionloss": "joint_friction",
+}
+#: What ``mj_setConst`` computes. A batch computes it for reading.
+CONSTANTS = (
+    "body_subtreemass body_invweight0 dof_invweight0 dof_M0 tendon_length0 tendon_invweight0 actuator_length0 "
+    "actuator_acc0 cam_pos0 cam_poscom0 cam_mat0 light_pos0 light_poscom0 light_dir0"
+).split()
+#: Beginnings of the names of fields without influence on the motion.
+_VISUAL = ("cam_", "light_", "mat_", "skin_", "geom_rgba", "geom_matid", "geom_group", "site_rgba", "site_group")
+#: Beginnings of the names of assets, which are not expanded.
+_ASSETS = ("mesh_", "hfield_", "tex_", "skin_", "bvh_", "text_", "name_", "numeric_", "tuple_", "key_", "plugin_")
+_SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+
+
+class Expansions:
+    """Arrays ``(num_sims, ...)`` of model fields.
+
+    Args:
+        model: The batch's own copy of the model.
+        num_sims: Number of simulations.
+    """
+
+    def __init__(self, model: Any, num_sims: int) -> None:
+        self._model, self._sims = model, num_sims
+        self._arrays: dict[str, Array] = {}
+
+    def __contains__(self, name: str) -> bool:
+        """Whether ``MjModel`` or ``MjOption`` has a field of this name."""
+        return not name.startswith("_") and self._template(name) is not None
+
+    def _template(self, name: str) -> Array | None:
+        for home in (self._model, self._model.opt):
+            value = getattr(home, name, None)
+            if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
+                return value
+        # of MjOption scalars expand, too; those of MjModel are sizes
+        value = getattr(self._model.opt, name, None)
+        return None if value is None or callable(value) else np.asarray(value, type(value))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Expanded fields."""
+        return tuple(self._arrays)
+
+    def of(self, name: str) -> Array:
+        """Return the values of a field: of each simulation if it is expanded, else ``(1, ...)`` of the model."""
+        if name in self._arrays:
+            return self._arrays[name]
+        template = self._template(name)
+        assert template is not None
+        return template[None]
+
+    def get(self, name: str, dtype: DTypeLike | None) -> Array:
+        """Return the array of a field, the same one at each call.
+
+        Raises:
+            ArgumentError: The field cannot differ between simulations, or the dtype is not one of the field's.
+        """
+        template = self._template(name)
+        assert template is not None
+        if name not in self._arrays:
+            self._check(name)
+        scalar = np.dtype(np.int32) if template.dtype.kind in "iu" and template.ndim == 0 else template.dtype
+        wanted = scalar if dtype is None else np.dtype(dtype)
+        if wanted != scalar and not (scalar == np.float64 and wanted == np.float32):
+            raise ArgumentError(f"{name} cannot be {wanted}; expand it as {scalar}")
+        if name not in self._arrays:
+            self._arrays[name] = np.repeat(template[None], self._sims, axis=0).astype(wanted)
+        if self._arrays[name].dtype != wanted:
+            raise ArgumentError(f"{name} is already expanded as {self._arrays[name].dtype}; give that dtype")
+        return self._arrays[name]
+
+    def _check(self, name: str) -> None:
+        if name.startswith(_ASSETS):
+            raise ArgumentError(f"{name} is asset data, which all simulations share; make a Batch per model instead")
+        free = (*_SAME, *Masses.FIELDS, "geom_friction", *CONSTANTS)
+        if name in free or name.startswith(_VISUAL) or hasattr(self._model.opt, name):
+            return
+        varying = ", ".join((*_SAME, *Masses.FIELDS, "geom_friction"))
+        raise ArgumentError(
+            f"{name} cannot differ between simulations of a Batch: tightloop varies {varying}; "
+            "edit the model and make a Batch per value"
+        )
+
+    def params(self) -> tuple[str, ...]:
+        """Return the parameters that must vary for what is expanded."""
+        found = [_SAME[name] for name in self._arrays if name in _SAME]
+        if any(name in self._arrays for name in Masses.FIELDS):
+            found.append("body_mass_scale")
+        if "geom_friction" in self._arrays:
+            found.append("shape_mu")
+        return tuple(found)
+
+    def values(self, shapes: list[int], ids: Array) -> dict[str, Array]:
+        """Return the parameters of all simulations, ``(num_sims, columns)``, after a check of the given ones.
+
+        Args:
+            shapes: The geom of each shape of the simulation.
+            ids: Indices of the simulations that are about to run.
+
+        Raises:
+            ArgumentError: A value cannot be taken over; the message has the simulation and the field.
+        """
+        self._check_options(ids)
+        found = {}
+        for name, array in self._arrays.items():
+            if name in _SAME:
+                found[_SAME[name]] = array.astype(np.float64)
+                self._check_finite(name, ids)
+        if any(name in self._arrays for name in Masses.FIELDS):
+            masses = Masses(self._model, self.of("body_mass"), self.of("body_inertia"))
+            found["body_mass_scale"] = np.broadcast_to(masses.scale(ids), (self._sims, self._model.nbody))
+        if "geom_friction" in self._arrays:
+            self._check_friction(ids)
+            found["shape_mu"] = self._arrays["geom_friction"][:, shapes, 0].astype(np.float64)
+        return found
+
+    def _check_finite(self, name: str, ids: Array) -> None:
+        array = self._arrays[name][ids].reshape(len(ids), -1)
+        wrong = np.flatnonzero(~np.isfinite(array).all(axis=1))
+        if len(wrong):
+            raise ArgumentError(f"sim {ids[wrong[0]]}: {name} is not finite")
+
+    def _check_options(self, ids: Array) -> None:
+        for name, array in self._arrays.items():
+            if name in _SAME or not hasattr(self._model.opt, name):
+                continue
+            template = np.asarray(self._template(name)).astype(array.dtype)
+            differs = (array[ids] != template).reshape(len(ids), -1).any(axis=1)
+            if differs.any():
+                sim = ids[int(differs.argmax())]
+                if name == "enableflags" and array[sim] & _SLEEP:
+                    raise ArgumentError(f"sim {sim}: sleep cannot be enabled in a Batch")
+                raise ArgumentError(
+                    f"sim {sim}: {name} differs from the model's; tightloop has one value of it for all simulations, "
+                    "so make a Batch per value"
+                )
+
+    def _check_friction(self, ids: Array) -> None:
+        """Torsional and rolling friction follow the sliding one."""
+        own = np.asarray(self._model.geom_friction)
+        rich = np.flatnonzero(np.asarray(self._model.geom_condim) > 3)
+        given = self._arrays["geom_friction"][ids][:, rich].astype(np.float64)
+        # products instead of quotients, since a coefficient may be 0
+        wrong = ~np.isclose(given[..., 1:] * own[rich, :1], own[rich, 1:] * given[..., :1], rtol=1e-6, atol=1e-12)
+        if wrong.any():
+            sim, geom = np.argwhere(wrong.any(axis=-1))[0]
+            raise ArgumentError(
+                f"sim {ids[sim]}: geom_friction of geom {rich[geom]}: tightloop scales torsional and rolling friction "
+                "with the sliding one; change all three by one factor"
+            )

@@ -1,0 +1,202 @@
+"""Steps, resets and evaluations of a batch: what MuJoCo does around the physics, and the fields it leaves behind.
+
+After ``mj_step``, the fields that a step computes belong to the state before its last substep, with the controls of
+the step. A frame of tightloop belongs to one state. So a batch takes these fields from the frame before the last
+substep. If the call has one substep, that is the frame at its start, whose worlds must hold the new controls first.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop._core import Frame
+from tightloop.errors import ArgumentError
+from tightloop.frames import FAULTED
+from tightloop.mujoco.batch.bindings import Bindings
+from tightloop.mujoco.batch.engine import Engine
+from tightloop.mujoco.batch.fields import Fields
+from tightloop.mujoco.batch.kinematics import Kinematics
+from tightloop.mujoco.batch.layout import StateLayout
+from tightloop.mujoco.batch.selection import Selection
+
+Array = NDArray[Any]
+
+#: Largest value of a state before MuJoCo calls it unstable: mjMAXVAL.
+_VALUE_MAX = 1e10
+#: Bit of ``status``: contacts did not fit.
+_LEFT_OUT = 4
+_WARN = mujoco.mjtWarning
+
+
+class Stepping:
+    """Runs the calls of a batch.
+
+    Args:
+        model: The model.
+        fields: Its fields.
+        layout: Its state.
+        bindings: Rows and live arrays.
+        engine: The simulation underneath.
+        forward: Whether fields are current after a step.
+
+    Attributes:
+        mass: Masses for centres of mass, ``(num_sims, nbody)`` or ``(1, nbody)`` [kg].
+    """
+
+    def __init__(
+        self, model: Any, fields: Fields, layout: StateLayout, bindings: Bindings, engine: Engine, *, forward: bool
+    ) -> None:
+        self._model, self._fields, self._layout = model, fields, layout
+        self._bindings, self._engine, self._forward = bindings, engine, forward
+        self._start = layout.start(-1)
+        self._direct: list[str] = []
+        self._computed: list[str] = []
+        self._accelerates = False
+        self.mass: Array = np.asarray(model.body_mass)[None]
+        reset = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        self._resets = not model.opt.disableflags & reset
+
+    def add(self, name: str, sources: tuple[str, ...]) -> None:
+        """Fill a bound field from now on, from fields of the simulation."""
+        (self._direct if sources == (name,) else self._computed).append(name)
+        self._accelerates |= self._fields.accelerates(name)
+        # `hold` checks the controls that it sets
+        self._engine.require(fields=(*sources, "ctrl") if self._accelerates else sources)
+
+    def step(self, chosen: Selection, params: dict[str, Array], nstep: int, history: Array | None) -> None:
+        """Advance simulations; see `Batch.step`."""
+        rows, ids, mask = self._bindings.rows, chosen.ids, chosen.mask
+        self._begin(chosen, params, resets=self._resets)
+        self._check_controls(chosen)
+        lags = bool(self._direct or self._computed) and not self._forward
+        if lags and nstep == 1:
+            self._evaluate(chosen)
+        if len(chosen) < len(rows):
+            self._engine.park(mask)
+        frame: Frame | None = None
+        for substep in range(nstep):
+            frame = None  # a client holds few frames
+            frame = self._engine.step(mask)
+            rows[ids, 0] += self._model.opt.timestep
+            if history is not None or self._engine.forces_turn:
+                self._take(frame, ids)
+            if history is not None:
+                history[:, substep] = rows[ids]
+            if lags and substep == nstep - 2:
+                frame = None
+                self._evaluate(chosen)
+        assert frame is not None
+        self._take(frame, ids)
+        self._count(frame, chosen)
+        if self._forward:
+            frame = None
+            self._evaluate(chosen)
+        self._bindings.settle(ids)
+
+    def forward(self, chosen: Selection, params: dict[str, Array]) -> None:
+        """Fill bound fields; see `Batch.forward`."""
+        self._begin(chosen, params, resets=False)
+        self._check_controls(chosen)
+        self._evaluate(chosen)
+        self._bindings.settle(chosen.ids)
+
+    def reset(self, chosen: Selection, params: dict[str, Array], start: Array) -> None:
+        """Reset simulations to a row; see `Batch.reset`."""
+        bindings, ids = self._bindings, chosen.ids
+        bindings.collect(ids)
+        written = bindings.rows[ids] != bindings.last[ids]
+        bindings.rows[ids] = np.where(written, bindings.rows[ids], start)
+        bindings.warnings[ids] = 0
+        # a reset clears the warm start, too
+        self._engine.mark_stale(ids)
+        self._begin(chosen, params, resets=False)
+        self._evaluate(chosen)
+        bindings.settle(ids)
+
+    def _begin(self, chosen: Selection, params: dict[str, Array], *, resets: bool) -> None:
+        """Bring everything that was written to the simulation, except controls and forces."""
+        bindings, layout = self._bindings, self._layout
+        bindings.collect(chosen.ids)
+        rows = bindings.rows[chosen.ids]
+        for name, warning in (("qpos", _WARN.mjWARN_BADQPOS), ("qvel", _WARN.mjWARN_BADQVEL)):
+            values = np.abs(rows[:, layout.at(name)])
+            # `not <=` is true for NaN
+            if values.size and not values.max() <= _VALUE_MAX:
+                sims = chosen.indices[~(values <= _VALUE_MAX).all(axis=1)]
+                if not resets:
+                    raise ArgumentError(f"sim {sims[0]}: {name} is NaN, infinite or huge; write another value")
+                self._restart(sims, int(warning))
+                rows = bindings.rows[chosen.ids]
+        fixed = layout.at("eq_active")
+        moved = (rows[:, fixed] != self._start[fixed]).any(axis=1)
+        if moved.any():
+            sim = chosen.indices[int(moved.argmax())]
+            raise ArgumentError(
+                f"sim {sim}: eq_active differs from the model's; tightloop cannot switch equalities while it runs, "
+                "so set `active` in the model"
+            )
+        if rows[:, layout.at("xfrc_applied")].any():
+            self._engine.require(params=("body_f",))
+        if "body_f" in self._engine.params:
+            params = params | {"body_f": layout.view(bindings.rows, "xfrc_applied")}
+        self._engine.sync(chosen.mask, params)
+
+    def _check_controls(self, chosen: Selection) -> None:
+        """MuJoCo sets all controls of a simulation to 0 if one of them is bad. Their rows keep what was written."""
+        columns = self._layout.at("ctrl")
+        ctrl = self._bindings.rows[chosen.ids, columns]
+        self._engine.silenced[chosen.ids] = False
+        if ctrl.size and not np.abs(ctrl).max() <= _VALUE_MAX:
+            sims = chosen.indices[~(np.abs(ctrl) <= _VALUE_MAX).all(axis=1)]
+            self._engine.silenced[sims] = True
+            self._bindings.warnings[sims, int(_WARN.mjWARN_BADCTRL), 1] += 1
+
+    def _restart(self, sims: Array, warning: int) -> None:
+        """Reset simulations that are unstable, as MuJoCo does, and count the warning."""
+        self._bindings.rows[sims] = self._start
+        self._bindings.warnings[sims] = 0
+        self._bindings.warnings[sims, warning, 1] += 1
+        self._engine.mark_stale(sims)
+
+    def _evaluate(self, chosen: Selection) -> None:
+        """Fill bound fields at the state of the newest frame, with the controls and forces of the rows."""
+        if not (self._direct or self._computed):
+            return
+        frame = self._engine.hold(chosen.mask) if self._accelerates else self._engine.frame
+        assert frame is not None
+        self._publish(frame, chosen.ids)
+
+    def _publish(self, frame: Frame, ids: Any) -> None:
+        derived = self._bindings.derived
+        for name in self._direct:
+            values = np.asarray(getattr(frame, name))[ids]
+            derived[name][ids] = values.reshape(len(values), *derived[name].shape[1:])
+        if self._computed:
+            body_qd = frame.body_qd[ids] if "body_qd" in frame.fields else None
+            mass = self.mass[ids] if len(self.mass) > 1 else self.mass
+            bodies = Kinematics(self._model, frame.body_q[ids], body_qd, mass)
+            for name in self._computed:
+                derived[name][ids] = getattr(bodies, name)
+
+    def _take(self, frame: Frame, ids: Any) -> None:
+        """Bring the state of a frame into the rows."""
+        rows, layout = self._bindings.rows, self._layout
+        rows[ids, layout.at("qpos")] = frame.qpos[ids]
+        rows[ids, layout.at("qvel")] = frame.qvel[ids]
+        if self._model.na:
+            rows[ids, layout.at("act")] = frame.act[ids]
+
+    def _count(self, frame: Frame, chosen: Selection) -> None:
+        """Count the simulation's warnings as MuJoCo's; a faulted world starts again."""
+        status = frame.status
+        if not status.any():
+            return
+        full = np.flatnonzero(chosen.mask & ((status & _LEFT_OUT) != 0))
+        self._bindings.warnings[full, int(_WARN.mjWARN_CONTACTFULL), 1] += 1
+        faulted = np.flatnonzero(chosen.mask & ((status & FAULTED) != 0))
+        if len(faulted):
+            self._restart(faulted, int(_WARN.mjWARN_BADQACC))
