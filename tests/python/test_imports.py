@@ -55,6 +55,7 @@ LAYERS = (
     ),
     ("tightloop.sim", "tightloop.groups"),
     ("tightloop.launching",),
+    ("tightloop.mujoco.batch",),
     # the names for users, `import tightloop as tl`
     ("tightloop",),
     ("tightloop.view",),

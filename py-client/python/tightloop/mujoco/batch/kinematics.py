@@ -23,11 +23,12 @@ class Kinematics:
         model: The model.
         body_q: Poses of the bodies in tightloop's conventions, ``(n, nbody, 7)`` [m, –].
         body_qd: Velocities of their centres of mass and angular velocities, ``(n, nbody, 6)`` [m/s, rad/s].
-        mass: Masses ``(n, nbody)`` or ``(nbody,)`` [kg].
+        masses: Masses of bodies, and of their subtrees as ``mj_setConst`` has left them, each ``(n, nbody)`` or
+            ``(1, nbody)`` [kg].
     """
 
-    def __init__(self, model: Any, body_q: Array, body_qd: Array | None, mass: Array) -> None:
-        self._model, self._body_q, self._body_qd, self._mass = model, body_q, body_qd, mass
+    def __init__(self, model: Any, body_q: Array, body_qd: Array | None, masses: tuple[Array, Array]) -> None:
+        self._model, self._body_q, self._body_qd, self._masses = model, body_q, body_qd, masses
 
     @cached_property
     def xpos(self) -> Array:
@@ -71,16 +72,12 @@ class Kinematics:
 
     @cached_property
     def subtree_com(self) -> Array:
-        masses = np.broadcast_to(self._mass, self.xipos.shape[:2]).copy()
-        moments = self.xipos * masses[..., None]
+        own, whole = self._masses
+        moments = self.xipos * own[..., None]
         for body in range(self._model.nbody - 1, 0, -1):
-            parent = self._model.body_parentid[body]
-            moments[:, parent] += moments[:, body]
-            masses[:, parent] += masses[:, body]
-        # as MuJoCo does for subtrees without mass
-        centers = self.xipos.copy()
-        np.divide(moments, masses[..., None], out=centers, where=masses[..., None] > _MASS_MIN)
-        return centers
+            moments[:, self._model.body_parentid[body]] += moments[:, body]
+        # a subtree without mass has its body's centre
+        return np.where(whole[..., None] < _MASS_MIN, self.xipos, moments / np.maximum(whole, _MASS_MIN)[..., None])
 
     @cached_property
     def cvel(self) -> Array:

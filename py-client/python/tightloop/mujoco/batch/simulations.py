@@ -298,8 +298,7 @@ class Batch(NamedViews):
         if "geom_friction" in self._expansions.names:
             shapes = geoms_of_shapes(self._own, self._engine.sim.shape_names)
         params = self._expansions.values(shapes, chosen.indices)
-        if "body_mass_scale" in params:
-            self._stepping.mass = self._expansions.of("body_mass")
+        self._stepping.masses = self._expansions.of("body_mass"), self._expansions.of("body_subtreemass")
         return params
 
 
