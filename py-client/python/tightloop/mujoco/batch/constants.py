@@ -6,11 +6,11 @@ import copy
 import warnings
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.mujoco.batch.expansions import CONSTANTS, Expansions
+from tightloop.mujoco.batch.library import mujoco
 
 #: Constants that make constraints soft; simulations keep those of the model.
 _SOFTNESS = ("body_invweight0", "dof_invweight0", "tendon_invweight0")

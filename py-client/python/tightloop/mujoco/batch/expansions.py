@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from tightloop.errors import ArgumentError
+from tightloop.mujoco.batch.library import mujoco
 from tightloop.mujoco.batch.masses import Masses
 
 Array = NDArray[Any]

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from tightloop.errors import ArgumentError
 from tightloop.mujoco.batch import kinematics
 from tightloop.mujoco.batch.layout import StateLayout
+from tightloop.mujoco.batch.library import mujoco
 
 #: Fields that depend on controls and forces, not on positions and velocities alone.
 _ACCELERATION = frozenset(

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tightloop.mujoco.batch.library import mujoco
 from tightloop.mujoco.batch.rotations import cross, rotated, rotations
 
 Array = NDArray[np.float64]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
+
+from tightloop.mujoco.batch.library import mujoco
 
 Array = NDArray[np.float64]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.errors import ArgumentError
+from tightloop.mujoco.batch.library import mujoco
 
 Array = NDArray[Any]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.errors import ArgumentError
 from tightloop.mujoco.batch.layout import StateLayout
+from tightloop.mujoco.batch.library import mujoco
 
 Array = NDArray[Any]
 
@@ -112,6 +112,8 @@ def _check(call: str, name: str, array: Any, shape: tuple[int, ...], dtypes: tup
     if array is None and name in ("geomid", "normal", "geomgroup", "bodyexclude", "jacp", "jacr"):
         return
     if not isinstance(array, np.ndarray) or array.shape != shape:
-        raise ArgumentError(f"{call}: {name} must be an array of shape {shape}; got {np.shape(array)}")
+        raise ArgumentError(
+            f"{call}: {name} must be an array of shape {shape}; got {getattr(array, 'shape', type(array).__name__)}"
+        )
     if array.dtype not in dtypes:
         raise ArgumentError(f"{call}: {name} is {array.dtype}; give {' or '.join(map(str, dtypes))}")

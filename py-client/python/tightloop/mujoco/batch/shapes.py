@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from tightloop.errors import ArgumentError
+from tightloop.mujoco.batch.library import mujoco
 
 
 def geoms_of_shapes(model: Any, shape_names: list[str]) -> list[int]:

@@ -7,7 +7,6 @@ import os
 import threading
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
@@ -18,6 +17,7 @@ from tightloop.mujoco.batch.engine import Engine
 from tightloop.mujoco.batch.expansions import Expansions
 from tightloop.mujoco.batch.fields import Fields
 from tightloop.mujoco.batch.layout import StateLayout
+from tightloop.mujoco.batch.library import mujoco
 from tightloop.mujoco.batch.queries import Queries
 from tightloop.mujoco.batch.selection import Selection
 from tightloop.mujoco.batch.shapes import geoms_of_shapes
@@ -56,7 +56,7 @@ class Batch(NamedViews):
 
     def __init__(
         self,
-        model: mujoco.MjModel,
+        model: Any,
         num_sims: int,
         num_threads: int = 0,
         forward: bool = False,

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +20,7 @@ from tightloop.mujoco.batch.engine import Engine
 from tightloop.mujoco.batch.fields import Fields
 from tightloop.mujoco.batch.kinematics import Kinematics
 from tightloop.mujoco.batch.layout import StateLayout
+from tightloop.mujoco.batch.library import mujoco
 from tightloop.mujoco.batch.selection import Selection
 
 Array = NDArray[Any]
@@ -173,7 +173,7 @@ class Stepping:
     def _publish(self, frame: Frame, ids: Any) -> None:
         derived = self._bindings.derived
         for name in self._direct:
-            values = np.asarray(getattr(frame, name))[ids]
+            values = _array(frame, name)[ids]
             derived[name][ids] = values.reshape(len(values), *derived[name].shape[1:])
         if self._computed:
             body_qd = frame.body_qd[ids] if "body_qd" in frame.fields else None
@@ -188,7 +188,7 @@ class Stepping:
         rows[ids, layout.at("qpos")] = frame.qpos[ids]
         rows[ids, layout.at("qvel")] = frame.qvel[ids]
         if self._model.na:
-            rows[ids, layout.at("act")] = frame.act[ids]
+            rows[ids, layout.at("act")] = _array(frame, "act")[ids]
 
     def _count(self, frame: Frame, chosen: Selection) -> None:
         """Count the simulation's warnings as MuJoCo's; a faulted world starts again."""
@@ -200,3 +200,8 @@ class Stepping:
         faulted = np.flatnonzero(chosen.mask & ((status & FAULTED) != 0))
         if len(faulted):
             self._restart(faulted, int(_WARN.mjWARN_BADQACC))
+
+
+def _array(frame: Frame, name: str) -> Array:
+    """A field that stubs of `Frame` need not know."""
+    return getattr(frame, name)

@@ -6,8 +6,9 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
-import mujoco
 from numpy.typing import DTypeLike, NDArray
+
+from tightloop.mujoco.batch.library import mujoco
 
 Array = NDArray[Any]
 
