@@ -121,7 +121,7 @@ class Expansions:
         Raises:
             ArgumentError: A value cannot be taken over; the message has the simulation and the field.
         """
-        self._check_options(ids)
+        self.check_options(ids)
         found = {}
         for name, array in self._arrays.items():
             if name in _SAME:
@@ -141,7 +141,12 @@ class Expansions:
         if len(wrong):
             raise ArgumentError(f"sim {ids[wrong[0]]}: {name} is not finite")
 
-    def _check_options(self, ids: Array) -> None:
+    def check_options(self, ids: Array) -> None:
+        """Check that options are those of the model.
+
+        Raises:
+            ArgumentError: One is not; the message has the simulation and the option.
+        """
         for name, array in self._arrays.items():
             if name in _SAME or not hasattr(self._model.opt, name):
                 continue

@@ -54,10 +54,10 @@ class Queries:
         count = pnt.shape[1]
         for name, array, shape, dtypes in (
             ("pnt", pnt, (num_sims, count, 3), _REAL),
-            ("vec", vec, (num_sims, count, 3), _REAL),
-            ("dist", dist, (num_sims, count), _REAL),
+            ("vec", vec, (num_sims, count, 3), (pnt.dtype,)),
+            ("dist", dist, (num_sims, count), (pnt.dtype,)),
             ("geomid", geomid, (num_sims, count), (np.dtype(np.int32),)),
-            ("normal", normal, (num_sims, count, 3), _REAL),
+            ("normal", normal, (num_sims, count, 3), (pnt.dtype,)),
             ("geomgroup", geomgroup, (6,), (np.dtype(np.uint8),)),
             ("bodyexclude", exclude, (count,), (np.dtype(np.int32),)),
         ):
@@ -85,14 +85,14 @@ class Queries:
         (jacp, jacr), (point, body) = filled, at
         shape = (num_sims, 3, self._model.nv)
         for name, array, expected, dtypes in (
-            ("jacp", jacp, shape, _REAL),
-            ("jacr", jacr, shape, _REAL),
             ("point", point, (num_sims, 3), _REAL),
+            ("jacp", jacp, shape, (point.dtype,)),
+            ("jacr", jacr, shape, (point.dtype,)),
             ("body", body, (num_sims,), (np.dtype(np.int32),)),
         ):
             _check("jac", name, array, expected, dtypes)
         if np.any((body[ids] < 0) | (body[ids] >= self._model.nbody)):
-            raise ArgumentError(f"jac: body must be between 0 and {self._model.nbody - 1}")
+            raise ArgumentError(f"jac: body must be at least 0 and below nbody, {self._model.nbody}")
         linear, angular = (np.empty((3, self._model.nv)) for _ in range(2))
         for row, sim in zip(rows, ids, strict=True):
             self._place(row)
@@ -112,8 +112,7 @@ def _check(call: str, name: str, array: Any, shape: tuple[int, ...], dtypes: tup
     if array is None and name in ("geomid", "normal", "geomgroup", "bodyexclude", "jacp", "jacr"):
         return
     if not isinstance(array, np.ndarray) or array.shape != shape:
-        raise ArgumentError(
-            f"{call}: {name} must be an array of shape {shape}; got {getattr(array, 'shape', type(array).__name__)}"
-        )
+        got = array.shape if isinstance(array, np.ndarray) else type(array).__name__
+        raise ArgumentError(f"{call}: {name} must be an array of shape {shape}, num_sims first; got {got}")
     if array.dtype not in dtypes:
         raise ArgumentError(f"{call}: {name} is {array.dtype}; give {' or '.join(map(str, dtypes))}")

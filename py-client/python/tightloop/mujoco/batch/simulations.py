@@ -136,9 +136,12 @@ class Batch(NamedViews):
                     raise ArgumentError(f'{name} is a field of the model; use expand("{name}")')
                 raise ArgumentError(f"{name} is not a field of MjData")
             if not self._fields.is_state(name) and not self._bindings.is_bound(name):
-                sources = self._fields.sources(name, self._engine.known_fields)
+                # a model without such elements has an empty field
+                empty = 0 in self._fields.shape(name)
+                sources = () if empty else self._fields.sources(name, self._engine.known_fields)
                 array = self._bindings.get(name, dtype)
-                self._stepping.add(name, sources)
+                if sources:
+                    self._stepping.add(name, sources)
                 return array
             return self._bindings.get(name, dtype)
 
@@ -232,10 +235,13 @@ class Batch(NamedViews):
             ids: As in `step`.
 
         Raises:
+            ArgumentError: An option differs from the model's.
             RuntimeError: MuJoCo refuses the values of a simulation; the message names the first one.
         """
         with self._lock:
-            set_const(self._own, self._expansions, Selection(ids, self.num_sims).indices, self.num_sims)
+            chosen = Selection(ids, self.num_sims)
+            self._expansions.check_options(chosen.indices)
+            set_const(self._own, self._expansions, chosen.indices, self.num_sims)
 
     def rays(  # noqa: PLR0917, mjbatch has these arguments in this order
         self,
@@ -254,7 +260,7 @@ class Batch(NamedViews):
         MuJoCo computes them one by one on one thread.
 
         Args:
-            pnt: Origins in the world [m], ``(num_sims, nray, 3)``, float64 or float32.
+            pnt: Origins in the world [m], ``(num_sims, nray, 3)``, float64 or float32 as all real arrays here.
             vec: Directions, same shape.
             dist: Filled with distances in units of ``vec``, ``(num_sims, nray)``; -1 where nothing is hit.
             geomid: Filled with the geoms, int32, ``(num_sims, nray)``; -1 where nothing is hit.
@@ -281,7 +287,7 @@ class Batch(NamedViews):
         Args:
             jacp: Filled with the Jacobian of the position, ``(num_sims, 3, nv)``, or None.
             jacr: Filled with that of the rotation, same shape, or None.
-            point: Points in the world [m], ``(num_sims, 3)``.
+            point: Points in the world [m], ``(num_sims, 3)``, float64 or float32 as the Jacobians.
             body: Body that each point moves with, int32, ``(num_sims,)``.
             ids: As in `step`.
 
