@@ -94,11 +94,17 @@ class Snapshot:
         records[worlds] = other._records()[worlds]
         return self._with(records)
 
+    def with_model(self, model_hash: int) -> Snapshot:
+        """Return the snapshot for a simulation of the same scene that has another hash, because of other substeps."""
+        return self._with(self._records(), model_hash)
+
     def _records(self) -> NDArray[np.uint8]:
         return np.frombuffer(self._data, np.uint8, offset=_HEAD.size).reshape(self.worlds, -1)
 
-    def _with(self, records: NDArray[np.uint8]) -> Snapshot:
+    def _with(self, records: NDArray[np.uint8], model_hash: int | None = None) -> Snapshot:
         data = bytearray(self._data[: _HEAD.size]) + records.tobytes()
+        if model_hash is not None:
+            struct.pack_into("<Q", data, _COVERED, model_hash)
         struct.pack_into("<I", data, _CHECKSUM, zlib.crc32(memoryview(data)[_COVERED:]))
         return Snapshot(bytes(data), "snapshot")
 

@@ -10,6 +10,7 @@ The rows of a batch are the truth. A world of the simulation is in one of three 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import gcd
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,8 @@ Mask = NDArray[np.bool_]
 
 #: Name of the model in the scene.
 MODEL = "model"
+#: Most substeps of a frame.
+_SUBSTEPS_MAX = 100
 #: Fields that simulations of this release have; filled by the first launch.
 _known_fields: set[str] = set()
 
@@ -47,6 +50,7 @@ class Engine:
         frame: The newest frame, or None before the first one of a launch.
         writes_rows: Whether each call starts from the rows alone.
         params: Names of the parameters that vary.
+        substeps: Steps of a frame of the simulation.
         silenced: Simulations whose controls count as 0, ``(num_sims,)``.
     """
 
@@ -58,6 +62,7 @@ class Engine:
         self._fields = {"qpos", "qvel"} | ({"act"} if model.na else set())
         self.params: set[str] = set()
         self._sim: Sim | None = None
+        self._launched_with = (0, 0, 0)
         self._snapshot: Snapshot | None = None
         self._stale, self._parked = np.ones(self._sims, bool), np.zeros(self._sims, bool)
         self._ctrl, self._force = np.zeros((self._sims, self._nu)), np.zeros((self._sims, self._nv))
@@ -66,13 +71,16 @@ class Engine:
         self._motion = slice(layout.at("qpos").start, layout.at("qacc_warmstart").stop)
         self.frame: Frame | None = None
         self.writes_rows = False
+        self.substeps = 1
+        self._common = 0
         self.silenced = np.zeros(self._sims, bool)
 
     @property
     def sim(self) -> Sim:
         """The simulation, launched with all that is required."""
         sim = self._sim
-        if sim is None or not (self._fields <= set(sim.fields) and self.params <= set(sim.params.names)):
+        # a launch changes none of these, so this is cheap
+        if sim is None or (len(self._fields), len(self.params), self.substeps) != self._launched_with:
             sim = self._launched()
         return sim
 
@@ -88,6 +96,16 @@ class Engine:
         self._fields.update(fields)
         self.params.update(params)
 
+    def plan(self, steps: int) -> int:
+        """Choose the steps of a frame for calls that need frames after this many steps; return the frames of a call.
+
+        It is the greatest common divisor of all calls, so that a simulation is launched again a few times at most.
+        """
+        self._common = gcd(self._common, steps)
+        most = min(self._common, _SUBSTEPS_MAX)
+        self.substeps = next(count for count in range(most, 0, -1) if self._common % count == 0)
+        return steps // self.substeps
+
     def close(self) -> None:
         """End the simulation."""
         self.frame = None
@@ -97,10 +115,11 @@ class Engine:
     def _launched(self) -> Sim:
         old, kept = self._sim, None
         if old is not None:
-            # with other parameters a snapshot does not fit
-            if self.params == set(old.params.names):
-                kept = old.snapshot()
+            kept = old.snapshot()
             self.close()
+        varied = self._launched_with[1]
+        self._scene.substeps = self.substeps
+        self._launched_with = (len(self._fields), len(self.params), self.substeps)
         self._sim = sim = launch(
             self._scene,
             worlds=self._sims,
@@ -109,8 +128,10 @@ class Engine:
             watch_worlds=1,
             **self._options,
         )
-        if kept is not None:
-            self.frame = sim.restore(kept)
+        # a snapshot fits where the same parameters vary
+        if kept is not None and varied == len(self.params):
+            self.frame = sim.restore(kept.with_model(sim.info["model_hash"]))
+            self._snapshot = self._snapshot and self._snapshot.with_model(sim.info["model_hash"])
         else:
             self._stale[:], self._parked[:], self._sent = True, False, {}
             self._ctrl[:], self._force[:] = 0.0, 0.0

@@ -70,18 +70,22 @@ class Stepping:
     def step(self, chosen: Selection, params: dict[str, Array], nstep: int, history: Array | None) -> None:
         """Advance simulations; see `Batch.step`."""
         rows, ids, mask = self._bindings.rows, chosen.ids, chosen.mask
+        lags = bool(self._direct or self._computed) and not self._forward
+        in_between = history is not None or lags or self._engine.forces_turn
+        frames = nstep * self._engine.plan(1) if in_between else self._engine.plan(nstep)
         self._begin(chosen, params, resets=self._resets)
         self._check_controls(chosen)
-        lags = bool(self._direct or self._computed) and not self._forward
         if lags and nstep == 1:
             self._evaluate(chosen)
         if len(chosen) < len(rows):
             self._engine.park(mask)
         frame: Frame | None = None
-        for substep in range(nstep):
+        for substep in range(frames):
             frame = None  # a client holds few frames
             frame = self._engine.step(mask)
-            rows[ids, 0] += self._model.opt.timestep
+            for _ in range(nstep // frames):
+                # a sum, as MuJoCo's
+                rows[ids, 0] += self._model.opt.timestep
             if history is not None or self._engine.forces_turn:
                 self._take(frame, ids)
             if history is not None:
