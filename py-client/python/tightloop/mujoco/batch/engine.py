@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop._core import Frame
+from tightloop.errors import ArgumentError
 from tightloop.frames import FAULTED
 from tightloop.launching import launch
 from tightloop.mujoco.batch.bindings import Bindings
@@ -194,6 +195,8 @@ class Engine:
         parts = {"joint_q": self._joints.positions(qpos), "joint_qd": self._joints.velocities(qpos, qvel)}
         act = rows[:, self._layout.at("act")]
         if act.size:
+            if not any(write["name"] == "act" for write in self.sim.info["writes"]):
+                raise ArgumentError("act: activations of this release cannot be written; remove them from the model")
             parts["act"] = act
         if changed.all():
             return self.sim.write(**parts)

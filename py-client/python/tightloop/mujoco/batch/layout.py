@@ -44,6 +44,7 @@ class StateLayout:
     def __init__(self, model: Any) -> None:
         self._model = model
         data = mujoco.MjData(model)
+        self._starts: dict[int, Array] = {}
         self._slices: dict[str, slice] = {}
         self._shapes: dict[str, tuple[int, ...]] = {}
         first = 0
@@ -73,11 +74,14 @@ class StateLayout:
 
     def start(self, keyframe: int) -> Array:
         """Return the row after a reset, ``(size,)``: of a keyframe, or of the model for -1."""
+        if keyframe in self._starts:
+            return self._starts[keyframe]
         data = mujoco.MjData(self._model)
         if keyframe >= 0:
             mujoco.mj_resetDataKeyframe(self._model, data, keyframe)
-        row = np.empty(self.size)
+        row = self._starts[keyframe] = np.empty(self.size)
         mujoco.mj_getState(self._model, data, row, _INTEGRATION)
+        row.flags.writeable = False
         return row
 
     def load(self, data: Any, row: Array) -> None:
