@@ -106,7 +106,10 @@ class Snapshot:
         if model_hash is not None:
             struct.pack_into("<Q", data, _COVERED, model_hash)
         struct.pack_into("<I", data, _CHECKSUM, zlib.crc32(memoryview(data)[_COVERED:]))
-        return Snapshot(bytes(data), "snapshot")
+        made = Snapshot.__new__(Snapshot)
+        made._data, made.worlds, made.precision = bytes(data), self.worlds, self.precision
+        made.model_hash = self.model_hash if model_hash is None else model_hash
+        return made
 
     def to_bytes(self) -> bytes:
         """Return the snapshot as bytes, for `from_bytes`."""

@@ -87,6 +87,17 @@ def test_expanded_fields_act_as_models_of_their_own(case: str) -> None:
         lockstep.assert_equal(("qpos", "qvel"), 1e-8)
 
 
+def test_a_flag_that_switches_a_part_off_holds_for_expanded_values() -> None:
+    xml = XML.format(contacts=0).replace("<worldbody>", '<option><flag gravity="disable"/></option><worldbody>', 1)
+    model = mujoco.MjModel.from_xml_string(xml)
+    with Batch(model, N, 1, precision="f64") as batch:
+        batch.expand("gravity")[:, 2] = -5.0
+        lockstep = Lockstep(batch, [model] * N)
+        lockstep.write("ctrl", np.full((N, model.nu), 0.4))
+        lockstep.step(nstep=3)
+        lockstep.assert_equal(("qpos", "qvel"), 1e-8)
+
+
 def test_friction_and_scaled_bodies_act_as_models_of_their_own() -> None:
     model = model_of(contacts=True)
     models = separate(model)
@@ -124,6 +135,11 @@ def test_values_that_tightloop_cannot_vary_are_refused_by_simulation_and_field()
                 with pytest.raises(ValueError, match=message):
                     call()
             values[2] = getattr(model.opt, field)
+        damping = batch.expand("dof_damping")
+        damping[1, -1] = 0.1
+        with pytest.raises(ValueError, match="sim 1: dof_damping of a free joint"):
+            batch.forward()
+        damping[1, -1] = 0.0
         flags = batch.expand("enableflags")
         flags[4] |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
         with pytest.raises(ValueError, match="sim 4: sleep"):

@@ -20,6 +20,12 @@ _SAME = {
     "dof_damping": "joint_damping",
     "dof_frictionloss": "joint_friction",
 }
+#: Flags that make a field count as 0, whatever its values.
+_SWITCHES = {
+    "gravity": ("mjDSBL_GRAVITY",),
+    "dof_damping": ("mjDSBL_DAMPER",),
+    "dof_frictionloss": ("mjDSBL_FRICTIONLOSS", "mjDSBL_CONSTRAINT"),
+}
 #: What ``mj_setConst`` computes. A batch computes it for reading.
 CONSTANTS = (
     "body_subtreemass body_invweight0 dof_invweight0 dof_M0 tendon_length0 tendon_invweight0 actuator_length0 "
@@ -125,8 +131,8 @@ class Expansions:
         found = {}
         for name, array in self._arrays.items():
             if name in _SAME:
-                found[_SAME[name]] = array.astype(np.float64)
-                self._check_finite(name, ids)
+                self._check_same(name, ids)
+                found[_SAME[name]] = array.astype(np.float64) * self._switch(name)
         if any(name in self._arrays for name in Masses.FIELDS):
             masses = Masses(self._model, self.of("body_mass"), self.of("body_inertia"))
             found["body_mass_scale"] = np.broadcast_to(masses.scale(ids), (self._sims, self._model.nbody))
@@ -135,11 +141,25 @@ class Expansions:
             found["shape_mu"] = self._arrays["geom_friction"][:, shapes, 0].astype(np.float64)
         return found
 
-    def _check_finite(self, name: str, ids: Array) -> None:
+    def _switch(self, name: str) -> float:
+        flags = [getattr(mujoco.mjtDisableBit, flag, 0) for flag in _SWITCHES.get(name, ())]
+        return 0.0 if any(self._model.opt.disableflags & int(flag) for flag in flags) else 1.0
+
+    def _check_same(self, name: str, ids: Array) -> None:
         array = self._arrays[name][ids].reshape(len(ids), -1)
         wrong = np.flatnonzero(~np.isfinite(array).all(axis=1))
         if len(wrong):
             raise ArgumentError(f"sim {ids[wrong[0]]}: {name} is not finite")
+        if name == "gravity":
+            return
+        # tightloop has other dofs for free joints: velocities of the centre of mass, in world axes
+        free = self._model.jnt_type[self._model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
+        moved = (array[:, free] != getattr(self._model, name)[free].astype(array.dtype)).any(axis=1)
+        if moved.any():
+            sim = ids[int(moved.argmax())]
+            raise ArgumentError(
+                f"sim {sim}: {name} of a free joint cannot differ from the model's; write other dofs only"
+            )
 
     def check_options(self, ids: Array) -> None:
         """Check that options are those of the model.
