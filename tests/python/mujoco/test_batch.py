@@ -177,6 +177,23 @@ def test_a_new_field_between_calls_changes_no_motion() -> None:
         np.testing.assert_array_equal(batch.bind("qpos"), other.bind("qpos"))
 
 
+@pytest.mark.parametrize("precision", ["f32", "f64"])
+def test_steps_of_one_call_are_those_of_many_calls_bit_for_bit(precision: str) -> None:
+    model = model_of(contacts=True)
+    with Batch(model, N, 1, precision=precision) as many, Batch(model, N, 1, precision=precision) as few:
+        for each in (many, few):
+            each.bind("qpos")[:] = positions(model, 9)
+        few.step(nstep=30)
+        few.step(nstep=20)
+        assert few.sim.substeps == 10
+        few.step(nstep=3)
+        assert few.sim.substeps == 1
+        for _ in range(53):
+            many.step()
+        for field in ("qpos", "qvel", "time"):
+            np.testing.assert_array_equal(few.bind(field), many.bind(field))
+
+
 def test_reset_to_the_start_or_a_keyframe_keeps_what_was_written() -> None:
     model = model_of()
     data = mujoco.MjData(model)
