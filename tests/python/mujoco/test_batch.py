@@ -238,6 +238,9 @@ def test_unstable_simulations_start_again_and_count_a_warning() -> None:
         assert np.isfinite(qpos).all()
         assert batch.bind("time")[2] == pytest.approx(0.004)
         assert np.isnan(ctrl[4, 0])
+        batch.reset(np.array([4]))
+        assert warning[4].sum() == 0
+        assert (ctrl[4] == 0).all()
         qpos[3] = np.inf
         with pytest.raises(ValueError, match="sim 3: qpos"):
             batch.forward()

@@ -112,12 +112,15 @@ class Stepping:
         """Reset simulations to a row; see `Batch.reset`."""
         bindings, ids = self._bindings, chosen.ids
         bindings.collect(ids)
-        written = bindings.rows[ids] != bindings.last[ids]
-        bindings.rows[ids] = np.where(written, bindings.rows[ids], start)
+        rows, last = bindings.rows[ids], bindings.last[ids]
+        # NaN is no other value than NaN
+        written = (rows != last) & ~(np.isnan(rows) & np.isnan(last))
+        bindings.rows[ids] = np.where(written, rows, start)
         bindings.warnings[ids] = 0
         # a reset clears the warm start, too
         self._engine.mark_stale(ids)
         self._begin(chosen, params, resets=False)
+        self._check_controls(chosen)
         self._evaluate(chosen)
         bindings.settle(ids)
 
