@@ -23,12 +23,11 @@ class Kinematics:
         model: The model.
         body_q: Poses of the bodies in tightloop's conventions, ``(n, nbody, 7)`` [m, –].
         body_qd: Velocities of their centres of mass and angular velocities, ``(n, nbody, 6)`` [m/s, rad/s].
-        masses: Masses of bodies, and of their subtrees as ``mj_setConst`` has left them, each ``(n, nbody)`` or
-            ``(1, nbody)`` [kg].
+        mass: Masses of the bodies, ``(n, nbody)`` or ``(1, nbody)`` [kg].
     """
 
-    def __init__(self, model: Any, body_q: Array, body_qd: Array | None, masses: tuple[Array, Array]) -> None:
-        self._model, self._body_q, self._body_qd, self._masses = model, body_q, body_qd, masses
+    def __init__(self, model: Any, body_q: Array, body_qd: Array | None, mass: Array) -> None:
+        self._model, self._body_q, self._body_qd, self._mass = model, body_q, body_qd, mass
 
     @cached_property
     def xpos(self) -> Array:
@@ -72,12 +71,14 @@ class Kinematics:
 
     @cached_property
     def subtree_com(self) -> Array:
-        own, whole = self._masses
-        moments = self.xipos * own[..., None]
+        moments, masses = self.xipos * self._mass[..., None], np.array(self._mass, np.float64)
         for body in range(self._model.nbody - 1, 0, -1):
-            moments[:, self._model.body_parentid[body]] += moments[:, body]
+            parent = self._model.body_parentid[body]
+            moments[:, parent] += moments[:, body]
+            masses[:, parent] += masses[:, body]
         # a subtree without mass has its body's centre
-        return np.where(whole[..., None] < _MASS_MIN, self.xipos, moments / np.maximum(whole, _MASS_MIN)[..., None])
+        whole = np.maximum(masses, _MASS_MIN)[..., None]
+        return np.where(masses[..., None] < _MASS_MIN, self.xipos, moments / whole)
 
     @cached_property
     def cvel(self) -> Array:

@@ -228,7 +228,7 @@ class Batch(NamedViews):
     def set_const(self, ids: ArrayLike | None = None) -> None:
         """Compute the constants of expanded fields as ``mj_setConst`` does, and expand those that changed.
 
-        The simulations themselves need none: the motion follows ``body_mass`` and ``dof_armature`` at once. Limits,
+        The simulations themselves need none: motion and ``subtree_com`` follow expanded fields at once. Limits,
         contacts and equalities keep the softness of the model, and a warning says so. MuJoCo runs once per simulation.
 
         Args:
@@ -304,7 +304,7 @@ class Batch(NamedViews):
         if "geom_friction" in self._expansions.names:
             shapes = geoms_of_shapes(self._own, self._engine.sim.shape_names)
         params = self._expansions.values(shapes, chosen.indices)
-        self._stepping.masses = self._expansions.of("body_mass"), self._expansions.of("body_subtreemass")
+        self._stepping.mass = self._expansions.of("body_mass")
         return params
 
 

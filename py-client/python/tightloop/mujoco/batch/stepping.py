@@ -44,7 +44,7 @@ class Stepping:
         forward: Whether fields are current after a step.
 
     Attributes:
-        masses: Masses of bodies and of subtrees, each ``(num_sims, nbody)`` or ``(1, nbody)`` [kg].
+        mass: Masses of the bodies, ``(num_sims, nbody)`` or ``(1, nbody)`` [kg].
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Stepping:
         self._direct: list[str] = []
         self._computed: list[str] = []
         self._accelerates = False
-        self.masses: tuple[Array, Array] = model.body_mass[None], model.body_subtreemass[None]
+        self.mass: Array = model.body_mass[None]
         reset = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self._resets = not model.opt.disableflags & reset
 
@@ -184,8 +184,8 @@ class Stepping:
             derived[name][ids] = values.reshape(len(values), *derived[name].shape[1:])
         if self._computed:
             body_qd = frame.body_qd[ids] if "body_qd" in frame.fields else None
-            own, whole = (mass[ids] if len(mass) > 1 else mass for mass in self.masses)
-            bodies = Kinematics(self._model, frame.body_q[ids], body_qd, (own, whole))
+            mass = self.mass[ids] if len(self.mass) > 1 else self.mass
+            bodies = Kinematics(self._model, frame.body_q[ids], body_qd, mass)
             for name in self._computed:
                 derived[name][ids] = getattr(bodies, name)
 
