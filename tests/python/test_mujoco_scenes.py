@@ -169,6 +169,12 @@ def test_commands_are_checked(model):
             '<actuator><muscle name="m" joint="j"/></actuator>',
             ["geom `g`: no support for the ellipsoid fluid model", "actuator `m`: no support for muscles"],
         ),
+        (
+            '<worldbody><geom name="f" type="plane" size="1 1 1"/>'
+            '<body><freejoint/><geom name="g" size=".1"/></body></worldbody>'
+            '<contact><pair name="p" geom1="f" geom2="g" friction="1 .5 .1 .1 .1"/></contact>',
+            ["pair `p`: no support for sliding friction that differs between the two tangents"],
+        ),
         ('<option integrator="implicit"/><worldbody><body><joint/><geom size=".1"/></body></worldbody>', ["implicit"]),
     ],
 )
