@@ -43,7 +43,11 @@ impl BodyBuilder {
         for drag in &parts.drags {
             let carrier = &carriers[drag.link];
             let inertial = carrier.pose.mul(&drag.inertial);
-            if let Some(body) = carrier.body {
+            // what has no dofs of its own does not move in the medium
+            let body = carrier
+                .body
+                .filter(|&body| !self.bodies[body].dofs().is_empty());
+            if let Some(body) = body {
                 self.mujoco.drags.push(Drag {
                     body,
                     center: inertial.pos,
