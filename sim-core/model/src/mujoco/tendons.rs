@@ -62,8 +62,11 @@ impl Tendons {
     }
 }
 
-/// Bounds of the sum of actuator forces along a tendon: the places of its actuators, and the range.
-pub(super) fn bounds(file: &ModelFile) -> Result<Vec<(Vec<usize>, [f64; 2])>, ModelError> {
+/// Places of a tendon's actuators, and the range of the sum of their forces [N or N·m].
+type Bound = (Vec<usize>, [f64; 2]);
+
+/// Bounds of the sum of actuator forces along a tendon.
+pub(super) fn bounds(file: &ModelFile) -> Result<Vec<Bound>, ModelError> {
     let (count, actuators) = (file.rows("tendon_num"), file.rows("actuator_trntype"));
     if file.first_set("tendon_actfrclimited").is_none() {
         return Ok(Vec::new());
