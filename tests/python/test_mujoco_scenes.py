@@ -165,7 +165,8 @@ def test_commands_are_checked(model):
             ["geom0", "ellipsoid"],
         ),
         (
-            '<worldbody><body><joint name="j" range="-9 9"/><geom name="g" size=".1" fluidshape="ellipsoid"/></body></worldbody>'
+            '<worldbody><body><joint name="j" range="-9 9"/>'
+            '<geom name="g" size=".1" fluidshape="ellipsoid"/></body></worldbody>'
             '<actuator><muscle name="m" joint="j"/></actuator>',
             ["geom `g`: no support for the ellipsoid fluid model", "actuator `m`: no support for muscles"],
         ),
