@@ -93,10 +93,6 @@ fn notes(file: &ModelFile) -> Result<Vec<String>, ModelError> {
             "its {idle} equalities that are not active at the start are not read"
         ));
     }
-    let keys = file.rows("key_time");
-    if keys > 0 {
-        notes.push(format!("its {keys} keyframes are not read"));
-    }
     Ok(notes)
 }
 

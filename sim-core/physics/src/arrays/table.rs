@@ -119,6 +119,10 @@ arrays! { m;
             => "bias_force" [Dofs], "Coriolis, centrifugal and gravity forces: what holds the joints at zero acceleration.";
         smooth_force: SmoothForce [Scalar; m.dofs.len()] Stage "N·m or N"
             => "smooth_force" [Dofs], "Applied, drive and damping forces less the bias: all but constraint forces.";
+        actuator_length: ActuatorLength [Scalar; m.mujoco.actuators.len()] Stage "rad or m"
+            => "actuator_length" [Actuators], "Length of each actuator, gear included.";
+        actuator_velocity: ActuatorVelocity [Scalar; m.mujoco.actuators.len()] Stage "rad/s or m/s"
+            => "actuator_velocity" [Actuators], "How fast it changes.";
         actuator_force: ActuatorForce [Scalar; m.mujoco.actuators.len()] Stage "N or N·m"
             => "actuator_force" [Actuators], "Force of each actuator along its length.";
         act_dot: ActDot [Scalar; m.mujoco.activations] Stage "1/s";

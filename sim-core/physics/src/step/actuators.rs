@@ -37,6 +37,8 @@ impl Stage for Actuators {
     ];
     const WRITES: &'static [A] = &[
         A::SmoothForce,
+        A::ActuatorLength,
+        A::ActuatorVelocity,
         A::ActuatorForce,
         A::QfrcActuator,
         A::ActuatorMoment,
@@ -63,7 +65,7 @@ impl Stage for Actuators {
         }
         for (k, actuator) in m.mujoco.actuators.iter().enumerate() {
             let input = input(cx, b, actuator, k);
-            let mut force = force(cx, m, b, actuator, input);
+            let mut force = force(cx, m, b, k, input);
             let mut bounds = m.mujoco.tendon_bounds.iter();
             if bounds.any(|bound| bound.actuators.contains(&k)) {
                 force = force * b.work.actuator_force[k];
@@ -107,9 +109,8 @@ fn tendon_scale<C: Cx>(
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     let mut sum = zero;
     for &k in &bound.actuators {
-        let actuator = &m.mujoco.actuators[k];
-        let input = input(cx, b, actuator, k);
-        sum = sum + force(cx, m, b, actuator, input);
+        let input = input(cx, b, &m.mujoco.actuators[k], k);
+        sum = sum + force(cx, m, b, k, input);
     }
     // a sum of 0 stays, whatever the range is
     let acts = zero.lt(sum.abs());
@@ -166,15 +167,10 @@ fn input<C: Cx>(
     }
 }
 
-/// Force of an actuator before it is clamped; `input` is its control or activation.
+/// Force of actuator `k` before it is clamped; writes its length and velocity. `input` is its control or activation.
 #[inline(always)]
-fn force<C: Cx>(
-    cx: &mut C,
-    m: &ConstantsOf<C>,
-    b: &mut BlockOf<C>,
-    actuator: &Actuator<<C::F as Num>::Real>,
-    input: C::F,
-) -> C::F {
+fn force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize, input: C::F) -> C::F {
+    let actuator = &m.mujoco.actuators[k];
     let (mut length, mut velocity) = (C::F::c(0.0), C::F::c(0.0));
     if let Some(turning) = &actuator.turning {
         length = measure(cx, m, b, turning);
@@ -190,6 +186,8 @@ fn force<C: Cx>(
             .fma(coefficient, length);
         velocity = cx.get(&b.joint_qd[term.dof]).fma(coefficient, velocity);
     }
+    b.work.actuator_length[k] = length;
+    b.work.actuator_velocity[k] = velocity;
     let law = |[constant, stiffness, damping]: [<C::F as Num>::Real; 3]| {
         let mut sum = C::F::k(constant);
         // most actuators have no such term
@@ -234,13 +232,10 @@ pub(super) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf
         }
         add_product(m, &mut b.work.mass_matrix, &actuator.terms, damping);
         if let Some(length) = &actuator.turning {
-            let swing = swing(cx, m, b, length);
             let w = &mut b.work;
             let moments = &w.actuator_moment[length.first..];
             add_moments(m, &mut w.mass_matrix, &length.dofs, moments, damping);
-            for (&dof, moment) in length.dofs.iter().zip(moments) {
-                w.acceleration[dof] = (damping * swing).fnma(*moment, w.acceleration[dof]);
-            }
+            subtract_swing(cx, m, b, length, damping);
         }
     }
     for tendon in &m.mujoco.tendons {
@@ -249,16 +244,16 @@ pub(super) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf
     }
 }
 
-/// What MuJoCo's J q̈ of a length has beyond ours: its acceleration of a free joint is that of the frame's origin, which
-/// differs from that of the centre of mass by ω × (ω × r).
+/// Subtracts x times the part of MuJoCo's J q̈ that ours does not have, from the dofs of the same branch: its acceleration of
+/// a free joint is that of the frame's origin, which differs from that of the centre of mass by ω × (ω × r).
 #[inline(always)]
-fn swing<C: Cx>(
+fn subtract_swing<C: Cx>(
     cx: &mut C,
     m: &ConstantsOf<C>,
-    b: &BlockOf<C>,
+    b: &mut BlockOf<C>,
     length: &TurningLength<<C::F as Num>::Real>,
-) -> C::F {
-    let mut sum = C::F::c(0.0);
+    x: C::F,
+) {
     for (k, body) in m.bodies.iter().enumerate() {
         let first = length.dofs.iter().position(|&dof| dof == body.dof);
         let (Motion::Free, Some(first)) = (body.motion, first) else {
@@ -267,14 +262,21 @@ fn swing<C: Cx>(
         let omega = Vec3(std::array::from_fn(|i| {
             cx.get(&b.joint_qd[body.dof + 3 + i])
         }));
-        let arm = Vec3::zero() - b.work.rotation[k] * Vec3::constant(body.center);
+        let w = &mut b.work;
+        let arm = Vec3::zero() - w.rotation[k] * Vec3::constant(body.center);
         let swing = omega.cross(omega.cross(arm));
+        let mut sum = C::F::c(0.0);
         for i in 0..3 {
-            let moment = b.work.actuator_moment[length.first + first + i];
+            let moment = w.actuator_moment[length.first + first + i];
             sum = moment.fma(swing[i], sum);
         }
+        for (place, &dof) in length.dofs.iter().enumerate() {
+            if shared(m, dof, body.dof).is_some() {
+                let moment = w.actuator_moment[length.first + place];
+                w.acceleration[dof] = (x * sum).fnma(moment, w.acceleration[dof]);
+            }
+        }
     }
-    sum
 }
 
 /// Adds Jᵀ x J to the mass matrix, J with the coefficients of a length.

@@ -16,12 +16,13 @@
 //! N α = (α × (ω × p) + ω × (α × p) + m S(α),  α × I ω + ω × I α + p × S(α))
 //! ```
 
+use super::actuators::is_damped;
 use super::{BlockOf, ConstantsOf, param};
 use crate::arrays::{Block, Workspace};
 use crate::constants::mujoco::Integrator;
 use crate::constants::params::Param;
 use crate::constants::{Constants, Motion};
-use crate::lane::{Cx, Num};
+use crate::lane::{Cx, Num, Real};
 use crate::math::spatial::Inertia;
 use crate::math::vec3::Vec3;
 
@@ -106,16 +107,22 @@ pub(super) fn add_damping_forces<C: Cx>(
     }
 }
 
-/// Subtracts what their armature needs for the part of MuJoCo's acceleration that ours does not have.
+/// Subtracts what their armature needs for the part of MuJoCo's acceleration that ours does not have, times a factor.
 #[inline(always)]
-pub(super) fn add_swing_forces<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
+pub(super) fn add_swing_forces<C: Cx>(
+    cx: &C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    times: f64,
+    to: &mut [C::F],
+) {
     for &body in &m.mujoco.free_joints {
         let first = m.bodies[body].dof;
         let (rotation, origin) = (b.work.rotation[body], b.work.origin[body]);
         let spin = spin(cx, b, first);
         let swing = spin.cross(spin.cross(origin));
         let [armature, _] = of_dofs(m, &b.params, Param::JointArmature, body);
-        let force = [scaled(armature, swing), Vec3::zero()];
+        let force = [scaled(armature, swing) * C::F::c(times), Vec3::zero()];
         subtract(&mut to[first..first + 6], force, rotation, origin);
     }
 }
@@ -205,16 +212,22 @@ pub(super) fn add_damping<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut BlockOf<C>)
 
 /// Free bodies that carry nothing and whose mass matrix has more than their inertia in a step: [`solve`] finds their
 /// accelerations.
-pub(super) fn solved<R: Copy>(m: &Constants<R>) -> impl Iterator<Item = usize> + '_ {
+pub(super) fn solved<R: Real>(m: &Constants<R>) -> impl Iterator<Item = usize> + '_ {
     let bodies = (0..m.bodies.len()).filter(|&k| is_solved(m, k));
     bodies.filter(|_| m.mujoco.integrator == Integrator::ImplicitFast)
 }
 
 /// Is a body one of [`solved`], where the integrator is implicit?
-pub(super) fn is_solved<R>(m: &Constants<R>, body: usize) -> bool {
+pub(super) fn is_solved<R: Real>(m: &Constants<R>, body: usize) -> bool {
     let is_alone = m.bodies.iter().all(|other| other.parent != Some(body));
     let drags = m.mujoco.drags.iter().any(|drag| drag.body == body);
-    is_alone && (has(m, body) || drags && m.bodies[body].motion == Motion::Free)
+    let mut actuators = m.mujoco.actuators.iter().filter(|own| is_damped(own));
+    let driven = actuators.any(|own| {
+        let dofs = own.turning.iter().flat_map(|length| &length.dofs);
+        dofs.into_iter().any(|&dof| m.dofs[dof].body == body)
+    });
+    let is_free = m.bodies[body].motion == Motion::Free;
+    is_alone && (has(m, body) || (drags || driven) && is_free)
 }
 
 /// Solves (H + h N) a = b for a free body, H its block of the mass matrix and b its part of `acceleration`; leaves a in `minimum`.

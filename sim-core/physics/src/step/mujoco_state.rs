@@ -8,7 +8,7 @@
 //! f' = f              τ' = Rᵀ (τ + r × f)      c' = T (c + M s),  s = ω × (ω × r): what a has at a' = 0
 //! ```
 
-use super::{BlockOf, ConstantsOf};
+use super::{BlockOf, ConstantsOf, free_joints};
 use crate::arrays::Workspace;
 use crate::constants::{Constants, Motion};
 use crate::lane::{Cx, Num};
@@ -76,6 +76,8 @@ pub fn bias<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) 
             }
         }
     }
+    // MuJoCo's have no armature
+    free_joints::add_swing_forces(cx, m, b, -1.0, to);
     turn_forces(m, w, to);
 }
 

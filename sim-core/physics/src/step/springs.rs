@@ -51,7 +51,7 @@ impl Stage for Springs {
         let mut smooth = std::mem::take(&mut b.work.smooth_force);
         add_springs(cx, m, b, &mut smooth);
         free_joints::add_damping_forces(cx, m, b, &mut smooth);
-        free_joints::add_swing_forces(cx, m, b, &mut smooth);
+        free_joints::add_swing_forces(cx, m, b, 1.0, &mut smooth);
         b.work.smooth_force = smooth;
     }
 }

@@ -31,6 +31,8 @@ impl Stage for States {
         A::Reference,
         A::Velocity,
         A::Orientation,
+        A::ActuatorLength,
+        A::ActuatorVelocity,
         A::Sensordata,
     ];
     const WRITES: &'static [A] = &[A::Sensordata];
@@ -61,8 +63,8 @@ impl Stage for States {
                 }
                 SensorKind::Length(terms) => &[length(cx, m, b, terms)],
                 SensorKind::Rate(terms) => &[rate(cx, b, terms)],
-                SensorKind::ActuatorLength(k) => &[length(cx, m, b, &m.mujoco.actuators[*k].terms)],
-                SensorKind::ActuatorRate(k) => &[rate(cx, b, &m.mujoco.actuators[*k].terms)],
+                SensorKind::ActuatorLength(k) => &[b.work.actuator_length[*k]],
+                SensorKind::ActuatorRate(k) => &[b.work.actuator_velocity[*k]],
                 SensorKind::BallQuat(coord) => {
                     let q = |k: usize| cx.get(&b.joint_q[coord + k]);
                     &[q(3), q(0), q(1), q(2)]
