@@ -264,3 +264,54 @@ def test_snapshots_are_edited_as_a_whole() -> None:
         assert same.to_bytes() == first.to_bytes()
         frame = sim.restore(mixed)
         np.testing.assert_array_equal(frame.step, np.where(mask, 0, 1))
+
+
+def test_mocap_bodies_and_activations_follow_their_rows() -> None:
+    """A hand that pulls a body, and a filtered actuator, through writes, subsets, keyframes and forward calls."""
+    model = mujoco.MjModel.from_xml_string(PULLED)
+    sims = 6
+    with Batch(model, sims, precision="f64") as batch:
+        datas = [mujoco.MjData(model) for _ in range(sims)]
+        names = ("qpos", "qvel", "act", "actuator_force", "xpos")
+        bound = {name: batch.bind(name) for name in names}
+        mocap, ctrl = batch.bind("mocap_pos"), batch.bind("ctrl")
+        rng = np.random.default_rng(0)
+        for call in range(20):
+            ids = np.arange(sims) if call % 3 else np.array([1, 4])
+            ctrl[ids], mocap[ids, 0] = rng.uniform(-1, 1, (len(ids), 1)), rng.normal([0, 0, 1], 0.1, (len(ids), 3))
+            for sim in ids:
+                datas[sim].ctrl[:], datas[sim].mocap_pos[:] = ctrl[sim], mocap[sim]
+            if call == 10:
+                batch.reset(ids, keyframe=0)
+            elif call == 15:
+                batch.forward(ids)
+            else:
+                batch.step(ids)
+            for sim in ids:
+                if call == 10:
+                    mujoco.mj_resetDataKeyframe(model, datas[sim], 0)
+                    datas[sim].ctrl[:], datas[sim].mocap_pos[:] = ctrl[sim], mocap[sim]
+                if call in (10, 15):
+                    mujoco.mj_forward(model, datas[sim])
+                else:
+                    mujoco.mj_step(model, datas[sim])
+            for name in names:
+                np.testing.assert_allclose(
+                    bound[name][ids], [getattr(datas[sim], name) for sim in ids], rtol=1e-8, atol=1e-8, err_msg=name
+                )
+
+
+PULLED = """
+<mujoco>
+  <worldbody>
+    <body name="hand" mocap="true" pos="0 0 1"><geom size=".02" contype="0" conaffinity="0"/></body>
+    <body name="held" pos="0 0 1"><freejoint/><geom size=".05" mass=".2"/></body>
+    <body pos="1 0 1"><joint name="hinge" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 .3" size=".02"/></body>
+  </worldbody>
+  <equality><weld body1="hand" body2="held"/></equality>
+  <actuator>
+    <general joint="hinge" dyntype="filter" dynprm="0.02" gainprm="5" biastype="affine" biasprm="0 -5 0"/>
+  </actuator>
+  <keyframe><key qpos="0 .1 1 1 0 0 0 .5" ctrl=".2" act=".3" mpos="0 0 1.1"/></keyframe>
+</mujoco>
+"""

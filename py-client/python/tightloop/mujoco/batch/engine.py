@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop._core import Frame
-from tightloop.errors import ArgumentError
 from tightloop.frames import FAULTED
 from tightloop.launching import launch
 from tightloop.mujoco.batch.bindings import Bindings
@@ -30,6 +29,8 @@ from tightloop.snapshot import Snapshot
 Array = NDArray[Any]
 Mask = NDArray[np.bool_]
 
+#: Parts of a row that a world holds until they are set again.
+_HELD = ("ctrl", "mocap_pos", "mocap_quat")
 #: Name of the model in the scene.
 MODEL = "model"
 #: Most substeps of a frame.
@@ -59,14 +60,17 @@ class Engine:
         self._scene = Scene.from_mujoco(model, name=MODEL)
         self._layout, self._bindings, self._options = layout, bindings, options
         self._joints = JointMap(model)
-        self._sims, self._nu, self._nv = len(bindings.rows), model.nu, model.nv
+        self._sims, self._nv = len(bindings.rows), model.nv
         self._fields = {"qpos", "qvel"} | ({"act"} if model.na else set())
         self.params: set[str] = set()
         self._sim: Sim | None = None
         self._launched_with = (0, 0, 0)
         self._snapshot: Snapshot | None = None
         self._stale, self._parked = np.ones(self._sims, bool), np.zeros(self._sims, bool)
-        self._ctrl, self._force = np.zeros((self._sims, self._nu)), np.zeros((self._sims, self._nv))
+        # what the worlds hold: controls and mocap bodies as in a row, and joint forces
+        self._held_at = {name: layout.at(name) for name in _HELD if layout.at(name).start < layout.at(name).stop}
+        self._held: dict[str, Array] = {}
+        self._force = np.zeros((self._sims, self._nv))
         self._sent: dict[str, Array] = {}
         # columns of a row that a write of the state sets: positions to warm start
         self._motion = slice(layout.at("qpos").start, layout.at("qacc_warmstart").stop)
@@ -135,8 +139,15 @@ class Engine:
             self._snapshot = self._snapshot and self._snapshot.with_model(sim.info["model_hash"])
         else:
             self._stale[:], self._parked[:], self._sent = True, False, {}
-            self._ctrl[:], self._force[:] = 0.0, 0.0
+            self._let_go(np.ones(self._sims, bool))
         return sim
+
+    def _let_go(self, mask: Mask) -> None:
+        """Note that worlds hold what they start with."""
+        start = self._layout.start(-1)
+        for name, at in self._held_at.items():
+            self._held.setdefault(name, np.zeros((self._sims, at.stop - at.start)))[mask] = start[at]
+        self._force[mask] = 0.0
 
     def mark_stale(self, ids: Any) -> None:
         """Let the rows of simulations be written before they run."""
@@ -185,7 +196,7 @@ class Engine:
         frozen = changed & ((self.frame.status & FAULTED) != 0)
         if frozen.any():
             self.frame = self.sim.reset(mask=frozen)
-            self._ctrl[frozen], self._force[frozen] = 0.0, 0.0
+            self._let_go(frozen)
             if "body_f" in self._sent:
                 self._sent["body_f"][frozen] = 0.0
 
@@ -195,8 +206,6 @@ class Engine:
         parts = {"joint_q": self._joints.positions(qpos), "joint_qd": self._joints.velocities(qpos, qvel)}
         act = rows[:, self._layout.at("act")]
         if act.size:
-            if not any(write["name"] == "act" for write in self.sim.info["writes"]):
-                raise ArgumentError("act: activations of this release cannot be written; remove them from the model")
             parts["act"] = act
         if changed.all():
             return self.sim.write(**parts)
@@ -206,18 +215,18 @@ class Engine:
             whole[name][changed] = values
         return self.sim.write(**whole, mask=changed)
 
-    def _commands(self, mask: Mask) -> tuple[Array, Array]:
-        """Controls and joint forces: of the rows in the mask, elsewhere what the worlds hold."""
+    def _commands(self, mask: Mask) -> tuple[dict[str, Array], Array]:
+        """What worlds shall hold, by name, and joint forces: of the rows in the mask, elsewhere what they hold."""
         rows = self._bindings.rows
-        ctrl = np.where(mask[:, None], rows[:, self._layout.at("ctrl")], self._ctrl)
-        if self.silenced.any():
-            ctrl[mask & self.silenced] = 0.0
+        held = {name: np.where(mask[:, None], rows[:, at], self._held[name]) for name, at in self._held_at.items()}
+        if self.silenced.any() and "ctrl" in held:
+            held["ctrl"][mask & self.silenced] = 0.0
         force = self._force
         applied = rows[:, self._layout.at("qfrc_applied")]
         if applied.any() or force.any():
             turned = self._joints.forces(rows[:, self._layout.at("qpos")], applied)
             force = np.where(mask[:, None], turned, force)
-        return ctrl, force
+        return held, force
 
     def park(self, mask: Mask) -> None:
         """Keep the worlds outside a mask, which the steps of the others are going to move."""
@@ -234,42 +243,39 @@ class Engine:
         self._parked |= others
 
     def hold(self, mask: Mask) -> Frame:
-        """Let the worlds of a mask hold the controls and forces of their rows, without a step."""
-        ctrl, force = self._commands(mask)
-        differs = (ctrl != self._ctrl).any(axis=1) | (force != self._force).any(axis=1)
-        if differs.any():
+        """Let the worlds of a mask hold what their rows have of controls, mocap bodies and forces, without a step."""
+        held, force = self._commands(mask)
+        pushed = (force != self._force).any(axis=1)
+        if pushed.any():
             taken = self.sim.snapshot()
             numbers = taken.numbers.copy()
-            # a record begins with three arrays of dofs, the third is joint_f; ctrl precedes the parameters at its end
-            numbers[differs, 2 * self._nv : 3 * self._nv] = force[differs]
-            end = numbers.shape[1] - sum(_columns(self.sim))
-            numbers[differs, end - self._nu : end] = ctrl[differs]
-            self.frame = self.sim.restore(taken.with_numbers(numbers), worlds=differs)
-            if self._nu and not np.array_equal(self.frame.ctrl[differs], ctrl[differs].astype(numbers.dtype)):
-                raise AssertionError("a record of a snapshot has its controls elsewhere")
-            self._ctrl, self._force = ctrl, force
+            # a record begins with three arrays of dofs, the third is joint_f
+            numbers[pushed, 2 * self._nv : 3 * self._nv] = force[pushed]
+            self.frame = self.sim.restore(taken.with_numbers(numbers), worlds=pushed)
+            self._force = force
+        changed = self._changed(held)
+        if changed:
+            self.frame = self.sim.write(**changed)
+            self._held = held
         assert self.frame is not None
         return self.frame
 
+    def _changed(self, held: dict[str, Array]) -> dict[str, Array]:
+        """What differs from what the worlds hold."""
+        return {name: values for name, values in held.items() if not np.array_equal(values, self._held[name])}
+
     def step(self, mask: Mask) -> Frame:
-        """Step all worlds, those of a mask with the controls and forces of their rows."""
-        ctrl, force = self._commands(mask)
-        commands: dict[str, Array] = {}
-        if not np.array_equal(ctrl, self._ctrl):
-            commands["ctrl"] = ctrl
+        """Step all worlds, those of a mask with what their rows have of controls, mocap bodies and forces."""
+        held, force = self._commands(mask)
+        commands = self._changed(held)
         if not np.array_equal(force, self._force):
             commands["joint_f"] = force
         self.frame = None
         self.frame = self.sim.step(**commands)
-        self._ctrl, self._force = ctrl, force
+        self._held, self._force = held, force
         return self.frame
 
     @property
     def forces_turn(self) -> bool:
         """Whether joint forces must be sent before each step: those of free joints depend on the positions."""
         return self._joints.has_free and bool(self._bindings.rows[:, self._layout.at("qfrc_applied")].any())
-
-
-def _columns(sim: Sim) -> list[int]:
-    """Numbers per world of each parameter that varies."""
-    return [param["info"]["columns"] for param in sim.info["params"] if param["place"] is not None]
