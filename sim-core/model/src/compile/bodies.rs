@@ -142,42 +142,6 @@ impl BodyBuilder {
         }
     }
 
-    /// A body that clients place, and that begins at `at`; in a tree of its own.
-    fn add_mocap(&mut self, at: Carrier) -> Carrier {
-        let base = self.trees[at.tree].base;
-        let [x, y, z, w] = at.pose.quat;
-        let start = &mut self.start;
-        start
-            .mocap_pos
-            .extend(base.iter().zip(at.pose.pos).map(|(base, x)| base + x));
-        start.mocap_quat.extend([w, x, y, z]);
-        self.trees.push(Tree {
-            base: [0.0; 3],
-            free: None,
-        });
-        self.bodies.push(Body {
-            motion: Motion::Mocap,
-            parent: None,
-            tree: self.trees.len() - 1,
-            dof: self.dofs.len(),
-            coord: self.mujoco.mocaps,
-            rotation: columns(Pose::identity().rotation()),
-            exchange: None,
-            quat: Pose::identity().quat,
-            position: [0.0; 3],
-            mass: 0.0,
-            center: [0.0; 3],
-            inertia: [0.0; 6],
-            parts: Vec::new(),
-        });
-        self.mujoco.mocaps += 1;
-        Carrier {
-            body: Some(self.bodies.len() - 1),
-            tree: self.trees.len() - 1,
-            pose: Pose::identity(),
-        }
-    }
-
     /// The bodies of a joint whose frame is `at`; returns where they carry its link. `own` is what only MuJoCo's joints have.
     fn add_joint(&mut self, joint: &Joint, own: Option<&MujocoJoint>, at: Carrier) -> Carrier {
         let turn = z_to(joint.axis);

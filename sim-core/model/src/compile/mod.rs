@@ -16,6 +16,7 @@ mod contact_pieces;
 mod contacts;
 mod inverse_weight;
 mod keyframes;
+mod mocaps;
 mod mujoco_contacts;
 mod mujoco_frames;
 mod mujoco_sensors;

@@ -42,7 +42,6 @@ use params::{gravity, param};
 pub use stage::{BlockOf, ConstantsOf, Runs, Stage, StageId, StageRow};
 
 /// The stages in the order of a step: name, page, and what runs it: a step, an evaluation of outputs, or both.
-///
 /// The name is also the symbol of the compiled function, so a profile shows it.
 #[macro_export]
 macro_rules! every_stage {
@@ -87,7 +86,7 @@ macro_rules! every_stage {
             solver_turning     [solver::Solver::<true>]      Both;
             refine             [solver::Refine]              Both;
             integrate          [integrate::Integrate]        Step;
-            // in its place: all above four times, each time followed by one of these
+            // in its place: all above four times, each followed by one of these
             runge_kutta_1      [runge_kutta::RungeKutta::<0>] Step;
             runge_kutta_2      [runge_kutta::RungeKutta::<1>] Step;
             runge_kutta_3      [runge_kutta::RungeKutta::<2>] Step;
