@@ -17,13 +17,17 @@ from tightloop._core import Frame
 from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
 from tightloop.errors import ArgumentError, CommandRefused
-from tightloop.inputs import as_array
+from tightloop.inputs import as_array, real_numbers
 from tightloop.params import Params
 from tightloop.snapshot import Snapshot, transfer_file
 from tightloop.viewer_process import Viewer
 
 #: An array ``(worlds, dofs)`` for the whole scene, ``(dofs,)`` for identical commands, or a dict of such by robot name.
 Command = ArrayLike | Mapping[str, ArrayLike]
+
+
+# A quaternion shorter than this has no direction (MuJoCo: ``mjMINVAL``).
+_QUAT_MIN = 1e-15
 
 
 class Sim:
@@ -48,6 +52,9 @@ class Sim:
         site_names: Name of each site, in the order of ``site_q`` and the other site fields.
         contact_sensor_names: Name of each contact sensor, in the order of ``contact_sensor``.
         actuator_names: ``model/actuator`` of each actuator, in the order of ``ctrl``.
+        activation_names: Those of them that have an activation, in the order of ``act``.
+        mocap_names: ``model/body`` of each mocap body, in the order of ``mocap_pos``.
+        keyframe_names: ``model/keyframe`` of each keyframe.
         sensor_names: ``model/sensor`` of each sensor of MuJoCo models, in MuJoCo's order.
         sensors: Columns of each sensor in ``sensordata``, by its name, and by ``sensor`` alone where one model has it.
         dofs: Slice of each robot's dofs, by robot name.
@@ -198,8 +205,8 @@ class Sim:
                 sequence with one seed per world. With one int, worlds draw different values, except with
                 ``draws="seed"``. If left out, the worlds start their next episode.
             keyframe: Keyframe of a MuJoCo model to write after the reset: its name, ``model/name``, or its place in
-                `keyframe_names`. It sets positions, velocities, ``act``, ``ctrl`` and mocap bodies; ``time`` begins at
-                0.
+                `keyframe_names`. It sets positions, velocities, ``act``, ``ctrl`` and mocap bodies of the whole scene:
+                what is not of that model is where the scene starts it, without draws. ``time`` begins at 0.
 
         Returns:
             A frame at the new state.
@@ -236,7 +243,8 @@ class Sim:
             joint_qd: Joint velocities [rad/s or m/s], shape ``(worlds, dofs)`` or ``(dofs,)``, or a dict by robot.
             act: Activations of the actuators that `activation_names` lists, shape ``(worlds, activations)`` or
                 ``(activations,)``.
-            ctrl: Controls, which hold until the next `step` that gives others; as there.
+            ctrl: Controls, which hold until the next `step` that gives others, shape ``(worlds, actuators)`` or
+                ``(actuators,)``.
             mocap_pos: Positions of mocap bodies, likewise.
             mocap_quat: Quaternions of mocap bodies, likewise.
             mask: Worlds to write, bool, shape ``(worlds,)``; all if left out.
@@ -404,9 +412,14 @@ class Sim:
     def _flat(self, name: str, value: ArrayLike) -> ArrayLike:
         """Return an array of mocap bodies with the entries of all of them in a row."""
         width = {"mocap_pos": 3, "mocap_quat": 4}.get(name)
-        given = np.asarray(value)
-        if width is None or given.shape[-2:] != (len(self.mocap_names), width):
+        if width is None:
             return value
+        given = real_numbers(name, value)
+        if given.shape[-2:] != (len(self.mocap_names), width):
+            return given
+        if name == "mocap_quat":  # as MuJoCo, which takes one without direction for no rotation
+            still = np.linalg.norm(given, axis=-1, keepdims=True) < _QUAT_MIN
+            given = np.where(still, [1.0, 0.0, 0.0, 0.0], given)
         return given.reshape(*given.shape[:-2], -1)
 
     def __enter__(self) -> Sim:

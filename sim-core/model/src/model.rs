@@ -250,6 +250,7 @@ impl Model {
         // recordings are older than what models from MuJoCo have
         let text = text.replace(&format!(", mujoco: {:?}", Mujoco::<f64>::default()), "");
         let text = text
+            .replace(", mocap_pos: [], mocap_quat: []", "")
             .replace(", turns: None", "")
             .replace(&format!(", turning: {:?}", Fixed::default()), "");
         text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| {

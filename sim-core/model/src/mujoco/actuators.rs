@@ -89,15 +89,19 @@ impl Activations {
     fn read(file: &ModelFile, count: usize) -> Result<Activations, ModelError> {
         let counts = file.integers("actuator_actnum", count)?;
         let firsts = file.integers("actuator_actadr", count)?;
+        let kinds = file.kinds("actuator_dyntype", count)?;
         let mut next = 0;
-        for (count, first) in counts.iter().zip(firsts) {
+        for (kind, (count, first)) in kinds.iter().zip(counts.iter().zip(firsts)) {
             if *count > 0 && first != next {
                 return Err(file.fault("has activations in another order".to_owned()));
+            }
+            if *count != i64::from(kind != "mjDYN_NONE") {
+                return Err(file.fault(format!("has {count} activations of kind {kind}")));
             }
             next += count;
         }
         Ok(Activations {
-            kinds: file.kinds("actuator_dyntype", count)?,
+            kinds,
             parameters: file.vectors::<10>("actuator_dynprm", count)?,
             ranges: ranges(file, "act", count)?,
             early: file.integers("actuator_actearly", count)?,

@@ -11,6 +11,10 @@ pub(super) fn keyframes(file: &ModelFile) -> Result<Vec<Keyframe>, ModelError> {
     let names = names(file, "key", count)?;
     let rows = |array: &str, width: usize| {
         let all = file.reals(array, count * width)?;
+        if let Some(place) = all.iter().position(|x| !x.is_finite()) {
+            let name = &names[place / width];
+            return Err(file.fault(format!("has an infinite number in keyframe `{name}`")));
+        }
         let of = |k: usize| all[k * width..(k + 1) * width].to_vec();
         Ok::<_, ModelError>((0..count).map(of).collect::<Vec<_>>())
     };

@@ -11,6 +11,7 @@ use crate::softness::POWER_MAX;
 const MUST_BE_ZERO: &[(&str, &str, &str)] = &[("geom", "geom_fluid", "the ellipsoid fluid model")];
 /// The same, of arrays that older versions of MuJoCo do not have.
 const NEWER_MUST_BE_ZERO: &[(&str, &str, &str)] = &[
+    ("pair", "pair_adhesion", "adhesion"),
     ("joint", "jnt_stiffnesspoly", "nonlinear stiffness"),
     ("geom", "geom_adhesion", "adhesion"),
     ("geom", "geom_surfacevel", "surface velocity"),

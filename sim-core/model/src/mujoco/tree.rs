@@ -43,6 +43,10 @@ pub(super) fn robot(file: &ModelFile, options: &MujocoOptions) -> Result<Robot, 
     if dofs != file.rows("dof_armature") {
         return Err(file.fault("has dofs without joints".to_owned()));
     }
+    let coords: usize = robot.joints.iter().map(|joint| joint.q.len()).sum();
+    if coords != file.rows("qpos0") {
+        return Err(file.fault("has coordinates without joints".to_owned()));
+    }
     constraints::add_constraints(file, &robot, &mut parts)?;
     robot.mujoco = Some(Box::new(parts));
     Ok(robot)

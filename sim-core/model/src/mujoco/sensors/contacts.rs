@@ -25,10 +25,9 @@ impl Reader<'_> {
 
     /// Records of contacts: what they show is the first parameter, then come reduction and number.
     pub(super) fn contact(&self, k: usize) -> Result<Sense, ModelError> {
-        let parameters = self.file.rows("sensor_intprm");
-        let [shows, reduction, records] = self
-            .file
-            .vectors_of_integers::<3>("sensor_intprm", parameters)?[k];
+        let count = self.kinds.len();
+        let [shows, reduction, records] =
+            self.file.vectors_of_integers::<3>("sensor_intprm", count)?[k];
         let first = self.touching(k, 0)?;
         Ok(Sense::Contact {
             zone: match first {
