@@ -31,6 +31,8 @@ Mask = NDArray[np.bool_]
 
 #: Parts of a row that a world holds until they are set again.
 _HELD = ("ctrl", "mocap_pos", "mocap_quat")
+#: Norm below which a quaternion counts as no rotation, MuJoCo's mjMINVAL [–].
+_NORM_MIN = 1e-15
 #: Name of the model in the scene.
 MODEL = "model"
 #: Most substeps of a frame.
@@ -122,9 +124,10 @@ class Engine:
         if old is not None:
             kept = old.snapshot()
             self.close()
+            # if the launch fails, the next call tries again, from the rows
+            self._sim = None
         varied = self._launched_with[1]
         self._scene.substeps = self.substeps
-        self._launched_with = (len(self._fields), len(self.params), self.substeps)
         self._sim = sim = launch(
             self._scene,
             worlds=self._sims,
@@ -133,6 +136,7 @@ class Engine:
             watch_worlds=1,
             **self._options,
         )
+        self._launched_with = (len(self._fields), len(self.params), self.substeps)
         # a snapshot fits where the same parameters vary
         if kept is not None and varied == len(self.params):
             self.frame = sim.restore(kept.with_model(sim.info["model_hash"]))
@@ -221,8 +225,12 @@ class Engine:
         held = {name: np.where(mask[:, None], rows[:, at], self._held[name]) for name, at in self._held_at.items()}
         if self.silenced.any() and "ctrl" in held:
             held["ctrl"][mask & self.silenced] = 0.0
+        if "mocap_quat" in held:
+            turns = held["mocap_quat"].reshape(-1, 4)
+            turns[np.linalg.norm(turns, axis=1) < _NORM_MIN] = (1.0, 0.0, 0.0, 0.0)
         force = self._force
-        applied = rows[:, self._layout.at("qfrc_applied")]
+        # other rows may hold anything until their next call
+        applied = np.where(mask[:, None], rows[:, self._layout.at("qfrc_applied")], 0.0)
         if applied.any() or force.any():
             turned = self._joints.forces(rows[:, self._layout.at("qpos")], applied)
             force = np.where(mask[:, None], turned, force)

@@ -19,6 +19,8 @@ _ACCELERATION = frozenset(
 )
 #: Fields of ``MjData`` whose names tightloop uses for other arrays.
 _OTHERS = ("efc_", "contact", "island", "history")
+#: Fields of ``MjData`` whose sizes change from step to step, so that they are empty in new data.
+_RESIZED = ("efc_", "iefc_", "island", "map_", "iacc", "ifrc_", "contact")
 
 
 class Fields:
@@ -56,6 +58,10 @@ class Fields:
     def is_state(self, name: str) -> bool:
         """Whether a row of the state holds the field, so that it can be written."""
         return name in self._layout or name == "warning"
+
+    def is_empty(self, name: str) -> bool:
+        """Whether a field has no elements in any state, as the model has none of its kind."""
+        return 0 in self.shape(name) and not name.startswith(_RESIZED)
 
     def sources(self, name: str, known: Collection[str]) -> tuple[str, ...]:
         """Return the fields of a simulation that a field is made of.

@@ -14,6 +14,8 @@ from tightloop.mujoco.batch.library import mujoco
 Array = NDArray[Any]
 
 _REAL = (np.dtype(np.float64), np.dtype(np.float32))
+#: Shortest direction of a ray, MuJoCo's mjMINVAL [–].
+_LENGTH_MIN = 1e-15
 
 
 class Queries:
@@ -49,8 +51,8 @@ class Queries:
             options: Groups of geoms, whether static geoms count, and the excluded body of each ray.
         """
         (pnt, vec), (dist, geomid, normal), (geomgroup, static, exclude) = given, filled, options
-        if np.ndim(pnt) != 3:
-            raise ArgumentError("rays: pnt must have shape (num_sims, nray, 3)")
+        if not isinstance(pnt, np.ndarray) or pnt.ndim != 3:
+            raise ArgumentError("rays: pnt must be an array of shape (num_sims, nray, 3)")
         count = pnt.shape[1]
         for name, array, shape, dtypes in (
             ("pnt", pnt, (num_sims, count, 3), _REAL),
@@ -62,6 +64,12 @@ class Queries:
             ("bodyexclude", exclude, (count,), (np.dtype(np.int32),)),
         ):
             _check("rays", name, array, shape, dtypes)
+        for name, array in (("pnt", pnt), ("vec", vec)):
+            if not np.isfinite(array[ids]).all():
+                raise ArgumentError(f"rays: {name} has a value that is NaN or infinite")
+        # for such a ray MuJoCo ends the process
+        if (np.linalg.norm(vec[ids].astype(np.float64), axis=-1) < _LENGTH_MIN).any():
+            raise ArgumentError("rays: a direction in vec has length 0")
         hit, face = np.zeros(1, np.int32), np.zeros(3)
         excluded = [-1] * count if exclude is None else exclude.tolist()
         for row, sim in zip(rows, ids, strict=True):
@@ -84,8 +92,8 @@ class Queries:
         """Fill Jacobians of a point per simulation; see `Batch.jac`. ``at`` is the points and their bodies."""
         (jacp, jacr), (point, body) = filled, at
         shape = (num_sims, 3, self._model.nv)
+        _check("jac", "point", point, (num_sims, 3), _REAL)
         for name, array, expected, dtypes in (
-            ("point", point, (num_sims, 3), _REAL),
             ("jacp", jacp, shape, (point.dtype,)),
             ("jacr", jacr, shape, (point.dtype,)),
             ("body", body, (num_sims,), (np.dtype(np.int32),)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import operator
 import os
 import threading
 from typing import Any
@@ -66,6 +67,7 @@ class Batch(NamedViews):
     ) -> None:
         if not isinstance(model, mujoco.MjModel):
             raise ArgumentError(f"Batch: model is {type(model).__name__}; give an mujoco.MjModel")
+        num_sims, num_threads = _integer("num_sims", num_sims), _integer("num_threads", num_threads)
         if num_sims < 1:
             raise ArgumentError(f"num_sims must be >= 1; got {num_sims}")
         if num_threads < 0:
@@ -73,8 +75,8 @@ class Batch(NamedViews):
         if model.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP):
             raise ArgumentError("Batch: the model enables sleep, which has no place in the state; disable it")
         self.model = model
-        self.num_sims = int(num_sims)
-        self.num_threads = min(int(num_threads) or os.cpu_count() or 1, self.num_sims)
+        self.num_sims = num_sims
+        self.num_threads = min(num_threads or os.cpu_count() or 1, self.num_sims)
         self._own = copy.copy(model)
         self._layout = StateLayout(self._own)
         self.nstate = self._layout.size
@@ -137,7 +139,7 @@ class Batch(NamedViews):
                 raise ArgumentError(f"{name} is not a field of MjData")
             if not self._fields.is_state(name) and not self._bindings.is_bound(name):
                 # a model without such elements has an empty field
-                empty = 0 in self._fields.shape(name)
+                empty = self._fields.is_empty(name)
                 sources = () if empty else self._fields.sources(name, self._engine.known_fields)
                 array = self._bindings.get(name, dtype)
                 if sources:
@@ -185,12 +187,13 @@ class Batch(NamedViews):
         """
         with self._lock:
             chosen = Selection(ids, self.num_sims)
+            nstep = _integer("nstep", nstep)
             if nstep < 1:
                 raise ArgumentError(f"nstep must be >= 1; got {nstep}")
             if history is not None:
                 _check_history(history, (len(chosen), nstep, self.nstate))
             if len(chosen):
-                self._stepping.step(chosen, self._params(chosen), int(nstep), history)
+                self._stepping.step(chosen, self._params(chosen), nstep, history)
 
     def forward(self, ids: ArrayLike | None = None) -> None:
         """Fill all bound fields at the current state and controls, as ``mj_forward`` does.
@@ -220,10 +223,11 @@ class Batch(NamedViews):
         """
         with self._lock:
             chosen = Selection(ids, self.num_sims)
+            keyframe = _integer("keyframe", keyframe)
             if not -1 <= keyframe < self._own.nkey:
                 raise ArgumentError(f"keyframe {keyframe} is out of range; the model has {self._own.nkey}")
             if len(chosen):
-                self._stepping.reset(chosen, self._params(chosen), self._layout.start(int(keyframe)))
+                self._stepping.reset(chosen, self._params(chosen), self._layout.start(keyframe))
 
     def set_const(self, ids: ArrayLike | None = None) -> None:
         """Compute the constants of expanded fields as ``mj_setConst`` does, and expand those that changed.
@@ -271,7 +275,7 @@ class Batch(NamedViews):
             ids: As in `step`.
 
         Raises:
-            ArgumentError: A shape or dtype is wrong.
+            ArgumentError: A shape or dtype is wrong, a value is not finite, or a direction has length 0.
         """
         with self._lock:
             chosen = Selection(ids, self.num_sims)
@@ -306,6 +310,13 @@ class Batch(NamedViews):
         params = self._expansions.values(shapes, chosen.indices)
         self._stepping.mass = self._expansions.of("body_mass")
         return params
+
+
+def _integer(name: str, value: Any) -> int:
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise ArgumentError(f"{name} must be an integer; got {value!r}") from None
 
 
 def _check_history(history: Array, shape: tuple[int, ...]) -> None:

@@ -27,6 +27,8 @@ Array = NDArray[Any]
 
 #: Largest value of a state before MuJoCo calls it unstable: mjMAXVAL.
 _VALUE_MAX = 1e10
+#: Parts of the state that must be finite, beside positions, velocities and controls.
+_FINITE = ("act", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat")
 #: Bit of ``status``: contacts did not fit.
 _LEFT_OUT = 4
 _WARN = mujoco.mjtWarning
@@ -59,6 +61,7 @@ class Stepping:
         self.mass: Array = model.body_mass[None]
         reset = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self._resets = not model.opt.disableflags & reset
+        self._clocks = _clocks(model)
 
     def add(self, name: str, sources: tuple[str, ...]) -> None:
         """Fill a bound field from now on, from fields of the simulation."""
@@ -138,6 +141,11 @@ class Stepping:
                     raise ArgumentError(f"sim {sims[0]}: {name} is NaN, infinite or huge; write another value")
                 self._restart(sims, int(warning))
                 rows = bindings.rows[chosen.ids]
+        for name in _FINITE:
+            finite = np.isfinite(rows[:, layout.at(name)])
+            if not finite.all():
+                sim = chosen.indices[int(finite.all(axis=1).argmin())]
+                raise ArgumentError(f"sim {sim}: {name} is NaN or infinite; write another value")
         fixed = layout.at("eq_active")
         moved = (rows[:, fixed] != self._start[fixed]).any(axis=1)
         if moved.any():
@@ -182,6 +190,10 @@ class Stepping:
         for name in self._direct:
             values = _array(frame, name)[ids]
             derived[name][ids] = values.reshape(len(values), *derived[name].shape[1:])
+            if name == "sensordata":
+                # the simulation's clock counts from its own reset
+                for column, cutoff in self._clocks:
+                    derived[name][ids, column] = np.clip(self._bindings.rows[ids, 0], -cutoff, cutoff)
         if self._computed:
             body_qd = frame.body_qd[ids] if "body_qd" in frame.fields else None
             mass = self.mass[ids] if len(self.mass) > 1 else self.mass
@@ -207,6 +219,15 @@ class Stepping:
         faulted = np.flatnonzero(chosen.mask & ((status & FAULTED) != 0))
         if len(faulted):
             self._restart(faulted, int(_WARN.mjWARN_BADQACC))
+
+
+def _clocks(model: Any) -> list[tuple[int, float]]:
+    """Column and cutoff of the clock sensors that are on."""
+    if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_SENSOR):
+        return []
+    clocks = np.flatnonzero(np.asarray(model.sensor_type) == int(mujoco.mjtSensor.mjSENS_CLOCK))
+    # a cutoff of 0 is none
+    return [(int(model.sensor_adr[clock]), float(model.sensor_cutoff[clock]) or np.inf) for clock in clocks]
 
 
 def _array(frame: Frame, name: str) -> Array:
