@@ -30,7 +30,8 @@ machine.
 - **Hulls differ.** MuJoCo keeps all vertices of a mesh's convex hull. tightloop keeps at most 64.
 - **EnvPool's scene is lighter.** Of its arm, only the hand and the fingers collide. Its solver stops after 5
   iterations.
-- **mjbatch is missing.** The project has no measurement of it yet.
+- **mjbatch is missing.** The only numbers beside it are from a busy machine, in
+  [Coming from MuJoCo](mujoco.md#batch).
 """
 
 

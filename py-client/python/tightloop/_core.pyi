@@ -38,6 +38,8 @@ class Frame:
     """Joint velocities [rad/s or m/s], ``(worlds, dofs)``."""
     joint_qdd: NDArray[Any]
     """Joint accelerations at the current commands, with constraints [rad/s² or m/s²], ``(worlds, dofs)``."""
+    act: NDArray[Any]
+    """Activations of the actuators of MuJoCo models that have one [–], ``(worlds, activations)``."""
     efc_D: NDArray[Any]
     """Regularised stiffness of each constraint row, zero if inactive [kg·m² or kg], ``(worlds, rows)``."""
     efc_aref: NDArray[Any]
@@ -54,10 +56,18 @@ class Frame:
     """Velocity targets of the drives [rad/s or m/s], ``(worlds, dofs)``."""
     ctrl: NDArray[Any]
     """Controls of the actuators of MuJoCo models, before they are clamped to their ranges, ``(worlds, actuators)``."""
+    mocap_pos: NDArray[Any]
+    """Positions of the mocap bodies of MuJoCo models in the world [m], ``(worlds, mocaps, 3)``."""
+    mocap_quat: NDArray[Any]
+    """Their quaternions (w, x, y, z) [–], of any length, ``(worlds, mocaps, 4)``."""
     bias_force: NDArray[Any]
     """Coriolis, centrifugal and gravity forces [N·m or N], ``(worlds, dofs)``."""
     smooth_force: NDArray[Any]
     """All forces except constraint forces, minus the bias force [N·m or N], ``(worlds, dofs)``."""
+    actuator_length: NDArray[Any]
+    """Length of each actuator of MuJoCo models, gear included [rad or m], ``(worlds, actuators)``."""
+    actuator_velocity: NDArray[Any]
+    """How fast it changes [rad/s or m/s], ``(worlds, actuators)``."""
     actuator_force: NDArray[Any]
     """Force of each actuator of MuJoCo models along its length [N or N·m], ``(worlds, actuators)``."""
     body_q: NDArray[Any]
