@@ -91,6 +91,8 @@ fn a_recorder_that_stands_loses_entries_says_so_and_keeps_nobody_waiting() {
     let mut news = String::new();
     recorder.news.read_line(&mut news).unwrap();
     assert!(news.contains("after frame 100 a gap"), "{news}");
+    // until it has written what waits
+    std::thread::sleep(Duration::from_millis(500));
     (0..50).for_each(|key| step(&client, key));
     std::thread::sleep(Duration::from_millis(300));
     let (said, code) = recorder.stop();
