@@ -80,10 +80,11 @@ fn grasp_demo_stays_within_1e_4_of_mujoco_to_the_end() {
 }
 
 /// What the solver finds: it ends where f32 sees no more progress, a last bit earlier or later.
-const SOLVED: [Field; 8] = [
+const SOLVED: [Field; 9] = [
     Field::JointQdd,
     Field::Qacc,
     Field::ConstraintForce,
+    Field::QfrcConstraint,
     Field::EfcForce,
     Field::ContactForce,
     Field::BodyContactForce,
