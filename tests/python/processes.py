@@ -28,6 +28,12 @@ def alive(pid: int) -> bool:
         return False
 
 
+def stopped(pid: int) -> bool:
+    """Return whether every thread of a process is stopped, which a SIGSTOP only asks for."""
+    stats = [task.joinpath("stat").read_text() for task in Path(f"/proc/{pid}/task").iterdir()]
+    return all(stat.rpartition(")")[2].split()[0] == "T" for stat in stats)
+
+
 def wait_until(condition: Callable[[], bool], seconds: float) -> bool:
     """Poll until a condition holds; return whether it did in time."""
     deadline = time.monotonic() + seconds

@@ -13,7 +13,7 @@ import time
 import pytest
 
 import tightloop as tl
-from processes import alive, left_of, stems_of, wait_until
+from processes import alive, left_of, stems_of, stopped, wait_until
 
 # Kills each way
 KILLS = int(os.environ.get("TIGHTLOOP_KILLS", "50"))
@@ -119,6 +119,7 @@ def test_the_next_start_of_any_daemon_cleans_up_after_both_sides_were_killed(pen
     stems = stems_of(pid)
     for victim in (pid, process.pid):
         os.kill(victim, signal.SIGSTOP)  # so that neither can clean up after the other
+    assert wait_until(lambda: stopped(pid) and stopped(process.pid), 5.0)
     for victim in (pid, process.pid):
         os.kill(victim, signal.SIGKILL)
     process.communicate()
