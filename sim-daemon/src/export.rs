@@ -66,10 +66,7 @@ pub(crate) fn description(
     let sizes = model.sizes();
     let input = |is_one: fn(Field) -> bool| {
         let rows = Field::ALL.iter().filter(move |field| {
-            let of_models = matches!(
-                field,
-                Field::Ctrl | Field::Act | Field::MocapPos | Field::MocapQuat
-            );
+            let of_models = field.is_mujoco_command() || **field == Field::Act;
             is_one(**field) && (!of_models || field.elements(&sizes) > 0)
         });
         rows.map(|field| InputInfo {
@@ -106,6 +103,7 @@ pub(crate) fn description(
         actuator_names: model.actuator_names().to_vec(),
         activation_names: model.activation_names().to_vec(),
         mocap_names: model.mocap_names().to_vec(),
+        equality_names: model.equality_names().to_vec(),
         keyframes: model.keyframes().iter().map(keyframe).collect(),
         sensor_names: {
             let sensors = model.sensors().iter();

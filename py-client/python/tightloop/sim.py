@@ -54,6 +54,7 @@ class Sim:
         actuator_names: ``model/actuator`` of each actuator, in the order of ``ctrl``.
         activation_names: Those of them that have an activation, in the order of ``act``.
         mocap_names: ``model/body`` of each mocap body, in the order of ``mocap_pos``.
+        equality_names: ``model/equality`` of each equality, in the order of ``eq_active``.
         keyframe_names: ``model/keyframe`` of each keyframe.
         sensor_names: ``model/sensor`` of each sensor of MuJoCo models, in MuJoCo's order.
         sensors: Columns of each sensor in ``sensordata``, by its name, and by ``sensor`` alone where one model has it.
@@ -90,6 +91,7 @@ class Sim:
         self.actuator_names: list[str] = self.info["actuator_names"]
         self.activation_names: list[str] = self.info["activation_names"]
         self.mocap_names: list[str] = self.info["mocap_names"]
+        self.equality_names: list[str] = self.info["equality_names"]
         self.keyframe_names: list[str] = [known["name"] for known in self.info["keyframes"]]
         self.sensor_names: list[str] = self.info["sensor_names"]
         self.sensors: dict[str, slice] = _by_name(self.sensor_names, self.info["sensors"])
@@ -107,6 +109,7 @@ class Sim:
         ctrl: Command | None = None,
         mocap_pos: ArrayLike | None = None,
         mocap_quat: ArrayLike | None = None,
+        eq_active: ArrayLike | None = None,
         body_f: Command | None = None,
     ) -> Frame:
         """Advance every world by one control frame. A command that is left out keeps its last value.
@@ -121,7 +124,10 @@ class Sim:
                 dict by model. Each is clamped to its ``ctrlrange``.
             mocap_pos: Where the mocap bodies of MuJoCo models are [m], shape ``(worlds, mocaps, 3)`` or
                 ``(mocaps, 3)``, in the order of `mocap_names`.
-            mocap_quat: Their quaternions (w, x, y, z), shape ``(worlds, mocaps, 4)`` or ``(mocaps, 4)``.
+            mocap_quat: Their quaternions (w, x, y, z), shape ``(worlds, mocaps, 4)`` or ``(mocaps, 4)``. One without
+                direction is no rotation.
+            eq_active: Whether equalities of MuJoCo models act, 0 or 1 or bool, shape ``(worlds, equalities)`` or
+                ``(equalities,)``, in the order of `equality_names`.
             body_f: Force on each body at its centre of mass [N], then torque [N·m], in world axes, shape
                 ``(worlds, bodies, 6)`` or ``(bodies, 6)``. It needs ``launch(params=("body_f",))``.
 
@@ -135,7 +141,7 @@ class Sim:
             LeaseLost: This client lost control of the daemon.
             DaemonLost: The daemon went away; its state is lost.
         """
-        more = self._arrays("commands", mocap_pos=mocap_pos, mocap_quat=mocap_quat, body_f=body_f)
+        more = self._arrays("commands", mocap_pos=mocap_pos, mocap_quat=mocap_quat, eq_active=eq_active, body_f=body_f)
         return self._client.step(joint_f, joint_target_q, joint_target_qd, ctrl, more)
 
     def send(
@@ -147,6 +153,7 @@ class Sim:
         ctrl: Command | None = None,
         mocap_pos: ArrayLike | None = None,
         mocap_quat: ArrayLike | None = None,
+        eq_active: ArrayLike | None = None,
         body_f: Command | None = None,
     ) -> None:
         """Begin a step and return at once: the worlds advance while the caller continues, until `recv`.
@@ -161,13 +168,14 @@ class Sim:
             ctrl: As in `step`.
             mocap_pos: As in `step`.
             mocap_quat: As in `step`.
+            eq_active: As in `step`.
             body_f: As in `step`.
 
         Raises:
             CommandRefused: A shape or dtype is wrong, or a step is in flight; nothing was sent. `recv` reports a wrong
                 value, such as NaN. Other errors are those of `step`.
         """
-        more = self._arrays("commands", mocap_pos=mocap_pos, mocap_quat=mocap_quat, body_f=body_f)
+        more = self._arrays("commands", mocap_pos=mocap_pos, mocap_quat=mocap_quat, eq_active=eq_active, body_f=body_f)
         self._client.send(joint_f, joint_target_q, joint_target_qd, ctrl, more)
 
     def recv(self) -> Frame:
@@ -230,6 +238,7 @@ class Sim:
         ctrl: ArrayLike | None = None,
         mocap_pos: ArrayLike | None = None,
         mocap_quat: ArrayLike | None = None,
+        eq_active: ArrayLike | None = None,
         mask: ArrayLike | None = None,
     ) -> Frame:
         """Set joint positions and velocities, and what else MuJoCo models begin with.
@@ -247,12 +256,13 @@ class Sim:
                 ``(actuators,)``.
             mocap_pos: Positions of mocap bodies, likewise.
             mocap_quat: Quaternions of mocap bodies, likewise.
+            eq_active: Whether equalities act, likewise.
             mask: Worlds to write, bool, shape ``(worlds,)``; all if left out.
 
         Returns:
             A frame at the new state. Raises as `step` does.
         """
-        more = self._arrays("writes", act=act, ctrl=ctrl, mocap_pos=mocap_pos, mocap_quat=mocap_quat)
+        more = self._arrays("writes", act=act, ctrl=ctrl, mocap_pos=mocap_pos, mocap_quat=mocap_quat, eq_active=eq_active)
         return self._client.write(joint_q, joint_qd, more, mask)
 
     def forward(self) -> Frame:
@@ -410,16 +420,15 @@ class Sim:
         return found
 
     def _flat(self, name: str, value: ArrayLike) -> ArrayLike:
-        """Return an array of mocap bodies with the entries of all of them in a row."""
+        """Return an array of mocap bodies with the entries of all of them in a row, and switches as numbers."""
+        if name == "eq_active" and np.asarray(value).dtype == np.bool_:
+            return np.asarray(value, np.float64)
         width = {"mocap_pos": 3, "mocap_quat": 4}.get(name)
         if width is None:
             return value
         given = real_numbers(name, value)
         if given.shape[-2:] != (len(self.mocap_names), width):
             return given
-        if name == "mocap_quat":  # as MuJoCo, which takes one without direction for no rotation
-            still = np.linalg.norm(given, axis=-1, keepdims=True) < _QUAT_MIN
-            given = np.where(still, [1.0, 0.0, 0.0, 0.0], given)
         return given.reshape(*given.shape[:-2], -1)
 
     def __enter__(self) -> Sim:

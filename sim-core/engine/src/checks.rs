@@ -43,6 +43,7 @@ impl Simulation {
             Field::Ctrl => self.model().actuator_names(),
             Field::Act => self.model().activation_names(),
             Field::MocapPos | Field::MocapQuat => self.model().mocap_names(),
+            Field::EqActive => self.model().equality_names(),
             _ => self.model().dof_names(),
         };
         let row_of = |world: usize| world * columns.len()..(world + 1) * columns.len();
@@ -67,6 +68,7 @@ impl Simulation {
             Field::JointTargetQ | Field::JointTargetQd => {
                 self.check_targets(field, columns, values)?;
             }
+            Field::EqActive => self.check_switches(columns, values, mask)?,
             _ => {}
         }
         Ok(())
@@ -122,6 +124,29 @@ impl Simulation {
                         field: field.row().name,
                         world,
                         name: self.model().dof_names()[dof].clone(),
+                        value,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses values that are neither 0 nor 1.
+    fn check_switches(
+        &self,
+        columns: &Range<usize>,
+        values: Values<'_>,
+        mask: Option<&[bool]>,
+    ) -> Result<(), BackendError> {
+        for world in (0..self.worlds()).filter(|&world| mask.is_none_or(|mask| mask[world])) {
+            for column in columns.clone() {
+                let value = values.at(world * columns.len() + column - columns.start);
+                if value != 0.0 && value != 1.0 {
+                    return Err(BackendError::Switch {
+                        field: Field::EqActive.row().name,
+                        world,
+                        name: self.model().equality_names()[column].clone(),
                         value,
                     });
                 }

@@ -36,8 +36,8 @@ mod validate;
 mod value_checks;
 
 pub use description::{
-    Actuator, Collision, ContactSensor, Description, Joint, JointDof, JointEquality, Link, Mimic,
-    MujocoJoint, MujocoParts, ParamDraw, Robot, Site, Solver, StaticShape, TargetMode,
+    Actuator, Collision, ContactSensor, Description, Joint, JointDof, Link, Mimic, MujocoJoint,
+    MujocoParts, ParamDraw, Robot, Site, Solver, StaticShape, TargetMode,
 };
 pub use distribution::{Distribution, ParamRanges};
 pub use error::ModelError;

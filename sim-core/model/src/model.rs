@@ -36,6 +36,7 @@ pub struct Model {
     pub(crate) actuator_names: Vec<String>,
     pub(crate) activation_names: Vec<String>,
     pub(crate) mocap_names: Vec<String>,
+    pub(crate) equality_names: Vec<String>,
     pub(crate) keyframes: Vec<KeyState>,
     pub(crate) sensors: Vec<SensorInfo>,
     pub(crate) refused_sensors: Vec<String>,
@@ -81,6 +82,8 @@ pub struct Start {
     pub mocap_pos: Vec<f64>,
     /// Their quaternions (w, x, y, z).
     pub mocap_quat: Vec<f64>,
+    /// 1 for each equality that acts, 0 for others.
+    pub eq_active: Vec<f64>,
     /// What a reset draws and adds to the positions, as [`crate::JointDof::offset_q`] has it.
     pub joint_q_offset: Vec<Option<Distribution>>,
     /// What a reset draws and adds to the velocities, which are 0.
@@ -144,6 +147,10 @@ impl Model {
     /// Keyframes of the models from MuJoCo.
     pub fn keyframes(&self) -> &[KeyState] {
         &self.keyframes
+    }
+    /// Names of the equalities, `robot/equality`, in the order of `eq_active`.
+    pub fn equality_names(&self) -> &[String] {
+        &self.equality_names
     }
     /// Names of the bodies that clients place, `robot/body`, in the order of `mocap_pos`.
     pub fn mocap_names(&self) -> &[String] {
@@ -211,6 +218,7 @@ impl Model {
             actuators: self.actuator_names.len(),
             activations: self.constants.mujoco.activations,
             mocaps: self.constants.mujoco.mocaps,
+            equalities: self.constants.mujoco.equalities,
             mujoco_bodies: self.constants.mujoco.frames.bodies.len(),
             mujoco_sites: self.constants.mujoco.frames.sites.len(),
             mujoco_geoms: self.constants.mujoco.frames.geoms.len(),
@@ -250,7 +258,7 @@ impl Model {
         // recordings are older than what models from MuJoCo have
         let text = text.replace(&format!(", mujoco: {:?}", Mujoco::<f64>::default()), "");
         let text = text
-            .replace(", mocap_pos: [], mocap_quat: []", "")
+            .replace(", mocap_pos: [], mocap_quat: [], eq_active: []", "")
             .replace(", turns: None", "")
             .replace(&format!(", turning: {:?}", Fixed::default()), "");
         text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| {

@@ -65,6 +65,9 @@ pub struct Description {
     /// `robot/body` of each body that clients place. Older recordings have none.
     #[serde(default)]
     pub mocap_names: Vec<String>,
+    /// `robot/equality` of each equality of MuJoCo models. Older recordings have none.
+    #[serde(default)]
+    pub equality_names: Vec<String>,
     /// Keyframes of the models from MuJoCo. Older recordings have none.
     #[serde(default)]
     pub keyframes: Vec<KeyframeInfo>,
@@ -211,6 +214,7 @@ impl Description {
         let all = actuators
             .chain(&self.activation_names)
             .chain(&self.mocap_names)
+            .chain(&self.equality_names)
             .chain(&self.sensor_names);
         all.for_each(|name| hash.text(name));
         for field in &self.fields {

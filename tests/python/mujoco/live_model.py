@@ -18,7 +18,7 @@ mujoco.set_mju_user_warning(lambda _: None)
 
 
 # What a world holds besides positions and velocities.
-HELD = ("ctrl", "act", "mocap_pos", "mocap_quat")
+HELD = ("ctrl", "act", "mocap_pos", "mocap_quat", "eq_active")
 
 
 @dataclass
@@ -31,6 +31,7 @@ class States:
     act: Array
     mocap_pos: Array
     mocap_quat: Array
+    eq_active: Array
 
 
 @dataclass
@@ -48,9 +49,9 @@ class Live:
             mujoco.mj_integratePos(m, row, rng.normal(0, spread, m.nv), 1.0)
         qvel, ctrl = rng.normal(0, speed, (worlds, m.nv)), rng.normal(0, 1, (worlds, m.nu))
         act = rng.normal(0, 0.5, (worlds, m.na))
-        return States(
-            qpos, qvel, ctrl, act, rng.normal(0, 0.5, (worlds, m.nmocap, 3)), rng.normal(0, 1, (worlds, m.nmocap, 4))
-        )
+        pos, quat = rng.normal(0, 0.5, (worlds, m.nmocap, 3)), rng.normal(0, 1, (worlds, m.nmocap, 4))
+        active = (rng.random((worlds, m.neq)) < 0.7).astype(float)
+        return States(qpos, qvel, ctrl, act, pos, quat, active)
 
     def place(self, states: States) -> tl.Frame:
         """Hold the controls and put the worlds into the states."""

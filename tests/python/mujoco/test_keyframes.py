@@ -92,6 +92,53 @@ def test_a_mocap_body_is_placed_by_a_step_and_by_a_write(case: Live) -> None:
     np.testing.assert_allclose(frame.qacc, [data.qacc] * 3, rtol=1e-7, atol=1e-7)
 
 
+def test_an_equality_is_switched_by_a_step_and_by_a_write_in_each_world(case: Live) -> None:
+    case.sim.reset()
+    assert case.sim.equality_names == ["m/equality0"]
+    on = np.array([[1.0], [0.0], [1.0]])
+    data = [mujoco.MjData(case.model) for _ in on]
+    for own, is_on in zip(data, on, strict=True):
+        own.eq_active[:] = is_on
+        own.qvel[:3] = 0.5
+    joint_qd = np.zeros((3, case.model.nv))
+    joint_qd[:, :3] = 0.5
+    case.sim.write(joint_qd=joint_qd)
+    for _ in range(5):
+        frame = case.sim.step(eq_active=on)
+        for own in data:
+            mujoco.mj_step(case.model, own)
+        np.testing.assert_allclose(frame.qpos, [own.qpos for own in data], rtol=1e-7, atol=1e-9)
+    assert not np.allclose(frame.qpos[0], frame.qpos[1])
+    # what was sent holds, and a snapshot has it
+    snapshot = case.sim.snapshot()
+    held = case.sim.step().qpos
+    frame = case.sim.write(eq_active=on[::-1] == 0)  # bool
+    for own, is_on in zip(data, on, strict=True):
+        mujoco.mj_step(case.model, own)
+        own.eq_active[:] = 1 - is_on
+        mujoco.mj_forward(case.model, own)
+    np.testing.assert_allclose(frame.qacc, [own.qacc for own in data], rtol=1e-6, atol=1e-6)
+    case.sim.restore(snapshot)
+    assert (case.sim.step().qpos == held).all()
+    case.sim.reset()
+    start = case.sim.step().qpos
+    assert (start == start[0]).all(), "a reset lets it act as the model says"
+    for wrong in (0.5, np.nan):
+        with pytest.raises(tl.CommandRefused, match="equality0"):
+            case.sim.step(eq_active=[[1.0], [wrong], [0.0]])
+
+
+def test_an_equality_that_is_off_at_the_start_can_be_switched_on() -> None:
+    with live(XML.replace('<weld body1="placed"', '<weld active="false" body1="placed"'), worlds=2) as case:
+        data = mujoco.MjData(case.model)
+        off = case.sim.step()
+        on = case.sim.step(eq_active=[1.0])
+        for frame, is_on in ((off, 0), (on, 1)):
+            data.eq_active[:] = is_on
+            mujoco.mj_step(case.model, data)
+            np.testing.assert_allclose(frame.qpos, [data.qpos] * 2, rtol=1e-7, atol=1e-9)
+
+
 def test_wrong_shapes_are_refused(case: Live) -> None:
     for more in ({"mocap_pos": np.zeros((2, 3))}, {"act": np.zeros(2)}, {"mocap_quat": np.full((1, 4), np.nan)}):
         with pytest.raises(tl.CommandRefused):

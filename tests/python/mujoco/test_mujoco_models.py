@@ -111,6 +111,34 @@ def test_accelerations_and_steps_are_mujocos(feature: str, seed: int) -> None:
         assert_step(case, seed, 1e-8)
 
 
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "RK4"])
+@pytest.mark.parametrize("seed", range(TREES))
+def test_runs_are_mujocos(integrator: str, seed: int) -> None:
+    """200 steps under random controls, until MuJoCo disagrees with a run of its own that begins 1e-13 away."""
+    medium = "" if integrator == "RK4" else MEDIUM
+    features = replace(EVERYTHING, option=f'{medium} integrator="{integrator}"')
+    with live(random_mjcf(seed, 1 + seed % 4, features), worlds=4) as case:
+        states = case.states(seed, speed=0.1)
+        own, other = list(case.data(states)), list(case.data(states))
+        for data in other:
+            data.qvel[:] *= 1 + 1e-13
+        case.place(states)
+        rng, agrees, steps = np.random.default_rng(seed), np.ones(len(own), bool), 0
+        for _ in range(200):
+            ctrl = states.ctrl + rng.normal(0, 0.1, states.ctrl.shape)
+            frame = case.sim.step(ctrl=ctrl if ctrl.size else None)
+            for world, pair in enumerate(zip(own, other, strict=True)):
+                for data in pair:
+                    data.ctrl[:] = ctrl[world]
+                    mujoco.mj_step(case.model, data)
+                first, second = pair
+                agrees[world] &= relative(first.qpos, second.qpos) < 1e-7 and not first.warning.number.any()
+                if agrees[world]:
+                    assert relative(frame.qpos[world], first.qpos) < 1e-6
+            steps += int(agrees.sum())
+        assert steps > 100
+
+
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
 @pytest.mark.parametrize("seed", range(TREES))
 def test_free_joints_and_balls_are_passive_as_mujocos(integrator: str, seed: int) -> None:

@@ -57,6 +57,18 @@ pub enum BackendError {
         /// A sentence per sensor.
         reasons: String,
     },
+    /// A value that is neither on nor off.
+    #[error("`{field}` of `{name}` in world {world} is {value}; give 1 for on, 0 for off")]
+    Switch {
+        /// The field.
+        field: &'static str,
+        /// World of the value.
+        world: usize,
+        /// What it switches.
+        name: String,
+        /// The value.
+        value: f64,
+    },
     /// Columns outside of a field.
     #[error("field `{field}` has {columns} columns; {start}..{end} is outside")]
     Columns {

@@ -8,7 +8,7 @@ use sim_physics::step::StageId;
 
 /// The arrays of a record in their order, which is that of a snapshot's file: arrays with an entry for each dof first, the
 /// parameters last.
-pub(in crate::backend) const RECORD: [Array; 13] = [
+pub(in crate::backend) const RECORD: [Array; 14] = [
     Array::JointQd,
     Array::JointQdd,
     Array::JointF,
@@ -21,6 +21,7 @@ pub(in crate::backend) const RECORD: [Array; 13] = [
     Array::Ctrl,
     Array::MocapPos,
     Array::MocapQuat,
+    Array::EqActive,
     Array::Params,
 ];
 
@@ -96,6 +97,7 @@ pub(in crate::backend) fn start<R: Real>(model: &Model) -> Vec<R> {
         (Array::JointTargetQd, &start.joint_target_qd),
         (Array::MocapPos, &start.mocap_pos),
         (Array::MocapQuat, &start.mocap_quat),
+        (Array::EqActive, &start.eq_active),
     ] {
         for (to, from) in reset[shape.start(array)..].iter_mut().zip(values) {
             *to = R::of(*from);

@@ -2,7 +2,7 @@
 
 use super::actuators;
 use super::carrier::Carrier;
-use super::constraint_rows::{DofEquality, DofJoint, SoftJoint};
+use super::constraint_rows::{DofJoint, SoftJoint};
 use super::mujoco_frames::add_frames;
 use super::ties::{DofConstraint, terms};
 use crate::description::{Joint, MujocoJoint, MujocoParts, Robot, TargetMode};
@@ -29,10 +29,10 @@ pub(super) struct BodyBuilder {
     pub body_names: Vec<String>,
     pub start: Start,
     pub mujoco: Mujoco<f64>,
-    pub equalities: Vec<DofEquality>,
     pub constraints: Vec<DofConstraint>,
     pub actuator_names: Vec<String>,
     pub mocap_names: Vec<String>,
+    pub equality_names: Vec<String>,
     pub sensors: Vec<SensorInfo>,
     pub refused_sensors: Vec<String>,
     /// First moment of what stands still in MuJoCo models [kg·m].
@@ -306,18 +306,7 @@ impl BodyBuilder {
         }
         self.add_compensations(robot, parts, carriers);
         self.add_drags(parts, carriers);
-        for equality in &parts.equalities {
-            let (follower, leader) = (dof_of[equality.follower], dof_of[equality.leader]);
-            self.couplings.push((follower, leader));
-            self.equalities.push(DofEquality {
-                follower,
-                leader,
-                multiplier: equality.multiplier,
-                offset: equality.offset,
-                softness: equality.softness,
-                safe_references: parts.safe_references,
-            });
-        }
+        let first_equality = self.mujoco.equalities;
         for constraint in &parts.constraints {
             let own = DofConstraint::new(
                 constraint,
@@ -325,10 +314,16 @@ impl BodyBuilder {
                 carriers,
                 &self.bodies,
                 first_body,
+                first_equality,
                 parts.safe_references,
             );
             self.couplings.extend(own.couplings());
             self.constraints.push(own);
+        }
+        self.mujoco.equalities += parts.equalities.len();
+        for (name, is_active) in &parts.equalities {
+            self.equality_names.push(format!("{}/{name}", robot.name));
+            self.start.eq_active.push(f64::from(u8::from(*is_active)));
         }
         for tendon in &parts.tendons {
             self.mujoco.tendons.push(Tendon {

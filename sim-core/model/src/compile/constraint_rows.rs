@@ -35,35 +35,14 @@ pub(super) struct SoftJoint {
     pub safe_references: bool,
 }
 
-/// An equality of two dofs from MuJoCo.
-pub(super) struct DofEquality {
-    pub follower: usize,
-    pub leader: usize,
-    pub multiplier: f64,
-    pub offset: f64,
-    pub softness: Softness,
-    pub safe_references: bool,
-}
-
 /// Constraint rows in MuJoCo's order.
 pub(super) fn add_rows(
     constants: &mut Constants<f64>,
     joints: &[DofJoint],
-    equalities: &[DofEquality],
     inverse_weight: &[f64],
     friction_varies: bool,
 ) {
     let dt = constants.dt;
-    for e in equalities {
-        let weight = inverse_weight[e.follower] + inverse_weight[e.leader];
-        constants.equalities.push(Equality {
-            follower: e.follower,
-            leader: e.leader,
-            multiplier: e.multiplier,
-            offset: e.offset,
-            soft: own_soft(&e.softness, weight, dt, e.safe_references),
-        });
-    }
     for (dof, joint) in joints.iter().enumerate() {
         let weight = inverse_weight[dof];
         if let Some((leader, multiplier, offset)) = joint.mimic {

@@ -124,7 +124,6 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     add_rows(
         &mut constants,
         &builder.joints,
-        &builder.equalities,
         &reference.dof_inverse_weight,
         scene.params.contains(&Param::JointFriction),
     );
@@ -197,6 +196,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         activation_names,
         keyframes,
         mocap_names: builder.mocap_names,
+        equality_names: builder.equality_names,
         actuator_names: builder.actuator_names,
         sensors: builder.sensors,
         refused_sensors: builder.refused_sensors,

@@ -20,18 +20,21 @@ pub(super) struct DofConstraint {
     pub measure: ties::Measure<f64>,
     pub dofs: Vec<usize>,
     pub constraint: Constraint,
+    /// Place of the robot's first equality among all.
+    pub first_equality: usize,
     pub safe_references: bool,
 }
 
 impl DofConstraint {
-    /// `dof_of` has the first dof of each joint of the robot, `carriers` an entry for each of its links, and `first_body` is
-    /// the first of its bodies among those of MuJoCo models.
+    /// `dof_of` has the first dof of each joint of the robot, `carriers` an entry for each of its links. `first_body` is the
+    /// first of its bodies among those of MuJoCo models, and `first_equality` of its equalities.
     pub fn new(
         constraint: &Constraint,
         dof_of: &[usize],
         carriers: &[Carrier],
         bodies: &[Body<f64>],
         first_body: usize,
+        first_equality: usize,
         safe_references: bool,
     ) -> DofConstraint {
         let body_of = |dof: usize| {
@@ -96,6 +99,7 @@ impl DofConstraint {
             measure,
             dofs,
             constraint: constraint.clone(),
+            first_equality,
             safe_references,
         }
     }
@@ -125,6 +129,7 @@ pub(super) fn add_ties(constants: &mut Constants<f64>, all: Vec<DofConstraint>) 
             measure,
             dofs,
             constraint,
+            first_equality,
             safe_references,
         } = own;
         let rows = match &measure {
@@ -149,7 +154,7 @@ pub(super) fn add_ties(constants: &mut Constants<f64>, all: Vec<DofConstraint>) 
         }
         let soft = own_soft(&constraint.softness, along, constants.dt, safe_references);
         let law = match constraint.law {
-            ConstraintLaw::Equality => TieLaw::Equality,
+            ConstraintLaw::Equality(place) => TieLaw::Equality(first_equality + place),
             ConstraintLaw::Friction(loss) => TieLaw::Friction(loss),
             ConstraintLaw::Range { bounds, margin } => {
                 TieLaw::Range([bounds[0] + margin, bounds[1] - margin])

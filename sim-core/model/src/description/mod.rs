@@ -19,8 +19,8 @@ pub(crate) use crate::joint_kind::JointKind;
 pub(crate) use frames::Bearer;
 pub use joint::{Joint, JointDof, Mimic, TargetMode};
 pub use mujoco::{
-    Actuator, ActuatorActivation, ActuatorLength, Compensator, ContactPair, Drag, JointEquality,
-    Keyframe, MujocoJoint, MujocoParts,
+    Actuator, ActuatorActivation, ActuatorLength, Compensator, ContactPair, Drag, Keyframe,
+    MujocoJoint, MujocoParts,
 };
 pub use mujoco_constraints::{Constraint, ConstraintLaw, Measure, Tendon};
 pub use mujoco_frames::{FrameParts, Inertia, OnLink};

@@ -20,9 +20,9 @@ pub struct MujocoParts {
     pub mean_inertia: f64,
     /// What each joint has, in their order.
     pub joints: Vec<MujocoJoint>,
-    /// Joints that follow others.
-    pub equalities: Vec<JointEquality>,
-    /// Other constraints.
+    /// Equalities, by name and whether they act at the start.
+    pub equalities: Vec<(String, bool)>,
+    /// Constraints.
     pub constraints: Vec<Constraint>,
     /// What the medium does to links.
     pub drags: Vec<Drag>,
@@ -121,21 +121,6 @@ pub enum Compensator {
     Actuators,
     /// Nothing, since the model has no actuators that could.
     Nothing,
-}
-
-/// A joint that follows another: q = offset + multiplier q of the leader.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JointEquality {
-    /// Index of the joint that follows.
-    pub follower: usize,
-    /// Index of the joint that leads.
-    pub leader: usize,
-    /// [–]
-    pub multiplier: f64,
-    /// [rad or m]
-    pub offset: f64,
-    /// Softness.
-    pub softness: Softness,
 }
 
 /// An actuator, as [`sim_physics::constants::mujoco::Actuator`] has it.

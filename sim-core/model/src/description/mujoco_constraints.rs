@@ -54,8 +54,8 @@ pub enum Measure {
 /// What a constraint allows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ConstraintLaw {
-    /// Nothing but 0.
-    Equality,
+    /// Nothing but 0, while the equality of this index is on.
+    Equality(usize),
     /// Motion against a dry friction of this bound [N or N·m].
     Friction(f64),
     /// What lies between two bounds, and how near to them it acts.

@@ -119,6 +119,37 @@ pub enum Sense {
     Clock,
 }
 
+impl Sense {
+    /// Numbers that it shows.
+    pub fn scalars(&self) -> usize {
+        const OF_PARTS: [usize; 7] = [1, 3, 3, 1, 3, 3, 3];
+        match self {
+            Sense::Vector(..)
+            | Sense::Acceleration { .. }
+            | Sense::Subtree(..)
+            | Sense::Wrench { .. } => 3,
+            Sense::Ball { is_rate, .. } => 4 - usize::from(*is_rate),
+            Sense::Frame { part, .. } => 3 + usize::from(*part == FramePart::Quat),
+            Sense::Contact { records, shows, .. } => {
+                let shown = OF_PARTS.iter().zip(shows).filter(|(_, shown)| **shown);
+                let of_each: usize = shown.map(|(size, _)| size).sum();
+                records.saturating_mul(of_each)
+            }
+            Sense::Length { .. }
+            | Sense::Actuator { .. }
+            | Sense::ActuatorForces(_)
+            | Sense::JointActuatorForce(_)
+            | Sense::JointLimit(..)
+            | Sense::ConstraintLimit(..)
+            | Sense::Touch(_)
+            | Sense::Range(..)
+            | Sense::PotentialEnergy
+            | Sense::KineticEnergy
+            | Sense::Clock => 1,
+        }
+    }
+}
+
 /// A solid at a site.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ZonePart {

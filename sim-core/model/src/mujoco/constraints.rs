@@ -2,11 +2,12 @@
 
 use super::format::ModelFile;
 use super::frame;
+use super::names::names;
 use super::options::has_flag;
 use super::tendons::{Tendons, moving};
 use super::tree::softness;
 use crate::description::{
-    Constraint, ConstraintLaw, JointEquality, JointKind, Measure, MujocoParts, Robot, Tendon,
+    Constraint, ConstraintLaw, JointKind, Measure, MujocoParts, Robot, Tendon,
 };
 use crate::error::ModelError;
 use crate::pose::Pose;
@@ -31,6 +32,17 @@ pub(super) fn add_constraints(
         add_limits(file, robot, &tendons, parts)?;
     }
     add_springs(file, &tendons, parts)
+}
+
+/// Names of all equalities, and whether they act at the start.
+pub(super) fn equalities(file: &ModelFile) -> Result<Vec<(String, bool)>, ModelError> {
+    let count = file.rows("eq_type");
+    let active = file.integers("eq_active0", count)?;
+    let active = active.into_iter().map(|active| active != 0);
+    Ok(names(file, "equality", count)?
+        .into_iter()
+        .zip(active)
+        .collect())
 }
 
 /// Inverse weights of lengths alone.
@@ -60,8 +72,7 @@ fn add_equalities(
         softness: softness(file, "eq", count)?,
     };
     let kinds = file.kinds("eq_type", count)?;
-    let active = file.integers("eq_active0", count)?;
-    for k in (0..count).filter(|&k| active[k] != 0) {
+    for k in 0..count {
         match kinds[k].as_str() {
             "mjEQ_JOINT" => equalities.add_joint(k, parts)?,
             "mjEQ_TENDON" => equalities.add_tendon(k, parts)?,
@@ -105,22 +116,10 @@ impl Equalities<'_> {
         let [constant, multiplier, c2, c3, c4, ..] = self.data[k];
         let follower = joint(self.firsts[k])?;
         let own = reference(parts, follower);
-        let leads = self.seconds[k] >= 0;
-        if leads && [c2, c3, c4] == [0.0; 3] {
-            let leader = joint(self.seconds[k])?;
-            parts.equalities.push(JointEquality {
-                follower,
-                leader,
-                multiplier,
-                offset: own + constant - multiplier * reference(parts, leader),
-                softness: self.softness[k],
-            });
-            return Ok(());
-        }
         let mut inverse_weight = weight(parts, follower);
         let (mut second, mut other, mut polynomial) = (Vec::new(), 0.0, [0.0; 5]);
         polynomial[0] = constant;
-        if leads {
+        if self.seconds[k] >= 0 {
             let leader = joint(self.seconds[k])?;
             second.push((leader, 1.0));
             other = reference(parts, leader);
@@ -134,7 +133,7 @@ impl Equalities<'_> {
                 offsets: [own, other],
                 polynomial,
             },
-            law: ConstraintLaw::Equality,
+            law: ConstraintLaw::Equality(k),
             softness: self.softness[k],
             inverse_weight: along(inverse_weight),
         });
@@ -165,7 +164,7 @@ impl Equalities<'_> {
                 offsets: [lengths[own], other],
                 polynomial,
             },
-            law: ConstraintLaw::Equality,
+            law: ConstraintLaw::Equality(k),
             softness: self.softness[k],
             inverse_weight: along(inverse_weight),
         });
@@ -210,7 +209,7 @@ impl Equalities<'_> {
                 poses,
                 torque_scale: is_weld.then_some(torque_scale),
             },
-            law: ConstraintLaw::Equality,
+            law: ConstraintLaw::Equality(k),
             softness: self.softness[k],
             inverse_weight: [first[0] + second[0], first[1] + second[1]],
         });

@@ -86,13 +86,6 @@ fn notes(file: &ModelFile) -> Result<Vec<String>, ModelError> {
             "its {spatial} spatial tendons, on which nothing acts, are not read"
         ));
     }
-    let active = file.integers("eq_active0", file.rows("eq_type"))?;
-    let idle = active.iter().filter(|&&active| active == 0).count();
-    if idle > 0 {
-        notes.push(format!(
-            "its {idle} equalities that are not active at the start are not read"
-        ));
-    }
     Ok(notes)
 }
 

@@ -188,9 +188,8 @@ fn equalities(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelErro
     let count = file.rows("eq_type");
     let names = names(file, "equality", count)?;
     let kinds = file.kinds("eq_type", count)?;
-    let active = file.integers("eq_active0", count)?;
     let solimps = file.vectors::<5>("eq_solimp", count)?;
-    for k in (0..count).filter(|&k| active[k] != 0) {
+    for k in 0..count {
         let problem = match kinds[k].as_str() {
             "mjEQ_JOINT" | "mjEQ_TENDON" | "mjEQ_CONNECT" | "mjEQ_WELD" => None,
             "mjEQ_DISTANCE" => Some("distance"),

@@ -105,7 +105,7 @@ fn parts(
         dof_inverse_weight: file.reals("dof_invweight0", file.rows("dof_armature"))?,
         mean_inertia: file.real("stat.meaninertia")?,
         joints: Vec::new(),
-        equalities: Vec::new(),
+        equalities: super::constraints::equalities(file)?,
         constraints: Vec::new(),
         drags: passive::drags(file, bodies)?,
         compensations: passive::compensations(file, bodies)?,

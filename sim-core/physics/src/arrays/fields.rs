@@ -74,6 +74,8 @@ pub enum Axis {
     Actuators,
     /// Bodies that clients place.
     Mocaps,
+    /// Equalities of MuJoCo models.
+    Equalities,
     /// Activations of actuators.
     Activations,
     /// Bodies of MuJoCo models.
@@ -101,6 +103,7 @@ impl Axis {
             Axis::ContactSensors => sizes.contact_sensors,
             Axis::Actuators => sizes.actuators,
             Axis::Mocaps => sizes.mocaps,
+            Axis::Equalities => sizes.equalities,
             Axis::Activations => sizes.activations,
             Axis::MujocoBodies => sizes.mujoco_bodies,
             Axis::MujocoSites => sizes.mujoco_sites,
@@ -122,6 +125,7 @@ impl Axis {
             Axis::ContactSensors => "contact_sensors".into(),
             Axis::Actuators => "actuators".into(),
             Axis::Mocaps => "mocaps".into(),
+            Axis::Equalities => "equalities".into(),
             Axis::Activations => "activations".into(),
             Axis::MujocoBodies => "nbody".into(),
             Axis::MujocoSites => "nsite".into(),
@@ -170,8 +174,13 @@ impl Field {
 
     /// Whether a write may set it: a state, or a command that begins with the state of a world, as MuJoCo's do.
     pub fn is_written(self) -> bool {
-        let is_command = matches!(self, Field::Ctrl | Field::MocapPos | Field::MocapQuat);
-        self.row().group == Group::State || is_command
+        self.row().group == Group::State || self.is_mujoco_command()
+    }
+
+    /// Whether it is a command that only models from MuJoCo take.
+    pub fn is_mujoco_command(self) -> bool {
+        use Field::{Ctrl, EqActive, MocapPos, MocapQuat};
+        matches!(self, Ctrl | MocapPos | MocapQuat | EqActive)
     }
 
     /// Elements per world.

@@ -94,6 +94,8 @@ arrays! { m;
             => "mocap_pos" Command [Mocaps, Size(3)], "Where the mocap bodies of MuJoCo models are, in the world.";
         mocap_quat: MocapQuat [Scalar; 4 * m.mujoco.mocaps] Command "–"
             => "mocap_quat" Command [Mocaps, Size(4)], "How they are turned: quaternions (w, x, y, z) of any length.";
+        eq_active: EqActive [Scalar; m.mujoco.equalities] Command "–"
+            => "eq_active" Command [Equalities], "1 where an equality of a MuJoCo model acts, 0 where it does not.";
         // commands of the frames before, the last one first, each as joint_f, joint_target_q, joint_target_qd
         command_history: CommandHistory [Scalar; m.delay.frames * 3 * m.dofs.len()] Command "–";
         // parameters of the model that vary from world to world, see `constants::params::Varying`

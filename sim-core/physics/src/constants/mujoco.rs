@@ -46,6 +46,8 @@ recast! {
         pub ties: Vec<Tie<R>>,
         /// Of each of their rows, its tie.
         pub tie_of_row: Vec<usize>,
+        /// How many equalities there are.
+        pub equalities: usize,
         /// Actuators.
         pub actuators: Vec<Actuator<R>>,
         /// How many of them have an activation.
@@ -87,6 +89,7 @@ impl<R> Default for Mujoco<R> {
             tendons: Vec::new(),
             ties: Vec::new(),
             tie_of_row: Vec::new(),
+            equalities: 0,
             actuators: Vec::new(),
             activations: 0,
             mocaps: 0,

@@ -23,6 +23,8 @@ pub struct Sizes {
     pub actuators: usize,
     /// Bodies that clients place.
     pub mocaps: usize,
+    /// Equalities of MuJoCo models.
+    pub equalities: usize,
     /// Actuators with an activation.
     pub activations: usize,
     /// Bodies of MuJoCo models, the world of each included.

@@ -75,8 +75,8 @@ recast! {
 /// What rows of a tie allow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TieLaw<R> {
-    /// Nothing but 0.
-    Equality,
+    /// Nothing but 0, while this entry of `eq_active` is 1.
+    Equality(usize),
     /// Motion against a dry friction of this bound [N or N·m].
     Friction(R),
     /// What lies between two bounds, margins included.
@@ -108,7 +108,7 @@ impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for TieLaw<R> {
     type Out = TieLaw<S>;
     fn recast(&self) -> TieLaw<S> {
         match self {
-            TieLaw::Equality => TieLaw::Equality,
+            TieLaw::Equality(place) => TieLaw::Equality(*place),
             TieLaw::Friction(loss) => TieLaw::Friction(loss.recast()),
             TieLaw::Range(bounds) => TieLaw::Range(bounds.recast()),
         }

@@ -110,13 +110,20 @@ fn moved<C: Cx>(
     }
 }
 
-/// The orientation that clients gave to mocap body `k`, as a quaternion (x, y, z, w).
+/// Least norm of a quaternion that turns (MuJoCo: `mjMINVAL`) [–].
+const NORM_MIN: f64 = 1e-15;
+
+/// The orientation that clients gave to mocap body `k`, as a quaternion (x, y, z, w). One without direction is no rotation,
+/// as in MuJoCo.
 #[inline(always)]
 pub(super) fn mocap_quat<F: Num>(all: &[F], k: usize) -> quat::Quat<F> {
     let [w, x, y, z] = std::array::from_fn(|i| all[4 * k + i]);
     let square = w.fma(w, x.fma(x, y.fma(y, z * z)));
-    let scale = F::c(1.0).div(square.sqrt());
-    [x * scale, y * scale, z * scale, w * scale]
+    let still = square.lt(F::c(NORM_MIN * NORM_MIN));
+    let scale = F::c(1.0).div(F::select(still, F::c(1.0), square).sqrt());
+    let [zero, one] = [F::c(0.0), F::c(1.0)];
+    let turned = [x * scale, y * scale, z * scale, w * scale];
+    std::array::from_fn(|i| F::select(still, if i == 3 { one } else { zero }, turned[i]))
 }
 
 /// Inertia of a body about the reference point; where masses vary, the sum of those of its links.

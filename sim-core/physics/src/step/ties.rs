@@ -37,6 +37,7 @@ impl Stage for Ties {
     const READS: &'static [A] = &[
         A::JointQ,
         A::JointQd,
+        A::EqActive,
         A::Rotation,
         A::Origin,
         A::Reference,
@@ -101,7 +102,7 @@ fn measure<C: Cx>(
             let length = of_lengths(cx, m, b, tie, lengths);
             match tie.law {
                 TieLaw::Friction(_) => Found::at(&[]),
-                TieLaw::Equality | TieLaw::Range(_) => Found::at(&[length]),
+                TieLaw::Equality(_) | TieLaw::Range(_) => Found::at(&[length]),
             }
         }
         Measure::Angle(coord, _) => {
@@ -208,16 +209,19 @@ fn write_rows<C: Cx>(
 ) {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     let mut position = found.position;
-    let mut active = None;
-    if let TieLaw::Range([lower, upper]) = tie.law {
-        let (above, below) = (position[0] - C::F::k(lower), C::F::k(upper) - position[0]);
-        let side = C::F::select(above.lt(below), one, -one);
-        for entry in &mut b.work.row_jacobian[tie.jacobian(0)] {
-            *entry = *entry * side;
+    let active = match tie.law {
+        TieLaw::Equality(place) => Some(C::F::c(0.5).lt(b.eq_active[place])),
+        TieLaw::Friction(_) => None,
+        TieLaw::Range([lower, upper]) => {
+            let (above, below) = (position[0] - C::F::k(lower), C::F::k(upper) - position[0]);
+            let side = C::F::select(above.lt(below), one, -one);
+            for entry in &mut b.work.row_jacobian[tie.jacobian(0)] {
+                *entry = *entry * side;
+            }
+            position[0] = above.min(below);
+            Some(position[0].lt(zero))
         }
-        position[0] = above.min(below);
-        active = Some(position[0].lt(zero));
-    }
+    };
     let mut size = position[0];
     if tie.rows > 1 {
         let mut square = zero;

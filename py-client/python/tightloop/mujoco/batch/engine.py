@@ -30,9 +30,7 @@ Array = NDArray[Any]
 Mask = NDArray[np.bool_]
 
 #: Parts of a row that a world holds until they are set again.
-_HELD = ("ctrl", "mocap_pos", "mocap_quat")
-#: Norm below which a quaternion counts as no rotation, MuJoCo's mjMINVAL [–].
-_NORM_MIN = 1e-15
+_HELD = ("ctrl", "eq_active", "mocap_pos", "mocap_quat")
 #: Name of the model in the scene.
 MODEL = "model"
 #: Most substeps of a frame.
@@ -69,7 +67,7 @@ class Engine:
         self._launched_with = (0, 0, 0)
         self._snapshot: Snapshot | None = None
         self._stale, self._parked = np.ones(self._sims, bool), np.zeros(self._sims, bool)
-        # what the worlds hold: controls and mocap bodies as in a row, and joint forces
+        # what the worlds hold: controls, equalities and mocap bodies as in a row, and joint forces
         self._held_at = {name: layout.at(name) for name in _HELD if layout.at(name).start < layout.at(name).stop}
         self._held: dict[str, Array] = {}
         self._force = np.zeros((self._sims, self._nv))
@@ -225,9 +223,8 @@ class Engine:
         held = {name: np.where(mask[:, None], rows[:, at], self._held[name]) for name, at in self._held_at.items()}
         if self.silenced.any() and "ctrl" in held:
             held["ctrl"][mask & self.silenced] = 0.0
-        if "mocap_quat" in held:
-            turns = held["mocap_quat"].reshape(-1, 4)
-            turns[np.linalg.norm(turns, axis=1) < _NORM_MIN] = (1.0, 0.0, 0.0, 0.0)
+        if "eq_active" in held:  # MuJoCo keeps a byte of each
+            held["eq_active"] = np.trunc(held["eq_active"]) != 0.0
         force = self._force
         # other rows may hold anything until their next call
         applied = np.where(mask[:, None], rows[:, self._layout.at("qfrc_applied")], 0.0)
@@ -251,7 +248,7 @@ class Engine:
         self._parked |= others
 
     def hold(self, mask: Mask) -> Frame:
-        """Let the worlds of a mask hold what their rows have of controls, mocap bodies and forces, without a step."""
+        """Let the worlds of a mask hold what their rows have of controls, equalities, mocap bodies and forces, without a step."""
         held, force = self._commands(mask)
         pushed = (force != self._force).any(axis=1)
         if pushed.any():
@@ -273,7 +270,7 @@ class Engine:
         return {name: values for name, values in held.items() if not np.array_equal(values, self._held[name])}
 
     def step(self, mask: Mask) -> Frame:
-        """Step all worlds, those of a mask with what their rows have of controls, mocap bodies and forces."""
+        """Step all worlds, those of a mask with what their rows have of controls, equalities, mocap bodies and forces."""
         held, force = self._commands(mask)
         commands = self._changed(held)
         if not np.array_equal(force, self._force):

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from tightloop.errors import ArgumentError
-from tightloop.mujoco.batch import kinematics
 from tightloop.mujoco.batch.layout import StateLayout
 from tightloop.mujoco.batch.library import mujoco
 
@@ -63,8 +62,8 @@ class Fields:
         """Whether a field has no elements in any state, as the model has none of its kind."""
         return 0 in self.shape(name) and not name.startswith(_RESIZED)
 
-    def sources(self, name: str, known: Collection[str]) -> tuple[str, ...]:
-        """Return the fields of a simulation that a field is made of.
+    def check(self, name: str, known: Collection[str]) -> None:
+        """Check that simulations have a field.
 
         Args:
             name: A field of ``MjData`` that is not part of the state.
@@ -74,11 +73,9 @@ class Fields:
             ArgumentError: tightloop does not compute the field.
         """
         if name in known and not name.startswith(_OTHERS):
-            return (name,)
-        if name in kinematics.SOURCES:
-            return kinematics.SOURCES[name]
-        offered = sorted({*kinematics.SOURCES, *(field for field in known if field in self and field != "time")})
-        offered = [field for field in offered if not field.startswith(_OTHERS) and not self.is_state(field)]
+            return
+        offered = sorted(field for field in known if field in self and not self.is_state(field))
+        offered = [field for field in offered if field != "time" and not field.startswith(_OTHERS)]
         raise ArgumentError(
             f"{name}: tightloop does not compute this field; bind one of {', '.join(offered)}, or a part of the state, "
             "or copy a row of the state into an MjData with mj_setState and call mj_forward"

@@ -140,10 +140,11 @@ class Batch(NamedViews):
             if not self._fields.is_state(name) and not self._bindings.is_bound(name):
                 # a model without such elements has an empty field
                 empty = self._fields.is_empty(name)
-                sources = () if empty else self._fields.sources(name, self._engine.known_fields)
+                if not empty:
+                    self._fields.check(name, self._engine.known_fields)
                 array = self._bindings.get(name, dtype)
-                if sources:
-                    self._stepping.add(name, sources)
+                if not empty:
+                    self._stepping.add(name)
                 return array
             return self._bindings.get(name, dtype)
 
@@ -307,9 +308,7 @@ class Batch(NamedViews):
         shapes: list[int] = []
         if "geom_friction" in self._expansions.names:
             shapes = geoms_of_shapes(self._own, self._engine.sim.shape_names)
-        params = self._expansions.values(shapes, chosen.indices)
-        self._stepping.mass = self._expansions.of("body_mass")
-        return params
+        return self._expansions.values(shapes, chosen.indices)
 
 
 def _integer(name: str, value: Any) -> int:

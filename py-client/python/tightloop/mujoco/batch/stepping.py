@@ -18,7 +18,6 @@ from tightloop.frames import FAULTED
 from tightloop.mujoco.batch.bindings import Bindings
 from tightloop.mujoco.batch.engine import Engine
 from tightloop.mujoco.batch.fields import Fields
-from tightloop.mujoco.batch.kinematics import Kinematics
 from tightloop.mujoco.batch.layout import StateLayout
 from tightloop.mujoco.batch.library import mujoco
 from tightloop.mujoco.batch.selection import Selection
@@ -28,7 +27,7 @@ Array = NDArray[Any]
 #: Largest value of a state before MuJoCo calls it unstable: mjMAXVAL.
 _VALUE_MAX = 1e10
 #: Parts of the state that must be finite, beside positions, velocities and controls.
-_FINITE = ("act", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat")
+_FINITE = ("act", "qfrc_applied", "xfrc_applied", "eq_active", "mocap_pos", "mocap_quat")
 #: Bit of ``status``: contacts did not fit.
 _LEFT_OUT = 4
 _WARN = mujoco.mjtWarning
@@ -44,9 +43,6 @@ class Stepping:
         bindings: Rows and live arrays.
         engine: The simulation underneath.
         forward: Whether fields are current after a step.
-
-    Attributes:
-        mass: Masses of the bodies, ``(num_sims, nbody)`` or ``(1, nbody)`` [kg].
     """
 
     def __init__(
@@ -55,25 +51,25 @@ class Stepping:
         self._model, self._fields, self._layout = model, fields, layout
         self._bindings, self._engine, self._forward = bindings, engine, forward
         self._start = layout.start(-1)
-        self._direct: list[str] = []
-        self._computed: list[str] = []
-        self._accelerates = False
-        self.mass: Array = model.body_mass[None]
+        self._names: list[str] = []
+        # whether fields follow what worlds hold beside positions and velocities: controls and forces, or mocap bodies
+        self._depends = bool(model.nmocap)
         reset = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self._resets = not model.opt.disableflags & reset
         self._clocks = _clocks(model)
 
-    def add(self, name: str, sources: tuple[str, ...]) -> None:
-        """Fill a bound field from now on, from fields of the simulation."""
-        (self._direct if sources == (name,) else self._computed).append(name)
-        self._accelerates |= self._fields.accelerates(name)
+    def add(self, name: str) -> None:
+        """Fill a bound field from now on, from the simulation's field of that name."""
+        self._names.append(name)
+        accelerates = self._fields.accelerates(name)
+        self._depends |= accelerates
         # `hold` checks the controls that it sets
-        self._engine.require(fields=(*sources, "ctrl") if self._accelerates else sources)
+        self._engine.require(fields=(name, "ctrl") if accelerates else (name,))
 
     def step(self, chosen: Selection, params: dict[str, Array], nstep: int, history: Array | None) -> None:
         """Advance simulations; see `Batch.step`."""
         rows, ids, mask = self._bindings.rows, chosen.ids, chosen.mask
-        lags = bool(self._direct or self._computed) and not self._forward
+        lags = bool(self._names) and not self._forward
         in_between = history is not None or lags or self._engine.forces_turn
         frames = nstep * self._engine.plan(1) if in_between else self._engine.plan(nstep)
         self._begin(chosen, params, resets=self._resets)
@@ -146,14 +142,6 @@ class Stepping:
             if not finite.all():
                 sim = chosen.indices[int(finite.all(axis=1).argmin())]
                 raise ArgumentError(f"sim {sim}: {name} is NaN or infinite; write another value")
-        fixed = layout.at("eq_active")
-        moved = (rows[:, fixed] != self._start[fixed]).any(axis=1)
-        if moved.any():
-            sim = chosen.indices[int(moved.argmax())]
-            raise ArgumentError(
-                f"sim {sim}: eq_active differs from the model's; tightloop cannot switch equalities while it runs, "
-                "so set `active` in the model"
-            )
         if rows[:, layout.at("xfrc_applied")].any():
             self._engine.require(params=("body_f",))
         if "body_f" in self._engine.params:
@@ -179,27 +167,21 @@ class Stepping:
 
     def _evaluate(self, chosen: Selection) -> None:
         """Fill bound fields at the state of the newest frame, with the controls and forces of the rows."""
-        if not (self._direct or self._computed):
+        if not self._names:
             return
-        frame = self._engine.hold(chosen.mask) if self._accelerates else self._engine.frame
+        frame = self._engine.hold(chosen.mask) if self._depends else self._engine.frame
         assert frame is not None
         self._publish(frame, chosen.ids)
 
     def _publish(self, frame: Frame, ids: Any) -> None:
         derived = self._bindings.derived
-        for name in self._direct:
+        for name in self._names:
             values = _array(frame, name)[ids]
             derived[name][ids] = values.reshape(len(values), *derived[name].shape[1:])
             if name == "sensordata":
                 # the simulation's clock counts from its own reset
                 for column, cutoff in self._clocks:
                     derived[name][ids, column] = np.clip(self._bindings.rows[ids, 0], -cutoff, cutoff)
-        if self._computed:
-            body_qd = frame.body_qd[ids] if "body_qd" in frame.fields else None
-            mass = self.mass[ids] if len(self.mass) > 1 else self.mass
-            bodies = Kinematics(self._model, frame.body_q[ids], body_qd, mass)
-            for name in self._computed:
-                derived[name][ids] = getattr(bodies, name)
 
     def _take(self, frame: Frame, ids: Any) -> None:
         """Bring the state of a frame into the rows."""

@@ -34,6 +34,7 @@ pub(super) fn commands(m: &Constants<f32>) -> impl Iterator<Item = (Input, usize
         (Field::Ctrl, actuators),
         (Field::MocapPos, 3 * mocaps),
         (Field::MocapQuat, 4 * mocaps),
+        (Field::EqActive, m.mujoco.equalities),
     ];
     let models = models.into_iter().filter(|&(_, columns)| columns > 0);
     let models = models.map(|(field, columns)| (Input::Field(field), columns));

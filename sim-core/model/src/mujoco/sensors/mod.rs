@@ -53,6 +53,15 @@ pub(super) fn add_sensors(file: &ModelFile, robot: &mut Robot) -> Result<(), Mod
                 None
             }
         };
+        if sense
+            .as_ref()
+            .is_some_and(|sense: &Sense| sense.scalars() != place.len())
+        {
+            let has = place.len();
+            return Err(file.fault(format!(
+                "has {has} numbers for sensor `{name}`, which is not its size"
+            )));
+        }
         let is_two_sided = datatypes[k] == "mjDATATYPE_REAL";
         let is_bounded = is_two_sided || datatypes[k] == "mjDATATYPE_POSITIVE";
         parts.all.push(Sensor {

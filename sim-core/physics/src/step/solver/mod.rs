@@ -184,10 +184,7 @@ fn model_cost<C: Cx, const TURNS: bool>(
     w.hessian.copy_from_slice(&w.mass_matrix);
     residual(
         m,
-        Jacobian {
-            side: &w.limit_side,
-            ties: &w.row_jacobian,
-        },
+        Jacobian::new(&w.limit_side, &w.row_jacobian),
         &w.row_aref,
         &w.start,
         &mut w.jar,
@@ -288,10 +285,7 @@ fn constraint_forces<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b
     }
     residual(
         m,
-        Jacobian {
-            side: &w.limit_side,
-            ties: &w.row_jacobian,
-        },
+        Jacobian::new(&w.limit_side, &w.row_jacobian),
         aref,
         a,
         jar,
@@ -299,10 +293,7 @@ fn constraint_forces<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b
     forces(
         m,
         &b.params,
-        Jacobian {
-            side: &w.limit_side,
-            ties: &w.row_jacobian,
-        },
+        Jacobian::new(&w.limit_side, &w.row_jacobian),
         [weight, jar],
         force,
         joint,
@@ -380,20 +371,14 @@ fn choose_start<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mu
     }
     residual(
         m,
-        Jacobian {
-            side: &w.limit_side,
-            ties: &w.row_jacobian,
-        },
+        Jacobian::new(&w.limit_side, &w.row_jacobian),
         aref,
         warm,
         jar,
     );
     residual(
         m,
-        Jacobian {
-            side: &w.limit_side,
-            ties: &w.row_jacobian,
-        },
+        Jacobian::new(&w.limit_side, &w.row_jacobian),
         aref,
         smooth,
         jar_smooth,

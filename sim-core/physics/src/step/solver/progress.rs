@@ -72,10 +72,7 @@ impl<C: Cx> Pieces<C> {
         let (w, half) = (&mut b.work, C::F::c(0.5));
         residual(
             m,
-            Jacobian {
-                side: &w.limit_side,
-                ties: &w.row_jacobian,
-            },
+            Jacobian::new(&w.limit_side, &w.row_jacobian),
             &w.row_aref,
             &w.minimum,
             &mut w.jar_minimum,

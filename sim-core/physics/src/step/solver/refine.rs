@@ -10,8 +10,8 @@
 //! `Newton::refinements` is the count of passes that a model needs.
 
 use super::linear::{Unknown, solve_system};
-use super::rows::{Jacobian, assemble, forces, residual};
-use super::{acts, contacts, gather, may_idle};
+use super::rows::{Jacobian, assemble, residual};
+use super::{acts, constraint_forces, contacts, gather, may_idle};
 use crate::arrays::Array as A;
 use crate::constants::contact::row;
 use crate::lane::{Cx, Num, Real};
@@ -19,35 +19,40 @@ use crate::step::inverse_dynamics::inverse_dynamics;
 use crate::step::{BlockOf, ConstantsOf, Stage};
 use crate::when;
 
+/// What a pass of inverse dynamics and the solver's sums read.
+const READS: &[A] = &[
+    A::JointQ,
+    A::JointQd,
+    A::JointQdd,
+    A::Params,
+    A::Rotation,
+    A::Velocity,
+    A::BiasForce,
+    A::MassMatrix,
+    A::SmoothForce,
+    A::EfcD,
+    A::EfcAref,
+    A::LimitSide,
+    A::RowJacobian,
+    A::EfcForce,
+    A::ConstraintForce,
+    A::ContactRows,
+    A::ContactForces,
+];
+/// What it corrects.
+const WRITES: &[A] = &[
+    A::JointQdd,
+    A::EfcForce,
+    A::ConstraintForce,
+    A::ContactForces,
+];
+
 /// Accelerations and constraint forces, corrected where `f32` needs it.
 pub struct Refine;
 
 impl Stage for Refine {
-    const READS: &'static [A] = &[
-        A::JointQ,
-        A::JointQd,
-        A::JointQdd,
-        A::Params,
-        A::Rotation,
-        A::Velocity,
-        A::BiasForce,
-        A::MassMatrix,
-        A::SmoothForce,
-        A::EfcD,
-        A::EfcAref,
-        A::LimitSide,
-        A::RowJacobian,
-        A::EfcForce,
-        A::ConstraintForce,
-        A::ContactRows,
-        A::ContactForces,
-    ];
-    const WRITES: &'static [A] = &[
-        A::JointQdd,
-        A::EfcForce,
-        A::ConstraintForce,
-        A::ContactForces,
-    ];
+    const READS: &'static [A] = READS;
+    const WRITES: &'static [A] = WRITES;
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
@@ -59,31 +64,8 @@ impl Stage for Refine {
 pub struct Accelerations;
 
 impl Stage for Accelerations {
-    const READS: &'static [A] = &[
-        A::JointQ,
-        A::JointQd,
-        A::JointQdd,
-        A::Params,
-        A::Rotation,
-        A::Velocity,
-        A::BiasForce,
-        A::MassMatrix,
-        A::SmoothForce,
-        A::EfcD,
-        A::EfcAref,
-        A::LimitSide,
-        A::RowJacobian,
-        A::EfcForce,
-        A::ConstraintForce,
-        A::ContactRows,
-        A::ContactForces,
-    ];
-    const WRITES: &'static [A] = &[
-        A::JointQdd,
-        A::EfcForce,
-        A::ConstraintForce,
-        A::ContactForces,
-    ];
+    const READS: &'static [A] = READS;
+    const WRITES: &'static [A] = WRITES;
     // the forces that it writes are 0, as the solver left them
     const COMPLETES: &'static [A] = &[A::JointQdd];
 
@@ -140,10 +122,7 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     w.hessian.copy_from_slice(&w.mass_matrix);
     residual(
         m,
-        Jacobian {
-            side: &w.limit_side,
-            ties: &w.row_jacobian,
-        },
+        Jacobian::new(&w.limit_side, &w.row_jacobian),
         &w.row_aref,
         &w.start,
         &mut w.jar,
@@ -152,43 +131,12 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     contacts::residual::<_, true>(cx, &m.contacts, &w.start, row::JAR);
     let touching = contacts::touching(cx, &m.contacts);
     solve_system::<_, true>(cx, m, b, Unknown::Missing, touching);
-    // the corrected accelerations, and the forces of joint rows and contacts at them
-    let w = &mut b.work;
-    let (missing, a, joint) = (&w.missing, &mut w.start, &mut w.joint_force);
-    let (jar, force) = (&mut w.jar, &mut w.row_force);
-    let (weight, aref) = (&w.row_weight, &w.row_aref);
-    for j in 0..n {
-        a[j] = a[j] + missing[j];
-        cx.set(&mut b.joint_qdd[j], a[j]);
-        joint[j] = C::F::c(0.0);
+    for (qdd, (start, missing)) in b
+        .joint_qdd
+        .iter_mut()
+        .zip(b.work.start.iter().zip(&b.work.missing))
+    {
+        cx.set(qdd, *start + *missing);
     }
-    residual(
-        m,
-        Jacobian {
-            side: &w.limit_side,
-            ties: &w.row_jacobian,
-        },
-        aref,
-        a,
-        jar,
-    );
-    forces(
-        m,
-        &b.params,
-        Jacobian {
-            side: &w.limit_side,
-            ties: &w.row_jacobian,
-        },
-        [weight, jar],
-        force,
-        joint,
-    );
-    for r in 0..m.rows() {
-        cx.set(&mut b.efc_force[r], force[r]);
-    }
-    for j in 0..n {
-        cx.set(&mut b.constraint_force[j], joint[j]);
-    }
-    contacts::residual::<_, true>(cx, &m.contacts, a, row::JAR);
-    contacts::forces::<_, true>(cx, &m.contacts, &mut b.constraint_force);
+    constraint_forces::<C, true>(cx, m, b);
 }

@@ -19,6 +19,13 @@ pub(super) struct Jacobian<'a, F> {
     pub ties: &'a [F],
 }
 
+impl<'a, F> Jacobian<'a, F> {
+    #[inline(always)]
+    pub(super) fn new(side: &'a [F], ties: &'a [F]) -> Jacobian<'a, F> {
+        Jacobian { side, ties }
+    }
+}
+
 /// The law of a row at a residual `jar`: force -s', stiffness s'', and which piece of s it is on.
 pub(super) struct Law<F> {
     /// [N·m or N]

@@ -9,7 +9,7 @@ use crate::lane::Num;
 #[inline(always)]
 pub(super) fn law<F: Num>(law: &TieLaw<F::Real>, jar: F, weight: F) -> Law<F> {
     match law {
-        TieLaw::Equality => equality(jar, weight),
+        TieLaw::Equality(_) => equality(jar, weight),
         TieLaw::Friction(loss) => {
             let loss = F::k(*loss);
             dry_friction(jar, weight, loss.div(weight), loss)
@@ -23,7 +23,7 @@ pub(super) fn law<F: Num>(law: &TieLaw<F::Real>, jar: F, weight: F) -> Law<F> {
 pub(super) fn cost<F: Num>(law: &TieLaw<F::Real>, jar: F, weight: F) -> F {
     let half = F::c(0.5);
     match law {
-        TieLaw::Equality => half * weight * jar * jar,
+        TieLaw::Equality(_) => half * weight * jar * jar,
         TieLaw::Friction(loss) => {
             let loss = F::k(*loss);
             dry_cost(jar, weight, loss.div(weight), loss)
