@@ -216,6 +216,7 @@ fn any_param(dice: &mut Dice, scope: &Scope<'_>, param: Param, column: usize) ->
     let huge = scope.huge.filter(|_| dice.chance(0.4));
     match param {
         Param::Gravity | Param::BodyF => huge.unwrap_or(5.0) * dice.number(),
+        Param::BodyInertia => start * dice.between(0.8, 1.2),
         Param::BodyMassScale => match huge {
             Some(_) => dice.pick(&[1e-3, 1e10, 1e30]),
             None => dice.order(0.2, 5.0),

@@ -60,6 +60,8 @@ class Frame:
     """Positions of the mocap bodies of MuJoCo models in the world [m], ``(worlds, mocaps, 3)``."""
     mocap_quat: NDArray[Any]
     """Their quaternions (w, x, y, z) [–], of any length, ``(worlds, mocaps, 4)``."""
+    eq_active: NDArray[Any]
+    """1 where an equality of a MuJoCo model acts, 0 where it does not, ``(worlds, equalities)``."""
     bias_force: NDArray[Any]
     """Coriolis, centrifugal and gravity forces [N·m or N], ``(worlds, dofs)``."""
     smooth_force: NDArray[Any]

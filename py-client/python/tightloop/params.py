@@ -14,7 +14,14 @@ from tightloop.errors import CommandRefused, ConstantParameter, UnknownField
 from tightloop.inputs import real_numbers
 
 #: Values per body or site, of parameters with several.
-PARTS = {"body_f": 6, "site_q_noise": 2, "site_qd_noise": 2}
+PARTS = {
+    "body_f": 6,
+    "site_q_noise": 2,
+    "site_qd_noise": 2,
+    "body_inertia": 6,
+    "actuator_gain": 3,
+    "actuator_bias": 3,
+}
 #: Parameters with one value per world.
 SINGLE = ("command_delay",)
 
@@ -34,7 +41,10 @@ class Params:
     ``gravity`` (worlds, 3) [m/s²], ``body_mass_scale`` (worlds, bodies) [–], ``joint_armature`` [kg·m² or kg],
     ``joint_damping``, ``joint_target_kd`` [N·m·s/rad or N·s/m], ``joint_target_ke`` [N·m/rad or N/m],
     ``joint_effort_limit`` [N·m or N; 1e30 is none], ``joint_friction`` [N·m or N], each (worlds, dofs),
-    ``shape_mu`` (worlds, shapes) [–], ``body_f`` (worlds, bodies, 6) [N, N·m].
+    ``shape_mu`` (worlds, shapes) [–], ``body_f`` (worlds, bodies, 6) [N, N·m]. ``body_mass`` (worlds, bodies) [kg] and
+    ``body_inertia`` (worlds, bodies, 6) [kg·m²] count before ``body_mass_scale``; an inertia is about the centre of
+    mass in the link's axes: xx, yy, zz, xy, xz, yz. ``actuator_gain`` and ``actuator_bias`` (worlds, actuators, 3) of
+    MuJoCo models are constant, factor of the length and factor of the velocity.
 
     ``command_delay`` (worlds,) [substeps]: delay until ``joint_f`` and targets of a frame act, rounded up to whole
     substeps; at most ``Scene.command_delay_max``.

@@ -262,7 +262,9 @@ class Sim:
         Returns:
             A frame at the new state. Raises as `step` does.
         """
-        more = self._arrays("writes", act=act, ctrl=ctrl, mocap_pos=mocap_pos, mocap_quat=mocap_quat, eq_active=eq_active)
+        more = self._arrays(
+            "writes", act=act, ctrl=ctrl, mocap_pos=mocap_pos, mocap_quat=mocap_quat, eq_active=eq_active
+        )
         return self._client.write(joint_q, joint_qd, more, mask)
 
     def forward(self) -> Frame:

@@ -120,6 +120,7 @@ impl Simulation {
             Per::Shape => model.shape_names()[column].clone(),
             Per::Site(n) => model.site_names()[column / n].clone(),
             Per::ContactSensor => model.contact_sensors()[column].name.clone(),
+            Per::Actuator(n) => model.actuator_names()[column / n].clone(),
         }
     }
 }

@@ -8,7 +8,7 @@ const ROUNDING: f64 = 1e-12;
 const DUST: f64 = 1e-15;
 
 /// Mass properties of a link.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inertial {
     /// Mass [kg].
     pub mass: f64,

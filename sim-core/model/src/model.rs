@@ -255,11 +255,16 @@ impl Model {
             self.contact_sensors,
             self.command_delay_max
         );
+        let text = text.replace(
+            &self.constants.varying.listed(),
+            &self.constants.varying.listed_in_recordings(),
+        );
         // recordings are older than what models from MuJoCo have
         let text = text.replace(&format!(", mujoco: {:?}", Mujoco::<f64>::default()), "");
         let text = text
             .replace(", mocap_pos: [], mocap_quat: [], eq_active: []", "")
             .replace(", turns: None", "")
+            .replace(", link_axes: None", "")
             .replace(&format!(", turning: {:?}", Fixed::default()), "");
         text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| {
             (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)

@@ -76,6 +76,7 @@ def live(
     precision: str = "f64",
     device: str = "cpu",
     fields: tuple[str, ...] = (),
+    params: tuple[str, ...] = (),
 ) -> Iterator[Live]:
     """Run a model, or that of an XML text; both sides solve to the end."""
     model = mujoco.MjModel.from_xml_string(model) if isinstance(model, str) else model
@@ -84,8 +85,20 @@ def live(
     model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
     scene = tl.Scene.from_mujoco(model, name="m")
     fields = ("qpos", "qvel", "qacc", "joint_q", "joint_qd", *(("act",) if model.na else ()), *fields)
-    with tl.launch(scene, worlds=worlds, precision=precision, fields=fields, device=device) as sim:
+    with tl.launch(scene, worlds=worlds, precision=precision, fields=fields, device=device, params=params) as sim:
         yield Live(model, sim)
+
+
+def relative(found: Array, expected: Array) -> float:
+    """Largest difference over the largest value of each row."""
+    scale = np.abs(expected).max(axis=-1, keepdims=True, initial=1e-3)
+    return float((np.abs(found - expected) / scale).max(initial=0.0))
+
+
+def has_closed_form(model: mujoco.MjModel, contact: mujoco.MjContact) -> bool:
+    """Whether both sides find the same points: of a box and a capsule or a box they may differ in number."""
+    kinds = {mujoco.mjtGeom(model.geom_type[geom]).name for geom in contact.geom}
+    return not ("mjGEOM_BOX" in kinds and kinds <= {"mjGEOM_BOX", "mjGEOM_CAPSULE"})
 
 
 def to_joints(model: mujoco.MjModel, qpos: Array, qvel: Array) -> tuple[Array, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,6 +47,33 @@ class Features:
     """Attributes of ``<option>``."""
     flag: str = ""
     """Attributes of ``<option><flag/>``."""
+
+
+#: A medium that drags.
+MEDIUM = 'density="900" viscosity="0.7" wind="0.3 -0.5 0.2"'
+JOINTS = Features(free=True, ball=True, several=True, reference=True)
+ACTUATED = replace(JOINTS, actuators=True, tendons=True)
+CONSTRAINED = replace(
+    ACTUATED,
+    springs=True,
+    limits=True,
+    friction=True,
+    armature=True,
+    damping=True,
+    equalities=True,
+    connections=True,
+    pulls=True,
+    bounds=True,
+)
+EVERYTHING = replace(
+    CONSTRAINED,
+    polynomials=True,
+    activations=True,
+    transmissions=True,
+    mocap=True,
+    compensation=True,
+    option=MEDIUM,
+)
 
 
 def random_mjcf(seed: int, bodies: int, features: Features) -> str:

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 from live_model import Live, live
-from random_mjcf import Features, random_mjcf
+from random_mjcf import CONSTRAINED, random_mjcf
 
 import tightloop as tl
 
@@ -17,24 +17,7 @@ TREES = int(os.environ.get("TIGHTLOOP_LIVE_TREES", "48")) // 4
 PLACES = tuple("xpos xquat xmat xipos ximat site_xpos site_xmat geom_xpos geom_xmat subtree_com cvel".split())
 FORCES = ("qfrc_actuator", "qfrc_constraint", "qfrc_bias", "qfrc_passive")
 FIELDS = (*PLACES, *FORCES)
-EVERYTHING = Features(
-    free=True,
-    ball=True,
-    several=True,
-    reference=True,
-    springs=True,
-    limits=True,
-    friction=True,
-    armature=True,
-    damping=True,
-    equalities=True,
-    connections=True,
-    actuators=True,
-    tendons=True,
-    pulls=True,
-    bounds=True,
-)
-TOUCHING = replace(EVERYTHING, geoms=True, equalities=False, connections=False, option='cone="elliptic"')
+TOUCHING = replace(CONSTRAINED, geoms=True, equalities=False, connections=False, option='cone="elliptic"')
 
 
 def assert_near(case: Live, seed: int, tolerance: float, fields: tuple[str, ...] = FIELDS) -> None:
@@ -53,7 +36,7 @@ def assert_near(case: Live, seed: int, tolerance: float, fields: tuple[str, ...]
 
 @pytest.mark.parametrize("seed", range(TREES))
 def test_fields_are_mujocos(seed: int) -> None:
-    with live(random_mjcf(seed, 2 + seed % 6, EVERYTHING), fields=FIELDS) as case:
+    with live(random_mjcf(seed, 2 + seed % 6, CONSTRAINED), fields=FIELDS) as case:
         assert_near(case, seed, 1e-8)
 
 
@@ -70,12 +53,12 @@ def test_geoms_are_shown_also_where_they_touch_nothing(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(TREES // 3))
 def test_fields_in_single_precision_are_near(seed: int) -> None:
-    with live(random_mjcf(seed, 2 + seed % 6, EVERYTHING), fields=FIELDS, precision="f32") as case:
+    with live(random_mjcf(seed, 2 + seed % 6, CONSTRAINED), fields=FIELDS, precision="f32") as case:
         assert_near(case, seed, 1e-3)
 
 
 def test_models_follow_each_other_and_leave_robots_out() -> None:
-    models = [mujoco.MjModel.from_xml_string(random_mjcf(seed, 3, EVERYTHING)) for seed in (1, 2)]
+    models = [mujoco.MjModel.from_xml_string(random_mjcf(seed, 3, CONSTRAINED)) for seed in (1, 2)]
     scene = tl.Scene.from_mujoco(models[0], name="first")
     scene.add_sphere(radius=0.1, body=scene.add_body(name="ball", pos=(0, 0, 3)))
     scene.add_mujoco(models[1], name="second", pos=(1, 2, 3))

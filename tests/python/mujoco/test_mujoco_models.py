@@ -8,31 +8,10 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from live_model import Live, live
-from random_mjcf import Features, random_mjcf
+from live_model import Live, has_closed_form, live, relative
+from random_mjcf import ACTUATED, EVERYTHING, JOINTS, MEDIUM, random_mjcf
 
-MEDIUM = 'density="900" viscosity="0.7" wind="0.3 -0.5 0.2"'
 TREES = int(os.environ.get("TIGHTLOOP_LIVE_TREES", "48")) // 8
-JOINTS = Features(free=True, ball=True, several=True, reference=True)
-ACTUATED = replace(JOINTS, actuators=True, tendons=True)
-EVERYTHING = replace(
-    ACTUATED,
-    springs=True,
-    limits=True,
-    friction=True,
-    armature=True,
-    damping=True,
-    equalities=True,
-    polynomials=True,
-    connections=True,
-    pulls=True,
-    activations=True,
-    transmissions=True,
-    mocap=True,
-    compensation=True,
-    bounds=True,
-    option=MEDIUM,
-)
 FEATURES = {
     "joints": JOINTS,
     "springs": replace(JOINTS, springs=True),
@@ -78,12 +57,6 @@ FEATURES = {
     "everything": EVERYTHING,
     "everything implicit": replace(EVERYTHING, option=f'{MEDIUM} integrator="implicitfast"'),
 }
-
-
-def relative(found: np.ndarray, expected: np.ndarray) -> float:
-    """Largest difference over the largest value of each row."""
-    scale = np.abs(expected).max(axis=-1, keepdims=True, initial=1e-3)
-    return float((np.abs(found - expected) / scale).max(initial=0.0))
 
 
 def assert_step(case: Live, seed: int, tolerance: float) -> None:
@@ -166,12 +139,6 @@ def test_free_joints_and_balls_are_passive_as_mujocos(integrator: str, seed: int
 def static_bodies(model: mujoco.MjModel) -> list[int]:
     """Bodies that stand still, which have no part in our potential energy."""
     return np.flatnonzero(model.body_weldid == 0).tolist()
-
-
-def has_closed_form(model: mujoco.MjModel, contact: mujoco.MjContact) -> bool:
-    """Whether both sides find the same points: of a box and a capsule or a box they may differ in number."""
-    kinds = {mujoco.mjtGeom(model.geom_type[geom]).name for geom in contact.geom}
-    return not ("mjGEOM_BOX" in kinds and kinds <= {"mjGEOM_BOX", "mjGEOM_CAPSULE"})
 
 
 @pytest.mark.parametrize("pairs", [False, True])

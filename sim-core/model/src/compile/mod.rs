@@ -16,6 +16,7 @@ mod contact_pieces;
 mod contacts;
 mod inverse_weight;
 mod keyframes;
+mod masses;
 mod mocaps;
 mod mujoco_contacts;
 mod mujoco_frames;
@@ -28,15 +29,14 @@ use crate::description::{Description, Robot};
 use crate::error::ModelError;
 use crate::model::{Model, RobotRange, Start};
 use bodies::BodyBuilder;
-use carrier::Carrier;
 use constraint_rows::{IMPEDANCE, add_rows};
 use contact_pieces::{Rules, connected, placed_shapes};
 use contacts::add_contacts;
 use inverse_weight::Reference;
 use sim_physics::constants::contact::Contacts;
 use sim_physics::constants::mujoco::{Actuator, Integrator, Mujoco};
-use sim_physics::constants::params::{Param, Varying};
-use sim_physics::constants::{Constants, Coupled, Delay, Newton, Part};
+use sim_physics::constants::params::{Param, SceneStarts, Varying};
+use sim_physics::constants::{Constants, Coupled, Delay, Newton};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -143,7 +143,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     check_models(scene)?;
     if let Some(parts) = scene.robots.iter().find_map(|robot| robot.mujoco.as_ref()) {
         constants.mujoco.integrator = parts.integrator;
-        constants.damped = is_damped(&constants, parts.implicit_damping);
+        constants.damped = is_damped(&constants, scene, parts.implicit_damping);
     }
     let shape_names = scene.shape_names();
     let placed = placed_shapes(scene, &builder.carriers, &constants);
@@ -157,8 +157,13 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     mujoco_contacts::add_contact_sensors(&mut constants, scene, &placed);
     let surfaces: Vec<f64> = placed.iter().map(|shape| shape.surface.mu).collect();
     let sensors = scene.sensed_shapes()?;
+    let starts = SceneStarts {
+        mu: surfaces,
+        contact_sensors: sensors.len(),
+        ..masses::starts(scene)
+    };
     for &param in &scene.params {
-        let numbers = param.starts(&constants, &surfaces, sensors.len());
+        let numbers = param.starts(&constants, &starts);
         constants.varying.add(param, numbers);
     }
     if scene.params.contains(&Param::CommandDelay) && !constants.dofs.is_empty() {
@@ -167,13 +172,13 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
             substeps: scene.substeps,
         };
     }
-    if scene.params.contains(&Param::BodyMassScale) {
+    if masses::vary(scene) {
         for (robot, (ours, carriers)) in scene
             .robots
             .iter()
             .zip(builder.robots.iter().zip(&builder.carriers))
         {
-            add_parts(&mut constants, robot, ours.bodies.start, carriers);
+            masses::add_parts(&mut constants, scene, robot, ours.bodies.start, carriers);
         }
     }
 
@@ -266,6 +271,23 @@ fn check_models(scene: &Description) -> Result<(), ModelError> {
             ),
         });
     }
+    let drags = |robot: &&Robot| {
+        let parts = robot.mujoco.as_ref();
+        parts.is_some_and(|parts| !parts.drags.is_empty())
+    };
+    let massive = [Param::BodyMass, Param::BodyInertia];
+    if let Some(robot) = models.iter().copied().find(drags)
+        && let Some(param) = massive.iter().find(|param| scene.params.contains(param))
+    {
+        return Err(ModelError::MujocoRefused {
+            reasons: format!(
+                "{} cannot vary: density and viscosity act on boxes with the masses and inertias of model `{}`; \
+                 vary body_mass_scale, or set both to 0",
+                param.row().name,
+                robot.name
+            ),
+        });
+    }
     let geoms = models.iter().flat_map(|robot| &robot.links);
     let geoms = geoms.flat_map(|link| &link.collisions);
     let priorities: BTreeSet<i64> = geoms
@@ -282,9 +304,11 @@ fn check_models(scene: &Description) -> Result<(), ModelError> {
 }
 
 /// Whether a step of a scene with MuJoCo's options is implicit in any damping.
-fn is_damped(m: &Constants<f64>, implicit_damping: bool) -> bool {
+fn is_damped(m: &Constants<f64>, scene: &Description, implicit_damping: bool) -> bool {
+    let varies = [Param::ActuatorGain, Param::ActuatorBias];
+    let varies = varies.iter().any(|param| scene.params.contains(param));
     let of_actuators =
-        |actuator: &Actuator<f64>| actuator.gain[2] != 0.0 || actuator.bias[2] != 0.0;
+        |actuator: &Actuator<f64>| varies || actuator.gain[2] != 0.0 || actuator.bias[2] != 0.0;
     match m.mujoco.integrator {
         Integrator::Euler => m.damped && implicit_damping,
         Integrator::RungeKutta => false,
@@ -296,22 +320,5 @@ fn is_damped(m: &Constants<f64>, implicit_damping: bool) -> bool {
                 || m.mujoco.actuators.iter().any(of_actuators)
                 || tendons.iter().any(|tendon| tendon.damping != 0.0)
         }
-    }
-}
-
-/// Adds to each body of a robot the links that it carries, in body order. `first` is the number of the robot's first link.
-fn add_parts(m: &mut Constants<f64>, robot: &Robot, first: usize, carriers: &[Carrier]) {
-    for (place, link) in robot.link_order().into_iter().enumerate() {
-        let carrier = &carriers[link];
-        let (Some(body), Some(inertial)) = (carrier.body, &robot.links[link].inertial) else {
-            continue;
-        };
-        let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = carrier.pose.rotate_tensor(inertial.inertia);
-        m.bodies[body].parts.push(Part {
-            link: first + place,
-            mass: inertial.mass,
-            center: carrier.pose.transform(inertial.pos),
-            inertia: [xx, yy, zz, xy, xz, yz],
-        });
     }
 }

@@ -81,7 +81,8 @@ impl BodyBuilder {
             self.mujoco.compensations.push(Compensation {
                 body,
                 link: first + place,
-                mass: share * inertial.mass,
+                mass: inertial.mass,
+                share,
                 center: carriers[link].pose.transform(inertial.pos),
             });
         }

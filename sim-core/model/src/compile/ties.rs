@@ -132,6 +132,10 @@ pub(super) fn add_ties(constants: &mut Constants<f64>, all: Vec<DofConstraint>) 
             first_equality,
             safe_references,
         } = own;
+        // as MuJoCo, which leaves out constraints without a Jacobian
+        if dofs.is_empty() {
+            continue;
+        }
         let rows = match &measure {
             ties::Measure::Lengths(_) | ties::Measure::Angle(..) => 1,
             ties::Measure::Free(body) => {

@@ -134,6 +134,19 @@ impl Description {
                     .flat_map(|site| parts(&site.name))
                     .collect()
             }
+            Per::Actuator(n) => {
+                let models = self.robots.iter();
+                let models = models.filter_map(|robot| Some((robot, robot.mujoco.as_ref()?)));
+                let names = models.flat_map(|(robot, parts)| {
+                    let name =
+                        |own: &str| vec![robot.name.clone(), format!("{}/{own}", robot.name)];
+                    let actuators = parts.actuators.iter();
+                    actuators
+                        .map(move |actuator| name(&actuator.name))
+                        .collect::<Vec<_>>()
+                });
+                names.flat_map(|names| vec![names; n]).collect()
+            }
             Per::ContactSensor => {
                 let sensors = self.contact_sensors.iter();
                 sensors.map(|sensor| vec![sensor.name.clone()]).collect()

@@ -176,6 +176,8 @@ recast! {
         pub center: [R; 3],
         /// xx yy zz xy xz yz about its centre of mass, in the body's axes [kg·m²].
         pub inertia: [R; 6],
+        /// Columns of the rotation from the link's axes to the body's, where its inertia varies [–].
+        pub link_axes: Option<[[R; 3]; 3]>,
     }
 }
 

@@ -161,8 +161,10 @@ recast! {
         pub body: usize,
         /// Its index among the links.
         pub link: usize,
-        /// Its mass times its share of compensation [kg].
+        /// Its mass [kg].
         pub mass: R,
+        /// The share of its weight that is compensated [–].
+        pub share: R,
         /// Its centre of mass in the body's frame [m].
         pub center: [R; 3],
     }

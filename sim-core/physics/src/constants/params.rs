@@ -19,6 +19,8 @@ pub enum Per {
     Site(usize),
     /// Each contact sensor.
     ContactSensor,
+    /// Each actuator of MuJoCo models, and this many entries.
+    Actuator(usize),
 }
 
 /// One row of the table.
@@ -90,6 +92,10 @@ params! {
     AccelerometerNoise "accelerometer_noise" Per::Site(1), "m/s²" Some(0.0), "Standard deviation of each part of accelerometer.";
     ContactSensorNoise "contact_sensor_noise" Per::ContactSensor, "N" Some(0.0), "Standard deviation of each part of contact_sensor.";
     BodyF "body_f" Per::Body(6), "N, N·m" None, "Force on each link at its centre of mass, then torque, in world axes, until it is written again; a reset clears it.";
+    BodyMass "body_mass" Per::Body(1), "kg" Some(0.0), "Mass of each link, before its scale. Its inertia stays.";
+    BodyInertia "body_inertia" Per::Body(6), "kg·m²" None, "Inertia of each link about its centre of mass in the link's axes, before its scale: xx, yy, zz, xy, xz, yz.";
+    ActuatorGain "actuator_gain" Per::Actuator(3), "–" None, "Gain of each actuator of MuJoCo models: constant, per length, per velocity.";
+    ActuatorBias "actuator_bias" Per::Actuator(3), "–" None, "Bias of each actuator of MuJoCo models: constant, per length, per velocity.";
 }
 
 /// Least mass and inertia of a link over those of the scene [–].
@@ -114,11 +120,12 @@ impl Param {
             Per::Shape => sizes.shapes,
             Per::Site(n) => n * sizes.sites,
             Per::ContactSensor => sizes.contact_sensors,
+            Per::Actuator(n) => n * sizes.actuators,
         }
     }
 
-    /// Initial values of a world, from the coefficient of friction of each shape and the count of contact sensors.
-    pub fn starts(self, m: &Constants<f64>, mu: &[f64], sensors: usize) -> Vec<f64> {
+    /// Initial values of a world.
+    pub fn starts(self, m: &Constants<f64>, scene: &SceneStarts) -> Vec<f64> {
         let of_dofs = |number: fn(&Dof<f64>) -> f64| m.dofs.iter().map(number).collect();
         match self {
             Param::Gravity => m.gravity.to_vec(),
@@ -133,7 +140,7 @@ impl Param {
             Param::JointTargetKe => of_dofs(|dof| dof.ke),
             Param::JointTargetKd => of_dofs(|dof| dof.kd),
             Param::JointEffortLimit => of_dofs(|dof| dof.effort_limit.unwrap_or(NO_LIMIT)),
-            Param::ShapeMu => mu.to_vec(),
+            Param::ShapeMu => scene.mu.clone(),
             Param::CommandDelay => vec![0.0],
             Param::JointFNoise
             | Param::JointTargetQNoise
@@ -143,8 +150,12 @@ impl Param {
             | Param::JointTorqueNoise => vec![0.0; m.dofs.len()],
             Param::SiteQNoise | Param::SiteQdNoise => vec![0.0; 2 * m.sites.len()],
             Param::GyroNoise | Param::AccelerometerNoise => vec![0.0; m.sites.len()],
-            Param::ContactSensorNoise => vec![0.0; sensors],
+            Param::ContactSensorNoise => vec![0.0; scene.contact_sensors],
             Param::BodyF => vec![0.0; 6 * m.frames.len()],
+            Param::BodyMass => scene.masses.clone(),
+            Param::BodyInertia => scene.inertias.as_flattened().to_vec(),
+            Param::ActuatorGain => m.mujoco.actuators.iter().flat_map(|own| own.gain).collect(),
+            Param::ActuatorBias => m.mujoco.actuators.iter().flat_map(|own| own.bias).collect(),
         }
     }
 
@@ -152,6 +163,19 @@ impl Param {
     pub fn is_load(self) -> bool {
         self == Param::BodyF
     }
+}
+
+/// What parameters start with beside the constants of a model.
+#[derive(Clone, Debug, Default)]
+pub struct SceneStarts {
+    /// Coefficient of friction of each shape [–].
+    pub mu: Vec<f64>,
+    /// How many contact sensors there are.
+    pub contact_sensors: usize,
+    /// Mass of each link [kg].
+    pub masses: Vec<f64>,
+    /// Inertia of each link in its axes: xx, yy, zz, xy, xz, yz [kg·m²].
+    pub inertias: Vec<[f64; 6]>,
 }
 
 /// The noise of each command, in the order `joint_f`, `joint_target_q`, `joint_target_qd`.
@@ -168,7 +192,23 @@ pub struct Varying {
     starts: Vec<(Param, f64)>,
 }
 
+/// Parameters that the first recordings know.
+const RECORDED: usize = 22;
+
 impl Varying {
+    /// How `Debug` shows which parameters vary.
+    pub fn listed(&self) -> String {
+        format!("first: {:?}", self.first)
+    }
+
+    /// The same as recordings know it, unless newer parameters vary.
+    pub fn listed_in_recordings(&self) -> String {
+        match self.first[RECORDED..].iter().any(Option::is_some) {
+            true => self.listed(),
+            false => format!("first: {:?}", &self.first[..RECORDED]),
+        }
+    }
+
     /// Adds a parameter with its initial values.
     pub fn add(&mut self, param: Param, numbers: impl IntoIterator<Item = f64>) {
         self.first[param as usize] = Some(self.starts.len());

@@ -83,21 +83,20 @@ impl<F: Num> Inertia<F> {
     /// `center` the centre of mass in the body's frame [m].
     #[inline(always)]
     pub fn placed(
-        mass: F::Real,
+        m: F,
         center: [F::Real; 3],
-        inertia: [F::Real; 6],
+        inertia: [F; 6],
         rotation: &Mat3<F>,
         origin: Vec3<F>,
     ) -> Self {
-        let m = F::k(mass);
         let c = rotation.mul_add(Vec3::constant(center), origin);
         let h = c * m;
         let [xx, yy, zz, xy, xz, yz] = inertia;
         // columns of R I
         let turned = Mat3([
-            rotation * Vec3::constant([xx, xy, xz]),
-            rotation * Vec3::constant([xy, yy, yz]),
-            rotation * Vec3::constant([xz, yz, zz]),
+            rotation * Vec3([xx, xy, xz]),
+            rotation * Vec3([xy, yy, yz]),
+            rotation * Vec3([xz, yz, zz]),
         ]);
         let (hc, zero) = (h.dot(c), F::c(0.0));
         Inertia([
@@ -136,9 +135,8 @@ fn second_moment<F: Num>(
 
 /// A symmetric constant, xx yy zz xy xz yz, times a vector.
 #[inline(always)]
-pub fn symmetric<F: Num>(i: [F::Real; 6], a: Vec3<F>) -> Vec3<F> {
-    let [xx, yy, zz, xy, xz, yz] = i;
-    Mat3::constant([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) * a
+pub fn symmetric<F: Num>([xx, yy, zz, xy, xz, yz]: [F; 6], a: Vec3<F>) -> Vec3<F> {
+    Mat3([Vec3([xx, xy, xz]), Vec3([xy, yy, yz]), Vec3([xz, yz, zz])]) * a
 }
 
 impl<F> Deref for Spatial<F> {

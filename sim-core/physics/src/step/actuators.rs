@@ -11,10 +11,11 @@
 //! clamped. The derivatives of forces with velocity are those before that, as MuJoCo's.
 
 use super::transmission::measure;
-use super::{BlockOf, ConstantsOf, Stage};
+use super::{BlockOf, ConstantsOf, Stage, param};
 use crate::arrays::Array as A;
 use crate::constants::actuator::{Activation, ActivationRate, TurningLength};
 use crate::constants::mujoco::{Actuator, TendonBound, Term};
+use crate::constants::params::Param;
 use crate::constants::{Constants, Motion};
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::vec3::Vec3;
@@ -28,6 +29,7 @@ impl Stage for Actuators {
         A::JointQd,
         A::Ctrl,
         A::Act,
+        A::Params,
         A::Rotation,
         A::Origin,
         A::Reference,
@@ -188,18 +190,21 @@ fn force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize, in
     }
     b.work.actuator_length[k] = length;
     b.work.actuator_velocity[k] = velocity;
-    let law = |[constant, stiffness, damping]: [<C::F as Num>::Real; 3]| {
-        let mut sum = C::F::k(constant);
+    let law = |which: Param, own: [<C::F as Num>::Real; 3]| {
+        let varies = m.varying.first(which).is_some();
+        let factor = |i: usize| param(m, &b.params, which, 3 * k + i, own[i]);
+        let mut sum = factor(0);
         // most actuators have no such term
-        if stiffness.to_f64() != 0.0 {
-            sum = length.fma(C::F::k(stiffness), sum);
+        if varies || own[1].to_f64() != 0.0 {
+            sum = length.fma(factor(1), sum);
         }
-        if damping.to_f64() != 0.0 {
-            sum = velocity.fma(C::F::k(damping), sum);
+        if varies || own[2].to_f64() != 0.0 {
+            sum = velocity.fma(factor(2), sum);
         }
         sum
     };
-    law(actuator.gain).fma(input, law(actuator.bias))
+    let gain = law(Param::ActuatorGain, actuator.gain);
+    gain.fma(input, law(Param::ActuatorBias, actuator.bias))
 }
 
 #[inline(always)]
@@ -210,9 +215,10 @@ fn bounded<F: Num>(x: F, range: Option<[F::Real; 2]>) -> F {
     }
 }
 
-/// Does the force of an actuator depend on its velocity?
-pub(super) fn is_damped<R: Real>(actuator: &Actuator<R>) -> bool {
-    actuator.gain[2].to_f64() != 0.0 || actuator.bias[2].to_f64() != 0.0
+/// May the force of an actuator depend on its velocity?
+pub(super) fn is_damped<R: Real>(m: &Constants<R>, actuator: &Actuator<R>) -> bool {
+    let of = |which: Param, own: [R; 3]| m.varying.first(which).is_some() || own[2].to_f64() != 0.0;
+    of(Param::ActuatorGain, actuator.gain) || of(Param::ActuatorBias, actuator.bias)
 }
 
 /// Adds -h ∂force/∂v of actuators and tendons to the mass matrix, Jᵀ (-h ∂f/∂v) J, where actuator forces are not at their
@@ -221,9 +227,13 @@ pub(super) fn is_damped<R: Real>(actuator: &Actuator<R>) -> bool {
 pub(super) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let dt = C::F::k(m.dt);
     let actuators = m.mujoco.actuators.iter().enumerate();
-    for (k, actuator) in actuators.filter(|(_, actuator)| is_damped(actuator)) {
+    for (k, actuator) in actuators.filter(|(_, actuator)| is_damped(m, actuator)) {
         let input = input(cx, b, actuator, k);
-        let slope = C::F::k(actuator.gain[2]).fma(input, C::F::k(actuator.bias[2]));
+        let of = |which: Param, own: [<C::F as Num>::Real; 3]| {
+            param(m, &b.params, which, 3 * k + 2, own[2])
+        };
+        let gain = of(Param::ActuatorGain, actuator.gain);
+        let slope = gain.fma(input, of(Param::ActuatorBias, actuator.bias));
         let mut damping = -(slope * dt);
         if let Some([least, most]) = actuator.force_range {
             let force = b.work.actuator_force[k];

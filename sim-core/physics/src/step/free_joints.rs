@@ -221,7 +221,7 @@ pub(super) fn solved<R: Real>(m: &Constants<R>) -> impl Iterator<Item = usize> +
 pub(super) fn is_solved<R: Real>(m: &Constants<R>, body: usize) -> bool {
     let is_alone = m.bodies.iter().all(|other| other.parent != Some(body));
     let drags = m.mujoco.drags.iter().any(|drag| drag.body == body);
-    let mut actuators = m.mujoco.actuators.iter().filter(|own| is_damped(own));
+    let mut actuators = m.mujoco.actuators.iter().filter(|own| is_damped(m, own));
     let driven = actuators.any(|own| {
         let dofs = own.turning.iter().flat_map(|length| &length.dofs);
         dofs.into_iter().any(|&dof| m.dofs[dof].body == body)

@@ -6,10 +6,9 @@
 //!
 //! The force of joints with `actuatorgravcomp` counts as one of their actuators ([`super::actuators`]).
 
-use super::{BlockOf, ConstantsOf, Stage, gravity, link_forces, param};
+use super::{BlockOf, ConstantsOf, Stage, gravity, link_forces, masses};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
-use crate::constants::params::Param;
 use crate::lane::{Cx, Num, Real};
 use crate::math::vec3::Vec3;
 
@@ -41,13 +40,13 @@ impl Stage for GravityCompensation {
 #[inline(always)]
 pub(super) fn forces<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let up = -gravity(m, &b.params);
-    let (w, params, one) = (&mut b.work, &b.params, <C::F as Num>::Real::of(1.0));
+    let (w, params) = (&mut b.work, &b.params);
     link_forces::clear(w);
     for held in &m.mujoco.compensations {
         let center = Vec3::constant(held.center);
         let point = w.rotation[held.body].mul_add(center, w.origin[held.body]);
-        let scale = param(m, params, Param::BodyMassScale, held.link, one);
-        let force = up * (scale * C::F::k(held.mass));
+        let mass = masses::mass(m, params, held.link, held.mass);
+        let force = up * (mass * C::F::k(held.share));
         link_forces::add(w, held.body, point, force, Vec3::zero());
     }
     link_forces::project(m, w);

@@ -24,7 +24,7 @@
 //! ```
 
 use super::kinematics::read_quat;
-use super::{BlockOf, ConstantsOf, Stage, actuators, fluid, free_joints, param};
+use super::{BlockOf, ConstantsOf, Stage, actuators, fluid, free_joints, masses, param};
 use crate::arrays::Array as A;
 use crate::constants::actuator::Activation;
 use crate::constants::mujoco::Integrator;
@@ -243,22 +243,20 @@ fn rotated_inertia<F: Num>(
     v: Vec3<F>,
 ) -> Vec3<F> {
     let v = rotation.transpose_mul(v);
-    let own = match m.varying.first(Param::BodyMassScale) {
-        None => symmetric(body.inertia, v),
-        Some(first) => {
-            let mut sum = Vec3::zero();
-            for part in &body.parts {
-                let scale = params[first + part.link];
-                // about the centre that the scene has
-                let arm = Vec3::constant(part.center) - Vec3::constant(body.center);
-                let swing = arm.cross(v.cross(arm));
-                let own = swing.scale_add(F::k(part.mass), symmetric(part.inertia, v));
-                sum = own.scale_add(scale, sum);
-            }
-            sum
-        }
-    };
-    rotation * own
+    if !masses::vary(m) {
+        return rotation * symmetric(body.inertia.map(F::k), v);
+    }
+    let mut sum = Vec3::zero();
+    for part in &body.parts {
+        // about the centre that the scene has
+        let arm = Vec3::constant(part.center) - Vec3::constant(body.center);
+        let swing = arm.cross(v.cross(arm));
+        let (mass, inertia) = masses::of_part(m, params, part);
+        let own = swing.scale_add(mass, symmetric(inertia, v));
+        let scale = masses::scale(m, params, part.link);
+        sum = own.scale_add(scale.unwrap_or(F::c(1.0)), sum);
+    }
+    rotation * sum
 }
 
 /// A free body, in MuJoCo's coordinates: velocity of its frame's origin, angular velocity in its own axes.

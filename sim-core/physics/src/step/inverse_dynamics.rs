@@ -9,7 +9,7 @@
 //! τ = z · n  or  z · f
 //! ```
 
-use super::{BlockOf, ConstantsOf, free_joints, gravity, param};
+use super::{BlockOf, ConstantsOf, free_joints, gravity, masses, param};
 use crate::constants::params::Param;
 use crate::constants::{Body, Motion};
 use crate::lane::{Cx, Num};
@@ -24,30 +24,19 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
     for (k, body) in m.bodies.iter().enumerate() {
         let w = &mut b.work;
         let (axes, omega) = (&w.rotation[k], w.velocity[k][ANGULAR]);
-        w.force[k] = match m.varying.first(Param::BodyMassScale) {
-            None => newton_euler::<C::F>(
-                body.mass,
-                body.center,
-                body.inertia,
-                axes,
-                omega,
-                w.force[k],
-            ),
-            Some(first) => {
-                let mut whole = Spatial::zero();
-                for part in &body.parts {
-                    let own = newton_euler::<C::F>(
-                        part.mass,
-                        part.center,
-                        part.inertia,
-                        axes,
-                        omega,
-                        w.force[k],
-                    );
-                    whole = own.scale_add(b.params[first + part.link], whole);
-                }
-                whole
+        let state = (axes, omega, w.force[k]);
+        w.force[k] = if masses::vary(m) {
+            let mut whole = Spatial::zero();
+            for part in &body.parts {
+                let massed = masses::of_part(m, &b.params, part);
+                let own = newton_euler::<C::F>(massed, part.center, state);
+                let scale = masses::scale(m, &b.params, part.link);
+                whole = own.scale_add(scale.unwrap_or(C::F::c(1.0)), whole);
             }
+            whole
+        } else {
+            let massed = (C::F::k(body.mass), body.inertia.map(C::F::k));
+            newton_euler::<C::F>(massed, body.center, state)
         };
     }
     for (k, body) in m.bodies.iter().enumerate().rev() {
@@ -139,15 +128,12 @@ pub(super) fn proper_accelerations<C: Cx>(
 /// The force of a mass under its acceleration, and its moment about the origin of its body.
 #[inline(always)]
 fn newton_euler<F: Num>(
-    mass: F::Real,
+    (mass, inertia): (F, [F; 6]),
     center: [F::Real; 3],
-    inertia: [F::Real; 6],
-    axes: &Mat3<F>,
-    omega: Vec3<F>,
-    acceleration: Spatial<F>,
+    (axes, omega, acceleration): (&Mat3<F>, Vec3<F>, Spatial<F>),
 ) -> Spatial<F> {
     let center = axes * Vec3::constant(center);
-    let force = point_acceleration(acceleration, omega, center) * F::k(mass);
+    let force = point_acceleration(acceleration, omega, center) * mass;
     let (spin, turn) = (
         axes.transpose_mul(omega),
         axes.transpose_mul(acceleration[ANGULAR]),

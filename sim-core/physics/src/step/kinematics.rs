@@ -11,9 +11,8 @@
 //!
 //! The reference point is the base, or the centre of mass c of a free body, for which S = 1.
 
-use super::{BlockOf, ConstantsOf, Stage};
+use super::{BlockOf, ConstantsOf, Stage, masses};
 use crate::arrays::{Array as A, Block};
-use crate::constants::params::Param;
 use crate::constants::{Body, Constants, Motion};
 use crate::lane::{Cx, Num};
 use crate::math::quat;
@@ -135,14 +134,17 @@ fn inertia<F: Num>(
     rotation: &Mat3<F>,
     origin: Vec3<F>,
 ) -> Inertia<F> {
-    let Some(first) = m.varying.first(Param::BodyMassScale) else {
-        return Inertia::placed(body.mass, body.center, body.inertia, rotation, origin);
-    };
+    if !masses::vary(m) {
+        let (mass, inertia) = (F::k(body.mass), body.inertia.map(F::k));
+        return Inertia::placed(mass, body.center, inertia, rotation, origin);
+    }
     let mut sum = Inertia::zero();
     for part in &body.parts {
-        let own = Inertia::placed(part.mass, part.center, part.inertia, rotation, origin);
+        let (mass, inertia) = masses::of_part(m, params, part);
+        let own = Inertia::placed(mass, part.center, inertia, rotation, origin);
+        let scale = masses::scale(m, params, part.link);
         for (sum, own) in sum.iter_mut().zip(*own) {
-            *sum = own.fma(params[first + part.link], *sum);
+            *sum = own.fma(scale.unwrap_or(F::c(1.0)), *sum);
         }
     }
     sum

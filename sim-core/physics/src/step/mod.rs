@@ -19,6 +19,7 @@ mod inverse_dynamics;
 pub mod kinematics;
 mod link_forces;
 pub mod mass_matrix;
+mod masses;
 pub mod mujoco_forces;
 pub mod mujoco_frames;
 pub mod mujoco_momenta;

@@ -2,16 +2,16 @@
 //!
 //! ```text
 //! cacc = (α, a + α × r + ω × (ω × r) - ω × v)     at c, the centre of mass of the body's tree; r from the body's origin
-//! F = m a(x)       N = R (I α' + ω' × I ω') + (x - c) × F                 x: the body's own centre of mass, ' in its axes
+//! F = m a(x)       N = I α + ω × I ω + (x - c) × F                        x: the body's own centre of mass
 //! cfrc_int(b) = (N, F) - cfrc_ext(b) + Σ cfrc_int(child)
 //! cfrc_ext(b) = contacts + body_f ± forces of connects and welds          each with its torque about c
 //! ```
 
 use super::contact_rows::class_list;
 use super::inverse_dynamics::{point_acceleration, proper_accelerations};
-use super::mujoco_subtrees::{mass, root_center};
-use super::sites::{axes, position, reference};
-use super::{BlockOf, ConstantsOf, Stage, tied_frames};
+use super::mujoco_subtrees::root_center;
+use super::sites::{position, reference};
+use super::{BlockOf, ConstantsOf, Stage, masses, tied_frames};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::contact::{row, turning};
@@ -20,7 +20,7 @@ use crate::constants::params::Param;
 use crate::constants::ties::{Frames, Measure};
 use crate::each;
 use crate::lane::{Cx, Num, Real};
-use crate::math::spatial::{ANGULAR, Spatial, symmetric};
+use crate::math::spatial::{ANGULAR, Spatial};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
 
 /// Accelerations of bodies, and forces on them.
@@ -104,10 +104,9 @@ fn accelerate<F: Num, V>(
     base: Vec3<F>,
 ) {
     let center = root_center(m, b, body);
-    let mass = mass(m, b, body);
+    let mass = masses::mass(m, &b.params, body.link, body.mass);
     let w = &mut b.work;
     let own = position(w, &body.inertial);
-    let turned: Mat3<F> = axes(w, &body.inertial);
     let (at_center, at_own, alpha, omega) = match body.frame.body {
         Some(carrier) => {
             let Spatial([linear, omega]) = w.velocity[carrier];
@@ -125,13 +124,9 @@ fn accelerate<F: Num, V>(
     };
     w.cacc[k] = six(alpha, at_center);
     let force = at_own * mass;
-    let [x, y, z] = body.moments;
-    let zero = F::Real::of(0.0);
-    let inertia = [x, y, z, zero, zero, zero];
-    let (spin, turn) = (turned.transpose_mul(omega), turned.transpose_mul(alpha));
-    let moment = spin.cross_add(symmetric(inertia, spin), symmetric(inertia, turn));
-    let torque = turned.mul_add(moment, (own - center).cross(force));
-    w.cfrc_int[k] = six(torque, force);
+    let times = |v| masses::inertia_times(m, b, body, v);
+    let moment = omega.cross_add(times(omega), times(alpha));
+    b.work.cfrc_int[k] = six(moment + (own - center).cross(force), force);
 }
 
 /// Angular, then linear part.

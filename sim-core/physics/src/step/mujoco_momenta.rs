@@ -7,14 +7,12 @@
 //!
 //! x is the body's own centre of mass, c that of its subtree.
 
-use super::mujoco_subtrees::mass;
-use super::sites::{axes, position, reference, velocity};
-use super::{BlockOf, ConstantsOf, Stage};
+use super::sites::{position, reference, velocity};
+use super::{BlockOf, ConstantsOf, Stage, masses};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::lane::{Cx, Num, Real};
 use crate::math::spatial::{ANGULAR, LINEAR};
-use crate::math::vec3::Vec3;
 
 /// Mass below which a subtree does not move (MuJoCo: `mjMINVAL`) [kg].
 const MASS_MIN: f64 = 1e-15;
@@ -44,12 +42,10 @@ impl Stage for Momenta {
         // momenta, until the subtree is complete
         for (k, body) in bodies.iter().enumerate() {
             let own = velocity(&b.work, &body.inertial, position(&b.work, &body.inertial));
-            b.work.subtree_linvel[k] = own[LINEAR] * mass(m, b, body);
+            b.work.subtree_linvel[k] =
+                own[LINEAR] * masses::mass(m, &b.params, body.link, body.mass);
             // the spin itself turns the body about its centre of mass
-            let turned = axes(&b.work, &body.inertial);
-            let Vec3(spin) = turned.transpose_mul(own[ANGULAR]);
-            let moment = Vec3(std::array::from_fn(|i| spin[i] * C::F::k(body.moments[i])));
-            b.work.subtree_angmom[k] = turned.mul_add(moment, Vec3::zero());
+            b.work.subtree_angmom[k] = masses::inertia_times(m, b, body, own[ANGULAR]);
         }
         for (k, body) in bodies.iter().enumerate().rev() {
             let momentum = b.work.subtree_linvel[k];
@@ -63,7 +59,7 @@ impl Stage for Momenta {
         for (k, body) in bodies.iter().enumerate().rev() {
             let own = position(&b.work, &body.inertial);
             let moving = velocity(&b.work, &body.inertial, own)[LINEAR];
-            let mass = mass(m, b, body);
+            let mass = masses::mass(m, &b.params, body.link, body.mass);
             let w = &mut b.work;
             let (center, carried) = (w.subtree_center[k], w.subtree_linvel[k]);
             let own = (own - center).cross((moving - carried) * mass);

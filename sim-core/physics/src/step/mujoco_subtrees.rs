@@ -8,11 +8,10 @@
 //! Centres are kept from the reference point of each body's tree, so they keep their digits far from the origin.
 
 use super::sites::{position, reference};
-use super::{BlockOf, ConstantsOf, Stage};
+use super::{BlockOf, ConstantsOf, Stage, masses};
 use crate::arrays::{Array as A, Block};
 use crate::constants::Constants;
 use crate::constants::mujoco_frames::MujocoBody;
-use crate::constants::params::Param;
 use crate::lane::{Cx, Num, Real};
 use crate::math::spatial::{ANGULAR, LINEAR, Spatial};
 use crate::math::vec3::Vec3;
@@ -36,7 +35,7 @@ impl Stage for Subtrees {
         let bodies = &m.mujoco.frames.bodies;
         // first moments, until the subtree is complete
         for (k, body) in bodies.iter().enumerate() {
-            let mass = mass(m, b, body);
+            let mass = masses::mass(m, &b.params, body.link, body.mass);
             b.work.subtree_mass[k] = mass;
             b.work.subtree_center[k] = position(&b.work, &body.inertial) * mass;
         }
@@ -67,20 +66,6 @@ impl Stage for Subtrees {
             let (Vec3([x, y, z]), Vec3([u, v, w])) = (angular, linear);
             b.work.cvel[k] = [x, y, z, u, v, w];
         }
-    }
-}
-
-/// Mass of a body.
-#[inline(always)]
-pub(super) fn mass<F: Num, V>(
-    m: &Constants<F::Real>,
-    b: &Block<F, V>,
-    body: &MujocoBody<F::Real>,
-) -> F {
-    let own = F::k(body.mass);
-    match m.varying.first(Param::BodyMassScale) {
-        Some(first) => own * b.params[first + body.link],
-        None => own,
     }
 }
 

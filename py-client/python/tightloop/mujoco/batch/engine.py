@@ -248,7 +248,7 @@ class Engine:
         self._parked |= others
 
     def hold(self, mask: Mask) -> Frame:
-        """Let the worlds of a mask hold what their rows have of controls, equalities, mocap bodies and forces, without a step."""
+        """Let the worlds of a mask hold what their rows have besides the state, without a step."""
         held, force = self._commands(mask)
         pushed = (force != self._force).any(axis=1)
         if pushed.any():
@@ -270,7 +270,7 @@ class Engine:
         return {name: values for name, values in held.items() if not np.array_equal(values, self._held[name])}
 
     def step(self, mask: Mask) -> Frame:
-        """Step all worlds, those of a mask with what their rows have of controls, equalities, mocap bodies and forces."""
+        """Step all worlds, those of a mask with what their rows have besides the state."""
         held, force = self._commands(mask)
         commands = self._changed(held)
         if not np.array_equal(force, self._force):

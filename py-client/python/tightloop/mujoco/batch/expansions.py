@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from tightloop.errors import ArgumentError
+from tightloop.mujoco.batch import gains, masses
 from tightloop.mujoco.batch.library import mujoco
-from tightloop.mujoco.batch.masses import Masses
 
 Array = NDArray[Any]
 
@@ -26,6 +26,8 @@ _SWITCHES = {
     "dof_damping": ("mjDSBL_DAMPER",),
     "dof_frictionloss": ("mjDSBL_FRICTIONLOSS", "mjDSBL_CONSTRAINT"),
 }
+#: Model fields that act.
+_VARYING = (*_SAME, *masses.FIELDS, *gains.PARAMS, "geom_friction")
 #: What ``mj_setConst`` computes. A batch computes it for reading.
 CONSTANTS = (
     "body_subtreemass body_invweight0 dof_invweight0 dof_M0 tendon_length0 tendon_invweight0 actuator_length0 "
@@ -49,6 +51,7 @@ class Expansions:
     def __init__(self, model: Any, num_sims: int) -> None:
         self._model, self._sims = model, num_sims
         self._arrays: dict[str, Array] = {}
+        self._inertias = masses.Inertias(np.asarray(model.body_iquat))
 
     def __contains__(self, name: str) -> bool:
         """Whether ``MjModel`` or ``MjOption`` has a field of this name."""
@@ -99,10 +102,10 @@ class Expansions:
     def _check(self, name: str) -> None:
         if name.startswith(_ASSETS):
             raise ArgumentError(f"{name} is asset data, which all simulations share; make a Batch per model instead")
-        free = (*_SAME, *Masses.FIELDS, "geom_friction", *CONSTANTS)
+        free = (*_VARYING, *CONSTANTS)
         if name in free or name.startswith(_VISUAL) or hasattr(self._model.opt, name):
             return
-        varying = ", ".join((*_SAME, *Masses.FIELDS, "geom_friction"))
+        varying = ", ".join(_VARYING)
         raise ArgumentError(
             f"{name} cannot differ between simulations of a Batch: tightloop varies {varying}; "
             "edit the model and make a Batch per value"
@@ -111,8 +114,9 @@ class Expansions:
     def params(self) -> tuple[str, ...]:
         """Return the parameters that must vary for what is expanded."""
         found = [_SAME[name] for name in self._arrays if name in _SAME]
-        if any(name in self._arrays for name in Masses.FIELDS):
-            found.append("body_mass_scale")
+        if any(name in self._arrays for name in masses.FIELDS):
+            found.extend(masses.PARAMS)
+        found.extend(param for name, param in gains.PARAMS.items() if name in self._arrays)
         if "geom_friction" in self._arrays:
             found.append("shape_mu")
         return tuple(found)
@@ -133,9 +137,16 @@ class Expansions:
             if name in _SAME:
                 self._check_same(name, ids)
                 found[_SAME[name]] = array.astype(np.float64) * self._switch(name)
-        if any(name in self._arrays for name in Masses.FIELDS):
-            masses = Masses(self._model, self.of("body_mass"), self.of("body_inertia"))
-            found["body_mass_scale"] = np.broadcast_to(masses.scale(ids), (self._sims, self._model.nbody))
+            elif name in gains.PARAMS:
+                self._check_finite(name, ids)
+                found[gains.PARAMS[name]] = gains.factors(self._model, name, array)
+            elif name in masses.FIELDS:
+                self._check_finite(name, ids)
+        if any(name in self._arrays for name in masses.FIELDS):
+            bodies = self._model.nbody
+            found["body_mass"] = np.broadcast_to(self.of("body_mass"), (self._sims, bodies)).astype(np.float64)
+            tensors = self._inertias.of(self.of("body_inertia"))
+            found["body_inertia"] = np.broadcast_to(tensors, (self._sims, bodies, 6))
         if "geom_friction" in self._arrays:
             self._check_friction(ids)
             found["shape_mu"] = self._arrays["geom_friction"][:, shapes, 0].astype(np.float64)
@@ -145,11 +156,15 @@ class Expansions:
         flags = [getattr(mujoco.mjtDisableBit, flag, 0) for flag in _SWITCHES.get(name, ())]
         return 0.0 if any(self._model.opt.disableflags & int(flag) for flag in flags) else 1.0
 
-    def _check_same(self, name: str, ids: Array) -> None:
+    def _check_finite(self, name: str, ids: Array) -> Array:
         array = self._arrays[name][ids].reshape(len(ids), -1)
         wrong = np.flatnonzero(~np.isfinite(array).all(axis=1))
         if len(wrong):
             raise ArgumentError(f"sim {ids[wrong[0]]}: {name} is not finite")
+        return array
+
+    def _check_same(self, name: str, ids: Array) -> None:
+        array = self._check_finite(name, ids)
         if name == "gravity":
             return
         # tightloop has other dofs for free joints: velocities of the centre of mass, in world axes

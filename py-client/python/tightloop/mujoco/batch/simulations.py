@@ -151,9 +151,10 @@ class Batch(NamedViews):
     def expand(self, name: str, dtype: DTypeLike | None = None) -> Array:
         """Return values of a field of ``MjModel`` or ``MjOption`` for each simulation, ``(num_sims, ...)``.
 
-        ``gravity``, ``dof_armature``, ``dof_damping``, ``dof_frictionloss``, ``geom_friction``, ``body_mass`` and
-        ``body_inertia`` act from the next call on. Other options may be read; a call refuses values that differ from
-        the model's. Fields for pictures, and what `set_const` computes, have no effect on the motion.
+        ``gravity``, ``dof_armature``, ``dof_damping``, ``dof_frictionloss``, ``geom_friction``, ``body_mass``,
+        ``body_inertia``, ``actuator_gainprm`` and ``actuator_biasprm`` act from the next call on. Other options may be
+        read; a call refuses values that differ from the model's. Fields for pictures, and what `set_const` computes,
+        have no effect on the motion.
 
         Args:
             name: The field.

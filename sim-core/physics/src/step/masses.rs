@@ -1,0 +1,97 @@
+//! Masses and inertias of links, where they vary from world to world.
+
+use super::param;
+use crate::arrays::{Block, Workspace};
+use crate::constants::mujoco_frames::MujocoBody;
+use crate::constants::params::Param;
+use crate::constants::{Constants, Part};
+use crate::lane::Num;
+use crate::math::vec3::{Mat3, Vec3};
+use crate::step::sites::axes;
+
+/// Do masses or inertias of links vary?
+#[inline(always)]
+pub(super) fn vary<R>(m: &Constants<R>) -> bool {
+    let params = [Param::BodyMassScale, Param::BodyMass, Param::BodyInertia];
+    params.iter().any(|&param| m.varying.first(param).is_some())
+}
+
+/// Mass of a link [kg], and its inertia about its centre of mass in the body's axes [kg·m²], both before their scale.
+#[inline(always)]
+pub(super) fn of_part<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    part: &Part<F::Real>,
+) -> (F, [F; 6]) {
+    let mass = param(m, params, Param::BodyMass, part.link, part.mass);
+    let inertia = match (m.varying.first(Param::BodyInertia), part.link_axes) {
+        (Some(first), Some(axes)) => {
+            let own = std::array::from_fn(|i| params[first + 6 * part.link + i]);
+            turned(&Mat3::constant(axes), own)
+        }
+        _ => part.inertia.map(F::k),
+    };
+    (mass, inertia)
+}
+
+/// What mass and inertia of a link are multiplied with; none where that does not vary.
+#[inline(always)]
+pub(super) fn scale<F: Num>(m: &Constants<F::Real>, params: &[F], link: usize) -> Option<F> {
+    let first = m.varying.first(Param::BodyMassScale)?;
+    Some(params[first + link])
+}
+
+/// Mass of a link with its scale, `fixed` where it does not vary [kg].
+#[inline(always)]
+pub(super) fn mass<F: Num>(m: &Constants<F::Real>, params: &[F], link: usize, fixed: F::Real) -> F {
+    let own = param(m, params, Param::BodyMass, link, fixed);
+    match scale(m, params, link) {
+        Some(scale) => own * scale,
+        None => own,
+    }
+}
+
+/// I v in world axes, of a link of a MuJoCo model about its centre of mass.
+#[inline(always)]
+pub(super) fn inertia_times<F: Num, V>(
+    m: &Constants<F::Real>,
+    b: &Block<F, V>,
+    body: &MujocoBody<F::Real>,
+    v: Vec3<F>,
+) -> Vec3<F> {
+    let w: &Workspace<F> = &b.work;
+    let own = match m.varying.first(Param::BodyInertia) {
+        Some(first) => {
+            let turn: Mat3<F> = axes(w, &body.frame);
+            let inertia = matrix(std::array::from_fn(|i| b.params[first + 6 * body.link + i]));
+            turn.mul_add(inertia * turn.transpose_mul(v), Vec3::zero())
+        }
+        None => {
+            let turn: Mat3<F> = axes(w, &body.inertial);
+            let Vec3(along) = turn.transpose_mul(v);
+            let moment = Vec3(std::array::from_fn(|i| along[i] * F::k(body.moments[i])));
+            turn.mul_add(moment, Vec3::zero())
+        }
+    };
+    match scale(m, &b.params, body.link) {
+        Some(scale) => own * scale,
+        None => own,
+    }
+}
+
+/// A symmetric tensor, xx yy zz xy xz yz, as a matrix.
+#[inline(always)]
+fn matrix<F: Num>([xx, yy, zz, xy, xz, yz]: [F; 6]) -> Mat3<F> {
+    Mat3([Vec3([xx, xy, xz]), Vec3([xy, yy, yz]), Vec3([xz, yz, zz])])
+}
+
+/// R I Rᵀ
+#[inline(always)]
+fn turned<F: Num>(rotation: &Mat3<F>, inertia: [F; 6]) -> [F; 6] {
+    let inertia = matrix(inertia);
+    // columns of I Rᵀ are I times the rows of R
+    let row = |i: usize| Vec3([rotation[0][i], rotation[1][i], rotation[2][i]]);
+    let column = |i: usize| rotation * (inertia * row(i));
+    let (x, y, z) = (column(0), column(1), column(2));
+    [x[0], y[1], z[2], x[1], x[2], y[2]]
+}
