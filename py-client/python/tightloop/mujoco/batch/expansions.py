@@ -83,12 +83,12 @@ class Expansions:
         """Return the array of a field, the same one at each call.
 
         Raises:
-            ArgumentError: The field cannot differ between simulations, or the dtype is not one of the field's.
+            ArgumentError: The field is of assets, or the dtype is not one of the field's.
         """
         template = self._template(name)
         assert template is not None
-        if name not in self._arrays:
-            self._check(name)
+        if name.startswith(_ASSETS):
+            raise ArgumentError(f"{name} is asset data, which all simulations share; make a Batch per model instead")
         scalar = np.dtype(np.int32) if template.dtype.kind in "iu" and template.ndim == 0 else template.dtype
         wanted = scalar if dtype is None else np.dtype(dtype)
         if wanted != scalar and not (scalar == np.float64 and wanted == np.float32):
@@ -98,18 +98,6 @@ class Expansions:
         if self._arrays[name].dtype != wanted:
             raise ArgumentError(f"{name} is already expanded as {self._arrays[name].dtype}; give that dtype")
         return self._arrays[name]
-
-    def _check(self, name: str) -> None:
-        if name.startswith(_ASSETS):
-            raise ArgumentError(f"{name} is asset data, which all simulations share; make a Batch per model instead")
-        free = (*_VARYING, *CONSTANTS)
-        if name in free or name.startswith(_VISUAL) or hasattr(self._model.opt, name):
-            return
-        varying = ", ".join(_VARYING)
-        raise ArgumentError(
-            f"{name} cannot differ between simulations of a Batch: tightloop varies {varying}; "
-            "edit the model and make a Batch per value"
-        )
 
     def params(self) -> tuple[str, ...]:
         """Return the parameters that must vary for what is expanded."""
@@ -131,7 +119,7 @@ class Expansions:
         Raises:
             ArgumentError: A value cannot be taken over; the message has the simulation and the field.
         """
-        self.check_options(ids)
+        self.check_fixed(ids)
         found = {}
         for name, array in self._arrays.items():
             if name in _SAME:
@@ -176,23 +164,25 @@ class Expansions:
                 f"sim {sim}: {name} of a free joint cannot differ from the model's; write other dofs only"
             )
 
-    def check_options(self, ids: Array) -> None:
-        """Check that options are those of the model.
+    def check_fixed(self, ids: Array) -> None:
+        """Check that fields that cannot differ have the values of the model.
 
         Raises:
-            ArgumentError: One is not; the message has the simulation and the option.
+            ArgumentError: One has not; the message has the simulation and the field.
         """
         for name, array in self._arrays.items():
-            if name in _SAME or not hasattr(self._model.opt, name):
+            if name in _VARYING or name in CONSTANTS or name.startswith(_VISUAL):
                 continue
             template = np.asarray(self._template(name)).astype(array.dtype)
-            differs = (array[ids] != template).reshape(len(ids), -1).any(axis=1)
+            given = array[ids]
+            # NaN is no other value than NaN
+            differs = ((given != template) & ~(np.isnan(given) & np.isnan(template))).reshape(len(ids), -1).any(axis=1)
             if differs.any():
                 sim = ids[int(differs.argmax())]
                 if name == "enableflags" and array[sim] & _SLEEP:
                     raise ArgumentError(f"sim {sim}: sleep cannot be enabled in a Batch")
                 raise ArgumentError(
-                    f"sim {sim}: {name} differs from the model's; tightloop has one value of it for all simulations, "
+                    f"sim {sim}: {name} differs from the model's; tightloop varies {', '.join(_VARYING)}, "
                     "so make a Batch per value"
                 )
 

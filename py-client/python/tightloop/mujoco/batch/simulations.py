@@ -152,16 +152,16 @@ class Batch(NamedViews):
         """Return values of a field of ``MjModel`` or ``MjOption`` for each simulation, ``(num_sims, ...)``.
 
         ``gravity``, ``dof_armature``, ``dof_damping``, ``dof_frictionloss``, ``geom_friction``, ``body_mass``,
-        ``body_inertia``, ``actuator_gainprm`` and ``actuator_biasprm`` act from the next call on. Other options may be
-        read; a call refuses values that differ from the model's. Fields for pictures, and what `set_const` computes,
-        have no effect on the motion.
+        ``body_inertia``, ``actuator_gainprm`` and ``actuator_biasprm`` act from the next call on. Other fields may be
+        read, and a step refuses values that differ from the model's. Fields for pictures, and what `set_const`
+        computes, have no effect on the motion.
 
         Args:
             name: The field.
             dtype: The field's own dtype, or float32 for real fields.
 
         Raises:
-            ArgumentError: There is no such field, or it cannot differ between simulations.
+            ArgumentError: There is no such field, or it is of assets.
         """
         with self._lock:
             if name not in self._expansions:
@@ -241,12 +241,10 @@ class Batch(NamedViews):
             ids: As in `step`.
 
         Raises:
-            ArgumentError: An option differs from the model's.
             RuntimeError: MuJoCo refuses the values of a simulation; the message names the first one.
         """
         with self._lock:
             chosen = Selection(ids, self.num_sims)
-            self._expansions.check_options(chosen.indices)
             set_const(self._own, self._expansions, chosen.indices, self.num_sims)
 
     def rays(  # noqa: PLR0917, mjbatch has these arguments in this order
