@@ -164,12 +164,24 @@ class Expansions:
                 f"sim {sim}: {name} of a free joint cannot differ from the model's; write other dofs only"
             )
 
+    def check_sleep(self, ids: Array) -> None:
+        """Check that no simulation is to sleep.
+
+        Raises:
+            ArgumentError: One is; the message has the simulation.
+        """
+        asleep = (self.of("enableflags") & _SLEEP) != 0
+        asleep = np.broadcast_to(asleep, self._sims)[ids]
+        if asleep.any():
+            raise ArgumentError(f"sim {ids[int(asleep.argmax())]}: sleep cannot be enabled in a Batch")
+
     def check_fixed(self, ids: Array) -> None:
         """Check that fields that cannot differ have the values of the model.
 
         Raises:
             ArgumentError: One has not; the message has the simulation and the field.
         """
+        self.check_sleep(ids)
         for name, array in self._arrays.items():
             if name in _VARYING or name in CONSTANTS or name.startswith(_VISUAL):
                 continue
@@ -179,8 +191,6 @@ class Expansions:
             differs = ((given != template) & ~(np.isnan(given) & np.isnan(template))).reshape(len(ids), -1).any(axis=1)
             if differs.any():
                 sim = ids[int(differs.argmax())]
-                if name == "enableflags" and array[sim] & _SLEEP:
-                    raise ArgumentError(f"sim {sim}: sleep cannot be enabled in a Batch")
                 raise ArgumentError(
                     f"sim {sim}: {name} differs from the model's; tightloop varies {', '.join(_VARYING)}, "
                     "so make a Batch per value"

@@ -241,10 +241,12 @@ class Batch(NamedViews):
             ids: As in `step`.
 
         Raises:
+            ArgumentError: A simulation is to sleep.
             RuntimeError: MuJoCo refuses the values of a simulation; the message names the first one.
         """
         with self._lock:
             chosen = Selection(ids, self.num_sims)
+            self._expansions.check_sleep(chosen.indices)
             set_const(self._own, self._expansions, chosen.indices, self.num_sims)
 
     def rays(  # noqa: PLR0917, mjbatch has these arguments in this order
