@@ -238,6 +238,8 @@ def test_unstable_simulations_start_again_and_count_a_warning() -> None:
         assert np.isfinite(qpos).all()
         assert batch.bind("time")[2] == pytest.approx(0.004)
         assert np.isnan(ctrl[4, 0])
+        batch.step(nstep=3)
+        assert warning[4, kinds.mjWARN_BADCTRL, 1] == 4
         batch.reset(np.array([4]))
         assert warning[4].sum() == 0
         assert (ctrl[4] == 0).all()

@@ -57,6 +57,8 @@ class Stepping:
         reset = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self._resets = not model.opt.disableflags & reset
         self._clocks = _clocks(model)
+        # how often a step reads the controls
+        self._evaluations = 4 if model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4) else 1
 
     def add(self, name: str) -> None:
         """Fill a bound field from now on, from the simulation's field of that name."""
@@ -73,7 +75,7 @@ class Stepping:
         in_between = history is not None or lags or self._engine.forces_turn
         frames = nstep * self._engine.plan(1) if in_between else self._engine.plan(nstep)
         self._begin(chosen, params, resets=self._resets)
-        self._check_controls(chosen)
+        self._check_controls(chosen, times=nstep * self._evaluations)
         if lags and nstep == 1:
             self._evaluate(chosen)
         if len(chosen) < len(rows):
@@ -148,15 +150,18 @@ class Stepping:
             params = params | {"body_f": layout.view(bindings.rows, "xfrc_applied")}
         self._engine.sync(chosen.mask, params)
 
-    def _check_controls(self, chosen: Selection) -> None:
-        """MuJoCo sets all controls of a simulation to 0 if one of them is bad. Their rows keep what was written."""
+    def _check_controls(self, chosen: Selection, times: int = 1) -> None:
+        """MuJoCo takes all controls of a simulation for 0 if one of them is bad, and counts it as often as it reads them.
+
+        Their rows keep what was written.
+        """
         columns = self._layout.at("ctrl")
         ctrl = self._bindings.rows[chosen.ids, columns]
         self._engine.silenced[chosen.ids] = False
         if ctrl.size and not np.abs(ctrl).max() <= _VALUE_MAX:
             sims = chosen.indices[~(np.abs(ctrl) <= _VALUE_MAX).all(axis=1)]
             self._engine.silenced[sims] = True
-            self._bindings.warnings[sims, int(_WARN.mjWARN_BADCTRL), 1] += 1
+            self._bindings.warnings[sims, int(_WARN.mjWARN_BADCTRL), 1] += times
 
     def _restart(self, sims: Array, warning: int) -> None:
         """Reset simulations that are unstable, as MuJoCo does, and count the warning."""
