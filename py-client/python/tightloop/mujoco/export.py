@@ -50,8 +50,8 @@ _ARRAYS = """
 """.split()
 # Arrays of newer versions; where they are missing, no model has what they describe.
 _NEWER_ARRAYS = """
-    jnt_stiffnesspoly dof_dampingpoly geom_adhesion geom_surfacevel tendon_armature tendon_dampingpoly
-    tendon_stiffnesspoly pair_adhesion tendon_actfrclimited tendon_actfrcrange
+    jnt_stiffnesspoly jnt_springyield dof_dampingpoly geom_adhesion geom_surfacevel tendon_armature
+    tendon_dampingpoly tendon_stiffnesspoly tendon_springyield pair_adhesion tendon_actfrclimited tendon_actfrcrange
     actuator_delay actuator_armature actuator_damping
     actuator_dampingpoly actuator_ctrlnum actuator_outnum
     sensor_delay sensor_interval sensor_intprm

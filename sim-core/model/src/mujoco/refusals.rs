@@ -13,24 +13,43 @@ const MUST_BE_ZERO: &[(&str, &str, &str)] = &[("geom", "geom_fluid", "the ellips
 const NEWER_MUST_BE_ZERO: &[(&str, &str, &str)] = &[
     ("pair", "pair_adhesion", "adhesion"),
     ("joint", "jnt_stiffnesspoly", "nonlinear stiffness"),
+    ("joint", "jnt_springyield", "plastic springs"),
     ("geom", "geom_adhesion", "adhesion"),
     ("geom", "geom_surfacevel", "surface velocity"),
     ("tendon", "tendon_armature", "armature of a tendon"),
     ("tendon", "tendon_dampingpoly", "damping of a tendon"),
     ("tendon", "tendon_stiffnesspoly", "stiffness of a tendon"),
+    ("tendon", "tendon_springyield", "plastic springs"),
     ("actuator", "actuator_delay", "a delay"),
     ("actuator", "actuator_armature", "armature of an actuator"),
     ("actuator", "actuator_damping", "damping of an actuator"),
     ("actuator", "actuator_dampingpoly", "damping of an actuator"),
 ];
 
-/// Flags of `<option>` that are not supported.
+/// Flags of `<option>` that are supported. All others are refused, also those that a newer MuJoCo brings.
 const FLAGS: &[&str] = &[
-    "mjENBL_OVERRIDE",
-    "mjENBL_INVDISCRETE",
-    "mjENBL_SLEEP",
-    "mjENBL_DIAGEXACT",
-    "mjENBL_IPC",
+    "mjENBL_ENERGY",
+    "mjENBL_FWDINV",
+    "mjDSBL_CONSTRAINT",
+    "mjDSBL_EQUALITY",
+    "mjDSBL_FRICTIONLOSS",
+    "mjDSBL_LIMIT",
+    "mjDSBL_CONTACT",
+    "mjDSBL_SPRING",
+    "mjDSBL_DAMPER",
+    "mjDSBL_GRAVITY",
+    "mjDSBL_CLAMPCTRL",
+    "mjDSBL_WARMSTART",
+    "mjDSBL_FILTERPARENT",
+    "mjDSBL_ACTUATION",
+    "mjDSBL_REFSAFE",
+    "mjDSBL_SENSOR",
+    "mjDSBL_MIDPHASE",
+    "mjDSBL_EULERDAMP",
+    "mjDSBL_AUTORESET",
+    "mjDSBL_NATIVECCD",
+    "mjDSBL_ISLAND",
+    "mjDSBL_MULTICCD",
 ];
 
 /// Most reasons in a message.
@@ -77,7 +96,7 @@ pub(super) fn no(kind: &str, name: &str, feature: &str) -> String {
 
 fn options(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
     for flag in file.texts("opt.flags")? {
-        if FLAGS.contains(&flag.as_str()) {
+        if !FLAGS.contains(&flag.as_str()) {
             found.push(no("option", "flag", &flag));
         }
     }

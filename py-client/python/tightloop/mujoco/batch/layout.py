@@ -27,6 +27,7 @@ _COMPONENTS = (
     ("mocap_quat", "mjSTATE_MOCAP_QUAT"),
     ("userdata", "mjSTATE_USERDATA"),
     ("plugin_state", "mjSTATE_PLUGIN"),
+    ("plastic", "mjSTATE_PLASTIC"),
 )
 _INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -49,7 +50,7 @@ class StateLayout:
         self._shapes: dict[str, tuple[int, ...]] = {}
         first = 0
         for name, flag in _COMPONENTS:
-            # versions of MuJoCo without delays have no history
+            # older versions of MuJoCo have no plastic springs
             kind = getattr(mujoco.mjtState, flag, None)
             size = 0 if kind is None else mujoco.mj_stateSize(model, kind)
             self._slices[name] = slice(first, first + size)
