@@ -84,7 +84,7 @@ _NAMED = {
     "pair": "npair",
     "equality": "neq",
     "tendon": "ntendon",
-    "actuator": "nu",
+    "actuator": "nactuator",
     "key": "nkey",
     "sensor": "nsensor",
 }
