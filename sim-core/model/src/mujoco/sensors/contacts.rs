@@ -6,6 +6,9 @@ use crate::error::ModelError;
 use crate::mujoco::format::ModelFile;
 use crate::mujoco::frames::on_links;
 
+/// Parts of a contact that a sensor shows.
+const SHOWN: u32 = 7;
+
 impl Reader<'_> {
     /// The zone of a sensor's site.
     pub(super) fn zone(&self, k: usize) -> Result<ZonePart, ModelError> {
@@ -23,13 +26,26 @@ impl Reader<'_> {
         })
     }
 
+    /// Whether a sensor's site is a mesh, which newer versions of MuJoCo have.
+    pub(super) fn is_zone_of_mesh(&self, k: usize) -> Result<bool, ModelError> {
+        if self.objects[0][k] != "mjOBJ_SITE" {
+            return Ok(false);
+        }
+        let site = self.index(k, self.sites.len())?;
+        Ok(self.site_kinds[site] == "mjGEOM_MESH")
+    }
+
     /// Records of contacts: what they show is the first parameter, then come reduction and number.
-    pub(super) fn contact(&self, k: usize) -> Result<Sense, ModelError> {
+    pub(super) fn contact(&self, k: usize) -> Sensed {
         let count = self.kinds.len();
         let [shows, reduction, records] =
             self.file.vectors_of_integers::<3>("sensor_intprm", count)?[k];
+        // newer versions of MuJoCo show velocities, too
+        if shows >> SHOWN != 0 {
+            return Ok(Err("velocities of contacts".to_owned()));
+        }
         let first = self.touching(k, 0)?;
-        Ok(Sense::Contact {
+        Ok(Ok(Sense::Contact {
             zone: match first {
                 Touching::InZone => Some(self.zone(k)?),
                 _ => None,
@@ -44,7 +60,7 @@ impl Reader<'_> {
             },
             records: usize::try_from(records).unwrap_or(1),
             shows: std::array::from_fn(|part| shows >> part & 1 == 1),
-        })
+        }))
     }
 
     /// The first (0) or second (1) object of a sensor of contacts.

@@ -53,8 +53,11 @@ impl Reader<'_> {
                 from: None,
                 is_local: true,
             },
+            "TOUCH" | "CONTACT" if self.is_zone_of_mesh(k)? => {
+                return Ok(Err("sites of meshes".to_owned()));
+            }
             "TOUCH" => Sense::Touch(self.zone(k)?),
-            "CONTACT" => self.contact(k)?,
+            "CONTACT" => return self.contact(k),
             "RANGEFINDER" => return self.range(k),
             "ACCELEROMETER" => Sense::Acceleration {
                 of: self.site(k)?,
