@@ -232,6 +232,17 @@ impl ModelFile {
         Ok(texts)
     }
 
+    /// Whether a version of MuJoCo, major and minor, or a newer one compiled the model.
+    pub fn is_since(&self, version: [u32; 2]) -> Result<bool, ModelError> {
+        if !self.has("mujoco_version") {
+            return Ok(false);
+        }
+        let text = self.texts("mujoco_version")?.concat();
+        let mut parts = text.split('.').map(|part| part.parse().unwrap_or(0));
+        let own: [u32; 2] = std::array::from_fn(|_| parts.next().unwrap_or(0));
+        Ok(own >= version)
+    }
+
     /// An array of enumerators, by the names that MuJoCo gives them.
     pub fn kinds(&self, name: &str, count: usize) -> Result<Vec<String>, ModelError> {
         let known = self.texts(&format!("{name}.names"))?;

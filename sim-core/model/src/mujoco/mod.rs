@@ -27,6 +27,7 @@ use crate::error::ModelError;
 use crate::pose::Pose;
 use format::ModelFile;
 pub use options::MujocoOptions;
+use sim_physics::constants::mujoco::Integrator;
 
 impl Robot {
     /// Reads a model that MuJoCo compiled as one robot. Its link 0 is the world, which `options.pose` places.
@@ -86,7 +87,35 @@ fn notes(file: &ModelFile) -> Result<Vec<String>, ModelError> {
             "its {spatial} spatial tendons, on which nothing acts, are not read"
         ));
     }
+    notes.extend(newer_steps(file)?);
     Ok(notes)
+}
+
+/// Where MuJoCo 4.0 changed a step, and ours is that of MuJoCo 3.17.
+fn newer_steps(file: &ModelFile) -> Result<Vec<String>, ModelError> {
+    if !file.is_since([4, 0])? {
+        return Ok(Vec::new());
+    }
+    let integrator = options::integrator(file)?;
+    let kinds = file.kinds("jnt_type", file.rows("jnt_type"))?;
+    let turns = kinds
+        .iter()
+        .any(|kind| kind == "mjJNT_BALL" || kind == "mjJNT_FREE");
+    let limits = ["jnt_actfrclimited", "tendon_actfrclimited"];
+    let saturates = limits.iter().any(|limit| file.first_set(limit).is_some());
+    let acts = file.rows("actuator_trntype") > 0;
+    let changes = [
+        (
+            integrator == Integrator::RungeKutta && turns,
+            "RK4 turns ball and free joints as in MuJoCo 3.17, with second order",
+        ),
+        (
+            integrator == Integrator::ImplicitFast && saturates && acts,
+            "implicitfast damps by actuators beyond `actuatorfrcrange`, as in MuJoCo 3.17",
+        ),
+    ];
+    let changed = changes.iter().filter(|(is_changed, _)| *is_changed);
+    Ok(changed.map(|(_, note)| (*note).to_owned()).collect())
 }
 
 /// Sensors that are not there.

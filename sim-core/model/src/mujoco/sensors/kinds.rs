@@ -1,7 +1,10 @@
 //! What sensors measure, by their types.
 
 use super::{Reader, Sensed};
-use crate::description::{FramePart, LimitPart, Sense, SubtreePart};
+use crate::description::{FramePart, LimitPart, OnLink, Sense, SubtreePart};
+use crate::error::ModelError;
+use crate::mujoco::options::has_flag;
+use crate::pose::Pose;
 
 impl Reader<'_> {
     /// What sensor `k` measures.
@@ -59,11 +62,17 @@ impl Reader<'_> {
             "TOUCH" => Sense::Touch(self.zone(k)?),
             "CONTACT" => return self.contact(k),
             "RANGEFINDER" => return self.range(k),
-            "ACCELEROMETER" => Sense::Acceleration {
-                of: self.site(k)?,
-                is_angular: false,
-                is_local: true,
-            },
+            "ACCELEROMETER" => {
+                let of = self.site(k)?;
+                match self.constant_acceleration(&of)? {
+                    Some(vector) => Sense::Vector(of, vector),
+                    None => Sense::Acceleration {
+                        of,
+                        is_angular: false,
+                        is_local: true,
+                    },
+                }
+            }
             _ => match (limit_part(kind), subtree_part(kind)) {
                 (Some((part, false)), _) => self.joint_limit(k, part)?,
                 (Some((part, true)), _) => self.tendon_limit(k, part)?,
@@ -72,6 +81,25 @@ impl Reader<'_> {
             },
         };
         Ok(Ok(sense))
+    }
+
+    /// The acceleration that MuJoCo shows of what no force moves, in world axes [m/s²]; none where the step has it.
+    ///
+    /// Since 4.0, MuJoCo shows what an accelerometer at rest does. Before, it showed 0, also of mocap bodies.
+    fn constant_acceleration(&self, of: &OnLink) -> Result<Option<[f64; 3]>, ModelError> {
+        let Some(parts) = &self.robot.mujoco else {
+            return Ok(None);
+        };
+        let root = parts.welds[of.link];
+        Ok(match self.file.is_since([4, 0])? {
+            true if root == 0 => {
+                let is_off = has_flag(self.file, "mjDSBL_GRAVITY")?;
+                let gravity = self.file.vectors::<3>("opt.gravity", 1)?[0];
+                Some(gravity.map(|g| if is_off { 0.0 } else { -g }))
+            }
+            false if root != 0 && parts.mocaps.contains(&root) => Some([0.0; 3]),
+            _ => None,
+        })
     }
 
     /// Sensors of frames, by their name without its prefix.
@@ -92,6 +120,15 @@ impl Reader<'_> {
             Err(what) => return Ok(Err(what)),
         };
         let Some(part) = part else {
+            if kind == "FRAMELINACC"
+                && let Some(vector) = self.constant_acceleration(&of)?
+            {
+                let world = OnLink {
+                    link: 0,
+                    pose: Pose::identity(),
+                };
+                return Ok(Ok(Sense::Vector(world, vector)));
+            }
             return Ok(Ok(Sense::Acceleration {
                 of,
                 is_angular: kind == "FRAMEANGACC",
