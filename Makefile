@@ -29,8 +29,8 @@ CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D
 VULKAN  := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
 BROWSER := chromium
 
-.PHONY: demo help test check check-format format docs test-rl train fuzz published menagerie packages coverage newcomer bench \
-  bench-env bench-gpu bench-mujoco wheel dist vulkan browser llvm-cov \
+.PHONY: demo help test check check-format format docs test-rl train fuzz published menagerie mujoco-versions packages coverage \
+  newcomer bench bench-env bench-gpu bench-mujoco wheel dist vulkan browser llvm-cov \
   $(addprefix announce-,demo test docs test-rl train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
 
@@ -44,7 +44,7 @@ demo: announce-demo wheel ## a tour with pictures, then the lesson and a grasp w
 	@cargo build --release --quiet --workspace --example franka_lesson && target/release/examples/franka_lesson $(WORLDS)
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-15s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 
 # Debian packages come first: without root, the request for them appears before minutes of compiling.
 test: announce-test vulkan browser wheel $(VENV)/.dev $(VENV)/.docs ## every Rust and Python test
@@ -97,6 +97,10 @@ published: wheel $(VENV)/.dev ## robots from PyPI, or yours, against MuJoCo (TIG
 menagerie: wheel $(VENV)/.dev ## MuJoCo models from PyPI, or yours, beside MuJoCo (MODELS=/path/robot.xml)
 	$(if $(MODELS),,$(PYTHON) tests/python/menagerie/fetch.py)
 	PYTHONPATH=tests/python/mujoco $(PYTHON) tests/python/menagerie/compare_with_mujoco.py $(MODELS)
+
+# Not part of `test`: it downloads 300 MB of wheels to out/mujoco-versions, and takes two minutes after that.
+mujoco-versions: wheel ## the wheel with several versions of MuJoCo, each in an environment of its own
+	$(PYTHON) tests/python/mujoco_versions/environments.py $(VENV)/wheels
 
 # Not part of `test`: it makes an environment of each Python and builds the daemon outside of the workspace.
 packages: wheel $(VENV)/.dev ## the wheel on every Python found, and the daemon by cargo install
