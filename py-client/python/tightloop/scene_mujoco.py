@@ -6,7 +6,7 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,7 +30,7 @@ HULL_VERTICES = 1024
 def read_model(
     model: Model,
     name: str | None,
-    taken: Iterable[str],
+    taken: Sequence[str],
     *,
     pos: Vector = ORIGIN,
     quat: Vector = UPRIGHT,

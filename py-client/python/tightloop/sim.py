@@ -107,9 +107,9 @@ class Sim:
         joint_target_q: Command | None = None,
         joint_target_qd: Command | None = None,
         ctrl: Command | None = None,
-        mocap_pos: ArrayLike | None = None,
-        mocap_quat: ArrayLike | None = None,
-        eq_active: ArrayLike | None = None,
+        mocap_pos: Command | None = None,
+        mocap_quat: Command | None = None,
+        eq_active: Command | None = None,
         body_f: Command | None = None,
     ) -> Frame:
         """Advance every world by one control frame. A command that is left out keeps its last value.
@@ -151,9 +151,9 @@ class Sim:
         joint_target_q: Command | None = None,
         joint_target_qd: Command | None = None,
         ctrl: Command | None = None,
-        mocap_pos: ArrayLike | None = None,
-        mocap_quat: ArrayLike | None = None,
-        eq_active: ArrayLike | None = None,
+        mocap_pos: Command | None = None,
+        mocap_quat: Command | None = None,
+        eq_active: Command | None = None,
         body_f: Command | None = None,
     ) -> None:
         """Begin a step and return at once: the worlds advance while the caller continues, until `recv`.
@@ -234,11 +234,11 @@ class Sim:
         *,
         joint_q: Command | None = None,
         joint_qd: Command | None = None,
-        act: ArrayLike | None = None,
-        ctrl: ArrayLike | None = None,
-        mocap_pos: ArrayLike | None = None,
-        mocap_quat: ArrayLike | None = None,
-        eq_active: ArrayLike | None = None,
+        act: Command | None = None,
+        ctrl: Command | None = None,
+        mocap_pos: Command | None = None,
+        mocap_quat: Command | None = None,
+        eq_active: Command | None = None,
         mask: ArrayLike | None = None,
     ) -> Frame:
         """Set joint positions and velocities, and what else MuJoCo models begin with.
@@ -406,7 +406,7 @@ class Sim:
         """
         self._end()
 
-    def _arrays(self, group: str, **given: ArrayLike | None) -> dict[str, NDArray[np.float64]]:
+    def _arrays(self, group: str, **given: Command | None) -> dict[str, NDArray[np.float64]]:
         """Return what is given as arrays, by the number of columns that ``info[group]`` lists."""
         found = {}
         for name, value in given.items():
@@ -421,7 +421,7 @@ class Sim:
             found[name] = as_array(name, None, self._flat(name, value), self.worlds, columns[name])
         return found
 
-    def _flat(self, name: str, value: ArrayLike) -> ArrayLike:
+    def _flat(self, name: str, value: Command) -> Command:
         """Return an array of mocap bodies with the entries of all of them in a row, and switches as numbers."""
         if name == "eq_active" and np.asarray(value).dtype == np.bool_:
             return np.asarray(value, np.float64)
