@@ -93,6 +93,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "geometry",
             "distribution",
             "surface",
+            "visual",
             "description",
             "validate",
             "urdf",

@@ -10,6 +10,7 @@
 //! | `value_checks` | checks of one name or one value |
 //! | `inertia`, `geometry` | mass properties; shapes, meshes, convex hulls |
 //! | `distribution`, `surface`, `softness`, `geom_contact` | what values are drawn from; how shapes touch, and MuJoCo's geoms |
+//! | `visual` | what links look like |
 //! | `description` | scene, robots, joints, and what is named in them |
 //! | `validate` | checks of a description |
 //! | `urdf`, `mujoco`, `rigid_body` | robots from files; bodies of one link |
@@ -34,6 +35,7 @@ mod surface;
 mod urdf;
 mod validate;
 mod value_checks;
+mod visual;
 
 pub use description::{
     Actuator, Collision, ContactSensor, Description, Joint, JointDof, Link, Mimic, MujocoJoint,
@@ -52,4 +54,5 @@ pub use rigid_body::Body;
 pub use sim_physics::constants::contact::Cone;
 pub use softness::Softness;
 pub use surface::Surface;
-pub use urdf::{Look, UrdfOptions, Visual, Visuals};
+pub use urdf::UrdfOptions;
+pub use visual::{Look, Visual, Visuals};

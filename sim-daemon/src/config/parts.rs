@@ -1,11 +1,12 @@
-//! What a scene looks like: the shapes that touch, as physics has them, and the visuals of its robots' files.
+//! What a scene looks like: the shapes that touch, as physics has them, and the visuals of its robots' and models' files.
 
 use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use serde_json::{Value, json};
 use sim_model::geometry::{Hull, TriMesh, triangles};
-use sim_model::{Description, Link, Look, Pose, Robot, Shape, Visual};
+use sim_model::{Description, Link, Look, ModelError, Pose, Robot, Shape, Visual, Visuals};
 
 use super::error::ConfigError;
 use super::scene::SceneFile;
@@ -23,9 +24,10 @@ impl SceneFile {
     /// What the scene looks like; paths as in [`SceneFile::describe`].
     ///
     /// A part has `kind` (`collision`, `visual`, or `bone`: for a robot of which nothing else can be seen), `name`,
-    /// `body` (`robot/link` as in the model's list; `null` is the world),
-    /// `pos` and `quat` of its frame in that body's, `shape` (`plane`, `box`, `sphere`, `cylinder`, `capsule`, `mesh`; of
-    /// visuals also `nothing`) and `mesh` (a place in the list of surfaces; `null` of a plane and of a visual's file).
+    /// `robot` (`null` for what the scene has itself), `body` (`robot/link` as in the model's list; `null` is the world, and
+    /// the world of a MuJoCo model), `pos` and `quat` of its frame in that body's, `shape` (`plane`, `box`, `sphere`,
+    /// `cylinder`, `capsule`, `mesh`; of visuals also `ellipsoid` and `nothing`) and `mesh` (a place in the list of surfaces;
+    /// `null` of a plane and of a visual's file). A visual that is a plane has `half_extents`, `null` where it has no end.
     /// Collisions also have `added` (whether it is the scene's and not its robot file's) and `whole` (the surface of a mesh
     /// before it became hulls, else as `mesh`); visuals have `color` (red, green, blue and opacity, 0 to 1, or `null`),
     /// `texture` (a file or `null`), `file` with `scale` where it is one, and `problem` where it cannot be shown.
@@ -38,7 +40,7 @@ impl SceneFile {
         let mut names = description.shape_names().into_iter();
         for shape in &description.shapes {
             let name = names.next().unwrap_or_default();
-            drawing.collision(None, &name, &shape.pose, &shape.shape, true);
+            drawing.collision(&Place::world(), &name, &shape.pose, &shape.shape, true);
         }
         for robot in &description.robots {
             for link in robot
@@ -46,12 +48,12 @@ impl SceneFile {
                 .into_iter()
                 .map(|link| &robot.links[link])
             {
-                let body = format!("{}/{}", robot.name, link.name);
+                let place = Place::of(robot, &link.name);
                 let own = self.own_shapes(robot, link);
                 for (index, collision) in link.collisions.iter().enumerate() {
                     let name = names.next().unwrap_or_default();
                     let (pose, shape) = (&collision.pose, &collision.shape);
-                    drawing.collision(Some(&body), &name, pose, shape, index >= own);
+                    drawing.collision(&place, &name, pose, shape, index >= own);
                 }
             }
         }
@@ -64,7 +66,7 @@ impl SceneFile {
 
     /// How many of a link's shapes are its robot's file's; those of the scene come after them.
     fn own_shapes(&self, robot: &Robot, link: &Link) -> usize {
-        if robot.urdf.is_none() {
+        if robot.urdf.is_none() && robot.mujoco.is_none() {
             return 0;
         }
         let it = Some((robot.name.as_str(), link.name.as_str()));
@@ -73,33 +75,88 @@ impl SceneFile {
     }
 
     fn visuals(&self, description: &Description, base_dir: &Path, drawing: &mut Drawing) {
-        // robots from files come first, in the order of their tables
-        for (table, robot) in self.robots.iter().zip(&description.robots) {
-            let name = &robot.name;
+        // robots from files come first, in the order of their tables, then models
+        let (robots, models) = description.robots.split_at(self.robots.len());
+        for (table, robot) in self.robots.iter().zip(robots) {
             let packages = table.options(base_dir).package_dirs;
-            match Robot::visuals(base_dir.join(&table.urdf), &packages) {
-                Ok(found) => {
-                    let notes = found.notes.into_iter();
-                    drawing
-                        .notes
-                        .extend(notes.map(|note| format!("robot `{name}`: {note}")));
-                    let mut counts = HashMap::new();
-                    for visual in &found.visuals {
-                        let count = counts.entry(visual.link.clone()).or_insert(0);
-                        drawing.visual(name, visual, *count);
-                        *count += 1;
-                    }
-                }
-                Err(error) => drawing.notes.push(format!("robot `{name}`: {error}")),
-            }
-            if robot
-                .links
-                .iter()
-                .all(|link| self.own_shapes(robot, link) == 0)
-            {
-                drawing.skeleton(robot);
-            }
+            let found = Robot::visuals(base_dir.join(&table.urdf), &packages);
+            self.robot_visuals(robot, found, drawing);
         }
+        for (table, robot) in self.mujoco.iter().zip(models) {
+            let found = Robot::mujoco_visuals(base_dir.join(&table.model));
+            self.robot_visuals(robot, found, drawing);
+        }
+    }
+
+    fn robot_visuals(
+        &self,
+        robot: &Robot,
+        found: Result<Visuals, ModelError>,
+        drawing: &mut Drawing,
+    ) {
+        let name = &robot.name;
+        match found {
+            Ok(found) => {
+                let notes = found.notes.into_iter();
+                drawing
+                    .notes
+                    .extend(notes.map(|note| format!("robot `{name}`: {note}")));
+                let mut counts = HashMap::new();
+                for visual in &found.visuals {
+                    let count = counts.entry(visual.link.clone()).or_insert(0);
+                    drawing.visual(robot, visual, *count);
+                    *count += 1;
+                }
+            }
+            Err(error) => drawing.notes.push(format!("robot `{name}`: {error}")),
+        }
+        let mut links = robot.links.iter();
+        if links.all(|link| self.own_shapes(robot, link) == 0) {
+            drawing.skeleton(robot);
+        }
+    }
+}
+
+/// Where a part is: its robot, its body, and that body's frame where the world stands for it.
+struct Place {
+    robot: Option<String>,
+    body: Option<String>,
+    frame: Pose,
+}
+
+impl Place {
+    fn world() -> Place {
+        Place {
+            robot: None,
+            body: None,
+            frame: Pose::identity(),
+        }
+    }
+
+    /// A link of a robot. The world of a MuJoCo model, its first link, is the world.
+    fn of(robot: &Robot, link: &str) -> Place {
+        let is_world = robot.mujoco.is_some() && robot.links[0].name == link;
+        Place {
+            robot: Some(robot.name.clone()),
+            body: (!is_world).then(|| format!("{}/{link}", robot.name)),
+            frame: match is_world {
+                true => robot.pose,
+                false => Pose::identity(),
+            },
+        }
+    }
+
+    /// A part of this kind, with its frame in the body's.
+    fn part(&self, kind: &str, name: &str, pose: &Pose) -> Value {
+        let pose = self.frame.mul(pose);
+        json!({
+            "kind": kind,
+            "name": name,
+            "robot": self.robot,
+            "body": self.body,
+            "pos": pose.pos,
+            "quat": pose.quat,
+        })
     }
 }
 
@@ -110,67 +167,53 @@ struct Drawing {
     meshes: Vec<TriMesh>,
     /// Shapes with surfaces in the list, by their sizes or files; what differs in more is told apart by looking.
     places: HashMap<String, Vec<(Shape, usize)>>,
+    /// Triangles with surfaces in the list.
+    shared: Vec<(Arc<TriMesh>, usize)>,
 }
 
 impl Drawing {
-    fn collision(
-        &mut self,
-        body: Option<&str>,
-        name: &str,
-        pose: &Pose,
-        shape: &Shape,
-        added: bool,
-    ) {
-        let mesh = self.place(shape, false);
-        let whole = self.place(shape, true);
-        self.parts.push(json!({
-            "kind": "collision",
-            "name": name,
-            "body": body,
-            "pos": pose.pos,
-            "quat": pose.quat,
-            "shape": shape.kind(),
-            "mesh": mesh,
-            "whole": whole,
-            "added": added,
-        }));
+    fn collision(&mut self, place: &Place, name: &str, pose: &Pose, shape: &Shape, added: bool) {
+        let mut part = place.part("collision", name, pose);
+        part["shape"] = json!(shape.kind());
+        part["mesh"] = json!(self.place(shape, false));
+        part["whole"] = json!(self.place(shape, true));
+        part["added"] = json!(added);
+        self.parts.push(part);
     }
 
     /// Adds what stands for a robot that nothing else of its file shows.
     fn skeleton(&mut self, robot: &Robot) {
-        for (place, (link, pose, shape)) in skeleton(robot).into_iter().enumerate() {
-            let body = format!("{}/{}", robot.name, robot.links[link].name);
-            let mesh = self.place(&shape, false);
-            self.parts.push(json!({
-                "kind": "bone",
-                "name": format!("{body}/bone{place}"),
-                "body": body,
-                "pos": pose.pos,
-                "quat": pose.quat,
-                "shape": shape.kind(),
-                "mesh": mesh,
-            }));
+        for (count, (link, pose, shape)) in skeleton(robot).into_iter().enumerate() {
+            let link = &robot.links[link].name;
+            let name = format!("{}/{link}/bone{count}", robot.name);
+            let mut part = Place::of(robot, link).part("bone", &name, &pose);
+            part["shape"] = json!(shape.kind());
+            part["mesh"] = json!(self.place(&shape, false));
+            self.parts.push(part);
         }
     }
 
     /// Adds a visual, the `index`th of its link.
-    fn visual(&mut self, robot: &str, visual: &Visual, index: usize) {
-        let body = format!("{robot}/{}", visual.link);
+    fn visual(&mut self, robot: &Robot, visual: &Visual, index: usize) {
         let own = visual.name.clone().unwrap_or_else(|| index.to_string());
-        let mut part = json!({
-            "kind": "visual",
-            "name": format!("{body}/{own}"),
-            "body": body,
-            "pos": visual.pose.pos,
-            "quat": visual.pose.quat,
-            "mesh": null,
-            "color": visual.color,
-            "texture": visual.texture.as_ref().map(|path| path.to_string_lossy()),
-        });
+        let name = format!("{}/{}/{own}", robot.name, visual.link);
+        let mut part = Place::of(robot, &visual.link).part("visual", &name, &visual.pose);
+        part["mesh"] = Value::Null;
+        part["color"] = json!(visual.color);
+        let texture = visual.texture.as_ref();
+        part["texture"] = json!(texture.map(|path| path.to_string_lossy()));
         match &visual.look {
             Look::Shape(shape) => {
                 part["shape"] = json!(shape.kind());
                 part["mesh"] = json!(self.place(shape, false));
+            }
+            Look::Sheet { half_extents } => {
+                part["shape"] = json!(Shape::Plane.kind());
+                part["half_extents"] = json!(half_extents);
+            }
+            Look::Triangles { kind, surface } => {
+                part["shape"] = json!(kind);
+                part["mesh"] = json!(self.shared(surface));
             }
             Look::File { path, scale } => {
                 part["shape"] = json!("mesh");
@@ -185,6 +228,26 @@ impl Drawing {
         self.parts.push(part);
     }
 
+    /// Where triangles that visuals share stand in the list.
+    fn shared(&mut self, surface: &Arc<TriMesh>) -> usize {
+        let mut known = self.shared.iter();
+        if let Some((_, place)) = known.find(|(other, _)| Arc::ptr_eq(other, surface)) {
+            return *place;
+        }
+        let place = self.add((**surface).clone(), "visual");
+        self.shared.push((surface.clone(), place));
+        place
+    }
+
+    /// Adds a surface, thinned if it is large.
+    fn add(&mut self, surface: TriMesh, what: &str) -> usize {
+        let (surface, note) = surface.thinned();
+        self.notes
+            .extend(note.map(|note| format!("a {what} mesh {note}")));
+        self.meshes.push(surface);
+        self.meshes.len() - 1
+    }
+
     /// Where a shape's surface stands in the list, shapes that are the same sharing one; none of a plane, which has no end.
     ///
     /// A mesh is its hulls, or what its file holds if it is to be whole.
@@ -194,19 +257,16 @@ impl Drawing {
             Shape::Mesh(mesh) => format!("{} {:?} {whole}", mesh.path.display(), mesh.scale),
             other => format!("{other:?}"),
         };
-        let alike = self.places.entry(key).or_default();
-        if let Some((_, place)) = alike.iter().find(|(other, _)| other == shape) {
+        let mut alike = self.places.get(&key).into_iter().flatten();
+        if let Some((_, place)) = alike.find(|(other, _)| other == shape) {
             return Some(*place);
         }
         let surface = match shape {
             Shape::Mesh(mesh) if !whole => mesh.hulls.iter().fold(TriMesh::default(), with_hull),
             other => triangles(other),
         };
-        let (surface, note) = surface.thinned();
-        self.notes
-            .extend(note.map(|note| format!("a collision mesh {note}")));
-        let place = self.meshes.len();
-        self.meshes.push(surface);
+        let place = self.add(surface, "collision");
+        let alike = self.places.entry(key).or_default();
         alike.push((shape.clone(), place));
         Some(place)
     }

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.errors import SceneError
+from tightloop.mujoco import textures
 from tightloop.optional_imports import optional_import
 
 #: Version of the file; `sim-core/model/src/mujoco/format.rs` reads it.
@@ -45,7 +46,7 @@ _ARRAYS = """
     actuator_dynprm actuator_group jnt_actgravcomp body_mocapid pair_dim pair_geom1 pair_geom2 pair_solref
     pair_solreffriction pair_solimp pair_margin pair_gap pair_friction
     key_time key_qpos key_qvel key_act key_ctrl key_mpos key_mquat
-    cam_bodyid cam_pos cam_quat geom_matid geom_rgba mat_rgba site_size sensor_adr sensor_dim sensor_objid
+    cam_bodyid cam_pos cam_quat geom_group geom_matid geom_rgba mat_rgba site_size sensor_adr sensor_dim sensor_objid
     sensor_refid sensor_cutoff
 """.split()
 # Arrays of newer versions; where they are missing, no model has what they describe.
@@ -147,6 +148,7 @@ def arrays(model: Any) -> dict[str, NDArray[Any]]:
         assert len(own) == getattr(model, count)
         found[f"names.{kind}"] = _texts(own)
     found |= _hulls(model)
+    found["mat_texture_mean"] = textures.means(model)
     for name in _REAL_OPTIONS:
         found[f"opt.{name}"] = np.array(getattr(model.opt, name), np.float64).reshape(-1)
     for name in _COUNT_OPTIONS:

@@ -1,8 +1,9 @@
 """What a scene looks like: the visuals of its robots' files, and the shapes that touch.
 
-A robot is seen as its file's visuals. Where a visual cannot be read, the collision shapes of that link stand in for
-all of its visuals, and a note says why; a robot whose file has no visuals at all, and what the scene adds, are seen as
-what touches. Collision meshes touch as convex hulls, and are then seen as their files have them.
+A robot is seen as its file's visuals, and a MuJoCo model as the geoms that MuJoCo's viewer shows. Where a visual cannot
+be read, the collision shapes of that link stand in for all of its visuals, and a note says why. A robot whose file has
+no visuals at all, and what the scene adds, are seen as what touches. Collision meshes touch as convex hulls, and are
+then seen as their files have them.
 """
 
 from __future__ import annotations
@@ -19,15 +20,11 @@ from numpy.typing import NDArray
 
 from tightloop import _core
 from tightloop.errors import SceneError
-from tightloop.view import paint, visual_mesh
+from tightloop.view import paint, sheets, visual_mesh
 from tightloop.view.visual_mesh import VisualMesh
 
 Kind = Literal["visual", "collision"]
 Color = tuple[int, int, int, int]
-
-# The sheet that is shown of a plane, and one of its fields [m].
-_SHEET = 10.0
-_FIELD = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +53,7 @@ class Part:
         pose: Its frame in the body's: position [m], then quaternion (x, y, z, w), shape ``(7,)``.
         mesh: Its surface; parts that look alike share one.
         shape: What it is: ``"plane"`` (a sheet around its frame's origin stands for it), ``"box"``, ``"sphere"``,
-            ``"cylinder"``, ``"capsule"`` or ``"mesh"``.
+            ``"cylinder"``, ``"capsule"``, ``"ellipsoid"`` or ``"mesh"``.
     """
 
     body: int
@@ -134,11 +131,11 @@ class _Assembly:
                 lost.add(entry["body"])
             else:
                 seen.setdefault(entry["body"], []).append(part)
-        dressed = {_robot(entry) for entry in visuals}
+        dressed = {entry["robot"] for entry in visuals}
         made = []
-        clad = {_robot(entry) for entry in visuals if entry["body"] in seen and entry["body"] not in lost}
+        clad = {entry["robot"] for entry in visuals if entry["body"] in seen and entry["body"] not in lost}
         for entry in told:
-            robot = _robot(entry)
+            robot = entry["robot"]
             if entry["kind"] == "bone" and robot not in clad:
                 self._note(
                     f"robot `{robot}`: nothing in its file can be shown; its joints, and lines between them, are"
@@ -147,7 +144,7 @@ class _Assembly:
         for entry in collisions:
             made.append(self._stand_in(entry, "collision"))
             body = entry["body"]
-            if entry["added"] or body in lost or _robot(entry) not in dressed:
+            if entry["added"] or body in lost or entry["robot"] not in dressed:
                 made.append(self._stand_in(entry, "visual"))
         for body, own in seen.items():
             if body not in lost:
@@ -159,7 +156,9 @@ class _Assembly:
         if "problem" in entry:
             raise SceneError(entry["problem"])
         own = self._material(entry)
-        if "file" in entry:
+        if entry["shape"] == "plane":
+            mesh = self._sheet(entry["half_extents"], own or paint.PLAIN)
+        elif "file" in entry:
             mesh = self._of_file(entry["file"], tuple(entry["scale"]), own or paint.PLAIN)
         else:
             mesh = self._of_surface(entry["mesh"], own or paint.PLAIN)
@@ -204,12 +203,16 @@ class _Assembly:
             self._meshes[key] = Mesh(vertices, faces, np.tile(np.array(color, np.uint8), (len(faces), 1)))
         return self._meshes[key]
 
+    def _sheet(self, half_extents: Sequence[float | None], color: Color | None) -> Mesh:
+        key = "plane", *half_extents, color
+        if key not in self._meshes:
+            self._meshes[key] = Mesh(*sheets.checkers(half_extents, sheets.fields(color)))
+        return self._meshes[key]
+
     def _stand_in(self, entry: dict[str, Any], kind: Kind) -> Part:
         """A collision shape, as what it is or as what is seen."""
         if entry["shape"] == "plane":
-            if "plane" not in self._meshes:
-                self._meshes["plane"] = _checkers()
-            return self._part(entry, kind, self._meshes["plane"])
+            return self._part(entry, kind, self._sheet((None, None), None))
         body = self._body(entry)
         color = paint.STILL if body < 0 else paint.palette(body)
         if kind == "visual" and not entry["added"]:
@@ -231,22 +234,3 @@ class _Assembly:
     def _note(self, note: str) -> None:
         if note not in self._notes:
             self._notes.append(note)
-
-
-def _robot(entry: dict[str, Any]) -> str | None:
-    """The robot whose body carries a part; None is the world."""
-    return None if entry["body"] is None else entry["body"].split("/")[0]
-
-
-def _checkers() -> Mesh:
-    """A sheet of square fields around the origin, seen from above and from below."""
-    count = round(_SHEET / _FIELD)
-    edge = np.linspace(-_SHEET / 2, _SHEET / 2, count + 1)
-    x, y = np.meshgrid(edge, edge, indexing="ij")
-    vertices = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3).astype(np.float32)
-    row, column = (index.ravel() for index in np.meshgrid(np.arange(count), np.arange(count), indexing="ij"))
-    corner = row * (count + 1) + column
-    beyond = corner + count + 1
-    faces = np.stack([corner, beyond, beyond + 1, corner, beyond + 1, corner + 1], axis=-1).reshape(-1, 3)
-    colors = np.array(paint.CHECKERS, np.uint8)[np.repeat((row + column) % 2, 2)]
-    return Mesh(vertices, faces.astype(np.uint32), colors)

@@ -32,6 +32,8 @@ _ROOM = 1.1
 # Distances of lines on the floor [m], and about how many of them cross the scene.
 _SPACINGS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 _LINES = 12
+# Smaller horizontal planes are drawn with their edges [m].
+_FLOOR_SIZE = 4.0
 
 
 class Picture:
@@ -266,9 +268,10 @@ class Picture:
 
 
 def _is_floor(part: Part) -> bool:
-    """Return whether a part is a horizontal plane that faces up."""
+    """Return whether a part is a large horizontal plane that faces up."""
     turned = np.abs(part.pose[3:5]).max()
-    return part.body < 0 and part.shape == "plane" and bool(turned < 1e-6)
+    is_flat = part.body < 0 and part.shape == "plane" and bool(turned < 1e-6)
+    return is_flat and bool(np.ptp(part.mesh.vertices[:, :2], axis=0).min() >= _FLOOR_SIZE)
 
 
 def _field(shown: Any, name: str, default: Any = None) -> Any:

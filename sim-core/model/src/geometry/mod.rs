@@ -21,6 +21,6 @@ pub use mass::{DENSITY, mass_properties};
 pub use mesh::{Mesh, MeshOptions};
 pub use polytope::NoHull;
 pub use shape::Shape;
-pub use tessellate::triangles;
+pub use tessellate::{ellipsoid, triangles};
 pub use trimesh::TriMesh;
 pub use visual::{Color, Image, TRIANGLES_SHOWN_MAX, Texture, VisualMesh};

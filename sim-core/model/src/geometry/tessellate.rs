@@ -42,6 +42,15 @@ pub fn triangles(shape: &Shape) -> TriMesh {
     }
 }
 
+/// An ellipsoid about the origin with these radii along the axes. [m]
+pub fn ellipsoid(radii: [f64; 3]) -> TriMesh {
+    let mut mesh = revolved(&half_circles(1.0, 0.0));
+    for vertex in &mut mesh.vertices {
+        *vertex = std::array::from_fn(|axis| radii[axis] * vertex[axis]);
+    }
+    mesh
+}
+
 fn cuboid(half: [f64; 3]) -> TriMesh {
     // corner k is on the high side of axis i where bit i of k is set
     let vertices = (0..8_usize)

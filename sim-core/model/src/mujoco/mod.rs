@@ -10,6 +10,8 @@ mod format;
 mod frames;
 mod geoms;
 mod keyframes;
+mod looks;
+mod meshes;
 mod names;
 mod options;
 mod pairs;

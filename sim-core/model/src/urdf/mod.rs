@@ -29,4 +29,3 @@ mod xacro;
 mod xml;
 
 pub use options::UrdfOptions;
-pub use visual::{Look, Visual, Visuals};

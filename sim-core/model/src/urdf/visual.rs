@@ -17,51 +17,7 @@ use super::{source, value, xml};
 use crate::description::{Robot, Shape};
 use crate::error::ModelError;
 use crate::pose::Pose;
-
-/// A `<visual>` of a URDF file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Visual {
-    /// Name of its link.
-    pub link: String,
-    /// Its name, if the file gives one.
-    pub name: Option<String>,
-    /// Its frame in the link frame.
-    pub pose: Pose,
-    /// Its geometry.
-    pub look: Look,
-    /// Red, green, blue and opacity of its material, from 0 to 1 [–].
-    pub color: Option<[f64; 4]>,
-    /// The image of its material.
-    pub texture: Option<PathBuf>,
-}
-
-/// Geometry of a visual.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Look {
-    /// A box, sphere, cylinder or capsule.
-    Shape(Shape),
-    /// A file that is there, in whatever format.
-    File {
-        /// The file, as resolved.
-        path: PathBuf,
-        /// Factor on each axis of the file [–].
-        scale: [f64; 3],
-    },
-    /// What cannot be shown.
-    Nothing {
-        /// Why, with the cure.
-        problem: String,
-    },
-}
-
-/// What a URDF file says of looks.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Visuals {
-    /// All visuals, in file order.
-    pub visuals: Vec<Visual>,
-    /// What of materials was ignored, one sentence each.
-    pub notes: Vec<String>,
-}
+use crate::visual::{Look, Visual, Visuals};
 
 impl Robot {
     /// Reads what the links of a URDF file look like; files are looked for as those of collisions are.

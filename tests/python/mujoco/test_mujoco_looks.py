@@ -1,0 +1,234 @@
+"""What MuJoCo models look like: the geoms that MuJoCo's viewer shows, where they are, in their colours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import mujoco
+import numpy as np
+import pytest
+from PIL import Image
+from safetensors.numpy import load_file, save_file
+
+import tightloop as tl
+from tightloop import optional_imports
+from tightloop.mujoco import textures
+from tightloop.view import Camera, Picture, paint
+from tightloop.view.parts import Parts, parts
+from tightloop.view.poses import place
+
+# Roundings of float32 in numbers of some metres
+ATOL = 1e-5
+# A wedge with a notch: its hull has other faces
+NOTCHED = """<mesh name="notched" vertex="0 0 0 .4 0 0 .4 0 .3 .2 0 .1 0 0 .3 0 .2 0 .4 .2 0 .4 .2 .3 .2 .2 .1 0 .2 .3"
+face="0 1 3 1 2 3 0 3 4 5 8 6 6 8 7 5 9 8 0 5 6 0 6 1 1 6 7 1 7 2 2 7 8 2 8 3 3 8 9 3 9 4 4 9 5 4 5 0"/>"""
+MODEL = f"""<mujoco model="looks"><asset>{NOTCHED}
+<texture name="squares" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 .5" width="64" height="64"/>
+<texture name="box" type="cube" builtin="flat" rgb1=".2 .4 .6" rgb2=".2 .4 .6" width="8" height="48"/>
+<texture name="sky" type="skybox" builtin="gradient" rgb1="1 1 1" rgb2="0 0 0" width="8" height="48"/>
+<material name="blue" rgba="0 0 1 1"/>
+<material name="squares" texture="squares" rgba="1 1 1 1"/>
+<material name="box" texture="box" rgba="1 .5 1 .5"/>
+</asset><worldbody>
+<geom name="floor" type="plane" size="0 0 .1" pos="0 0 -1" material="squares"/>
+<geom name="table" type="plane" size="1 .5 .1" rgba="0 1 0 1"/>
+<body name="dressed" pos="0 0 1" euler="20 30 40"><freejoint/>
+  <geom name="hull" type="box" size=".1 .2 .3" group="3"/>
+  <geom name="plain" type="sphere" size=".1" contype="0" conaffinity="0"/>
+  <geom name="shown" type="ellipsoid" size=".1 .2 .3" group="2" contype="0" conaffinity="0" material="blue"/>
+  <geom name="own" type="capsule" size=".1 .2" group="1" contype="0" conaffinity="0" material="blue" rgba="1 0 0 1"/>
+  <geom name="clear" type="sphere" size=".3" contype="0" conaffinity="0" rgba="1 0 0 0"/></body>
+<body name="bare" pos="1 0 1"><freejoint/><geom name="box" type="box" size=".1 .2 .3" group="4" material="box"/></body>
+<body name="mesh" pos="2 0 1"><freejoint/>
+  <geom name="notched" type="mesh" mesh="notched" contype="0" conaffinity="0" pos=".1 .2 .3" euler="10 20 30"/>
+  <geom name="again" type="mesh" mesh="notched" contype="0" conaffinity="0" pos="0 0 -.3"/>
+  <geom name="rod" type="cylinder" size=".1 .2" group="3"/></body>
+</worldbody></mujoco>"""
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+def parts_of(scene: tl.Scene, folder: Path | str = "/") -> Parts:
+    return parts(scene.to_toml(), folder, tl.Dynamics(scene).body_names)
+
+
+def seen(xml: str, kind: str = "visual") -> dict:
+    """Parts of one kind by the names of their geoms."""
+    return {part.name.rpartition("/")[2]: part for part in parts_of(tl.Scene.from_mujoco(spec(xml))).of(kind)}
+
+
+def spec(xml: str) -> mujoco.MjSpec:
+    return mujoco.MjSpec.from_string(xml)
+
+
+def start(model: mujoco.MjModel) -> np.ndarray:
+    """`joint_q` of free joints at the start, shape ``(1, coords)``."""
+    pos, turn = np.split(model.qpos0.reshape(-1, 7), [3], axis=1)
+    return np.concatenate([pos, np.roll(turn, -1, axis=1)], axis=1).reshape(1, -1)
+
+
+def color(part) -> list[int]:
+    """The colour of a part that has only one."""
+    (only,) = np.unique(part.mesh.colors, axis=0)
+    return only.tolist()
+
+
+def changed(scene: tl.Scene, change, path: Path) -> tl.Scene:
+    """The scene with other arrays in the file of its only model."""
+    (model,) = scene.models.values()
+    arrays = load_file(model.file)
+    change(arrays)
+    save_file(arrays, path)
+    text = scene.to_toml().replace(str(model.file), str(path))
+    (path.with_suffix(".toml")).write_text(text)
+    return tl.Scene.load(path.with_suffix(".toml"))
+
+
+def test_geoms_are_seen_that_mujocos_viewer_shows():
+    # of `dressed` no group above 2 and nothing clear, of `bare` all, since it has nothing else
+    shown = {"floor", "table", "plain", "shown", "own", "box", "notched", "again"}
+    assert set(seen(MODEL)) == shown
+    assert set(seen(MODEL, "collision")) == {"floor", "table", "hull", "box", "rod"}
+
+
+def test_colours_are_mujocos():
+    found = seen(MODEL)
+    assert color(found["plain"]) == [128, 128, 128, 255], "MuJoCo's grey"
+    assert color(found["shown"]) == [0, 0, 255, 255], "the material's"
+    assert color(found["own"]) == [255, 0, 0, 255], "its own before the material's"
+    assert color(found["box"]) == [51, 51, 153, 128], "the material's times the texture's mean"
+    floor = np.unique(found["floor"].mesh.colors, axis=0)
+    np.testing.assert_allclose(floor.mean(axis=0), [127.5, 0, 63.75, 255], atol=2)
+
+
+def test_a_texture_from_a_file_has_the_mean_that_a_robots_has(tmp_path):
+    rng = np.random.default_rng(3)
+    for mode, shape in (("RGB", (6, 5, 3)), ("L", (6, 5)), ("RGBA", (6, 5, 4))):
+        file = tmp_path / f"{mode}.png"
+        Image.fromarray(rng.integers(0, 256, shape, np.uint8), mode).save(file)
+        channels = {"RGB": 3, "L": 1, "RGBA": 4}[mode]
+        xml = f"""<mujoco><asset><texture name="t" type="2d" file="{file}" nchannel="{channels}"/>
+        <material name="none"/><material name="m" texture="t"/></asset><worldbody/></mujoco>"""
+        model = mujoco.MjModel.from_xml_string(xml)
+        none, mean = textures.means(model)
+        assert none.tolist() == [1, 1, 1]
+        # the other mean is rounded
+        np.testing.assert_allclose(255 * mean, paint.file_mean(file)[:3], atol=0.5 + 1e-9)
+
+
+def test_surfaces_are_where_mujoco_has_them():
+    model = spec(MODEL).compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    scene = tl.Scene.from_mujoco(model)
+    dynamics = tl.Dynamics(scene)
+    (body_q,) = dynamics.forward_kinematics(start(model))
+    found = seen(MODEL)
+
+    def corners(name):
+        part = found[name]
+        own = place(part.pose, part.mesh.vertices)
+        return own if part.body < 0 else place(body_q[part.body], own)
+
+    def placed(name, points):
+        geom = model.geom(name).id
+        return points @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+
+    faces = {tuple(face) for face in model.mesh_face.tolist()}
+    for name in ("notched", "again"):
+        np.testing.assert_allclose(corners(name), placed(name, model.mesh_vert), atol=ATOL)
+        assert {tuple(face) for face in found[name].mesh.faces.tolist()} == faces, "all faces, not those of the hull"
+    assert found["notched"].mesh is found["again"].mesh
+    geom = model.geom("shown").id
+    local = (corners("shown") - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
+    np.testing.assert_allclose(np.linalg.norm(local / [0.1, 0.2, 0.3], axis=1), 1, atol=1e-4)
+    assert found["shown"].shape == "ellipsoid"
+    np.testing.assert_allclose(np.abs(corners("table")).max(axis=0), [1, 0.5, 0], atol=ATOL)
+    np.testing.assert_allclose(corners("floor")[:, 2], -1)
+    assert found["floor"].mesh.vertices.max() == 5, "a plane without end is a sheet"
+
+
+def test_the_world_of_a_model_stands_where_the_scene_puts_it():
+    scene = tl.Scene(dt=0.002, gravity=(0, 0, -9.81))
+    scene.solver(iterations=100, ls_iterations=50, tolerance=1e-8, cone="pyramidal", impratio=1)
+    scene.add_mujoco(spec(MODEL), pos=(1, 2, 3), quat=(0, 0, 1, 0))
+    (table,) = (part for part in parts_of(scene).of("visual") if part.name.endswith("/table"))
+    assert table.body == -1
+    np.testing.assert_allclose(table.pose, [1, 2, 3, 0, 0, 1, 0], atol=1e-12)
+
+
+def test_looks_change_no_physics(tmp_path):
+    scene = tl.Scene.from_mujoco(spec(MODEL))
+
+    def paint_it(arrays):
+        arrays["geom_group"][:] = 1
+        arrays["mat_rgba"][:] = 0.3
+        arrays["mat_texture_mean"][:] = 0.7
+
+    other = changed(scene, paint_it, tmp_path / "other.safetensors")
+    assert tl.Dynamics(other).model_hash == tl.Dynamics(scene).model_hash
+    names, others = ({part.name for part in parts_of(one).of("visual")} for one in (scene, other))
+    assert others - names == {"looks/dressed/hull", "looks/mesh/rod"}
+
+
+@pytest.mark.parametrize("array", ["geom_group", "mat_texture_mean"])
+def test_an_older_file_shows_what_touches(tmp_path, array):
+    scene = tl.Scene.from_mujoco(spec(MODEL))
+    older = parts_of(changed(scene, lambda arrays: arrays.pop(array), tmp_path / "older.safetensors"))
+    touching = {part.name for part in older.of("collision")}
+    assert {part.name for part in older.of("visual")} == touching
+    assert len(older.notes) == 1 and "save the scene again" in older.notes[0]
+
+
+def test_a_saved_scene_needs_no_mujoco_for_its_looks(tmp_path, monkeypatch):
+    scene = tl.Scene.from_mujoco(spec(MODEL))
+    scene.save(tmp_path / "scene.toml")
+    monkeypatch.setattr(optional_imports, "import_module", _missing)
+    loaded = tl.Scene.load(tmp_path / "scene.toml")
+    assert [part.name for part in parts_of(loaded)] == [part.name for part in parts_of(scene)]
+
+
+def _missing(_: str) -> None:
+    raise ModuleNotFoundError(name="mujoco")
+
+
+def test_a_shape_of_the_scene_on_a_link_is_seen_with_its_geoms():
+    scene = tl.Scene.from_mujoco(spec(MODEL))
+    extra = '[[shape]]\ntype = "sphere"\nradius = 0.2\nbody = "looks/dressed"\nname = "extra"\n'
+    found = parts(f"{scene.to_toml()}\n{extra}", "/", tl.Dynamics(scene).body_names)
+    names = {part.name for part in found.of("visual")}
+    assert {"looks/dressed/extra", "looks/dressed/plain"} <= names and "looks/dressed/hull" not in names
+
+
+def test_what_is_not_shown_is_named():
+    xml = """<mujoco model="m"><asset><hfield name="hills" nrow="3" ncol="3" size="1 1 .1 .1"/></asset><worldbody>
+    <geom name="hills" type="hfield" hfield="hills" contype="0" conaffinity="0"/><geom name="ball" size=".1"/>
+    </worldbody></mujoco>"""
+    found = parts_of(tl.Scene.from_mujoco(spec(xml)))
+    assert [part.name for part in found.of("visual")] == ["m/world/ball"]
+    assert len(found.notes) == 1 and "`hills`" in found.notes[0] and "height field" in found.notes[0]
+
+
+def test_a_model_without_geoms_shows_its_joints():
+    xml = """<mujoco model="m"><worldbody><body pos="0 0 1"><joint axis="0 1 0"/><inertial pos="0 0 -.5" mass="1"
+    diaginertia=".1 .1 .1"/></body></worldbody></mujoco>"""
+    found = parts_of(tl.Scene.from_mujoco(spec(xml)))
+    assert len(found.of("visual")) > 1 and "joints" in found.notes[0]
+
+
+def test_a_picture_shows_them():
+    xml = MODEL.replace('name="shown"', 'name="shown" pos="0 0 1"')
+    model = spec(xml).compile()
+    scene = tl.Scene.from_mujoco(model)
+    shown = SimpleNamespace(body_q=tl.Dynamics(scene).forward_kinematics(start(model)))
+    view = Camera((4, -4, 3), (1, 0, 1))
+    pictures = {
+        kind: Picture(parts_of(scene), 240, 180, kind=kind).render(shown, camera=view).astype(int)
+        for kind in ("visual", "collision")
+    }
+    blue = {kind: picture[..., 2] - picture[..., :2].max(axis=-1) > 100 for kind, picture in pictures.items()}
+    assert blue["visual"].sum() > 50 and blue["collision"].sum() == 0
