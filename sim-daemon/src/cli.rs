@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
-use crate::config::MeshOptions;
 use crate::error::DaemonError;
 
 /// Step many robot worlds at once, and serve them over shared memory.
@@ -27,10 +26,10 @@ pub(crate) enum CliCommand {
     ///
     /// Example: tightloop serve scene.toml --worlds 4096 --name franka
     Serve(Box<Serve>),
-    /// Show what a URDF file means: tree, dofs, masses, limits, repairs, and a picture.
+    /// Show what a robot file means: tree, dofs, masses, limits, repairs, and a picture.
     ///
-    /// Also lists what the reader ignored. The picture shows the collision shapes and goes to ROBOT.png in the working
-    /// folder.
+    /// Reads URDF and, with the Python package and MuJoCo, MJCF. Also lists what the reader ignored or refused. The picture
+    /// shows the collision shapes and goes to ROBOT.png in the working folder.
     ///
     /// Example: tightloop inspect robot.urdf --package-dir ~/robots
     Inspect(Inspect),
@@ -207,8 +206,13 @@ pub(crate) struct Replay {
 /// Arguments of `inspect` as given; `inspect` checks them.
 #[derive(Debug, Args)]
 pub(crate) struct Inspect {
-    /// URDF file of the robot.
-    pub(crate) urdf: PathBuf,
+    /// URDF or MJCF file of the robot, or a model that a scene with MuJoCo models saved.
+    #[arg(value_name = "URDF|MJCF|MODEL.safetensors")]
+    pub(crate) file: PathBuf,
+
+    /// The compiled model of an MJCF file, which the Python package adds.
+    #[arg(long, hide = true)]
+    pub(crate) exported: Option<PathBuf>,
 
     /// Free the base: let the root link move.
     #[arg(long)]
@@ -222,9 +226,9 @@ pub(crate) struct Inspect {
     #[arg(long = "package-dir", value_name = "DIR")]
     pub(crate) package_dirs: Vec<PathBuf>,
 
-    /// Most vertices of a collision mesh's convex hull.
-    #[arg(long, value_name = "COUNT", default_value_t = MeshOptions::default().max_hull_vertices)]
-    pub(crate) mesh_max_hull_vertices: usize,
+    /// Most vertices of a collision mesh's convex hull; default: 64, or 1024 for a MuJoCo model.
+    #[arg(long, value_name = "COUNT")]
+    pub(crate) mesh_max_hull_vertices: Option<usize>,
 
     /// Split a concave collision mesh into several convex hulls.
     #[arg(long)]
@@ -234,7 +238,8 @@ pub(crate) struct Inspect {
     #[arg(long)]
     pub(crate) hulls: bool,
 
-    /// Joint positions of the picture [rad or m], one per coordinate, separated by commas; default: 0.
+    /// Joint positions of the picture [rad or m], one per coordinate, separated by commas; default: 0, or the start of a
+    /// MuJoCo model.
     #[arg(
         long,
         value_name = "Q",

@@ -47,6 +47,17 @@ pub enum DaemonError {
         /// What the system says.
         problem: String,
     },
+    /// A MuJoCo model has elements that are not supported.
+    #[error(
+        "{}: {count} of its elements or options have no support, listed above; remove them from the model",
+        path.display()
+    )]
+    Refused {
+        /// The file.
+        path: std::path::PathBuf,
+        /// How many.
+        count: usize,
+    },
     /// The picture cannot be written.
     #[error("picture {}: {problem}", path.display())]
     Picture {
@@ -152,7 +163,7 @@ impl DaemonError {
             | Protocol(ProtocolError::SharedMemory { .. } | ProtocolError::Memory { .. }) => {
                 "ResourceError"
             }
-            Read { .. } | Config(_) | Model(_) => "SceneError",
+            Read { .. } | Config(_) | Model(_) | Refused { .. } => "SceneError",
             Recording { .. } | Replay { .. } | Differs { .. } | Gap { .. } => "RecordingError",
             State { .. } => "SnapshotError",
             NeedsPython { .. } => "MissingLibrary",

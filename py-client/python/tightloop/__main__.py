@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import re
 import signal
 import sys
 from pathlib import Path
@@ -14,6 +15,8 @@ _IN_PYTHON = {
     "film": "tightloop.view.film_command",
     "view": "tightloop.view.command",
 }
+# The first element of a robot file begins within so many bytes.
+_HEAD_BYTES = 1 << 16
 
 
 def main() -> int:
@@ -31,6 +34,8 @@ def main() -> int:
     arguments = sys.argv[1:]
     if arguments[:1] == ["serve"]:
         arguments = [_scene_file(argument) for argument in arguments]
+    if arguments[:1] == ["inspect"]:
+        arguments = _with_compiled(arguments)
     # Rust does the work and never returns to the interpreter in between: Python's own handler would only set a flag.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     return _core.command_line(["tightloop", *arguments])
@@ -43,6 +48,23 @@ def _scene_file(argument: str) -> str:
     from tightloop.mujoco import serve
 
     return serve.scene_file(argument)
+
+
+def _with_compiled(arguments: list[str]) -> list[str]:
+    """Return the arguments of ``inspect``; if they name an MJCF file, with the model that MuJoCo compiles from it."""
+    for argument in arguments[1:]:
+        if Path(argument).is_file() and _is_mjcf(Path(argument)):
+            from tightloop.mujoco import serve
+
+            return [*arguments, "--exported", serve.exported_file(argument)]
+    return arguments
+
+
+def _is_mjcf(path: Path) -> bool:
+    """Return whether the first element of a file is MJCF's."""
+    with path.open("rb") as file:
+        text = file.read(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
+    return re.match(r"(\s|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>)*<mujoco[\s>/]", text, re.DOTALL) is not None
 
 
 if __name__ == "__main__":

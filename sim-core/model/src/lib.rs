@@ -48,7 +48,7 @@ pub use geometry::Shape;
 pub use inertia::{Inertial, principal_moments};
 pub use joint_kind::JointKind;
 pub use model::{KeyState, Model, RobotRange, SensedShapes, Start};
-pub use mujoco::MujocoOptions;
+pub use mujoco::{MujocoContents, MujocoElement, MujocoOptions};
 pub use pose::Pose;
 pub use rigid_body::Body;
 pub use sim_physics::constants::contact::Cone;

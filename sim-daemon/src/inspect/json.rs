@@ -3,21 +3,29 @@
 use std::path::Path;
 
 use serde_json::{Value, json};
-use sim_model::{Collision, Pose, Shape, principal_moments};
+use sim_model::{Collision, Joint, MujocoContents, Pose, Shape, principal_moments};
 
+use super::mujoco;
 use super::properties::Properties;
 use crate::config::{joint_type, mesh_properties, robot_summary};
 
-/// All there is to say of a robot: what [`crate::config::urdf_summary`] has, and `file`, `floating`, `mass`, `links`,
+/// All there is to say of a robot or a model: what [`crate::config::urdf_summary`] has, and `file`, `floating`, `mass`, `links`,
 /// `picture`.
+///
+/// Of a model that MuJoCo compiled also `mujoco`, as [`super::mujoco::json`] has it; a link may have several `joints`.
 ///
 /// A link, in body order: `name`, `parent`, `merged_into`, `joint` (`name`, `type`, `axis`, `pos`, `quat`), `mass`, `center`,
 /// `inertia`, `principal_moments`, `collisions` (`type`, sizes, `pos`, `quat`). What is absent is `null`; SI units.
-pub(super) fn document(properties: &Properties, picture: Option<&Path>) -> Value {
+pub(super) fn document(
+    properties: &Properties,
+    contents: Option<&MujocoContents>,
+    file: &Path,
+    picture: Option<&Path>,
+) -> Value {
     let robot = properties.robot;
     let mut document = robot_summary(robot);
     let mut add = |key: &str, value: Value| document[key] = value;
-    add("file", path(robot.urdf.as_deref()));
+    add("file", path(Some(file)));
     add("floating", json!(robot.floating));
     add("mass", json!(properties.mass()));
     add(
@@ -29,6 +37,9 @@ pub(super) fn document(properties: &Properties, picture: Option<&Path>) -> Value
             .collect(),
     );
     add("picture", path(picture));
+    if let Some(contents) = contents {
+        add("mujoco", mujoco::json(contents));
+    }
     document
 }
 
@@ -46,17 +57,20 @@ fn link(properties: &Properties, index: usize) -> Value {
         "name": link.name,
         "parent": parent.map(|parent| &robot.links[parent].name),
         "merged_into": properties.merged_into(index),
-        "joint": joint.map(|joint| placed(&joint.origin, json!({
-            "name": joint.name,
-            "type": joint_type(joint),
-            "axis": joint.axis,
-        }))),
+        "joint": joint.map(above),
+        "joints": properties.joints(index).map(above).collect::<Value>(),
         "mass": inertial.map(|inertial| inertial.mass),
         "center": inertial.map(|inertial| inertial.pos),
         "inertia": inertial.map(|inertial| inertial.inertia),
         "principal_moments": inertial.map(|inertial| principal_moments(inertial.inertia)),
         "collisions": link.collisions.iter().map(collision).collect::<Value>(),
     })
+}
+
+fn above(joint: &Joint) -> Value {
+    let joint_type = joint_type(joint);
+    let value = json!({ "name": joint.name, "type": joint_type, "axis": joint.axis });
+    placed(&joint.origin, value)
 }
 
 fn collision(collision: &Collision) -> Value {

@@ -1,8 +1,11 @@
-//! `tightloop inspect`: what a URDF file means, as text, as JSON, and as a picture of its collision shapes.
+//! `tightloop inspect`: what a URDF file or a MuJoCo model means, as text, as JSON, and as a picture of its collision
+//! shapes.
 
 mod json;
+mod mujoco;
 mod picture;
 mod properties;
+mod source;
 mod table;
 mod text;
 mod tree;
@@ -11,9 +14,10 @@ mod wrap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use serde_json::json;
 use sim_engine::dynamics::Dynamics;
 use sim_model::geometry::{MeshOptions, triangles};
-use sim_model::{Description, ModelError, Pose, Robot, Shape, UrdfOptions};
+use sim_model::{ModelError, MujocoContents, Pose, Robot, Shape};
 
 use crate::cli::Inspect;
 use crate::config::hull_sides;
@@ -23,34 +27,36 @@ use properties::Properties;
 
 /// Runs the command.
 pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
-    let meshes = MeshOptions {
-        max_hull_vertices: args.mesh_max_hull_vertices,
-        convex_decomposition: args.convex_decomposition,
+    if let Some(max_hull_vertices) = args.mesh_max_hull_vertices {
+        let meshes = MeshOptions {
+            max_hull_vertices,
+            ..MeshOptions::default()
+        };
+        meshes.validate().map_err(|error| DaemonError::Argument {
+            argument: "--mesh-max-hull-vertices",
+            value: max_hull_vertices.to_string(),
+            problem: error.to_string(),
+        })?;
+    }
+    let exported = source::exported(args);
+    let contents = exported.map(MujocoContents::read).transpose()?;
+    let mut scene = match (exported, &contents) {
+        (Some(path), Some(contents)) => {
+            let name = source::name(contents, &args.file);
+            if !contents.refused.is_empty() {
+                return Err(refused(args, contents, &name));
+            }
+            source::mujoco(args, path, &name)?
+        }
+        _ => source::urdf(args)?,
     };
-    meshes.validate().map_err(|error| DaemonError::Argument {
-        argument: "--mesh-max-hull-vertices",
-        value: args.mesh_max_hull_vertices.to_string(),
-        problem: error.to_string(),
-    })?;
-    // nothing moves here: any step does
-    let mut scene = Description::new(1e-3, 1);
-    let robot = scene.add_urdf(
-        &args.urdf,
-        UrdfOptions {
-            floating: args.floating,
-            strict: args.strict,
-            meshes,
-            package_dirs: args.package_dirs.clone(),
-            ..UrdfOptions::default()
-        },
-    )?;
     if let Some(joint_q) = &args.joint_q {
         let wrong = |error: ModelError| DaemonError::Argument {
             argument: "--joint-q",
             value: commas(joint_q),
             problem: error.to_string(),
         };
-        robot.set_joint_q(joint_q).map_err(wrong)?;
+        scene.robots[0].set_joint_q(joint_q).map_err(wrong)?;
     }
     // what a simulation would refuse is refused here
     let model = scene.compile()?;
@@ -69,21 +75,47 @@ pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
             failed(path, format!("{error}; say with --png FILE where to write, or --no-png"))
         })
     });
+    let report = || text::document(&properties, contents.as_ref(), &args.file, args.long);
     let said = match (args.json, &drawn, &path) {
         (true, Err(_), _) => String::new(),
-        (true, Ok(()), _) => format!("{:#}\n", json::document(&properties, path.as_deref())),
+        (true, Ok(()), _) => {
+            let file = &args.file;
+            let document = json::document(&properties, contents.as_ref(), file, path.as_deref());
+            format!("{document:#}\n")
+        }
         (false, Ok(()), Some(path)) => {
             let picture = path.display();
-            format!(
-                "{}\nPicture    {picture}\n",
-                text::document(&properties, args.long)
-            )
+            format!("{}\nPicture    {picture}\n", report())
         }
-        (false, _, _) => text::document(&properties, args.long),
+        (false, _, _) => report(),
     };
+    say(&said);
+    drawn
+}
+
+fn say(said: &str) {
     // whoever reads us may stop reading
     let _ = std::io::stdout().write_all(said.as_bytes());
-    drawn
+}
+
+/// Reports a model that cannot run.
+fn refused(args: &Inspect, contents: &MujocoContents, name: &str) -> DaemonError {
+    let file = &args.file;
+    say(&match args.json {
+        true => {
+            let (file, own) = (file.to_string_lossy(), mujoco::json(contents));
+            let document = json!({ "name": name, "file": file, "mujoco": own });
+            format!("{document:#}\n")
+        }
+        false => {
+            let head = mujoco::head(contents, name, file);
+            format!("{head}\n{}", mujoco::refused(contents))
+        }
+    });
+    DaemonError::Refused {
+        path: file.clone(),
+        count: contents.refused.len(),
+    }
 }
 
 fn failed(path: &Path, problem: String) -> DaemonError {
@@ -123,7 +155,9 @@ fn drawing(properties: &Properties, frames: &[f64], args: &Inspect) -> Drawing {
     let poses: Vec<Pose> = frames.chunks_exact(7).map(pose).collect();
     let mut shapes = Vec::new();
     for (place, (&link, pose)) in properties.order.iter().zip(&poses).enumerate() {
-        for collision in &robot.links[link].collisions {
+        // a plane has no end; the picture has a floor of its own
+        let own = &robot.links[link].collisions;
+        for collision in own.iter().filter(|own| own.shape != Shape::Plane) {
             let frame = pose.mul(&collision.pose);
             let mut draw = |surface| shapes.push((place as u32, frame, surface));
             match &collision.shape {
@@ -135,6 +169,7 @@ fn drawing(properties: &Properties, frames: &[f64], args: &Inspect) -> Drawing {
     let outside = properties.outside_range();
     let mut caption = match &args.joint_q {
         Some(joint_q) => format!("joint_q = {}", commas(joint_q)),
+        None if robot.mujoco.is_some() => "at the start".to_owned(),
         None => "joint_q = 0".to_owned(),
     };
     match outside.as_slice() {

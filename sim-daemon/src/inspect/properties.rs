@@ -7,8 +7,8 @@ pub(super) struct Properties<'a> {
     pub robot: &'a Robot,
     /// Links, parents before children.
     pub order: Vec<usize>,
-    /// The joint above each link, as indices of `robot.joints`.
-    pub joint_above: Vec<Option<usize>>,
+    /// The joints above each link, as indices of `robot.joints`; several of a link of a MuJoCo model.
+    pub joints_above: Vec<Vec<usize>>,
     /// Links below each link, in the order of their joints.
     pub children: Vec<Vec<usize>>,
     /// The link that each one is part of: itself if it moves, or is the root.
@@ -18,17 +18,21 @@ pub(super) struct Properties<'a> {
 impl<'a> Properties<'a> {
     pub fn new(robot: &'a Robot) -> Properties<'a> {
         let order = robot.link_order();
-        let mut joint_above = vec![None; robot.links.len()];
+        let mut joints_above = vec![Vec::new(); robot.links.len()];
         let mut children = vec![Vec::new(); robot.links.len()];
         for (index, joint) in robot.joints.iter().enumerate() {
-            joint_above[joint.child] = Some(index);
-            if let Some(parent) = joint.parent {
+            joints_above[joint.child].push(index);
+            let parent = joint
+                .parent
+                .filter(|_| joints_above[joint.child].len() == 1);
+            if let Some(parent) = parent {
                 children[parent].push(joint.child);
             }
         }
         let mut body: Vec<usize> = (0..robot.links.len()).collect();
         for &link in &order {
-            let joint = joint_above[link].map(|index: usize| &robot.joints[index]);
+            let first: Option<&usize> = joints_above[link].first();
+            let joint = first.map(|&index| &robot.joints[index]);
             if let Some(parent) = joint.filter(|joint| !joint.moves()).and_then(|j| j.parent) {
                 body[link] = body[parent];
             }
@@ -36,15 +40,22 @@ impl<'a> Properties<'a> {
         Properties {
             robot,
             order,
-            joint_above,
+            joints_above,
             children,
             body,
         }
     }
 
-    /// The joint above a link.
+    /// The joint above a link, the first of several.
     pub fn joint(&self, link: usize) -> Option<&'a Joint> {
-        self.joint_above[link].map(|index| &self.robot.joints[index])
+        self.joints(link).next()
+    }
+
+    /// The joints above a link.
+    pub fn joints(&self, link: usize) -> impl Iterator<Item = &'a Joint> {
+        let robot = self.robot;
+        let above = self.joints_above[link].iter();
+        above.map(|&index| &robot.joints[index])
     }
 
     /// The link that a link is merged into, if it does not move by itself.
@@ -111,6 +122,35 @@ impl<'a> Properties<'a> {
             short(self.mass()),
             count(shapes, "collision shape"),
         )
+    }
+}
+
+/// A shape in its plural where there are several.
+pub(super) fn kinds(number: usize, kind: &str) -> String {
+    match (kind, number) {
+        ("box" | "mesh", 2..) => format!("{number} {kind}es"),
+        _ => count(number, kind),
+    }
+}
+
+/// How often each word comes, in the order in which they come first.
+pub(super) fn tally<'a>(words: impl Iterator<Item = &'a str>) -> Vec<(&'a str, usize)> {
+    let mut found: Vec<(&str, usize)> = Vec::new();
+    for word in words {
+        match found.iter_mut().find(|(other, _)| *other == word) {
+            Some((_, count)) => *count += 1,
+            None => found.push((word, 1)),
+        }
+    }
+    found
+}
+
+/// A number, and what it consists of.
+pub(super) fn with_kinds(all: usize, kinds: impl Iterator<Item = String>) -> String {
+    let kinds: Vec<String> = kinds.collect();
+    match kinds.len() {
+        0 => all.to_string(),
+        _ => format!("{all}: {}", kinds.join(", ")),
     }
 }
 

@@ -64,7 +64,7 @@ pub(super) fn dofs(properties: &Properties) -> String {
     let mut text =
         "Dofs (turns in rad, rad/s, N·m, N·m·s/rad, kg·m²; slides in m, m/s, N, N·s/m, kg)\n"
             .to_owned();
-    text += &aligned(&rows);
+    text += &aligned(&rows, &[1, 4], Some(4));
     if !absent.is_empty() {
         let absent: Vec<&str> = absent.iter().map(|(heading, _)| *heading).collect();
         let (last, rest) = absent.split_last().expect("one at least");
@@ -127,8 +127,8 @@ fn followers(robot: &Robot) -> String {
     text
 }
 
-/// Rows in columns two spaces apart: numbers to the right, the name and the unit to the left.
-fn aligned(rows: &[Vec<String>]) -> String {
+/// Rows in columns two spaces apart, the unit nearer: some columns to the left, numbers to the right.
+pub(super) fn aligned(rows: &[Vec<String>], left: &[usize], unit: Option<usize>) -> String {
     let width = |column: usize| {
         let cells = rows.iter().map(|row| row[column].chars().count());
         cells.max().unwrap_or(0)
@@ -139,10 +139,10 @@ fn aligned(rows: &[Vec<String>]) -> String {
         let mut line = String::new();
         for (column, (cell, &width)) in row.iter().zip(&widths).enumerate() {
             // a unit belongs to the number before it
-            let gap = if column == 4 { 1 } else { 2 };
+            let gap = if unit == Some(column) { 1 } else { 2 };
             let fill = " ".repeat(width - cell.chars().count());
             line += &" ".repeat(gap);
-            if [1, 4].contains(&column) {
+            if left.contains(&column) {
                 line += cell;
                 line += &fill;
             } else {

@@ -1,22 +1,34 @@
 //! The report as text.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
-use sim_model::Shape;
+use sim_model::{MujocoContents, Shape};
 
-use super::properties::{Properties, count, short};
+use super::properties::{Properties, count, kinds, short, tally, with_kinds};
 use super::wrap::wrapped;
-use super::{table, tree};
+use super::{mujoco, table, tree};
 use crate::config::joint_type;
 
-/// All there is to say of a robot.
-pub(super) fn document(properties: &Properties, long: bool) -> String {
-    let mut text = head(properties);
+/// All there is to say of a robot, or of a model that MuJoCo compiled.
+pub(super) fn document(
+    properties: &Properties,
+    contents: Option<&MujocoContents>,
+    file: &Path,
+    long: bool,
+) -> String {
+    let mut text = match contents {
+        None => head(properties),
+        Some(contents) => mujoco::head(contents, &properties.robot.name, file),
+    };
     text += "\nTree (● moves by itself, ○ is part of the link it is fixed to)\n";
     text += &tree::tree(properties, long);
     text += "\n";
     text += &table::dofs(properties);
     text += "\n";
+    if let Some(contents) = contents {
+        text += &mujoco::tables(contents, &properties.robot.name);
+    }
     text += &notes(properties);
     text
 }
@@ -47,45 +59,22 @@ fn head(properties: &Properties) -> String {
         _ => format!(", of which {merged} are merged into the link they are fixed to"),
     };
     line("Links", links);
-    let kinds = tally(robot.joints.iter().map(joint_type));
-    let kinds = kinds.iter().map(|(kind, n)| format!("{n} {kind}"));
-    line("Joints", with_kinds(robot.joints.len(), kinds));
+    let found = tally(robot.joints.iter().map(joint_type));
+    let named = found.iter().map(|(kind, n)| format!("{n} {kind}"));
+    line("Joints", with_kinds(robot.joints.len(), named));
     let coords = count(properties.coords(), "coordinate");
     line("Dofs", format!("{}, {coords}", properties.dofs()));
     line("Mass", format!("{} kg", short(properties.mass())));
     let shapes = robot.links.iter().flat_map(|link| &link.collisions);
-    let kinds = tally(shapes.map(|collision| Shape::kind(&collision.shape)));
-    let all = kinds.iter().map(|(_, count)| count).sum();
-    let kinds = kinds.iter().map(|(kind, n)| match (*kind, n) {
-        ("box" | "mesh", 2..) => format!("{n} {kind}es"),
-        _ => count(*n, kind),
-    });
-    let mut shapes = with_kinds(all, kinds);
+    let found = tally(shapes.map(|collision| Shape::kind(&collision.shape)));
+    let all = found.iter().map(|(_, count)| count).sum();
+    let named = found.iter().map(|(kind, n)| kinds(*n, kind));
+    let mut shapes = with_kinds(all, named);
     if all == 0 {
         shapes += ", so the picture shows the frames of the links";
     }
     line("Collisions", shapes);
     text
-}
-
-/// How often each word comes, in the order in which they come first.
-fn tally<'a>(words: impl Iterator<Item = &'a str>) -> Vec<(&'a str, usize)> {
-    let mut found: Vec<(&str, usize)> = Vec::new();
-    for word in words {
-        match found.iter_mut().find(|(other, _)| *other == word) {
-            Some((_, count)) => *count += 1,
-            None => found.push((word, 1)),
-        }
-    }
-    found
-}
-
-fn with_kinds(all: usize, kinds: impl Iterator<Item = String>) -> String {
-    let kinds: Vec<String> = kinds.collect();
-    match kinds.len() {
-        0 => all.to_string(),
-        _ => format!("{all}: {}", kinds.join(", ")),
-    }
 }
 
 /// What was ignored or mended, warnings first.

@@ -81,9 +81,13 @@ fn link(properties: &Properties, row: &Row, column: usize, long: bool) -> String
     let link = &properties.robot.links[row.link];
     let merged = properties.merged_into(row.link);
     let dot = if merged.is_some() { '○' } else { '●' };
-    let joint = match properties.joint(row.link) {
-        None => "fixed to the world".to_owned(),
-        Some(joint) => above(joint, merged),
+    let joints: Vec<String> = properties
+        .joints(row.link)
+        .map(|joint| above(joint, merged))
+        .collect();
+    let joint = match joints.len() {
+        0 => "fixed to the world".to_owned(),
+        _ => joints.join("; "),
     };
     let name = format!("{}{dot} {}", row.first, link.name);
     let mut text = if name.chars().count().max(column) + joint.chars().count() <= COLUMNS {
@@ -199,12 +203,11 @@ fn shape(properties: &Properties, collision: &Collision) -> String {
             short(2.0 * half_height)
         ),
         Shape::Mesh(mesh) => {
-            let folder = properties
-                .robot
-                .urdf
-                .as_deref()
-                .and_then(|urdf| urdf.parent());
-            let file = relative_to(folder.unwrap_or(Path::new("")), &mesh.path);
+            // meshes of a MuJoCo model have names instead of files
+            let file = match &properties.robot.urdf {
+                None => mesh.path.clone(),
+                Some(urdf) => relative_to(urdf.parent().unwrap_or(Path::new("")), &mesh.path),
+            };
             let [low, high] = mesh.triangles.extent();
             let size = edges([0, 1, 2].map(|axis| high[axis] - low[axis]));
             let facets = count(mesh.triangles.triangles.len(), "triangle");

@@ -147,6 +147,7 @@ def arrays(model: Any) -> dict[str, NDArray[Any]]:
         own = [text[start : text.index(b"\0", start)].decode(errors="replace") for start in starts]
         assert len(own) == getattr(model, count)
         found[f"names.{kind}"] = _texts(own)
+    found["names.model"] = _texts([text[: text.index(b"\0")].decode(errors="replace")])
     found |= _hulls(model)
     found["mat_texture_mean"] = textures.means(model)
     for name in _REAL_OPTIONS:

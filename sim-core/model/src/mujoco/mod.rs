@@ -6,6 +6,7 @@
 
 mod actuators;
 mod constraints;
+mod contents;
 mod format;
 mod frames;
 mod geoms;
@@ -27,6 +28,7 @@ use std::path::Path;
 use crate::description::{Description, Robot};
 use crate::error::ModelError;
 use crate::pose::Pose;
+pub use contents::{MujocoContents, MujocoElement};
 use format::ModelFile;
 pub use options::MujocoOptions;
 use sim_physics::constants::mujoco::Integrator;

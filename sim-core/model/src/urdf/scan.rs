@@ -69,7 +69,9 @@ impl<'a, 'input> Scan<'a, 'input> {
         if root.tag_name().name() != ROBOT.name {
             let cure = match root.tag_name().name() {
                 "sdf" => "this is SDFormat; convert it to URDF first",
-                "mujoco" | "mujocoinclude" => "this is MuJoCo's MJCF; give the URDF file",
+                "mujoco" | "mujocoinclude" => {
+                    "this is MuJoCo's MJCF; read it with the Python package, by `Scene.from_mujoco` or its `tightloop`"
+                }
                 "COLLADA" => "this is a COLLADA mesh; give the URDF file that names it",
                 "launch" | "package" => "this is a file of ROS; give the URDF file",
                 _ if is_xacro(root) => {
