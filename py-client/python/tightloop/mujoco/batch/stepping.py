@@ -151,7 +151,7 @@ class Stepping:
         self._engine.sync(chosen.mask, params)
 
     def _check_controls(self, chosen: Selection, times: int = 1) -> None:
-        """MuJoCo takes all controls of a simulation for 0 if one of them is bad, and counts it as often as it reads them.
+        """MuJoCo takes all controls of a simulation for 0 if one of them is bad, and counts that at each reading.
 
         Their rows keep what was written.
         """
