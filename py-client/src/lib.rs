@@ -13,6 +13,7 @@ mod observe;
 mod parts;
 mod picture;
 mod random;
+mod rays;
 mod scene;
 
 use std::ffi::OsString;
@@ -53,6 +54,8 @@ mod core {
     use super::picture::Renderer;
     #[pymodule_export]
     use super::random::draw;
+    #[pymodule_export]
+    use super::rays::RayScene;
     #[pymodule_export]
     use super::scene::{load_scene, read_mesh, read_mujoco, read_urdf, save_scene, scene_to_toml};
 

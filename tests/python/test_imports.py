@@ -50,6 +50,7 @@ LAYERS = (
         "tightloop.daemon",
         "tightloop.dynamics",
         "tightloop.params",
+        "tightloop.rays",
         "tightloop.snapshot",
         "tightloop.viewer_process",
     ),

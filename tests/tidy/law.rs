@@ -96,6 +96,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "visual",
             "description",
             "validate",
+            "ray_scene",
             "urdf",
             "rigid_body",
             "hull_tables",
@@ -232,7 +233,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
         "py-client/src",
         &[
             "errors", "parts", "input", "frame", "client", "scene", "dynamics", "arrays",
-            "picture", "observe", "random",
+            "picture", "observe", "random", "rays",
         ],
     ),
 ];

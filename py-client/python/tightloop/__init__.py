@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from tightloop.frames import FrameCopy
     from tightloop.groups import Groups
     from tightloop.launching import attach, launch
+    from tightloop.rays import RayHits
     from tightloop.robot import Link, Robot
     from tightloop.scene import Scene
     from tightloop.sensors import ContactSensor, Site
@@ -85,6 +86,7 @@ _HOMES = {
     "tightloop.frames": ("FrameCopy",),
     "tightloop.groups": ("Groups",),
     "tightloop.launching": ("attach", "launch"),
+    "tightloop.rays": ("RayHits",),
     "tightloop.robot": ("Link", "Robot"),
     "tightloop.scene": ("Scene",),
     "tightloop.sensors": ("ContactSensor", "Site"),
@@ -114,6 +116,7 @@ __all__ = [
     "MissingLibrary",
     "Normal",
     "ProtocolMismatch",
+    "RayHits",
     "RecordingError",
     "ResourceError",
     "Robot",

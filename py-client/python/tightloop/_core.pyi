@@ -1,7 +1,7 @@
 """Types of the compiled module."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar, overload
 
 import numpy as np
@@ -313,6 +313,22 @@ class Dynamics:
         damping: bool,
         /,
     ) -> NDArray[np.float64]: ...
+
+class RayScene:
+    """What rays meet in a scene; `tightloop.rays.Rays` wraps it."""
+
+    def __init__(self, scene: str, folder: str, first_bodies: Mapping[str, int]) -> None: ...
+    def geoms(self) -> dict[str, list[Any]]: ...
+    def cast(
+        self,
+        chosen: NDArray[np.int64],
+        poses: Sequence[NDArray[Any]],
+        pnt: NDArray[Any],
+        vec: NDArray[Any],
+        exclude: NDArray[np.int32],
+        threads: int,
+        /,
+    ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]: ...
 
 def pack(
     out: NDArray[np.float32],

@@ -17,17 +17,15 @@ from tightloop._core import Frame
 from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
 from tightloop.errors import ArgumentError, CommandRefused
+from tightloop.frames import FrameCopy
 from tightloop.inputs import as_array, real_numbers
 from tightloop.params import Params
+from tightloop.rays import RayHits, Rays, ray_poses
 from tightloop.snapshot import Snapshot, transfer_file
 from tightloop.viewer_process import Viewer
 
 #: An array ``(worlds, dofs)`` for the whole scene, ``(dofs,)`` for identical commands, or a dict of such by robot name.
 Command = ArrayLike | Mapping[str, ArrayLike]
-
-
-# A quaternion shorter than this has no direction (MuJoCo: ``mjMINVAL``).
-_QUAT_MIN = 1e-15
 
 
 class Sim:
@@ -378,6 +376,41 @@ class Sim:
     ) -> NDArray[np.float64]:
         """Compute joint forces for given accelerations and states; see `Dynamics.inverse_dynamics`."""
         return self.dynamics.inverse_dynamics(joint_q, joint_qd, joint_qdd, damping=damping)
+
+    @functools.cached_property
+    def _ray_scene(self) -> Rays:
+        firsts = {name: bodies.start for name, bodies in self.bodies.items()}
+        return Rays(self.info["scene"], self.info["scene_folder"], firsts, len(self.body_names))
+
+    def rays(
+        self,
+        pnt: ArrayLike,
+        vec: ArrayLike,
+        *,
+        geomgroup: ArrayLike | None = None,
+        flg_static: bool = True,
+        bodyexclude: ArrayLike = -1,
+        frame: Frame | FrameCopy | None = None,
+    ) -> RayHits:
+        """Find what rays meet first of the geoms of MuJoCo models, as ``mj_ray`` does, in this process.
+
+        Args:
+            pnt: Origins in the world [m]. It and ``vec`` broadcast to ``(worlds, rays, 3)``: ``(rays, 3)`` counts for
+                all worlds, ``(3,)`` for all rays.
+            vec: Directions; their lengths are the units of the distances.
+            geomgroup: Six flags, which groups of geoms count; all if left out.
+            flg_static: Whether geoms of bodies that are welded to the world count.
+            bodyexclude: Place in `body_names` of a body to pass through, or -1; also one per world or per ray.
+            frame: A frame with ``body_q``, or with ``geom_xpos`` and ``geom_xmat``; that of `forward` if left out.
+
+        Raises:
+            ArgumentError: A shape, dtype or value is wrong, or a geom that counts is a height field or an SDF.
+            SceneError: A model's file cannot be read here, or no model of the scene has geoms.
+            UnknownField: The frame has no poses.
+        """
+        poses = ray_poses(self.forward() if frame is None else frame)
+        options: dict[str, Any] = {"geomgroup": geomgroup, "flg_static": flg_static, "bodyexclude": bodyexclude}
+        return self._ray_scene.cast(poses, pnt, vec, threads=self.threads, **options)
 
     def view(self, *, port: int = 8080, worlds: int = 256, open: bool = False) -> Viewer:
         """Open a browser viewer in a separate process, which ends with the simulation.

@@ -13,6 +13,7 @@
 //! | `visual` | what links look like |
 //! | `description` | scene, robots, joints, and what is named in them |
 //! | `validate` | checks of a description |
+//! | `ray_scene` | what rays meet in many worlds |
 //! | `urdf`, `mujoco`, `rigid_body` | robots from files; bodies of one link |
 //! | `hull_tables`, `model` | the kernel source's tables of hulls; the result |
 //! | `compile` | from a description to a model |
@@ -29,6 +30,7 @@ mod joint_kind;
 mod model;
 mod mujoco;
 mod pose;
+pub mod ray_scene;
 mod rigid_body;
 mod softness;
 mod surface;

@@ -17,6 +17,7 @@ mod names;
 mod options;
 mod pairs;
 mod passive;
+mod rays;
 mod refusals;
 mod sensors;
 mod tendons;

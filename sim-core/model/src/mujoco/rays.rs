@@ -1,0 +1,145 @@
+//! Geoms of a model as rays meet them: also those that touch nothing, and meshes by their triangles.
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::format::ModelFile;
+use super::frames::on_links;
+use super::names::names;
+use crate::error::ModelError;
+use crate::geometry::{RayShape, TriMesh, TriangleTree};
+use crate::ray_scene::{RayGeom, RayScene};
+
+impl RayScene {
+    /// Adds the geoms of a model that MuJoCo compiled. In the scene it has a name, and `first_body` is its world.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or that lacks what rays need.
+    pub fn add_mujoco(
+        &mut self,
+        path: impl AsRef<Path>,
+        name: &str,
+        first_body: usize,
+    ) -> Result<(), ModelError> {
+        let file = ModelFile::read(path.as_ref())?;
+        let count = file.rows("geom_type");
+        let all_names = names(&file, "geom", count)?;
+        let kinds = file.kinds("geom_type", count)?;
+        let sizes = file.vectors::<3>("geom_size", count)?;
+        let bodies = file.rows("body_weldid");
+        let welds = file.indices("body_weldid", bodies, bodies)?;
+        let places = on_links(&file, "geom", bodies)?;
+        let visible = visible(&file, count)?;
+        let groups = match file.has("geom_group") {
+            true => Some(file.integers("geom_group", count)?),
+            false => None,
+        };
+        let mut meshes = Meshes::read(&file)?;
+        let own_meshes = file.integers("geom_dataid", count)?;
+        for geom in 0..count {
+            let [a, b, c] = sizes[geom];
+            let shape = match kinds[geom].as_str() {
+                "mjGEOM_PLANE" => Some(RayShape::Plane([a, b])),
+                "mjGEOM_SPHERE" => Some(RayShape::Sphere(a)),
+                "mjGEOM_CAPSULE" => Some(RayShape::Capsule(a, b)),
+                "mjGEOM_ELLIPSOID" => Some(RayShape::Ellipsoid([a, b, c])),
+                "mjGEOM_CYLINDER" => Some(RayShape::Cylinder(a, b)),
+                "mjGEOM_BOX" => Some(RayShape::Box([a, b, c])),
+                "mjGEOM_MESH" => Some(RayShape::Mesh(meshes.tree(&file, own_meshes[geom])?)),
+                _ => None,
+            };
+            self.geoms.push(RayGeom {
+                name: format!("{name}/{}", all_names[geom]),
+                kind: kinds[geom].clone(),
+                shape,
+                body: first_body + places[geom].link,
+                pose: places[geom].pose,
+                group: groups.as_ref().map(|groups| groups[geom]),
+                is_static: welds[places[geom].link] == Some(0),
+                is_visible: visible[geom],
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Which geoms are seen: the opacity of a material comes before that of a geom.
+fn visible(file: &ModelFile, count: usize) -> Result<Vec<bool>, ModelError> {
+    let colors = file.vectors::<4>("geom_rgba", count)?;
+    let materials = file.rows("mat_rgba");
+    let of_materials = file.vectors::<4>("mat_rgba", materials)?;
+    let materials = file.indices("geom_matid", count, materials)?;
+    let both = colors.iter().zip(materials);
+    let color = both.map(|(own, material)| material.map_or(own, |place| &of_materials[place]));
+    Ok(color.map(|color| color[3] != 0.0).collect())
+}
+
+/// The meshes of a model; those that geoms name become trees of triangles.
+struct Meshes {
+    vertices: Vec<[f64; 3]>,
+    faces: Vec<[i64; 3]>,
+    /// Of each mesh the first vertex, the number of vertices, the first face and the number of faces.
+    parts: Vec<[i64; 4]>,
+    known: HashMap<i64, Arc<TriangleTree>>,
+}
+
+impl Meshes {
+    fn read(file: &ModelFile) -> Result<Meshes, ModelError> {
+        let meshes = file.rows("mesh_vertadr");
+        let all = [
+            "mesh_vertadr",
+            "mesh_vertnum",
+            "mesh_faceadr",
+            "mesh_facenum",
+        ];
+        let mut parts = vec![[0; 4]; meshes];
+        for (column, name) in all.into_iter().enumerate() {
+            for (mesh, number) in file.integers(name, meshes)?.into_iter().enumerate() {
+                parts[mesh][column] = number;
+            }
+        }
+        Ok(Meshes {
+            vertices: file.vectors("mesh_vert", file.rows("mesh_vert"))?,
+            faces: file.vectors_of_integers("mesh_face", file.rows("mesh_face"))?,
+            parts,
+            known: HashMap::new(),
+        })
+    }
+
+    fn tree(&mut self, file: &ModelFile, mesh: i64) -> Result<Arc<TriangleTree>, ModelError> {
+        if let Some(tree) = self.known.get(&mesh) {
+            return Ok(tree.clone());
+        }
+        let found = self.surface(mesh);
+        let found = found
+            .ok_or_else(|| file.fault("has a mesh with corners that are not there".to_owned()))?;
+        let tree = Arc::new(TriangleTree::new(&found));
+        self.known.insert(mesh, tree.clone());
+        Ok(tree)
+    }
+
+    fn surface(&self, mesh: i64) -> Option<TriMesh> {
+        let [first, count, first_face, faces] = self
+            .parts
+            .get(usize::try_from(mesh).ok()?)?
+            .map(|x| usize::try_from(x).ok());
+        let vertices = part(&self.vertices, first?, count?)?;
+        let faces = part(&self.faces, first_face?, faces?)?;
+        let corner = |corner: i64| {
+            let corner = u32::try_from(corner).ok()?;
+            ((corner as usize) < vertices.len()).then_some(corner)
+        };
+        let triangles = faces
+            .iter()
+            .map(|&[a, b, c]| Some([corner(a)?, corner(b)?, corner(c)?]));
+        Some(TriMesh {
+            vertices: vertices.to_vec(),
+            triangles: triangles.collect::<Option<_>>()?,
+        })
+    }
+}
+
+fn part<T>(all: &[T], first: usize, count: usize) -> Option<&[T]> {
+    all.get(first..first.checked_add(count)?)
+}
