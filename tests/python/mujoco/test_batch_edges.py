@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from batch_reference import N, model_of
+from batch_reference import XML, N, model_of, positions
 
 from tightloop.mujoco import Batch
 from tightloop.mujoco.batch import engine
@@ -95,6 +95,36 @@ def test_rays_without_a_direction_are_refused() -> None:
         for call, arguments, name in calls:
             with pytest.raises(ValueError, match=f"{name} must be an array"):
                 call(*arguments)
+
+
+@pytest.mark.parametrize("hill", [False, True])
+def test_rays_have_mujoco_s_filters_with_and_without_a_height_field(hill: bool) -> None:
+    spec = mujoco.MjSpec.from_string(XML.format(contacts=1))
+    if hill:
+        spec.add_hfield(name="hill", nrow=3, ncol=3, size=[2, 2, 0.2, 0.1], userdata=np.linspace(0, 1, 9))
+        field = spec.worldbody.add_geom(name="hill", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="hill", group=4)
+        field.contype = field.conaffinity = 0
+    model, rng, rays = spec.compile(), np.random.default_rng(3), 40
+    data, hit, face = mujoco.MjData(model), np.zeros(1, np.int32), np.zeros(3)
+    pnt = rng.normal(0, 0.3, (N, rays, 3)) + np.array([0.5, 0, 2])
+    vec = (rng.normal(0, 0.5, (N, rays, 3)) + np.array([0.5, 0, 0.5]) - pnt).astype(np.float32)
+    body = rng.integers(-2, model.nbody + 2, rays).astype(np.int32)
+    pnt, dist, normal = pnt.astype(np.float32), np.zeros((N, rays), np.float32), np.zeros((N, rays, 3), np.float32)
+    geomid = np.zeros((N, rays), np.int32)
+    with Batch(model, N, 2) as batch:
+        batch.bind("qpos")[:] = positions(model, 3)
+        for group in (None, np.array([1, 0, 0, 0, 1, 0], np.uint8), np.array([0, 1, 1, 1, 1, 1], np.uint8)):
+            for static in (True, False):
+                batch.rays(pnt, vec, dist, geomid, normal, group, static, body)
+                for sim in range(N):
+                    data.qpos[:] = batch.bind("qpos")[sim]
+                    mujoco.mj_forward(model, data)
+                    for ray in range(rays):
+                        start, way = pnt[sim, ray].astype(float), vec[sim, ray].astype(float)
+                        far = mujoco.mj_ray(model, data, start, way, group, static, body[ray], hit, face)
+                        assert geomid[sim, ray] == hit[0]
+                        assert dist[sim, ray] == pytest.approx(far, rel=1e-6)
+                        np.testing.assert_allclose(normal[sim, ray], face if far >= 0 else 0, atol=1e-6)
 
 
 def test_a_launch_that_fails_gives_the_same_error_again() -> None:

@@ -49,6 +49,7 @@ class Engine:
         options: ``threads``, ``precision`` and ``device`` of the launch.
 
     Attributes:
+        scene: The scene with the model alone.
         frame: The newest frame, or None before the first one of a launch.
         writes_rows: Whether each call starts from the rows alone.
         params: Names of the parameters that vary.
@@ -57,7 +58,7 @@ class Engine:
     """
 
     def __init__(self, model: Any, layout: StateLayout, bindings: Bindings, options: dict[str, Any]) -> None:
-        self._scene = Scene.from_mujoco(model, name=MODEL)
+        self.scene = Scene.from_mujoco(model, name=MODEL)
         self._layout, self._bindings, self._options = layout, bindings, options
         self._joints = JointMap(model)
         self._sims, self._nv = len(bindings.rows), model.nv
@@ -125,9 +126,9 @@ class Engine:
             # if the launch fails, the next call tries again, from the rows
             self._sim = None
         varied = self._launched_with[1]
-        self._scene.substeps = self.substeps
+        self.scene.substeps = self.substeps
         self._sim = sim = launch(
-            self._scene,
+            self.scene,
             worlds=self._sims,
             fields=sorted(self._fields),
             params=sorted(self.params),

@@ -1,7 +1,8 @@
-"""Rays and Jacobians, which MuJoCo computes for each simulation in a scratch ``MjData``."""
+"""Rays and Jacobians at the poses that MuJoCo computes for each simulation in a scratch ``MjData``."""
 
 from __future__ import annotations
 
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from tightloop.errors import ArgumentError
 from tightloop.mujoco.batch.layout import StateLayout
 from tightloop.mujoco.batch.library import mujoco
+from tightloop.rays import RayHits, Rays
+from tightloop.scene import Scene
 
 Array = NDArray[Any]
 
@@ -24,11 +27,18 @@ class Queries:
     Args:
         model: The batch's own copy of the model.
         layout: Its state.
+        scene: The scene with the model alone.
+        threads: Largest number of threads.
     """
 
-    def __init__(self, model: Any, layout: StateLayout) -> None:
+    def __init__(self, model: Any, layout: StateLayout, scene: Scene, threads: int) -> None:
         self._model, self._layout = model, layout
+        self._scene, self._threads = scene, threads
         self._data = mujoco.MjData(model)
+
+    @cached_property
+    def _rays(self) -> Rays:
+        return Rays(self._scene.to_toml(), "/", None, self._model.nbody)
 
     def rays(
         self,
@@ -70,21 +80,47 @@ class Queries:
         # for such a ray MuJoCo ends the process
         if (np.linalg.norm(vec[ids].astype(np.float64), axis=-1) < _LENGTH_MIN).any():
             raise ArgumentError("rays: a direction in vec has length 0")
-        hit, face = np.zeros(1, np.int32), np.zeros(3)
-        excluded = [-1] * count if exclude is None else exclude.tolist()
-        for row, sim in zip(rows, ids, strict=True):
+        excluded = np.full(count, -1, np.int32)
+        if exclude is not None:
+            is_body = (exclude >= 0) & (exclude < self._model.nbody)
+            excluded[is_body] = exclude[is_body]
+        origins, directions = pnt[ids], vec[ids]
+        if self._rays.is_complete:
+            cast = partial(self._rays.cast, self._poses(rows), threads=self._threads)
+        else:
+            cast = partial(self._by_mujoco, rows)
+        found = cast(origins, directions, geomgroup=geomgroup, flg_static=bool(static), bodyexclude=excluded[None, :])
+        for array, values in zip(filled, found, strict=True):
+            if array is not None:
+                array[ids] = values
+
+    def _poses(self, rows: Array) -> list[Array]:
+        """``geom_xpos`` and ``geom_xmat`` of rows."""
+        geoms = self._model.ngeom
+        poses = [np.empty((len(rows), geoms, 3)), np.empty((len(rows), geoms, 9))]
+        for at, row in enumerate(rows):
             self._place(row)
-            origins, directions = pnt[sim].astype(np.float64), vec[sim].astype(np.float64)
-            for ray in range(count):
+            poses[0][at], poses[1][at] = self._data.geom_xpos, self._data.geom_xmat
+        return poses
+
+    def _by_mujoco(
+        self, rows: Array, pnt: Array, vec: Array, *, geomgroup: Array | None, flg_static: bool, bodyexclude: Array
+    ) -> RayHits:
+        """What rays meet where a geom is a height field or an SDF."""
+        shape = pnt.shape[:2]
+        found = RayHits(np.empty(shape), np.empty(shape, np.int32), np.zeros((*shape, 3)))
+        hit, face = np.zeros(1, np.int32), np.zeros(3)
+        excluded = bodyexclude[0].tolist()
+        for at, row in enumerate(rows):
+            self._place(row)
+            origins, directions = pnt[at].astype(np.float64), vec[at].astype(np.float64)
+            for ray in range(shape[1]):
                 origin, direction, body = origins[ray], directions[ray], excluded[ray]
-                far = mujoco.mj_ray(
-                    self._model, self._data, origin, direction, geomgroup, bool(static), body, hit, face
-                )
-                dist[sim, ray] = far
-                if geomid is not None:
-                    geomid[sim, ray] = hit[0]
-                if normal is not None:
-                    normal[sim, ray] = face if far >= 0.0 else 0.0
+                far = mujoco.mj_ray(self._model, self._data, origin, direction, geomgroup, flg_static, body, hit, face)
+                found.dist[at, ray], found.geomid[at, ray] = far, hit[0]
+                if far >= 0.0:
+                    found.normal[at, ray] = face
+        return found
 
     def jac(
         self, rows: Array, ids: Array, num_sims: int, filled: tuple[Array | None, Array | None], at: tuple[Array, Array]

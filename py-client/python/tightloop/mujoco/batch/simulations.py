@@ -88,7 +88,7 @@ class Batch(NamedViews):
         self._stepping = Stepping(
             self._own, self._fields, self._layout, self._bindings, self._engine, forward=bool(forward)
         )
-        self._queries = Queries(self._own, self._layout)
+        self._queries = Queries(self._own, self._layout, self._engine.scene, self.num_threads)
         self._lock = threading.RLock()
 
     @property
@@ -263,7 +263,8 @@ class Batch(NamedViews):
     ) -> None:
         """Intersect rays with the geoms of each simulation, as ``mj_ray`` does. No simulation and no field changes.
 
-        MuJoCo computes them one by one on one thread.
+        MuJoCo places the geoms of each simulation on one thread; the rays of all run on `num_threads`. In a model with
+        visible height fields, MuJoCo computes the rays one by one.
 
         Args:
             pnt: Origins in the world [m], ``(num_sims, nray, 3)``, float64 or float32 as all real arrays here.
