@@ -30,7 +30,7 @@ impl RayScene {
         let bodies = file.rows("body_weldid");
         let welds = file.indices("body_weldid", bodies, bodies)?;
         let places = on_links(&file, "geom", bodies)?;
-        let visible = visible(&file, count)?;
+        let visible = visible(&file)?;
         let groups = match file.has("geom_group") {
             true => Some(file.integers("geom_group", count)?),
             false => None,
@@ -65,7 +65,8 @@ impl RayScene {
 }
 
 /// Which geoms are seen: the opacity of a material comes before that of a geom.
-fn visible(file: &ModelFile, count: usize) -> Result<Vec<bool>, ModelError> {
+pub(super) fn visible(file: &ModelFile) -> Result<Vec<bool>, ModelError> {
+    let count = file.rows("geom_type");
     let colors = file.vectors::<4>("geom_rgba", count)?;
     let materials = file.rows("mat_rgba");
     let of_materials = file.vectors::<4>("mat_rgba", materials)?;

@@ -19,7 +19,6 @@ mod inverse_dynamics;
 pub mod kinematics;
 mod link_forces;
 pub mod mass_matrix;
-mod masses;
 pub mod mujoco_forces;
 pub mod mujoco_frames;
 pub mod mujoco_momenta;
@@ -39,7 +38,7 @@ pub mod ties;
 mod transmission;
 pub mod velocities;
 
-use params::{gravity, param};
+use params::{gravity, masses, param};
 pub use stage::{BlockOf, ConstantsOf, Runs, Stage, StageId, StageRow};
 
 /// The stages in the order of a step: name, page, and what runs it: a step, an evaluation of outputs, or both.

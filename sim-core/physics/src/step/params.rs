@@ -1,5 +1,7 @@
 //! Parameters as stages read them: values of each world where they vary, otherwise constants of the model.
 
+pub(super) mod masses;
+
 use crate::constants::Constants;
 use crate::constants::params::Param;
 use crate::lane::Num;

@@ -104,21 +104,6 @@ impl Reader<'_> {
     }
 }
 
-/// Which geoms have any opacity of their own or of their material.
-pub(super) fn visible(file: &ModelFile) -> Result<Vec<bool>, ModelError> {
-    let count = file.rows("geom_type");
-    let colors = file.vectors::<4>("geom_rgba", count)?;
-    let materials = file.rows("mat_rgba");
-    let of_materials = file.vectors::<4>("mat_rgba", materials)?;
-    let materials = file.indices("geom_matid", count, materials)?;
-    let both = colors.iter().zip(materials);
-    Ok(both
-        .map(|([_, _, _, alpha], material)| {
-            *alpha != 0.0 || material.is_some_and(|material| of_materials[material][3] != 0.0)
-        })
-        .collect())
-}
-
 /// What rays meet of each geom.
 pub(super) fn rays(file: &ModelFile, bodies: usize) -> Result<Vec<Option<RayPart>>, ModelError> {
     let geoms = on_links(file, "geom", bodies)?;

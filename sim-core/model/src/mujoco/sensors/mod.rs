@@ -9,6 +9,7 @@ use super::frame;
 use super::frames::on_links;
 use super::names::names;
 use super::options::has_flag;
+use super::rays;
 use super::tendons::{Tendons, moving};
 use crate::description::{OnLink, RayPart, Robot, Sense, Sensor, SensorParts};
 use crate::error::ModelError;
@@ -144,7 +145,7 @@ impl<'a> Reader<'a> {
             bodies: inertial.map(|(pos, quat)| frame(pos, quat)).collect(),
             geoms: on_links(file, "geom", bodies)?,
             sites: on_links(file, "site", bodies)?,
-            is_visible: contacts::visible(file)?,
+            is_visible: rays::visible(file)?,
             rays: contacts::rays(file, bodies)?,
             site_kinds: file.kinds("site_type", file.rows("site_bodyid"))?,
             site_sizes: file.vectors("site_size", file.rows("site_bodyid"))?,

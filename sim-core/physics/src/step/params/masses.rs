@@ -11,14 +11,14 @@ use crate::step::sites::axes;
 
 /// Do masses or inertias of links vary?
 #[inline(always)]
-pub(super) fn vary<R>(m: &Constants<R>) -> bool {
+pub(in crate::step) fn vary<R>(m: &Constants<R>) -> bool {
     let params = [Param::BodyMassScale, Param::BodyMass, Param::BodyInertia];
     params.iter().any(|&param| m.varying.first(param).is_some())
 }
 
 /// Mass of a link [kg], and its inertia about its centre of mass in the body's axes [kg·m²], both before their scale.
 #[inline(always)]
-pub(super) fn of_part<F: Num>(
+pub(in crate::step) fn of_part<F: Num>(
     m: &Constants<F::Real>,
     params: &[F],
     part: &Part<F::Real>,
@@ -36,14 +36,23 @@ pub(super) fn of_part<F: Num>(
 
 /// What mass and inertia of a link are multiplied with; none where that does not vary.
 #[inline(always)]
-pub(super) fn scale<F: Num>(m: &Constants<F::Real>, params: &[F], link: usize) -> Option<F> {
+pub(in crate::step) fn scale<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    link: usize,
+) -> Option<F> {
     let first = m.varying.first(Param::BodyMassScale)?;
     Some(params[first + link])
 }
 
 /// Mass of a link with its scale, `fixed` where it does not vary [kg].
 #[inline(always)]
-pub(super) fn mass<F: Num>(m: &Constants<F::Real>, params: &[F], link: usize, fixed: F::Real) -> F {
+pub(in crate::step) fn mass<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    link: usize,
+    fixed: F::Real,
+) -> F {
     let own = param(m, params, Param::BodyMass, link, fixed);
     match scale(m, params, link) {
         Some(scale) => own * scale,
@@ -53,7 +62,7 @@ pub(super) fn mass<F: Num>(m: &Constants<F::Real>, params: &[F], link: usize, fi
 
 /// I v in world axes, of a link of a MuJoCo model about its centre of mass.
 #[inline(always)]
-pub(super) fn inertia_times<F: Num, V>(
+pub(in crate::step) fn inertia_times<F: Num, V>(
     m: &Constants<F::Real>,
     b: &Block<F, V>,
     body: &MujocoBody<F::Real>,
