@@ -316,7 +316,9 @@ def main() -> None:
     print_table(rows)
     if options.dry_run:
         return
-    given = "".join(f" {word}" for word in sys.argv[1:])
+    # the folder of the models is of this machine
+    words = ["REFERENCE" if Path(word) == options.reference else word for word in sys.argv[1:]]
+    given = "".join(f" {word}" for word in words)
     facts = {
         "command": f"python benches/mujoco_models.py{given}",
         "mjbatch": peer.versions["mjbatch"],

@@ -12,8 +12,8 @@ import pytest
 import tightloop as tl
 from conftest import REPOSITORY
 
-ROBOT = """<?xml version="1.0"?>
-<!-- a comment -->
+HEAD = '<?xml version="1.0"?>\n' + 60 * "<!-- a comment -->\n"
+ROBOT = """
 <mujoco model="two joints"><option timestep="0.005" integrator="implicitfast"><flag gravity="disable"/></option>
 <worldbody><geom name="floor" type="plane" size="0 0 1"/>
 <body name="cart" pos="0 0 1"><joint name="x" type="slide" axis="1 0 0" range="-1 1" limited="true"/>
@@ -28,6 +28,7 @@ ROBOT = """<?xml version="1.0"?>
   <velocity tendon="both" kv="3"/></actuator>
 <sensor><accelerometer name="imu" site="top"/><jointpos name="where" joint="x"/></sensor>
 <keyframe><key name="home" qpos="0.5 0.1"/></keyframe></mujoco>"""
+ROBOT = HEAD + ROBOT.lstrip()
 MUSCLE = ROBOT.replace("<actuator>", '<actuator><muscle name="calf" joint="x" ctrlrange="0 1" lengthrange="0 1"/>')
 
 

@@ -17,6 +17,8 @@ _IN_PYTHON = {
 }
 # The first element of a robot file begins within so many bytes.
 _HEAD_BYTES = 1 << 16
+_BEFORE_ELEMENTS = re.compile(r"\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>", re.DOTALL)
+_MJCF = re.compile(r"<mujoco[\s>/]")
 
 
 def main() -> int:
@@ -53,7 +55,7 @@ def _scene_file(argument: str) -> str:
 def _with_compiled(arguments: list[str]) -> list[str]:
     """Return the arguments of ``inspect``; if they name an MJCF file, with the model that MuJoCo compiles from it."""
     for argument in arguments[1:]:
-        if Path(argument).is_file() and _is_mjcf(Path(argument)):
+        if _is_mjcf(Path(argument)):
             from tightloop.mujoco import serve
 
             return [*arguments, "--exported", serve.exported_file(argument)]
@@ -61,10 +63,18 @@ def _with_compiled(arguments: list[str]) -> list[str]:
 
 
 def _is_mjcf(path: Path) -> bool:
-    """Return whether the first element of a file is MJCF's."""
-    with path.open("rb") as file:
-        text = file.read(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
-    return re.match(r"(\s|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>)*<mujoco[\s>/]", text, re.DOTALL) is not None
+    """Return whether this is a file whose first element is MJCF's."""
+    try:
+        if not path.is_file():
+            return False
+        with path.open("rb") as file:
+            text = file.read(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
+    except (OSError, ValueError):  # an option's value that is too long for a path, or a file that Rust reports
+        return False
+    at = 0
+    while skipped := _BEFORE_ELEMENTS.match(text, at):
+        at = skipped.end()
+    return _MJCF.match(text, at) is not None
 
 
 if __name__ == "__main__":

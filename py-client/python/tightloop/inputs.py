@@ -38,6 +38,16 @@ def real_numbers(what: str, value: Any) -> NDArray[Any]:
     return given
 
 
+def switches(what: str, value: Any) -> NDArray[Any]:
+    """Convert an array of bool or of real numbers to NumPy, bool to 0 and 1.
+
+    Raises:
+        CommandRefused: The value is no array, or of something else.
+    """
+    given = _numpy(what, value)
+    return given.astype(np.float64) if given.dtype == np.bool_ else real_numbers(what, given)
+
+
 def as_mask(name: str, value: Any, worlds: int) -> NDArray[np.bool_]:
     """Convert a mask to a contiguous bool array, shape ``(worlds,)``; ``name`` is for messages.
 

@@ -18,7 +18,7 @@ from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
 from tightloop.errors import ArgumentError, CommandRefused
 from tightloop.frames import FrameCopy
-from tightloop.inputs import as_array, real_numbers
+from tightloop.inputs import as_array, real_numbers, switches
 from tightloop.params import Params
 from tightloop.rays import RayHits, Rays, ray_poses
 from tightloop.snapshot import Snapshot, transfer_file
@@ -105,9 +105,9 @@ class Sim:
         joint_target_q: Command | None = None,
         joint_target_qd: Command | None = None,
         ctrl: Command | None = None,
-        mocap_pos: Command | None = None,
-        mocap_quat: Command | None = None,
-        eq_active: Command | None = None,
+        mocap_pos: ArrayLike | None = None,
+        mocap_quat: ArrayLike | None = None,
+        eq_active: ArrayLike | None = None,
         body_f: Command | None = None,
     ) -> Frame:
         """Advance every world by one control frame. A command that is left out keeps its last value.
@@ -149,9 +149,9 @@ class Sim:
         joint_target_q: Command | None = None,
         joint_target_qd: Command | None = None,
         ctrl: Command | None = None,
-        mocap_pos: Command | None = None,
-        mocap_quat: Command | None = None,
-        eq_active: Command | None = None,
+        mocap_pos: ArrayLike | None = None,
+        mocap_quat: ArrayLike | None = None,
+        eq_active: ArrayLike | None = None,
         body_f: Command | None = None,
     ) -> None:
         """Begin a step and return at once: the worlds advance while the caller continues, until `recv`.
@@ -232,11 +232,11 @@ class Sim:
         *,
         joint_q: Command | None = None,
         joint_qd: Command | None = None,
-        act: Command | None = None,
-        ctrl: Command | None = None,
-        mocap_pos: Command | None = None,
-        mocap_quat: Command | None = None,
-        eq_active: Command | None = None,
+        act: ArrayLike | None = None,
+        ctrl: ArrayLike | None = None,
+        mocap_pos: ArrayLike | None = None,
+        mocap_quat: ArrayLike | None = None,
+        eq_active: ArrayLike | None = None,
         mask: ArrayLike | None = None,
     ) -> Frame:
         """Set joint positions and velocities, and what else MuJoCo models begin with.
@@ -456,8 +456,8 @@ class Sim:
 
     def _flat(self, name: str, value: Command) -> Command:
         """Return an array of mocap bodies with the entries of all of them in a row, and switches as numbers."""
-        if name == "eq_active" and np.asarray(value).dtype == np.bool_:
-            return np.asarray(value, np.float64)
+        if name == "eq_active":
+            return switches(name, value)
         width = {"mocap_pos": 3, "mocap_quat": 4}.get(name)
         if width is None:
             return value

@@ -174,6 +174,27 @@ def test_equalities_are_switched_in_each_simulation() -> None:
         assert (active == 1).all()
 
 
+def test_rays_and_jacobians_are_refused_where_a_model_would_differ() -> None:
+    model = model_of()
+    with Batch(model, N, 1, precision="f64") as batch:
+        pnt, vec, dist = np.zeros((N, 1, 3)), np.tile([0.0, 0.0, -1.0], (N, 1, 1)), np.zeros((N, 1))
+        for name in ("geom_pos", "geom_rgba"):
+            values = batch.expand(name)
+            batch.rays(pnt, vec, dist)
+            values[2, 0] += 0.25
+            with pytest.raises(ValueError, match=f"sim 2: {name} differs"):
+                batch.rays(pnt, vec, dist)
+            values[2, 0] -= 0.25
+
+
+def test_masses_in_a_medium_are_not_expanded() -> None:
+    xml = XML.format(contacts=0).replace("<worldbody>", '<option density="1.2"/><worldbody>', 1)
+    with Batch(mujoco.MjModel.from_xml_string(xml), N, 1) as batch:
+        with pytest.raises(ValueError, match="body_mass cannot differ between simulations of a medium"):
+            batch.expand("body_mass")
+        batch.step()
+
+
 def test_set_const_computes_constants_of_each_simulation() -> None:
     model = model_of()
     cart = model.body("cart").id

@@ -104,3 +104,33 @@ def test_masses_in_a_medium_do_not_vary() -> None:
     xml = random_mjcf(0, 3, EVERYTHING)
     with pytest.raises(tl.SceneError, match="body_mass cannot vary: density and viscosity"):
         tl.launch(tl.Scene.from_mujoco(mujoco.MjModel.from_xml_string(xml)), worlds=1, params=("body_mass",))
+
+
+def test_bodies_without_mass_are_given_one() -> None:
+    """A payload beside its frame that is held against gravity, and a static body that is weighed."""
+    model = mujoco.MjModel.from_xml_string("""
+<mujoco>
+  <worldbody>
+    <body name="still" pos=".1 .2 1"><geom size=".1" mass="1" contype="0" conaffinity="0"/></body>
+    <body pos="0 0 1">
+      <joint axis="0 1 0"/><geom type="capsule" size=".05" fromto="0 0 0 .5 0 0" mass="1"/>
+      <body name="payload" pos=".5 0 0" gravcomp=".5"><inertial pos=".3 0 -.2" mass="0" diaginertia="0 0 0"/></body>
+    </body>
+  </worldbody>
+  <sensor><e_potential/></sensor>
+</mujoco>""")
+    with live(model, worlds=2, fields=("sensordata", "subtree_com"), params=("body_mass",)) as case:
+        mass = np.array([model.body_mass, model.body_mass])
+        mass[1, [1, 3]] = 3.0, 2.0
+        case.sim.params.write(body_mass=mass)
+        frame = case.sim.write(joint_q=[0.3], joint_qd=[0.2])
+        for world in range(2):
+            own = copy.copy(model)
+            own.body_mass[:] = mass[world]
+            mujoco.mj_setConst(own, mujoco.MjData(own))
+            data = mujoco.MjData(own)
+            data.qpos[:], data.qvel[:] = 0.3, 0.2
+            mujoco.mj_forward(own, data)
+            np.testing.assert_allclose(frame.qacc[world], data.qacc, rtol=1e-9)
+            np.testing.assert_allclose(frame.sensordata[world], data.sensordata, rtol=1e-9)
+            np.testing.assert_allclose(frame.subtree_com[world], data.subtree_com, atol=1e-9)

@@ -40,7 +40,7 @@ pub(super) fn add_parts(
     for (place, link) in robot.link_order().into_iter().enumerate() {
         let carrier = &carriers[link];
         let inertial = robot.links[link].inertial;
-        let inertial = inertial.or_else(|| is_given.then(Inertial::default));
+        let inertial = inertial.or_else(|| is_given.then(|| massless(robot, link)));
         let (Some(body), Some(inertial)) = (carrier.body, inertial) else {
             continue;
         };
@@ -52,6 +52,15 @@ pub(super) fn add_parts(
             inertia: packed(carrier.pose.rotate_tensor(inertial.inertia)),
             link_axes: turns.then(|| axes.map(|axis| carrier.pose.rotate(axis))),
         });
+    }
+}
+
+/// What a link without mass has, about the centre of mass that its file gives.
+pub(super) fn massless(robot: &Robot, link: usize) -> Inertial {
+    let parts = robot.mujoco.as_ref();
+    Inertial {
+        pos: parts.map_or([0.0; 3], |parts| parts.frames.inertias[link].pose.pos),
+        ..Inertial::default()
     }
 }
 

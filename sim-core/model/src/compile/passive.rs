@@ -2,6 +2,7 @@
 
 use super::bodies::{BodyBuilder, columns};
 use super::carrier::Carrier;
+use super::masses::massless;
 use crate::description::{Compensator, Description, Joint, MujocoJoint, MujocoParts, Robot};
 use crate::joint_kind::JointKind;
 use sim_physics::constants::Constants;
@@ -71,13 +72,12 @@ impl BodyBuilder {
         // frames are in the order of links
         for (place, link) in robot.link_order().into_iter().enumerate() {
             let share = parts.compensations.iter().find(|(own, _)| *own == link);
-            let Some((&(_, share), inertial)) = share.zip(robot.links[link].inertial.as_ref())
-            else {
+            let (Some(&(_, share)), Some(body)) = (share, carriers[link].body) else {
                 continue;
             };
-            let Some(body) = carriers[link].body else {
-                continue;
-            };
+            // one without mass may be given some
+            let inertial = robot.links[link].inertial;
+            let inertial = inertial.unwrap_or_else(|| massless(robot, link));
             self.mujoco.compensations.push(Compensation {
                 body,
                 link: first + place,

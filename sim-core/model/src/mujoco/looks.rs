@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::format::ModelFile;
-use super::frame;
+use super::frames::on_links;
 use super::geoms::primitive;
 use super::meshes::Meshes;
 use super::names::names;
@@ -50,7 +50,7 @@ fn visuals(file: &ModelFile) -> Result<Visuals, ModelError> {
     let links = names(file, "body", file.rows("body_parentid"))?;
     let geom_names = names(file, "geom", count)?;
     let kinds = file.kinds("geom_type", count)?;
-    let bodies = file.indices("geom_bodyid", count, links.len())?;
+    let places = on_links(file, "geom", links.len())?;
     let groups = file.integers("geom_group", count)?;
     let colors = colors(file, count)?;
     let mut notes = Vec::new();
@@ -68,21 +68,19 @@ fn visuals(file: &ModelFile) -> Result<Visuals, ModelError> {
     let is_shown = |geom: usize| is_seen(geom) && groups[geom] < GROUPS_SHOWN;
     let mut dressed = vec![false; links.len()];
     for geom in (0..count).filter(|&geom| is_shown(geom)) {
-        dressed[bodies[geom].unwrap_or(0)] = true;
+        dressed[places[geom].link] = true;
     }
-    let places = file.vectors::<3>("geom_pos", count)?;
-    let turns = file.vectors::<4>("geom_quat", count)?;
     let mut surfaces = Surfaces::read(file, count)?;
     let mut visuals = Vec::new();
     for geom in (0..count).filter(|&geom| is_seen(geom)) {
-        let link = bodies[geom].unwrap_or(0);
+        let link = places[geom].link;
         if dressed[link] && !is_shown(geom) {
             continue;
         }
         visuals.push(Visual {
             link: links[link].clone(),
             name: Some(geom_names[geom].clone()),
-            pose: frame(places[geom], turns[geom]),
+            pose: places[geom].pose,
             look: surfaces.look(&kinds[geom], geom)?,
             color: Some(colors[geom].map(|part| part.clamp(0.0, 1.0))),
             texture: None,

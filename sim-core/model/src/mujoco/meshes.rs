@@ -67,6 +67,10 @@ impl<'a> Meshes<'a> {
     pub fn triangles(&self, mesh: i64) -> Result<TriMesh, ModelError> {
         let [vertices, faces, _] = &self.parts[self.place(mesh)?];
         let vertices = self.vertices[vertices.clone()].to_vec();
+        if vertices.as_flattened().iter().any(|x| !x.is_finite()) {
+            let fault = "has a mesh with an infinite vertex".to_owned();
+            return Err(self.file.fault(fault));
+        }
         let triangles = self.faces[faces.clone()].iter().map(|face| {
             let corners = face.map(|corner| u32::try_from(corner).unwrap_or(u32::MAX));
             let is_there = corners.iter().all(|&c| (c as usize) < vertices.len());

@@ -1,14 +1,16 @@
 //! Geoms of a model as rays meet them: also those that touch nothing, and meshes by their triangles.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::path::Path;
 use std::sync::Arc;
 
 use super::format::ModelFile;
 use super::frames::on_links;
+use super::meshes::Meshes;
 use super::names::names;
 use crate::error::ModelError;
-use crate::geometry::{RayShape, TriMesh, TriangleTree};
+use crate::geometry::{RayShape, TriangleTree};
 use crate::ray_scene::{RayGeom, RayScene};
 
 impl RayScene {
@@ -35,7 +37,17 @@ impl RayScene {
             true => Some(file.integers("geom_group", count)?),
             false => None,
         };
-        let mut meshes = Meshes::read(&file)?;
+        let meshes = Meshes::read(&file)?;
+        let mut trees: HashMap<i64, Arc<TriangleTree>> = HashMap::new();
+        let mut tree = |mesh: i64| -> Result<Arc<TriangleTree>, ModelError> {
+            Ok(match trees.entry(mesh) {
+                Entry::Occupied(known) => known.get().clone(),
+                Entry::Vacant(new) => {
+                    let made = Arc::new(TriangleTree::new(&meshes.triangles(mesh)?));
+                    new.insert(made).clone()
+                }
+            })
+        };
         let own_meshes = file.integers("geom_dataid", count)?;
         for geom in 0..count {
             let [a, b, c] = sizes[geom];
@@ -46,7 +58,7 @@ impl RayScene {
                 "mjGEOM_ELLIPSOID" => Some(RayShape::Ellipsoid([a, b, c])),
                 "mjGEOM_CYLINDER" => Some(RayShape::Cylinder(a, b)),
                 "mjGEOM_BOX" => Some(RayShape::Box([a, b, c])),
-                "mjGEOM_MESH" => Some(RayShape::Mesh(meshes.tree(&file, own_meshes[geom])?)),
+                "mjGEOM_MESH" => Some(RayShape::Mesh(tree(own_meshes[geom])?)),
                 _ => None,
             };
             self.geoms.push(RayGeom {
@@ -74,73 +86,4 @@ pub(super) fn visible(file: &ModelFile) -> Result<Vec<bool>, ModelError> {
     let both = colors.iter().zip(materials);
     let color = both.map(|(own, material)| material.map_or(own, |place| &of_materials[place]));
     Ok(color.map(|color| color[3] != 0.0).collect())
-}
-
-/// The meshes of a model; those that geoms name become trees of triangles.
-struct Meshes {
-    vertices: Vec<[f64; 3]>,
-    faces: Vec<[i64; 3]>,
-    /// Of each mesh the first vertex, the number of vertices, the first face and the number of faces.
-    parts: Vec<[i64; 4]>,
-    known: HashMap<i64, Arc<TriangleTree>>,
-}
-
-impl Meshes {
-    fn read(file: &ModelFile) -> Result<Meshes, ModelError> {
-        let meshes = file.rows("mesh_vertadr");
-        let all = [
-            "mesh_vertadr",
-            "mesh_vertnum",
-            "mesh_faceadr",
-            "mesh_facenum",
-        ];
-        let mut parts = vec![[0; 4]; meshes];
-        for (column, name) in all.into_iter().enumerate() {
-            for (mesh, number) in file.integers(name, meshes)?.into_iter().enumerate() {
-                parts[mesh][column] = number;
-            }
-        }
-        Ok(Meshes {
-            vertices: file.vectors("mesh_vert", file.rows("mesh_vert"))?,
-            faces: file.vectors_of_integers("mesh_face", file.rows("mesh_face"))?,
-            parts,
-            known: HashMap::new(),
-        })
-    }
-
-    fn tree(&mut self, file: &ModelFile, mesh: i64) -> Result<Arc<TriangleTree>, ModelError> {
-        if let Some(tree) = self.known.get(&mesh) {
-            return Ok(tree.clone());
-        }
-        let found = self.surface(mesh);
-        let found = found
-            .ok_or_else(|| file.fault("has a mesh with corners that are not there".to_owned()))?;
-        let tree = Arc::new(TriangleTree::new(&found));
-        self.known.insert(mesh, tree.clone());
-        Ok(tree)
-    }
-
-    fn surface(&self, mesh: i64) -> Option<TriMesh> {
-        let [first, count, first_face, faces] = self
-            .parts
-            .get(usize::try_from(mesh).ok()?)?
-            .map(|x| usize::try_from(x).ok());
-        let vertices = part(&self.vertices, first?, count?)?;
-        let faces = part(&self.faces, first_face?, faces?)?;
-        let corner = |corner: i64| {
-            let corner = u32::try_from(corner).ok()?;
-            ((corner as usize) < vertices.len()).then_some(corner)
-        };
-        let triangles = faces
-            .iter()
-            .map(|&[a, b, c]| Some([corner(a)?, corner(b)?, corner(c)?]));
-        Some(TriMesh {
-            vertices: vertices.to_vec(),
-            triangles: triangles.collect::<Option<_>>()?,
-        })
-    }
-}
-
-fn part<T>(all: &[T], first: usize, count: usize) -> Option<&[T]> {
-    all.get(first..first.checked_add(count)?)
 }

@@ -224,8 +224,8 @@ class Engine:
         held = {name: np.where(mask[:, None], rows[:, at], self._held[name]) for name, at in self._held_at.items()}
         if self.silenced.any() and "ctrl" in held:
             held["ctrl"][mask & self.silenced] = 0.0
-        if "eq_active" in held:  # MuJoCo keeps a byte of each
-            held["eq_active"] = np.trunc(held["eq_active"]) != 0.0
+        if "eq_active" in held:  # as MuJoCo, which keeps a bool of each
+            held["eq_active"] = held["eq_active"] != 0.0
         force = self._force
         # other rows may hold anything until their next call
         applied = np.where(mask[:, None], rows[:, self._layout.at("qfrc_applied")], 0.0)

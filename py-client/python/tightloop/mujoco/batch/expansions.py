@@ -93,6 +93,11 @@ class Expansions:
         wanted = scalar if dtype is None else np.dtype(dtype)
         if wanted != scalar and not (scalar == np.float64 and wanted == np.float32):
             raise ArgumentError(f"{name} cannot be {wanted}; expand it as {scalar}")
+        if name in masses.FIELDS and (self._model.opt.density > 0.0 or self._model.opt.viscosity > 0.0):
+            raise ArgumentError(
+                f"{name} cannot differ between simulations of a medium, which drags boxes of the model's masses; "
+                "set density and viscosity to 0, or make a Batch per value"
+            )
         if name not in self._arrays:
             self._arrays[name] = np.repeat(template[None], self._sims, axis=0).astype(wanted)
         if self._arrays[name].dtype != wanted:
@@ -103,7 +108,7 @@ class Expansions:
         """Return the parameters that must vary for what is expanded."""
         found = [_SAME[name] for name in self._arrays if name in _SAME]
         if any(name in self._arrays for name in masses.FIELDS):
-            found.extend(masses.PARAMS)
+            found.extend(masses.FIELDS)
         found.extend(param for name, param in gains.PARAMS.items() if name in self._arrays)
         if "geom_friction" in self._arrays:
             found.append("shape_mu")
@@ -175,15 +180,16 @@ class Expansions:
         if asleep.any():
             raise ArgumentError(f"sim {ids[int(asleep.argmax())]}: sleep cannot be enabled in a Batch")
 
-    def check_fixed(self, ids: Array) -> None:
-        """Check that fields that cannot differ have the values of the model.
+    def check_fixed(self, ids: Array, also: tuple[str, ...] = ()) -> None:
+        """Check that fields that cannot differ, and those of ``also``, have the values of the model.
 
         Raises:
             ArgumentError: One has not; the message has the simulation and the field.
         """
         self.check_sleep(ids)
         for name, array in self._arrays.items():
-            if name in _VARYING or name in CONSTANTS or name.startswith(_VISUAL):
+            free = name in _VARYING or name in CONSTANTS or name.startswith(_VISUAL)
+            if free and name not in also:
                 continue
             template = np.asarray(self._template(name)).astype(array.dtype)
             given = array[ids]

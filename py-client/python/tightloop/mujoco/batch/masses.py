@@ -11,10 +11,8 @@ from tightloop.mujoco.batch.rotations import rotations
 
 Array = NDArray[Any]
 
-#: Model fields that masses and inertias are made of.
+#: Model fields, and parameters of a simulation of the same names: inertias in the axes of bodies there.
 FIELDS = ("body_mass", "body_inertia")
-#: The parameters that they become.
-PARAMS = ("body_mass", "body_inertia")
 # entries of a symmetric matrix in the order of `body_inertia`: xx, yy, zz, xy, xz, yz
 _ROWS, _COLUMNS = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
 

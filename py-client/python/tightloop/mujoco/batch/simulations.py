@@ -28,6 +28,9 @@ from tightloop.sim import Sim
 
 Array = NDArray[Any]
 
+#: Fields for pictures that decide what rays meet.
+_SEEN_BY_RAYS = ("geom_rgba", "geom_matid", "geom_group", "mat_rgba")
+
 
 class Batch(NamedViews):
     """Many simulations of one MuJoCo model, read and written through live arrays.
@@ -278,10 +281,12 @@ class Batch(NamedViews):
             ids: As in `step`.
 
         Raises:
-            ArgumentError: A shape or dtype is wrong, a value is not finite, or a direction has length 0.
+            ArgumentError: A shape or dtype is wrong, a value is not finite, a direction has length 0, or a simulation
+                has geoms that differ from the model's.
         """
         with self._lock:
             chosen = Selection(ids, self.num_sims)
+            self._expansions.check_fixed(chosen.indices, also=_SEEN_BY_RAYS)
             rows = self._bindings.pending(chosen.ids)
             filled, options = (dist, geomid, normal), (geomgroup, flg_static, bodyexclude)
             self._queries.rays(rows, chosen.indices, self.num_sims, given=(pnt, vec), filled=filled, options=options)
@@ -303,6 +308,7 @@ class Batch(NamedViews):
         """
         with self._lock:
             chosen = Selection(ids, self.num_sims)
+            self._expansions.check_fixed(chosen.indices)
             rows = self._bindings.pending(chosen.ids)
             self._queries.jac(rows, chosen.indices, self.num_sims, (jacp, jacr), (point, body))
 

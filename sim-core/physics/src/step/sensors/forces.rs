@@ -11,10 +11,11 @@ use crate::math::spatial::{ANGULAR, Spatial};
 use crate::math::vec3::Vec3;
 use crate::step::inverse_dynamics::{point_acceleration, proper_accelerations};
 use crate::step::kinematics::read_quat;
+use crate::step::mujoco_frames::in_world;
 use crate::step::mujoco_subtrees::root_center;
 use crate::step::sites::{position, to_local};
 use crate::step::ties::length;
-use crate::step::{BlockOf, ConstantsOf, Stage, gravity};
+use crate::step::{BlockOf, ConstantsOf, Stage, gravity, masses};
 
 /// Sensors of accelerations.
 pub struct Accelerations;
@@ -248,6 +249,7 @@ pub struct Energies;
 impl Stage for Energies {
     const READS: &'static [A] = &[
         A::Params,
+        A::Reference,
         A::KineticEnergy,
         A::PotentialEnergy,
         A::Sensordata,
@@ -266,11 +268,27 @@ impl Stage for Energies {
                 SensorKind::KineticEnergy => b.work.kinetic_energy[0],
                 SensorKind::PotentialEnergy(moment) => {
                     let gravity = gravity(m, &b.params);
-                    b.work.potential_energy[0] - gravity.dot(Vec3::constant(*moment))
+                    let moment = match masses::vary(m) {
+                        true => static_moment::<C>(m, b),
+                        false => Vec3::constant(*moment),
+                    };
+                    b.work.potential_energy[0] - gravity.dot(moment)
                 }
                 _ => continue,
             };
             put(&mut b.work.sensordata, sensor, &[energy]);
         }
     }
+}
+
+/// First moment of what stands still in all models [kg·m].
+#[inline(always)]
+fn static_moment<C: Cx>(m: &ConstantsOf<C>, b: &BlockOf<C>) -> Vec3<C::F> {
+    let mut sum = Vec3::zero();
+    let bodies = m.mujoco.frames.bodies.iter();
+    for body in bodies.filter(|body| body.frame.body.is_none()) {
+        let mass = masses::mass(m, &b.params, body.link, body.mass);
+        sum = in_world(&b.work, &body.inertial).scale_add(mass, sum);
+    }
+    sum
 }
