@@ -41,7 +41,7 @@ demo: announce-demo wheel ## a tour with pictures, then the lesson and a grasp w
 	$(PYTHON) examples/franka_grasp.py --worlds $(WORLDS)
 	$(PYTHON) examples/randomized_push.py --worlds $(WORLDS)
 	@echo && echo "The same in process, without daemon and Python:"
-	@cargo build --release --quiet --workspace --example franka_lesson && target/release/examples/franka_lesson $(WORLDS)
+	@cargo build --release --quiet --workspace --example franka_lesson && "$${CARGO_TARGET_DIR:-target}"/release/examples/franka_lesson $(WORLDS)
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-15s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))

@@ -177,3 +177,34 @@ def test_what_is_no_recording_is_refused_with_code_2(tmp_path, content, words):
         out.write_bytes(content)
     code, said = replay(out)
     assert code == 2 and words in said and "run.tlrec" in said
+
+
+MODEL = """
+<mujoco>
+  <worldbody>
+    <body name="hand" mocap="true" pos="0 0 1"/>
+    <body name="held" pos="0 0 1"><freejoint/><geom size=".1"/>
+      <body pos="0 0 .2"><joint name="hinge"/><geom size=".05" pos=".1 0 0"/></body></body>
+  </worldbody>
+  <equality><weld body1="hand" body2="held"/></equality>
+  <actuator><general joint="hinge" dyntype="filter" dynprm=".1"/></actuator>
+  <keyframe><key name="up" qpos="0 0 2 1 0 0 0 .3" act=".2"/></keyframe>
+</mujoco>"""
+
+
+def test_what_models_from_mujoco_hold_is_replayed_with_the_same_bits(tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    scene = tl.Scene.from_mujoco(mujoco.MjModel.from_xml_string(MODEL), name="m")
+    scene.save(tmp_path / "scene.toml")
+    rng, out = np.random.default_rng(0), tmp_path / "run.tlrec"
+    with tl.launch(tl.Scene.load(tmp_path / "scene.toml"), worlds=3, fields=("qpos", "act", "eq_active")) as sim:
+        recorder = Recorder(sim, out, "--frames", "60")
+        sim.reset(keyframe="up")
+        for number in range(59):
+            active = (rng.random((3, 1)) < 0.5).astype(float)
+            sim.step(eq_active=active, mocap_pos=rng.normal(0, 0.1, (3, 1, 3)), ctrl=rng.normal(size=(3, 1)))
+            if number == 30:
+                sim.reset(keyframe=0, mask=np.array([True, False, True]))
+                sim.write(act=rng.normal(size=(3, 1)), eq_active=1.0 - active)
+        recorder.finish()
+    assert replay(out)[0] == 0
