@@ -30,8 +30,8 @@ machine.
 - **Hulls differ.** MuJoCo keeps all vertices of a mesh's convex hull. tightloop keeps at most 64.
 - **EnvPool's scene is lighter.** Of its arm, only the hand and the fingers collide. Its solver stops after 5
   iterations.
-- **mjbatch has [its own table](#mujoco-models-beside-mjbatch-on-one-thread).** That machine has AVX2, with 8 worlds in a
-  register.
+- **mjbatch has [its own table](#mujoco-models-beside-mjbatch-on-one-thread).** That machine has AVX2, with 8 worlds in
+  a register.
 """
 
 
