@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core
 from tightloop.errors import ArgumentError, SceneError
+from tightloop.inputs import reals
 from tightloop.scene import Scene
 
 Array = NDArray[np.float64]
@@ -173,12 +174,7 @@ class Dynamics:
 
 
 def _numbers(name: str, value: ArrayLike, columns: int) -> Array:
-    try:
-        array = np.asarray(value)
-    except (ValueError, TypeError) as problem:
-        raise ArgumentError(f"{name} is no array: {problem}") from None
-    if array.dtype.kind not in "fiu":
-        raise ArgumentError(f"{name} has dtype {array.dtype}; give real numbers")
+    array = reals(name, value)
     if array.ndim not in (1, 2) or array.shape[-1] != columns:
         raise ArgumentError(f"{name} has shape {array.shape}; give ({columns},), or (n, {columns}) for many states")
     return array.astype(np.float64)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.errors import CommandRefused
+from tightloop.errors import ArgumentError, CommandRefused
 
 
 def as_array(field: str, robot: str | None, value: Any, worlds: int, columns: int) -> NDArray[np.float64]:
@@ -35,6 +35,21 @@ def real_numbers(what: str, value: Any) -> NDArray[Any]:
     given = _numpy(what, value)
     if given.dtype.kind not in "fiu":
         raise CommandRefused(f"{what}: dtype {given.dtype} is not a real number; give float32 or float64")
+    return given
+
+
+def reals(what: str, value: Any) -> NDArray[Any]:
+    """Convert an argument of a calculation to NumPy, with its dtype; ``what`` is for messages.
+
+    Raises:
+        ArgumentError: The value is no array, or its values are not real.
+    """
+    try:
+        given = np.asarray(value)
+    except (ValueError, TypeError) as problem:
+        raise ArgumentError(f"{what} is no array: {problem}") from None
+    if given.dtype.kind not in "fiu":
+        raise ArgumentError(f"{what} has dtype {given.dtype}; give real numbers")
     return given
 
 

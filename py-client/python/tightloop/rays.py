@@ -11,6 +11,7 @@ from tightloop import _core
 from tightloop._core import Frame
 from tightloop.errors import ArgumentError, SceneError, UnknownField
 from tightloop.frames import FrameCopy
+from tightloop.inputs import reals
 
 Array = NDArray[Any]
 
@@ -85,7 +86,7 @@ class Rays:
             threads: Most threads.
         """
         worlds = len(poses[0])
-        origins, directions = _reals("pnt", pnt), _reals("vec", vec)
+        origins, directions = points("pnt", pnt), points("vec", vec)
         try:
             shape = np.broadcast_shapes(origins.shape, directions.shape, (worlds, 1, 3))
         except ValueError:
@@ -95,8 +96,7 @@ class Rays:
                 f"rays: pnt has shape {origins.shape} and vec {directions.shape}; give ({worlds}, rays, 3), "
                 f"(rays, 3) for all {worlds} worlds alike, or (3,) for all rays alike"
             )
-        if (np.linalg.norm(directions.astype(np.float64), axis=-1) < _LENGTH_MIN).any():
-            raise ArgumentError("rays: a direction in vec has length 0")
+        check_lengths(directions)
         excluded = self._excluded(bodyexclude, shape[:2])
         dist, geomid, normal = self._core.cast(
             self._chosen(geomgroup, bool(flg_static)),
@@ -144,6 +144,16 @@ class Rays:
             ) from None
 
 
+def check_lengths(directions: Array) -> None:
+    """Check that directions have a length; for one without, MuJoCo ends the process.
+
+    Raises:
+        ArgumentError: One has none.
+    """
+    if (np.linalg.norm(directions.astype(np.float64), axis=-1) < _LENGTH_MIN).any():
+        raise ArgumentError("rays: a direction in vec has length 0")
+
+
 def ray_poses(frame: Frame | FrameCopy) -> list[Array]:
     """Return ``geom_xpos`` and ``geom_xmat`` of a frame if it has them, else ``body_q``.
 
@@ -160,13 +170,13 @@ def ray_poses(frame: Frame | FrameCopy) -> list[Array]:
     return [array for array in found if array is not None]
 
 
-def _reals(name: str, value: ArrayLike) -> Array:
-    try:
-        given = np.asarray(value)
-    except (ValueError, TypeError) as problem:
-        raise ArgumentError(f"rays: {name} is no array: {problem}") from None
-    if given.dtype.kind not in "fiu":
-        raise ArgumentError(f"rays: {name} has dtype {given.dtype}; give real numbers")
+def points(name: str, value: ArrayLike) -> Array:
+    """Convert origins or directions, ``(..., 3)``, to finite float32 or float64.
+
+    Raises:
+        ArgumentError: They are not.
+    """
+    given = reals(f"rays: {name}", value)
     if given.dtype != np.float32:
         given = given.astype(np.float64, copy=False)
     if given.ndim == 0 or given.shape[-1] != 3:

@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 from tightloop.errors import ArgumentError
 from tightloop.mujoco.batch.layout import StateLayout
 from tightloop.mujoco.batch.library import mujoco
-from tightloop.rays import RayHits, Rays
+from tightloop.rays import RayHits, Rays, check_lengths, points
 from tightloop.scene import Scene
 
 Array = NDArray[Any]
 
 _REAL = (np.dtype(np.float64), np.dtype(np.float32))
-#: Shortest direction of a ray, MuJoCo's mjMINVAL [–].
-_LENGTH_MIN = 1e-15
 
 
 class Queries:
@@ -74,12 +72,6 @@ class Queries:
             ("bodyexclude", exclude, (count,), (np.dtype(np.int32),)),
         ):
             _check("rays", name, array, shape, dtypes)
-        for name, array in (("pnt", pnt), ("vec", vec)):
-            if not np.isfinite(array[ids]).all():
-                raise ArgumentError(f"rays: {name} has a value that is NaN or infinite")
-        # for such a ray MuJoCo ends the process
-        if (np.linalg.norm(vec[ids].astype(np.float64), axis=-1) < _LENGTH_MIN).any():
-            raise ArgumentError("rays: a direction in vec has length 0")
         excluded = np.full(count, -1, np.int32)
         if exclude is not None:
             is_body = (exclude >= 0) & (exclude < self._model.nbody)
@@ -107,15 +99,16 @@ class Queries:
         self, rows: Array, pnt: Array, vec: Array, *, geomgroup: Array | None, flg_static: bool, bodyexclude: Array
     ) -> RayHits:
         """What rays meet where a geom is a height field or an SDF."""
+        origins, directions = points("pnt", pnt).astype(np.float64), points("vec", vec).astype(np.float64)
+        check_lengths(directions)
         shape = pnt.shape[:2]
         found = RayHits(np.empty(shape), np.empty(shape, np.int32), np.zeros((*shape, 3)))
         hit, face = np.zeros(1, np.int32), np.zeros(3)
         excluded = bodyexclude[0].tolist()
         for at, row in enumerate(rows):
             self._place(row)
-            origins, directions = pnt[at].astype(np.float64), vec[at].astype(np.float64)
             for ray in range(shape[1]):
-                origin, direction, body = origins[ray], directions[ray], excluded[ray]
+                origin, direction, body = origins[at, ray], directions[at, ray], excluded[ray]
                 far = mujoco.mj_ray(self._model, self._data, origin, direction, geomgroup, flg_static, body, hit, face)
                 found.dist[at, ray], found.geomid[at, ray] = far, hit[0]
                 if far >= 0.0:
