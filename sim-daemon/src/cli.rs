@@ -33,6 +33,13 @@ pub(crate) enum CliCommand {
     ///
     /// Example: tightloop inspect robot.urdf --package-dir ~/robots
     Inspect(Inspect),
+    /// Measure how fast a scene runs in this process, and where the time goes.
+    ///
+    /// Prints steps per second, contacts and constraint rows of a world, iterations of the solver, time by stage, and the
+    /// share of SIMD lanes that wait for others. Runs on the CPU. Other programs on the same cores change the result.
+    ///
+    /// Example: tightloop bench scene.toml --worlds 4096
+    Bench(Box<Bench>),
     /// Record every command that a daemon executes into a file for `replay`.
     ///
     /// Writes states, commands, resets, parameters and digests of frames until Ctrl-C or until the daemon ends. The
@@ -201,6 +208,53 @@ pub(crate) struct Replay {
     /// Stop after this many frames.
     #[arg(long)]
     pub(crate) frames: Option<u64>,
+}
+
+/// Arguments of `bench` as given; `bench` checks them.
+#[derive(Debug, Args)]
+pub(crate) struct Bench {
+    /// Scene file in TOML; `-` reads standard input, with paths relative to the working folder.
+    pub(crate) scene: PathBuf,
+
+    /// Number of worlds.
+    #[arg(long, default_value_t = 1024)]
+    pub(crate) worlds: usize,
+
+    /// Threads of a step. Times by stage are of one thread.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) threads: usize,
+
+    /// What the worlds are told: random gives each world smooth commands of its own, hold keeps those of the start.
+    #[arg(long, default_value = "random")]
+    pub(crate) commands: String,
+
+    /// Largest amplitude of a random command, as a share of half its range.
+    #[arg(long, default_value_t = 0.2)]
+    pub(crate) swing: f64,
+
+    /// Keyframe of a MuJoCo model in which all worlds begin; its controls are what random ones swing about.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) keyframe: Option<String>,
+
+    /// Simulated time before the measurement [s].
+    #[arg(long, value_name = "SECONDS", default_value_t = 2.0)]
+    pub(crate) settle: f64,
+
+    /// Length of the measurement [s].
+    #[arg(long, default_value_t = 2.5)]
+    pub(crate) seconds: f64,
+
+    /// Worlds per block: 1, 8 (AVX2) or 16 (AVX-512); default: the most that the processor has.
+    #[arg(long)]
+    pub(crate) lanes: Option<usize>,
+
+    /// Precision of the state: f32 or f64.
+    #[arg(long, default_value = "f32")]
+    pub(crate) precision: String,
+
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// Arguments of `inspect` as given; `inspect` checks them.

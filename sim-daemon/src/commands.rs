@@ -7,7 +7,7 @@ use sim_protocol::{AttachOptions, Client, keep_waiting};
 
 use crate::cli::{self, CliCommand};
 use crate::error::DaemonError;
-use crate::{devices, inspect, recording, session};
+use crate::{bench, devices, inspect, recording, session};
 
 /// Runs a command line; the exit code is 0 done, 1 failed, 2 misused.
 pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
@@ -18,6 +18,7 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
     let result = match &command {
         CliCommand::Serve(serve) => session::run(serve),
         CliCommand::Inspect(args) => inspect::run(args),
+        CliCommand::Bench(args) => bench::run(args),
         CliCommand::Record(args) => recording::record(args),
         CliCommand::Replay(args) => recording::replay(args),
         CliCommand::Devices => devices::run(),

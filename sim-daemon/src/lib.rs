@@ -4,6 +4,7 @@
 //! [`serve`] is the whole command line as one function, so that a Python wheel can carry it.
 
 mod arrays;
+mod bench;
 mod cli;
 mod commands;
 pub mod config;

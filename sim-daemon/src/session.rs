@@ -397,7 +397,7 @@ fn device(serve: &Serve) -> Option<Device> {
 }
 
 /// The scene, and the folder that its paths are relative to.
-fn read_scene(path: &Path) -> Result<(SceneFile, PathBuf), DaemonError> {
+pub(crate) fn read_scene(path: &Path) -> Result<(SceneFile, PathBuf), DaemonError> {
     let folder = |path: &Path| {
         let here = if path.as_os_str().is_empty() {
             Path::new(".")

@@ -1,6 +1,8 @@
 //! Many worlds of one model: reset, write, step, read.
 
-pub use crate::backend::{Faults, FirstFrozen, Frozen, Lanes, Precision, ProgramInfo};
+pub use crate::backend::{
+    Faults, FirstFrozen, Frozen, Histogram, Lanes, Precision, Profile, ProgramInfo, StageProfile,
+};
 pub use crate::options::{AUTO_WORLDS, Device, Options};
 pub use crate::random::Draws;
 
@@ -277,6 +279,15 @@ impl Simulation {
     /// If the arena (8-byte words) is smaller than the layout.
     pub fn step(&mut self, arena: &mut [u64]) {
         self.backend.run(self.model.substeps(), arena);
+    }
+
+    /// As [`Simulation::step`], on one thread, and adds what that took to a profile; false on a GPU, where nothing is done.
+    ///
+    /// # Panics
+    /// As [`Simulation::step`].
+    pub fn step_profiled(&mut self, arena: &mut [u64], to: &mut Profile) -> bool {
+        self.backend
+            .run_profiled(self.model.substeps(), arena, to)
     }
 
     /// Evaluates every field at the present state into the arena, without stepping.

@@ -8,11 +8,13 @@ mod gather;
 pub mod gpu;
 mod input;
 mod noise;
+mod profile;
 mod state;
 
 pub use error::BackendError;
 pub use frozen::{FirstFrozen, Frozen};
 pub use input::{Input, Values};
+pub use profile::{Histogram, Profile, StageProfile};
 
 use crate::random::Numbering;
 use std::ops::Range;
@@ -155,6 +157,11 @@ pub trait Backend: Send {
     /// Runs `substeps` substeps (none = evaluates only), then writes every field of the layout
     /// into the arena, 8-byte words. No allocation, no error: see [`Backend::lost`].
     fn run(&mut self, substeps: usize, arena: &mut [u64]);
+    /// As [`Backend::run`], on the caller's thread alone, and adds what that took to the profile; false where a backend has no
+    /// profile, and nothing is run then.
+    fn run_profiled(&mut self, _substeps: usize, _arena: &mut [u64], _to: &mut Profile) -> bool {
+        false
+    }
     /// The error that lost the device. Nothing is computed after it.
     fn lost(&self) -> Option<&BackendError> {
         None

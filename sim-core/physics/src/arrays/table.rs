@@ -76,6 +76,9 @@ arrays! { m;
         coupled_system: CoupledSystem [m.coupled.pattern.len()] Scratch "–";
         pull: Pull [if m.contacts.classes.is_empty() { 0 } else { m.dofs.len() }] Scratch "–";
         solution: Solution [m.dofs.len()] Scratch "–";
+        // iterations of the solver, line searches and their evaluations so far, for a profile: of each world, and of the block
+        solver_work: SolverWork [3] Scratch "–";
+        solver_block_work: SolverBlockWork [3] Scratch "–";
         // contacts that a sensor shows
         contact_records: ContactRecords [17 * m.mujoco.sensors.records] Scratch "–";
         // torque, then force, of the contacts of each body of MuJoCo models

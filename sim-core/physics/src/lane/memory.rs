@@ -1,6 +1,6 @@
 //! The execution context of the CPU: a mask of active worlds, and scratch rows of one block of worlds.
 
-use super::{Cx, Fixed, Lane, Real, Table, Tables};
+use super::{Cx, Fixed, Lane, Num, Real, Table, Tables};
 
 /// Runs physics code natively: loops are Rust loops, blocks are masks.
 pub struct Cpu<'a, F: Lane> {
@@ -37,6 +37,38 @@ impl<'a, F: Lane> Cpu<'a, F> {
             None => list.count,
         }
     }
+}
+
+/// `sum` plus the dot product of two triples.
+#[inline(always)]
+fn dot_add<F: Num>(a: &[F; 3], b: &[F; 3], sum: F) -> F {
+    a[2].fma(b[2], a[1].fma(b[1], a[0].fma(b[0], sum)))
+}
+
+/// [`Cx::add_triples_of_three`] of rows of A, B = A + 1 and C = A + 2 cells: without a check of bounds inside.
+#[inline(always)]
+fn add_rows_of<F: Num, const A: usize, const B: usize, const C: usize>(
+    triples: &[[F; 3]],
+    by: &[[F; 3]; 3],
+    rows: [&mut [F]; 3],
+) {
+    let [a, b, c] = rows;
+    let (Some(triples), Some(a)) = (triples.first_chunk::<C>(), a.first_chunk_mut::<A>()) else {
+        unreachable!("{A} cells");
+    };
+    let (Some(b), Some(c)) = (b.first_chunk_mut::<B>(), c.first_chunk_mut::<C>()) else {
+        unreachable!("{B} and {C} cells");
+    };
+    for l in 0..A {
+        // J is loaded once for all rows
+        let j = triples[l];
+        a[l] = dot_add(&j, &by[0], a[l]);
+        b[l] = dot_add(&j, &by[1], b[l]);
+        c[l] = dot_add(&j, &by[2], c[l]);
+    }
+    b[A] = dot_add(&triples[A], &by[1], b[A]);
+    c[A] = dot_add(&triples[A], &by[2], c[A]);
+    c[B] = dot_add(&triples[B], &by[2], c[B]);
 }
 
 /// Rows of every world, compacted: world w has rows first..first + count(w).
@@ -95,9 +127,30 @@ impl<F: Lane> Cx for Cpu<'_, F> {
         *v = x;
     }
     #[inline(always)]
+    fn tally(&mut self, of_worlds: &mut F, of_block: &mut F) {
+        *of_worlds = F::select(self.mask, *of_worlds + F::c(1.0), *of_worlds);
+        *of_block = *of_block + F::c(1.0);
+    }
+    #[inline(always)]
     fn only(&mut self, x: F) -> F {
         F::select(self.mask, x, F::c(0.0))
     }
+
+    #[inline(always)]
+    fn or_nothing(&mut self, x: F) -> F {
+        // -0 + x is x for every x, while 0 + -0 is 0
+        F::select(self.mask, x, F::c(-0.0))
+    }
+
+    const LOCKSTEP: bool = true;
+    #[inline(always)]
+    fn cells<'a>(&mut self, values: &'a mut [F], _cells: &'a mut [F]) -> &'a mut [F] {
+        values
+    }
+    #[inline(always)]
+    fn put_values(&mut self, _values: &[F], _cells: &mut [F]) {}
+    #[inline(always)]
+    fn get_values(&mut self, _values: &mut [F], _cells: &[F]) {}
 
     #[inline(always)]
     fn at(&self, i: usize) -> usize {
@@ -168,13 +221,41 @@ impl<F: Lane> Cx for Cpu<'_, F> {
     }
     #[inline(always)]
     fn add_triples(&mut self, t: Table, row: usize, k: usize, by: [F; 3], cells: &mut [F]) {
-        // -0 + x is x for every x, while 0 + -0 is 0: inactive worlds keep their bits
-        let (first, mask, zero) = (t.base + row * t.stride + k, self.mask, F::c(-0.0));
+        let first = t.base + row * t.stride + k;
         // one check of the bounds instead of one per scalar
         let (triples, _) = self.memory[first..first + 3 * cells.len()].as_chunks::<3>();
-        for (cell, triple) in cells.iter_mut().zip(triples) {
-            for i in 0..3 {
-                *cell = F::select(mask, triple[i], zero).fma(by[i], *cell);
+        for (cell, j) in cells.iter_mut().zip(triples) {
+            *cell = dot_add(j, &by, *cell);
+        }
+    }
+    #[inline(always)]
+    fn add_triples_of_three(
+        &mut self,
+        t: Table,
+        row: usize,
+        k: usize,
+        by: [[F; 3]; 3],
+        cells: &mut [F],
+        places: [usize; 3],
+        count: usize,
+    ) {
+        let first = t.base + row * t.stride + k;
+        let (triples, _) = self.memory[first..first + 3 * (count + 2)].as_chunks::<3>();
+        let (before, c) = cells.split_at_mut(places[2]);
+        let (before, b) = before.split_at_mut(places[1]);
+        let rows = [&mut before[places[0]..], b, c];
+        match count {
+            1 => add_rows_of::<F, 1, 2, 3>(triples, &by, rows),
+            4 => add_rows_of::<F, 4, 5, 6>(triples, &by, rows),
+            7 => add_rows_of::<F, 7, 8, 9>(triples, &by, rows),
+            10 => add_rows_of::<F, 10, 11, 12>(triples, &by, rows),
+            13 => add_rows_of::<F, 13, 14, 15>(triples, &by, rows),
+            _ => {
+                for (i, (by, row)) in by.iter().zip(rows).enumerate() {
+                    for (cell, j) in row[..count + i].iter_mut().zip(triples) {
+                        *cell = dot_add(j, by, *cell);
+                    }
+                }
             }
         }
     }

@@ -10,6 +10,7 @@
 //! A run-time `if` on a world's value does not type-check: select with [`Num::select`], or open a block with [`when!`]. Loops
 //! over the tree and branches on model constants are native Rust.
 
+mod control;
 pub mod memory;
 pub mod scalar;
 pub mod simd;
@@ -279,8 +280,44 @@ pub trait Cx: Sized {
     /// Assigns without a mask, where inactive worlds need no guard: `x` is the value they have already, or it is not read there.
     /// Cheaper than [`Cx::set`]; see [`Cx::only`].
     fn put(&mut self, v: &mut Self::V, x: Self::F);
+    /// Adds 1 to a count of the active worlds and to one of the whole block, for a profile. Backends without one do nothing.
+    #[inline(always)]
+    fn tally(&mut self, _of_worlds: &mut Self::V, _of_block: &mut Self::V) {}
     /// `x` in the active worlds, 0 elsewhere.
     fn only(&mut self, x: Self::F) -> Self::F;
+    /// `x` in the active worlds, -0 elsewhere: times a positive number or 0 it adds nothing to any sum, not even to the sign
+    /// of a 0.
+    #[inline(always)]
+    fn or_nothing(&mut self, x: Self::F) -> Self::F {
+        self.only(x)
+    }
+
+    /// Do all worlds of a block run each instruction, active or not? Then what some need is computed for all.
+    const LOCKSTEP: bool = false;
+    /// Values that loops change: the values themselves on a backend where those are cells, else the cells. Call
+    /// [`Cx::put_values`] before, and [`Cx::get_values`] after.
+    #[inline(always)]
+    fn cells<'a>(
+        &mut self,
+        _values: &'a mut [Self::F],
+        cells: &'a mut [Self::V],
+    ) -> &'a mut [Self::V] {
+        cells
+    }
+    /// Sets [`Cx::cells`] to the values.
+    #[inline(always)]
+    fn put_values(&mut self, values: &[Self::F], cells: &mut [Self::V]) {
+        for (cell, value) in cells.iter_mut().zip(values) {
+            self.put(cell, *value);
+        }
+    }
+    /// Sets the values to [`Cx::cells`].
+    #[inline(always)]
+    fn get_values(&mut self, values: &mut [Self::F], cells: &[Self::V]) {
+        for (value, cell) in values.iter_mut().zip(cells) {
+            *value = self.get(cell);
+        }
+    }
 
     /// A constant index.
     fn at(&self, i: usize) -> Self::I;
@@ -313,8 +350,8 @@ pub trait Cx: Sized {
             self.load(t, row, k + 2),
         ]
     }
-    /// Adds to cell c, in the active worlds, the dot product of `by` and the three scalars of a row from `k + 3 c` on. Inactive
-    /// worlds need no guard; see [`Cx::put`].
+    /// Adds to cell c the dot product of `by` and the three scalars of a row from `k + 3 c` on. In inactive worlds `by` is
+    /// [`Cx::only`] and the row was written with [`Cx::or_nothing`].
     #[inline(always)]
     fn add_triples(
         &mut self,
@@ -328,9 +365,27 @@ pub trait Cx: Sized {
             let mut sum = self.get(cell);
             let triple = self.load3(t, row, k + 3 * c);
             for (x, by) in triple.into_iter().zip(by) {
-                sum = self.only(x).fma(by, sum);
+                sum = x.fma(by, sum);
             }
             self.put(cell, sum);
+        }
+    }
+    /// [`Cx::add_triples`] of three rows of a packed triangle, of `count`, `count` + 1 and `count` + 2 cells, that begin at rising
+    /// places.
+    #[allow(clippy::too_many_arguments)]
+    #[inline(always)]
+    fn add_triples_of_three(
+        &mut self,
+        t: Table,
+        row: Self::I,
+        k: usize,
+        by: [[Self::F; 3]; 3],
+        cells: &mut [Self::V],
+        places: [usize; 3],
+        count: usize,
+    ) {
+        for (i, (by, place)) in by.into_iter().zip(places).enumerate() {
+            self.add_triples(t, row, k, by, &mut cells[place..place + count + i]);
         }
     }
     /// `sum` plus, for each x(c), the three scalars of a row from `k + 3 c` on times x(c). The result is undefined in inactive
@@ -419,66 +474,3 @@ pub trait Cx: Sized {
 
 /// The mask of an execution context's scalars.
 pub type MaskOf<C> = <<C as Cx>::F as Num>::Mask;
-
-/// `each!(cx, row in list, { … })`: the body for every row of the list.
-#[macro_export]
-macro_rules! each {
-    ($cx:ident, $row:ident in $list:expr, $body:block) => {{
-        let mut rows = $crate::lane::Cx::rows($cx, &$list);
-        while let Some($row) = $crate::lane::Cx::next($cx, &mut rows) $body
-    }};
-}
-
-/// `times!(cx, n, { … })` or `times!(cx, i in n, { … })`: at most `n` iterations; see [`break_if!`].
-#[macro_export]
-macro_rules! times {
-    ($cx:ident, $i:ident in $n:expr, $body:block) => {{
-        let mut rounds = $crate::lane::Cx::times($cx, $n);
-        while let Some($i) = $crate::lane::Cx::next($cx, &mut rounds) $body
-    }};
-    ($cx:ident, $n:expr, $body:block) => {{
-        let mut rounds = $crate::lane::Cx::times($cx, $n);
-        while let Some(_) = $crate::lane::Cx::next($cx, &mut rounds) $body
-    }};
-}
-
-/// `span!(cx, i in first, end, { … })`: the body for every index from `first` to before `end`.
-#[macro_export]
-macro_rules! span {
-    ($cx:ident, $i:ident in $first:expr, $end:expr, $body:block) => {{
-        let mut rounds = $crate::lane::Cx::span($cx, $first, $end);
-        while let Some($i) = $crate::lane::Cx::next($cx, &mut rounds) $body
-    }};
-}
-
-/// `push!(cx, list, mask, row, { … })`: a fresh row in the worlds of the mask, filled by the body.
-#[macro_export]
-macro_rules! push {
-    ($cx:ident, $list:expr, $mask:expr, $row:ident, $body:block) => {{
-        let (block, row) = $crate::lane::Cx::push($cx, &mut $list, $mask);
-        if let Some($row) = row $body
-        $crate::lane::Cx::leave($cx, block);
-    }};
-}
-
-/// `when!(cx, mask, { … })`: the body in the worlds of the mask.
-#[macro_export]
-macro_rules! when {
-    ($cx:ident, $mask:expr, $body:block) => {{
-        let (block, any) = $crate::lane::Cx::enter($cx, $mask);
-        if any $body
-        $crate::lane::Cx::leave($cx, block);
-    }};
-}
-
-/// `break_if!(cx, mask)`: ends the loop for the worlds of the mask. Only at the level of a loop
-/// body, not inside a [`when!`].
-#[macro_export]
-macro_rules! break_if {
-    ($cx:ident, $mask:expr) => {
-        // `continue` reaches `next`, which closes the loop
-        if $crate::lane::Cx::stop($cx, $mask) {
-            continue;
-        }
-    };
-}

@@ -137,7 +137,7 @@ impl<'a, C: Cx> Contact<'a, C> {
             let mut jacobian = [C::F::c(0.0); 3];
             for i in 0..3 {
                 let moved = linear.dot(frame[i]) + angular.dot(torques[i]);
-                jacobian[i] = lever * moved;
+                jacobian[i] = cx.or_nothing(lever * moved);
                 velocity[i] = jacobian[i].fma(speed, velocity[i]);
             }
             cx.fill_all(t.memory.rows, self.row, row::JACOBIAN + 3 * c, jacobian);
@@ -161,7 +161,7 @@ impl<'a, C: Cx> Contact<'a, C> {
             let speed = cx.get(&b.joint_qd[column.dof]);
             let mut jacobian = [zero; 3];
             for i in 0..3 {
-                jacobian[i] = lever * scales[i] * angular.dot(self.frame[i]);
+                jacobian[i] = cx.or_nothing(lever * scales[i] * angular.dot(self.frame[i]));
                 velocity[i] = jacobian[i].fma(speed, velocity[i]);
             }
             cx.fill_all(

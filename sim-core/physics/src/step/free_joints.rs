@@ -219,6 +219,11 @@ pub(super) fn solved<R: Real>(m: &Constants<R>) -> impl Iterator<Item = usize> +
 
 /// Is a body one of [`solved`], where the integrator is implicit?
 pub(super) fn is_solved<R: Real>(m: &Constants<R>, body: usize) -> bool {
+    // first what rules out most bodies
+    let is_free = m.bodies[body].motion == Motion::Free;
+    if !is_free && !has(m, body) {
+        return false;
+    }
     let is_alone = m.bodies.iter().all(|other| other.parent != Some(body));
     let drags = m.mujoco.drags.iter().any(|drag| drag.body == body);
     let mut actuators = m.mujoco.actuators.iter().filter(|own| is_damped(m, own));
@@ -226,7 +231,6 @@ pub(super) fn is_solved<R: Real>(m: &Constants<R>, body: usize) -> bool {
         let dofs = own.turning.iter().flat_map(|length| &length.dofs);
         dofs.into_iter().any(|&dof| m.dofs[dof].body == body)
     });
-    let is_free = m.bodies[body].motion == Motion::Free;
     is_alone && (has(m, body) || (drags || driven) && is_free)
 }
 

@@ -67,11 +67,15 @@ fn add_to_zero<C: Cx>(cx: &mut C, x: &[C::F]) -> Vec<C::F> {
     let mut list = cx.list(TRIPLES.rows);
     push!(cx, list, c(0.0).lt(x[0]), row, {
         for k in 0..3 {
-            cx.init(TRIPLES, row, k, c(1.0));
+            cx.init(TRIPLES, row, k, c(0.0));
         }
     });
     let mut cell = [cx.var(c(-0.0))];
     each!(cx, row in list, {
+        for k in 0..3 {
+            let one = cx.or_nothing(c(1.0));
+            cx.fill(TRIPLES, row, k, one);
+        }
         let by = cx.only(x[0]);
         cx.add_triples(TRIPLES, row, 0, [by; 3], &mut cell);
     });

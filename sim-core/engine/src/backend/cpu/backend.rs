@@ -2,7 +2,7 @@
 
 use super::chunk::{Chunk, Job};
 use super::transfer;
-use crate::backend::{Backend, BackendError, Faults, Frozen, Input, Values};
+use crate::backend::{Backend, BackendError, Faults, Frozen, Input, Profile, Values};
 use rayon::prelude::*;
 use sim_physics::compiled::Stages;
 use sim_physics::lane::Lane;
@@ -13,7 +13,7 @@ use std::sync::Arc;
 ///
 /// # Safety
 /// As [`Chunk::run`].
-pub(super) type RunChunk<F> = unsafe fn(&mut Chunk<F>, &Job<F>, usize, transfer::Arena);
+pub(super) type RunChunk<F> = unsafe fn(&mut Chunk<F>, &Job<F>, usize, transfer::Arena, Option<&mut Profile>);
 
 /// The physics code, compiled for an instruction set.
 pub(super) struct CompiledStages<F: Lane> {
@@ -207,7 +207,20 @@ impl<F: Lane> Backend for Cpu<F> {
         self.for_each(|chunk, job| {
             // SAFETY: `dispatch` chose `run` for instructions that this processor has; the arena holds
             // the layout (asserted) and outlives the call; each chunk writes its own worlds' rows only.
-            unsafe { run(chunk, job, substeps, arena) }
+            unsafe { run(chunk, job, substeps, arena, None) }
         });
+    }
+
+    fn run_profiled(&mut self, substeps: usize, arena: &mut [u64], to: &mut Profile) -> bool {
+        assert!(
+            arena.len() >= self.arena_words,
+            "the arena is smaller than the layout"
+        );
+        let arena = transfer::Arena::new(arena);
+        for chunk in &mut self.chunks {
+            // SAFETY: as in `run`.
+            unsafe { (self.run)(chunk, &self.job, substeps, arena, Some(&mut *to)) }
+        }
+        true
     }
 }

@@ -3,7 +3,7 @@
 use super::backend::{CompiledStages, Cpu, Workers};
 use super::chunk::{Chunk, Job};
 use super::transfer::Arena;
-use crate::backend::{Backend, BackendError, Backends, Groups, Lanes, Precision};
+use crate::backend::{Backend, BackendError, Backends, Groups, Lanes, Precision, Profile};
 use sim_model::Model;
 use sim_physics::arrays::Layout;
 use sim_physics::compiled::Stages;
@@ -13,9 +13,9 @@ macro_rules! compiled {
     ($(#[$attribute:meta])* $name:ident $($features:literal)?) => {
         $(#[$attribute])*
         $(#[target_feature(enable = $features)])?
-        unsafe fn $name<F: Lane>(chunk: &mut Chunk<F>, job: &Job<F>, substeps: usize, arena: Arena) {
+        unsafe fn $name<F: Lane>(chunk: &mut Chunk<F>, job: &Job<F>, substeps: usize, arena: Arena, profile: Option<&mut Profile>) {
             // SAFETY: by contract.
-            unsafe { chunk.run(job, substeps, arena) }
+            unsafe { chunk.run(job, substeps, arena, profile) }
         }
     };
 }

@@ -20,6 +20,7 @@ mod dispatch;
 mod faults;
 mod lane_assignment;
 mod noise;
+mod probe;
 mod records;
 mod regroup;
 mod reset;

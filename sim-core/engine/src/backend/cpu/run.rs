@@ -2,10 +2,12 @@
 
 use super::chunk::{Chunk, Job};
 use super::contacts;
+use super::probe::{Moment, Probe, Watch};
 use super::transfer::{self, Arena};
-use crate::backend::clocks;
+use crate::backend::{Profile, clocks};
 use sim_physics::arrays::{Field, Slot, Source};
 use sim_physics::lane::Lane;
+use std::time::Instant;
 
 /// Whether the field is a counter that a chunk keeps per world, outside of the state.
 fn is_counter(field: Field) -> bool {
@@ -18,7 +20,41 @@ impl<F: Lane> Chunk<F> {
     /// # Safety
     /// The processor has the instructions of `F`; the arena holds the job's layout.
     #[inline(always)]
-    pub unsafe fn run(&mut self, job: &Job<F>, substeps: usize, arena: Arena) {
+    pub unsafe fn run(
+        &mut self,
+        job: &Job<F>,
+        substeps: usize,
+        arena: Arena,
+        profile: Option<&mut Profile>,
+    ) {
+        // SAFETY: by contract.
+        unsafe {
+            match profile {
+                None => self.run_watched(job, substeps, arena, &mut ()),
+                Some(profile) => {
+                    let begin = Instant::now();
+                    let mut watch = Watch::new(profile, &job.constants);
+                    self.run_watched(job, substeps, arena, &mut watch);
+                    let own_ns = watch.own_ns;
+                    profile.total_ns += begin.elapsed().as_nanos() as u64 - own_ns;
+                    profile.world_steps += (substeps * self.worlds.len()) as u64;
+                }
+            }
+        }
+    }
+
+    /// [`Chunk::run`], watched by a probe.
+    ///
+    /// # Safety
+    /// As [`Chunk::run`].
+    #[inline(always)]
+    unsafe fn run_watched(
+        &mut self,
+        job: &Job<F>,
+        substeps: usize,
+        arena: Arena,
+        probe: &mut impl Probe<F>,
+    ) {
         let shape = job.shape;
         let stride = shape.total() * F::WIDTH;
         self.frames += u64::from(substeps > 0);
@@ -45,11 +81,14 @@ impl<F: Lane> Chunk<F> {
                 } else {
                     &job.step[..]
                 };
-                for stage in stages {
+                for &stage in stages {
+                    let lanes = self.lanes_of(block).len();
+                    probe.before(self.moment(job, lanes, stage, evaluates));
                     // SAFETY: by contract the processor has the instructions of the job's stages.
                     unsafe {
-                        job.stages[*stage](&job.constants, &mut self.block, &mut self.memory);
+                        job.stages[stage](&job.constants, &mut self.block, &mut self.memory);
                     }
+                    probe.after(self.moment(job, lanes, stage, evaluates));
                 }
             }
             if substeps > 0 || job.finds_contacts {
@@ -108,6 +147,25 @@ impl<F: Lane> Chunk<F> {
                 self.reset_frozen(job);
             }
             self.regroup(job);
+        }
+    }
+
+    /// What a probe sees of a stage.
+    #[inline(always)]
+    fn moment<'a>(
+        &'a mut self,
+        job: &'a Job<F>,
+        lanes: usize,
+        stage: usize,
+        evaluates: bool,
+    ) -> Moment<'a, F> {
+        Moment {
+            constants: &job.constants,
+            block: &mut self.block,
+            memory: &self.memory,
+            lanes,
+            stage,
+            evaluates,
         }
     }
 

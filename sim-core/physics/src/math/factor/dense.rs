@@ -79,35 +79,15 @@ fn forward_tile<F: Num, const S: usize>(p: usize, factor: &[F], x: &mut [F]) {
     tree::forward::<F, S>(own, &ROWS[..p], x_above, x);
 }
 
-/// `f::<F, K>(…)` for every row K below `n`: a loop over a short row costs more than its arithmetic.
-macro_rules! rows {
-    ($n:expr, $f:ident($($arg:expr),*)) => {
-        rows!(@ $n, $f($($arg),*), 0 1 2 3 4 5 6 7 8 9 10 11)
-    };
-    (@ $n:expr, $f:ident $args:tt, $($k:literal)*) => {
-        $(rows!(@one $n, $f $args, $k);)*
-    };
-    (@one $n:expr, $f:ident($($arg:expr),*), $k:literal) => {
-        if $k < $n {
-            $f::<F, $k>($($arg),*);
-        }
-    };
-}
-
 #[inline(always)]
 pub(super) fn multiply<F: Num>(size: usize, a: &[F], x: &[F], y: &mut [F]) {
-    rows!(size, add_row(a, x, y));
+    tile!(size, 0, multiply_tile(a, x, y));
+    tile!(size, 3, multiply_tile(a, x, y));
+    tile!(size, 6, multiply_tile(a, x, y));
+    tile!(size, 9, multiply_tile(a, x, y));
 }
 
 #[inline(always)]
-fn add_row<F: Num, const K: usize>(a: &[F], x: &[F], y: &mut [F]) {
-    let row = &a[tri(K, 0)..tri(K, 0) + K + 1];
-    let (x, y) = (&x[..K + 1], &mut y[..K + 1]);
-    let xk = x[K];
-    let mut yk = row[K] * xk;
-    for i in 0..K {
-        yk = row[i].fma(x[i], yk);
-        y[i] = row[i].fma(xk, y[i]);
-    }
-    y[K] = yk;
+fn multiply_tile<F: Num, const S: usize>(p: usize, a: &[F], x: &[F], y: &mut [F]) {
+    tree::add_rows::<F, S>(&a[tri(p, 0)..tri(p + S, 0)], &ROWS[..p], p, x, y);
 }

@@ -96,8 +96,6 @@ impl Segment {
 
 /// A row of a tree.
 pub(super) struct Path<'a> {
-    /// Where the row begins, counted from the block's first scalar.
-    pub start: usize,
     /// Rows on the path to the root, root first, counted from the block's first.
     pub rows: &'a [usize],
     /// Where they begin.
@@ -299,7 +297,6 @@ impl Pattern {
         let k = block.first + row;
         let bounds = self.path_bounds[k]..self.path_bounds[k + 1];
         Path {
-            start: self.starts[k] - block.offset,
             rows: &self.path_rows[bounds.clone()],
             starts: &self.path_starts[bounds],
         }

@@ -212,15 +212,47 @@ pub(super) fn forward<F: Num, const S: usize>(own: &[F], path: &[usize], above: 
 
 #[inline(always)]
 pub(super) fn multiply<F: Num>(pattern: &Pattern, block: &Block, a: &[F], x: &[F], y: &mut [F]) {
-    for k in 0..block.size {
-        let path = pattern.path(block, k);
-        let row = &a[path.start..path.start + path.rows.len() + 1];
-        let xk = x[k];
-        let mut yk = row[path.rows.len()] * xk;
-        for (e, &i) in row.iter().zip(path.rows) {
-            yk = e.fma(x[i], yk);
-            y[i] = e.fma(xk, y[i]);
+    for segment in pattern.segments(block) {
+        let own = &a[segment.range()];
+        if segment.is_root() {
+            let rows = segment.rows();
+            dense::multiply(segment.size, own, &x[rows.clone()], &mut y[rows]);
+        } else {
+            let path = pattern.path(block, segment.first).rows;
+            of_size!(segment.size, add_rows(own, path, segment.first, x, y));
         }
-        y[k] = yk;
     }
+}
+
+/// Adds the products of S rows that follow each other, the first of them row `first`, and of their columns. What is above is
+/// loaded and stored once for all of them.
+#[inline(always)]
+pub(super) fn add_rows<F: Num, const S: usize>(
+    own: &[F],
+    path: &[usize],
+    first: usize,
+    x: &[F],
+    y: &mut [F],
+) {
+    let rows = split_ref::<F, S>(own, path.len());
+    let mut x_own = [F::c(0.0); S];
+    x_own.copy_from_slice(&x[first..first + S]);
+    let mut y_own = [F::c(0.0); S];
+    for k in 0..S {
+        y_own[k] = rows[k][path.len() + k] * x_own[k];
+        for i in 0..k {
+            let entry = rows[k][path.len() + i];
+            y_own[k] = entry.fma(x_own[i], y_own[k]);
+            y_own[i] = entry.fma(x_own[k], y_own[i]);
+        }
+    }
+    for (j, &i) in path.iter().enumerate() {
+        let (xi, mut yi) = (x[i], y[i]);
+        for k in 0..S {
+            y_own[k] = rows[k][j].fma(xi, y_own[k]);
+            yi = rows[k][j].fma(x_own[k], yi);
+        }
+        y[i] = yi;
+    }
+    y[first..first + S].copy_from_slice(&y_own);
 }

@@ -13,18 +13,23 @@ use crate::each;
 use crate::lane::{Cx, MaskOf, Num};
 use crate::step::contact_rows::class_list;
 
-type ContactsOf<C> = Contacts<<<C as Cx>::F as Num>::Real>;
-type ClassOf<C> = Class<<<C as Cx>::F as Num>::Real>;
+pub(super) type ContactsOf<C> = Contacts<<<C as Cx>::F as Num>::Real>;
+pub(super) type ClassOf<C> = Class<<<C as Cx>::F as Num>::Real>;
 
 /// Where the second block of a contact's row begins. Where no class has one, it is compiled without.
 #[inline(always)]
-fn block_of<R, const TURNS: bool>(class: &Class<R>) -> Option<usize> {
+pub(super) fn block_of<R, const TURNS: bool>(class: &Class<R>) -> Option<usize> {
     if TURNS { class.turns } else { None }
 }
 
 /// The law of a contact at a residual `jar`.
 #[inline(always)]
-fn law_at<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, jar: [C::F; 3]) -> ConeLaw<C::F> {
+pub(super) fn law_at<C: Cx>(
+    cx: &mut C,
+    t: &ContactsOf<C>,
+    r: C::I,
+    jar: [C::F; 3],
+) -> ConeLaw<C::F> {
     let stiff = cx.load(t.memory.rows, r, row::STIFFNESS);
     let mu = cx.load(t.memory.rows, r, row::MU);
     match t.cone {
@@ -163,97 +168,9 @@ fn second(place: usize) -> usize {
     }
 }
 
-/// Adds Jᵀ W J of a class to `hessian`, and Jᵀ f to `rhs` if `pulls`. Writes the pieces that its contacts are on.
-#[inline(always)]
-pub(super) fn assemble<C: Cx, const TURNS: bool>(
-    cx: &mut C,
-    t: &ContactsOf<C>,
-    k: usize,
-    hessian: &mut [C::V],
-    rhs: &mut [C::V],
-    pulls: bool,
-) {
-    let class: &ClassOf<C> = &t.classes[k];
-    let list = class_list(cx, t, k);
-    if let Some(block) = block_of::<_, TURNS>(class) {
-        each!(cx, r in list, {
-            assemble_turning(cx, t, (class, block), r, hessian, rhs, pulls);
-        });
-        return;
-    }
-    each!(cx, r in list, {
-        let jar = cx.load3(t.memory.rows, r, row::JAR);
-        let law = law_at(cx, t, r, jar);
-        cx.fill(t.memory.rows, r, row::STATE, law.state);
-        let [nn, nx, ny, xx, xy, yy] = law.stiffness;
-        let rows = [[nn, nx, ny], [nx, xx, xy], [ny, xy, yy]];
-        // worlds without this contact add 0
-        let mut pull = law.force;
-        for x in &mut pull {
-            *x = cx.only(*x);
-        }
-        if pulls {
-            for run in &class.runs {
-                let first = row::JACOBIAN + 3 * run.column;
-                cx.add_triples(t.memory.rows, r, first, pull, &mut rhs[run.places()]);
-            }
-        }
-        // column by column: W J(c), then its products with the columns up to c
-        for (c, entries) in class.entries.iter().enumerate() {
-            let mut own = cx.load3(t.memory.rows, r, row::JACOBIAN + 3 * c);
-            for x in &mut own {
-                *x = cx.only(*x);
-            }
-            let mut stiff = [C::F::c(0.0); 3];
-            for i in 0..3 {
-                let along = rows[i][1].fma(own[1], rows[i][2] * own[2]);
-                stiff[i] = cx.only(rows[i][0].fma(own[0], along));
-            }
-            for run in entries {
-                let (first, places) = (row::JACOBIAN + 3 * run.column, run.places());
-                cx.add_triples(t.memory.rows, r, first, stiff, &mut hessian[places]);
-            }
-        }
-    });
-}
-
-/// [`assemble`] of one contact with torsional friction.
-#[inline(always)]
-fn assemble_turning<C: Cx>(
-    cx: &mut C,
-    t: &ContactsOf<C>,
-    (class, block): (&ClassOf<C>, usize),
-    r: C::I,
-    hessian: &mut [C::V],
-    rhs: &mut [C::V],
-    pulls: bool,
-) {
-    let rows = t.memory.rows;
-    let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
-    let law = turning::law_at(cx, t, r, block, jar);
-    cx.fill(rows, r, row::STATE, law.state);
-    if pulls {
-        add_turning(cx, t, class, block, r, law.force, rhs);
-    }
-    for (c, entries) in class.entries.iter().enumerate() {
-        let (first, other) = (row::JACOBIAN + 3 * c, block + more::JACOBIAN + 3 * c);
-        let own = turning::six(cx, t, r, first, other).map(|x| cx.only(x));
-        let [a, b, d, e, f, g] = law.times(own).map(|x| cx.only(x));
-        for run in entries {
-            let cells = &mut hessian[run.places()];
-            let (first, other) = (
-                row::JACOBIAN + 3 * run.column,
-                more::JACOBIAN + 3 * run.column,
-            );
-            cx.add_triples(rows, r, first, [a, b, d], cells);
-            cx.add_triples(rows, r, block + other, [e, f, g], cells);
-        }
-    }
-}
-
 /// Adds Jᵀ f of a contact with torsional friction.
 #[inline(always)]
-fn add_turning<C: Cx>(
+pub(super) fn add_turning<C: Cx>(
     cx: &mut C,
     t: &ContactsOf<C>,
     class: &ClassOf<C>,

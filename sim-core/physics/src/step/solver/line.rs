@@ -8,6 +8,7 @@ use crate::arrays::Workspace;
 use crate::constants::Constants;
 use crate::lane::{Cx, Num, Real};
 use crate::{break_if, times};
+use std::ops::Range;
 
 /// The cost p along the segment from `a` (α = 0) to the minimum of its quadratic model (α = 1).
 ///
@@ -82,6 +83,18 @@ impl<'a, F: Num> Line<'a, F> {
         }
     }
 
+    /// Residual, its change and weight of some rows.
+    #[inline(always)]
+    fn rows(&self, rows: Range<usize>) -> impl Iterator<Item = [F; 3]> + '_ {
+        let jv = self.jv[rows.clone()].iter();
+        let both = self.jar[rows.clone()].iter().zip(jv);
+        let all = both.zip(&self.weight[rows]);
+        all.map(
+            #[inline(always)]
+            |((jar, jv), weight)| [*jar, *jv, *weight],
+        )
+    }
+
     #[inline(always)]
     fn derivative<C: Cx<F = F>, const TURNS: bool>(
         &self,
@@ -96,18 +109,25 @@ impl<'a, F: Num> Line<'a, F> {
             curvature: self.descent,
             size: slope.abs(),
         };
-        // equalities have one piece only
-        for r in m.equalities.len()..m.rows() {
-            let (jv, weight) = (self.jv[r], self.weight[r]);
-            let start = law(m, self.params, r, self.jar[r], weight);
-            let here = law(m, self.params, r, alpha.fma(jv, self.jar[r]), weight);
-            let model = (start.stiffness * alpha).fnma(jv, start.force);
-            // exactly 0 where the piece is the same, in spite of rounding
-            let moved = F::c(0.5).lt((here.state - start.state).abs());
-            let power = F::select(moved, (model - here.force) * jv, F::c(0.0));
-            d.slope = d.slope + power;
-            d.size = d.size + power.abs();
-            d.curvature = ((here.stiffness - start.stiffness) * jv).fma(jv, d.curvature);
+        // equalities have one piece only; of the others those of joints are told apart once, not row by row
+        let (frictions, limits) = (m.equalities.len(), m.equalities.len() + m.frictions.len());
+        for ([jar, jv, weight], friction) in self.rows(frictions..limits).zip(&m.frictions) {
+            let [zone, loss] = bounds(m, self.params, friction);
+            let start = dry_friction(jar, weight, zone, loss);
+            let here = dry_friction(alpha.fma(jv, jar), weight, zone, loss);
+            d.add(alpha, jv, start, here);
+        }
+        for [jar, jv, weight] in self.rows(limits..m.joint_rows()) {
+            let start = one_sided(jar, weight);
+            d.add(alpha, jv, start, one_sided(alpha.fma(jv, jar), weight));
+        }
+        for ([jar, jv, weight], tie) in self
+            .rows(m.joint_rows()..m.rows())
+            .zip(&m.mujoco.tie_of_row)
+        {
+            let law = &m.mujoco.ties[*tie].law;
+            let start = ties::law(law, jar, weight);
+            d.add(alpha, jv, start, ties::law(law, alpha.fma(jv, jar), weight));
         }
         if self.touches {
             let mut slope = cx.var(d.slope);
@@ -122,6 +142,20 @@ impl<'a, F: Num> Line<'a, F> {
             };
         }
         d
+    }
+}
+
+impl<F: Num> Derivative<F> {
+    /// Adds a row whose residual changes by `jv` over the segment, from its laws at the start and here. It adds exactly 0 where
+    /// the piece is the same, in spite of rounding.
+    #[inline(always)]
+    fn add(&mut self, alpha: F, jv: F, start: Law<F>, here: Law<F>) {
+        let model = (start.stiffness * alpha).fnma(jv, start.force);
+        let moved = F::c(0.5).lt((here.state - start.state).abs());
+        let power = F::select(moved, (model - here.force) * jv, F::c(0.0));
+        self.slope = self.slope + power;
+        self.size = self.size + power.abs();
+        self.curvature = ((here.stiffness - start.stiffness) * jv).fma(jv, self.curvature);
     }
 }
 
@@ -157,6 +191,7 @@ pub(super) fn search<C: Cx, const TURNS: bool>(
     m: &ConstantsOf<C>,
     line: &Line<'_, C::F>,
     length: &mut C::V,
+    counts: (&mut C::V, &mut C::V),
 ) {
     let (zero, half, one) = (C::F::c(0.0), C::F::c(0.5), C::F::c(1.0));
     let resolution = C::F::c(4.0 * <<C::F as Num>::Real as Real>::EPSILON);
@@ -173,6 +208,7 @@ pub(super) fn search<C: Cx, const TURNS: bool>(
     let mut side = cx.var(zero);
     let mut last_move = cx.var(one);
     times!(cx, m.solver.ls_iterations, {
+        cx.tally(counts.0, counts.1);
         let alpha = cx.get(length);
         let d = line.derivative::<C, TURNS>(cx, m, alpha);
         let falls = d.slope.lt(zero);

@@ -1,8 +1,9 @@
 //! The linear system of an iteration, H x = rhs, with the terms of contacts.
 
-use super::{contacts, gather};
-use crate::lane::{Cx, MaskOf, Num};
-use crate::math::factor::solve as solve_linear;
+use super::{assembly, contacts, gather};
+use crate::constants::Constants;
+use crate::lane::{Cx, MaskOf, Num, Real};
+use crate::math::factor::{Pattern, solve as solve_linear};
 use crate::step::{BlockOf, ConstantsOf};
 use crate::when;
 
@@ -15,7 +16,25 @@ pub(super) enum Unknown {
     Missing,
 }
 
-/// Solves (M + Jᵀ W J) x = rhs. `hessian` has the rows of joints already; `touching` is that of [`contacts::touching`].
+/// Worlds whose contacts couple dofs that the mass matrix does not couple; none if no world has such contacts. `touching` is
+/// that of [`contacts::touching`].
+#[inline(always)]
+pub(super) fn coupling<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    touching: Option<MaskOf<C>>,
+) -> Option<MaskOf<C>> {
+    if touching.is_none() || !m.contacts.couples() {
+        return None;
+    }
+    let some = C::F::c(0.5).lt(contacts::coupling(cx, &m.contacts));
+    cx.anywhere(some).then_some(some)
+}
+
+/// Solves (M + Jᵀ W J) x = rhs. `hessian` has the rows of joints already; `touching` is that of [`contacts::touching`],
+/// `coupling` that of [`coupling`].
+///
+/// Returns the largest ratio of diagonal entries of H and M: how much stiffer contacts make the system.
 ///
 /// A world whose contacts couple dofs that the mass matrix does not couple solves a larger system.
 #[inline(always)]
@@ -25,7 +44,8 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
     b: &mut BlockOf<C>,
     x: Unknown,
     touching: Option<MaskOf<C>>,
-) {
+    coupling: Option<MaskOf<C>>,
+) -> C::F {
     let t = &m.contacts;
     let w = &mut b.work;
     let (vector, pulls) = match x {
@@ -34,61 +54,100 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
     };
     let touches = touching.is_some();
     if touches {
-        for (cell, value) in b.system.iter_mut().zip(&w.hessian) {
-            cx.put(cell, *value);
-        }
+        cx.put_values(&w.hessian, &mut b.system);
         for (cell, value) in b.pull.iter_mut().zip(&*vector) {
             cx.put(cell, *value);
         }
     }
-    let couples = touches && t.couples();
-    let coupling = contacts::coupling(cx, t);
-    let (none, half) = (coupling.lt(C::F::c(0.5)), C::F::c(0.5));
+    // of the worlds that are still solved for
+    let some = coupling.filter(|some| cx.anywhere(*some));
+    let couples = some.is_some();
+    // the larger system has the same solution where nothing couples: a block in lockstep solves one of the two
+    let solves_both = couples && !C::LOCKSTEP;
+    let mut stiffening = cx.var(C::F::c(1.0));
     // a loop, so that assembly and factorisation are compiled once: they are long
     for larger in [false, true] {
         if larger && !couples {
             break;
         }
-        let solves = if larger { half.lt(coupling) } else { none };
-        if larger {
-            when!(cx, solves, {
-                for cell in &mut b.coupled_system {
+        if let (true, Some(some)) = (larger, some) {
+            when!(cx, some, {
+                let smaller = &*cx.cells(&mut w.hessian, &mut b.system);
+                let cells = cx.cells(&mut w.coupled_hessian, &mut b.coupled_system);
+                for cell in &mut *cells {
                     cx.put(cell, C::F::c(0.0));
                 }
-                for (cell, &place) in b.system.iter().zip(&m.coupled.places) {
+                for (cell, &place) in smaller.iter().zip(&m.coupled.places) {
                     let value = cx.get(cell);
-                    cx.put(&mut b.coupled_system[place], value);
+                    cx.put(&mut cells[place], value);
                 }
             });
         }
-        let (pattern, cells, matrix) = if larger {
+        let (pattern, matrix, system) = if larger {
             (
                 &m.coupled.pattern,
-                &mut b.coupled_system,
                 &mut w.coupled_hessian,
+                &mut b.coupled_system,
             )
         } else {
-            (&m.pattern, &mut b.system, &mut w.hessian)
+            (&m.pattern, &mut w.hessian, &mut b.system)
         };
         if touches {
+            let cells = cx.cells(matrix, system);
             for k in 0..t.classes.len() {
                 if t.classes[k].couples == larger {
-                    contacts::assemble::<_, TURNS>(cx, t, k, cells, &mut b.pull, pulls);
+                    assembly::assemble::<_, TURNS>(cx, t, k, cells, &mut b.pull, pulls);
                 }
             }
         }
-        when!(cx, solves, {
-            if touches {
-                gather(cx, cells, matrix);
+        if let (true, Some(some)) = (solves_both, some) {
+            let solves = if larger { some } else { !some };
+            when!(cx, solves, {
+                cx.get_values(matrix, system);
                 gather(cx, &b.pull, vector);
+                let ratio = stiffening_of(m, pattern, matrix, &w.mass_matrix);
+                cx.set(&mut stiffening, ratio);
+                solve_linear(pattern, matrix, vector);
+                for (cell, value) in b.solution.iter_mut().zip(&*vector) {
+                    cx.set(cell, *value);
+                }
+            });
+        } else if larger == couples {
+            if touches {
+                cx.get_values(matrix, system);
+                gather(cx, &b.pull, vector);
+                let ratio = stiffening_of(m, pattern, matrix, &w.mass_matrix);
+                cx.put(&mut stiffening, ratio);
             }
             solve_linear(pattern, matrix, vector);
-            for (cell, value) in b.solution.iter_mut().zip(&*vector) {
-                cx.set(cell, *value);
-            }
-        });
+        }
     }
-    gather(cx, &b.solution, vector);
+    if solves_both {
+        gather(cx, &b.solution, vector);
+    }
+    for x in vector.iter_mut() {
+        // a 0 of the larger system may have another sign
+        *x = *x + C::F::c(0.0);
+    }
+    cx.get(&stiffening)
+}
+
+/// The largest ratio of diagonal entries of H and M; 1 in `f64`, which does not ask.
+#[inline(always)]
+fn stiffening_of<F: Num>(
+    m: &Constants<F::Real>,
+    pattern: &Pattern,
+    hessian: &[F],
+    mass_matrix: &[F],
+) -> F {
+    let mut largest = F::c(1.0);
+    if !F::Real::DOUBLE && m.solver.refinements == 0 {
+        for j in 0..m.dofs.len() {
+            let ratio = hessian[pattern.at(j, j)].div(mass_matrix[m.pattern.at(j, j)]);
+            largest = ratio.max(largest);
+        }
+    }
+    largest
 }
 
 /// The gain of a whole step, ½ gᵀ H⁻¹ g, summed over the parts of the mass matrix with contacts; a part that several classes

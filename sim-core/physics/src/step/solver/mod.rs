@@ -48,12 +48,13 @@
 //! | `linear` | the system of an iteration |
 //! | `rows`, `cones` | laws of joint rows and of contacts: force, stiffness, cost |
 //! | `ties` | sums over constraints with Jacobians found at run time |
-//! | `contacts` | sums over contacts |
+//! | `contacts`, `assembly` | sums over contacts, and their Jᵀ W J |
 //! | `turning` | laws of contacts with torsional and rolling friction |
 //! | `line` | the line search |
 //! | `progress` | which worlds search, and which have arrived |
 //! | `refine` | corrections by inverse dynamics, in `f32` |
 
+mod assembly;
 mod cones;
 mod contacts;
 mod line;
@@ -125,15 +126,17 @@ fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
     gather(cx, &b.efc_aref, &mut b.work.row_aref);
     // contacts are so stiff that M is lost in the rounding of H a⁺: worlds with contacts solve for the correction a⁺ - a
     let corrects = contacts::touching(cx, &m.contacts);
+    let coupling = linear::coupling(cx, m, corrects);
     let mut progress = Progress::new(cx, acts, corrects);
     times!(cx, m.solver.iterations, {
         if may_idle::<C>(m) {
             break_if!(cx, !acts);
         }
+        cx.tally(&mut b.solver_work[0], &mut b.solver_block_work[0]);
         // the cost at a: residuals of the rows, H = M + Jᵀ W J and the right-hand side
         model_cost::<C, TURNS>(cx, m, b, corrects);
-        // its minimum a⁺, and what bodies that touch gain by going there
-        let gain = minimize_model::<C, TURNS>(cx, m, b, corrects);
+        // its minimum a⁺, what bodies that touch gain by going there, and how much stiffer than M it is
+        let gain = minimize_model::<C, TURNS>(cx, m, b, corrects, coupling);
         // rows that are on another piece of their cost at a⁺
         let pieces = Pieces::compare::<TURNS>(cx, m, b, corrects);
         // the worlds that search the segment from a to a⁺
@@ -195,15 +198,18 @@ fn model_cost<C: Cx, const TURNS: bool>(
     }
 }
 
-/// Solves for the minimum a⁺ of the model. Returns the gain of bodies in contact, where it is known.
+/// Solves for the minimum a⁺ of the model. Returns the gain of bodies in contact, where it is known, and the largest ratio of
+/// diagonal entries of H and M.
 #[inline(always)]
 fn minimize_model<C: Cx, const TURNS: bool>(
     cx: &mut C,
     m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
     corrects: Option<MaskOf<C>>,
-) -> C::F {
-    linear::solve_system::<_, TURNS>(cx, m, b, linear::Unknown::Minimum, corrects);
+    coupling: Option<MaskOf<C>>,
+) -> (C::F, C::F) {
+    let unknown = linear::Unknown::Minimum;
+    let stiffening = linear::solve_system::<_, TURNS>(cx, m, b, unknown, corrects, coupling);
     let gain = match corrects {
         Some(corrects) if !<<C::F as Num>::Real as Real>::DOUBLE => {
             C::F::select(corrects, linear::touched_gain(cx, m, b), C::F::c(UNKNOWN))
@@ -217,7 +223,7 @@ fn minimize_model<C: Cx, const TURNS: bool>(
             w.minimum[j] = C::F::select(corrects, whole, w.minimum[j]);
         }
     }
-    gain
+    (gain, stiffening)
 }
 
 /// Moves to the minimum of the model, or to the point of the segment that was found.
@@ -246,6 +252,7 @@ fn search_segment<C: Cx, const TURNS: bool>(
         settled: cx.var(zero),
     };
     when!(cx, plan.searches, {
+        cx.tally(&mut b.solver_work[1], &mut b.solver_block_work[1]);
         let w = &mut b.work;
         for j in 0..m.dofs.len() {
             w.step[j] = w.minimum[j] - w.start[j];
@@ -260,7 +267,8 @@ fn search_segment<C: Cx, const TURNS: bool>(
             w.jar_minimum[r] = w.jar_minimum[r] - w.jar[r];
         }
         let line = Line::new::<C, TURNS>(cx, m, &b.params, curvature, power, &b.work, corrects);
-        search::<C, TURNS>(cx, m, &line, &mut found.length);
+        let counts = (&mut b.solver_work[2], &mut b.solver_block_work[2]);
+        search::<C, TURNS>(cx, m, &line, &mut found.length, counts);
         progress.judge(cx, m, &line, &mut found, plan, corrects);
     });
     found

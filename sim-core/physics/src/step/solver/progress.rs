@@ -52,6 +52,12 @@ const STALLED: f64 = 0.25;
 /// cones, accelerations are then off by at most 3e-4 in `f32`; with 10,000 times by 2e-3.
 const DOUBTED: f64 = 100.0;
 
+/// An impratio above which the edges of pyramids may be too stiff for whole steps [–].
+const STIFF: f64 = 10.0;
+/// Relative error of a step that is solved for in a system so many times as stiff as bodies are heavy, over that and the rounding
+/// of a scalar [–].
+const SOLVED: f64 = 30.0;
+
 /// Iterations that take the whole step without a line search, which costs as much as two iterations.
 ///
 /// Newton's method on a piecewise quadratic mostly ends in two or three iterations. A world that needs more searches. The
@@ -115,10 +121,10 @@ impl<C: Cx> Progress<C> {
         cx: &mut C,
         m: &ConstantsOf<C>,
         pieces: &Pieces<C>,
-        gain: C::F,
+        (gain, stiffening): (C::F, C::F),
         corrects: Option<MaskOf<C>>,
     ) -> Plan<C> {
-        let half = C::F::c(0.5);
+        let (half, one) = (C::F::c(0.5), C::F::c(1.0));
         let changed = pieces.changed;
         let later = half.lt(cx.get(&self.iteration));
         let early = cx
@@ -126,10 +132,18 @@ impl<C: Cx> Progress<C> {
             .lt(C::F::c(trusted_iterations::<C::F>()));
         let mut trusted = early & pieces.straight;
         // the edges of a pyramid may be too stiff for the factorisation
-        if let (Some(corrects), Cone::Pyramidal) = (corrects, m.contacts.cone) {
+        if let (Some(corrects), Cone::Pyramidal) = (corrects, m.contacts.cone)
+            && m.contacts.impratio.to_f64() > STIFF
+        {
             trusted = trusted & !corrects;
         }
-        let quiet = !changed & gain.lt(C::F::k(m.solver.tolerance));
+        // on straight pieces the step is exact but for its rounding; inverse dynamics will correct that, if the model needs it
+        let rounding = match m.solver.refinements {
+            0 => stiffening * C::F::c(SOLVED * <<C::F as Num>::Real as Real>::EPSILON),
+            _ => C::F::c(0.0),
+        };
+        let left = C::F::select(pieces.straight, gain * (rounding * rounding).min(one), gain);
+        let quiet = !changed & left.lt(C::F::k(m.solver.tolerance));
         Plan {
             changed,
             later,

@@ -9,7 +9,7 @@
 //! refinement (Wilkinson 1963) with inverse dynamics as the residual. One pass reduces an error of 1e-3 to 1e-6;
 //! `Newton::refinements` is the count of passes that a model needs.
 
-use super::linear::{Unknown, solve_system};
+use super::linear::{Unknown, coupling, solve_system};
 use super::rows::{Jacobian, assemble, residual};
 use super::{acts, constraint_forces, contacts, gather, may_idle};
 use crate::arrays::Array as A;
@@ -130,7 +130,8 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     assemble(m, &b.params, w, None);
     contacts::residual::<_, true>(cx, &m.contacts, &w.start, row::JAR);
     let touching = contacts::touching(cx, &m.contacts);
-    solve_system::<_, true>(cx, m, b, Unknown::Missing, touching);
+    let coupling = coupling(cx, m, touching);
+    solve_system::<_, true>(cx, m, b, Unknown::Missing, touching, coupling);
     for (qdd, (start, missing)) in b
         .joint_qdd
         .iter_mut()

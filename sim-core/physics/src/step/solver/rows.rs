@@ -114,9 +114,10 @@ pub(super) fn residual<F: Num>(
         jar[r] = a[f.dof] - aref[r];
         r += 1;
     }
-    for (l, side) in m.limits.iter().zip(jacobian.side) {
-        jar[r] = side.fma(a[l.dof], -aref[r]);
-        r += 1;
+    let limits = r..m.joint_rows();
+    let rows = jar[limits.clone()].iter_mut().zip(&aref[limits]);
+    for ((jar, aref), (l, side)) in rows.zip(m.limits.iter().zip(jacobian.side)) {
+        *jar = side.fma(a[l.dof], -*aref);
     }
     ties::residual(m, jacobian.ties, aref, a, jar);
 }
@@ -202,12 +203,14 @@ pub(super) fn changes<F: Num>(
         turned = turned + F::select(one.lt(moved), one, zero);
         r += 1;
     }
-    for _ in &m.limits {
-        let before = one_sided(jar[r], weight[r]).state;
-        let after = one_sided(other[r], weight[r]).state;
+    let limits = r..m.joint_rows();
+    let places = jar[limits.clone()].iter().zip(&other[limits.clone()]);
+    for ((jar, other), weight) in places.zip(&weight[limits]) {
+        let before = one_sided(*jar, *weight).state;
+        let after = one_sided(*other, *weight).state;
         sum = sum + (before - after).abs();
-        r += 1;
     }
+    r = m.joint_rows();
     for tie in &m.mujoco.ties {
         for _ in 0..tie.rows {
             let before = ties::law(&tie.law, jar[r], weight[r]).state;

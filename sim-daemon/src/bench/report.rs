@@ -1,0 +1,128 @@
+//! What a benchmark prints.
+
+use std::io::Write;
+
+use serde_json::{Value, json};
+use sim_engine::simulation::Histogram;
+
+use super::Measured;
+
+/// Prints the report, as tables or as JSON.
+pub(super) fn print(measured: &Measured, as_json: bool) {
+    let text = match as_json {
+        true => format!("{:#}\n", json_of(measured)),
+        false => text(measured),
+    };
+    // whoever reads it may stop reading
+    let _ = std::io::stdout().write_all(text.as_bytes());
+}
+
+/// The histograms, with what they count.
+fn counts(measured: &Measured) -> [(&'static str, &Histogram); 7] {
+    let p = &measured.profile;
+    [
+        ("contacts", &p.contacts),
+        ("constraint rows", &p.rows),
+        ("solver iterations", &p.iterations),
+        ("  of the slowest of a block", &p.block_iterations),
+        ("line searches", &p.searches),
+        ("line-search evaluations", &p.evaluations),
+        ("  of a block", &p.block_evaluations),
+    ]
+}
+
+fn text(measured: &Measured) -> String {
+    let p = &measured.profile;
+    let rates = &measured.rates;
+    let threads = match measured.threads {
+        1 => String::new(),
+        n => format!(" ({n} threads)"),
+    };
+    let mut lines = vec![
+        format!("{}, {} worlds", measured.device, measured.worlds),
+        format!("commands: {}", measured.command.unwrap_or("held")),
+        format!(
+            "{:.0} steps/s{threads}, median of {}, from {:.0} to {:.0}",
+            rates[rates.len() / 2],
+            rates.len(),
+            rates[0],
+            rates[rates.len() - 1],
+        ),
+        format!("worlds faulted: {}, not converged: {}", measured.faulted, measured.unconverged),
+        String::new(),
+        format!("{:<28}{:>9}{:>7}{:>9}", "a world and step", "mean", "99 %", "largest"),
+    ];
+    for (name, of) in counts(measured) {
+        if !of.is_empty() {
+            let (mean, most, all) = (of.mean(), of.quantile(0.99), of.max());
+            lines.push(format!("{name:<28}{mean:>9.2}{most:>7}{all:>9}"));
+        }
+    }
+    lines.push(String::new());
+    lines.push(format!(
+        "{:<28}{:>9}{:>7}{:>9}",
+        "stage, one thread", "ns", "share", "masked"
+    ));
+    let steps = p.world_steps.max(1) as f64;
+    let all = p.total_ns as f64 / steps;
+    let mut others = all;
+    let mut outputs = 0.0;
+    for (name, stage) in p.stages() {
+        let ns = stage.step_ns as f64 / steps;
+        outputs += stage.evaluation_ns as f64 / steps;
+        others -= ns;
+        if stage.step_ns > 0 {
+            let masked = stage.masked().map_or(String::new(), |x| format!("{:.0} %", 100.0 * x));
+            lines.push(row(name, ns, all, &masked));
+        }
+    }
+    lines.push(row("outputs", outputs, all, ""));
+    lines.push(row("everything else", others - outputs, all, ""));
+    lines.push(String::new());
+    lines.join("\n")
+}
+
+fn row(name: &str, ns: f64, all: f64, masked: &str) -> String {
+    let share = format!("{:.1} %", 100.0 * ns / all);
+    format!("{name:<28}{ns:>9.1}{share:>7}{masked:>9}")
+}
+
+fn json_of(measured: &Measured) -> Value {
+    let p = &measured.profile;
+    let steps = p.world_steps.max(1) as f64;
+    let stages = p.stages().map(|(name, stage)| {
+        json!({
+            "stage": name,
+            "step_ns": stage.step_ns as f64 / steps,
+            "output_ns": stage.evaluation_ns as f64 / steps,
+            "masked": stage.masked(),
+        })
+    });
+    let stages: Vec<Value> = stages.collect();
+    let counts = counts(measured).into_iter().zip([
+        "contacts",
+        "rows",
+        "iterations",
+        "block_iterations",
+        "searches",
+        "evaluations",
+        "block_evaluations",
+    ]);
+    let counts = counts.filter(|((_, of), _)| !of.is_empty()).map(|((_, of), name)| {
+        let numbers = json!({"mean": of.mean(), "p99": of.quantile(0.99), "max": of.max()});
+        (name.to_owned(), numbers)
+    });
+    json!({
+        "device": measured.device,
+        "worlds": measured.worlds,
+        "threads": measured.threads,
+        "commands": measured.command,
+        "steps_per_s": measured.rates[measured.rates.len() / 2],
+        "steps_per_s_turns": measured.rates,
+        "faulted": measured.faulted,
+        "unconverged": measured.unconverged,
+        "counts": counts.collect::<serde_json::Map<_, _>>(),
+        "total_ns": p.total_ns as f64 / steps,
+        "stages": stages,
+    })
+}
