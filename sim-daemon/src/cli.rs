@@ -380,6 +380,7 @@ mod tests {
                 "inspect_help.txt",
                 include_str!("inspect_help.txt"),
             ),
+            ("bench", "bench_help.txt", include_str!("bench_help.txt")),
         ] {
             let mut command = Cli::command().term_width(100);
             command.build(); // so that usage lines begin with `tightloop`

@@ -286,8 +286,7 @@ impl Simulation {
     /// # Panics
     /// As [`Simulation::step`].
     pub fn step_profiled(&mut self, arena: &mut [u64], to: &mut Profile) -> bool {
-        self.backend
-            .run_profiled(self.model.substeps(), arena, to)
+        self.backend.run_profiled(self.model.substeps(), arena, to)
     }
 
     /// Evaluates every field at the present state into the arena, without stepping.

@@ -67,7 +67,8 @@ impl Commands {
                         let angle = std::f64::consts::TAU * (cycles[i] * at + phases[i]);
                         value += share * parts[i] * angle.sin();
                     }
-                    let (low, high) = (channel.middle - channel.half, channel.middle + channel.half);
+                    let (low, high) =
+                        (channel.middle - channel.half, channel.middle + channel.half);
                     row[world * channels.len() + k] = value.clamp(low, high) as f32;
                 }
             }

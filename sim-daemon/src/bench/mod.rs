@@ -39,7 +39,11 @@ pub(crate) fn run(args: &Bench) -> Result<(), DaemonError> {
     let (scene, folder) = read_scene(&args.scene)?;
     let model = scene.describe(&folder)?.compile()?;
     let start = keyframe(&model, args.keyframe.as_deref())?;
-    let swing = if args.commands == "hold" { 0.0 } else { args.swing };
+    let swing = if args.commands == "hold" {
+        0.0
+    } else {
+        args.swing
+    };
     let mut commands = Commands::new(&model, start.as_ref(), options.worlds, swing);
     let mut simulation = Simulation::new(model.clone(), &options)?;
     if let Some(key) = &start {
@@ -87,13 +91,19 @@ pub(crate) fn run(args: &Bench) -> Result<(), DaemonError> {
     let words: &[u32] = bytemuck::cast_slice(&arena);
     let having = |bits: u32| {
         let statuses = &words[first..first + options.worlds];
-        statuses.iter().filter(|&&status| status & bits != 0).count()
+        statuses
+            .iter()
+            .filter(|&&status| status & bits != 0)
+            .count()
     };
     let measured = Measured {
         device: simulation.device().to_owned(),
         worlds: options.worlds,
         threads: simulation.threads(),
-        command: commands.as_ref().filter(|_| swing > 0.0).map(Commands::field),
+        command: commands
+            .as_ref()
+            .filter(|_| swing > 0.0)
+            .map(Commands::field),
         rates,
         profile,
         faulted: having(sim_physics::arrays::status::FROZEN),
@@ -117,7 +127,11 @@ fn check(args: &Bench) -> Result<Options, DaemonError> {
         return Err(wrong("threads", &args.threads, "ask for 1 to 1024"));
     }
     if !matches!(args.commands.as_str(), "random" | "hold") {
-        return Err(wrong("commands", &args.commands, "unknown; use random or hold"));
+        return Err(wrong(
+            "commands",
+            &args.commands,
+            "unknown; use random or hold",
+        ));
     }
     for (argument, value, most) in [
         ("swing", args.swing, 1.0),

@@ -48,9 +48,15 @@ fn text(measured: &Measured) -> String {
             rates[0],
             rates[rates.len() - 1],
         ),
-        format!("worlds faulted: {}, not converged: {}", measured.faulted, measured.unconverged),
+        format!(
+            "worlds faulted: {}, not converged: {}",
+            measured.faulted, measured.unconverged
+        ),
         String::new(),
-        format!("{:<28}{:>9}{:>7}{:>9}", "a world and step", "mean", "99 %", "largest"),
+        format!(
+            "{:<28}{:>9}{:>7}{:>9}",
+            "a world and step", "mean", "99 %", "largest"
+        ),
     ];
     for (name, of) in counts(measured) {
         if !of.is_empty() {
@@ -72,7 +78,9 @@ fn text(measured: &Measured) -> String {
         outputs += stage.evaluation_ns as f64 / steps;
         others -= ns;
         if stage.step_ns > 0 {
-            let masked = stage.masked().map_or(String::new(), |x| format!("{:.0} %", 100.0 * x));
+            let masked = stage
+                .masked()
+                .map_or(String::new(), |x| format!("{:.0} %", 100.0 * x));
             lines.push(row(name, ns, all, &masked));
         }
     }
@@ -108,10 +116,12 @@ fn json_of(measured: &Measured) -> Value {
         "evaluations",
         "block_evaluations",
     ]);
-    let counts = counts.filter(|((_, of), _)| !of.is_empty()).map(|((_, of), name)| {
-        let numbers = json!({"mean": of.mean(), "p99": of.quantile(0.99), "max": of.max()});
-        (name.to_owned(), numbers)
-    });
+    let counts = counts
+        .filter(|((_, of), _)| !of.is_empty())
+        .map(|((_, of), name)| {
+            let numbers = json!({"mean": of.mean(), "p99": of.quantile(0.99), "max": of.max()});
+            (name.to_owned(), numbers)
+        });
     json!({
         "device": measured.device,
         "worlds": measured.worlds,

@@ -13,7 +13,8 @@ use std::sync::Arc;
 ///
 /// # Safety
 /// As [`Chunk::run`].
-pub(super) type RunChunk<F> = unsafe fn(&mut Chunk<F>, &Job<F>, usize, transfer::Arena, Option<&mut Profile>);
+pub(super) type RunChunk<F> =
+    unsafe fn(&mut Chunk<F>, &Job<F>, usize, transfer::Arena, Option<&mut Profile>);
 
 /// The physics code, compiled for an instruction set.
 pub(super) struct CompiledStages<F: Lane> {

@@ -67,7 +67,8 @@ impl<'a, F: Lane> Watch<'a, F> {
             &moment.constants.contacts.classes,
             moment.constants.contacts.memory.counts,
         );
-        let counts = (0..classes.len()).map(move |k| moment.memory[counts.base + k * counts.stride]);
+        let counts =
+            (0..classes.len()).map(move |k| moment.memory[counts.base + k * counts.stride]);
         let kept = counts.zip(classes);
         kept.map(|(count, class)| count.min(F::c(class.capacity as f64)))
     }
@@ -86,7 +87,11 @@ impl<'a, F: Lane> Watch<'a, F> {
     fn note_contacts(&mut self, moment: &Moment<'_, F>) {
         let is_rows = moment.stage == self.contact_rows;
         for (k, count) in Watch::count(moment).enumerate() {
-            let new = if is_rows { count } else { count - self.counts[k] };
+            let new = if is_rows {
+                count
+            } else {
+                count - self.counts[k]
+            };
             self.counts[k] = count;
             if F::any(F::c(0.5).lt(new)) {
                 self.note_work(moment.stage, moment.lanes, new);
@@ -103,7 +108,9 @@ impl<'a, F: Lane> Watch<'a, F> {
             return;
         }
         self.profile.block_iterations.add(most);
-        self.profile.block_evaluations.add(of_block.lane(0).to_usize());
+        self.profile
+            .block_evaluations
+            .add(of_block.lane(0).to_usize());
         let rows = moment.constants.rows();
         for lane in 0..moment.lanes {
             let of = |x: F| x.lane(lane).to_usize();
