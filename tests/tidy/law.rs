@@ -129,6 +129,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "sim-core/engine/src/backend/cpu",
         &[
+            "contact_kinds",
             "lane_assignment",
             "chunk",
             "delay",

@@ -1,8 +1,11 @@
 //! Convex hulls as the narrow phase reads them: rows of the model's tables.
 
 use crate::geometry::{Face, Hull};
-use sim_physics::constants::hull::{CORNERS_MAX, HullTables};
+use sim_physics::constants::hull::{CLUSTER, CORNERS_MAX, HullTables};
 use sim_physics::lane::{Fixed, Tables};
+
+/// A cluster's ball is larger by this part of its hull's radius than its vertices need, more than `f32` rounds their heights.
+const ROUNDING: f64 = 1e-5;
 
 /// The frame of a hull in a table, and how large it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,8 +22,9 @@ pub struct HullFrame {
 pub fn append(hulls: &[Hull], tables: &mut Tables<f64>) -> (HullTables, Vec<HullFrame>) {
     let frames: Vec<HullFrame> = hulls.iter().map(HullFrame::of).collect();
     let mut rows = Rows::default();
+    let clustered = hulls.iter().any(|hull| hull.vertices.len() > CLUSTER);
     for (hull, frame) in hulls.iter().zip(&frames) {
-        rows.push(hull, frame);
+        rows.push(hull, frame, clustered);
     }
     let spans = Fixed {
         base: tables.indices.len(),
@@ -28,6 +32,22 @@ pub fn append(hulls: &[Hull], tables: &mut Tables<f64>) -> (HullTables, Vec<Hull
         rows: hulls.len(),
     };
     tables.indices.extend(rows.spans);
+    let mut clusters_of = |new: Vec<u32>| {
+        let (base, rows) = (tables.indices.len(), new.len() / 2);
+        tables.indices.extend(new);
+        Fixed {
+            base,
+            stride: 2,
+            rows,
+        }
+    };
+    let (cluster_spans, cluster_rows) = match clustered {
+        true => (
+            clusters_of(rows.cluster_spans),
+            clusters_of(rows.cluster_rows),
+        ),
+        false => Default::default(),
+    };
     let mut numbers = |stride: usize, new: Vec<f64>| {
         let base = tables.numbers.len();
         let rows = new.len() / stride;
@@ -41,6 +61,12 @@ pub fn append(hulls: &[Hull], tables: &mut Tables<f64>) -> (HullTables, Vec<Hull
         faces: numbers(6, rows.faces),
         corners: numbers(3, rows.corners),
         edges: numbers(13, rows.edges),
+        cluster_spans,
+        cluster_rows,
+        clusters: match clustered {
+            true => numbers(4, rows.clusters),
+            false => Fixed::default(),
+        },
     };
     (placed, frames)
 }
@@ -66,18 +92,30 @@ struct Rows {
     faces: Vec<f64>,
     corners: Vec<f64>,
     edges: Vec<f64>,
+    cluster_spans: Vec<u32>,
+    cluster_rows: Vec<u32>,
+    clusters: Vec<f64>,
 }
 
 impl Rows {
-    fn push(&mut self, hull: &Hull, frame: &HullFrame) {
+    fn push(&mut self, hull: &Hull, frame: &HullFrame, clustered: bool) {
         let centred = |vertex: u32| -> [f64; 3] {
             let place = hull.vertices[vertex as usize];
             std::array::from_fn(|i| place[i] - frame.center[i])
         };
         let first = self.ends();
-        let count = hull.vertices.len() as u32;
-        for place in 0..count.next_multiple_of(4) {
-            self.vertices.extend(centred(place.min(count - 1)));
+        let mut order: Vec<u32> = (0..hull.vertices.len() as u32).collect();
+        if clustered {
+            let first = self.clusters.len() / 4;
+            sort_into_clusters(&mut order, &centred);
+            for cluster in order.chunks(CLUSTER) {
+                let points: Vec<[f64; 3]> = cluster.iter().map(|&vertex| centred(vertex)).collect();
+                self.push_cluster(&points, frame.radius);
+            }
+            let end = self.clusters.len() / 4;
+            self.cluster_spans.extend([first as u32, end as u32]);
+        } else {
+            self.push_vertices(order.into_iter().map(centred).collect());
         }
         for face in &hull.faces {
             let offset = face.offset - dot(face.normal, frame.center);
@@ -106,6 +144,33 @@ impl Rows {
         self.sizes.push(frame.radius);
     }
 
+    /// Four vertices a row; the last row repeats the last vertex.
+    fn push_vertices(&mut self, mut points: Vec<[f64; 3]>) {
+        if let Some(&last) = points.last() {
+            points.resize(points.len().next_multiple_of(4), last);
+        }
+        self.vertices.extend(points.into_iter().flatten());
+    }
+
+    /// A cluster of the vertices of a hull of this radius.
+    fn push_cluster(&mut self, points: &[[f64; 3]], size: f64) {
+        let among = |pick: fn(f64, f64) -> f64, i: usize| points.iter().map(|x| x[i]).reduce(pick);
+        let center: [f64; 3] = std::array::from_fn(|i| {
+            let (low, high) = (among(f64::min, i), among(f64::max, i));
+            0.5 * (low.unwrap_or(0.0) + high.unwrap_or(0.0))
+        });
+        let squares = points.iter().map(|x| {
+            let from_center: [f64; 3] = std::array::from_fn(|i| x[i] - center[i]);
+            dot(from_center, from_center)
+        });
+        let radius = squares.fold(0.0, f64::max).sqrt() + ROUNDING * size;
+        self.clusters.extend(center);
+        self.clusters.push(radius);
+        let first = self.ends()[0];
+        self.push_vertices(points.to_vec());
+        self.cluster_rows.extend([first, self.ends()[0]]);
+    }
+
     fn ends(&self) -> [u32; 3] {
         let rows = [
             self.vertices.len() / 12,
@@ -114,6 +179,31 @@ impl Rows {
         ];
         rows.map(|rows| rows as u32)
     }
+}
+
+/// Sorts vertices so that each [`CLUSTER`] of them are near each other: halves along the longest side of their bounding box,
+/// in turn, until a cluster is left.
+fn sort_into_clusters(vertices: &mut [u32], place: &impl Fn(u32) -> [f64; 3]) {
+    if vertices.len() <= CLUSTER {
+        // as they were given: of equal vertices the first one counts
+        vertices.sort_unstable();
+        return;
+    }
+    let extent = |i: usize| {
+        let along = || vertices.iter().map(|&vertex| place(vertex)[i]);
+        along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
+    };
+    let sides: [f64; 3] = std::array::from_fn(extent);
+    let longest = (0..3).fold(0, |best, i| if sides[i] > sides[best] { i } else { best });
+    vertices.sort_unstable_by(|&a, &b| {
+        let [x, y] = [a, b].map(|vertex| place(vertex)[longest]);
+        x.total_cmp(&y).then(a.cmp(&b))
+    });
+    // all clusters but the last are full
+    let half = (vertices.len() / 2).next_multiple_of(CLUSTER);
+    let (low, high) = vertices.split_at_mut(half.min(vertices.len()));
+    sort_into_clusters(low, place);
+    sort_into_clusters(high, place);
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

@@ -265,9 +265,16 @@ impl Model {
             .replace(", mocap_pos: [], mocap_quat: [], eq_active: []", "")
             .replace(", turns: None", "")
             .replace(", link_axes: None", "")
-            .replace(&format!(", turning: {:?}", Fixed::default()), "");
+            .replace(&format!(", turning: {:?}", Fixed::default()), "")
+            .replace(&no_clusters(), "");
         text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| {
             (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
         })
     }
+}
+
+/// What the `Debug` text of a model says where no hull has clusters of vertices.
+fn no_clusters() -> String {
+    let none = Fixed::default();
+    format!(", cluster_spans: {none:?}, cluster_rows: {none:?}, clusters: {none:?}")
 }

@@ -6,6 +6,9 @@ use crate::lane::Fixed;
 /// The deepest point of a contact does not depend on them, only how far its support reaches.
 pub const CORNERS_MAX: usize = 12;
 
+/// Most vertices of a cluster: four rows.
+pub const CLUSTER: usize = 16;
+
 /// Where the hulls of a model are in its tables.
 ///
 /// A hull's frame has the axes of the frame that its vertices were given in and the centre of their bounding box.
@@ -23,4 +26,11 @@ pub struct HullTables {
     pub corners: Fixed,
     /// One end, unit direction, outward normals of the faces beside it, and length. `(edges, 13)` [m, –]
     pub edges: Fixed,
+    /// Of each hull: first and end of its clusters of vertices. Without rows where every hull is one cluster. Indices.
+    /// `(hulls, 2)`
+    pub cluster_spans: Fixed,
+    /// First and end of the rows of a cluster in `vertices`. Indices. `(clusters, 2)`
+    pub cluster_rows: Fixed,
+    /// Centre of a cluster, and radius of a ball about it that holds its vertices. `(clusters, 4)` [m]
+    pub clusters: Fixed,
 }

@@ -1,5 +1,6 @@
 //! A chunk: blocks of worlds that one thread works on, with their state in lane order and one workspace.
 
+use super::contact_kinds::ContactKinds;
 use super::lane_assignment::LaneAssignment;
 use crate::backend::noise::Noise;
 use crate::backend::state::{self, RECORD, Shape};
@@ -76,6 +77,8 @@ pub(super) struct Chunk<F: Lane> {
     pub(super) state: Vec<F::Real>,
     /// The lane of each world.
     pub(super) assignment: LaneAssignment,
+    /// What makes worlds share a block.
+    pub(super) kinds: ContactKinds,
     /// Control frames since the reset of each world; a frozen world does not count.
     pub(super) steps: Vec<u64>,
     pub(super) status: Vec<u32>,
@@ -124,6 +127,7 @@ impl<F: Lane> Chunk<F> {
             lanes: vec![F::Real::default(); elements * F::WIDTH],
             rows: vec![F::Real::default(); elements * F::WIDTH],
             assignment: LaneAssignment::new(worlds.len(), blocks * F::WIDTH),
+            kinds: ContactKinds::default(),
             worlds,
         };
         chunk.start(job);

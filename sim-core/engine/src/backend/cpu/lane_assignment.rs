@@ -1,16 +1,11 @@
 //! Lane assignment: which lane of which block holds a world.
 //!
-//! A block takes as long as its slowest world, and visits every contact that any of its worlds has. So worlds with the same kinds of
-//! contacts share a block: after each frame a chunk sorts its worlds by the contact classes of the last substep (`regroup`).
+//! A block takes as long as its slowest world, and visits every contact that any of its worlds has. So worlds of the same kind
+//! (`contact_kinds`) share a block: after each frame a chunk sorts its worlds by the contacts of the last substep (`regroup`).
 //! No value of a world depends on its lane or its neighbours.
 
+use super::contact_kinds::{KINDS, Kind};
 use std::ops::Range;
-
-/// One bit per contact class that a world has, modulo the number of bits.
-pub(super) type Touches = u8;
-pub(super) const BITS: usize = Touches::BITS as usize;
-/// Number of different values.
-const KINDS: usize = 1 << BITS;
 
 /// Lanes of a chunk, counted from its first block.
 pub(super) struct LaneAssignment {
@@ -18,9 +13,9 @@ pub(super) struct LaneAssignment {
     lane: Vec<usize>,
     /// The world in each lane.
     world: Vec<usize>,
-    /// Contact classes of each world.
-    touches: Vec<Touches>,
-    /// Whether the contact classes of a world changed since the last assignment.
+    /// The kind of each world.
+    kinds: Vec<Kind>,
+    /// Whether the kind of a world changed since the last assignment.
     changed: bool,
 }
 
@@ -30,7 +25,7 @@ impl LaneAssignment {
         LaneAssignment {
             lane: (0..lanes).collect(),
             world: (0..lanes).collect(),
-            touches: vec![0; worlds],
+            kinds: vec![0; worlds],
             changed: false,
         }
     }
@@ -55,13 +50,13 @@ impl LaneAssignment {
         follows.then(|| first..first + worlds.len())
     }
 
-    /// Sets the contact classes of a world.
-    pub fn note(&mut self, world: usize, touches: Touches) {
-        self.changed |= self.touches[world] != touches;
-        self.touches[world] = touches;
+    /// Sets the kind of a world.
+    pub fn note(&mut self, world: usize, kind: Kind) {
+        self.changed |= self.kinds[world] != kind;
+        self.kinds[world] = kind;
     }
 
-    /// Assigns neighbouring lanes to worlds with the same contact classes. Calls `swap` for each pair of lanes that exchange worlds.
+    /// Assigns neighbouring lanes to worlds of the same kind. Calls `swap` for each pair of lanes that exchange worlds.
     ///
     /// A world that is in the range of its kind already stays there.
     pub fn group(&mut self, mut swap: impl FnMut(usize, usize)) {
@@ -69,8 +64,8 @@ impl LaneAssignment {
             return;
         }
         let mut ends = [0; KINDS];
-        for &touches in &self.touches {
-            ends[usize::from(touches)] += 1;
+        for &kind in &self.kinds {
+            ends[usize::from(kind)] += 1;
         }
         // the next lane of each kind to examine
         let mut next = [0; KINDS];
@@ -83,13 +78,13 @@ impl LaneAssignment {
         for kind in 0..KINDS {
             while next[kind] < ends[kind] {
                 let lane = next[kind];
-                let own = usize::from(self.touches[self.world[lane]]);
+                let own = usize::from(self.kinds[self.world[lane]]);
                 if own == kind {
                     next[kind] += 1;
                     continue;
                 }
                 // there is one, since each kind has as many lanes as worlds
-                while usize::from(self.touches[self.world[next[own]]]) == own {
+                while usize::from(self.kinds[self.world[next[own]]]) == own {
                     next[own] += 1;
                 }
                 let other = next[own];

@@ -14,6 +14,7 @@
 
 mod backend;
 mod chunk;
+mod contact_kinds;
 mod contacts;
 mod delay;
 mod dispatch;

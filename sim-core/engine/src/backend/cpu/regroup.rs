@@ -1,35 +1,47 @@
-//! Moves worlds between lanes, so that those with the same contact classes share a block.
+//! Moves worlds between lanes, so that those with the same contacts share a block.
 
 use super::chunk::{Chunk, Job};
-use super::lane_assignment::{BITS, Touches};
+use super::contact_kinds::{Bit, ContactKinds, Kind};
 use sim_physics::constants::Constants;
 use sim_physics::lane::Lane;
 
 impl<F: Lane> Chunk<F> {
-    /// Records which contact classes the worlds of a block have now.
+    /// Records of which kind the worlds of a block are now.
     #[inline(always)]
-    pub(super) fn note_contact_classes(&mut self, m: &Constants<F::Real>, block: usize) {
+    pub(super) fn note_contacts(&mut self, m: &Constants<F::Real>, block: usize) {
         let classes = m.contacts.classes.len();
         if classes == 0 || F::WIDTH == 1 {
             return;
         }
-        let mut touches = [0; 64];
-        let counts = m.contacts.memory.counts;
-        for class in 0..classes {
-            let count = self.memory[counts.base + class * counts.stride];
-            let bits = F::bits(F::c(0.5).lt(count));
-            for (lane, touches) in touches[..F::WIDTH].iter_mut().enumerate() {
-                *touches |= ((bits >> lane & 1) as Touches) << (class % BITS);
+        let (counts, memory, lanes) =
+            (m.contacts.memory.counts, &self.memory, self.lanes_of(block));
+        let set = |bit: Bit| {
+            let count = memory[counts.base + bit.class * counts.stride];
+            F::bits(F::c(bit.threshold()).lt(count))
+        };
+        if ContactKinds::is_due(self.frames) {
+            // lanes past the last world have no contacts
+            self.kinds
+                .count(classes, lanes.len(), |bit| set(bit).count_ones());
+        }
+        let mut kinds: [Kind; 64] = [0; 64];
+        for (of, bit) in self.kinds.bits() {
+            let worlds = set(*of);
+            for (lane, kind) in kinds[..F::WIDTH].iter_mut().enumerate() {
+                *kind |= (worlds >> lane & 1) as Kind * bit;
             }
         }
-        for lane in self.lanes_of(block) {
+        for lane in lanes {
             let world = self.assignment.world(lane);
-            self.assignment.note(world, touches[lane % F::WIDTH]);
+            self.assignment.note(world, kinds[lane % F::WIDTH]);
         }
     }
 
-    /// Moves worlds with the same contact classes into neighbouring lanes, with their state.
+    /// Moves worlds of the same kind into neighbouring lanes, with their state.
     pub(super) fn regroup(&mut self, job: &Job<F>) {
+        if ContactKinds::is_due(self.frames) {
+            self.kinds.choose(&job.constants);
+        }
         let numbers = job.shape.total();
         let place = |lane: usize| (lane / F::WIDTH) * numbers * F::WIDTH + lane % F::WIDTH;
         let state = &mut self.state;

@@ -95,7 +95,7 @@ impl<F: Lane> Chunk<F> {
                 self.count_left_out(block);
             }
             if substeps > 0 {
-                self.note_contact_classes(&job.constants, block);
+                self.note_contacts(&job.constants, block);
             }
             for slot in job
                 .layout

@@ -137,11 +137,17 @@ impl<'a, F: Num, const S: usize> Removed<'a, F, S> {
             rows[k] = &mut std::mem::take(&mut rows[k])[..length];
         }
         for j in 0..length {
+            let mut column = [F::c(0.0); S];
+            for k in 0..S {
+                column[k] = rows[k][j];
+            }
             for k in (1..S).rev() {
-                let x = rows[k][j];
                 for i in 0..k {
-                    rows[i][j] = l[k][i].fnma(x, rows[i][j]);
+                    column[i] = l[k][i].fnma(column[k], column[i]);
                 }
+            }
+            for k in 0..S - 1 {
+                rows[k][j] = column[k];
             }
         }
         Removed { rows, inverse, y }
@@ -155,10 +161,15 @@ impl<'a, F: Num, const S: usize> Removed<'a, F, S> {
         for k in 0..S {
             share[k] = rows[k][last] * share[k];
         }
-        for j in 0..last + 1 {
+        // of one length, so that the loop has no check
+        let mut own: [&[F]; S] = [&[]; S];
+        for k in 0..S {
+            own[k] = &rows[k][..target.len()];
+        }
+        for j in 0..target.len() {
             let mut entry = target[j];
             for k in (0..S).rev() {
-                entry = share[k].fnma(rows[k][j], entry);
+                entry = share[k].fnma(own[k][j], entry);
             }
             target[j] = entry;
         }
@@ -181,19 +192,23 @@ fn subtract<F: Num, const S: usize, const I: usize>(
     segment.subtract_from(target, &mut x_above[path.rows[I]]);
 }
 
-/// The rows of a segment of `path` ancestors, to read.
+/// The rows of a segment of `path` ancestors, to read: their entries with the ancestors, all of one length, and those among
+/// themselves.
 #[inline(always)]
-fn split_ref<F, const S: usize>(mut own: &[F], path: usize) -> [&[F]; S] {
+fn split_ref<F: Num, const S: usize>(mut own: &[F], path: usize) -> ([&[F]; S], [[F; S]; S]) {
     let mut rows = [&own[..0]; S];
-    for (k, row) in rows.iter_mut().enumerate() {
-        (*row, own) = own.split_at(path + k + 1);
+    let mut corner = [[F::c(0.0); S]; S];
+    for k in 0..S {
+        let (row, rest) = own.split_at(path + k + 1);
+        corner[k][..k + 1].copy_from_slice(&row[path..]);
+        (rows[k], own) = (&row[..path], rest);
     }
-    rows
+    (rows, corner)
 }
 
 #[inline(always)]
 pub(super) fn forward<F: Num, const S: usize>(own: &[F], path: &[usize], above: &[F], x: &mut [F]) {
-    let rows = split_ref::<F, S>(own, path.len());
+    let (rows, corner) = split_ref::<F, S>(own, path.len());
     let mut y = [F::c(0.0); S];
     y.copy_from_slice(x);
     for (j, &i) in path.iter().enumerate() {
@@ -204,7 +219,7 @@ pub(super) fn forward<F: Num, const S: usize>(own: &[F], path: &[usize], above: 
     }
     for k in 0..S {
         for i in 0..k {
-            y[k] = rows[k][path.len() + i].fnma(y[i], y[k]);
+            y[k] = corner[k][i].fnma(y[i], y[k]);
         }
     }
     x.copy_from_slice(&y);
@@ -234,18 +249,19 @@ pub(super) fn add_rows<F: Num, const S: usize>(
     x: &[F],
     y: &mut [F],
 ) {
-    let rows = split_ref::<F, S>(own, path.len());
+    let (rows, corner) = split_ref::<F, S>(own, path.len());
     let mut x_own = [F::c(0.0); S];
     x_own.copy_from_slice(&x[first..first + S]);
     let mut y_own = [F::c(0.0); S];
     for k in 0..S {
-        y_own[k] = rows[k][path.len() + k] * x_own[k];
+        y_own[k] = corner[k][k] * x_own[k];
         for i in 0..k {
-            let entry = rows[k][path.len() + i];
-            y_own[k] = entry.fma(x_own[i], y_own[k]);
-            y_own[i] = entry.fma(x_own[k], y_own[i]);
+            y_own[k] = corner[k][i].fma(x_own[i], y_own[k]);
+            y_own[i] = corner[k][i].fma(x_own[k], y_own[i]);
         }
     }
+    // one check of the bounds for both
+    let x = &x[..y.len()];
     for (j, &i) in path.iter().enumerate() {
         let (xi, mut yi) = (x[i], y[i]);
         for k in 0..S {

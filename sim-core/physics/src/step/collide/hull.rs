@@ -1,14 +1,36 @@
 //! Convex hulls as rows of the model's tables, and their support functions.
 //!
-//! A support function visits every vertex: hulls are small (at most 64 vertices), and hill climbing over neighbours
-//! (as in MuJoCo's `engine_collision_convex.c`) would take another path in each world of a block.
+//! A support function visits every cluster of vertices that may hold the farthest one. Hill climbing over neighbours (as in
+//! MuJoCo's `engine_collision_convex.c`) would take another path in each world of a block.
 
 use super::support::Support;
 use super::variables::pick3;
 use crate::constants::hull::HullTables;
 use crate::lane::{Cx, Fixed, Num};
 use crate::math::vec3::{Mat3, Vec3};
-use crate::span;
+use crate::{span, when};
+
+/// `each_far_row!(cx, hull, d, best, row, { … })`: the body for every row of vertices of which one may be farther along `d` than
+/// `best`, which the body raises. Where it is not, the body changes nothing, so it may run in any world.
+macro_rules! each_far_row {
+    ($cx:ident, $hull:expr, $d:ident, $best:ident, $row:ident, $body:block) => {
+        if $hull.tables.clusters.rows == 0 {
+            let (first, end) = $hull.span($cx, Part::Vertices);
+            span!($cx, $row in first, end, $body);
+        } else {
+            let length = $d.dot($d).sqrt();
+            let (first, end) = $hull.clusters($cx);
+            span!($cx, cluster in first, end, {
+                let (center, radius) = $hull.cluster($cx, cluster);
+                let bound = radius.fma(length, center.dot($d));
+                when!($cx, $cx.get(&$best).lt(bound), {
+                    let (first, end) = $hull.cluster_rows($cx, cluster);
+                    span!($cx, $row in first, end, $body);
+                });
+            });
+        }
+    };
+}
 
 /// A hull in its own frame.
 pub(super) struct Hull<'a, C: Cx> {
@@ -52,6 +74,29 @@ impl<C: Cx> Hull<'_, C> {
         (first, end)
     }
 
+    /// First and end of its clusters.
+    #[inline(always)]
+    pub fn clusters(&self, cx: &mut C) -> (C::I, C::I) {
+        let (spans, end) = (self.tables.cluster_spans, self.tables.clusters.rows + 1);
+        let first = cx.index(spans, self.row, 0, end);
+        (first, cx.index(spans, self.row, 1, end))
+    }
+
+    /// Centre and radius of a cluster [m].
+    #[inline(always)]
+    pub fn cluster(&self, cx: &mut C, cluster: C::I) -> (Vec3<C::F>, C::F) {
+        let [x, y, z, radius] = cx.constants(self.tables.clusters, cluster, 0);
+        (Vec3([x, y, z]), radius)
+    }
+
+    /// First and end of the rows of a cluster's vertices.
+    #[inline(always)]
+    pub fn cluster_rows(&self, cx: &mut C, cluster: C::I) -> (C::I, C::I) {
+        let (rows, end) = (self.tables.cluster_rows, self.tables.vertices.rows + 1);
+        let first = cx.index(rows, cluster, 0, end);
+        (first, cx.index(rows, cluster, 1, end))
+    }
+
     /// Half extents of its bounding box [m].
     #[inline(always)]
     pub fn half_extents(&self, cx: &mut C) -> Vec3<C::F> {
@@ -67,9 +112,8 @@ impl<C: Cx> Hull<'_, C> {
     /// How far it reaches along `d`: the largest d · vertex.
     #[inline(always)]
     pub fn reach(&self, cx: &mut C, d: Vec3<C::F>) -> C::F {
-        let (first, end) = self.span(cx, Part::Vertices);
         let mut best = cx.var(C::F::c(-1e18));
-        span!(cx, row in first, end, {
+        each_far_row!(cx, self, d, best, row, {
             let mut reach = cx.get(&best);
             for point in vertex_row(cx, self.tables, row) {
                 reach = reach.max(point.dot(d));
@@ -83,11 +127,10 @@ impl<C: Cx> Hull<'_, C> {
 impl<C: Cx> Support<C> for Hull<'_, C> {
     #[inline(always)]
     fn farthest(&self, cx: &mut C, d: Vec3<C::F>) -> Vec3<C::F> {
-        let (first, end) = self.span(cx, Part::Vertices);
         let mut best = cx.var(C::F::c(-1e18));
         // row of the vertex, and its quarter of the row
         let mut at = cx.var(C::F::c(0.0));
-        span!(cx, row in first, end, {
+        each_far_row!(cx, self, d, best, row, {
             let number = cx.number(row);
             let (mut reach, mut place) = (cx.get(&best), cx.get(&at));
             for (k, point) in vertex_row(cx, self.tables, row).into_iter().enumerate() {

@@ -1,176 +1,24 @@
-//! A plane, sphere, capsule, box, cylinder or hull against a hull.
+//! A sphere, capsule, box, cylinder or hull against a hull. A plane is in [`super::plane_hull`].
 //!
-//! - Plane: the hull's lowest vertices.
 //! - Sphere, capsule, box: all separating axes, which are exact in penetration, and GJK from the best of them otherwise.
 //! - Cylinder: GJK at a stand-off from the best axis of the hull.
 //! - Hull: GJK at a stand-off, and in deep penetration the nearest face of the Minkowski difference.
 
 use super::convex::{ConvexPair, add_convex_contacts, separation_by_axes};
 use super::features::{HullFace, aligned};
-use super::hull::{Hull, Part, PosedHull, vertex_row};
-use super::hull_axes::{
-    BoxReach, HullAxes, Reach, SeparatingAxis, axis_tolerance, bounding_box_axis,
-};
+use super::hull::{Hull, PosedHull};
+use super::hull_axes::{BoxReach, HullAxes, SeparatingAxis, axis_tolerance, bounding_box_axis};
 use super::hull_depth::MinkowskiFaces;
 use super::manifold::{FeaturePair, Separation};
 use super::narrow::{ShapePair, ShapePose};
 use super::points::Points;
 use super::posed::{FacetedShape, PosedBox, PosedCapsule, PosedCylinder, PosedSphere};
-use super::reduction::ReductionScore;
 use super::restart::DirectionSamples;
-use super::select::{perpendicular, select};
-use super::variables::{get3, set3, var3};
 use crate::lane::{Cx, Num, Table};
-use crate::math::vec3::{Mat3, Vec3};
-use crate::{span, when};
+use crate::math::vec3::Vec3;
 
 /// Depth past which the nearest axis of two hulls may not be that of least depth, relative to the smaller radius.
 const DEEP: f64 = 0.01;
-/// Vertices whose heights differ by less than this part of the hull's radius count as equally deep.
-const SAME_DEPTH: f64 = 2e-6;
-/// Vertices nearer to those chosen than this part of the hull's radius do not widen a contact.
-const SPREAD: f64 = 1e-3;
-
-/// Plane and hull: the deepest vertex below the margin, and three others that span most.
-#[inline(always)]
-pub fn plane_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
-    let (hull, b, normal) = (pair.hull_b(), pair.pose_b, pair.axes_a[2]);
-    let n = b.axes.transpose_mul(normal);
-    let height = normal.dot(b.center);
-    let half = hull.half_extents(cx);
-    let reach = BoxReach(half).reach(n);
-    when!(cx, (height - reach).lt(pair.margin), {
-        let size = hull.radius(cx);
-        // seen along the normal: two directions across it, and the height
-        let u = perpendicular(n);
-        let view = Mat3([u, n.cross(u), n]);
-        let vertices = Vertices {
-            view,
-            height,
-            size,
-            span: hull.span(cx, Part::Vertices),
-        };
-        let (spots, found) = vertices.choose(cx, pair, &hull);
-        for k in 0..4 {
-            let x = get3(cx, &spots[k]);
-            let distance = x[2] + height;
-            // half-way between vertex and plane
-            let on_hull = view[0].scale_add(
-                x[0],
-                view[1].scale_add(x[1], n * (x[2] - C::F::c(0.5) * distance)),
-            );
-            let is = C::F::c(0.5).lt(cx.get(&found[k]));
-            let point = b.axes.mul_add(on_hull, b.center);
-            out.add(cx, is, point, distance, normal);
-        }
-    });
-}
-
-/// Vertices of a hull as seen along the normal of a plane.
-struct Vertices<F, I> {
-    /// Two directions across the normal, and the normal.
-    view: Mat3<F>,
-    /// Height of the hull's centre above the plane [m].
-    height: F,
-    /// Radius of the hull [m].
-    size: F,
-    /// Rows of the vertices.
-    span: (I, I),
-}
-
-/// Variables of four points and of whether there is one.
-type FourPoints<V> = ([[V; 3]; 4], [V; 4]);
-
-impl<F: Num, I: Copy> Vertices<F, I> {
-    /// Chooses four vertices.
-    #[inline(always)]
-    fn choose<C: Cx<F = F, I = I>>(
-        &self,
-        cx: &mut C,
-        pair: &ShapePair<'_, C>,
-        hull: &Hull<'_, C>,
-    ) -> FourPoints<C::V> {
-        let c = F::c;
-        let mut spots = [
-            var3(cx, Vec3::zero()),
-            var3(cx, Vec3::zero()),
-            var3(cx, Vec3::zero()),
-            var3(cx, Vec3::zero()),
-        ];
-        let mut found = [
-            cx.var(c(0.0)),
-            cx.var(c(0.0)),
-            cx.var(c(0.0)),
-            cx.var(c(0.0)),
-        ];
-        let deepest = self.deepest(cx, hull);
-        set3(cx, &mut spots[0], deepest);
-        cx.set(
-            &mut found[0],
-            F::select((deepest[2] + self.height).lt(pair.margin), c(1.0), c(0.0)),
-        );
-        for count in 0..3 {
-            let chosen: [Vec3<F>; 3] = [
-                get3(cx, &spots[0]),
-                get3(cx, &spots[1]),
-                get3(cx, &spots[2]),
-            ];
-            let (x, is) = self.farthest(cx, pair, hull, count, chosen);
-            set3(cx, &mut spots[count + 1], x);
-            cx.set(&mut found[count + 1], is);
-        }
-        (spots, found)
-    }
-
-    /// The deepest vertex; of those that are equally deep the first, so that a resting hull keeps its points.
-    #[inline(always)]
-    fn deepest<C: Cx<F = F, I = I>>(&self, cx: &mut C, hull: &Hull<'_, C>) -> Vec3<F> {
-        let c = F::c;
-        let (first, end) = self.span;
-        let mut lowest = var3(cx, Vec3([c(0.0), c(0.0), c(1e18)]));
-        span!(cx, row in first, end, {
-            for point in vertex_row(cx, hull.tables, row) {
-                let x = self.view.transpose_mul(point);
-                let old = get3(cx, &lowest);
-                let deeper = (x[2] + c(SAME_DEPTH) * self.size).lt(old[2]);
-                set3(cx, &mut lowest, select(deeper, x, old));
-            }
-        });
-        get3(cx, &lowest)
-    }
-
-    /// The vertex below the margin that adds most to the `count` + 1 chosen, and 1 if there is one, else 0.
-    #[inline(always)]
-    fn farthest<C: Cx<F = F, I = I>>(
-        &self,
-        cx: &mut C,
-        pair: &ShapePair<'_, C>,
-        hull: &Hull<'_, C>,
-        count: usize,
-        chosen: [Vec3<F>; 3],
-    ) -> (Vec3<F>, F) {
-        let c = F::c;
-        let (first, end) = self.span;
-        let score = ReductionScore::of(count, chosen);
-        let mut best = cx.var(score.threshold(c(SPREAD) * self.size));
-        // where none is found the first point stands in, and nothing is found after it
-        let mut place = var3(cx, chosen[0]);
-        let mut is = cx.var(c(0.0));
-        span!(cx, row in first, end, {
-            for point in vertex_row(cx, hull.tables, row) {
-                let x = self.view.transpose_mul(point);
-                let here = score.at(x[0], x[1]);
-                let (old, kept, had) = (cx.get(&best), get3(cx, &place), cx.get(&is));
-                let farther = old.lt(here) & (x[2] + self.height).lt(pair.margin);
-                cx.set(&mut best, F::select(farther, here, old));
-                set3(cx, &mut place, select(farther, x, kept));
-                cx.set(&mut is, F::select(farther, c(1.0), had));
-            }
-        });
-        (get3(cx, &place), cx.get(&is))
-    }
-}
-
 /// Sphere and hull: one point.
 #[inline(always)]
 pub fn sphere_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {

@@ -28,6 +28,7 @@ mod hull_depth;
 mod hulls;
 mod manifold;
 mod narrow;
+mod plane_hull;
 mod planes;
 mod points;
 mod posed;

@@ -2,7 +2,7 @@
 
 use super::hull::Hull;
 use super::points::Points;
-use super::{boxes, capsules, collide_group, cylinders, hulls, planes, spheres};
+use super::{boxes, capsules, collide_group, cylinders, hulls, plane_hull, planes, spheres};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::clip::Cut;
@@ -195,7 +195,7 @@ pairs! {
     PlaneCapsule(Plane, Capsule) = planes::plane_capsule;
     PlaneBox(Plane, Box) = planes::plane_box;
     PlaneCylinder(Plane, Cylinder) = planes::plane_cylinder;
-    PlaneHull(Plane, Hull) = hulls::plane_hull;
+    PlaneHull(Plane, Hull) = plane_hull::plane_hull;
     SphereSphere(Sphere, Sphere) = spheres::sphere_sphere;
     SphereCapsule(Sphere, Capsule) = spheres::sphere_capsule;
     SphereBox(Sphere, Box) = spheres::sphere_box;

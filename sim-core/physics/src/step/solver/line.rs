@@ -2,13 +2,12 @@
 
 use super::super::ConstantsOf;
 use super::contacts;
-use super::rows::{Law, bounds, dry_friction, equality, one_sided};
+use super::rows::{Acting, Law, bounds, dry_friction, equality, one_sided};
 use super::ties;
 use crate::arrays::Workspace;
 use crate::constants::Constants;
 use crate::lane::{Cx, Num, Real};
 use crate::{break_if, times};
-use std::ops::Range;
 
 /// The cost p along the segment from `a` (α = 0) to the minimum of its quadratic model (α = 1).
 ///
@@ -27,6 +26,7 @@ pub(super) struct Line<'a, F> {
     pub noise: F,
     /// Has any world of the block contacts?
     touches: bool,
+    acting: Acting,
     params: &'a [F],
     weight: &'a [F],
     jar: &'a [F],
@@ -48,9 +48,9 @@ impl<'a, F: Num> Line<'a, F> {
         cx: &mut C,
         m: &Constants<F::Real>,
         params: &'a [F],
-        curvature: F,
-        power: F,
+        [curvature, power]: [F; 2],
         w: &'a Workspace<F>,
+        acting: Acting,
         corrects: Option<F::Mask>,
     ) -> Self {
         let (weight, aref) = (&w.row_weight, &w.row_aref);
@@ -58,12 +58,27 @@ impl<'a, F: Num> Line<'a, F> {
         let epsilon = F::c(<F::Real as Real>::EPSILON);
         let (mut descent, mut size) = (curvature, curvature);
         let mut terms = power;
-        for r in 0..m.rows() {
-            let law = law(m, params, r, jar[r], weight[r]);
+        let mut add = |law: Law<F>, r: usize| {
             descent = (law.stiffness * jv[r]).fma(jv[r], descent);
             size = size + (law.force * jv[r]).abs();
             let rounded = (jar[r] + aref[r]).abs() + aref[r].abs();
             terms = (law.stiffness * rounded).fma(rounded, terms);
+        };
+        let (frictions, limits) = (m.equalities.len(), m.equalities.len() + m.frictions.len());
+        for r in 0..frictions {
+            add(equality(jar[r], weight[r]), r);
+        }
+        for (r, friction) in (frictions..limits).zip(&m.frictions) {
+            let [zone, loss] = bounds(m, params, friction);
+            add(dry_friction(jar[r], weight[r], zone, loss), r);
+        }
+        for run in acting.runs() {
+            for r in limits + run.start..limits + run.end {
+                add(one_sided(jar[r], weight[r]), r);
+            }
+        }
+        for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.mujoco.tie_of_row) {
+            add(ties::law(&m.mujoco.ties[*tie].law, jar[r], weight[r]), r);
         }
         let mut noise = size * epsilon;
         if let Some(corrects) = corrects {
@@ -76,23 +91,12 @@ impl<'a, F: Num> Line<'a, F> {
             descent,
             noise,
             touches: corrects.is_some(),
+            acting,
             params,
             weight,
             jar,
             jv,
         }
-    }
-
-    /// Residual, its change and weight of some rows.
-    #[inline(always)]
-    fn rows(&self, rows: Range<usize>) -> impl Iterator<Item = [F; 3]> + '_ {
-        let jv = self.jv[rows.clone()].iter();
-        let both = self.jar[rows.clone()].iter().zip(jv);
-        let all = both.zip(&self.weight[rows]);
-        all.map(
-            #[inline(always)]
-            |((jar, jv), weight)| [*jar, *jv, *weight],
-        )
     }
 
     #[inline(always)]
@@ -111,23 +115,27 @@ impl<'a, F: Num> Line<'a, F> {
         };
         // equalities have one piece only; of the others those of joints are told apart once, not row by row
         let (frictions, limits) = (m.equalities.len(), m.equalities.len() + m.frictions.len());
-        for ([jar, jv, weight], friction) in self.rows(frictions..limits).zip(&m.frictions) {
+        let (weight, jar, jv) = (self.weight, self.jar, self.jv);
+        for (r, friction) in (frictions..limits).zip(&m.frictions) {
             let [zone, loss] = bounds(m, self.params, friction);
-            let start = dry_friction(jar, weight, zone, loss);
-            let here = dry_friction(alpha.fma(jv, jar), weight, zone, loss);
-            d.add(alpha, jv, start, here);
+            let start = dry_friction(jar[r], weight[r], zone, loss);
+            let here = dry_friction(alpha.fma(jv[r], jar[r]), weight[r], zone, loss);
+            d.add(alpha, jv[r], start, here);
         }
-        for [jar, jv, weight] in self.rows(limits..m.joint_rows()) {
-            let start = one_sided(jar, weight);
-            d.add(alpha, jv, start, one_sided(alpha.fma(jv, jar), weight));
+        for run in self.acting.runs() {
+            let rows = limits + run.start..limits + run.end;
+            let both = jar[rows.clone()].iter().zip(&jv[rows.clone()]);
+            for ((jar, jv), weight) in both.zip(&weight[rows]) {
+                let start = one_sided(*jar, *weight);
+                let here = one_sided(alpha.fma(*jv, *jar), *weight);
+                d.add(alpha, *jv, start, here);
+            }
         }
-        for ([jar, jv, weight], tie) in self
-            .rows(m.joint_rows()..m.rows())
-            .zip(&m.mujoco.tie_of_row)
-        {
+        for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.mujoco.tie_of_row) {
             let law = &m.mujoco.ties[*tie].law;
-            let start = ties::law(law, jar, weight);
-            d.add(alpha, jv, start, ties::law(law, alpha.fma(jv, jar), weight));
+            let start = ties::law(law, jar[r], weight[r]);
+            let here = ties::law(law, alpha.fma(jv[r], jar[r]), weight[r]);
+            d.add(alpha, jv[r], start, here);
         }
         if self.touches {
             let mut slope = cx.var(d.slope);
@@ -156,24 +164,6 @@ impl<F: Num> Derivative<F> {
         self.slope = self.slope + power;
         self.size = self.size + power.abs();
         self.curvature = ((here.stiffness - start.stiffness) * jv).fma(jv, self.curvature);
-    }
-}
-
-/// The law of row `r`.
-#[inline(always)]
-fn law<F: Num>(m: &Constants<F::Real>, params: &[F], r: usize, jar: F, weight: F) -> Law<F> {
-    let frictions = m.equalities.len();
-    let limits = frictions + m.frictions.len();
-    if r < frictions {
-        equality(jar, weight)
-    } else if r < limits {
-        let friction = &m.frictions[r - frictions];
-        let [zone, loss] = bounds(m, params, friction);
-        dry_friction(jar, weight, zone, loss)
-    } else if r < m.joint_rows() {
-        one_sided(jar, weight)
-    } else {
-        ties::law(ties::law_of(m, r - m.joint_rows()), jar, weight)
     }
 }
 

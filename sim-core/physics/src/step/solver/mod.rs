@@ -77,7 +77,7 @@ use crate::math::factor::{multiply, solve as solve_linear};
 use crate::{break_if, times, when};
 use line::{Line, search};
 use progress::{Found, Pieces, Plan, Progress};
-use rows::{Jacobian, assemble, cost, forces, residual};
+use rows::{Acting, Jacobian, assemble, cost, forces, residual};
 
 /// Accelerations and constraint forces. Where a contact has torsional friction, `TURNS` is true: other models run a
 /// solver without code for it.
@@ -118,12 +118,13 @@ impl<const TURNS: bool> Stage for Solver<TURNS> {
 /// Newton's method, from the last step's accelerations to the minimum of the cost.
 #[inline(always)]
 fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    if <<C::F as Num>::Real as Real>::DOUBLE {
-        choose_start::<C, TURNS>(cx, m, b);
-    }
-    let acts = acts(cx, m, &b.efc_weight);
     gather(cx, &b.efc_weight, &mut b.work.row_weight);
     gather(cx, &b.efc_aref, &mut b.work.row_aref);
+    let acting = Acting::find(cx, m, &b.work.row_weight);
+    if <<C::F as Num>::Real as Real>::DOUBLE {
+        choose_start::<C, TURNS>(cx, m, b, acting);
+    }
+    let acts = acts(cx, m, &b.efc_weight);
     // contacts are so stiff that M is lost in the rounding of H a⁺: worlds with contacts solve for the correction a⁺ - a
     let corrects = contacts::touching(cx, &m.contacts);
     let coupling = linear::coupling(cx, m, corrects);
@@ -134,15 +135,15 @@ fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
         }
         cx.tally(&mut b.solver_work[0], &mut b.solver_block_work[0]);
         // the cost at a: residuals of the rows, H = M + Jᵀ W J and the right-hand side
-        model_cost::<C, TURNS>(cx, m, b, corrects);
+        model_cost::<C, TURNS>(cx, m, b, acting, corrects);
         // its minimum a⁺, what bodies that touch gain by going there, and how much stiffer than M it is
         let gain = minimize_model::<C, TURNS>(cx, m, b, corrects, coupling);
         // rows that are on another piece of their cost at a⁺
-        let pieces = Pieces::compare::<TURNS>(cx, m, b, corrects);
+        let pieces = Pieces::compare::<TURNS>(cx, m, b, acting, corrects);
         // the worlds that search the segment from a to a⁺
         let plan = progress.plan(cx, m, &pieces, gain, corrects);
         // where on it the cost is least
-        let found = search_segment::<C, TURNS>(cx, m, b, &mut progress, &plan, corrects);
+        let found = search_segment::<C, TURNS>(cx, m, b, &mut progress, &plan, acting, corrects);
         // the next a, and the worlds that have arrived
         advance(cx, b, &plan, &found);
         let done = progress.note(cx, &plan, &found, corrects);
@@ -156,10 +157,10 @@ fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
             cx.set(force, C::F::c(0.0));
         }
         when!(cx, acts, {
-            constraint_forces::<C, TURNS>(cx, m, b);
+            constraint_forces::<C, TURNS>(cx, m, b, acting);
         });
     } else {
-        constraint_forces::<C, TURNS>(cx, m, b);
+        constraint_forces::<C, TURNS>(cx, m, b, acting);
     }
 }
 
@@ -170,6 +171,7 @@ fn model_cost<C: Cx, const TURNS: bool>(
     cx: &mut C,
     m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
+    acting: Acting,
     corrects: Option<MaskOf<C>>,
 ) {
     let w = &mut b.work;
@@ -187,12 +189,12 @@ fn model_cost<C: Cx, const TURNS: bool>(
     w.hessian.copy_from_slice(&w.mass_matrix);
     residual(
         m,
-        Jacobian::new(&w.limit_side, &w.row_jacobian),
+        Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
         &w.row_aref,
         &w.start,
         &mut w.jar,
     );
-    assemble(m, &b.params, w, corrects);
+    assemble(m, &b.params, w, acting, corrects);
     if corrects.is_some() {
         contacts::residual::<_, TURNS>(cx, &m.contacts, &w.start, row::JAR);
     }
@@ -244,6 +246,7 @@ fn search_segment<C: Cx, const TURNS: bool>(
     b: &mut BlockOf<C>,
     progress: &mut Progress<C>,
     plan: &Plan<C>,
+    acting: Acting,
     corrects: Option<MaskOf<C>>,
 ) -> Found<C> {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
@@ -266,7 +269,15 @@ fn search_segment<C: Cx, const TURNS: bool>(
         for r in 0..m.rows() {
             w.jar_minimum[r] = w.jar_minimum[r] - w.jar[r];
         }
-        let line = Line::new::<C, TURNS>(cx, m, &b.params, curvature, power, &b.work, corrects);
+        let line = Line::new::<C, TURNS>(
+            cx,
+            m,
+            &b.params,
+            [curvature, power],
+            &b.work,
+            acting,
+            corrects,
+        );
         let counts = (&mut b.solver_work[2], &mut b.solver_block_work[2]);
         search::<C, TURNS>(cx, m, &line, &mut found.length, counts);
         progress.judge(cx, m, &line, &mut found, plan, corrects);
@@ -282,7 +293,12 @@ pub(super) fn touching<C: Cx>(cx: &mut C, m: &ConstantsOf<C>) -> Option<MaskOf<C
 
 /// Forces of the rows at the accelerations found.
 #[inline(always)]
-fn constraint_forces<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+fn constraint_forces<C: Cx, const TURNS: bool>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    acting: Acting,
+) {
     let w = &mut b.work;
     let (a, joint) = (&mut w.start, &mut w.joint_force);
     let (jar, force) = (&mut w.jar, &mut w.row_force);
@@ -293,7 +309,7 @@ fn constraint_forces<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b
     }
     residual(
         m,
-        Jacobian::new(&w.limit_side, &w.row_jacobian),
+        Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
         aref,
         a,
         jar,
@@ -301,7 +317,7 @@ fn constraint_forces<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b
     forces(
         m,
         &b.params,
-        Jacobian::new(&w.limit_side, &w.row_jacobian),
+        Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
         [weight, jar],
         force,
         joint,
@@ -362,11 +378,14 @@ fn acts<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, weight: &[C::V]) -> MaskOf<C> {
 /// reference must reproduce. In `f32` it is not worth a factorisation and extra iterations: from a start without constraints
 /// more rows change their piece.
 #[inline(always)]
-fn choose_start<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+fn choose_start<C: Cx, const TURNS: bool>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    acting: Acting,
+) {
     let n = m.dofs.len();
     let w = &mut b.work;
-    gather(cx, &b.efc_weight, &mut w.row_weight);
-    gather(cx, &b.efc_aref, &mut w.row_aref);
     let (warm, smooth, ahead) = (&mut w.start, &mut w.minimum, &mut w.step);
     let (jar, jar_smooth) = (&mut w.jar, &mut w.jar_minimum);
     let (weight, aref) = (&w.row_weight, &w.row_aref);
@@ -379,14 +398,14 @@ fn choose_start<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mu
     }
     residual(
         m,
-        Jacobian::new(&w.limit_side, &w.row_jacobian),
+        Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
         aref,
         warm,
         jar,
     );
     residual(
         m,
-        Jacobian::new(&w.limit_side, &w.row_jacobian),
+        Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
         aref,
         smooth,
         jar_smooth,
@@ -396,8 +415,8 @@ fn choose_start<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mu
     for j in 0..n {
         gauss = ahead[j].fma(w.joint_force[j], gauss);
     }
-    let mut cost_warm = cx.var(gauss.fma(C::F::c(0.5), cost(m, &b.params, weight, jar)));
-    let mut cost_smooth = cx.var(cost(m, &b.params, weight, jar_smooth));
+    let mut cost_warm = cx.var(gauss.fma(C::F::c(0.5), cost(m, &b.params, acting, [weight, jar])));
+    let mut cost_smooth = cx.var(cost(m, &b.params, acting, [weight, jar_smooth]));
     contacts::residual::<_, TURNS>(cx, &m.contacts, warm, row::JAR);
     contacts::residual::<_, TURNS>(cx, &m.contacts, smooth, row::AHEAD);
     contacts::cost::<_, TURNS>(cx, &m.contacts, row::JAR, &mut cost_warm);

@@ -1,7 +1,7 @@
 //! Progress of Newton's method: which worlds search the segment, and which have arrived.
 
 use super::line::Line;
-use super::rows::{Jacobian, changes, residual};
+use super::rows::{Acting, Jacobian, changes, residual};
 use super::{UNKNOWN, contacts};
 use crate::constants::contact::{Cone, row};
 use crate::lane::{Cx, MaskOf, Num, Real};
@@ -73,17 +73,23 @@ impl<C: Cx> Pieces<C> {
         cx: &mut C,
         m: &ConstantsOf<C>,
         b: &mut BlockOf<C>,
+        acting: Acting,
         corrects: Option<MaskOf<C>>,
     ) -> Pieces<C> {
         let (w, half) = (&mut b.work, C::F::c(0.5));
         residual(
             m,
-            Jacobian::new(&w.limit_side, &w.row_jacobian),
+            Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
             &w.row_aref,
             &w.minimum,
             &mut w.jar_minimum,
         );
-        let [sum, turned] = changes(m, &b.params, &w.row_weight, &w.jar, &w.jar_minimum);
+        let [sum, turned] = changes(
+            m,
+            &b.params,
+            acting,
+            [&w.row_weight, &w.jar, &w.jar_minimum],
+        );
         let (mut moved, mut curved) = (cx.var(sum), cx.var(turned));
         if corrects.is_some() {
             contacts::residual::<_, TURNS>(cx, &m.contacts, &w.minimum, row::AHEAD);

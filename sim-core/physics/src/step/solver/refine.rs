@@ -10,7 +10,7 @@
 //! `Newton::refinements` is the count of passes that a model needs.
 
 use super::linear::{Unknown, coupling, solve_system};
-use super::rows::{Jacobian, assemble, residual};
+use super::rows::{Acting, Jacobian, assemble, residual};
 use super::{acts, constraint_forces, contacts, gather, may_idle};
 use crate::arrays::Array as A;
 use crate::constants::contact::row;
@@ -112,6 +112,7 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let w = &mut b.work;
     gather(cx, &b.efc_weight, &mut w.row_weight);
     gather(cx, &b.efc_aref, &mut w.row_aref);
+    let acting = Acting::find(cx, m, &w.row_weight);
     for j in 0..n {
         w.start[j] = cx.get(&b.joint_qdd[j]);
         let applied = w.smooth_force[j] + w.bias_force[j];
@@ -122,12 +123,12 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     w.hessian.copy_from_slice(&w.mass_matrix);
     residual(
         m,
-        Jacobian::new(&w.limit_side, &w.row_jacobian),
+        Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
         &w.row_aref,
         &w.start,
         &mut w.jar,
     );
-    assemble(m, &b.params, w, None);
+    assemble(m, &b.params, w, acting, None);
     contacts::residual::<_, true>(cx, &m.contacts, &w.start, row::JAR);
     let touching = contacts::touching(cx, &m.contacts);
     let coupling = coupling(cx, m, touching);
@@ -139,5 +140,5 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     {
         cx.set(qdd, *start + *missing);
     }
-    constraint_forces::<C, true>(cx, m, b);
+    constraint_forces::<C, true>(cx, m, b, acting);
 }

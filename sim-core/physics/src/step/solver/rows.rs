@@ -6,13 +6,16 @@
 use crate::arrays::Workspace;
 use crate::constants::params::Param;
 use crate::constants::{Constants, Friction};
-use crate::lane::Num;
+use crate::lane::{Cx, Num};
 use crate::step::param;
 use crate::step::solver::ties;
+use std::ops::Range;
 
 /// What is known of J at run time only.
 #[derive(Clone, Copy)]
 pub(super) struct Jacobian<'a, F> {
+    /// The limits that act; others add nothing, and have no row.
+    pub acting: Acting,
     /// Sign of each limit.
     pub side: &'a [F],
     /// Entries of the rows of ties.
@@ -21,8 +24,69 @@ pub(super) struct Jacobian<'a, F> {
 
 impl<'a, F> Jacobian<'a, F> {
     #[inline(always)]
-    pub(super) fn new(side: &'a [F], ties: &'a [F]) -> Jacobian<'a, F> {
-        Jacobian { side, ties }
+    pub(super) fn new(acting: Acting, side: &'a [F], ties: &'a [F]) -> Jacobian<'a, F> {
+        Jacobian { acting, side, ties }
+    }
+}
+
+/// The limits that act in some world of a block: most joints of most worlds are inside their range.
+#[derive(Clone, Copy)]
+pub(super) struct Acting {
+    /// A bit for each group of limits.
+    groups: u64,
+    /// Limits of a group, which follow each other.
+    size: usize,
+    /// Limits in all.
+    len: usize,
+}
+
+impl Acting {
+    /// From the weights of all rows, 0 where a limit does not act. A backend that cannot know has all of them.
+    #[inline(always)]
+    pub fn find<C: Cx>(cx: &mut C, m: &Constants<<C::F as Num>::Real>, weight: &[C::F]) -> Acting {
+        let limits = &weight[m.equalities.len() + m.frictions.len()..m.joint_rows()];
+        let size = limits.len().div_ceil(u64::BITS as usize).max(1);
+        let mut groups = 0;
+        for (k, group) in limits.chunks(size).enumerate() {
+            let mut stiffest = C::F::c(0.0);
+            for weight in group {
+                stiffest = stiffest.max(*weight);
+            }
+            if cx.anywhere(C::F::c(0.0).lt(stiffest)) {
+                groups |= 1 << k;
+            }
+        }
+        Acting {
+            groups,
+            size,
+            len: limits.len(),
+        }
+    }
+
+    /// Runs of limits that follow each other, in rising order.
+    #[inline(always)]
+    pub fn runs(self) -> Runs {
+        Runs(self)
+    }
+}
+
+/// See [`Acting::runs`].
+pub(super) struct Runs(Acting);
+
+impl Iterator for Runs {
+    type Item = Range<usize>;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Range<usize>> {
+        let Acting { groups, size, len } = &mut self.0;
+        if *groups == 0 {
+            return None;
+        }
+        let first = groups.trailing_zeros() as usize;
+        let end = first + (*groups >> first).trailing_ones() as usize;
+        // the carry takes the run with it
+        *groups &= groups.wrapping_add(1 << first);
+        Some(first * *size..(end * *size).min(*len))
     }
 }
 
@@ -114,10 +178,15 @@ pub(super) fn residual<F: Num>(
         jar[r] = a[f.dof] - aref[r];
         r += 1;
     }
-    let limits = r..m.joint_rows();
-    let rows = jar[limits.clone()].iter_mut().zip(&aref[limits]);
-    for ((jar, aref), (l, side)) in rows.zip(m.limits.iter().zip(jacobian.side)) {
-        *jar = side.fma(a[l.dof], -*aref);
+    for run in jacobian.acting.runs() {
+        let limits = m.limits[run.clone()]
+            .iter()
+            .zip(&jacobian.side[run.clone()]);
+        let rows = r + run.start..r + run.end;
+        let rows = jar[rows.clone()].iter_mut().zip(&aref[rows]);
+        for ((jar, aref), (l, side)) in rows.zip(limits) {
+            *jar = side.fma(a[l.dof], -*aref);
+        }
     }
     ties::residual(m, jacobian.ties, aref, a, jar);
 }
@@ -139,6 +208,7 @@ pub(super) fn assemble<F: Num>(
     m: &Constants<F::Real>,
     params: &[F],
     w: &mut Workspace<F>,
+    acting: Acting,
     corrects: Option<F::Mask>,
 ) {
     let (hessian, rhs) = (&mut w.hessian, &mut w.minimum);
@@ -168,13 +238,15 @@ pub(super) fn assemble<F: Num>(
         rhs[f.dof] = rhs[f.dof] + pull(&law, jar[r], aref[r], corrects);
         r += 1;
     }
-    for (l, side) in m.limits.iter().zip(side) {
-        let law = one_sided(jar[r], weight[r]);
-        let diagonal = m.pattern.at(l.dof, l.dof);
-        hessian[diagonal] = hessian[diagonal] + law.stiffness;
-        let pull = pull(&law, jar[r], aref[r], corrects);
-        rhs[l.dof] = side.fma(pull, rhs[l.dof]);
-        r += 1;
+    for run in acting.runs() {
+        let limits = m.limits[run.clone()].iter().zip(&side[run.clone()]);
+        for ((l, side), r) in limits.zip(r + run.start..) {
+            let law = one_sided(jar[r], weight[r]);
+            let diagonal = m.pattern.at(l.dof, l.dof);
+            hessian[diagonal] = hessian[diagonal] + law.stiffness;
+            let pull = pull(&law, jar[r], aref[r], corrects);
+            rhs[l.dof] = side.fma(pull, rhs[l.dof]);
+        }
     }
     let pull = |law: &Law<F>, r: usize| pull(law, jar[r], aref[r], corrects);
     ties::assemble(m, &w.row_jacobian, [weight, jar], hessian, rhs, pull);
@@ -185,9 +257,8 @@ pub(super) fn assemble<F: Num>(
 pub(super) fn changes<F: Num>(
     m: &Constants<F::Real>,
     params: &[F],
-    weight: &[F],
-    jar: &[F],
-    other: &[F],
+    acting: Acting,
+    [weight, jar, other]: [&[F]; 3],
 ) -> [F; 2] {
     let (zero, one) = (F::c(0.0), F::c(1.0));
     let (mut sum, mut turned) = (zero, zero);
@@ -203,12 +274,14 @@ pub(super) fn changes<F: Num>(
         turned = turned + F::select(one.lt(moved), one, zero);
         r += 1;
     }
-    let limits = r..m.joint_rows();
-    let places = jar[limits.clone()].iter().zip(&other[limits.clone()]);
-    for ((jar, other), weight) in places.zip(&weight[limits]) {
-        let before = one_sided(*jar, *weight).state;
-        let after = one_sided(*other, *weight).state;
-        sum = sum + (before - after).abs();
+    for run in acting.runs() {
+        let rows = r + run.start..r + run.end;
+        let places = jar[rows.clone()].iter().zip(&other[rows.clone()]);
+        for ((jar, other), weight) in places.zip(&weight[rows]) {
+            let before = one_sided(*jar, *weight).state;
+            let after = one_sided(*other, *weight).state;
+            sum = sum + (before - after).abs();
+        }
     }
     r = m.joint_rows();
     for tie in &m.mujoco.ties {
@@ -247,17 +320,29 @@ pub(super) fn forces<F: Num>(
         joint[f.dof] = joint[f.dof] + force[r];
         r += 1;
     }
-    for (l, side) in m.limits.iter().zip(jacobian.side) {
-        force[r] = one_sided(jar[r], weight[r]).force;
-        joint[l.dof] = side.fma(force[r], joint[l.dof]);
-        r += 1;
+    for force in &mut force[r..m.joint_rows()] {
+        *force = F::c(0.0);
+    }
+    for run in jacobian.acting.runs() {
+        let limits = m.limits[run.clone()]
+            .iter()
+            .zip(&jacobian.side[run.clone()]);
+        for ((l, side), r) in limits.zip(r + run.start..) {
+            force[r] = one_sided(jar[r], weight[r]).force;
+            joint[l.dof] = side.fma(force[r], joint[l.dof]);
+        }
     }
     ties::forces(m, jacobian.ties, [weight, jar], force, joint);
 }
 
 /// Σ s(jar)
 #[inline(always)]
-pub(super) fn cost<F: Num>(m: &Constants<F::Real>, params: &[F], weight: &[F], jar: &[F]) -> F {
+pub(super) fn cost<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    acting: Acting,
+    [weight, jar]: [&[F]; 2],
+) -> F {
     let half = F::c(0.5);
     let mut sum = F::c(0.0);
     let mut r = 0;
@@ -270,12 +355,12 @@ pub(super) fn cost<F: Num>(m: &Constants<F::Real>, params: &[F], weight: &[F], j
         sum = sum + dry_cost(jar[r], weight[r], zone, loss);
         r += 1;
     }
-    for _ in &m.limits {
+    for r in acting.runs().flatten().map(|l| r + l) {
         // ½ D jar² = -½ f jar where active
         let push = one_sided(jar[r], weight[r]).force;
         sum = (half * push).fnma(jar[r], sum);
-        r += 1;
     }
+    r = m.joint_rows();
     for tie in &m.mujoco.ties {
         for _ in 0..tie.rows {
             sum = sum + ties::cost(&tie.law, jar[r], weight[r]);

@@ -32,12 +32,6 @@ pub(super) fn cost<F: Num>(law: &TieLaw<F::Real>, jar: F, weight: F) -> F {
     }
 }
 
-/// The law of row `r`, counted after the rows of joints.
-#[inline(always)]
-pub(super) fn law_of<R>(m: &Constants<R>, r: usize) -> &TieLaw<R> {
-    &m.mujoco.ties[m.mujoco.tie_of_row[r]].law
-}
-
 /// jar = J a - aref
 #[inline(always)]
 pub(super) fn residual<F: Num>(

@@ -1,0 +1,98 @@
+//! Kinds of worlds by their contacts: what a block of worlds has in common.
+//!
+//! A block visits every contact that any of its worlds has. Whether a world has at least so many contacts of a class is a
+//! bit of its kind. There are many such bits, so a kind has those that tell most worlds apart, weighed by what a contact of the
+//! class costs; the other classes share a few lower bits. Which ones these are is counted anew from time to time, since robots
+//! fall and stand up.
+
+use sim_physics::constants::Constants;
+use sim_physics::lane::Real;
+
+/// The bits of a kind.
+pub(super) type Kind = u16;
+/// Bits that stand for a class and a count of their own.
+const OWN: usize = 9;
+/// Lower bits, each of which is set by any of several classes.
+const SHARED: usize = 3;
+/// Number of different kinds.
+pub(super) const KINDS: usize = 1 << (OWN + SHARED);
+/// Contacts of a class that are told apart: none, one, …, this many or more.
+const LEVELS: usize = 4;
+/// Control frames after which the bits are chosen anew.
+const PERIOD: u64 = 64;
+
+/// Whether a world has at least `level` + 1 contacts of a class.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bit {
+    pub class: usize,
+    pub level: usize,
+}
+
+impl Bit {
+    /// The bit with this place in the counts.
+    fn of(place: usize) -> Bit {
+        let (class, level) = (place / LEVELS, place % LEVELS);
+        Bit { class, level }
+    }
+
+    /// A count above which it is set [–].
+    pub fn threshold(self) -> f64 {
+        self.level as f64 + 0.5
+    }
+}
+
+/// The bits of kinds, and the counts that they are chosen by.
+#[derive(Default)]
+pub(super) struct ContactKinds {
+    /// What sets a bit, and the bit.
+    bits: Vec<(Bit, Kind)>,
+    /// Worlds in which a bit would be set. `(classes, LEVELS)`
+    counts: Vec<u32>,
+    /// Worlds that were counted.
+    worlds: u32,
+    /// Scratch: what a bit is worth, and its place in the counts.
+    scores: Vec<(f64, usize)>,
+}
+
+impl ContactKinds {
+    /// Is it time to count?
+    pub fn is_due(frame: u64) -> bool {
+        frame % PERIOD == 1
+    }
+
+    /// What sets a bit, and the bit.
+    pub fn bits(&self) -> &[(Bit, Kind)] {
+        &self.bits
+    }
+
+    /// Counts the worlds of a block; `set` says in how many of them a bit is set.
+    pub fn count(&mut self, classes: usize, worlds: usize, set: impl Fn(Bit) -> u32) {
+        self.counts.resize(classes * LEVELS, 0);
+        for (k, count) in self.counts.iter_mut().enumerate() {
+            *count += set(Bit::of(k));
+        }
+        self.worlds += worlds as u32;
+    }
+
+    /// Chooses the bits by what was counted, and forgets it. Of equal bits the first is taken.
+    pub fn choose<R: Real>(&mut self, m: &Constants<R>) {
+        let worlds = f64::from(std::mem::take(&mut self.worlds).max(1));
+        self.scores.clear();
+        for (k, count) in self.counts.iter_mut().enumerate() {
+            let share = f64::from(std::mem::take(count)) / worlds;
+            let cost = m.contacts.classes[k / LEVELS].columns.len().pow(2) as f64;
+            self.scores.push((share * (1.0 - share) * cost, k));
+        }
+        self.scores.retain(|(score, _)| *score > 0.0);
+        // a stable sort would allocate
+        self.scores
+            .sort_unstable_by(|(one, k), (other, l)| other.total_cmp(one).then(k.cmp(l)));
+        self.bits.clear();
+        let ranked = self.scores.iter().map(|(_, k)| Bit::of(*k));
+        let own = (0..OWN).map(|place| 1 << (SHARED + OWN - 1 - place));
+        self.bits.extend(ranked.clone().zip(own));
+        let others = ranked.skip(OWN).filter(|bit| bit.level == 0);
+        let shared = (0..SHARED).cycle().map(|place| 1 << place);
+        self.bits.extend(others.zip(shared));
+    }
+}
