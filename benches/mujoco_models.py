@@ -4,7 +4,8 @@
 
 mjbatch steps MuJoCo C, in a process with an environment and a MuJoCo of its own (out/mjbatch, made by the first run).
 tightloop steps the same models through `sim.step`, and through `tightloop.mujoco.Batch`. benches/mujoco_robots.py says
-where the models are from. Without the wheels' files in out/menagerie or a reference folder, their models are left out.
+where the models are from, and benches/mujoco_heaps.py has the legged robots in a heap (`--models heap`). Without the
+wheels' files in out/menagerie and out/published, or a reference folder, their models are left out.
 
 Every world has ctrl of its own: sums of a few sines inside ctrlrange, drawn before the clock starts, the same numbers
 for all sides. tightloop first runs the worlds until the robots stand or lie in contact; all sides begin there. Then
