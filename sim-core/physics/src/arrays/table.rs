@@ -112,9 +112,11 @@ arrays! { m;
         origin: Origin [Vec3; m.bodies.len()] Stage "m";
         // world position of each robot's reference point
         reference: Reference [Vec3; m.trees.len()] Stage "m";
+        // from the point of a body's carrier, of a root from the reference point, to the body's own: see `step::kinematics`
+        arm: Arm [Vec3; m.bodies.len()] Stage "m";
         // motion axis of each dof
         motion: Motion [Spatial; m.dofs.len()] Stage "–";
-        // of each body; the mass matrix makes it that of the subtree
+        // of each body about its own point; the mass matrix makes it that of the subtree
         inertia: Inertia [Inertia; m.bodies.len()] Stage "kg, kg·m, kg·m²";
         velocity: Velocity [Spatial; m.bodies.len()] Stage "m/s, rad/s";
 

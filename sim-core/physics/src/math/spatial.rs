@@ -1,4 +1,4 @@
-//! Spatial vectors and inertias about a fixed reference point, in world axes (Featherstone 2008, chapter 2).
+//! Spatial vectors and inertias about a point, in world axes (Featherstone 2008, chapter 2).
 
 use super::vec3::{Mat3, Vec3};
 use crate::lane::Num;
@@ -15,7 +15,7 @@ pub const LINEAR: usize = 0;
 /// Index of the angular part.
 pub const ANGULAR: usize = 1;
 
-/// Inertia about the reference point: mass, first moment m c, then xx yy zz xy xz yz of the second moment.
+/// Inertia about a point: mass, first moment m c, then xx yy zz xy xz yz of the second moment.
 #[derive(Clone, Copy, Debug, PartialEq, TransparentWrapper)]
 #[repr(transparent)]
 pub struct Inertia<F>(pub [F; 10]);
@@ -49,24 +49,11 @@ impl<F: Num> Spatial<F> {
         self[LINEAR].dot(force[LINEAR]) + self[ANGULAR].dot(force[ANGULAR])
     }
 
-    /// Rate of change of a motion vector that moves along with this velocity: v × m.
+    /// The same force about another point, from which this one's is at `arm`.
     #[inline(always)]
-    pub fn cross_motion(&self, m: Self) -> Self {
-        let v = self;
-        let linear = v[LINEAR].cross(m[ANGULAR]);
-        Spatial([
-            v[ANGULAR].cross_add(m[LINEAR], linear),
-            v[ANGULAR].cross(m[ANGULAR]),
-        ])
-    }
-
-    /// v ×* f + g: the rate of change of a force vector that moves along with this velocity, plus another.
-    #[inline(always)]
-    pub fn cross_force_add(&self, f: Self, g: Self) -> Self {
-        let v = self;
-        let linear = v[ANGULAR].cross_add(f[LINEAR], g[LINEAR]);
-        let angular = v[LINEAR].cross_add(f[LINEAR], g[ANGULAR]);
-        Spatial([linear, v[ANGULAR].cross_add(f[ANGULAR], angular)])
+    pub fn moved(self, arm: Vec3<F>) -> Self {
+        let [force, torque] = self.0;
+        Spatial([force, arm.cross_add(force, torque)])
     }
 }
 
@@ -77,7 +64,7 @@ impl<F: Num> Inertia<F> {
         Inertia([F::c(0.0); 10])
     }
 
-    /// Inertia about the reference point of a body whose frame has this rotation and origin.
+    /// Inertia of a body about a point, from which its frame has this rotation and origin.
     ///
     /// `inertia` is xx yy zz xy xz yz about the centre of mass, in the body's axes [kg·m²];
     /// `center` the centre of mass in the body's frame [m].
@@ -110,6 +97,59 @@ impl<F: Num> Inertia<F> {
             second_moment(&turned, rotation, h, c, 0, 1, zero),
             second_moment(&turned, rotation, h, c, 0, 2, zero),
             second_moment(&turned, rotation, h, c, 1, 2, zero),
+        ])
+    }
+
+    /// First moment.
+    #[inline(always)]
+    pub fn first_moment(&self) -> Vec3<F> {
+        Vec3([self[1], self[2], self[3]])
+    }
+
+    /// The second moment times a vector.
+    #[inline(always)]
+    pub fn second_moment(&self, v: Vec3<F>) -> Vec3<F> {
+        let [_, _, _, _, xx, yy, zz, xy, xz, yz] = **self;
+        Vec3([
+            xx.fma(v[0], xy.fma(v[1], xz * v[2])),
+            xy.fma(v[0], yy.fma(v[1], yz * v[2])),
+            xz.fma(v[0], yz.fma(v[1], zz * v[2])),
+        ])
+    }
+
+    /// The same inertia about another point, from which this one's is at `arm`:
+    /// `h' = h + m r`, `I' = I + tr(h rᵀ + r h'ᵀ) 1 - (h rᵀ + r h'ᵀ)`.
+    #[inline(always)]
+    pub fn moved(&self, arm: Vec3<F>) -> Self {
+        let [m, _, _, _, xx, yy, zz, xy, xz, yz] = **self;
+        let (r, h) = (arm, self.first_moment());
+        let moved = r.scale_add(m, h);
+        let twice = h + moved;
+        let [x, y, z] = [twice[0] * r[0], twice[1] * r[1], twice[2] * r[2]];
+        Inertia([
+            m,
+            moved[0],
+            moved[1],
+            moved[2],
+            xx + (y + z),
+            yy + (x + z),
+            zz + (x + y),
+            h[0].fnma(r[1], r[0].fnma(moved[1], xy)),
+            h[0].fnma(r[2], r[0].fnma(moved[2], xz)),
+            h[1].fnma(r[2], r[1].fnma(moved[2], yz)),
+        ])
+    }
+
+    /// Force that an acceleration of the point and an angular one need at an angular velocity (Newton and Euler).
+    #[inline(always)]
+    pub fn force(&self, omega: Vec3<F>, acceleration: Spatial<F>) -> Spatial<F> {
+        let Spatial([linear, angular]) = acceleration;
+        let h = self.first_moment();
+        let carried = angular.cross_add(h, linear * self[0]);
+        let turned = h.cross_add(linear, self.second_moment(angular));
+        Spatial([
+            omega.cross_add(omega.cross(h), carried),
+            omega.cross_add(self.second_moment(omega), turned),
         ])
     }
 }
@@ -203,17 +243,10 @@ impl<F: Num> Mul<Spatial<F>> for Inertia<F> {
     type Output = Spatial<F>;
     #[inline(always)]
     fn mul(self, v: Spatial<F>) -> Spatial<F> {
-        let i = self;
-        let h = Vec3([i[1], i[2], i[3]]);
-        let w = v[ANGULAR];
-        let second = Vec3([
-            i[4].fma(w[0], i[7].fma(w[1], i[8] * w[2])),
-            i[7].fma(w[0], i[5].fma(w[1], i[9] * w[2])),
-            i[8].fma(w[0], i[9].fma(w[1], i[6] * w[2])),
-        ]);
+        let (h, w) = (self.first_moment(), v[ANGULAR]);
         Spatial([
-            w.cross_add(h, v[LINEAR] * i[0]),
-            h.cross_add(v[LINEAR], second),
+            w.cross_add(h, v[LINEAR] * self[0]),
+            h.cross_add(v[LINEAR], self.second_moment(w)),
         ])
     }
 }

@@ -1,13 +1,18 @@
 //! Bias forces by the recursive Newton-Euler algorithm (Featherstone 2008, section 5.3) at zero joint acceleration.
 //!
 //! ```text
-//! v(b) = v(parent) + Σ S q̇            a(b) = a(parent) + v(parent) × Σ S q̇,   a(base) = -g
-//! f(b) = I a + v ×* I v + Σ f(child)   c(dof) = S · f(b)
+//! ω(b) = ω(parent) + z q̇      α(b) = α(parent) + ω(parent) × z q̇                        revolute
+//! a(b) = a(parent) + α × r + ω × (ω × r)   … + 2 ω × z q̇   a(base) = -g                 prismatic
+//! f(b) = m a + α × h + ω × (ω × h) + Σ f(child)             h = m c
+//! n(b) = I α + ω × I ω + h × a + Σ (n(child) + r × f(child))
+//! c(dof) = z · n  or  z · f
 //! ```
 //!
-//! A free body has S = 1. The axes of its linear velocity are fixed, those of its rotation move with its centre of mass:
-//! a = v × ω.
+//! Each body's equations are about its own point (see [`super::kinematics`]), so rounding is relative to the load of a joint,
+//! not to its distance from the robot's reference point. A free body has S = 1, and its centre of mass the acceleration of
+//! the base.
 
+use super::inverse_dynamics::point_acceleration;
 use super::{BlockOf, ConstantsOf, Stage, gravity};
 use crate::arrays::Array as A;
 use crate::constants::{Body, Motion};
@@ -19,7 +24,7 @@ use crate::math::vec3::Vec3;
 pub struct Bias;
 
 impl Stage for Bias {
-    const READS: &'static [A] = &[A::JointQd, A::Motion, A::Inertia, A::Params];
+    const READS: &'static [A] = &[A::JointQd, A::Arm, A::Motion, A::Inertia, A::Params];
     const WRITES: &'static [A] = &[A::BiasForce, A::Velocity];
 
     #[inline(always)]
@@ -28,9 +33,7 @@ impl Stage for Bias {
         accelerations_at_rest(cx, m, b, -gravity(m, &b.params));
         let w = &mut b.work;
         for k in 0..m.bodies.len() {
-            let v = w.velocity[k];
-            let inertial = w.inertia[k] * w.force[k];
-            w.force[k] = v.cross_force_add(w.inertia[k] * v, inertial);
+            w.force[k] = w.inertia[k].force(w.velocity[k][ANGULAR], w.force[k]);
         }
         // children follow their parents, so in the backward pass the force of a body is complete when it is reached
         for (k, body) in m.bodies.iter().enumerate().rev() {
@@ -40,16 +43,26 @@ impl Stage for Bias {
                 continue;
             }
             for d in body.dofs() {
-                w.bias_force[d] = w.motion[d].dot(force);
+                w.bias_force[d] = along(body.motion, &w.motion[d], force);
             }
             if let Some(parent) = body.parent {
-                w.force[parent] = w.force[parent] + force;
+                w.force[parent] = w.force[parent] + force.moved(w.arm[k]);
             }
         }
     }
 }
 
-/// Writes the velocity of each body, and to `force` its acceleration at zero joint acceleration over a base that has `base`.
+/// What a force about a body's point does along an axis of its joint, S · f.
+#[inline(always)]
+pub(super) fn along<F: Num>(motion: Motion, axis: &Spatial<F>, force: Spatial<F>) -> F {
+    match motion {
+        Motion::Prismatic => axis[LINEAR].dot(force[LINEAR]),
+        _ => axis[ANGULAR].dot(force[ANGULAR]),
+    }
+}
+
+/// Writes the velocity of each body, and to `force` the acceleration of its point, and its angular one, at zero joint
+/// acceleration over a base that has `base`.
 #[inline(always)]
 pub(super) fn accelerations_at_rest<C: Cx>(
     cx: &mut C,
@@ -61,20 +74,36 @@ pub(super) fn accelerations_at_rest<C: Cx>(
     for (k, body) in m.bodies.iter().enumerate() {
         let own = joint_velocity(cx, b, body);
         let w = &mut b.work;
-        let (velocity, acceleration) = match (body.parent, body.motion) {
-            (_, Motion::Mocap) => (own, base),
-            (_, Motion::Free) => {
-                let swing = own[LINEAR].cross_add(own[ANGULAR], base[LINEAR]);
-                (own, Spatial([swing, base[ANGULAR]]))
-            }
-            (Some(parent), _) => {
+        let (velocity, acceleration) = match body.parent {
+            Some(parent) => {
                 let v = w.velocity[parent];
-                (v + own, w.force[parent] + v.cross_motion(own))
+                let carried = carried(body.motion, w.force[parent], v, own, w.arm[k]);
+                (v + own, carried)
             }
-            (None, _) => (own, base),
+            None => (own, base),
         };
         w.velocity[k] = velocity;
         w.force[k] = acceleration;
+    }
+}
+
+/// Acceleration of a body at `arm` from the point of its carrier, whose own and whose velocity are given.
+#[inline(always)]
+fn carried<F: Num>(
+    motion: Motion,
+    carrier: Spatial<F>,
+    velocity: Spatial<F>,
+    own: Spatial<F>,
+    arm: Vec3<F>,
+) -> Spatial<F> {
+    let omega = velocity[ANGULAR];
+    let point = point_acceleration(carrier, omega, arm);
+    match motion {
+        Motion::Prismatic => {
+            let twice = own[LINEAR] * F::c(2.0);
+            Spatial([omega.cross_add(twice, point), carrier[ANGULAR]])
+        }
+        _ => Spatial([point, omega.cross_add(own[ANGULAR], carrier[ANGULAR])]),
     }
 }
 

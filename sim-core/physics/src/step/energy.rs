@@ -4,7 +4,7 @@
 //! E_kin = ½ q̇ᵀ M q̇          E_pot = - Σ g · m c + Σ ½ k (q - rest)²       c a body's centre of mass in the world
 //! ```
 //!
-//! After the mass matrix, a root's inertia is that of its whole tree: its first moment h = m (c - reference) has all bodies.
+//! After the mass matrix, a root's inertia is that of its whole tree: its first moment h = m (c - point) has all bodies.
 //! What stands still has no part in either, as where MuJoCo fuses static bodies.
 
 use super::springs::{pose_stretch, stretch};
@@ -12,7 +12,6 @@ use super::{BlockOf, ConstantsOf, Stage, gravity};
 use crate::arrays::Array as A;
 use crate::lane::{Cx, Num, Real};
 use crate::math::factor::multiply;
-use crate::math::vec3::Vec3;
 
 /// Kinetic and potential energy, for output.
 pub struct Energy;
@@ -24,6 +23,7 @@ impl Stage for Energy {
         A::MassMatrix,
         A::Inertia,
         A::Reference,
+        A::Arm,
         A::Params,
     ];
     const WRITES: &'static [A] = &[A::KineticEnergy, A::PotentialEnergy];
@@ -45,9 +45,9 @@ impl Stage for Energy {
         let mut potential = zero;
         for (k, body) in m.bodies.iter().enumerate() {
             if body.parent.is_none() {
-                let Vec3([x, y, z]) = w.reference[body.tree];
-                let [mass, hx, hy, hz, ..] = w.inertia[k].0;
-                let moment = Vec3([mass.fma(x, hx), mass.fma(y, hy), mass.fma(z, hz)]);
+                let inertia = &w.inertia[k];
+                let point = w.reference[body.tree] + w.arm[k];
+                let moment = point.scale_add(inertia[0], inertia.first_moment());
                 potential = potential - gravity.dot(moment);
             }
         }

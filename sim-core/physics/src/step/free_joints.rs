@@ -278,27 +278,16 @@ fn bias_change<F: Num>(
     spin: Vec3<F>,
     turn: Vec3<F>,
 ) -> [Vec3<F>; 2] {
-    let moment = Vec3([inertia[1], inertia[2], inertia[3]]);
+    let moment = inertia.first_moment();
     let arm = -origin;
     let swing = turn.cross_add(spin.cross(arm), spin.cross(turn.cross(arm)));
     let pull = turn.cross_add(spin.cross(moment), spin.cross(turn.cross(moment)));
-    let gyration = spin.cross(second_moment(inertia, turn));
-    let gyration = turn.cross_add(second_moment(inertia, spin), gyration);
+    let gyration = spin.cross(inertia.second_moment(turn));
+    let gyration = turn.cross_add(inertia.second_moment(spin), gyration);
     [
         swing.scale_add(inertia[0], pull),
         moment.cross_add(swing, gyration),
     ]
-}
-
-/// The second moment of an inertia times a vector.
-#[inline(always)]
-fn second_moment<F: Num>(inertia: &Inertia<F>, v: Vec3<F>) -> Vec3<F> {
-    let [_, _, _, _, xx, yy, zz, xy, xz, yz] = **inertia;
-    Vec3([
-        xx.fma(v[0], xy.fma(v[1], xz * v[2])),
-        xy.fma(v[0], yy.fma(v[1], yz * v[2])),
-        xz.fma(v[0], yz.fma(v[1], zz * v[2])),
-    ])
 }
 
 /// Gauss' elimination without pivots: the system is that of a positive definite matrix, and a step's change of it.

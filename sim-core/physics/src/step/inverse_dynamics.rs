@@ -59,7 +59,7 @@ pub(super) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Bl
             Motion::Mocap => {}
         }
         if let Some(parent) = body.parent {
-            let carried = Spatial([force, arm.cross_add(force, moment)]);
+            let carried = w.force[k].moved(arm);
             w.force[parent] = w.force[parent] + carried;
         }
     }

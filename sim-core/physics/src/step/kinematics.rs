@@ -10,6 +10,10 @@
 //! ```
 //!
 //! The reference point is the base, or the centre of mass c of a free body, for which S = 1.
+//!
+//! Inertias are about a point of each body: the origin of its frame, or the reference point for a free body. About the
+//! reference point of a long arm, m p² of a light wrist is thousands of times the wrist's own inertia, which `f32` then
+//! loses. An arm leads from the point of a body's carrier to that of the body.
 
 use super::{BlockOf, ConstantsOf, Stage, masses};
 use crate::arrays::{Array as A, Block};
@@ -24,7 +28,14 @@ pub struct Kinematics;
 
 impl Stage for Kinematics {
     const READS: &'static [A] = &[A::JointQ, A::Params, A::MocapPos, A::MocapQuat];
-    const WRITES: &'static [A] = &[A::Rotation, A::Origin, A::Reference, A::Motion, A::Inertia];
+    const WRITES: &'static [A] = &[
+        A::Rotation,
+        A::Origin,
+        A::Reference,
+        A::Arm,
+        A::Motion,
+        A::Inertia,
+    ];
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
@@ -33,29 +44,59 @@ impl Stage for Kinematics {
         }
         // parents precede children (sim-model sorts them), so one forward pass suffices
         for (k, body) in m.bodies.iter().enumerate() {
-            let (rest, origin) = at_zero(b, body);
+            let (rest, place) = at_zero(b, body);
+            let place = slid(cx, b, body, rest, place);
+            let origin = match body.parent {
+                Some(parent) => b.work.origin[parent] + place,
+                None => place,
+            };
             let (rotation, origin) = moved(cx, b, body, rest, origin);
+            let from_point = match body.motion {
+                Motion::Free => origin,
+                _ => Vec3::zero(),
+            };
             b.work.rotation[k] = rotation;
             b.work.origin[k] = origin;
-            b.work.inertia[k] = inertia(m, &b.params, body, &rotation, origin);
+            b.work.arm[k] = match body.parent {
+                // its point is the reference point
+                Some(parent) if m.bodies[parent].motion == Motion::Free => origin,
+                Some(_) => place,
+                None => origin - from_point,
+            };
+            b.work.inertia[k] = inertia(m, &b.params, body, &rotation, from_point);
         }
     }
 }
 
-/// Axes and origin of a body whose joint is at 0.
+/// Axes of a body whose joint is at 0, and its origin from that of its carrier, or from the base.
 #[inline(always)]
 fn at_zero<F: Num, V>(b: &Block<F, V>, body: &Body<F::Real>) -> (Mat3<F>, Vec3<F>) {
+    let place = Vec3::constant(body.position);
     match body.parent {
         Some(parent) => {
             let r = &b.work.rotation[parent];
-            let origin = r.mul_add(Vec3::constant(body.position), b.work.origin[parent]);
-            (rest_rotation(r, body), origin)
+            (rest_rotation(r, body), r * place)
         }
-        None => (Mat3::constant(body.rotation), Vec3::constant(body.position)),
+        None => (Mat3::constant(body.rotation), place),
     }
 }
 
-/// Axes and origin of a body moved by its joint; writes the joint's motion axes.
+/// The same origin after the joint's slide.
+#[inline(always)]
+fn slid<C: Cx>(
+    cx: &mut C,
+    b: &BlockOf<C>,
+    body: &Body<<C::F as Num>::Real>,
+    rest: Mat3<C::F>,
+    place: Vec3<C::F>,
+) -> Vec3<C::F> {
+    match body.motion {
+        Motion::Prismatic => rest[2].scale_add(cx.get(&b.joint_q[body.coord]), place),
+        _ => place,
+    }
+}
+
+/// Axes and origin of a body turned by its joint; writes the joint's motion axes.
 #[inline(always)]
 fn moved<C: Cx>(
     cx: &mut C,
@@ -75,7 +116,7 @@ fn moved<C: Cx>(
         }
         Motion::Prismatic => {
             w.motion[d] = Spatial([z, Vec3::zero()]);
-            (rest, z.scale_add(cx.get(&b.joint_q[c]), origin))
+            (rest, origin)
         }
         Motion::Ball => {
             let Mat3([x, y, z]) = quat::matrix(read_quat(cx, &b.joint_q, c));
@@ -125,7 +166,7 @@ pub(super) fn mocap_quat<F: Num>(all: &[F], k: usize) -> quat::Quat<F> {
     std::array::from_fn(|i| F::select(still, if i == 3 { one } else { zero }, turned[i]))
 }
 
-/// Inertia of a body about the reference point; where masses vary, the sum of those of its links.
+/// Inertia of a body about a point, from which its origin is given; where masses vary, the sum of those of its links.
 #[inline(always)]
 fn inertia<F: Num>(
     m: &Constants<F::Real>,

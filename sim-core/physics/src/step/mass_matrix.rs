@@ -5,19 +5,30 @@
 //! ```
 //!
 //! For a free body S = 1: its columns are the momentum Iᶜ S(i) itself, its own block is Iᶜ.
+//!
+//! Each Iᶜ is about the body's own point, and Iᶜ S(i) moves from there to the point of each body on the path (see
+//! [`super::kinematics`]). So an entry's rounding is relative to what it is made of, also in `f32`.
 
+use super::bias::along;
 use super::{BlockOf, ConstantsOf, Stage, free_joints, param};
-use crate::arrays::Array as A;
-use crate::constants::Motion;
+use crate::arrays::{Array as A, Workspace};
 use crate::constants::params::Param;
+use crate::constants::{Constants, MassEntry, Motion};
 use crate::lane::{Cx, Num};
-use crate::math::spatial::Inertia;
+use crate::math::spatial::{ANGULAR, Inertia, LINEAR, Spatial};
 
 /// Joint-space inertia.
 pub struct MassMatrix;
 
 impl Stage for MassMatrix {
-    const READS: &'static [A] = &[A::Motion, A::Inertia, A::Params, A::Rotation, A::Origin];
+    const READS: &'static [A] = &[
+        A::Arm,
+        A::Motion,
+        A::Inertia,
+        A::Params,
+        A::Rotation,
+        A::Origin,
+    ];
     const WRITES: &'static [A] = &[A::MassMatrix, A::Inertia];
 
     #[inline(always)]
@@ -42,15 +53,13 @@ impl Stage for MassMatrix {
                     }
                     diagonal = row[axis];
                 } else {
-                    let force = composite * w.motion[i];
+                    let force = momentum(body.motion, &composite, &w.motion[i]);
+                    diagonal = along(body.motion, &w.motion[i], force);
                     let (base, path) = path.split_at(if is_free { 6 } else { 0 });
+                    let force = write_path(m, w, k, path, force);
                     for (entry, x) in base.iter().zip(force.scalars()) {
                         w.mass_matrix[entry.place] = x;
                     }
-                    for entry in path {
-                        w.mass_matrix[entry.place] = w.motion[entry.other].dot(force);
-                    }
-                    diagonal = w.motion[i].dot(force);
                 }
                 w.mass_matrix[own.place] = match free_joints::has(m, k) {
                     true => diagonal,
@@ -61,10 +70,49 @@ impl Stage for MassMatrix {
                 free_joints::add_armature(m, params, w, k);
             }
             if let Some(parent) = body.parent {
-                w.inertia[parent] = w.inertia[parent] + composite;
+                w.inertia[parent] = w.inertia[parent] + composite.moved(w.arm[k]);
             }
         }
     }
+}
+
+/// Iᶜ S(i) about the point of a body whose joint does not move it freely.
+#[inline(always)]
+fn momentum<F: Num>(motion: Motion, composite: &Inertia<F>, axis: &Spatial<F>) -> Spatial<F> {
+    let h = composite.first_moment();
+    match motion {
+        Motion::Prismatic => {
+            let z = axis[LINEAR];
+            Spatial([z * composite[0], h.cross(z)])
+        }
+        _ => {
+            let z = axis[ANGULAR];
+            Spatial([z.cross(h), composite.second_moment(z)])
+        }
+    }
+}
+
+/// Writes the entries of a dof of body `k` with those before it on its path, root first, from its Iᶜ S(i). Returns this
+/// about the point of the body that carries the last.
+#[inline(always)]
+fn write_path<F: Num>(
+    m: &Constants<F::Real>,
+    w: &mut Workspace<F>,
+    k: usize,
+    path: &[MassEntry],
+    force: Spatial<F>,
+) -> Spatial<F> {
+    let (mut at, mut force) = (k, force);
+    for entry in path.iter().rev() {
+        let body = m.dofs[entry.other].body;
+        if body != at {
+            force = force.moved(w.arm[at]);
+            at = body;
+        }
+        w.mass_matrix[entry.place] = along(m.bodies[body].motion, &w.motion[entry.other], force);
+    }
+    // of a root, which has no carrier, it is not used
+    force.moved(w.arm[at])
 }
 
 /// Row `axis` of an inertia as a 6 × 6 matrix, linear then angular, up to its diagonal.

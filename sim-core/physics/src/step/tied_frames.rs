@@ -8,13 +8,14 @@
 //!
 //! A row's reference acceleration is that of r̈ = J q̈ + J̇ q̇ (MuJoCo 3.17).
 
+use super::inverse_dynamics::point_acceleration;
 use super::sites;
 use super::ties::Found;
 use super::{BlockOf, ConstantsOf};
 use crate::arrays::Workspace;
-use crate::constants::Constants;
 use crate::constants::site::Mount;
 use crate::constants::ties::{Frames, Tie};
+use crate::constants::{Constants, Motion};
 use crate::lane::{Cx, Num};
 use crate::math::spatial::{ANGULAR, LINEAR, Spatial};
 use crate::math::vec3::{Mat3, Vec3};
@@ -57,7 +58,7 @@ pub(super) fn of_frames<C: Cx>(
     let apart = (first.point - second.point) + (first.reference - second.reference);
     let mut found = Found::at(&apart.0);
     let [one, other] = [(mounts[0], &first), (mounts[1], &second)]
-        .map(|(mount, placed)| moving(&b.work, mount, placed));
+        .map(|(mount, placed)| moving(m, &b.work, mount, placed));
     found.swing[..3].copy_from_slice(&*(one.acceleration[LINEAR] - other.acceleration[LINEAR]));
     let turned = frames.torque_scale.map(|scale| {
         let quat = between(&first.rotation, &second.rotation);
@@ -109,20 +110,28 @@ struct Moving<F> {
 }
 
 #[inline(always)]
-fn moving<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>, placed: &Placed<F>) -> Moving<F> {
+fn moving<F: Num>(
+    m: &Constants<F::Real>,
+    w: &Workspace<F>,
+    mount: &Mount<F::Real>,
+    placed: &Placed<F>,
+) -> Moving<F> {
     let Some(body) = mount.body else {
         return Moving {
             omega: Vec3::zero(),
             acceleration: Spatial::zero(),
         };
     };
-    let Spatial([linear, omega]) = w.velocity[body];
-    let Spatial([origin, angular]) = w.force[body];
-    let velocity = omega.cross_add(placed.point, linear);
-    let carried = angular.cross_add(placed.point, origin);
+    let (omega, acceleration) = (w.velocity[body][ANGULAR], w.force[body]);
+    // from the body's own point, see `kinematics`
+    let arm = match m.bodies[body].motion {
+        Motion::Free => placed.point,
+        _ => placed.point - w.origin[body],
+    };
+    let linear = point_acceleration(acceleration, omega, arm);
     Moving {
         omega,
-        acceleration: Spatial([omega.cross_add(velocity, carried), angular]),
+        acceleration: Spatial([linear, acceleration[ANGULAR]]),
     }
 }
 

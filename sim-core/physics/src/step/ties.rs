@@ -41,6 +41,7 @@ impl Stage for Ties {
         A::Rotation,
         A::Origin,
         A::Reference,
+        A::Arm,
         A::Motion,
         A::Velocity,
         A::EfcD,
