@@ -18,8 +18,8 @@ const SHARED: usize = 3;
 pub(super) const KINDS: usize = 1 << (OWN + SHARED);
 /// Contacts of a class that are told apart: none, one, …, this many or more.
 const LEVELS: usize = 4;
-/// Control frames after which the bits are chosen anew.
-const PERIOD: u64 = 64;
+/// Control frames after which the bits are chosen anew; sooner after the start, when robots fall.
+const PERIOD: u64 = 32;
 
 /// Whether a world has at least `level` + 1 contacts of a class.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +57,7 @@ pub(super) struct ContactKinds {
 impl ContactKinds {
     /// Is it time to count?
     pub fn is_due(frame: u64) -> bool {
-        frame % PERIOD == 1
+        frame.is_power_of_two() || frame.is_multiple_of(PERIOD)
     }
 
     /// What sets a bit, and the bit.
