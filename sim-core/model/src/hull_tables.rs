@@ -215,3 +215,69 @@ fn kept(face: &Face) -> Vec<u32> {
     let few = count.min(CORNERS_MAX);
     (0..few).map(|i| face.corners[i * count / few]).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points on a sphere, in a spiral.
+    fn ball(count: usize) -> Hull {
+        let points: Vec<[f64; 3]> = (0..count)
+            .map(|k| {
+                let z = 1.0 - (2 * k + 1) as f64 / count as f64;
+                let (sin, cos) = (2.4 * k as f64).sin_cos();
+                let radius = (1.0 - z * z).sqrt();
+                [radius * cos, radius * sin, z]
+            })
+            .collect();
+        Hull::of(&points, 1024).unwrap()
+    }
+
+    #[test]
+    fn every_vertex_is_in_the_ball_of_its_cluster_and_in_no_other() {
+        let (large, small) = (ball(100), ball(10));
+        let mut tables = Tables::default();
+        let (placed, frames) = append(&[large.clone(), small], &mut tables);
+        let index =
+            |t: Fixed, row: usize, k: usize| tables.indices[t.base + row * t.stride + k] as usize;
+        let number = |t: Fixed, k: usize| tables.numbers[t.base + k];
+        let spans = [0, 1].map(|hull| {
+            let at = |k| index(placed.cluster_spans, hull, k);
+            at(0)..at(1)
+        });
+        assert_eq!(spans, [0..7, 7..8]);
+        let mut found = Vec::new();
+        for cluster in 0..placed.clusters.rows {
+            let ball: [f64; 4] = std::array::from_fn(|k| number(placed.clusters, 4 * cluster + k));
+            let rows =
+                index(placed.cluster_rows, cluster, 0)..index(placed.cluster_rows, cluster, 1);
+            assert!((1..=CLUSTER / 4).contains(&rows.len()));
+            // a cluster is a small part of its hull
+            assert!(cluster == 7 || ball[3] < 0.8, "radius {}", ball[3]);
+            for vertex in 4 * rows.start..4 * rows.end {
+                let x: [f64; 3] = std::array::from_fn(|i| number(placed.vertices, 3 * vertex + i));
+                let from: [f64; 3] = std::array::from_fn(|i| x[i] - ball[i]);
+                assert!(dot(from, from).sqrt() < ball[3], "cluster {cluster}: {x:?}");
+                if spans[0].contains(&cluster) {
+                    found.push(x.map(f64::to_bits));
+                }
+            }
+        }
+        found.sort_unstable();
+        found.dedup();
+        let center = frames[0].center;
+        let mut given: Vec<_> = large
+            .vertices
+            .iter()
+            .map(|x| std::array::from_fn(|i| (x[i] - center[i]).to_bits()))
+            .collect();
+        given.sort_unstable();
+        assert_eq!(found, given);
+    }
+
+    #[test]
+    fn small_hulls_have_no_clusters() {
+        let (placed, _) = append(&[ball(CLUSTER)], &mut Tables::default());
+        assert_eq!(placed.clusters, Fixed::default());
+    }
+}

@@ -127,7 +127,7 @@ impl<F: Lane> Chunk<F> {
             lanes: vec![F::Real::default(); elements * F::WIDTH],
             rows: vec![F::Real::default(); elements * F::WIDTH],
             assignment: LaneAssignment::new(worlds.len(), blocks * F::WIDTH),
-            kinds: ContactKinds::default(),
+            kinds: ContactKinds::new(job.constants.contacts.classes.len()),
             worlds,
         };
         chunk.start(job);

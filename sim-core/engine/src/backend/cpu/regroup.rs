@@ -9,8 +9,7 @@ impl<F: Lane> Chunk<F> {
     /// Records of which kind the worlds of a block are now.
     #[inline(always)]
     pub(super) fn note_contacts(&mut self, m: &Constants<F::Real>, block: usize) {
-        let classes = m.contacts.classes.len();
-        if classes == 0 || F::WIDTH == 1 {
+        if m.contacts.classes.is_empty() || F::WIDTH == 1 {
             return;
         }
         let (counts, memory, lanes) =
@@ -20,9 +19,11 @@ impl<F: Lane> Chunk<F> {
             F::bits(F::c(bit.threshold()).lt(count))
         };
         if ContactKinds::is_due(self.frames) {
-            // lanes past the last world have no contacts
-            self.kinds
-                .count(classes, lanes.len(), |bit| set(bit).count_ones());
+            // the last block may have lanes without a world
+            let inhabited = (1u64 << lanes.len()) - 1;
+            self.kinds.count(lanes.len(), |bit| {
+                (u64::from(set(bit)) & inhabited).count_ones()
+            });
         }
         let mut kinds: [Kind; 64] = [0; 64];
         for (of, bit) in self.kinds.bits() {
@@ -40,7 +41,9 @@ impl<F: Lane> Chunk<F> {
     /// Moves worlds of the same kind into neighbouring lanes, with their state.
     pub(super) fn regroup(&mut self, job: &Job<F>) {
         if ContactKinds::is_due(self.frames) {
-            self.kinds.choose(&job.constants);
+            let classes = &job.constants.contacts.classes;
+            self.kinds
+                .choose(|class| classes[class].columns.len().pow(2));
         }
         let numbers = job.shape.total();
         let place = |lane: usize| (lane / F::WIDTH) * numbers * F::WIDTH + lane % F::WIDTH;

@@ -1,0 +1,119 @@
+//! `tightloop bench`: what it measures, and which arguments it refuses.
+
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+const SCENE: &str = r#"
+dt = 0.002
+substeps = 2
+[[robot]]
+name = "box"
+urdf = "box.urdf"
+floating = true
+pos = [0.0, 0.0, 0.099]
+[[shape]]
+name = "ground"
+kind = "plane"
+"#;
+const BOX: &str = r#"<robot name="box"><link name="base">
+<inertial><mass value="1"/><inertia ixx="0.007" iyy="0.007" izz="0.007" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision>
+</link></robot>"#;
+
+/// Runs `tightloop bench` on a box that stands on the ground.
+fn bench(name: &str, arguments: &[&str]) -> Output {
+    let folder: PathBuf = std::env::temp_dir().join(format!("bench-{name}-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("scene.toml"), SCENE).unwrap();
+    std::fs::write(folder.join("box.urdf"), BOX).unwrap();
+    let done = Command::new(env!("CARGO_BIN_EXE_tightloop"))
+        .args([
+            "bench",
+            "scene.toml",
+            "--worlds",
+            "11",
+            "--settle",
+            "0.1",
+            "--seconds",
+            "0.05",
+        ])
+        .args(arguments)
+        .current_dir(&folder)
+        .output()
+        .unwrap();
+    std::fs::remove_dir_all(folder).unwrap();
+    done
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+#[test]
+fn a_standing_box_has_four_contacts_and_a_solver() {
+    let done = bench("json", &["--json"]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let found: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert!(found["steps_per_s"].as_f64().unwrap() > 0.0);
+    assert_eq!(found["worlds"], 11);
+    assert_eq!(found["faulted"], 0);
+    let mean = |count: &str| found["counts"][count]["mean"].as_f64().unwrap();
+    assert_eq!((mean("contacts"), mean("rows")), (4.0, 12.0));
+    assert!(mean("iterations") >= 1.0 && mean("block_iterations") >= mean("iterations"));
+    let stages = found["stages"].as_array().unwrap();
+    let time = |name: &str| {
+        let stage = stages.iter().find(|stage| stage["stage"] == name);
+        stage.unwrap_or_else(|| panic!("{name}"))["step_ns"]
+            .as_f64()
+            .unwrap()
+    };
+    let times: f64 = stages
+        .iter()
+        .map(|stage| stage["step_ns"].as_f64().unwrap())
+        .sum();
+    assert!(time("plane_box") > 0.0 && time("solver") > 0.0);
+    assert!(times <= found["total_ns"].as_f64().unwrap());
+}
+
+#[test]
+fn f64_has_one_world_a_block_and_no_masked_lanes() {
+    let done = bench("double", &["--json", "--precision", "f64"]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let found: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    let mean = |count: &str| found["counts"][count]["mean"].as_f64().unwrap();
+    assert_eq!(mean("block_iterations"), mean("iterations"));
+}
+
+#[test]
+fn people_get_a_table() {
+    let done = bench("table", &[]);
+    let said = text(&done.stdout);
+    for word in [
+        "steps/s",
+        "contacts",
+        "solver iterations",
+        "plane_box",
+        "masked",
+    ] {
+        assert!(said.contains(word), "{word} in {said}");
+    }
+}
+
+#[test]
+fn wrong_arguments_are_named() {
+    for (arguments, words) in [
+        (["--worlds", "0"], "ask for 1 to 16777216"),
+        (["--threads", "0"], "ask for 1 to 1024"),
+        (["--commands", "walk"], "use random or hold"),
+        (["--swing", "nan"], "from 0 to 1"),
+        (["--seconds", "-1"], "from 0 to"),
+        (["--lanes", "7"], "use 1, 8 or 16"),
+        (["--precision", "f16"], "use f32 or f64"),
+        (["--keyframe", "home"], "no keyframes"),
+    ] {
+        let done = bench("wrong", &[&format!("{}={}", arguments[0], arguments[1])]);
+        let said = text(&done.stderr);
+        assert_eq!(done.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(said.contains(words), "{arguments:?}: {said}");
+    }
+}
