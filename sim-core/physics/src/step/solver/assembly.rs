@@ -45,13 +45,13 @@ pub(super) fn assemble<C: Cx, const TURNS: bool>(
         }
         // W J(c) of three columns at a time, then its products with the columns up to c
         let mut c = 0;
-        while let Some(entries) = class.entries[c..].first_chunk() {
+        while let Some([a, b, d]) = class.entries[c..].first_chunk() {
             let stiff = [
                 stiff_column(cx, t, r, &rows, c),
                 stiff_column(cx, t, r, &rows, c + 1),
                 stiff_column(cx, t, r, &rows, c + 2),
             ];
-            add_three_columns(cx, t, r, stiff, entries, hessian);
+            add_three_columns(cx, t, r, stiff, [a, b, d], hessian);
             c += 3;
         }
         for (c, entries) in class.entries.iter().enumerate().skip(c) {
@@ -102,10 +102,10 @@ fn add_three_columns<C: Cx>(
     t: &ContactsOf<C>,
     r: C::I,
     stiff: [[C::F; 3]; 3],
-    entries: &[Vec<Run>; 3],
+    entries: [&[Run]; 3],
     hessian: &mut [C::V],
 ) {
-    if let [[a], [b], [c]] = [&entries[0][..], &entries[1][..], &entries[2][..]]
+    if let [[a], [b], [c]] = entries
         && (a.column, a.len + 1) == (b.column, b.len)
         && (a.column, a.len + 2) == (c.column, c.len)
     {

@@ -74,30 +74,18 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
             when!(cx, some, {
                 let smaller = &*cx.cells(&mut w.hessian, &mut b.system);
                 let cells = cx.cells(&mut w.coupled_hessian, &mut b.coupled_system);
-                for cell in &mut *cells {
-                    cx.put(cell, C::F::c(0.0));
-                }
-                for (cell, &place) in smaller.iter().zip(&m.coupled.places) {
-                    let value = cx.get(cell);
-                    cx.put(&mut cells[place], value);
-                }
+                widen(cx, &m.coupled.places, smaller, cells);
             });
         }
-        let (pattern, matrix, system) = if larger {
-            (
-                &m.coupled.pattern,
-                &mut w.coupled_hessian,
-                &mut b.coupled_system,
-            )
-        } else {
-            (&m.pattern, &mut w.hessian, &mut b.system)
+        let coupled = (&mut w.coupled_hessian, &mut b.coupled_system);
+        let (pattern, (matrix, system)) = match larger {
+            true => (&m.coupled.pattern, coupled),
+            false => (&m.pattern, (&mut w.hessian, &mut b.system)),
         };
         if touches {
             let cells = cx.cells(matrix, system);
-            for k in 0..t.classes.len() {
-                if t.classes[k].couples == larger {
-                    assembly::assemble::<_, TURNS>(cx, t, k, cells, &mut b.pull, pulls);
-                }
+            for k in (0..t.classes.len()).filter(|&k| t.classes[k].couples == larger) {
+                assembly::assemble::<_, TURNS>(cx, t, k, cells, &mut b.pull, pulls);
             }
         }
         if let (true, Some(some)) = (solves_both, some) {
@@ -125,11 +113,28 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
     if solves_both {
         gather(cx, &b.solution, vector);
     }
-    for x in vector.iter_mut() {
-        // a 0 of the larger system may have another sign
-        *x = *x + C::F::c(0.0);
-    }
+    without_signs_of_zeros(vector);
     cx.get(&stiffening)
+}
+
+/// A 0 that a larger system was solved for may have another sign: all become +0.
+#[inline(always)]
+fn without_signs_of_zeros<F: Num>(vector: &mut [F]) {
+    for x in vector {
+        *x = *x + F::c(0.0);
+    }
+}
+
+/// Copies a system to the places that it has in a larger one, which is 0 elsewhere.
+#[inline(always)]
+fn widen<C: Cx>(cx: &mut C, places: &[usize], smaller: &[C::V], larger: &mut [C::V]) {
+    for cell in &mut *larger {
+        cx.put(cell, C::F::c(0.0));
+    }
+    for (cell, &place) in smaller.iter().zip(places) {
+        let value = cx.get(cell);
+        cx.put(&mut larger[place], value);
+    }
 }
 
 /// The largest ratio of diagonal entries of H and M; 1 in `f64`, which does not ask.
