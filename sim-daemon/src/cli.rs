@@ -224,7 +224,8 @@ pub(crate) struct Bench {
     #[arg(long, default_value_t = 1)]
     pub(crate) threads: usize,
 
-    /// What the worlds are told: random gives each world smooth commands of its own, hold keeps those of the start.
+    /// Commands: random gives each world smooth ones of its own, about the middle of the range or the keyframe's; hold keeps
+    /// what these are about. A range without bounds counts as ±1.
     #[arg(long, default_value = "random")]
     pub(crate) commands: String,
 

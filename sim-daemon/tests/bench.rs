@@ -111,9 +111,17 @@ fn wrong_arguments_are_named() {
         (["--precision", "f16"], "use f32 or f64"),
         (["--keyframe", "home"], "no keyframes"),
     ] {
-        let done = bench("wrong", &[&format!("{}={}", arguments[0], arguments[1])]);
+        let argument = format!("{}={}", arguments[0], arguments[1]);
+        let done = bench("wrong", &[&argument]);
         let said = text(&done.stderr);
         assert_eq!(done.status.code(), Some(2), "{arguments:?}: {said}");
         assert!(said.contains(words), "{arguments:?}: {said}");
     }
+}
+
+#[test]
+fn f64_has_no_lanes() {
+    let done = bench("lanes", &["--precision", "f64", "--lanes", "8"]);
+    assert_eq!(done.status.code(), Some(2));
+    assert!(text(&done.stderr).contains("one world a block"));
 }

@@ -140,6 +140,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "reset",
             "transfer",
             "contacts",
+            "probe",
             "run",
             "backend",
             "dispatch",

@@ -1,4 +1,4 @@
-//! Commands of a benchmark: every world follows its own smooth random motion, or holds its start.
+//! Commands of a benchmark: every world follows its own smooth random motion, or holds what that is about.
 
 use sim_engine::backend::{BackendError, Values};
 use sim_engine::random::{Draw, Stream};
@@ -11,17 +11,31 @@ const SEED: u64 = 0;
 /// Commands repeat after so much simulated time [s], or after so many frames.
 const PERIOD: f64 = 2.0;
 const FRAMES_MAX: usize = 400;
+/// Most numbers of all frames: a gibibyte.
+const NUMBERS_MAX: usize = 1 << 28;
 /// Fastest sine of a command [Hz], and how many are added.
 const FREQUENCY_MAX: f64 = 2.5;
 const SINES: usize = 3;
 /// Half the range of a target or control that has no bounds [rad, m or –], and of a torque without one [N·m or N].
 const HALF_RANGE: f64 = 1.0;
 
-/// Middle and half width of what a command may be.
+/// What a command swings about, and what it may be.
 #[derive(Clone, Copy)]
 struct Channel {
     middle: f64,
-    half: f64,
+    low: f64,
+    high: f64,
+}
+
+impl Channel {
+    /// Of a command that swings about the middle of its range.
+    fn about(middle: f64, half: f64) -> Channel {
+        Channel {
+            middle,
+            low: middle - half,
+            high: middle + half,
+        }
+    }
 }
 
 /// Commands of all frames: one field, `(frames, worlds, columns)`.
@@ -47,7 +61,10 @@ impl Commands {
         }
         let frame = model.dt() * model.substeps() as f64;
         let frames = match swing > 0.0 {
-            true => ((PERIOD / frame).round() as usize).clamp(1, FRAMES_MAX),
+            true => {
+                let most = (NUMBERS_MAX / (worlds * channels.len())).clamp(1, FRAMES_MAX);
+                ((PERIOD / frame).round() as usize).clamp(1, most)
+            }
             false => 1,
         };
         let waves = (FREQUENCY_MAX * frames as f64 * frame).floor().max(1.0);
@@ -57,7 +74,8 @@ impl Commands {
             for (k, channel) in channels.iter().enumerate() {
                 let sine = |i: usize| 3 * (k * SINES + i) as u32;
                 let parts: [f64; SINES] = [0, 1, 2].map(|i| draw.uniform(sine(i), 0.0, 1.0));
-                let share = swing * channel.half / parts.iter().sum::<f64>().max(1.0);
+                let half = (channel.high - channel.low) / 2.0;
+                let share = swing * half / parts.iter().sum::<f64>().max(1.0);
                 let cycles = [0, 1, 2].map(|i| draw.uniform(sine(i) + 1, 1.0, waves + 1.0).floor());
                 let phases = [0, 1, 2].map(|i| draw.uniform(sine(i) + 2, 0.0, 1.0));
                 for (number, row) in all.iter_mut().enumerate() {
@@ -67,9 +85,8 @@ impl Commands {
                         let angle = std::f64::consts::TAU * (cycles[i] * at + phases[i]);
                         value += share * parts[i] * angle.sin();
                     }
-                    let (low, high) =
-                        (channel.middle - channel.half, channel.middle + channel.half);
-                    row[world * channels.len() + k] = value.clamp(low, high) as f32;
+                    let value = value.max(channel.low).min(channel.high);
+                    row[world * channels.len() + k] = value as f32;
                 }
             }
         }
@@ -106,7 +123,8 @@ fn channels(model: &Model, start: Option<&KeyState>) -> (Field, Vec<Channel>) {
             let [low, high] = actuator.ctrl_range.unwrap_or([-HALF_RANGE, HALF_RANGE]);
             Channel {
                 middle: start.map_or((low + high) / 2.0, |key| key.ctrl[k]),
-                half: (high - low) / 2.0,
+                low,
+                high,
             }
         };
         let actuators = m.mujoco.actuators.iter().enumerate();
@@ -116,22 +134,26 @@ fn channels(model: &Model, start: Option<&KeyState>) -> (Field, Vec<Channel>) {
     if m.dofs.iter().any(|dof| dof.follows_position) {
         let channel = |(k, dof): (usize, &sim_physics::constants::Dof<f64>)| {
             let limit = m.limits.iter().find(|limit| limit.dof == k);
-            let half = limit.map_or(HALF_RANGE, |limit| (limit.upper - limit.lower) / 2.0);
-            Channel {
-                middle: targets[k],
-                half: if dof.follows_position { half } else { 0.0 },
+            match (dof.follows_position, limit) {
+                (false, _) => Channel::about(targets[k], 0.0),
+                (true, None) => Channel::about(targets[k], HALF_RANGE),
+                (true, Some(limit)) => Channel {
+                    middle: targets[k],
+                    low: limit.lower,
+                    high: limit.upper,
+                },
             }
         };
         let dofs = m.dofs.iter().enumerate();
         return (Field::JointTargetQ, dofs.map(channel).collect());
     }
-    let channel = |dof: &sim_physics::constants::Dof<f64>| Channel {
-        middle: 0.0,
+    let channel = |dof: &sim_physics::constants::Dof<f64>| {
         // the six dofs of a free body have no motor
-        half: match m.bodies[dof.body].motion.dofs() {
+        let half = match m.bodies[dof.body].motion.dofs() {
             1 => dof.effort_limit.unwrap_or(HALF_RANGE),
             _ => 0.0,
-        },
+        };
+        Channel::about(0.0, half)
     };
     (Field::JointF, m.dofs.iter().map(channel).collect())
 }

@@ -28,7 +28,7 @@ struct Measured {
     /// Steps of a world per second, of each turn, least first.
     rates: Vec<f64>,
     profile: Profile,
-    /// Worlds that faulted, and whose solver used up its iterations.
+    /// Worlds that have faulted, and whose solver used up its iterations in the last frame.
     faulted: usize,
     unconverged: usize,
 }
@@ -73,7 +73,7 @@ pub(crate) fn run(args: &Bench) -> Result<(), DaemonError> {
     let mut rates = Vec::new();
     for _ in 0..TURNS {
         let (begin, mut frames) = (Instant::now(), 0.0);
-        while begin.elapsed() < turn {
+        while begin.elapsed() < turn || frames == 0.0 {
             step(&mut simulation, None)?;
             frames += 1.0;
         }
@@ -160,6 +160,10 @@ fn check(args: &Bench) -> Result<Options, DaemonError> {
         "f64" => Precision::F64,
         other => return Err(wrong("precision", &other, "unknown; use f32 or f64")),
     };
+    if precision == Precision::F64 && !matches!(args.lanes, None | Some(1)) {
+        let problem = "f64 has one world a block; leave it out";
+        return Err(wrong("lanes", &args.lanes.unwrap_or(0), problem));
+    }
     Ok(Options {
         worlds: args.worlds,
         threads: Some(args.threads),

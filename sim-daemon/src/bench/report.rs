@@ -49,7 +49,7 @@ fn text(measured: &Measured) -> String {
             rates[rates.len() - 1],
         ),
         format!(
-            "worlds faulted: {}, not converged: {}",
+            "worlds faulted: {}, not converged in the last frame: {}",
             measured.faulted, measured.unconverged
         ),
         String::new(),

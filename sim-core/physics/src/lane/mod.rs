@@ -285,7 +285,7 @@ pub trait Cx: Sized {
     fn tally(&mut self, _of_worlds: &mut Self::V, _of_block: &mut Self::V) {}
     /// `x` in the active worlds, 0 elsewhere.
     fn only(&mut self, x: Self::F) -> Self::F;
-    /// `x` in the active worlds, -0 elsewhere: times a positive number or 0 it adds nothing to any sum, not even to the sign
+    /// `x` in the active worlds, -0 elsewhere: times a positive number or +0 it adds nothing to any sum, not even to the sign
     /// of a 0.
     #[inline(always)]
     fn or_nothing(&mut self, x: Self::F) -> Self::F {

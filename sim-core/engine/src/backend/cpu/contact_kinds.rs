@@ -7,7 +7,7 @@
 
 /// The bits of a kind.
 pub(super) type Kind = u16;
-/// Bits that stand for a class and a count of their own.
+/// Bits that stand for a class and a count of their own: 4096 worlds of 8 lanes are as many blocks as these tell apart.
 const OWN: usize = 9;
 /// Lower bits, each of which is set by any of several classes.
 const SHARED: usize = 3;

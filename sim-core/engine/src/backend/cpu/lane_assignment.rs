@@ -63,7 +63,7 @@ impl LaneAssignment {
         if !std::mem::take(&mut self.changed) {
             return;
         }
-        let mut ends = [0; KINDS];
+        let mut ends = [0_usize; KINDS];
         for &kind in &self.kinds {
             ends[usize::from(kind)] += 1;
         }

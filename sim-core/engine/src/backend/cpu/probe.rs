@@ -42,8 +42,6 @@ pub(super) struct Watch<'a, F> {
     place: usize,
     contact_rows: usize,
     solver: [usize; 2],
-    /// Counts of the solver before the stage, of worlds and of the block.
-    work: [F; 6],
 }
 
 impl<'a, F: Lane> Watch<'a, F> {
@@ -57,7 +55,6 @@ impl<'a, F: Lane> Watch<'a, F> {
             place: place("place"),
             contact_rows: place("contact_rows"),
             solver: ["solver", "solver_turning"].map(place),
-            work: [F::c(0.0); 6],
         }
     }
 
@@ -100,9 +97,13 @@ impl<'a, F: Lane> Watch<'a, F> {
     }
 
     fn note_solve(&mut self, moment: &Moment<'_, F>) {
-        let now = work_of(moment.block);
-        let [iterations, searches, evaluations, _, _, of_block] =
-            [0, 1, 2, 3, 4, 5].map(|k| now[k] - self.work[k]);
+        let work = (
+            &moment.block.solver_work[..],
+            &moment.block.solver_block_work[..],
+        );
+        let (&[iterations, searches, evaluations], &[_, _, of_block]) = work else {
+            unreachable!("three counts each")
+        };
         let most = self.note_work(moment.stage, moment.lanes, iterations);
         if moment.evaluates {
             return;
@@ -126,14 +127,6 @@ impl<'a, F: Lane> Watch<'a, F> {
     }
 }
 
-/// Counts of the solver so far.
-fn work_of<F: Lane>(block: &Block<F, F>) -> [F; 6] {
-    let ([a, b, c], [d, e, f]) = (&block.solver_work[..], &block.solver_block_work[..]) else {
-        unreachable!("three counts each")
-    };
-    [*a, *b, *c, *d, *e, *f]
-}
-
 /// Contacts of a world, and their rows.
 fn contacts_of<F: Lane>(moment: &Moment<'_, F>, lane: usize) -> (usize, usize) {
     let t = &moment.constants.contacts;
@@ -153,7 +146,9 @@ fn contacts_of<F: Lane>(moment: &Moment<'_, F>, lane: usize) -> (usize, usize) {
 
 impl<F: Lane> Probe<F> for Watch<'_, F> {
     fn before(&mut self, moment: Moment<'_, F>) {
-        self.work = work_of(moment.block);
+        // they count on in all steps
+        moment.block.solver_work.fill(F::c(0.0));
+        moment.block.solver_block_work.fill(F::c(0.0));
         self.begin = Instant::now();
     }
 

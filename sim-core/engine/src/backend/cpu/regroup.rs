@@ -9,7 +9,8 @@ impl<F: Lane> Chunk<F> {
     /// Records of which kind the worlds of a block are now.
     #[inline(always)]
     pub(super) fn note_contacts(&mut self, m: &Constants<F::Real>, block: usize) {
-        if m.contacts.classes.is_empty() || F::WIDTH == 1 {
+        let is_one_block = self.worlds.len() <= F::WIDTH;
+        if m.contacts.classes.is_empty() || is_one_block || F::WIDTH == 1 {
             return;
         }
         let (counts, memory, lanes) =

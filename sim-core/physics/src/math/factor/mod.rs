@@ -3,7 +3,7 @@
 //! Elimination runs from the last dof to the first, so that a tree makes no fill. The pattern is fixed when the model is
 //! compiled: independent parts of the scene are blocks, each a packed lower triangle or the paths of a tree. A solve
 //! eliminates the right-hand side along with the matrix. There are three kernels, which do the same operations in the same
-//! order:
+//! order (in [`multiply`], sums of another order):
 //!
 //! - [`dense`]: small full blocks, such as an arm, unrolled,
 //! - [`tree`]: trees, unrolled along their paths,

@@ -11,19 +11,20 @@ use crate::math::vec3::{Mat3, Vec3};
 use crate::{span, when};
 
 /// `each_far_row!(cx, hull, d, best, row, { … })`: the body for every row of vertices of which one may be farther along `d` than
-/// `best`, which the body raises. Where it is not, the body changes nothing, so it may run in any world.
+/// `best`, which the body raises, in the worlds where it may. A direction that is not a number meets every row.
 macro_rules! each_far_row {
     ($cx:ident, $hull:expr, $d:ident, $best:ident, $row:ident, $body:block) => {
         if $hull.tables.clusters.rows == 0 {
             let (first, end) = $hull.span($cx, Part::Vertices);
             span!($cx, $row in first, end, $body);
         } else {
-            let length = $d.dot($d).sqrt();
+            // not less than the length of d, whose square may be too small for a number
+            let length = $d[0].abs() + ($d[1].abs() + $d[2].abs());
             let (first, end) = $hull.clusters($cx);
             span!($cx, cluster in first, end, {
                 let (center, radius) = $hull.cluster($cx, cluster);
                 let bound = radius.fma(length, center.dot($d));
-                when!($cx, $cx.get(&$best).lt(bound), {
+                when!($cx, !bound.lt($cx.get(&$best)), {
                     let (first, end) = $hull.cluster_rows($cx, cluster);
                     span!($cx, $row in first, end, $body);
                 });
@@ -118,7 +119,7 @@ impl<C: Cx> Hull<'_, C> {
             for point in vertex_row(cx, self.tables, row) {
                 reach = reach.max(point.dot(d));
             }
-            cx.put(&mut best, reach);
+            cx.set(&mut best, reach);
         });
         cx.get(&best)
     }
@@ -139,8 +140,8 @@ impl<C: Cx> Support<C> for Hull<'_, C> {
                 reach = reach.max(x);
                 place = C::F::select(farther, number + C::F::c(0.25 * k as f64), place);
             }
-            cx.put(&mut best, reach);
-            cx.put(&mut at, place);
+            cx.set(&mut best, reach);
+            cx.set(&mut at, place);
         });
         // the same table with one vertex a row
         let single = Fixed {

@@ -61,7 +61,7 @@ pub(super) fn assemble<C: Cx, const TURNS: bool>(
     });
 }
 
-/// W J(c) of a contact, 0 in worlds without it.
+/// W J(c) of a contact; 0 in worlds without it, where J is -0 and W is -0.
 #[inline(always)]
 fn stiff_column<C: Cx>(
     cx: &mut C,
@@ -106,6 +106,8 @@ fn add_three_columns<C: Cx>(
     hessian: &mut [C::V],
 ) {
     if let [[a], [b], [c]] = entries
+        && a.place + a.len <= b.place
+        && b.place + b.len <= c.place
         && (a.column, a.len + 1) == (b.column, b.len)
         && (a.column, a.len + 2) == (c.column, c.len)
     {

@@ -36,7 +36,8 @@ pub(super) fn coupling<C: Cx>(
 ///
 /// Returns the largest ratio of diagonal entries of H and M: how much stiffer contacts make the system.
 ///
-/// A world whose contacts couple dofs that the mass matrix does not couple solves a larger system.
+/// A world whose contacts couple dofs that the mass matrix does not couple solves a larger system. A block in lockstep solves it
+/// for all of its worlds.
 #[inline(always)]
 pub(super) fn solve_system<C: Cx, const TURNS: bool>(
     cx: &mut C,

@@ -13,7 +13,8 @@
 //! ```
 //!
 //! If no row changes its piece of cost between `a` and `a⁺`, the model was exact and `a⁺` is the answer. Otherwise an exact
-//! line search on the segment finds the next `a` (in `f32` only after three whole steps, or where these may overshoot). The
+//! line search on the segment finds the next `a` (in `f32` only after three whole steps, or where these may overshoot, as with
+//! stiff pyramids). The
 //! start is the result of the last step, so mostly one iteration is enough. In `f64`, the reference, the start is chosen as in
 //! MuJoCo (see [`choose_start`]).
 //!
@@ -31,7 +32,7 @@
 //!
 //! Contacts are up to 10⁶ times as stiff as bodies are heavy. So in worlds that touch, an iteration solves for the step
 //! a⁺ - a, not for a⁺. It ends where the gain is what rounding alone would promise ([`Line::noise`]). A whole step that found
-//! the minimum is followed by one more, unless bodies that touch gained less than the tolerance.
+//! the minimum is followed by one more, unless that could gain less than the tolerance (see [`Progress::plan`]).
 //!
 //! Where the mass matrix loses too many digits in `f32`, [`refine`] corrects the accelerations by inverse dynamics.
 //!
@@ -41,7 +42,9 @@
 //! matrix of its own. [`Accelerations`] then finds accelerations for output only.
 //!
 //! A contact adds Jᵀ W J to the mass matrix. Contacts that couple two trees need a larger pattern. That system is assembled
-//! and solved only in worlds that have such a contact ([`linear`]).
+//! and solved only in worlds that have such a contact, or in blocks of worlds of which one has ([`linear`]).
+//!
+//! A limit that acts in no world of a block has no row ([`rows::Acting`]).
 //!
 //! | File | What it has |
 //! |---|---|
@@ -266,6 +269,7 @@ fn search_segment<C: Cx, const TURNS: bool>(
             curvature = w.step[j].fma(w.joint_force[j], curvature);
             power = power + (w.smooth_force[j] * w.start[j]).abs();
         }
+        // of limits that do not act both are undefined, and not read
         for r in 0..m.rows() {
             w.jar_minimum[r] = w.jar_minimum[r] - w.jar[r];
         }

@@ -29,7 +29,8 @@ impl<'a, F> Jacobian<'a, F> {
     }
 }
 
-/// The limits that act in some world of a block: most joints of most worlds are inside their range.
+/// The groups of limits of which one acts in some world of a block: most joints of most worlds are inside their range. With at
+/// most 64 limits each is a group of its own.
 #[derive(Clone, Copy)]
 pub(super) struct Acting {
     /// A bit for each group of limits.
