@@ -27,7 +27,8 @@ others from a 4-core machine.
 
 - **Precision differs.** MuJoCo computes in float64, one world at a time. tightloop computes in float32, with 16 worlds
   in one AVX-512 register.
-- **Hulls differ.** MuJoCo keeps all vertices of a mesh's convex hull. tightloop keeps at most 64.
+- **Hulls differ.** MuJoCo keeps all vertices of a mesh's convex hull. tightloop keeps at most 64 of a URDF's mesh, and
+  all of a MuJoCo model's.
 - **EnvPool's scene is lighter.** Of its arm, only the hand and the fingers collide. Its solver stops after 5
   iterations.
 - **mjbatch has [its own table](#mujoco-models-beside-mjbatch-on-one-thread).** It steps MuJoCo C. That machine has AVX2,

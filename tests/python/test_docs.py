@@ -153,6 +153,10 @@ def test_the_readme_claims_no_more_than_was_measured():
     text = performance.README.read_text()
     said = re.search(r"makes (\d+) to (\d+) times the .* make (\d+) times", text, re.DOTALL)
     assert said is not None
+    on_the_ground = re.search(r"steps (\d+) to (\d+)\s+times as many", text)
+    assert on_the_ground is not None
+    batch = ratios("mjbatch")
+    assert [int(number) for number in on_the_ground.groups()] == [round(min(batch)), round(max(batch))]
     mujoco, envpool = ratios("rollout"), ratios("EnvPool")
     assert [int(number) for number in said.groups()] == [round(min(mujoco)), round(max(mujoco)), round(min(envpool))]
 
