@@ -13,30 +13,29 @@ floating = true
 pos = [0.0, 0.0, 0.099]
 [[shape]]
 name = "ground"
-kind = "plane"
+type = "plane"
 "#;
 const BOX: &str = r#"<robot name="box"><link name="base">
 <inertial><mass value="1"/><inertia ixx="0.007" iyy="0.007" izz="0.007" ixy="0" ixz="0" iyz="0"/></inertial>
 <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision>
 </link></robot>"#;
 
+/// Few worlds and a short time, where a test says nothing else.
+const QUICK: [&str; 3] = ["--worlds=11", "--settle=0.1", "--seconds=0.05"];
+
 /// Runs `tightloop bench` on a box that stands on the ground.
 fn bench(name: &str, arguments: &[&str]) -> Output {
+    let is_given = |short: &str| {
+        let (name, _) = short.split_once('=').expect("a value");
+        arguments.iter().any(|given| given.starts_with(name))
+    };
     let folder: PathBuf = std::env::temp_dir().join(format!("bench-{name}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     std::fs::write(folder.join("scene.toml"), SCENE).unwrap();
     std::fs::write(folder.join("box.urdf"), BOX).unwrap();
     let done = Command::new(env!("CARGO_BIN_EXE_tightloop"))
-        .args([
-            "bench",
-            "scene.toml",
-            "--worlds",
-            "11",
-            "--settle",
-            "0.1",
-            "--seconds",
-            "0.05",
-        ])
+        .args(["bench", "scene.toml"])
+        .args(QUICK.iter().filter(|short| !is_given(short)))
         .args(arguments)
         .current_dir(&folder)
         .output()

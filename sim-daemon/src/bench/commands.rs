@@ -5,6 +5,7 @@ use sim_engine::random::{Draw, Stream};
 use sim_engine::simulation::Simulation;
 use sim_model::{KeyState, Model};
 use sim_physics::arrays::Field;
+use sim_physics::constants::{Dof, Motion};
 
 /// Seed of the motion.
 const SEED: u64 = 0;
@@ -131,10 +132,13 @@ fn channels(model: &Model, start: Option<&KeyState>) -> (Field, Vec<Channel>) {
         return (Field::Ctrl, actuators.map(channel).collect());
     }
     let targets = &model.start().joint_target_q;
-    if m.dofs.iter().any(|dof| dof.follows_position) {
-        let channel = |(k, dof): (usize, &sim_physics::constants::Dof<f64>)| {
+    // a free body has no drive
+    let follows =
+        |dof: &Dof<f64>| dof.follows_position && m.bodies[dof.body].motion != Motion::Free;
+    if m.dofs.iter().any(follows) {
+        let channel = |(k, dof): (usize, &Dof<f64>)| {
             let limit = m.limits.iter().find(|limit| limit.dof == k);
-            match (dof.follows_position, limit) {
+            match (follows(dof), limit) {
                 (false, _) => Channel::about(targets[k], 0.0),
                 (true, None) => Channel::about(targets[k], HALF_RANGE),
                 (true, Some(limit)) => Channel {
@@ -147,7 +151,7 @@ fn channels(model: &Model, start: Option<&KeyState>) -> (Field, Vec<Channel>) {
         let dofs = m.dofs.iter().enumerate();
         return (Field::JointTargetQ, dofs.map(channel).collect());
     }
-    let channel = |dof: &sim_physics::constants::Dof<f64>| {
+    let channel = |dof: &Dof<f64>| {
         // the six dofs of a free body have no motor
         let half = match m.bodies[dof.body].motion.dofs() {
             1 => dof.effort_limit.unwrap_or(HALF_RANGE),
