@@ -22,8 +22,8 @@ table name its machine, commit and command.
 ## Summary
 
 These rows use independent commands. The rows of MuJoCo compare one thread with one thread. In the rows of EnvPool and
-gymnasium, each side uses all four cores. The first two rows and those with mjbatch come from 2-core machines, the
-others from a 4-core machine.
+gymnasium, each side uses all four cores. The first two rows come from a 2-core machine, the others from a 4-core
+machine.
 
 - **Precision differs.** MuJoCo computes in float64, one world at a time. tightloop computes in float32, with 16 worlds
   in one AVX-512 register.
@@ -31,8 +31,8 @@ others from a 4-core machine.
   all of a MuJoCo model's.
 - **EnvPool's scene is lighter.** Of its arm, only the hand and the fingers collide. Its solver stops after 5
   iterations.
-- **mjbatch has [its own table](#mujoco-models-beside-mjbatch-on-one-thread).** It steps MuJoCo C. That machine has AVX2,
-  with 8 worlds in a register.
+- **mjbatch has [its own table](#mujoco-models-beside-mjbatch-on-one-thread).** It steps MuJoCo C. That machine has
+  AVX2, with 8 worlds in a register.
 - **Contacts cost more than joints.** Robots on the ground gain less than arms in the air: worlds that share a register
   wait for the one with the most contacts.
 """
@@ -89,13 +89,6 @@ def _environments(peer: str, side: str) -> Line:
     return Line("FrankaPickCube, random actions", peer, file, theirs, {"side": "tightloop"}, rate, rate, ratio)
 
 
-def _on_the_ground(workload: str, model: str, steps: int) -> Line:
-    row = {"model": model, "steps_per_call": str(steps)}
-    ratio = row | {"column": "median_ratio"}
-    file = "amd-epyc-2-cores/mujoco_models.csv"
-    return Line(workload, "MuJoCo C 3.14, mjbatch", file, row, row, "mjbatch_steps_per_s", "tightloop_steps_per_s", ratio)
-
-
 _ROLLOUT = "MuJoCo C 3.17, `rollout`"
 _CONTACTS = "amd-epyc-4-cores/contacts.csv"
 SUMMARY = (
@@ -105,10 +98,6 @@ SUMMARY = (
     _beside("FR3 arm grasps a cube", _CONTACTS, {"demo": "grasp", "worlds_alike": "no"}),
     _beside("FR3 arm and cube, random targets", _CONTACTS, {"demo": "random", "worlds_alike": "no"}),
     _beside("Quadruped, 18 dofs, no contacts", "amd-epyc-4-cores/legged.csv", {"robot": "quadruped"}),
-    _on_the_ground("Go1 stands, its feet collide (AVX2)", "mjlab Go1, feet only", 4),
-    _on_the_ground("a1 falls and lies, pyramidal cones (AVX2)", "a1 heap, pyramidal", 8),
-    _on_the_ground("a1 falls and lies, elliptic cones (AVX2)", "a1 heap, elliptic 1000", 8),
-    _on_the_ground("G1 stands, collides with itself (AVX2)", "mjlab G1", 4),
     _environments("EnvPool 1.2.5, `PandaPickCube-v1`", "envpool PandaPickCube-v1"),
     _environments("gymnasium 1.2.2, `AsyncVectorEnv` over MuJoCo C", "gymnasium AsyncVectorEnv, MuJoCo C"),
 )
@@ -184,9 +173,6 @@ stand or lie on the ground. mjbatch runs MuJoCo C.
   that. tightloop solves the same problem with Newton's method.
 - The torso of dm_control's quadruped is an ellipsoid. Its contacts are off on all sides, since tightloop refuses them.
 - No side evaluates sensors. In the row `mjlab Go1, feet only`, no other part collides.
-- `heap` rows: robots drop from 0.5 m and writhe on the ground under large random targets, at 480 Hz. All their shapes
-  collide. They run with pyramidal cones and impratio 1, and with elliptic cones and impratio 1000.
-- The meshes of laikago and mini cheetah are convex hulls with up to 672 vertices, on all sides.
 """,
         {
             "model": "model",

@@ -137,7 +137,8 @@ def test_the_reference_has_the_words_that_the_parser_knows(word, text, tmp_path)
 def test_the_command_line_page_has_every_command():
     text = pages.page("command-line.md")
     named = command_line.commands()
-    assert {"serve", "inspect", "bench", "record", "replay", "devices", "list", "stop", "completions", "man"} <= set(named)
+    some = {"serve", "inspect", "bench", "record", "replay", "devices", "list", "stop", "completions", "man"}
+    assert some <= set(named)
     assert all(f"## tightloop {name}\n" in text for name in named)
 
 
@@ -154,12 +155,16 @@ def test_the_readme_claims_no_more_than_was_measured():
     text = performance.README.read_text()
     said = re.search(r"makes (\d+) to (\d+) times the .* make (\d+) times", text, re.DOTALL)
     assert said is not None
-    on_the_ground = re.search(r"steps (\d+) to (\d+)\s+times as many", text)
-    assert on_the_ground is not None
-    batch = ratios("mjbatch")
-    assert [int(number) for number in on_the_ground.groups()] == [round(min(batch)), round(max(batch))]
     mujoco, envpool = ratios("rollout"), ratios("EnvPool")
     assert [int(number) for number in said.groups()] == [round(min(mujoco)), round(max(mujoco)), round(min(envpool))]
+
+
+def test_the_readme_says_what_robots_on_the_ground_gain():
+    rows = performance.read(performance.RESULTS / "amd-epyc-2-cores/mujoco_models.csv").rows
+    ratios = [float(row["median_ratio"]) for row in rows]
+    said = re.search(r"on the ground gain less: (\d+) to (\d+) times", performance.README.read_text())
+    assert said is not None
+    assert [int(number) for number in said.groups()] == [round(min(ratios)), round(max(ratios))]
 
 
 def test_the_performance_page_has_every_result():

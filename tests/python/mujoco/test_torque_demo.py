@@ -17,8 +17,6 @@ from conftest import START
 WORLDS, FRAMES, SUBSTEPS = 4096, 180, 8
 # Worlds of MuJoCo's, which are the first of ours
 COMPARED = 1024
-# Worlds of which energies are compared
-WEIGHED = 96
 # Frames before its greatest depth from which a world is given to MuJoCo
 LED = 3
 # Frames until the fingers, which start outside their limits, have come back; the table is touched in frame 14
@@ -58,9 +56,10 @@ def test_it_sinks_in_no_deeper_than_mujocos_and_gains_no_more_energy():
         q, qd = (array[world].astype(float) for array in states[first])
         assert depth[world] <= 1.1 * depth_after(model, to, q, qd, range(first, deepest)), f"world {world}"
     q, qd = ([compared(state[k]) for state in states] for k in (0, 1))
-    gain = gain_of(model, to, np.array(q)[:, :WEIGHED], np.array(qd)[:, :WEIGHED])
-    theirs = gain_of(model, to, their_q[:, :WEIGHED], their_qd[:, :WEIGHED])
-    for share in (0.5, 0.9, 1.0):
+    gain = gain_of(model, to, np.array(q), np.array(qd))
+    theirs = gain_of(model, to, their_q, their_qd)
+    # 20 worlds are beyond the last share: the greatest gain of any number of worlds is one world's luck
+    for share in (0.5, 0.9, 0.98):
         # MuJoCo gains up to a tenth of the work where soft limits of the joints give back what they took
         most = 0.01 + max(0.0, 1.1 * np.quantile(theirs, share))
         assert np.quantile(gain, share) <= most, f"{np.sort(gain)}, MuJoCo {np.sort(theirs)}"
