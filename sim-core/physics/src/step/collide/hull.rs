@@ -14,7 +14,8 @@ use crate::{span, when};
 /// `best`, which the body raises, in the worlds where it may. A direction that is not a number meets every row.
 macro_rules! each_far_row {
     ($cx:ident, $hull:expr, $d:ident, $best:ident, $row:ident, $body:block) => {
-        if $hull.tables.clusters.rows == 0 {
+        // a recorded program has no room for another loop inside those of GJK
+        if $hull.tables.clusters.rows == 0 || !C::LOCKSTEP {
             let (first, end) = $hull.span($cx, Part::Vertices);
             span!($cx, $row in first, end, $body);
         } else {

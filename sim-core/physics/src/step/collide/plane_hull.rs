@@ -128,7 +128,9 @@ impl<F: Num> View<F> {
             for point in vertex_row(cx, hull.tables, row) {
                 let x = self.axes.transpose_mul(point);
                 let old = get3(cx, &lowest);
-                let deeper = (x[2] + c(SAME_DEPTH) * self.size).lt(old[2]);
+                // whether others are visited depends on clusters
+                let touches = x[2].lt(self.limit);
+                let deeper = (x[2] + c(SAME_DEPTH) * self.size).lt(old[2]) & touches;
                 set3(cx, &mut lowest, select(deeper, x, old));
             }
         });
