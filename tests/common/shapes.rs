@@ -64,15 +64,15 @@ pub fn shapes(cone: Cone) -> Description {
 /// One shape of every kind but the plane, about as large as a ball of this radius [m].
 pub fn every_kind(size: f64) -> [Shape; 5] {
     let [x, y, z] = [0.9 * size, 0.7 * size, 1.1 * size];
-    // more vertices than a cluster has
-    let corners: Vec<[f64; 3]> = (0..24)
-        .map(|k| {
-            let height = 1.0 - (2 * k + 1) as f64 / 24.0;
-            let (sin, cos) = (2.4 * k as f64).sin_cos();
-            let radius = (1.0 - height * height).sqrt();
-            [x * radius * cos, y * radius * sin, z * height]
-        })
-        .collect();
+    let corners = [
+        [x, 0.0, 0.0],
+        [-x, 0.1 * x, 0.0],
+        [0.0, y, 0.2 * y],
+        [0.0, -y, 0.0],
+        [0.1 * z, 0.0, z],
+        [0.5 * x, 0.5 * y, -z],
+        [-0.5 * x, -0.5 * y, -z],
+    ];
     let hull = Mesh {
         path: PathBuf::from("stone"),
         scale: [1.0; 3],
