@@ -255,10 +255,6 @@ pub(super) fn add_rows<F: Num, const S: usize>(
     let mut y_own = [F::c(0.0); S];
     for k in 0..S {
         y_own[k] = corner[k][k] * x_own[k];
-        for i in 0..k {
-            y_own[k] = corner[k][i].fma(x_own[i], y_own[k]);
-            y_own[i] = corner[k][i].fma(x_own[k], y_own[i]);
-        }
     }
     // one check of the bounds for both
     let x = &x[..y.len()];
@@ -269,6 +265,13 @@ pub(super) fn add_rows<F: Num, const S: usize>(
             yi = rows[k][j].fma(x_own[k], yi);
         }
         y[i] = yi;
+    }
+    // after the ancestors, in the order of a loop over single rows
+    for k in 0..S {
+        for i in 0..k {
+            y_own[k] = corner[k][i].fma(x_own[i], y_own[k]);
+            y_own[i] = corner[k][i].fma(x_own[k], y_own[i]);
+        }
     }
     y[first..first + S].copy_from_slice(&y_own);
 }
