@@ -179,7 +179,7 @@ fn a_killed_controller_loses_its_lease_within_a_second_and_the_daemon_goes_on() 
             for _ in 0..10 {
                 step(&next).unwrap();
             }
-            assert!(observer.latest().is_ok());
+            assert!(observer.latest(&mut keep_waiting()).is_ok());
         }
         let name = daemon.name.clone();
         observer.shutdown(&mut keep_waiting()).unwrap();
@@ -297,7 +297,7 @@ fn an_old_client_is_told_of_a_restart_and_does_not_disturb_the_new_daemon() {
         step(&new).unwrap();
     }
     step(&{
-        new.release();
+        new.release(&mut keep_waiting()).unwrap();
         second.attach()
     })
     .unwrap();

@@ -1,7 +1,7 @@
 //! A client of one daemon, as Python holds it: steps without the interpreter lock, and listens to Ctrl-C meanwhile.
 
 use std::ops::ControlFlow;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use pyo3::prelude::*;
@@ -33,7 +33,8 @@ impl Client {
                 connection.acquire(hook)?;
             }
             Ok(connection)
-        })?;
+        })
+        .map_err(|failure| failure.raised(py))?;
         Ok(Client {
             description: Arc::clone(connection.description()),
             connection: Mutex::new(Some(connection.into())),
@@ -58,7 +59,7 @@ impl Client {
         let connection = self.connection(py)?;
         let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], ctrl, more)?;
         let commands = inputs.commands()?;
-        frame(py, |hook| connection.step(&commands, hook))
+        self.frame(py, |hook| connection.step(&commands, hook))
     }
 
     fn send(
@@ -73,12 +74,12 @@ impl Client {
         let connection = self.connection(py)?;
         let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], ctrl, more)?;
         let commands = inputs.commands()?;
-        waiting(py, |hook| connection.send(&commands, hook))
+        self.waiting(py, |hook| connection.send(&commands, hook))
     }
 
     fn recv(&self, py: Python<'_>) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
-        frame(py, |hook| connection.recv(hook))
+        self.frame(py, |hook| connection.recv(hook))
     }
 
     fn write(
@@ -98,7 +99,7 @@ impl Client {
         inputs.add("joint_qd", Axis::Dofs, joint_qd)?;
         let mask = Mask::new("mask", mask, self.description.worlds)?;
         let (commands, mask) = (inputs.commands()?, mask.as_slice()?);
-        frame(py, |hook| connection.write(&commands, mask, hook))
+        self.frame(py, |hook| connection.write(&commands, mask, hook))
     }
 
     /// Parameters by name, each `(worlds, columns)` in float64, contiguous.
@@ -115,7 +116,7 @@ impl Client {
         }
         let mask = Mask::new("mask", mask, self.description.worlds)?;
         let (commands, mask) = (inputs.commands()?, mask.as_slice()?);
-        frame(py, |hook| connection.write(&commands, mask, hook))
+        self.frame(py, |hook| connection.write(&commands, mask, hook))
     }
 
     fn reset(
@@ -128,17 +129,17 @@ impl Client {
         let mask = Mask::new("mask", mask, self.description.worlds)?;
         let seed = Seed::new(seed, self.description.worlds)?;
         let (mask, seed) = (mask.as_slice()?, seed.as_slice()?);
-        frame(py, |hook| connection.reset(mask, seed, hook))
+        self.frame(py, |hook| connection.reset(mask, seed, hook))
     }
 
     fn forward(&self, py: Python<'_>) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
-        frame(py, |hook| connection.forward(hook))
+        self.frame(py, |hook| connection.forward(hook))
     }
 
     fn snapshot(&self, py: Python<'_>, path: &str) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
-        frame(py, |hook| connection.snapshot(path, hook))
+        self.frame(py, |hook| connection.snapshot(path, hook))
     }
 
     fn restore(
@@ -151,14 +152,13 @@ impl Client {
         let connection = self.connection(py)?;
         let mask = Mask::new("worlds", mask, self.description.worlds)?;
         let mask = mask.as_slice()?;
-        frame(py, |hook| connection.restore(path, mask, from_world, hook))
+        self.frame(py, |hook| connection.restore(path, mask, from_world, hook))
     }
 
     /// The newest frame that observers see and this client has not, or None.
     fn latest(&self, py: Python<'_>) -> PyResult<Option<PyFrame>> {
         let connection = self.connection(py)?;
-        let latest = py.detach(|| connection.latest());
-        let latest = latest.map_err(|error| protocol(py, &error))?;
+        let latest = self.waiting(py, |hook| connection.latest(hook))?;
         latest.map(|frame| PyFrame::new(py, frame)).transpose()
     }
 
@@ -166,30 +166,25 @@ impl Client {
     fn wait_newer(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<PyFrame>> {
         let connection = self.connection(py)?;
         let timeout = Duration::try_from_secs_f64(timeout).ok();
-        let newer = waiting(py, |hook| connection.wait_newer(timeout, hook))?;
+        let newer = self.waiting(py, |hook| connection.wait_newer(timeout, hook))?;
         newer.map(|frame| PyFrame::new(py, frame)).transpose()
     }
 
     /// Process in control, if any.
     fn controller(&self, py: Python<'_>) -> PyResult<Option<u32>> {
         let connection = self.connection(py)?;
-        waiting(py, |hook| connection.controller(hook))
+        self.waiting(py, |hook| connection.controller(hook))
     }
 
     /// Give the lease back; the next command takes one again.
     fn release(&self, py: Python<'_>) -> PyResult<()> {
         let connection = self.connection(py)?;
-        py.detach(|| connection.release());
-        Ok(())
+        self.waiting(py, |hook| connection.release(hook))
     }
 
     /// Give the lease back and end the connection; calls after it raise ``SimClosed``.
     fn close(&self, py: Python<'_>) {
-        let connection = self
-            .connection
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .take();
+        let connection = self.held().take();
         py.detach(|| drop(connection));
     }
 }
@@ -227,26 +222,62 @@ impl Client {
             );
             return Err(raise(py, "LeaseHeld", problem));
         }
-        let connection = self
-            .connection
+        // raising runs Python code, which must not find the lock held
+        let connection = self.held().clone();
+        connection.ok_or_else(|| self.closed(py))
+    }
+
+    fn held(&self) -> MutexGuard<'_, Option<Arc<Connection>>> {
+        self.connection
             .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        connection.clone().ok_or_else(|| {
-            let problem = format!("simulation `{name}` was closed; launch or attach again");
-            raise(py, "SimClosed", problem)
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn closed(&self, py: Python<'_>) -> PyErr {
+        let name = &self.description.name;
+        let problem = format!("simulation `{name}` was closed; launch or attach again");
+        raise(py, "SimClosed", problem)
+    }
+
+    fn frame<F>(&self, py: Python<'_>, call: F) -> PyResult<PyFrame>
+    where
+        F: FnOnce(Hook<'_>) -> Result<sim_protocol::Frame, ProtocolError> + Send,
+    {
+        PyFrame::new(py, self.waiting(py, call)?)
+    }
+
+    /// Runs a call that may wait. Of one that fails after a signal handler or another thread closed the simulation, that
+    /// is the reason.
+    fn waiting<T, F>(&self, py: Python<'_>, call: F) -> PyResult<T>
+    where
+        T: Send,
+        F: FnOnce(Hook<'_>) -> Result<T, ProtocolError> + Send,
+    {
+        waiting(py, call).map_err(|failure| match failure {
+            Failure::Protocol(_) if self.held().is_none() => self.closed(py),
+            failure => failure.raised(py),
         })
     }
 }
 
-fn frame<F>(py: Python<'_>, call: F) -> PyResult<PyFrame>
-where
-    F: FnOnce(Hook<'_>) -> Result<sim_protocol::Frame, ProtocolError> + Send,
-{
-    PyFrame::new(py, waiting(py, call)?)
+/// Why a call that waits ended without a result.
+enum Failure {
+    /// A signal handler raised.
+    Handler(PyErr),
+    Protocol(ProtocolError),
+}
+
+impl Failure {
+    fn raised(self, py: Python<'_>) -> PyErr {
+        match self {
+            Failure::Handler(raised) => raised,
+            Failure::Protocol(error) => protocol(py, &error),
+        }
+    }
 }
 
 /// Runs a call that may wait, without the interpreter lock; Ctrl-C ends it with its exception.
-fn waiting<T, F>(py: Python<'_>, call: F) -> PyResult<T>
+fn waiting<T, F>(py: Python<'_>, call: F) -> Result<T, Failure>
 where
     T: Send,
     F: FnOnce(Hook<'_>) -> Result<T, ProtocolError> + Send,
@@ -262,8 +293,8 @@ where
         })
     });
     match interrupt {
-        Some(raised) => Err(raised),
-        None => result.map_err(|error| protocol(py, &error)),
+        Some(raised) => Err(Failure::Handler(raised)),
+        None => result.map_err(Failure::Protocol),
     }
 }
 
@@ -274,6 +305,7 @@ pub(crate) fn groups(py: Python<'_>, name: &str) -> PyResult<usize> {
         let beacon = sim_protocol::find(name, &AttachOptions::default(), hook)?;
         Ok(beacon.groups)
     })
+    .map_err(|failure| failure.raised(py))
 }
 
 /// Remove what a dead daemon of that name left behind; whether nothing is left, that is, false while one runs.

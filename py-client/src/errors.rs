@@ -27,6 +27,7 @@ pub(crate) fn protocol(py: Python<'_>, error: &ProtocolError) -> PyErr {
         DaemonRestarted { .. } => "DaemonRestarted",
         LeaseHeld { .. } => "LeaseHeld",
         LeaseLost { .. } => "LeaseLost",
+        CallInProgress => "CallInProgress",
         FramesHeld { .. } => "FramesHeld",
         NoField { .. } => "UnknownField",
         CommandRefused {
@@ -36,8 +37,8 @@ pub(crate) fn protocol(py: Python<'_>, error: &ProtocolError) -> PyErr {
         NotAnInput { .. } | Shape { .. } | CommandRefused { .. } | StepInFlight | NothingSent => {
             "CommandRefused"
         }
-        SharedMemory { .. } | Memory { .. } => "ResourceError",
-        Timeout { .. } => "WaitTimeout",
+        SharedMemory { .. } | Memory { .. } | Descriptors { .. } => "ResourceError",
+        Timeout { .. } | Silent { .. } => "WaitTimeout",
         Root { .. } | NameTaken { .. } => "LaunchError",
         _ => "TransportError",
     };

@@ -54,7 +54,9 @@ impl Evaluation {
         let mut guard = lock(py, &self.0);
         let inner = &mut *guard;
         let arrays = py.detach(move || inner.evaluate(state));
-        dict(py, arrays.map_err(|error| raised(py, &error))?, usize::MAX)
+        let copied = arrays.map(|arrays| dict(py, arrays, usize::MAX));
+        drop(guard); // raising runs Python code
+        copied.map_err(|error| raised(py, &error))?
     }
 }
 
@@ -106,10 +108,9 @@ impl Playback {
         let mut guard = lock(py, &self.inner);
         let inner = &mut *guard;
         let arrays = py.detach(move || inner.advance());
-        let arrays = arrays.map_err(|error| raised(py, &error))?;
-        arrays
-            .map(|arrays| dict(py, arrays, self.worlds))
-            .transpose()
+        let copied = arrays.map(|arrays| arrays.map(|arrays| dict(py, arrays, self.worlds)));
+        drop(guard); // raising runs Python code
+        copied.map_err(|error| raised(py, &error))?.transpose()
     }
 }
 

@@ -294,7 +294,7 @@ fn a_second_controller_is_told_who_is_first_and_may_follow() {
     );
     assert_eq!(second.controller(&mut keep_waiting()).unwrap(), Some(ours));
     step(&first, &[]).unwrap();
-    first.release();
+    first.release(&mut keep_waiting()).unwrap();
     assert_eq!(
         step(&second, &[])
             .unwrap()
@@ -307,7 +307,7 @@ fn a_second_controller_is_told_who_is_first_and_may_follow() {
     drop(second);
     for _ in 0..20 {
         reset(&first);
-        first.release();
+        first.release(&mut keep_waiting()).unwrap();
     }
 }
 
@@ -338,7 +338,10 @@ fn an_observer_sees_the_first_worlds_and_disturbs_nobody() {
         assert!(Instant::now() < deadline, "the last state was not shown");
     };
     assert_eq!(floats(&seen, "joint_q"), floats(&last, "joint_q")[..36]);
-    assert!(observer.latest().unwrap().is_none(), "nothing is newer");
+    assert!(
+        observer.latest(&mut keep_waiting()).unwrap().is_none(),
+        "nothing is newer"
+    );
     let late = daemon.attach();
     let frame = late
         .wait_newer(Some(Duration::from_secs(2)), &mut keep_waiting())

@@ -179,7 +179,7 @@ fn four_recorders_record_at_once_and_a_fifth_is_refused() {
     );
     assert!(!Path::new(&out(4)).exists());
     // the journals go on under another controller
-    client.release();
+    client.release(&mut keep_waiting()).unwrap();
     let other = daemon.attach();
     (0..200).for_each(|key| act(&other, &folder, 120 + key));
     std::thread::sleep(Duration::from_millis(300));

@@ -192,6 +192,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "table",
             "digest",
             "transport",
+            "turn",
             "connection",
             "heartbeat",
             "affinity",

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from tightloop.dynamics import Dynamics
     from tightloop.errors import (
         ArgumentError,
+        CallInProgress,
         CommandRefused,
         ConstantParameter,
         DaemonLost,
@@ -61,6 +62,7 @@ _HOMES = {
     "tightloop.dynamics": ("Dynamics",),
     "tightloop.errors": (
         "ArgumentError",
+        "CallInProgress",
         "CommandRefused",
         "ConstantParameter",
         "DaemonLost",
@@ -99,6 +101,7 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "ArgumentError",
     "Body",
+    "CallInProgress",
     "CommandRefused",
     "ConstantParameter",
     "ContactSensor",

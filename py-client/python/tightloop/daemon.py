@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -90,6 +91,8 @@ class Daemon:
         process = self.process
         try:
             process.terminate()
+            # a stopped one ends only when it continues
+            process.send_signal(signal.SIGCONT)
             process.wait(_STOP_SECONDS)
         except subprocess.TimeoutExpired:
             process.kill()

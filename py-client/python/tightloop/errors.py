@@ -71,6 +71,13 @@ class CommandRefused(TightloopError, ValueError):
     """A command has a wrong shape, dtype or value; the message names field, world and dof. The daemon continues."""
 
 
+class CallInProgress(CommandRefused):
+    """A signal handler called a simulation while a call of the same one waited. Set a flag in the handler instead.
+
+    The call in the handler changed nothing. ``close`` and ``release`` are allowed there.
+    """
+
+
 class ConstantParameter(CommandRefused, AttributeError):
     """A parameter is constant in this run; the message says how to let it vary."""
 

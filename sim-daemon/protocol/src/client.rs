@@ -1,10 +1,11 @@
 //! A client: attaches to a running daemon, observes it, and controls it when it holds the lease.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use crate::command::{Call, Command};
-use crate::connection::{ANSWER_MAX, Connection, S, lock, malformed};
+use crate::connection::{ANSWER_MAX, Connection, S, malformed};
 use crate::control::{Request, Response};
 use crate::controller::Controller;
 use crate::discovery::{AttachOptions, find};
@@ -15,14 +16,17 @@ use crate::liveness::Peer;
 use crate::observer::Observer;
 use crate::paths::{DaemonPaths, Presence};
 use crate::transport::{self, handshake};
+use crate::turn::{Held, Turn};
 use crate::{Description, Frame, Op, PROTOCOL_VERSION, ProtocolError};
 
 /// A connection to a daemon. All methods take `&self`, from any thread; calls that step wait for each other.
 #[derive(Debug)]
 pub struct Client {
     description: Arc<Description>,
-    controller: Mutex<Option<Controller>>,
-    observer: Mutex<Option<Observer>>,
+    controller: Turn<Option<Box<Controller>>>,
+    observer: Turn<Option<Box<Observer>>>,
+    /// The lease is to be given back once the call that uses it returns.
+    release: AtomicBool,
     frames: Arc<Alive>,
     connection: Arc<Connection>,
     process: u32,
@@ -45,7 +49,7 @@ impl Client {
             return Err(ProtocolError::Grouped { name, groups });
         }
         let paths = DaemonPaths::new(options.root.as_deref(), name)?;
-        let peer = Peer { paths, beacon };
+        let peer = Peer::find(paths, beacon)?;
         let client = Client::handshake(peer.clone(), hook);
         // a daemon that ended meanwhile explains any failure better than the failure does
         if client.is_err() {
@@ -72,6 +76,7 @@ impl Client {
         let connection = Connection {
             peer,
             wake: transport::notifier(&wake)?,
+            asking: Turn::new(()),
             requester: Mutex::new(transport::requester(&node)?),
             node: Mutex::new(node),
         };
@@ -107,8 +112,9 @@ impl Client {
         }
         Ok(Client {
             description: Arc::new(*description),
-            controller: Mutex::new(None),
-            observer: Mutex::new(None),
+            controller: Turn::new(None),
+            observer: Turn::new(None),
+            release: AtomicBool::new(false),
             frames: Alive::new(),
             connection: Arc::new(connection),
             process: std::process::id(),
@@ -133,7 +139,8 @@ impl Client {
 
     /// Whether this client holds the lease, as far as it knows.
     pub fn holds_lease(&self) -> bool {
-        lock(&self.controller).is_some()
+        // a call that has it takes the lease, or uses it
+        self.controller.look(Option::is_some).unwrap_or(true)
     }
 
     /// Takes the lease; done by itself at the first [`Client::step`], [`Client::send`], [`Client::reset`], [`Client::write`],
@@ -143,12 +150,7 @@ impl Client {
     /// [`ProtocolError::LeaseHeld`] with the holder's process, [`ProtocolError::SharedMemory`],
     /// [`ProtocolError::DaemonLost`] and its kin.
     pub fn acquire(&self, hook: Hook<'_>) -> Result<(), ProtocolError> {
-        self.check_process()?;
-        let mut controller = lock(&self.controller);
-        if controller.is_none() {
-            *controller = Some(self.take_lease(hook)?);
-        }
-        Ok(())
+        self.with_controller(hook, |_, _| Ok(()))
     }
 
     /// The ports belong to the process that opened them.
@@ -160,13 +162,22 @@ impl Client {
         Err(ProtocolError::Forked { name, pid })
     }
 
-    fn take_lease(&self, hook: Hook<'_>) -> Result<Controller, ProtocolError> {
-        Controller::acquire(&self.connection, &self.description, &self.frames, hook)
+    fn take_lease(&self, hook: Hook<'_>) -> Result<Box<Controller>, ProtocolError> {
+        Controller::acquire(&self.connection, &self.description, &self.frames, hook).map(Box::new)
     }
 
-    /// Gives the lease back, so that another client can take it. Does nothing without one. Frames stay valid.
-    pub fn release(&self) {
-        lock(&self.controller).take(); // dropping it releases
+    /// Gives the lease back, so that another client can take it. Does nothing without one. Frames stay valid. From a hook
+    /// it takes effect when the call that waits returns.
+    ///
+    /// # Errors
+    /// [`ProtocolError::Interrupted`] while it waits for the call of another thread.
+    pub fn release(&self, hook: Hook<'_>) -> Result<(), ProtocolError> {
+        match self.controller.take(hook) {
+            Ok(mut held) => drop(held.take()), // dropping it releases
+            Err(ProtocolError::CallInProgress) => self.release.store(true, Ordering::Relaxed),
+            Err(error) => return Err(error),
+        }
+        Ok(())
     }
 
     /// Sets the given inputs, advances every world by one control frame and returns the frame. What is left out keeps its
@@ -200,13 +211,13 @@ impl Client {
     /// [`ProtocolError::LeaseLost`], [`ProtocolError::DaemonLost`], [`ProtocolError::DaemonRestarted`].
     pub fn recv(&self, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
         self.check_process()?;
-        let mut held = lock(&self.controller);
+        let mut held = self.controller.take(hook)?;
         let Some(controller) = &mut *held else {
             self.check_alive()?;
             return Err(ProtocolError::NothingSent);
         };
         let result = controller.recv(hook);
-        forget_lost(&mut held, &result);
+        self.settle(held, &result);
         result
     }
 
@@ -296,23 +307,37 @@ impl Client {
         call: impl FnOnce(&mut Controller, Hook<'_>) -> Result<T, ProtocolError>,
     ) -> Result<T, ProtocolError> {
         self.check_process()?;
-        let mut held = lock(&self.controller);
+        let mut held = self.controller.take(hook)?;
         let controller = match &mut *held {
             Some(controller) => controller,
             empty => empty.insert(self.take_lease(hook)?),
         };
         let result = call(controller, hook);
-        forget_lost(&mut held, &result);
+        self.settle(held, &result);
         result
+    }
+
+    /// Ends the use of a lease. One that is lost can be asked for again; a lost daemon cannot come back.
+    fn settle<T>(
+        &self,
+        mut held: Held<'_, Option<Box<Controller>>>,
+        result: &Result<T, ProtocolError>,
+    ) {
+        let is_lost = matches!(result, Err(ProtocolError::LeaseLost { .. }));
+        if is_lost || self.release.load(Ordering::Relaxed) {
+            self.release.store(false, Ordering::Relaxed);
+            held.take();
+        }
     }
 
     /// The newest frame for observers, if there is one that was not returned before. It shows the first
     /// `watch_worlds` worlds and is published at a limited rate.
     ///
     /// # Errors
-    /// [`ProtocolError::FramesHeld`], [`ProtocolError::DaemonLost`] and its kin.
-    pub fn latest(&self) -> Result<Option<Frame>, ProtocolError> {
-        self.with_observer(Observer::latest)
+    /// [`ProtocolError::FramesHeld`], [`ProtocolError::DaemonLost`] and its kin, [`ProtocolError::CallInProgress`],
+    /// [`ProtocolError::Interrupted`] while it waits for the call of another thread.
+    pub fn latest(&self, hook: Hook<'_>) -> Result<Option<Frame>, ProtocolError> {
+        self.with_observer(hook, |observer, _| observer.latest())
     }
 
     /// Waits for a frame newer than those returned before; `None` after `timeout`.
@@ -324,20 +349,24 @@ impl Client {
         timeout: Option<Duration>,
         hook: Hook<'_>,
     ) -> Result<Option<Frame>, ProtocolError> {
-        self.with_observer(|observer| observer.wait_newer(timeout, hook))
+        self.with_observer(hook, |observer, hook| observer.wait_newer(timeout, hook))
     }
 
     fn with_observer<T>(
         &self,
-        call: impl FnOnce(&mut Observer) -> Result<T, ProtocolError>,
+        hook: Hook<'_>,
+        call: impl FnOnce(&mut Observer, Hook<'_>) -> Result<T, ProtocolError>,
     ) -> Result<T, ProtocolError> {
         self.check_process()?;
-        let mut observer = lock(&self.observer);
-        let observer = match &mut *observer {
+        let mut held = self.observer.take(hook)?;
+        let observer = match &mut *held {
             Some(observer) => observer,
-            empty => empty.insert(Observer::open(&self.connection, &self.description)?),
+            empty => {
+                let opened = Observer::open(&self.connection, &self.description, hook)?;
+                empty.insert(Box::new(opened))
+            }
         };
-        call(observer)
+        call(observer, hook)
     }
 
     /// Subscribes to every command that the daemon carries out from now on, from any client, with digests of its
@@ -357,10 +386,17 @@ impl Client {
         &self,
         send: impl FnOnce(&crate::transport::CommandPublisher<S>, u64),
     ) -> Result<Frame, ProtocolError> {
-        lock(&self.controller)
-            .as_mut()
-            .expect("the lease is held")
-            .raw(send)
+        let mut held = self.controller.take(&mut crate::hook::keep_waiting())?;
+        held.as_mut().expect("the lease is held").raw(send)
+    }
+
+    /// Lets a test take the lease for another process, which never opens its ports.
+    #[cfg(test)]
+    pub(crate) fn ask_for_lease(&self, pid: u32) -> bool {
+        let granted = self
+            .connection
+            .ask(&Request::Acquire { pid }, &mut crate::hook::keep_waiting());
+        matches!(granted, Ok(Response::Granted { .. }))
     }
 
     /// Errors when the daemon is gone. A few microseconds.
@@ -376,8 +412,8 @@ impl Client {
     /// # Errors
     /// [`ProtocolError::Timeout`], [`ProtocolError::Interrupted`].
     pub fn shutdown(&self, hook: Hook<'_>) -> Result<(), ProtocolError> {
-        self.release();
-        lock(&self.observer).take();
+        self.release(hook)?;
+        self.observer.take(hook)?.take();
         match self.connection.ask(&Request::Shutdown, hook) {
             Ok(_)
             | Err(ProtocolError::DaemonLost { .. } | ProtocolError::DaemonRestarted { .. }) => {}
@@ -387,7 +423,7 @@ impl Client {
         // the daemon goes after its groups
         let (peer, daemon) = (&self.connection.peer, self.connection.peer.paths.daemon()?);
         let runs = |paths: &DaemonPaths| match paths.presence() {
-            Presence::Running(beacon) => beacon.pid == peer.beacon.pid,
+            Ok(Presence::Running(beacon)) => beacon.pid == peer.beacon.pid,
             _ => false,
         };
         while self.check_alive().is_ok() || runs(&daemon) {
@@ -403,30 +439,13 @@ impl Client {
     }
 }
 
-/// A lost lease can be asked for again; a lost daemon cannot come back.
-fn forget_lost<T>(held: &mut Option<Controller>, result: &Result<T, ProtocolError>) {
-    if matches!(result, Err(ProtocolError::LeaseLost { .. })) {
-        held.take();
-    }
-}
-
 impl Drop for Client {
     fn drop(&mut self) {
         // in a forked child the ports belong to the parent: leave them alone
         if std::process::id() != self.process {
-            // another thread may have held the locks when the process forked
-            std::mem::forget(
-                self.controller
-                    .get_mut()
-                    .unwrap_or_else(PoisonError::into_inner)
-                    .take(),
-            );
-            std::mem::forget(
-                self.observer
-                    .get_mut()
-                    .unwrap_or_else(PoisonError::into_inner)
-                    .take(),
-            );
+            // what another thread used when the process forked is out of reach, and as good as forgotten
+            std::mem::forget(self.controller.value().and_then(Option::take));
+            std::mem::forget(self.observer.value().and_then(Option::take));
             std::mem::forget(Arc::clone(&self.connection));
         }
     }

@@ -1,6 +1,6 @@
 //! How each part of a client reaches the daemon: node, control requests, wake-up.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::notifier::Notifier;
@@ -11,6 +11,7 @@ use crate::control::{Request, Response};
 use crate::hook::Hook;
 use crate::liveness::Peer;
 use crate::transport::{Requester, SLICE};
+use crate::turn::{Turn, lock};
 
 /// Clients are used from any thread.
 pub(crate) type S = ipc_threadsafe::Service;
@@ -18,11 +19,18 @@ pub(crate) type S = ipc_threadsafe::Service;
 /// How long control requests wait for a daemon that lives but is busy or stopped.
 pub(crate) const ANSWER_MAX: Duration = Duration::from_secs(30);
 
+/// How long ports that cannot be opened are tried again.
+const OPEN_MAX: Duration = Duration::from_secs(1);
+/// Time between two tries of anything.
+const PAUSE: Duration = Duration::from_millis(10);
+
 /// What every part of a client uses to reach the daemon.
 #[derive(Debug)]
 pub(crate) struct Connection {
     pub(crate) peer: Peer,
     pub(crate) wake: Notifier<S>,
+    /// One request is waited for at a time.
+    pub(crate) asking: Turn<()>,
     pub(crate) requester: Mutex<Requester<S>>,
     pub(crate) node: Mutex<Node<S>>,
 }
@@ -30,18 +38,21 @@ pub(crate) struct Connection {
 impl Connection {
     /// Asks and waits for the answer; control requests are rare, so waiting is by sleeping.
     pub(crate) fn ask(&self, request: &Request, hook: Hook<'_>) -> Result<Response, ProtocolError> {
-        let requester = lock(&self.requester);
+        let _turn = self.asking.take(hook)?;
         let text = serde_json::to_vec(request).expect("requests are plain data");
         let failed = |error: &dyn std::fmt::Debug| {
             ProtocolError::transport(format!("send {request:?}"), error)
         };
-        let loan = requester
-            .loan_slice_uninit(text.len())
-            .map_err(|error| failed(&error))?;
-        let pending = loan
-            .write_from_slice(&text)
-            .send()
-            .map_err(|error| failed(&error))?;
+        let pending = {
+            // not while waiting: the hook runs the caller's code
+            let requester = lock(&self.requester);
+            let loan = requester
+                .loan_slice_uninit(text.len())
+                .map_err(|error| failed(&error))?;
+            loan.write_from_slice(&text)
+                .send()
+                .map_err(|error| failed(&error))?
+        };
         self.notify();
         let (start, mut nap, mut polled) =
             (Instant::now(), Duration::from_micros(20), Instant::now());
@@ -69,6 +80,13 @@ impl Connection {
         }
     }
 
+    /// Says that we are alive, unless a request that is waited for says so: too many that are unread would push it out.
+    pub(crate) fn beat(&self, epoch: u64) {
+        if self.asking.look(|()| ()).is_some() {
+            self.post(&Request::Heartbeat { epoch });
+        }
+    }
+
     /// Sends without waiting for an answer; a failure shows at the next step.
     pub(crate) fn post(&self, request: &Request) {
         let requester = lock(&self.requester);
@@ -84,14 +102,43 @@ impl Connection {
         let _ = self.wake.notify();
     }
 
+    /// Opens ports, or does something else with the node.
     pub(crate) fn with_node<T>(&self, call: impl FnOnce(&Node<S>) -> T) -> T {
         call(&lock(&self.node))
     }
+
+    /// Opens ports. What the daemon is just making or removing is tried again.
+    ///
+    /// # Errors
+    /// That of the last try; [`ProtocolError::DaemonLost`] and its kin, which explain it better; [`ProtocolError::Interrupted`].
+    pub(crate) fn open<T>(
+        &self,
+        hook: Hook<'_>,
+        ports: impl Fn(&Node<S>) -> Result<T, ProtocolError>,
+    ) -> Result<T, ProtocolError> {
+        let start = Instant::now();
+        loop {
+            let opened = self.with_node(&ports);
+            let Err(error) = opened else {
+                return opened;
+            };
+            self.peer.check()?;
+            let again = matches!(error, ProtocolError::Transport { .. });
+            if !again || start.elapsed() > OPEN_MAX {
+                return Err(error);
+            }
+            pause(hook)?;
+        }
+    }
 }
 
-/// Nothing of ours is left half-written when a thread panics: a poisoned lock is as good as any.
-pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+/// Lets time pass before the next try.
+pub(crate) fn pause(hook: Hook<'_>) -> Result<(), ProtocolError> {
+    if hook().is_break() {
+        return Err(ProtocolError::Interrupted);
+    }
+    std::thread::sleep(PAUSE);
+    Ok(())
 }
 
 pub(crate) fn malformed(problem: &str) -> ProtocolError {

@@ -8,12 +8,12 @@ use iceoryx2::prelude::PortFactory;
 
 use crate::affinity::CoreAffinity;
 use crate::command::{Call, command_bytes};
-use crate::connection::{Connection, S, malformed};
+use crate::connection::{Connection, S, malformed, pause};
 use crate::control::{Request, Response};
 use crate::frame::{Alive, FrameSample};
 use crate::heartbeat::HeartbeatThread;
 use crate::hook::Hook;
-use crate::liveness::Peer;
+use crate::liveness::{Peer, is_gone};
 use crate::loaned;
 use crate::memory::reserve;
 use crate::transport::{self, CommandPublisher, FrameService, FrameSubscriber};
@@ -22,6 +22,17 @@ use crate::{ALIGNMENT, CommandHeader, Description, Frame, Op, ProtocolError, Ref
 
 /// A step that takes longer than this is taken for a daemon that stands.
 const ANSWER_MAX: Duration = Duration::from_secs(120);
+
+/// How long a lease is asked for again that cannot be had though nobody alive holds it.
+const ACQUIRE_MAX: Duration = Duration::from_secs(10);
+
+/// The ports of a lease.
+type Ports = (
+    FrameService<S>,
+    FrameSubscriber<S>,
+    Listener<S>,
+    CommandPublisher<S>,
+);
 
 /// What became of the command sent last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,57 +73,40 @@ impl Controller {
         frames: &Arc<Alive>,
         hook: Hook<'_>,
     ) -> Result<Controller, ProtocolError> {
-        let name = || connection.peer.paths.name().to_owned();
-        let epoch = match connection.ask(
-            &Request::Acquire {
-                pid: std::process::id(),
-            },
-            hook,
-        )? {
-            Response::Granted { epoch } => epoch,
-            Response::Held { pid } => return Err(ProtocolError::LeaseHeld { name: name(), pid }),
-            Response::NoMemory { free, needed } => {
-                let (path, what) = (
-                    crate::paths::SHARED_MEMORY.to_owned(),
-                    "the frames of a new lease".to_owned(),
-                );
-                return Err(ProtocolError::SharedMemory {
-                    path,
-                    free,
-                    needed,
-                    what,
-                });
-            }
-            Response::Refused { reason } => {
-                let kind = RefusalKind::Backend;
-                return Err(ProtocolError::CommandRefused { kind, reason });
-            }
-            _ => return Err(malformed("the answer to acquire")),
-        };
-        let bytes = command_bytes(description);
-        let ports = connection.with_node(|node| {
-            let service = transport::open_frames(node, epoch)?;
-            let event = transport::open_event(node, &format!("obs/{epoch}"))?;
-            let subscriber = transport::frame_subscriber(&service, 0)?;
-            let listener = transport::listener(&event)?;
-            // last: the daemon counts the lease as used once it sees this
-            let commands = transport::open_commands(node, epoch)?;
-            let publisher = transport::command_publisher(&commands, bytes)?;
-            let prefix = node.config().global.prefix.to_string();
-            reserve(&prefix, publisher.id().value(), "the commands of a lease")?;
-            Ok((service, subscriber, listener, publisher))
-        });
-        let (service, subscriber, listener, publisher) = match ports {
-            Ok(ports) => ports,
-            Err(error) => {
-                connection.post(&Request::Release { epoch });
-                connection.peer.check()?;
+        let start = Instant::now();
+        loop {
+            let error = match ask_for_lease(connection, hook) {
+                Ok(epoch) => match open_lease(connection, description, frames, epoch) {
+                    Ok(controller) => return Ok(controller),
+                    Err(error) => error,
+                },
+                Err(error) => error,
+            };
+            // a daemon that is short of time takes a lease back whose ports it did not see in time, and cleans up after a
+            // dead holder late
+            let again = match error {
+                ProtocolError::Transport { .. } => true,
+                ProtocolError::LeaseHeld { pid, .. } => is_gone(pid),
+                _ => false,
+            };
+            if !again || start.elapsed() > ACQUIRE_MAX {
                 return Err(error);
             }
-        };
+            pause(hook)?;
+        }
+    }
+
+    fn new(
+        connection: &Arc<Connection>,
+        description: &Arc<Description>,
+        frames: &Arc<Alive>,
+        epoch: u64,
+        ports: Ports,
+    ) -> Controller {
+        let (service, subscriber, listener, publisher) = ports;
         // the daemon's step needs its threads, and we spin on one more
         let free_core = cores() > description.busy_threads();
-        Ok(Controller {
+        Controller {
             connection: Arc::clone(connection),
             description: Arc::clone(description),
             epoch,
@@ -127,7 +121,7 @@ impl Controller {
             listener,
             service,
             _heartbeat: HeartbeatThread::start(connection, epoch),
-        })
+        }
     }
 
     /// Sends one command and waits for its frame.
@@ -245,6 +239,62 @@ impl Controller {
         let table = check_table(&mut self.table, payload, header.rows)?;
         Ok(Frame::new(sample, table, Arc::clone(&self.frames)))
     }
+}
+
+/// Asks for the lease once.
+fn ask_for_lease(connection: &Connection, hook: Hook<'_>) -> Result<u64, ProtocolError> {
+    let pid = std::process::id();
+    match connection.ask(&Request::Acquire { pid }, hook)? {
+        Response::Granted { epoch } => Ok(epoch),
+        Response::Held { pid } => Err(ProtocolError::LeaseHeld {
+            name: connection.peer.paths.name().to_owned(),
+            pid,
+        }),
+        Response::NoMemory { free, needed } => Err(ProtocolError::SharedMemory {
+            path: crate::paths::SHARED_MEMORY.to_owned(),
+            free,
+            needed,
+            what: "the frames of a new lease".to_owned(),
+        }),
+        Response::Refused { reason } => Err(ProtocolError::CommandRefused {
+            kind: RefusalKind::Backend,
+            reason,
+        }),
+        _ => Err(malformed("the answer to acquire")),
+    }
+}
+
+/// Opens the ports of a lease that was granted, or gives it back.
+fn open_lease(
+    connection: &Arc<Connection>,
+    description: &Arc<Description>,
+    frames: &Arc<Alive>,
+    epoch: u64,
+) -> Result<Controller, ProtocolError> {
+    let bytes = command_bytes(description);
+    let ports = connection.with_node(|node| {
+        let service = transport::open_frames(node, epoch)?;
+        let event = transport::open_event(node, &format!("obs/{epoch}"))?;
+        let subscriber = transport::frame_subscriber(&service, 0)?;
+        let listener = transport::listener(&event)?;
+        // last: the daemon counts the lease as used once it sees this
+        let commands = transport::open_commands(node, epoch)?;
+        let publisher = transport::command_publisher(&commands, bytes)?;
+        let prefix = node.config().global.prefix.to_string();
+        reserve(&prefix, publisher.id().value(), "the commands of a lease")?;
+        Ok((service, subscriber, listener, publisher))
+    });
+    if ports.is_err() {
+        connection.post(&Request::Release { epoch });
+        connection.peer.check()?;
+    }
+    Ok(Controller::new(
+        connection,
+        description,
+        frames,
+        epoch,
+        ports?,
+    ))
 }
 
 impl Drop for Controller {

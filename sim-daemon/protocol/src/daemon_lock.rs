@@ -1,14 +1,14 @@
 //! The lock of a daemon's name, and cleaning up after a daemon that died.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{Seek, Write};
+use std::io::Write;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
-use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{FileExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::paths::{
-    DaemonPaths, Presence, SHARED_MEMORY, default_root, names_with_lock, private_folder,
+    DaemonPaths, Presence, SHARED_MEMORY, STARTING, default_root, names_with_lock, private_folder,
 };
 use crate::{PROTOCOL_VERSION, ProtocolError};
 
@@ -35,12 +35,14 @@ impl DaemonLock {
         let start = Instant::now();
         loop {
             if let Some(mut daemon_lock) = DaemonLock::try_take(paths)? {
+                daemon_lock.say(STARTING)?;
                 paths.remove_shared_files();
                 daemon_lock._mark = Some(mark(paths)?);
                 return Ok(daemon_lock);
             }
-            let pid = match paths.presence() {
+            let pid = match paths.presence()? {
                 Presence::Running(beacon) => beacon.pid,
+                Presence::Starting => 0,
                 _ if start.elapsed() > LOOK_MAX => 0,
                 _ => {
                     std::thread::sleep(Duration::from_millis(2));
@@ -102,9 +104,13 @@ impl DaemonLock {
             _ => format!(" {groups}"),
         };
         let line = format!("tightloop {PROTOCOL_VERSION} {pid} {session:016x}{groups}\n");
+        self.say(&line)
+    }
+
+    /// Writes the line that clients read, which is longer than the one before.
+    fn say(&mut self, line: &str) -> Result<(), ProtocolError> {
         self.file
-            .rewind()
-            .and_then(|()| self.file.write_all(line.as_bytes()))
+            .write_all_at(line.as_bytes(), 0)
             .map_err(|error| root_error(&self.paths.lock_path(), &error))
     }
 
@@ -169,7 +175,7 @@ pub fn cleanup_after_death(root: Option<&Path>, name: &str) -> Result<bool, Prot
             return Ok(true);
         }
         // a client's look at the lock is no daemon, nor is somebody else's sweep: that one we wait for
-        let runs = matches!(paths.presence(), Presence::Running(_));
+        let runs = matches!(paths.presence()?, Presence::Running(_) | Presence::Starting);
         if runs || start.elapsed() > LOOK_MAX {
             return Ok(false);
         }
@@ -184,7 +190,7 @@ pub fn cleanup_after_death(root: Option<&Path>, name: &str) -> Result<bool, Prot
 /// [`ProtocolError::Root`].
 pub fn sweep(root: Option<&Path>) -> Result<(), ProtocolError> {
     for paths in names_with_lock(root)? {
-        if paths.presence() == Presence::Absent {
+        if matches!(paths.presence(), Ok(Presence::Absent)) {
             drop(DaemonLock::try_take(&paths)?);
         }
     }
@@ -247,7 +253,7 @@ mod tests {
         let root = root("place");
         let paths = DaemonPaths::new(Some(&root), "one").unwrap();
         let mut first = DaemonLock::take(&paths).unwrap();
-        assert_eq!(paths.presence(), Presence::Starting);
+        assert_eq!(paths.presence().unwrap(), Presence::Starting);
         first.announce(7, 1).unwrap();
         let beacon = Beacon {
             protocol: PROTOCOL_VERSION,
@@ -255,13 +261,13 @@ mod tests {
             session: 7,
             groups: 1,
         };
-        assert_eq!(paths.presence(), Presence::Running(beacon));
+        assert_eq!(paths.presence().unwrap(), Presence::Running(beacon));
         assert_eq!(running(Some(&root)).unwrap(), ["one"]);
         let error = DaemonLock::take(&paths).unwrap_err().to_string();
         assert!(error.contains(&std::process::id().to_string()), "{error}");
         assert!(!cleanup_after_death(Some(&root), "one").unwrap());
         drop(first);
-        assert_eq!(paths.presence(), Presence::Absent);
+        assert_eq!(paths.presence().unwrap(), Presence::Absent);
         assert!(!Path::new(SHARED_MEMORY).join(paths.stem()).exists());
         assert_eq!(fs::read_dir(&root).unwrap().count(), 0);
         fs::remove_dir(&root).unwrap();
@@ -284,9 +290,9 @@ mod tests {
         daemon.announce(7, 2).unwrap();
         assert_eq!(running(Some(&root)).unwrap(), ["many"]);
         assert!(
-            matches!(paths.presence(), Presence::Running(beacon) if beacon.groups == 2),
+            matches!(paths.presence().unwrap(), Presence::Running(beacon) if beacon.groups == 2),
             "{:?}",
-            paths.presence()
+            paths.presence().unwrap()
         );
         drop((daemon, held));
         for group in &groups {

@@ -7,6 +7,11 @@ use crate::hook::Hook;
 use crate::paths::{Beacon, DaemonPaths, Presence, running};
 use crate::{PROTOCOL_VERSION, ProtocolError};
 
+/// How long a lock is waited for whose holder does not say who it is.
+const SILENCE_MAX: Duration = Duration::from_secs(2);
+/// How long a daemon is waited for that reads its scene.
+const START_MAX: Duration = Duration::from_secs(120);
+
 /// How to attach.
 #[derive(Debug, Clone, Default)]
 pub struct AttachOptions {
@@ -20,13 +25,28 @@ pub struct AttachOptions {
 ///
 /// # Errors
 /// [`ProtocolError::NoDaemon`], [`ProtocolError::ProtocolVersion`], [`ProtocolError::BadName`],
-/// [`ProtocolError::Interrupted`].
+/// [`ProtocolError::Interrupted`]; [`ProtocolError::Silent`] when somebody holds the name for too long and does not run.
 pub fn find(name: &str, options: &AttachOptions, hook: Hook<'_>) -> Result<Beacon, ProtocolError> {
     let paths = DaemonPaths::new(options.root.as_deref(), name)?;
-    let deadline = Instant::now() + options.wait;
+    let (deadline, mut since, mut seen) = (Instant::now() + options.wait, Instant::now(), None);
     let beacon = loop {
-        match paths.presence() {
+        let presence = paths.presence()?;
+        if seen != Some(presence) {
+            (since, seen) = (Instant::now(), Some(presence));
+        }
+        let silence_max = match presence {
+            Presence::Starting => START_MAX,
+            _ => SILENCE_MAX.max(options.wait),
+        };
+        match presence {
             Presence::Running(beacon) => break beacon,
+            Presence::Silent | Presence::Starting if since.elapsed() > silence_max => {
+                return Err(ProtocolError::Silent {
+                    name: name.to_owned(),
+                    path: paths.lock_path(),
+                    seconds: since.elapsed().as_secs(),
+                });
+            }
             Presence::Absent if Instant::now() >= deadline => {
                 let names = running(Some(paths.root()))?;
                 let running = if names.is_empty() {

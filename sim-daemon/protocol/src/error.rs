@@ -26,6 +26,17 @@ pub enum ProtocolError {
         problem: String,
     },
 
+    /// Whether the daemon lives cannot be told: this process has no file descriptor left.
+    #[error(
+        "{path:?} cannot be opened: {problem}; raise the limit on open files (`ulimit -n 65536`), or close some"
+    )]
+    Descriptors {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        problem: String,
+    },
+
     /// Nothing with this name runs.
     #[error("no daemon named {name:?} runs under {root:?}; running: {running}")]
     NoDaemon {
@@ -185,6 +196,13 @@ pub enum ProtocolError {
     #[error("no step was sent whose frame could be received; call send first")]
     NothingSent,
 
+    /// The caller's own code, which ran while a call waited, made another one; nothing was sent or touched.
+    #[error(
+        "another call of this client is waiting in the same thread, which a signal handler interrupted; set a flag in the \
+         handler, and call after the other call has returned"
+    )]
+    CallInProgress,
+
     /// The client was copied into a child process.
     #[error(
         "this client of daemon {name:?} belongs to process {pid}, which forked; attach again in this process"
@@ -244,6 +262,21 @@ pub enum ProtocolError {
         from: &'static str,
         /// What is wrong.
         problem: String,
+    },
+
+    /// Something holds a daemon's name and does not become one.
+    #[error(
+        "something has held {path:?} for {seconds} s without becoming daemon {name:?}; end the process that `fuser {}` shows, or wait if \
+         it still starts",
+        path.display()
+    )]
+    Silent {
+        /// The daemon's name.
+        name: String,
+        /// The lock file.
+        path: PathBuf,
+        /// How long was waited.
+        seconds: u64,
     },
 
     /// The daemon lives but did not answer in time.

@@ -4,8 +4,8 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use crate::connection::{Connection, lock};
-use crate::control::Request;
+use crate::connection::Connection;
+use crate::turn::lock;
 
 /// How often the lease is confirmed.
 const PERIOD: Duration = Duration::from_millis(250);
@@ -29,7 +29,7 @@ impl HeartbeatThread {
                     .wait_timeout(guard, PERIOD)
                     .map_or_else(|poison| poison.into_inner().0, |(guard, _)| guard);
                 if !*guard {
-                    connection.post(&Request::Heartbeat { epoch });
+                    connection.beat(epoch);
                 }
             }
         };

@@ -117,18 +117,11 @@ impl Journal {
             }
             _ => return Err(malformed("the answer to journal")),
         };
-        let subscriber = connection.with_node(|node| {
+        let subscriber = connection.open(hook, |node| {
             let prefix = node.config().global.prefix.to_string();
             reserve(&prefix, port, "the journal of a recorder")?;
             transport::journal_subscriber(&transport::open_journal(node, journal)?)
-        });
-        let subscriber = match subscriber {
-            Ok(subscriber) => subscriber,
-            Err(error) => {
-                connection.peer.check()?;
-                return Err(error);
-            }
-        };
+        })?;
         // a daemon that sleeps begins the journal when it looks around
         connection.notify();
         Ok(Journal {

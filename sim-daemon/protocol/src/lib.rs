@@ -51,6 +51,7 @@ mod observer;
 pub mod paths;
 pub mod table;
 mod transport;
+mod turn;
 mod waiter;
 
 pub use client::Client;

@@ -1,5 +1,7 @@
 //! Is the daemon that we attached to still there?
 
+use std::fs::File;
+use std::sync::Arc;
 use std::time::Duration;
 
 use crate::ProtocolError;
@@ -10,25 +12,42 @@ use crate::paths::{Beacon, DaemonPaths, Presence};
 pub(crate) struct Peer {
     pub(crate) paths: DaemonPaths,
     pub(crate) beacon: Beacon,
+    /// Its lock file. A logout may remove the file's name while the daemon lives on, and holds the lock.
+    lock: Arc<File>,
 }
 
 impl Peer {
-    /// Errors when the daemon ended, was killed, or is another one than it was. A few microseconds.
-    pub(crate) fn check(&self) -> Result<(), ProtocolError> {
-        match self.paths.presence() {
-            Presence::Running(beacon) if beacon.session == self.beacon.session => Ok(()),
-            Presence::Running(_) => Err(ProtocolError::DaemonRestarted {
-                name: self.paths.name().to_owned(),
-            }),
-            // ours has announced itself: one that is starting, or cleaning up, is another
-            Presence::Absent | Presence::Starting => Err(self.lost()),
-        }
+    /// Opens the lock file of a daemon that was seen to run.
+    ///
+    /// # Errors
+    /// [`ProtocolError::DaemonLost`] when it ended meanwhile; as [`DaemonPaths::presence`].
+    pub(crate) fn find(paths: DaemonPaths, beacon: Beacon) -> Result<Peer, ProtocolError> {
+        let Some(lock) = paths.open_lock()? else {
+            return Err(lost(&paths, beacon));
+        };
+        let lock = Arc::new(lock);
+        Ok(Peer {
+            paths,
+            beacon,
+            lock,
+        })
     }
 
-    pub(crate) fn lost(&self) -> ProtocolError {
-        ProtocolError::DaemonLost {
+    /// Errors when the daemon ended, was killed, or is another one than it was. A microsecond; opens nothing while it lives.
+    pub(crate) fn check(&self) -> Result<(), ProtocolError> {
+        let restarted = || ProtocolError::DaemonRestarted {
             name: self.paths.name().to_owned(),
-            pid: self.beacon.pid,
+        };
+        match self.paths.presence_in(&self.lock)? {
+            Presence::Running(beacon) if beacon.session == self.beacon.session => Ok(()),
+            Presence::Running(_) => Err(restarted()),
+            // ours has announced itself: one that is starting, or cleaning up, is another
+            Presence::Absent | Presence::Silent | Presence::Starting => {
+                match self.paths.presence() {
+                    Ok(Presence::Running(_)) => Err(restarted()),
+                    _ => Err(lost(&self.paths, self.beacon)),
+                }
+            }
         }
     }
 
@@ -45,4 +64,24 @@ impl Peer {
             seconds: waited.as_secs_f64(),
         }
     }
+}
+
+fn lost(paths: &DaemonPaths, beacon: Beacon) -> ProtocolError {
+    ProtocolError::DaemonLost {
+        name: paths.name().to_owned(),
+        pid: beacon.pid,
+    }
+}
+
+/// Whether a process of this machine is gone, or has only its exit code left. One that cannot be seen from here, such as in
+/// another container, counts as gone.
+pub(crate) fn is_gone(pid: u32) -> bool {
+    let Ok(status) = std::fs::read_to_string(format!("/proc/{pid}/stat")) else {
+        return true;
+    };
+    // the name stands in parentheses and may have any character; the state comes after it
+    let state = status
+        .rsplit_once(')')
+        .and_then(|(_, rest)| rest.trim_start().chars().next());
+    matches!(state, None | Some('Z' | 'X'))
 }

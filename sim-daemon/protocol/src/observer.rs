@@ -28,21 +28,15 @@ impl Observer {
     pub(crate) fn open(
         connection: &Arc<Connection>,
         description: &Arc<Description>,
+        hook: Hook<'_>,
     ) -> Result<Observer, ProtocolError> {
-        let ports = connection.with_node(|node| {
+        let (subscriber, listener) = connection.open(hook, |node| {
             let listener = transport::listener(&transport::open_event(node, "watch")?)?;
             Ok((
                 transport::frame_subscriber(&transport::open_watch(node)?, 1)?,
                 listener,
             ))
-        });
-        let (subscriber, listener) = match ports {
-            Ok(ports) => ports,
-            Err(error) => {
-                connection.peer.check()?;
-                return Err(error);
-            }
-        };
+        })?;
         // a daemon that sleeps shows a new observer its present state when it looks around
         connection.notify();
         Ok(Observer {

@@ -10,14 +10,16 @@
 //! Whoever can take the lock may remove the rest. The transport folder is in /dev/shm whatever ROOT is, since the path
 //! of a Unix socket is limited to 107 bytes.
 
-use std::fs::{self, DirBuilder, File, Metadata, TryLockError};
-use std::io::{ErrorKind, Read};
-use std::os::unix::fs::{DirBuilderExt, MetadataExt};
+use std::fs::{self, DirBuilder, File, Metadata, OpenOptions, TryLockError};
+use std::io::ErrorKind;
+use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use iceoryx2::config::Config;
 use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString};
+use rustix::fs::OFlags;
+use rustix::io::Errno;
 
 use crate::ProtocolError;
 use crate::hash::Fnv;
@@ -57,7 +59,9 @@ pub struct Beacon {
 pub enum Presence {
     /// Nobody holds the lock, or there is no lock file.
     Absent,
-    /// Somebody holds it and has not written the beacon yet.
+    /// Somebody holds it and says nothing: for an instant one who looks or cleans up, else no daemon.
+    Silent,
+    /// A daemon holds it and reads its scene.
     Starting,
     /// A daemon runs.
     Running(Beacon),
@@ -175,15 +179,52 @@ impl DaemonPaths {
     }
 
     /// Whether a daemon runs here. Takes no lock for longer than an instant; a few microseconds.
-    pub fn presence(&self) -> Presence {
-        let Ok(mut file) = File::open(self.lock_path()) else {
-            return Presence::Absent;
-        };
-        match file.try_lock_shared() {
-            Err(TryLockError::WouldBlock) => {
-                read_beacon(&mut file).map_or(Presence::Starting, Presence::Running)
+    ///
+    /// # Errors
+    /// [`ProtocolError::Descriptors`] when this process has none left; [`ProtocolError::Root`] when the lock file cannot be
+    /// read.
+    pub fn presence(&self) -> Result<Presence, ProtocolError> {
+        match self.open_lock()? {
+            Some(file) => self.presence_in(&file),
+            None => Ok(Presence::Absent),
+        }
+    }
+
+    /// What an open lock file says, whatever became of its name.
+    pub(crate) fn presence_in(&self, lock: &File) -> Result<Presence, ProtocolError> {
+        match lock.try_lock_shared() {
+            Err(TryLockError::WouldBlock) => Ok(read_beacon(lock)),
+            Err(TryLockError::Error(error)) => Err(self.lock_error(&error)),
+            // the file may stay open, so closing it does not give the lock back
+            Ok(()) => match lock.unlock() {
+                Ok(()) => Ok(Presence::Absent),
+                Err(error) => Err(self.lock_error(&error)),
+            },
+        }
+    }
+
+    /// The lock file, if there is one.
+    pub(crate) fn open_lock(&self) -> Result<Option<File>, ProtocolError> {
+        let opened = OpenOptions::new()
+            .read(true)
+            .custom_flags(OFlags::NONBLOCK.bits() as i32)
+            .open(self.lock_path());
+        match opened {
+            Ok(file) => Ok(Some(file)),
+            Err(error)
+                if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) =>
+            {
+                Ok(None)
             }
-            _ => Presence::Absent,
+            Err(error) => Err(self.lock_error(&error)),
+        }
+    }
+
+    fn lock_error(&self, error: &std::io::Error) -> ProtocolError {
+        let (path, problem) = (self.lock_path(), error.to_string());
+        match error.raw_os_error().map(Errno::from_raw_os_error) {
+            Some(Errno::MFILE | Errno::NFILE) => ProtocolError::Descriptors { path, problem },
+            _ => ProtocolError::Root { path, problem },
         }
     }
 
@@ -231,7 +272,7 @@ impl DaemonPaths {
 /// [`ProtocolError::Root`].
 pub fn running(root: Option<&Path>) -> Result<Vec<String>, ProtocolError> {
     let mut names = names_with_lock(root)?;
-    names.retain(|paths| !paths.is_group() && matches!(paths.presence(), Presence::Running(_)));
+    names.retain(|paths| !paths.is_group() && matches!(paths.presence(), Ok(Presence::Running(_))));
     Ok(names.into_iter().map(|paths| paths.name).collect())
 }
 
@@ -272,9 +313,25 @@ pub(crate) fn names_with_lock(root: Option<&Path>) -> Result<Vec<DaemonPaths>, P
     Ok(places)
 }
 
-fn read_beacon(file: &mut File) -> Option<Beacon> {
-    let mut text = String::new();
-    file.take(128).read_to_string(&mut text).ok()?;
+/// The line of a daemon that starts; then comes its [`Beacon`].
+pub(crate) const STARTING: &str = "tightloop starting\n";
+
+/// What the holder of the lock says.
+fn read_beacon(file: &File) -> Presence {
+    let mut bytes = [0; 128];
+    let text = file
+        .read_at(&mut bytes, 0)
+        .ok()
+        .and_then(|read| str::from_utf8(&bytes[..read]).ok());
+    match text {
+        Some(STARTING) => Presence::Starting,
+        text => text
+            .and_then(parse_beacon)
+            .map_or(Presence::Silent, Presence::Running),
+    }
+}
+
+fn parse_beacon(text: &str) -> Option<Beacon> {
     let mut words = text.strip_suffix('\n')?.split(' ');
     let ("tightloop", protocol, pid, session) =
         (words.next()?, words.next()?, words.next()?, words.next()?)

@@ -4,6 +4,7 @@ use std::fmt::Debug;
 use std::sync::Once;
 use std::time::Duration;
 
+use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::config::Config;
 use iceoryx2::port::client::Client as ControlClient;
 use iceoryx2::port::listener::{Listener, ListenerWaitError};
@@ -19,8 +20,8 @@ use crate::{ALIGNMENT, CommandHeader, FrameHeader, JournalHeader, Line, Protocol
 
 /// Clients that may be attached at once, controllers and observers together.
 pub(crate) const CLIENTS_MAX: usize = 32;
-/// Control requests of one client that may be unread: a heartbeat and one that is waited for.
-const CONTROL_ACTIVE: usize = 2;
+/// Control requests of one client that may be unread: two heartbeats, a release, and one that is waited for.
+const CONTROL_ACTIVE: usize = 4;
 /// Longest time anybody sleeps without looking around.
 pub(crate) const SLICE: Duration = Duration::from_millis(50);
 
@@ -46,6 +47,9 @@ pub(crate) type CommandService<S> = publish_subscribe::PortFactory<S, [Line], Co
 pub(crate) type Requester<S> = ControlClient<S, [u8], (), [u8], ()>;
 /// Requests at the daemon.
 pub(crate) type Responder<S> = Server<S, [u8], (), [u8], ()>;
+
+/// A request that awaits its answer, at the daemon.
+pub(crate) type Asked<S> = ActiveRequest<S, [u8], (), [u8], ()>;
 
 /// A node: one process's membership in the transport of one daemon.
 pub(crate) fn node<S: Service>(config: &Config, role: &str) -> Result<Node<S>, ProtocolError> {

@@ -15,7 +15,7 @@ use crate::affinity::CoreAffinity;
 use crate::control::{Request, Response};
 use crate::loaned;
 use crate::memory;
-use crate::transport::Responder;
+use crate::transport::{self, Responder};
 use crate::waiter::Awaited;
 use crate::{ALIGNMENT, Description, Dtype, FrameHeader, ProtocolError, RefusalKind, Table};
 
@@ -133,7 +133,7 @@ impl State {
 
     /// Answers the control requests that are there.
     fn control(&mut self) -> Option<Next> {
-        let mut end = false;
+        let (mut end, mut later) = (false, Vec::new());
         // as with commands: a client that was killed while it connected is no reason to end
         while let Ok(Some(active)) = self.responder.receive() {
             let response = match serde_json::from_slice(active.payload()) {
@@ -144,7 +144,11 @@ impl State {
                         .as_ref()
                         .and_then(|lease| Some(lease.holder.as_ref()?.pid)),
                 }),
-                Ok(Request::Acquire { pid }) => Some(self.acquire(pid)),
+                // a release that waits unread came before: the requests of several clients come in no order
+                Ok(Request::Acquire { pid }) => {
+                    later.push((active, pid));
+                    continue;
+                }
                 Ok(Request::Heartbeat { epoch }) => {
                     if let Some(Lease {
                         holder: Some(holder),
@@ -173,10 +177,14 @@ impl State {
             let response = response
                 .map(|response| serde_json::to_vec(&response).expect("responses are plain data"));
             let bytes = response.as_ref().unwrap_or(&self.description_json);
-            // a client that died or gave up while it waited is no trouble of ours
-            if let Ok(loan) = active.loan_slice_uninit(bytes.len()) {
-                let _ = loan.write_from_slice(bytes).send();
-            }
+            respond(&active, bytes);
+        }
+        for (active, pid) in later {
+            let response = self.acquire(pid);
+            respond(
+                &active,
+                &serde_json::to_vec(&response).expect("responses are plain data"),
+            );
         }
         end.then_some(Next::End)
     }
@@ -300,6 +308,13 @@ impl State {
         self.observers.refresh();
         let waits = self.journals.refresh(self.description.session);
         next.or(waits.then_some(Next::Record))
+    }
+}
+
+/// Answers a request. A client that died or gave up while it waited is no trouble of ours.
+fn respond(active: &transport::Asked<S>, bytes: &[u8]) {
+    if let Ok(loan) = active.loan_slice_uninit(bytes.len()) {
+        let _ = loan.write_from_slice(bytes).send();
     }
 }
 

@@ -1,0 +1,104 @@
+"""Signal handlers that use the simulation that they interrupt, and threads that wait for each other."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+# The daemon is stopped, so that the outer call waits; the alarm comes first, then the daemon goes on
+SCRIPT = """
+import os, signal, threading, time
+import tightloop as tl
+scene = tl.Scene(dt=1 / 480, substeps=4)
+scene.add_urdf({urdf!r}, name="arm")
+sim = tl.launch(scene, worlds=4, params=("gravity",))
+kept = sim.snapshot()
+told = []
+def handler(*_):
+    try:
+        told.append(type({inner}).__name__)
+    except tl.TightloopError as error:
+        told.append(type(error).__name__)
+signal.signal(signal.SIGALRM, handler)
+os.kill(sim.pid, signal.SIGSTOP)
+signal.setitimer(signal.ITIMER_REAL, 0.3)
+threading.Timer(1.0, os.kill, (sim.pid, signal.SIGCONT)).start()
+try:
+    told.append(type({outer}).__name__)
+except tl.TightloopError as error:
+    told.append(type(error).__name__)
+{after}
+print(*told, flush=True)
+"""
+REFUSED = "CallInProgress"
+
+
+def said(code: str, seconds: float = 30.0) -> str:
+    """Return what a program prints, which must end by itself."""
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=seconds, check=False)
+    assert process.returncode == 0, process.stderr
+    return process.stdout.strip()
+
+
+@pytest.mark.parametrize(
+    "outer", ["sim.step()", "sim.snapshot()", "sim.restore(kept)", "sim.reset()", "sim.params.gravity"]
+)
+@pytest.mark.parametrize("inner", ["sim.step()", "sim.snapshot()", "sim.params.gravity", "sim.send()"])
+def test_a_call_from_a_handler_inside_a_call_is_refused_and_both_go_on(pendulum_urdf, outer, inner):
+    code = SCRIPT.format(
+        urdf=str(pendulum_urdf), inner=inner, outer=outer, after="told.append(type(sim.step()).__name__)"
+    )
+    words = {"sim.step()": "Frame", "sim.snapshot()": "Snapshot", "sim.restore(kept)": "Frame", "sim.reset()": "Frame"}
+    assert said(code) == f"{REFUSED} {words.get(outer, 'ndarray')} Frame"
+
+
+def test_a_handler_may_ask_who_is_in_control_and_look_on(pendulum_urdf):
+    inner = "(sim.latest(), threading.Timer(0.2, os.kill, (sim.pid, signal.SIGCONT)).start(), sim.controller())"
+    code = SCRIPT.format(urdf=str(pendulum_urdf), inner=inner, outer="sim.step()", after="")
+    assert said(code) == "tuple Frame"
+
+
+def test_a_handler_inside_a_question_to_the_daemon_may_not_ask_another(pendulum_urdf):
+    code = SCRIPT.format(urdf=str(pendulum_urdf), inner="sim.controller()", outer="sim.controller()", after="")
+    assert said(code) == f"{REFUSED} int"
+
+
+def test_control_that_a_handler_releases_goes_when_the_call_returns(pendulum_urdf):
+    after = "told.append(str(sim.controller())); sim.step(); told.append(str(sim.controller() == os.getpid()))"
+    code = SCRIPT.format(urdf=str(pendulum_urdf), inner="sim.release()", outer="sim.step()", after=after)
+    assert said(code) == "NoneType Frame None True"
+
+
+def test_a_handler_may_close_the_simulation_that_it_interrupts(pendulum_urdf):
+    code = SCRIPT.format(urdf=str(pendulum_urdf), inner="sim.close()", outer="sim.step()", after="")
+    assert said(code) == "NoneType SimClosed"
+
+
+def test_a_handler_that_raises_ends_the_call(pendulum_urdf):
+    # as a handler of SIGTERM does that cleans up and exits
+    inner = "(sim.close(), exit(0))"
+    code = SCRIPT.format(urdf=str(pendulum_urdf), inner=inner, outer="sim.step()", after="told.append('went on')")
+    assert said(code) == ""
+
+
+def test_ctrl_c_reaches_a_thread_that_waits_behind_another(pendulum_urdf):
+    outer = """wait(threading.Thread(target=sim.step))"""
+    code = SCRIPT.format(urdf=str(pendulum_urdf), inner="interrupt()", outer=outer, after="told.append(str(in_time))")
+    helpers = """
+def interrupt():
+    raise KeyboardInterrupt
+def wait(first):
+    global in_time
+    first.start()
+    time.sleep(0.1)
+    began = time.monotonic()
+    try:
+        sim.step()
+    except KeyboardInterrupt:
+        in_time = first.is_alive()
+    first.join()
+"""
+    code = code.replace("told = []", "told = []" + helpers)
+    assert said(code) == "NoneType True"
