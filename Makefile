@@ -12,6 +12,9 @@ WORLDS ?= 4096
 CASES  ?= 2000
 SEED   ?= 1
 TASK   ?= CartPoleSwingUp
+ROUNDS ?= 200
+HOURS  ?= 1
+PATIENCE ?= 2
 
 # The wheel, the tests and the lints build pyo3 with the same environment. With different ones each would rebuild it.
 export PYO3_PYTHON := $(CURDIR)/$(PYTHON)
@@ -29,7 +32,7 @@ CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D
 VULKAN  := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
 BROWSER := chromium
 
-.PHONY: demo help test check check-format format docs test-rl train fuzz published menagerie mujoco-versions packages coverage \
+.PHONY: demo help test check check-format format docs test-rl train kills soak fuzz published menagerie mujoco-versions packages coverage \
   newcomer bench bench-env bench-gpu bench-mujoco wheel dist vulkan browser llvm-cov \
   $(addprefix announce-,demo test docs test-rl train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
@@ -82,6 +85,13 @@ test-rl: announce-test-rl wheel $(VENV)/.dev $(VENV)/.rl ## adapters of RL libra
 
 train: announce-train wheel $(VENV)/.rl ## train a policy, into out/train (TASK=FrankaReach SEED=0 MINUTES=3 RESUME=1)
 	$(PYTHON) examples/ppo.py $(TASK) --seed $(SEED) $(if $(MINUTES),--minutes $(MINUTES)) $(if $(RESUME),--resume)
+
+# Not part of `test`, which runs a few rounds: 200 take half an hour. Set the patience for a machine under load.
+kills: wheel $(VENV)/.dev ## kill and stop every process at random moments (ROUNDS=200 PATIENCE=2)
+	TIGHTLOOP_ROUNDS=$(ROUNDS) TIGHTLOOP_PATIENCE=$(PATIENCE) $(PYTEST) tests/python/test_kill_matrix.py
+
+soak: wheel $(VENV)/.dev ## full speed with guests that come, go and die; the curve into benches/results (HOURS=1)
+	$(PYTHON) benches/soak.py --hours $(HOURS)
 
 # A failure prints its seed. Ten properties take about a minute for 100 cases of each.
 fuzz: ## random programs on random scenes (CASES=1000 SEED=5000)

@@ -1,0 +1,143 @@
+"""Every kind of process is killed, or stopped for a while, at random moments: the others go on, and nothing is left.
+
+A round takes about a second. `TIGHTLOOP_ROUNDS` sets how many there are of each kind; `make kills` runs 200.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import tightloop as tl
+from processes import alive, left_of, stems_of, stopped, wait_until
+
+ROUNDS = int(os.environ.get("TIGHTLOOP_ROUNDS", "4"))
+# A bystander may wait this long for anything [s]: on an idle machine, and with five busy processes a core
+PATIENCE = float(os.environ.get("TIGHTLOOP_PATIENCE", "10"))
+
+CONTROLLER = """
+import sys, tightloop as tl
+sim = tl.attach(sys.argv[1])
+while True:
+    sim.step(); sim.params.gravity; sim.restore(sim.snapshot()); sim.reset()
+"""
+OBSERVER = """
+import sys, tightloop as tl
+while True:
+    sim = tl.attach(sys.argv[1])
+    for _ in range(20):
+        sim.latest(0.05)
+    sim.close()
+"""
+CLIENTS: dict[str, list[str]] = {
+    "controller": ["-c", CONTROLLER],
+    "observer": ["-c", OBSERVER],
+    "recorder": ["-m", "tightloop", "record"],
+    "viewer": ["-m", "tightloop", "view", "--port=8390"],
+}
+
+
+def start(victim: str, name: str, folder: Path) -> subprocess.Popen[bytes]:
+    out = [str(folder / f"{victim}.tlrec"), "--force"] if victim == "recorder" else []
+    arguments = [sys.executable, *CLIENTS[victim], name, *out]
+    return subprocess.Popen(
+        arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=os.environ | {"TMPDIR": str(folder)}
+    )
+
+
+def hit(pid: int, how: str, draw: random.Random) -> None:
+    """Kill a process, or stop it for a while."""
+    if how == "kill":
+        os.kill(pid, signal.SIGKILL)
+        return
+    os.kill(pid, signal.SIGSTOP)
+    time.sleep(draw.uniform(0.0, 0.5))
+    os.kill(pid, signal.SIGCONT)
+
+
+def strays(pids: set[int], folder: Path) -> list[Path]:
+    """Files that these processes, which are gone, left in shared memory, and temporary ones."""
+    left = tuple(f"tightloop-{pid}-" for pid in pids)
+    shared = [path for path in Path("/dev/shm").iterdir() if path.name.startswith(left)]
+    return shared + [path for path in folder.iterdir() if path.suffix != ".tlrec"]
+
+
+def promptly(call: Callable[[], object]) -> None:
+    """Make a call, which must neither fail nor take long."""
+    began = time.monotonic()
+    call()
+    assert time.monotonic() - began < PATIENCE, "it takes too long"
+
+
+@pytest.mark.parametrize("how", ["kill", "stop"])
+@pytest.mark.parametrize("victim", CLIENTS)
+def test_a_client_that_is_hit_hinders_nobody(pendulum, tmp_path, victim, how):
+    if victim == "viewer":
+        pytest.importorskip("viser")
+    draw = random.Random(f"{victim} {how}")
+    with tl.launch(pendulum, worlds=16, params=("gravity",)) as sim:
+        sim.step()
+        shared, victims = stems_of(sim.pid), set[int]()
+        files = len(left_of(shared))
+        for _ in range(ROUNDS):
+            sim.release()
+            process = start(victim, sim.name, tmp_path)
+            victims.add(process.pid)
+            time.sleep(draw.uniform(0.0, 1.2))
+            hit(process.pid, how, draw)
+            with tl.attach(sim.name) as onlooker:
+                if how == "stop" and victim != "controller":
+                    # one that goes on beside us
+                    promptly(onlooker.step)
+                process.kill()
+                process.wait()
+                promptly(onlooker.step)
+                promptly(lambda onlooker=onlooker: onlooker.latest(1.0))
+            promptly(sim.snapshot)
+        assert strays(victims, tmp_path) == []
+        assert wait_until(lambda: len(left_of(shared)) <= files, PATIENCE), "the dead leave nothing with the living"
+        assert alive(sim.pid)
+
+
+@pytest.mark.parametrize("how", ["kill", "stop"])
+def test_a_daemon_that_is_hit_is_told_rightly(pendulum, root, tmp_path, how):
+    draw, stems = random.Random(f"daemon {how}"), set[str]()
+    for _ in range(ROUNDS):
+        with tl.launch(pendulum, worlds=16, params=("gravity",)) as sim:
+            stems |= stems_of(sim.pid)
+            onlooker = tl.attach(sim.name)
+            hitter = threading.Timer(draw.uniform(0.0, 0.1), hit, (sim.pid, how, draw))
+            hitter.start()
+            call = began = 0.0
+            calls = (
+                sim.step,
+                sim.reset,
+                sim.snapshot,
+                lambda sim=sim: sim.params.gravity,
+                lambda onlooker=onlooker: onlooker.latest(0.01),
+            )
+            try:
+                while hitter.is_alive() or how == "kill":
+                    began = time.monotonic()
+                    draw.choice(calls)()
+                    call = max(call, time.monotonic() - began)
+            except tl.DaemonLost:
+                assert how == "kill", "a stopped daemon is not lost"
+                call = time.monotonic() - began
+            hitter.join()
+            assert call < PATIENCE
+            if how == "stop":
+                assert not stopped(sim.pid)
+                sim.step()
+            onlooker.close()
+        assert not list(root.iterdir())
+    assert left_of(stems) == [] and strays({os.getpid()}, tmp_path) == []
