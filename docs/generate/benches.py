@@ -22,8 +22,8 @@ table name its machine, commit and command.
 ## Summary
 
 These rows use independent commands. The rows of MuJoCo compare one thread with one thread. In the rows of EnvPool and
-gymnasium, each side uses all four cores. The first two rows come from a 2-core machine, the others from a 4-core
-machine.
+gymnasium, each side uses all four cores. The first two rows and those of robots on the ground come from a 2-core
+machine, the others from a 4-core machine.
 
 - **Precision differs.** MuJoCo computes in float64, one world at a time. tightloop computes in float32, with 16 worlds
   in one AVX-512 register.
@@ -89,6 +89,13 @@ def _environments(peer: str, side: str) -> Line:
     return Line("FrankaPickCube, random actions", peer, file, theirs, {"side": "tightloop"}, rate, rate, ratio)
 
 
+def _on_the_ground(workload: str, model: str, steps_per_call: int) -> Line:
+    row = {"model": model, "steps_per_call": str(steps_per_call)}
+    place = "amd-epyc-2-cores/mujoco_models.csv"
+    ratio = row | {"column": "median_ratio"}
+    return Line(workload, "mjbatch 0.1.4", place, row, row, "mjbatch_steps_per_s", "tightloop_steps_per_s", ratio)
+
+
 _ROLLOUT = "MuJoCo C 3.17, `rollout`"
 _CONTACTS = "amd-epyc-4-cores/contacts.csv"
 SUMMARY = (
@@ -98,6 +105,10 @@ SUMMARY = (
     _beside("FR3 arm grasps a cube", _CONTACTS, {"demo": "grasp", "worlds_alike": "no"}),
     _beside("FR3 arm and cube, random targets", _CONTACTS, {"demo": "random", "worlds_alike": "no"}),
     _beside("Quadruped, 18 dofs, no contacts", "amd-epyc-4-cores/legged.csv", {"robot": "quadruped"}),
+    _on_the_ground("Go1 on the ground, feet only", "mjlab Go1, feet only", 4),
+    _on_the_ground("G1 humanoid on the ground", "MuJoCo-Warp G1, flat", 4),
+    _on_the_ground("Go1 falls and lies, all of it touches", "mjlab Go1 heap, pyramidal", 8),
+    _on_the_ground("The same, elliptic cones, `impratio` 1000", "mjlab Go1 heap, elliptic 1000", 8),
     _environments("EnvPool 1.2.5, `PandaPickCube-v1`", "envpool PandaPickCube-v1"),
     _environments("gymnasium 1.2.2, `AsyncVectorEnv` over MuJoCo C", "gymnasium AsyncVectorEnv, MuJoCo C"),
 )
@@ -173,6 +184,8 @@ stand or lie on the ground. mjbatch runs MuJoCo C.
   that. tightloop solves the same problem with Newton's method.
 - The torso of dm_control's quadruped is an ellipsoid. Its contacts are off on all sides, since tightloop refuses them.
 - No side evaluates sensors. In the row `mjlab Go1, feet only`, no other part collides.
+- In rows with `heap`, all parts of a robot collide. It falls, lies on the ground and moves about under small random
+  controls. `pyramidal` has an `impratio` of 1. `elliptic 1000` has elliptic cones and an `impratio` of 1000.
 """,
         {
             "model": "model",
