@@ -38,6 +38,16 @@ pub(crate) struct Connection {
 impl Connection {
     /// Asks and waits for the answer; control requests are rare, so waiting is by sleeping.
     pub(crate) fn ask(&self, request: &Request, hook: Hook<'_>) -> Result<Response, ProtocolError> {
+        self.ask_within(ANSWER_MAX, request, hook)
+    }
+
+    /// The same for a daemon that answers within `limit`.
+    pub(crate) fn ask_within(
+        &self,
+        limit: Duration,
+        request: &Request,
+        hook: Hook<'_>,
+    ) -> Result<Response, ProtocolError> {
         let _turn = self.asking.take(hook)?;
         let text = serde_json::to_vec(request).expect("requests are plain data");
         let failed = |error: &dyn std::fmt::Debug| {
@@ -70,8 +80,8 @@ impl Connection {
                 if hook().is_break() {
                     return Err(ProtocolError::Interrupted);
                 }
-                if start.elapsed() > ANSWER_MAX {
-                    return Err(self.peer.timeout(ANSWER_MAX));
+                if start.elapsed() > limit {
+                    return Err(self.peer.timeout(limit));
                 }
                 polled = Instant::now();
             }

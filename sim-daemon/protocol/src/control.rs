@@ -73,9 +73,9 @@ pub enum Response {
         /// The port that sends, as its higher and lower half. Its memory is the recorder's to take: that takes a while.
         port: [u64; 2],
     },
-    /// Answer to [`Request::Heartbeat`] and [`Request::Release`]: whether that lease is the present one.
+    /// Answer to [`Request::Release`]: whether that lease is the present one.
     Lease {
-        /// False when the lease was lost.
+        /// False when the lease was lost before.
         valid: bool,
     },
     /// Answer to [`Request::Shutdown`].

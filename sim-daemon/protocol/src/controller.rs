@@ -12,7 +12,7 @@ use crate::connection::{Connection, S, malformed, pause};
 use crate::control::{Request, Response};
 use crate::frame::{Alive, FrameSample};
 use crate::heartbeat::HeartbeatThread;
-use crate::hook::Hook;
+use crate::hook::{Hook, keep_waiting};
 use crate::liveness::{Peer, is_gone};
 use crate::loaned;
 use crate::memory::reserve;
@@ -25,6 +25,9 @@ const ANSWER_MAX: Duration = Duration::from_secs(120);
 
 /// How long a lease is asked for again that cannot be had though nobody alive holds it.
 const ACQUIRE_MAX: Duration = Duration::from_secs(10);
+
+/// How long a daemon is waited for that is told of a release.
+const RELEASE_MAX: Duration = Duration::from_millis(250);
 
 /// The ports of a lease.
 type Ports = (
@@ -299,9 +302,11 @@ fn open_lease(
 
 impl Drop for Controller {
     fn drop(&mut self) {
-        self.connection
-            .post(&Request::Release { epoch: self.epoch });
-        self.connection.notify();
+        // a daemon that is told only while we go may not find the message any more, and would wait for us to come
+        let release = Request::Release { epoch: self.epoch };
+        let _ = self
+            .connection
+            .ask_within(RELEASE_MAX, &release, &mut keep_waiting());
     }
 }
 

@@ -162,8 +162,9 @@ impl State {
                 // the ports of the holder go right after this: `is_over` sees that
                 Ok(Request::Release { epoch }) => {
                     let lease = self.lease.as_mut().filter(|lease| lease.epoch == epoch);
+                    let valid = lease.is_some();
                     lease.into_iter().for_each(Lease::joined);
-                    continue;
+                    Some(Response::Lease { valid })
                 }
                 Ok(Request::Journal { observed }) => Some(self.journal(observed)),
                 Ok(Request::Shutdown) => {
