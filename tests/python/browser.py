@@ -54,7 +54,7 @@ class View:
         self.page.on("console", lambda said: self._hear(said.type, said.text))
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         # viser would lower its resolution while it is slow, and pictures could not be compared
-        self.page.goto(f"{url}/?fixedDpr=1")
+        self.page.goto(f"{url}?fixedDpr=1")
         self.wait(lambda: "world" in self.text, "the panel shows text")
 
     def _hear(self, kind: str, text: str) -> None:

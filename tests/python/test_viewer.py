@@ -292,7 +292,8 @@ def test_viewers_of_a_simulation_have_ports_of_their_own_and_end_with_it(pendulu
         first, second = sim.view(port=8350), sim.view(port=8350)
         assert first.url != second.url
         assert all(
-            re.fullmatch(r"http://localhost:\d+", viewer.url) and served(viewer.url) for viewer in (first, second)
+            re.fullmatch(r"http://localhost:\d+/[\w-]{32}/", viewer.url) and served(viewer.url)
+            for viewer in (first, second)
         )
         first.close()
         assert not alive(first.pid) and alive(second.pid)

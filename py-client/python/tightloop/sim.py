@@ -412,15 +412,16 @@ class Sim:
         options: dict[str, Any] = {"geomgroup": geomgroup, "flg_static": flg_static, "bodyexclude": bodyexclude}
         return self._ray_scene.cast(poses, pnt, vec, threads=self.threads, **options)
 
-    def view(self, *, port: int = 8080, worlds: int = 256, open: bool = False) -> Viewer:
+    def view(self, *, port: int = 8080, worlds: int = 256, open: bool = False, hosts: Sequence[str] = ()) -> Viewer:
         """Open a browser viewer in a separate process, which ends with the simulation.
 
-        The page can also drive the simulation while no other client is in control.
+        Whoever has the ``url`` of the viewer can also drive the simulation while no other client is in control.
 
         Args:
             port: Port of the page on this machine; the next free one if it is taken.
             worlds: Largest number of worlds to show, up to 1024; the daemon publishes its first ``watch_worlds``.
             open: Whether to open the page in a browser on this machine.
+            hosts: Host names of the page besides ``localhost``, such as that of a notebook server's proxy.
 
         Returns:
             The viewer: its ``url``, and ``close()``.
@@ -428,7 +429,7 @@ class Sim:
         Raises:
             LaunchError: The viewer did not start; stderr has the reason.
         """
-        viewer = Viewer(self.name, port=port, worlds=worlds, open=open)
+        viewer = Viewer(self.name, port=port, worlds=worlds, open=open, hosts=hosts)
         self._viewers.append(viewer)
         return viewer
 

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import weakref
+from collections.abc import Sequence
 
 from tightloop.errors import LaunchError
 
@@ -16,12 +17,13 @@ class Viewer:
     """A viewer, started by `Sim.view`. It ends with the simulation, with this process, or by ``close``.
 
     Attributes:
-        url: Address of the page.
+        url: Address of the page. Its token lets whoever has it control the worlds.
         pid: Process id of the viewer.
     """
 
-    def __init__(self, name: str, *, port: int, worlds: int, open: bool) -> None:
+    def __init__(self, name: str, *, port: int, worlds: int, open: bool, hosts: Sequence[str] = ()) -> None:
         command = [sys.executable, "-m", "tightloop", "view", name, f"--port={port}", f"--worlds={worlds}"]
+        command += [f"--allow-host={host}" for host in hosts]
         command += [f"--parent={os.getpid()}", *(["--open"] if open else [])]
         # the viewer shares our stderr; Ctrl-C in a terminal goes to this process, which decides when the viewer ends
         process = subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True)

@@ -13,7 +13,7 @@ import webbrowser
 from pathlib import Path
 
 from tightloop.errors import TightloopError
-from tightloop.view import dependencies
+from tightloop.view import dependencies, gate
 
 _WORLDS_MAX = 1024
 _EPILOG = """examples:
@@ -25,7 +25,8 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     made = argparse.ArgumentParser(
         prog="tightloop view",
-        description="Show the worlds of a daemon or a recording in the browser. Stop with Ctrl-C.",
+        description="Show the worlds of a daemon or a recording in the browser. Prints the address of the page; "
+        "whoever has this address can control the worlds. Stop with Ctrl-C.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -37,7 +38,15 @@ def parser() -> argparse.ArgumentParser:
         "--host",
         type=_host,
         default="127.0.0.1",
-        help="address to listen on; 0.0.0.0 also lets other machines control the worlds (default 127.0.0.1)",
+        help="address to listen on; 0.0.0.0 is for other machines too, without encryption (default 127.0.0.1)",
+    )
+    made.add_argument(
+        "--allow-host",
+        type=_name,
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="also answer to this host name, such as that of a proxy; repeat it for more names",
     )
     made.add_argument(
         "--worlds", type=_worlds, default=256, help=f"most worlds to show, up to {_WORLDS_MAX} (default 256)"
@@ -58,7 +67,8 @@ def main(arguments: list[str]) -> int:
         from tightloop.view.server import Server
 
         _give_way()
-        server = Server(given.target, host=given.host, port=given.port, worlds=given.worlds)
+        names = given.allow_host
+        server = Server(given.target, host=given.host, port=given.port, worlds=given.worlds, names=names)
     except (TightloopError, OSError) as problem:
         print(f"tightloop: {problem}", file=sys.stderr)
         return 1
@@ -67,7 +77,7 @@ def main(arguments: list[str]) -> int:
             print(f"tightloop: port {given.port} is taken; the page is at {server.port}", file=sys.stderr, flush=True)
         print(server.url, flush=True)
         if given.open:
-            webbrowser.open(server.url)
+            webbrowser.open(server.url_once())
         server.run(stopped, given.parent)
     finally:
         server.close()
@@ -94,6 +104,13 @@ def _host(text: str) -> str:
             f"{text!r} is no address of this machine; give 127.0.0.1 or 0.0.0.0"
         ) from problem
     return text
+
+
+def _name(text: str) -> str:
+    try:
+        return gate.host_name(text)
+    except ValueError as problem:
+        raise argparse.ArgumentTypeError(str(problem)) from None
 
 
 def _port(text: str) -> int:

@@ -10,10 +10,11 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import viser
 
+from tightloop.view import guarded_server
 from tightloop.view.cameras import Camera, camera
 from tightloop.view.display_options import DisplayOptions, Kind
+from tightloop.view.gate import Gate
 from tightloop.view.overlay import Overlay
 from tightloop.view.parts import Parts
 from tightloop.view.source import CONTACT_FIELDS
@@ -50,8 +51,8 @@ class Html:
         self._path, self._parts, self._bodies = path, parts, bodies
         self._fps, self._view = fps, view
         self._options = DisplayOptions(kind=kind, contacts="all worlds" if contacts else "off")
-        with contextlib.redirect_stdout(io.StringIO()):  # viser prints a greeting
-            self._server = viser.ViserServer("127.0.0.1", 0, verbose=False)
+        # viser records only what a server shows; nobody gets the token of this one
+        self._server = guarded_server.start(Gate("127.0.0.1"), "127.0.0.1", 0)
         self._world_meshes: WorldMeshes | None = None
         self._overlay: Overlay | None = None
         self._serializer: Any = None

@@ -7,11 +7,14 @@ import io
 import os
 import threading
 import time
+from collections.abc import Sequence
 
 import viser
 
 from tightloop.errors import DaemonLost, TightloopError, UnknownDaemon
+from tightloop.view import guarded_server
 from tightloop.view.frame_stream import FEW_WORLDS, FrameStream, open_stream
+from tightloop.view.gate import Gate
 from tightloop.view.page import Page
 
 # Least time between frames: with few worlds all 60 frames per second are shown, with many worlds every other one.
@@ -26,7 +29,7 @@ class Server:
     """Shows a daemon or a recording in browsers.
 
     Attributes:
-        url: Address of the page.
+        url: Address of the page, with the token that opens it.
         port: Port of the page: the requested one, or the next free one.
 
     Args:
@@ -34,24 +37,31 @@ class Server:
         host: Address to listen on.
         port: First port to try.
         worlds: Largest number of worlds to show.
+        names: Host names of the page, besides ``localhost`` and ``host``.
 
     Raises:
         UnknownDaemon: No daemon of that name is running; the message lists those that are.
     """
 
-    def __init__(self, target: str, *, host: str, port: int, worlds: int) -> None:
+    def __init__(self, target: str, *, host: str, port: int, worlds: int, names: Sequence[str] = ()) -> None:
         self._target = target
         self._worlds = worlds
         self._stream: FrameStream | None = open_stream(target, worlds)
         self._page: Page | None = None
         self._reported = ""
-        with contextlib.redirect_stdout(io.StringIO()):  # viser prints a greeting
-            self._viser = viser.ViserServer(host, port, label=f"tightloop · {target}", verbose=False)
+        self._gate = Gate(host, names)
+        self._viser = guarded_server.start(self._gate, host, port, f"tightloop · {target}")
         self._viser.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         # registered once, for all pages to come
         self._viser.on_client_connect(self._aim)
         self.port: int = self._viser.get_port()
-        self.url = f"http://{'localhost' if host in ('0.0.0.0', '127.0.0.1', '::') else host}:{self.port}"
+        shown = "localhost" if host in ("0.0.0.0", "127.0.0.1", "::") else f"[{host}]" if ":" in host else host
+        self._place = f"http://{shown}:{self.port}"
+        self.url = f"{self._place}/{self._gate.token}/"
+
+    def url_once(self) -> str:
+        """Return an address that leads to the page once, for the command line of a browser."""
+        return self._place + self._gate.path_once()
 
     def run(self, stopped: threading.Event, parent: int | None = None) -> None:
         """Show frames until ``stopped`` is set or the parent process ends."""
