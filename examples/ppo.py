@@ -37,6 +37,7 @@ from tqdm import tqdm
 
 from evaluation import evaluate, told
 from tightloop.env import AutoresetMode, VectorEnv
+from tightloop.whole_files import whole_file
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
@@ -275,7 +276,7 @@ class Trainer:
                     log.add_scalar(name, value, self.steps)
 
     def save(self) -> None:
-        """Write the checkpoint; what was there stays until the new one is whole."""
+        """Write the checkpoint."""
         state = {
             "task": self.task,
             "config": asdict(self.config),
@@ -286,8 +287,8 @@ class Trainer:
             "steps": self.steps,
             "curve": self.curve,
         }
-        torch.save(state, self.folder / "checkpoint.new")
-        (self.folder / "checkpoint.new").replace(self.folder / "checkpoint.pt")
+        with whole_file(self.folder / "checkpoint.pt") as part:
+            torch.save(state, part)
 
     def resume(self) -> None:
         """Go on from the checkpoint."""
@@ -304,16 +305,17 @@ class Trainer:
         path = self.folder / "policy.onnx"
         agent, obs = self.agent.cpu().eval(), torch.zeros(2, *self.envs.single_observation_space.shape)
         shapes = {"obs": {0: torch.export.Dim("worlds")}}
-        torch.onnx.export(
-            agent,
-            (obs,),
-            path,
-            input_names=["obs"],
-            output_names=["action"],
-            dynamic_shapes=shapes,
-            verbose=False,
-            external_data=False,
-        )
+        with whole_file(path) as part:
+            torch.onnx.export(
+                agent,
+                (obs,),
+                part,
+                input_names=["obs"],
+                output_names=["action"],
+                dynamic_shapes=shapes,
+                verbose=False,
+                external_data=False,
+            )
         return path
 
     def close(self) -> None:
@@ -324,7 +326,7 @@ class Trainer:
 def draw(curve: list[dict[str, float]], title: str, path: Path) -> None:
     """The curve as CSV and PNG: return, and success or error, over minutes."""
     names = [name for name in ("return", "success", "error") if name in curve[0]]
-    with path.with_suffix(".csv").open("w", newline="") as file:
+    with whole_file(path.with_suffix(".csv")) as part, part.open("w", newline="") as file:
         table = csv.DictWriter(file, ["seconds", "steps", *names], lineterminator="\n")
         table.writeheader()
         table.writerows({name: f"{value:.6g}" for name, value in row.items()} for row in curve)
@@ -335,7 +337,8 @@ def draw(curve: list[dict[str, float]], title: str, path: Path) -> None:
         axis.set(title=name, xlabel="time [min]")
         axis.grid(alpha=0.3)
     figure.suptitle(title)
-    figure.savefig(path, dpi=90)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=90)
     plt.close(figure)
 
 

@@ -21,6 +21,7 @@ from training import command_line
 
 from evaluation import evaluate, told
 from tightloop.adapters.rsl_rl import GROUP, RslRlVecEnv
+from tightloop.whole_files import whole_file
 
 OUT = Path(__file__).resolve().parent.parent / "out" / "rsl_rl"
 EVALUATED = 25  # iterations between two evaluations
@@ -101,7 +102,8 @@ def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> d
                 found = evaluate(task, act, threads=threads)
                 bar.update(count)
                 bar.set_postfix(told(found))
-        runner.save(str(folder / "model.pt"))
+        with whole_file(folder / "model.pt") as part:
+            runner.save(str(part))
         runner.export_policy_to_onnx(str(folder))
         return found
     finally:

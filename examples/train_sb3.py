@@ -24,6 +24,7 @@ from training import command_line
 
 from evaluation import evaluate, told
 from tightloop.adapters.sb3 import Sb3VecEnv
+from tightloop.whole_files import whole_file
 
 OUT = Path(__file__).resolve().parent.parent / "out" / "sb3"
 EVALUATED = 20  # rollouts between two evaluations
@@ -115,8 +116,10 @@ def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> d
         )
         progress = Progress(task, preset.rollouts, env, threads)
         model.learn(preset.total, callback=progress, log_interval=None)
-        model.save(folder / "model.zip")
-        env.save(str(folder / "normalize.pkl"))
+        with whole_file(folder / "model.zip") as part:
+            model.save(part)
+        with whole_file(folder / "normalize.pkl") as part:
+            env.save(str(part))
         return progress.found
     finally:
         env.close()

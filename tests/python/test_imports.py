@@ -26,7 +26,14 @@ Graph = dict[str, set[str]]
 #: the module or one of its packages decides.
 LAYERS = (
     ("tightloop.errors",),
-    ("tightloop.checks", "tightloop.frames", "tightloop.inputs", "tightloop.keyframes", "tightloop.optional_imports"),
+    (
+        "tightloop.checks",
+        "tightloop.frames",
+        "tightloop.inputs",
+        "tightloop.keyframes",
+        "tightloop.optional_imports",
+        "tightloop.whole_files",
+    ),
     ("tightloop._core",),
     ("tightloop.mujoco",),
     # what a scene is made of

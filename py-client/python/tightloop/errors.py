@@ -86,6 +86,10 @@ class SnapshotError(TightloopError, ValueError):
     """A snapshot is damaged, does not fit, or cannot be written; the message says which. No world changed."""
 
 
+class OutputError(TightloopError, OSError):
+    """A file cannot be written; the message has the reason. A file that was there is unchanged."""
+
+
 class RecordingError(TightloopError, ValueError):
     """A recording cannot be read to its end, or the files of its scene are missing or have changed."""
 

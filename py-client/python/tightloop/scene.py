@@ -24,6 +24,7 @@ from tightloop.scene_mujoco import HULL_VERTICES, check_options, keep_beside, re
 from tightloop.scene_options import Cone, Solver, capacity
 from tightloop.scene_randomization import SceneRandomization
 from tightloop.shapes import ORIGIN, UPRIGHT, Shape, Surface, checked_surface
+from tightloop.whole_files import whole_file
 
 if TYPE_CHECKING:
     # typing has it from Python 3.11 on, the package runs on 3.10
@@ -402,7 +403,8 @@ class Scene(SceneRandomization):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the scene as a TOML file. Paths in it are relative if they share a folder with the file.
 
-        MuJoCo models are copied into the folder ``NAME_models`` beside it.
+        MuJoCo models are copied into the folder ``NAME_models`` beside it. An existing file is replaced as a whole or,
+        after an error, not at all.
 
         Args:
             path: The file.
@@ -412,7 +414,11 @@ class Scene(SceneRandomization):
         """
         file = checks.path("save: path", path)
         kept = {model.name: keep_beside(file, model) for model in self.models.values()}
-        _core.save_scene(self._json(kept), str(file))
+        with whole_file(file, SceneError) as part:
+            try:
+                _core.save_scene(self._json(kept), str(part))
+            except SceneError as problem:
+                raise SceneError(str(problem).replace(str(part), str(file))) from None
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Scene:

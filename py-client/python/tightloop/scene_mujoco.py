@@ -16,6 +16,7 @@ from tightloop.errors import SceneError
 from tightloop.mujoco import export
 from tightloop.mujoco_model import MujocoModel
 from tightloop.shapes import ORIGIN, UPRIGHT
+from tightloop.whole_files import whole_file
 
 if TYPE_CHECKING:
     import mujoco
@@ -82,7 +83,8 @@ def keep_beside(scene_file: Path, model: MujocoModel) -> Path:
     try:
         folder.mkdir(exist_ok=True)
         if not (kept.exists() and kept.samefile(model.file)):
-            shutil.copyfile(model.file, kept)
+            with whole_file(kept) as part:
+                shutil.copyfile(model.file, part)
     except OSError as error:
         raise SceneError(f"save: model `{model.name}` cannot be written to {kept}: {error}") from error
     return kept

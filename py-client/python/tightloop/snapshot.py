@@ -6,7 +6,6 @@ A snapshot is a header of 40 bytes, then a record per world; `sim-core/engine/sr
 from __future__ import annotations
 
 import os
-import secrets
 import struct
 import tempfile
 import zlib
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 
 from tightloop import checks
 from tightloop.errors import SnapshotError
+from tightloop.whole_files import whole_file
 
 # magic, version, checksum, model hash, worlds, values per world, bytes per value; little endian
 _HEAD = struct.Struct("<8sIIQQII")
@@ -125,25 +125,8 @@ class Snapshot:
             SnapshotError: The file cannot be written; the message has the reason.
         """
         file = checks.path("snapshot: path", path, error=SnapshotError)
-        # the rename below would replace a device or a pipe by a file
-        if file.exists() and not (file.is_file() or file.is_dir()):
-            raise SnapshotError(f"{file}: is there and no file; give the path of one")
-        # keep a symbolic link, and replace its target
-        file = file.resolve()
-        part = file.with_name(f".tightloop-{secrets.token_hex(8)}")
-        try:
-            try:
-                with part.open("xb") as to:
-                    to.write(self._data)
-                    to.flush()
-                    # without it, a power cut may leave an empty file
-                    os.fsync(to.fileno())
-                part.replace(file)
-            except BaseException:
-                part.unlink(missing_ok=True)
-                raise
-        except OSError as problem:
-            raise SnapshotError(f"{file}: cannot be written: {problem.strerror}") from None
+        with whole_file(file, SnapshotError) as part:
+            part.write_bytes(self._data)
 
     def __repr__(self) -> str:
         return f"Snapshot(worlds={self.worlds}, precision={self.precision!r}, model_hash={self.model_hash:#018x})"

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from tightloop.demo.scenes import DemoScene
 from tightloop.errors import MissingLibrary
+from tightloop.whole_files import whole_file
 
 # Size of the pictures [pixels].
 _SIZE = (1280, 720)
@@ -113,7 +114,8 @@ def _draw(demo_scene: DemoScene, path: Path) -> None:
     body_q = sim.forward_kinematics(demo_scene.state())
     look = parts(sim.info["scene"], sim.info["scene_folder"], sim.body_names)
     picture = Picture(look, *_SIZE)
-    Image.fromarray(picture.render(Shown({"body_q": body_q}), goals=demo_scene.goals())).save(path)
+    with whole_file(path) as part:
+        Image.fromarray(picture.render(Shown({"body_q": body_q}), goals=demo_scene.goals())).save(part)
 
 
 class _Page:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from tightloop.errors import SceneError
 from tightloop.mujoco import textures
 from tightloop.optional_imports import optional_import
+from tightloop.whole_files import whole_file
 
 #: Version of the file; `sim-core/model/src/mujoco/format.rs` reads it.
 FORMAT = 1
@@ -173,6 +173,7 @@ def export(model: Any, path: str | os.PathLike[str]) -> None:
 
     Raises:
         SceneError: MuJoCo cannot compile the model.
+        OutputError: The file cannot be written.
         MissingLibrary: The package ``mujoco`` is not installed.
     """
     _save(arrays(compiled(model)), Path(path))
@@ -194,10 +195,7 @@ def cached(model: Any) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"{digest.hexdigest()[:32]}.safetensors"
         if not path.is_file():
-            # another process may write the same file
-            with tempfile.TemporaryDirectory(dir=folder) as temporary:
-                _save(found, Path(temporary) / path.name)
-                (Path(temporary) / path.name).replace(path)
+            _save(found, path)
     except OSError as error:
         raise SceneError(
             f"{folder}: the model cannot be kept there: {error}; set XDG_CACHE_HOME to a folder"
@@ -206,9 +204,11 @@ def cached(model: Any) -> Path:
 
 
 def _save(found: dict[str, NDArray[Any]], path: Path) -> None:
-    from safetensors.numpy import save_file
+    from safetensors.numpy import save
 
-    save_file(found, str(path))
+    # another process may write the same file
+    with whole_file(path) as part:
+        part.write_bytes(save(found))
 
 
 def _hulls(model: Any) -> dict[str, NDArray[Any]]:

@@ -15,12 +15,14 @@ def scene_file(path: str) -> str:
         SystemExit: The model cannot be read; the message says why.
     """
     from tightloop.scene import Scene
+    from tightloop.whole_files import whole_file
 
     with _said():
         scene = Scene.from_mujoco(path)
         (model,) = scene.models.values()
         file = Path(model.file).with_suffix(f".{model.name}.toml")
-        file.write_text(scene.to_toml())
+        with whole_file(file) as part:
+            part.write_text(scene.to_toml())
     return str(file)
 
 

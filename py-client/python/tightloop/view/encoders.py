@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Protocol
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from tightloop.errors import ArgumentError
 from tightloop.view import dependencies
+from tightloop.whole_files import WholeFile, whole_file
 
 Pixels = NDArray[np.uint8]
 
@@ -33,6 +35,10 @@ class Encoder(Protocol):
         """Finish the file."""
         ...
 
+    def discard(self) -> None:
+        """Leave no file; one that was there stays."""
+        ...
+
 
 class PngFile:
     """One PNG file of the first picture."""
@@ -45,11 +51,15 @@ class PngFile:
     def add(self, pixels: Pixels) -> None:
         """Write the first picture; ignore later ones."""
         if not self._done:
-            _image(pixels).save(self._path)
+            with whole_file(self._path) as part:
+                _image(pixels).save(part)
             self._done = True
 
     def close(self) -> None:
-        """Do nothing: each picture is already written."""
+        """Do nothing: the picture is already written."""
+
+    def discard(self) -> None:
+        """Do nothing: the picture is already written."""
 
 
 class PngFolder:
@@ -70,11 +80,16 @@ class PngFolder:
 
     def add(self, pixels: Pixels) -> None:
         """Write the next file."""
-        _image(pixels).save(self._folder / f"{self._count:0{_DIGITS}}.png")
+        # a wait for the disk after each picture would take longer than the picture
+        with whole_file(self._folder / f"{self._count:0{_DIGITS}}.png", durable=False) as part:
+            _image(pixels).save(part)
         self._count += 1
 
     def close(self) -> None:
         """Do nothing: each picture is already written."""
+
+    def discard(self) -> None:
+        """Do nothing: each picture is already written, and is whole."""
 
 
 class GifEncoder:
@@ -101,14 +116,18 @@ class GifEncoder:
         ends = [round(_GIF_TICKS * (number + 1) / self._fps) for number in range(len(self._images))]
         durations = np.diff([0, *ends]) * (1000 // _GIF_TICKS)
         first, *rest = self._images
-        first.save(
-            self._path,
-            save_all=True,
-            append_images=rest,
-            duration=[int(duration) for duration in durations],
-            loop=0,
-            optimize=False,
-        )
+        with whole_file(self._path) as part:
+            first.save(
+                part,
+                save_all=True,
+                append_images=rest,
+                duration=[int(duration) for duration in durations],
+                loop=0,
+                optimize=False,
+            )
+
+    def discard(self) -> None:
+        """Do nothing: nothing is written before `close`."""
 
 
 class Mp4Encoder:
@@ -124,8 +143,9 @@ class Mp4Encoder:
         dependencies.check("av")
         import av
 
+        self._file = WholeFile(path)
         # the index comes first, so that playback can start during download
-        self._container = av.open(str(path), "w", options={"movflags": "+faststart"})
+        self._container = av.open(str(self._file.part), "w", options={"movflags": "+faststart"})
         self._stream = self._container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
         self._stream.width, self._stream.height = size
         self._stream.pix_fmt = "yuv420p"
@@ -136,12 +156,21 @@ class Mp4Encoder:
         import av
 
         frame = av.VideoFrame.from_ndarray(pixels, format="rgb24")
-        self._container.mux(self._stream.encode(frame))
+        with self._file.writing():
+            self._container.mux(self._stream.encode(frame))
 
     def close(self) -> None:
         """Encode the remaining frames, and finish the file."""
-        self._container.mux(self._stream.encode(None))
-        self._container.close()
+        with self._file.writing():
+            self._container.mux(self._stream.encode(None))
+            self._container.close()
+        self._file.keep()
+
+    def discard(self) -> None:
+        """Remove what was encoded."""
+        with contextlib.suppress(OSError):
+            self._container.close()
+        self._file.discard()
 
 
 def _image(pixels: Pixels) -> Any:

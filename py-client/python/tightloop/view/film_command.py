@@ -27,7 +27,12 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     made.add_argument("source", metavar="NAME|FILE.tlrec", help="name of a daemon, or a recording")
-    made.add_argument("out", metavar="OUT", help="a .png, .gif, .mp4 or .html file, or a folder of PNG files")
+    made.add_argument(
+        "out",
+        metavar="OUT",
+        help="a .png, .gif, .mp4 or .html file, which replaces an existing one once it is complete, or a new folder "
+        "of PNG files",
+    )
     made.add_argument(
         "--at", type=float, metavar="SECONDS", help="start of the film, or time of a .png [s] (default 0)"
     )

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tightloop import checks
-from tightloop.errors import ArgumentError, WaitTimeout
+from tightloop.errors import ArgumentError, DaemonLost, WaitTimeout
 from tightloop.view import dependencies
 from tightloop.view.cameras import PRESETS, Camera
 from tightloop.view.display_options import Kind
@@ -18,9 +18,11 @@ from tightloop.view.encoders import Encoder, GifEncoder, Mp4Encoder, PngFile, Pn
 from tightloop.view.parts import parts
 from tightloop.view.picture import Picture
 from tightloop.view.source import Live, Recorded, Source, is_recording
+from tightloop.whole_files import place_of
 
 if TYPE_CHECKING:
     from tightloop.sim import Sim
+    from tightloop.view.html import Html
 
 #: Frame fields of a film.
 FIELDS = ("body_q", "contact_count", "contact_pos", "contact_force")
@@ -43,6 +45,9 @@ class Film:
     browser shows from all sides. A name without an ending is a folder of PNG files. The CPU draws ``fps`` pictures per
     second of the run.
 
+    The file appears, or replaces an existing one, when the film is complete: at `close`, or at the end of a ``with``
+    block without an error. After an error there is no film, and an existing file is unchanged.
+
     Attributes:
         pictures: Number of pictures so far.
 
@@ -61,6 +66,7 @@ class Film:
     Raises:
         ArgumentError: An argument is not valid; the message names it.
         MissingLibrary: The library for this kind of file is not installed.
+        OutputError: The file cannot be written.
     """
 
     def __init__(
@@ -90,7 +96,7 @@ class Film:
         self._period: float = info["dt"] * info["substeps"]
         self._camera, self._world, self._contacts = camera, world, contacts
         self._worlds = chosen_worlds(worlds, world, info["worlds"])
-        self._page: Any = None
+        self._page: Html | None = None
         self._encoder: Encoder | None = None
         seen = parts(info["scene"], info["scene_folder"], info["body_names"])
         #: Notes on what could not be drawn as in its file.
@@ -98,6 +104,8 @@ class Film:
         if isinstance(worlds, int) and worlds > len(self._worlds):
             self.notes.append(f"{worlds} worlds were asked for, and {len(self._worlds)} can be seen")
         self._picture = Picture(seen, *size, kind=kind)
+        if _ending(path) in _ENDINGS and not path.is_dir():
+            place_of(path)
         if _ending(path) == ".html":
             dependencies.check("viser")
             from tightloop.view.html import Html
@@ -151,17 +159,33 @@ class Film:
         self.pictures += more
 
     def close(self) -> None:
-        """Finish the file; a second call does nothing."""
-        for kept in (self._encoder, self._page):
-            if kept is not None:
-                kept.close()
-        self._encoder = self._page = None
+        """Finish the file; a second call does nothing.
+
+        Raises:
+            OutputError: The file cannot be written; one that was there is unchanged.
+        """
+        if (made := self._take()) is not None:
+            made.close()
+
+    def discard(self) -> None:
+        """Leave no film; a file that was there is unchanged. A folder keeps its pictures. After `close`, do nothing."""
+        if (made := self._take()) is not None:
+            made.discard()
 
     def __enter__(self) -> Film:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self.discard()
+
+    def _take(self) -> Encoder | Html | None:
+        """Return what is to be finished, once."""
+        made = self._page or self._encoder
+        self._page = self._encoder = None
+        return made
 
     def _reached(self, seconds: float) -> int:
         """Return the number of pictures of a film of this length, with one at each end."""
@@ -185,7 +209,7 @@ def film(
         source: Name of a daemon, a `Sim`, or path of a recording, which ends in ``.tlrec``.
         out: As of `Film`.
         seconds: Length [s]: wall-clock time of a daemon, 5 s if left out; simulated time of a recording, all if left
-            out.
+            out. The film is shorter if the daemon ends first; a note says so.
         at: Start of the film, or time of the picture, after the start of the recording [s]; of a daemon, from now.
         worlds: As of `Film`.
         world: As of `Film`.
@@ -200,6 +224,7 @@ def film(
         UnknownDaemon: No daemon of that name is running; the message lists those that are.
         RecordingError: The recording cannot be read.
         WaitTimeout: The daemon published no frame.
+        OutputError: The file cannot be written; one that was there is unchanged.
     """
     at = 0.0 if at is None else checks.number("film: at", at, least=0.0, error=ArgumentError)
     if seconds is not None:
@@ -251,8 +276,14 @@ def _watch(source: Live, made: Film, at: float, seconds: float, progress: Progre
     count = max(math.ceil(seconds / spacing - _SLACK), 1)
     while made.pictures < count:
         due = made.pictures
-        while (wait := began + due * spacing - time.monotonic()) > 0:
-            shown = source.poll(wait) or shown
+        try:
+            while (wait := began + due * spacing - time.monotonic()) > 0:
+                shown = source.poll(wait) or shown
+        except DaemonLost as lost:
+            if not made.pictures:
+                raise
+            made.notes.append(f"the film ends after {made.seconds:.3g} s: {lost}")
+            break
         # if drawing is too slow, pictures repeat and the film keeps real time
         late = int((time.monotonic() - began) / spacing)
         made.add(shown, min(max(due, late), count - 1) * spacing - made.seconds)

@@ -19,6 +19,7 @@ from tightloop.view.overlay import Overlay
 from tightloop.view.parts import Parts
 from tightloop.view.source import CONTACT_FIELDS
 from tightloop.view.world_meshes import WorldMeshes
+from tightloop.whole_files import whole_file
 
 # Aspect ratio assumed for the browser's window, which is not known yet.
 _ASPECT = 1.6
@@ -73,8 +74,15 @@ class Html:
 
     def close(self) -> None:
         """Write the file."""
-        if self._serializer is not None:
-            self._path.write_text(self._serializer.as_html(), encoding="utf-8")
+        try:
+            if self._serializer is not None:
+                with whole_file(self._path) as part:
+                    part.write_text(self._serializer.as_html(), encoding="utf-8")
+        finally:
+            self.discard()
+
+    def discard(self) -> None:
+        """Write nothing, and end the server."""
         with contextlib.redirect_stdout(io.StringIO()):
             self._server.stop()
 
