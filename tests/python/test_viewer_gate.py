@@ -6,10 +6,12 @@ import contextlib
 import http.client
 import http.server
 import io
+import os
 import socket
 import subprocess
 import sys
 import threading
+import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -204,6 +206,25 @@ def test_an_address_for_a_browsers_command_line_leads_to_the_page_once() -> None
     assert answer is not None and answer.status == 303 and answer.location == f"../{gate.token}/"
     again = gate.check(once, ["localhost"], [])
     assert again is not None and again.status == 403
+
+
+def test_the_command_line_of_a_browser_has_no_token(sim: tl.Sim, tmp_path: Path) -> None:
+    browser, opened = tmp_path / "browser", tmp_path / "opened"
+    browser.write_text(f'#!/bin/sh\nprintf %s "$*" > {opened}.new && mv {opened}.new {opened}\n')
+    browser.chmod(0o755)
+    command = [sys.executable, "-m", "tightloop", "view", sim.name, "--port=8380", "--open"]
+    env = os.environ | {"BROWSER": f"{browser} %s"}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=env) as viewer:
+        assert viewer.stdout is not None
+        served = Served(viewer.stdout.readline().strip())
+        assert wait_until(opened.exists, 60)
+        url = opened.read_text()
+        assert served.path not in url and urlsplit(url).port == served.port
+        with urllib.request.urlopen(url, timeout=60) as answer:
+            assert answer.url == served.url and b"<html" in answer.read()
+        assert served.get(urlsplit(url).path)[0] == 403
+        viewer.terminate()
+        assert viewer.wait(60) == 0
 
 
 @pytest.mark.parametrize("wrong", ["http://hub.example/", "hub.example:80", "", "a b", "[::1"])
