@@ -35,9 +35,13 @@ pub(crate) struct View {
     #[arg(long, default_value_t = 8080)]
     port: u16,
 
-    /// Address to listen on; 0.0.0.0 also lets other machines control the worlds.
+    /// Address to listen on; 0.0.0.0 is for other machines too, without encryption.
     #[arg(long, default_value = "127.0.0.1")]
     host: IpAddr,
+
+    /// Also answer to this host name, such as that of a proxy; can be repeated.
+    #[arg(long, value_name = "NAME")]
+    allow_host: Vec<String>,
 
     /// Most worlds to show, up to 1024.
     #[arg(long, default_value_t = 256)]
@@ -54,7 +58,8 @@ pub(crate) struct Film {
     #[arg(value_name = "NAME|FILE.tlrec")]
     source: PathBuf,
 
-    /// Output: a .png, .gif, .mp4 or .html file, or a folder of .png files.
+    /// Output: a .png, .gif, .mp4 or .html file, which replaces an existing one once it is complete, or a new folder
+    /// of .png files.
     out: PathBuf,
 
     /// Start of the film, or time of a .png [s].
