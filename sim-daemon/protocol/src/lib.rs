@@ -26,6 +26,7 @@
 //! [`Client`] is one end, [`host::Host`] the other. This crate alone uses iceoryx2.
 
 mod affinity;
+mod cgroup;
 mod client;
 mod command;
 mod connection;

@@ -1,9 +1,11 @@
 //! Shared memory of a daemon: how much it will take, whether that is there, and taking it for certain.
 
 use std::fs::{self, OpenOptions};
+use std::path::Path;
 
 use rustix::fs::{FallocateFlags, fallocate, statvfs};
 
+use crate::cgroup;
 use crate::command::command_bytes;
 use crate::paths::SHARED_MEMORY;
 use crate::transport::{COMMAND_SLOTS, frame_slots, watch_slots};
@@ -61,7 +63,7 @@ pub(crate) fn own_bytes(description: &Description) -> usize {
 pub(crate) struct Free {
     /// Of the file system that holds shared memory.
     shared: u64,
-    /// Of the machine and of our control group, whichever has less; shared memory counts there, too.
+    /// Of the machine and of our control groups, whichever has least; shared memory counts there, too.
     pub(crate) memory: u64,
 }
 
@@ -90,7 +92,6 @@ pub(crate) fn check(free: Free, shared: usize, own: u64, what: &str) -> Result<(
 
 /// What can be taken now.
 pub(crate) fn free() -> Free {
-    let number = |path: &str| fs::read_to_string(path).ok()?.trim().parse::<u64>().ok();
     let file_system = statvfs(SHARED_MEMORY).map_or(0, |status| status.f_bavail * status.f_frsize);
     let machine = fs::read_to_string("/proc/meminfo").ok().and_then(|text| {
         let line = text
@@ -98,11 +99,7 @@ pub(crate) fn free() -> Free {
             .find_map(|line| line.strip_prefix("MemAvailable:"))?;
         Some(line.trim().strip_suffix(" kB")?.parse::<u64>().ok()? * 1024)
     });
-    // "max" is no number, and no limit
-    let limit = number("/sys/fs/cgroup/memory.max");
-    let group = limit
-        .zip(number("/sys/fs/cgroup/memory.current"))
-        .map(|(limit, used)| limit.saturating_sub(used));
+    let group = cgroup::free_memory(Path::new("/"));
     Free {
         shared: file_system,
         memory: [machine, group]
