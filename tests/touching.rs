@@ -3,6 +3,7 @@
 mod common;
 
 use common::shapes::shapes;
+use common::stones::stones;
 use common::{Run, noise};
 use sim_engine::backend::{Values, cpu};
 use sim_engine::simulation::{Lanes, Options, Precision};
@@ -82,8 +83,13 @@ fn with(precision: Precision, lanes: Lanes, threads: usize) -> Options {
     }
 }
 
-fn models() -> [Arc<Model>; 2] {
-    [Cone::Elliptic, Cone::Pyramidal].map(|cone| shapes(cone).compile().unwrap())
+/// Shapes of every kind, and hulls of several clusters of vertices.
+fn models() -> Vec<Arc<Model>> {
+    let cones = [Cone::Elliptic, Cone::Pyramidal];
+    let scenes = cones
+        .into_iter()
+        .flat_map(|cone| [shapes(cone), stones(cone)]);
+    scenes.map(|scene| scene.compile().unwrap()).collect()
 }
 
 #[test]

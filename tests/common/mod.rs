@@ -13,6 +13,7 @@ pub mod played;
 pub mod program;
 pub mod recorded;
 pub mod shapes;
+pub mod stones;
 
 #[allow(unused_imports)] // as above
 pub use lesson_scene::{Demo, FRAMES, START, command, lesson};

@@ -73,14 +73,6 @@ pub fn every_kind(size: f64) -> [Shape; 5] {
         [0.5 * x, 0.5 * y, -z],
         [-0.5 * x, -0.5 * y, -z],
     ];
-    let hull = Mesh {
-        path: PathBuf::from("stone"),
-        scale: [1.0; 3],
-        triangles: solid(&corners),
-        closed: true,
-        hulls: vec![Hull::of(&corners, 64).unwrap()],
-        notes: Vec::new(),
-    };
     [
         Shape::Sphere { radius: size },
         Shape::Capsule {
@@ -94,8 +86,20 @@ pub fn every_kind(size: f64) -> [Shape; 5] {
             radius: 0.8 * size,
             half_height: 0.9 * size,
         },
-        Shape::Mesh(Arc::new(hull)),
+        stone(&corners),
     ]
+}
+
+/// A mesh that is the hull of some corners.
+pub fn stone(corners: &[[f64; 3]]) -> Shape {
+    Shape::Mesh(Arc::new(Mesh {
+        path: PathBuf::from("stone"),
+        scale: [1.0; 3],
+        triangles: solid(corners),
+        closed: true,
+        hulls: vec![Hull::of(corners, 64).unwrap()],
+        notes: Vec::new(),
+    }))
 }
 
 /// Triangles of the hull of some corners, counter-clockwise from outside.
