@@ -87,6 +87,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
         &[
             "joint_kind",
             "error",
+            "files",
             "pose",
             "value_checks",
             "inertia",
@@ -198,6 +199,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "affinity",
             "waiter",
             "command",
+            "cgroup",
             "memory",
             "loaned",
             "frame",

@@ -22,6 +22,7 @@ mod compile;
 mod description;
 mod distribution;
 mod error;
+pub mod files;
 mod geom_contact;
 pub mod geometry;
 pub mod hull_tables;

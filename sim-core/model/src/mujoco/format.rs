@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use safetensors::{Dtype, SafeTensors};
 
 use crate::error::ModelError;
+use crate::files::{self, FileError};
 
 /// Version of the file; `py-client/python/tightloop/mujoco/export.py` writes it.
 const FORMAT: i64 = 1;
@@ -43,14 +44,10 @@ impl ModelFile {
             path: path.to_owned(),
             reason,
         };
-        let unread = |error: std::io::Error| ModelError::File {
-            path: path.to_owned(),
-            reason: error.to_string(),
-        };
-        if std::fs::metadata(path).map_err(unread)?.len() > FILE_MAX {
-            return Err(fault("is larger than 2 GiB".to_owned()));
-        }
-        let bytes = std::fs::read(path).map_err(unread)?;
+        let bytes = files::read(path, FILE_MAX).map_err(|error| match error {
+            FileError::TooLarge { .. } => fault("is larger than 2 GiB".to_owned()),
+            error => error.of(path),
+        })?;
         let tensors = SafeTensors::deserialize(&bytes)
             .map_err(|error| fault(format!("is no exported MuJoCo model: {error}")))?;
         let mut arrays = HashMap::new();

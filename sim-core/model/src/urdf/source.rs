@@ -5,12 +5,11 @@
 //! place. What would cost the parser too much time or memory is refused.
 
 use std::borrow::Cow;
-use std::fs::File;
-use std::io::Read as _;
 use std::path::Path;
 
 use super::markup::{ATTRIBUTES_OF_ONE_MAX, Markup, starts_with};
 use crate::error::ModelError;
+use crate::files::{self, FileError};
 
 /// Largest file [bytes]: published robots have some hundred kilobytes.
 const FILE_MAX: usize = 16 << 20;
@@ -26,25 +25,11 @@ const NAMESPACES_MAX: usize = 64;
 /// # Errors
 /// A path that is no file or cannot be read, and a file that is too large or in UTF-16 or UTF-32.
 pub(super) fn read(path: &Path, notes: &mut Vec<String>) -> Result<String, ModelError> {
-    let metadata = std::fs::metadata(path).map_err(|error| fault(path, error.to_string()))?;
-    // a pipe or a device may never end
-    if !metadata.is_file() {
-        return Err(fault(path, "it is not a file".to_owned()));
-    }
-    let mut bytes = Vec::new();
-    let file = File::open(path).map_err(|error| fault(path, error.to_string()))?;
-    file.take(FILE_MAX as u64 + 1)
-        .read_to_end(&mut bytes)
-        .map_err(|error| fault(path, error.to_string()))?;
-    too_large(path, bytes.len())?;
+    let bytes = files::read(path, FILE_MAX as u64).map_err(|error| match error {
+        FileError::TooLarge { .. } => size_limit(path),
+        error => error.of(path),
+    })?;
     decode(bytes, path, notes)
-}
-
-fn fault(path: &Path, reason: String) -> ModelError {
-    ModelError::File {
-        path: path.to_owned(),
-        reason,
-    }
 }
 
 fn limit(path: &Path, what: &'static str, limit: String) -> ModelError {
@@ -55,12 +40,9 @@ fn limit(path: &Path, what: &'static str, limit: String) -> ModelError {
     }
 }
 
-fn too_large(path: &Path, bytes: usize) -> Result<(), ModelError> {
-    if bytes > FILE_MAX {
-        let most = format!("{} MiB", FILE_MAX >> 20);
-        return Err(limit(path, "the size of the file", most));
-    }
-    Ok(())
+fn size_limit(path: &Path) -> ModelError {
+    let most = format!("{} MiB", FILE_MAX >> 20);
+    limit(path, "the size of the file", most)
 }
 
 /// UTF-8, or else Latin-1. Outside of names and comments URDF is ASCII, so other old encodings read almost the same.
@@ -103,7 +85,9 @@ pub(super) fn prepare<'a>(
     path: &Path,
     notes: &mut Vec<String>,
 ) -> Result<Cow<'a, str>, ModelError> {
-    too_large(path, text.len())?;
+    if text.len() > FILE_MAX {
+        return Err(size_limit(path));
+    }
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let text = text.trim_end_matches(|c: char| c == '\0' || c.is_ascii_whitespace());
     let refuse = |at: usize, reason: String| ModelError::Xml {

@@ -20,11 +20,10 @@ mod raw;
 mod scene;
 mod stl;
 
-use std::fs::File;
-use std::io::Read as _;
 use std::path::Path;
 
 use super::trimesh::TriMesh;
+use crate::files::{self, FileError};
 pub(super) use raw::{Material, RawMesh, Run, Uv};
 
 /// Largest file [bytes].
@@ -154,24 +153,10 @@ fn format_of(path: &Path) -> Result<Format, String> {
 
 /// The bytes of a regular file, up to a limit.
 fn bytes_of(path: &Path, most: u64) -> Result<Vec<u8>, String> {
-    let unreadable = |error: std::io::Error| format!("cannot be read: {error}");
-    let metadata = std::fs::metadata(path).map_err(unreadable)?;
-    // a pipe or a device may never end
-    if !metadata.is_file() {
-        return Err("it is not a file".to_owned());
-    }
-    let mut bytes = Vec::new();
-    let file = File::open(path).map_err(unreadable)?;
-    file.take(most + 1)
-        .read_to_end(&mut bytes)
-        .map_err(unreadable)?;
-    if bytes.len() as u64 > most {
-        return Err(format!(
-            "it is larger than the limit of {} MiB; simplify the mesh",
-            most >> 20
-        ));
-    }
-    Ok(bytes)
+    files::read(path, most).map_err(|error| match error {
+        FileError::TooLarge { .. } => format!("{error}; simplify the mesh"),
+        error => error.to_string(),
+    })
 }
 
 /// Lines of a text, whether they end as on Unix, Windows or the old Macintosh.

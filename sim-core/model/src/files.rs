@@ -1,0 +1,129 @@
+//! Files that somebody names: opened only where they are files, and read up to a limit.
+//!
+//! A pipe may be waited for without end, and a device may have no end.
+
+use std::fs::{File, OpenOptions};
+use std::io::Read as _;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::Path;
+
+use rustix::fs::OFlags;
+
+use crate::error::ModelError;
+
+/// Why a file is not read.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// What the operating system said.
+    #[error("cannot be read: {0}")]
+    Read(#[from] std::io::Error),
+    /// A folder, a pipe, a socket or a device.
+    #[error("it is not a file")]
+    NotAFile,
+    /// More bytes than anybody needs.
+    #[error("it is larger than the limit of {} MiB", limit >> 20)]
+    TooLarge {
+        /// Most bytes that are read.
+        limit: u64,
+    },
+}
+
+impl FileError {
+    /// What is wrong, for a message that says itself that the file cannot be read.
+    pub fn reason(&self) -> String {
+        match self {
+            FileError::Read(problem) => problem.to_string(),
+            other => other.to_string(),
+        }
+    }
+
+    /// As the error of a robot's or a model's file.
+    pub(crate) fn of(&self, path: &Path) -> ModelError {
+        ModelError::File {
+            path: path.to_owned(),
+            reason: self.reason(),
+        }
+    }
+}
+
+/// Opens a file to read; waits for nobody.
+///
+/// # Errors
+/// What the system says; [`FileError::NotAFile`].
+pub fn open(path: &Path) -> Result<File, FileError> {
+    // a pipe without a writer would be waited for, and a terminal would become that of this process
+    let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
+    let file = OpenOptions::new()
+        .read(true)
+        .custom_flags(flags.bits() as i32)
+        .open(path)?;
+    match file.metadata()?.is_file() {
+        true => Ok(file),
+        false => Err(FileError::NotAFile),
+    }
+}
+
+/// The bytes of a file of at most `limit` of them.
+///
+/// # Errors
+/// As [`open`], and [`FileError::TooLarge`].
+pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, FileError> {
+    let file = open(path)?;
+    let length = file.metadata()?.len();
+    // a file that is too large is not read to find out
+    if length > limit {
+        return Err(FileError::TooLarge { limit });
+    }
+    let mut bytes = Vec::with_capacity(length as usize);
+    // it may grow meanwhile, and files of the system have no length
+    file.take(limit + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
+        return Err(FileError::TooLarge { limit });
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_files_up_to_a_limit_are_read_and_nobody_is_waited_for() {
+        let folder = std::env::temp_dir().join(format!("tightloop-files-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let (pipe, file) = (folder.join("pipe"), folder.join("file"));
+        rustix::fs::mknodat(
+            rustix::fs::CWD,
+            &pipe,
+            rustix::fs::FileType::Fifo,
+            rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR,
+            0,
+        )
+        .unwrap();
+        std::fs::write(&file, [7; 100]).unwrap();
+        for path in [
+            &pipe,
+            &folder,
+            Path::new("/dev/zero"),
+            Path::new("/dev/null"),
+        ] {
+            let read = read(path, 1 << 20);
+            assert!(
+                matches!(read, Err(FileError::NotAFile)),
+                "{path:?}: {read:?}"
+            );
+        }
+        assert_eq!(read(&file, 100).unwrap(), [7; 100]);
+        let read_less = read(&file, 99);
+        assert!(matches!(read_less, Err(FileError::TooLarge { limit: 99 })));
+        let missing = read(&folder.join("nothing"), 1).unwrap_err();
+        assert!(missing.to_string().contains("No such file"), "{missing}");
+        // a file of the system says that it has no bytes
+        assert!(
+            !read(Path::new("/proc/self/maps"), 1 << 30)
+                .unwrap()
+                .is_empty()
+        );
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+}
