@@ -92,7 +92,8 @@ pub(crate) enum CliCommand {
 /// Arguments of `serve` as given; `session` checks them.
 #[derive(Debug, Args)]
 pub(crate) struct Serve {
-    /// Scene file in TOML; `-` reads standard input, with paths relative to the working folder.
+    /// Scene file in TOML, or with the Python package an MJCF file that ends in .xml; `-` reads standard input, with paths
+    /// relative to the working folder.
     pub(crate) scene: PathBuf,
 
     /// Number of worlds.
@@ -213,7 +214,8 @@ pub(crate) struct Replay {
 /// Arguments of `bench` as given; `bench` checks them.
 #[derive(Debug, Args)]
 pub(crate) struct Bench {
-    /// Scene file in TOML; `-` reads standard input, with paths relative to the working folder.
+    /// Scene file in TOML, or with the Python package an MJCF file that ends in .xml; `-` reads standard input, with paths
+    /// relative to the working folder.
     pub(crate) scene: PathBuf,
 
     /// Number of worlds.

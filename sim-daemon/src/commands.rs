@@ -7,7 +7,7 @@ use sim_protocol::{AttachOptions, Client, keep_waiting};
 
 use crate::cli::{self, CliCommand};
 use crate::error::DaemonError;
-use crate::{bench, devices, inspect, recording, session};
+use crate::{bench, devices, inspect, output, recording, session};
 
 /// Runs a command line; the exit code is 0 done, 1 failed, 2 misused.
 pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
@@ -41,13 +41,9 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
 }
 
 fn list() -> Result<(), DaemonError> {
-    for name in sim_protocol::running(None)? {
-        // whoever reads our list may stop reading
-        if writeln!(std::io::stdout(), "{name}").is_err() {
-            break;
-        }
-    }
-    Ok(())
+    let names = sim_protocol::running(None)?;
+    let lines: String = names.iter().map(|name| format!("{name}\n")).collect();
+    output::print(lines.as_bytes()).map_err(DaemonError::stdout)
 }
 
 fn stop(name: &str) -> Result<(), DaemonError> {

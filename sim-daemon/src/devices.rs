@@ -1,31 +1,21 @@
 //! `tightloop devices`: the GPUs of this machine, and what fits on each.
 
-use std::io::Write;
-
 use sim_engine::options::{AdapterInfo, adapters};
 
 use crate::error::DaemonError;
+use crate::output;
 
 /// Numbers that a world of the lesson's grasp keeps on a GPU, about: an arm of 9 dofs, a cube and a table [–].
 const NUMBERS: u64 = 16_000;
 
 /// Prints a line an adapter.
 pub(crate) fn run() -> Result<(), DaemonError> {
-    let mut out = std::io::stdout();
-    let found = adapters();
-    if found.is_empty() {
-        let _ = writeln!(
-            out,
-            "no GPU: no Vulkan driver shows one (a software one: apt-get install mesa-vulkan-drivers libvulkan1)"
-        );
+    let mut lines: Vec<String> = adapters().iter().map(line).collect();
+    if lines.is_empty() {
+        lines.push("no GPU: no Vulkan driver shows one (a software one: apt-get install mesa-vulkan-drivers libvulkan1)".to_owned());
     }
-    for info in found {
-        // whoever reads our list may stop reading
-        if writeln!(out, "{}", line(&info)).is_err() {
-            break;
-        }
-    }
-    Ok(())
+    lines.push(String::new());
+    output::print(lines.join("\n").as_bytes()).map_err(DaemonError::stdout)
 }
 
 fn line(info: &AdapterInfo) -> String {

@@ -145,6 +145,14 @@ pub enum DaemonError {
 }
 
 impl DaemonError {
+    /// Standard output cannot be written.
+    pub(crate) fn stdout(error: std::io::Error) -> DaemonError {
+        DaemonError::System {
+            action: "write to standard output",
+            problem: error.to_string(),
+        }
+    }
+
     /// Class of the error, for programs: the name of the Python exception.
     pub fn kind(&self) -> &'static str {
         use DaemonError::*;

@@ -17,6 +17,8 @@ mod groups;
 mod inspect;
 mod log;
 pub mod observe;
+mod output;
+mod printer;
 mod recording;
 mod refusal;
 mod server;

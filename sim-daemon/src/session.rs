@@ -187,6 +187,14 @@ fn open(serve: &Serve) -> Result<Opened, DaemonError> {
         let problem = "a name with a number after a dot is that of a group";
         return Err(ProtocolError::BadName { name, problem }.into());
     }
+    // clients get it as text
+    if paths.root().to_str().is_none() {
+        let path = paths.root().to_owned();
+        let problem = "its path is not UTF-8".to_owned();
+        // it was made a moment ago, if it is empty
+        let _ = std::fs::remove_dir(&path);
+        return Err(ProtocolError::Root { path, problem }.into());
+    }
     sim_protocol::sweep(None)?;
     let daemon_lock = DaemonLock::take(&paths)?;
     let (daemon, locks) = match count {
@@ -407,13 +415,19 @@ pub(crate) fn read_scene(path: &Path) -> Result<(SceneFile, PathBuf), DaemonErro
         std::fs::canonicalize(here).unwrap_or_else(|_| here.to_owned())
     };
     if path == Path::new("-") {
+        let failed = |problem: String| DaemonError::Read {
+            name: "on standard input".to_owned(),
+            problem,
+        };
         let mut text = String::new();
         std::io::stdin()
+            .take(config::SCENE_MAX + 1)
             .read_to_string(&mut text)
-            .map_err(|error| DaemonError::Read {
-                name: "on standard input".to_owned(),
-                problem: error.to_string(),
-            })?;
+            .map_err(|error| failed(error.to_string()))?;
+        if text.len() as u64 > config::SCENE_MAX {
+            let most = config::SCENE_MAX >> 20;
+            return Err(failed(format!("it is larger than the limit of {most} MiB")));
+        }
         return Ok((
             config::parse(&text, "standard input")?,
             folder(Path::new("")),

@@ -5,6 +5,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
 
 use sim_engine::simulation::Simulation;
+use sim_model::files::{self, FileError};
 use sim_protocol::RefusalKind;
 use sim_protocol::host::{Inbox, free_memory};
 
@@ -78,11 +79,10 @@ pub(crate) fn restore(
 /// The bytes of a file.
 fn read(path: &Path) -> Result<Vec<u8>, String> {
     let failed = |problem: std::io::Error| format!("cannot be read: {problem}");
-    // a pipe would be waited for, and a device has no end
-    if !fs::metadata(path).map_err(failed)?.is_file() {
-        return Err("is no file; give the file of a snapshot".to_owned());
-    }
-    let file = File::open(path).map_err(failed)?;
+    let file = files::open(path).map_err(|error| match error {
+        FileError::NotAFile => "is no file; give the file of a snapshot".to_owned(),
+        error => error.to_string(),
+    })?;
     let length = file.metadata().map_err(failed)?.len();
     check_room(length)?;
     let mut bytes = Vec::with_capacity(length as usize);

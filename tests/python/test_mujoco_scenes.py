@@ -113,6 +113,14 @@ def test_a_model_is_served_from_the_command_line(tmp_path):
     assert failed.returncode == 1 and "MuJoCo cannot compile it" in failed.stderr
 
 
+def test_a_model_is_measured_from_the_command_line(tmp_path):
+    path = tmp_path / "cart.xml"
+    path.write_text(CART)
+    command = [sys.executable, "-m", "tightloop", "bench", str(path), "--worlds=3", "--settle=0", "--seconds=0.01"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "3 worlds" in done.stdout, done.stderr
+
+
 def test_models_stand_beside_robots_and_bodies(model):
     scene = tl.Scene.from_mujoco(model)
     scene.add_body(name="cube", pos=(0, 0, 1.19))

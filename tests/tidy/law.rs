@@ -213,8 +213,10 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "sim-daemon/src",
         &[
+            "output",
             "config",
             "error",
+            "printer",
             "cli",
             "environment",
             "devices",

@@ -34,7 +34,7 @@ def main() -> int:
     from tightloop import _core
 
     arguments = sys.argv[1:]
-    if arguments[:1] == ["serve"]:
+    if arguments[:1] in (["serve"], ["bench"]):
         arguments = [_scene_file(argument) for argument in arguments]
     if arguments[:1] == ["inspect"]:
         arguments = _with_compiled(arguments)

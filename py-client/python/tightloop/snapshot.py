@@ -6,6 +6,7 @@ A snapshot is a header of 40 bytes, then a record per world; `sim-core/engine/sr
 from __future__ import annotations
 
 import os
+import stat
 import struct
 import tempfile
 import zlib
@@ -26,6 +27,8 @@ _HEAD = struct.Struct("<8sIIQQII")
 _MAGIC, _VERSION = b"tlsnap\r\n", 1
 # offset of the checksum; offset from which it covers the bytes; bytes of a world's counters, which precede its values
 _CHECKSUM, _COVERED, _COUNTERS = 12, 16, 28
+# largest file that is read: a million worlds of the largest robots have less
+_BYTES_MAX = 1 << 36
 _SHARED_MEMORY = Path("/dev/shm")
 
 
@@ -67,11 +70,12 @@ class Snapshot:
             path: The file.
 
         Raises:
-            SnapshotError: The file cannot be read, is no snapshot, or is of another version, truncated or damaged.
+            SnapshotError: The file cannot be read, is larger than 64 GiB, is no snapshot, or is of another version,
+                truncated or damaged.
         """
         file = checks.path("snapshot: path", path, error=SnapshotError)
         try:
-            data = file.read_bytes()
+            data = _read(file)
         except OSError as problem:
             raise SnapshotError(f"{file}: cannot be read: {problem.strerror}") from None
         return cls(data, str(file))
@@ -147,6 +151,19 @@ def transfer_file() -> Iterator[Path]:
         raise SnapshotError(f"snapshot: no room on its way to the daemon: {problem}") from None
     with folder as path:
         yield Path(path) / "snapshot"
+
+
+def _read(file: Path) -> bytes:
+    """Return the bytes of a regular file that begins as a snapshot does, or the beginning of another one."""
+    # a pipe without a writer would be waited for
+    with open(file, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK | os.O_NOCTTY)) as source:
+        found = os.fstat(source.fileno())
+        if not stat.S_ISREG(found.st_mode):
+            raise SnapshotError(f"{file}: is no file; give the file of a snapshot")
+        if found.st_size > _BYTES_MAX:
+            raise SnapshotError(f"{file}: is larger than the limit of {_BYTES_MAX >> 30} GiB; give a snapshot")
+        head = source.read(_HEAD.size)
+        return head + source.read(found.st_size) if head.startswith(_MAGIC) else head
 
 
 def _check(data: bytes, origin: str) -> tuple[int, int, int]:

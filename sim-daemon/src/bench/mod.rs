@@ -109,8 +109,7 @@ pub(crate) fn run(args: &Bench) -> Result<(), DaemonError> {
         faulted: having(sim_physics::arrays::status::FROZEN),
         unconverged: having(sim_physics::arrays::status::NOT_CONVERGED),
     };
-    report::print(&measured, args.json);
-    Ok(())
+    report::print(&measured, args.json)
 }
 
 /// The arguments, checked.

@@ -1,20 +1,19 @@
 //! What a benchmark prints.
 
-use std::io::Write;
-
 use serde_json::{Value, json};
 use sim_engine::simulation::Histogram;
 
 use super::Measured;
+use crate::error::DaemonError;
+use crate::output;
 
 /// Prints the report, as tables or as JSON.
-pub(super) fn print(measured: &Measured, as_json: bool) {
+pub(super) fn print(measured: &Measured, as_json: bool) -> Result<(), DaemonError> {
     let text = match as_json {
         true => format!("{:#}\n", json_of(measured)),
         false => text(measured),
     };
-    // whoever reads it may stop reading
-    let _ = std::io::stdout().write_all(text.as_bytes());
+    output::print(text.as_bytes()).map_err(DaemonError::stdout)
 }
 
 /// The histograms, with what they count.

@@ -1,11 +1,12 @@
 //! What the command line says of itself to shells and to `man`.
 
-use std::io::Write;
+use std::fs;
 use std::path::Path;
 
 use clap::{Command, ValueEnum};
 
 use crate::error::DaemonError;
+use crate::output;
 
 /// A shell that completes command lines.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -24,9 +25,7 @@ pub(super) fn completions(mut command: Command, shell: Shell) -> Result<(), Daem
     };
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut command, "tightloop", &mut script);
-    // whoever reads it may stop reading
-    let _ = std::io::stdout().write_all(&script);
-    Ok(())
+    output::print(&script).map_err(DaemonError::stdout)
 }
 
 /// Prints the manual page of the program, or writes it and those of its commands into a folder.
@@ -41,13 +40,22 @@ pub(super) fn man(command: Command, folder: Option<&Path>) -> Result<(), DaemonE
         clap_mangen::Man::new(command)
             .render(&mut page)
             .expect("memory takes every page");
-        let _ = std::io::stdout().write_all(&page);
-        return Ok(());
+        return output::print(&page).map_err(DaemonError::stdout);
     };
-    std::fs::create_dir_all(folder)
-        .and_then(|()| clap_mangen::generate_to(command, folder))
-        .map_err(|error| DaemonError::Pages {
-            folder: folder.to_owned(),
-            problem: error.to_string(),
-        })
+    write_pages(command, folder).map_err(|error| DaemonError::Pages {
+        folder: folder.to_owned(),
+        problem: error.to_string(),
+    })
+}
+
+/// Writes all pages beside their places, and renames them once all are complete.
+fn write_pages(command: Command, folder: &Path) -> std::io::Result<()> {
+    fs::create_dir_all(folder)?;
+    let part = output::beside(&folder.join("pages"));
+    fs::create_dir(&part)?;
+    let rename = |entry: fs::DirEntry| fs::rename(entry.path(), folder.join(entry.file_name()));
+    let written = clap_mangen::generate_to(command, &part)
+        .and_then(|()| fs::read_dir(&part)?.try_for_each(|entry| rename(entry?)));
+    let _ = fs::remove_dir_all(&part);
+    written
 }

@@ -27,6 +27,7 @@ pub use parts::Parts;
 pub(crate) use parts::hull_sides;
 pub use randomize::{DistributionTable, ParamTable, RandomizeTable};
 pub use robots::{ModeName, RobotTable};
+pub(crate) use scene::SCENE_MAX;
 pub use scene::{ConeName, SceneFile, SolverTable, load, parse};
 pub use sensors::{ContactSensorTable, SiteTable};
 pub use shapes::{ShapeName, ShapeTable};

@@ -1,9 +1,11 @@
 //! Scene files: what they hold, and the description that this stands for.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use sim_engine::dynamics::Dynamics;
+use sim_model::files;
 use sim_model::{Cone, Description, Solver};
 
 use super::bodies::BodyTable;
@@ -15,6 +17,17 @@ use super::randomize::{RandomizeTable, param};
 use super::robots::RobotTable;
 use super::sensors::{ContactSensorTable, SiteTable};
 use super::shapes::ShapeTable;
+use crate::output;
+
+/// Largest scene file [bytes]: a hundred thousand shapes have some ten megabytes.
+pub(crate) const SCENE_MAX: u64 = 32 << 20;
+/// Longest line of a message: the list of all entries that a table may have has some hundred bytes.
+const LINE_MAX: usize = 1000;
+
+/// What is said of a robot file in place of a scene.
+const XML: &str = "this is XML and not a scene; name a URDF file in a scene file (dt = 0.002, substeps = 4, [[robot]], \
+                   name = \"arm\", urdf = \"robot.urdf\"), or give an MJCF file that ends in .xml to the command of the \
+                   Python package";
 
 /// A scene as a file holds it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -120,11 +133,12 @@ pub enum ConeName {
 /// # Errors
 /// A file that is missing or not TOML, or an entry that is unknown or of a wrong type, with its line.
 pub fn load(path: &Path) -> Result<SceneFile, ConfigError> {
-    let fault = |error: std::io::Error| ConfigError::Read {
+    let fault = |reason: String| ConfigError::Read {
         path: path.to_owned(),
-        reason: error.to_string(),
+        reason,
     };
-    let text = std::fs::read_to_string(path).map_err(fault)?;
+    let bytes = files::read(path, SCENE_MAX).map_err(|error| fault(error.reason()))?;
+    let text = String::from_utf8(bytes).map_err(|_| fault("it is not UTF-8 text".to_owned()))?;
     parse(&text, &path.display().to_string())
 }
 
@@ -133,14 +147,36 @@ pub fn load(path: &Path) -> Result<SceneFile, ConfigError> {
 /// # Errors
 /// Text that is not TOML, or an entry that is unknown or of a wrong type, with its line.
 pub fn parse(text: &str, place: &str) -> Result<SceneFile, ConfigError> {
-    toml::from_str(text).map_err(|error| syntax(place, error.to_string()))
+    if text.trim_start().starts_with('<') {
+        return Err(syntax(place, XML));
+    }
+    toml::from_str(text).map_err(|error| syntax(place, &error.to_string()))
 }
 
-fn syntax(place: &str, reason: String) -> ConfigError {
+fn syntax(place: &str, reason: &str) -> ConfigError {
+    // a parser quotes whole lines and names, which may be all of a file
+    let lines: Vec<_> = reason.trim_end().lines().map(shortened).collect();
     ConfigError::Syntax {
         place: place.to_owned(),
-        reason: reason.trim_end().to_owned(),
+        reason: lines.join("\n"),
     }
+}
+
+/// A line without its middle, where it is long.
+fn shortened(line: &str) -> Cow<'_, str> {
+    if line.len() <= LINE_MAX {
+        return line.into();
+    }
+    let (head, tail) = (
+        line.floor_char_boundary(LINE_MAX / 2),
+        line.ceil_char_boundary(line.len() - LINE_MAX / 2),
+    );
+    format!(
+        "{} … {}",
+        line[..head].trim_end(),
+        line[tail..].trim_start()
+    )
+    .into()
 }
 
 impl SceneFile {
@@ -170,7 +206,7 @@ impl SceneFile {
     /// # Errors
     /// Text that is not JSON, or an entry that is unknown or of a wrong type, with its place.
     pub fn from_json(text: &str) -> Result<SceneFile, ConfigError> {
-        serde_json::from_str(text).map_err(|error| syntax("scene", error.to_string()))
+        serde_json::from_str(text).map_err(|error| syntax("scene", &error.to_string()))
     }
 
     /// Writes the scene as TOML, with paths made relative to that file; so far they are relative to `base_dir`.
@@ -195,7 +231,7 @@ impl SceneFile {
         {
             *path = paths::relative_to(folder, &base_dir.join(&*path));
         }
-        std::fs::write(path, scene.to_toml()).map_err(|error| ConfigError::Write {
+        output::write(path, scene.to_toml().as_bytes()).map_err(|error| ConfigError::Write {
             path: path.to_owned(),
             reason: error.to_string(),
         })

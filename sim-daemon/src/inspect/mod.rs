@@ -11,7 +11,6 @@ mod text;
 mod tree;
 mod wrap;
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
@@ -22,6 +21,7 @@ use sim_model::{ModelError, MujocoContents, Pose, Robot, Shape};
 use crate::cli::Inspect;
 use crate::config::hull_sides;
 use crate::error::DaemonError;
+use crate::output;
 use picture::Drawing;
 use properties::Properties;
 
@@ -89,19 +89,18 @@ pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
         }
         (false, _, _) => report(),
     };
-    say(&said);
-    drawn
+    let printed = say(&said);
+    drawn.and(printed)
 }
 
-fn say(said: &str) {
-    // whoever reads us may stop reading
-    let _ = std::io::stdout().write_all(said.as_bytes());
+fn say(said: &str) -> Result<(), DaemonError> {
+    output::print(said.as_bytes()).map_err(DaemonError::stdout)
 }
 
 /// Reports a model that cannot run.
 fn refused(args: &Inspect, contents: &MujocoContents, name: &str) -> DaemonError {
     let file = &args.file;
-    say(&match args.json {
+    let said = match args.json {
         true => {
             let (file, own) = (file.to_string_lossy(), mujoco::json(contents));
             let document = json!({ "name": name, "file": file, "mujoco": own });
@@ -111,11 +110,11 @@ fn refused(args: &Inspect, contents: &MujocoContents, name: &str) -> DaemonError
             let head = mujoco::head(contents, name, file);
             format!("{head}\n{}", mujoco::refused(contents))
         }
-    });
-    DaemonError::Refused {
+    };
+    say(&said).err().unwrap_or_else(|| DaemonError::Refused {
         path: file.clone(),
         count: contents.refused.len(),
-    }
+    })
 }
 
 fn failed(path: &Path, problem: String) -> DaemonError {

@@ -1,10 +1,12 @@
 //! PNG files.
 
-use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
+use sim_model::files;
+
 use super::canvas::Canvas;
+use crate::output;
 
 /// What our files say of themselves.
 const SOFTWARE: &str = "tightloop inspect";
@@ -14,8 +16,8 @@ const HEAD: u64 = 512;
 /// Whether a file is a picture of ours, which may be written anew.
 pub(crate) fn is_ours(path: &Path) -> bool {
     let mut head = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
-    read.is_ok() && contains(&head, b"\x89PNG") && contains(&head, SOFTWARE.as_bytes())
+    let read = files::open(path).map(|file| file.take(HEAD).read_to_end(&mut head));
+    matches!(read, Ok(Ok(_))) && contains(&head, b"\x89PNG") && contains(&head, SOFTWARE.as_bytes())
 }
 
 fn contains(bytes: &[u8], part: &[u8]) -> bool {
@@ -28,7 +30,7 @@ fn contains(bytes: &[u8], part: &[u8]) -> bool {
 /// What the system says.
 pub(crate) fn write(canvas: &Canvas, path: &Path) -> std::io::Result<()> {
     let bytes = encode(canvas).map_err(std::io::Error::other)?;
-    std::fs::write(path, bytes)
+    output::write(path, &bytes)
 }
 
 fn encode(canvas: &Canvas) -> Result<Vec<u8>, png::EncodingError> {

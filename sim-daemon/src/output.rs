@@ -1,0 +1,127 @@
+//! What a command writes: files that a user names, whole or not at all, and results on standard output.
+
+use std::fs::{self, File, OpenOptions};
+use std::hash::{BuildHasher, Hasher, RandomState};
+use std::io::{self, ErrorKind, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+
+/// Writes a file beside its place and renames it, so that a full disk leaves what was there before.
+///
+/// A link stays and its target is replaced. A device or a pipe is written to.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    if fs::metadata(path).is_ok_and(|there| !there.is_file()) {
+        return open(path, OpenOptions::new().write(true))?.write_all(bytes);
+    }
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let part = beside(&target);
+    let write = || {
+        let mut file = File::create_new(&part)?;
+        file.write_all(bytes)?;
+        if let Ok(there) = fs::metadata(&target) {
+            file.set_permissions(there.permissions())?;
+        }
+        // or a power cut might leave the name with nothing behind it
+        file.sync_all()?;
+        fs::rename(&part, &target)
+    };
+    write().inspect_err(|_| {
+        let _ = fs::remove_file(&part);
+    })
+}
+
+/// A path in the same folder, of a name that nobody else has.
+pub(crate) fn beside(path: &Path) -> PathBuf {
+    let number = RandomState::new().build_hasher().finish();
+    path.with_file_name(format!(".tightloop-{number:016x}"))
+}
+
+/// Opens what is written piece by piece; a pipe without a reader is an error, and not waited for.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn open(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
+    let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
+    let file = options.custom_flags(flags.bits() as i32).open(path)?;
+    // writes to a slow reader do wait
+    fcntl_setfl(&file, fcntl_getfl(&file)? - OFlags::NONBLOCK)?;
+    Ok(file)
+}
+
+/// Prints a result. Whoever reads it may stop reading.
+///
+/// # Errors
+/// What the system says, such as that the disk behind standard output is full.
+pub(crate) fn print(text: &[u8]) -> io::Result<()> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(text).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+
+    use super::*;
+
+    struct Folder(PathBuf);
+
+    impl Folder {
+        fn new(test: &str) -> Folder {
+            let name = format!("tightloop-output-{test}-{}", std::process::id());
+            let path = std::env::temp_dir().join(name);
+            fs::create_dir_all(&path).unwrap();
+            Folder(path)
+        }
+
+        fn names(&self) -> Vec<String> {
+            let entries = fs::read_dir(&self.0).unwrap();
+            let mut names: Vec<_> = entries
+                .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+                .collect();
+            names.sort();
+            names
+        }
+    }
+
+    impl Drop for Folder {
+        fn drop(&mut self) {
+            let _ = fs::remove_dir_all(&self.0);
+        }
+    }
+
+    #[test]
+    fn a_file_is_replaced_as_a_whole_with_its_permissions_and_behind_its_links() {
+        let folder = Folder::new("replaced");
+        let (file, link) = (folder.0.join("file"), folder.0.join("link"));
+        write(&file, b"first").unwrap();
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).unwrap();
+        symlink(&file, &link).unwrap();
+        write(&link, b"second").unwrap();
+        assert_eq!(fs::read(&file).unwrap(), b"second");
+        assert_eq!(
+            fs::metadata(&file).unwrap().permissions().mode() & 0o777,
+            0o640
+        );
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(folder.names(), ["file", "link"]);
+    }
+
+    #[test]
+    fn what_cannot_be_written_leaves_nothing_behind_and_devices_stay() {
+        let folder = Folder::new("refused");
+        assert!(write(&folder.0.join("missing/file"), b"x").is_err());
+        assert!(write(&folder.0, b"x").is_err());
+        write(Path::new("/dev/null"), b"x").unwrap();
+        assert!(write(Path::new("/dev/full"), b"x").is_err());
+        assert!(!fs::metadata("/dev/null").unwrap().is_file());
+        assert_eq!(folder.names(), [""; 0]);
+    }
+}
