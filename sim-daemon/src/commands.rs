@@ -2,7 +2,9 @@
 
 use std::ffi::OsString;
 use std::io::Write;
+use std::sync::Arc;
 
+use signal_hook::consts::SIGXFSZ;
 use sim_protocol::{AttachOptions, Client, keep_waiting};
 
 use crate::cli::{self, CliCommand};
@@ -15,6 +17,8 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
         Ok(command) => command,
         Err(code) => return code,
     };
+    // a file that may not grow is an error to report, no reason to be killed
+    let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
     let result = match &command {
         CliCommand::Serve(serve) => session::run(serve),
         CliCommand::Inspect(args) => inspect::run(args),
@@ -31,8 +35,8 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
     match result {
         Ok(()) => 0,
         Err(error) => {
-            // whoever launched us reads it from our line on stdout
-            if !matches!(&command, CliCommand::Serve(serve) if serve.parent.is_some()) {
+            // a daemon has said it, without waiting for whoever reads it
+            if !matches!(&command, CliCommand::Serve(_)) {
                 let _ = writeln!(std::io::stderr(), "tightloop: {error}");
             }
             error.exit_code()

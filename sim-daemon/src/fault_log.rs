@@ -18,7 +18,7 @@ pub(crate) struct FaultLog {
 impl FaultLog {
     /// Reports the worlds that were frozen since the last line, unless a line was just written: then the next command or the
     /// end reports them.
-    pub(crate) fn report(&mut self, simulation: &mut Simulation, log: &mut Log, now: Instant) {
+    pub(crate) fn report(&mut self, simulation: &mut Simulation, log: &Log, now: Instant) {
         if self
             .reported
             .is_some_and(|reported| now.duration_since(reported) < PERIOD)
@@ -32,7 +32,7 @@ impl FaultLog {
     }
 
     /// Reports what is left.
-    pub(crate) fn end(mut self, simulation: &mut Simulation, log: &mut Log) {
+    pub(crate) fn end(mut self, simulation: &mut Simulation, log: &Log) {
         self.reported = None;
         self.report(simulation, log, Instant::now());
     }

@@ -19,7 +19,7 @@ mod tests;
 pub(crate) fn run(
     mut simulation: Simulation,
     host: &mut Host,
-    log: &mut Log,
+    log: &Log,
 ) -> Result<(), DaemonError> {
     let mut faults = FaultLog::default();
     let result = serve(&mut simulation, host, log, &mut faults);
@@ -30,7 +30,7 @@ pub(crate) fn run(
 fn serve(
     simulation: &mut Simulation,
     host: &mut Host,
-    log: &mut Log,
+    log: &Log,
     faults: &mut FaultLog,
 ) -> Result<(), DaemonError> {
     let mut mask = Vec::with_capacity(simulation.worlds());

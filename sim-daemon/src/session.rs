@@ -19,7 +19,7 @@ use crate::config::{self, SceneFile};
 use crate::error::DaemonError;
 use crate::export::{self, RunInfo};
 use crate::groups;
-use crate::log::Log;
+use crate::log::{Log, Streams};
 use crate::server;
 use crate::watchdog::Watchdog;
 
@@ -28,10 +28,32 @@ const COUNT_MAX: u64 = u32::MAX as u64;
 /// Each has a thread and services of its own.
 const GROUPS_MAX: u64 = 64;
 
-/// Runs `tightloop serve`: from the arguments to the last cleaning. Prints one line to stdout when ready or failed.
+/// Runs `tightloop serve`: from the arguments to the last cleaning. Prints one line to stdout when ready or failed, and
+/// errors to stderr, where whoever launched us does not get them from that line.
 pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
-    let mut log =
-        Log::open(serve.log.as_deref(), serve.parent.is_some()).inspect_err(announce_error)?;
+    let streams = Streams::open().inspect_err(|error| {
+        // nothing is served yet that could wait
+        let _ = writeln!(std::io::stderr(), "tightloop: {error}");
+    })?;
+    let mut was_ready = false;
+    let result = run_with(serve, &streams, &mut was_ready);
+    if let Err(error) = &result {
+        if !was_ready {
+            announce_error(error, &streams);
+        }
+        if was_ready || serve.parent.is_none() {
+            streams.complain(error);
+        }
+    }
+    result
+}
+
+fn run_with(serve: &Serve, streams: &Streams, was_ready: &mut bool) -> Result<(), DaemonError> {
+    let log = Log::open(
+        serve.log.as_deref(),
+        serve.parent.is_some(),
+        &streams.stderr,
+    )?;
     // from here on, a request to stop is carried out as soon as that is clean
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [
@@ -39,14 +61,14 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
         signal_hook::consts::SIGINT,
         signal_hook::consts::SIGHUP,
     ] {
-        signal_hook::flag::register(signal, Arc::clone(&stop))
-            .map_err(|error| DaemonError::System {
+        signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(|error| {
+            DaemonError::System {
                 action: "handle signals",
                 problem: error.to_string(),
-            })
-            .inspect_err(announce_error)?;
+            }
+        })?;
     }
-    let Opened { daemon, groups } = open(serve).inspect_err(announce_error)?;
+    let Opened { daemon, groups } = open(serve)?;
     let door = Mutex::new(Door {
         daemon,
         closed: groups.len(),
@@ -54,9 +76,10 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
         bytes: 0,
         session: 0,
         log: log.clone(),
+        streams,
     });
     let result = groups::serve_all(groups, &stop, |number, group: Group| {
-        let mut log = match group.announced.groups {
+        let log = match group.announced.groups {
             1 => log.clone(),
             _ => log.for_group(number),
         };
@@ -70,27 +93,20 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
         door.lock()
             .unwrap_or_else(PoisonError::into_inner)
             .open(&host)?;
-        let result = server::run(group.simulation, &mut host, &mut log);
+        let result = server::run(group.simulation, &mut host, &log);
         // its cleanup must not read the shared folder while the host removes it
         drop(watchdog);
         result
     });
     let door = door.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let was_ready = door.is_ready;
+    *was_ready = door.is_ready;
     // the daemon's name goes after those of its groups
     drop(door);
     match &result {
         Ok(()) => log.write("ended"),
         Err(error) => log.write(&format!("failed: {error}")),
     }
-    if let Err(error) = &result {
-        if !was_ready {
-            announce_error(error);
-        } else if serve.parent.is_some() {
-            // the one line is said; this is for the terminal of whoever launched us
-            let _ = writeln!(std::io::stderr(), "tightloop: {error}");
-        }
-    }
+    log.flush();
     result
 }
 
@@ -110,7 +126,7 @@ struct Group {
 }
 
 /// What is said when the last group is open.
-struct Door {
+struct Door<'a> {
     daemon: Option<DaemonLock>,
     /// Groups that are not open yet.
     closed: usize,
@@ -121,9 +137,10 @@ struct Door {
     /// Of the first group's run.
     session: u64,
     log: Log,
+    streams: &'a Streams,
 }
 
-impl Door {
+impl Door<'_> {
     /// A group is open. After the last one, the daemon announces that it is ready.
     fn open(&mut self, host: &Host) -> Result<(), DaemonError> {
         let description = host.description();
@@ -159,7 +176,7 @@ impl Door {
             .notes
             .iter()
             .for_each(|note| self.log.write(note));
-        announce(&json!({ "ready": {
+        let ready = json!({ "ready": {
             "name": name,
             "pid": description.pid,
             "session": format!("{:016x}", self.session),
@@ -170,7 +187,8 @@ impl Door {
             "precision": description.precision,
             "threads": description.threads,
             "root": host.daemon_lock().paths().root(),
-        }}));
+        }});
+        announce(&ready, self.streams);
         self.is_ready = true;
         Ok(())
     }
@@ -439,12 +457,12 @@ pub(crate) fn read_scene(path: &Path) -> Result<(SceneFile, PathBuf), DaemonErro
     ))
 }
 
-fn announce_error(error: &DaemonError) {
-    announce(&json!({ "error": { "kind": error.kind(), "message": error.to_string() } }));
+fn announce_error(error: &DaemonError, streams: &Streams) {
+    let line = json!({ "error": { "kind": error.kind(), "message": error.to_string() } });
+    announce(&line, streams);
 }
 
 /// The one line on stdout. Whoever launched us may be gone already: the watchdog sees that.
-fn announce(line: &serde_json::Value) {
-    let mut stdout = std::io::stdout().lock();
-    let _ = writeln!(stdout, "{line}").and_then(|()| stdout.flush());
+fn announce(line: &serde_json::Value, streams: &Streams) {
+    streams.stdout.print(format!("{line}\n"));
 }

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -232,6 +233,16 @@ def test_a_daemon_that_ends_before_it_is_ready_says_how(pendulum, tmp_path, monk
     monkeypatch.setattr("tightloop.daemon._PROGRAM", program)
     with pytest.raises(tl.LaunchError, match=rf"{told} before it was ready; .*log=FILE"):
         tl.launch(pendulum, worlds=1)
+
+
+def test_lines_that_a_driver_prints_before_the_daemon_is_ready_are_passed_over(pendulum, tmp_path, monkeypatch):
+    real = Path(tl.__file__).with_name("__main__.py")
+    program = tmp_path / "daemon.py"
+    said = 'print("driver: hello"); print(7); print({}); sys.stdout.flush()'
+    program.write_text(f"import runpy, sys\n{said}\nrunpy.run_path({str(real)!r}, run_name='__main__')")
+    monkeypatch.setattr("tightloop.daemon._PROGRAM", program)
+    with tl.launch(pendulum, worlds=1) as sim:
+        sim.step()
 
 
 def test_a_log_file_gets_the_news(pendulum, tmp_path, capfd):

@@ -64,20 +64,19 @@ class Daemon:
                 stdin.write(scene.encode())
         except BrokenPipeError:
             pass  # the daemon ended before it read the scene; its answer has the reason
-        line = self.process.stdout.readline()
-        try:
-            answer = json.loads(line)
-        except ValueError:
-            raise LaunchError(f"the daemon {self._end()} before it was ready; launch again with log=FILE") from None
+        # a driver may print lines of its own before the daemon's only one
+        answer = next(filter(None, map(_answer, self.process.stdout)), None)
+        if answer is None:
+            raise LaunchError(f"the daemon {self._end()} before it was ready; launch again with log=FILE")
         if "error" in answer:
             raise getattr(errors, answer["error"]["kind"], LaunchError)(answer["error"]["message"])
 
     def _end(self) -> str:
-        """Describe the end of a daemon whose answer was empty or not understood."""
+        """Describe the end of a daemon that did not answer."""
         try:
             code = self.process.wait(_STOP_SECONDS)
         except subprocess.TimeoutExpired:
-            return "was not understood"
+            return "closed its standard output"
         return f"was killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
 
     def leave(self) -> None:
@@ -101,3 +100,12 @@ class Daemon:
             if process.stdout is not None:
                 process.stdout.close()
         _core.sweep(self.name)
+
+
+def _answer(line: bytes) -> dict[str, Any] | None:
+    """Return the daemon's answer if a line is one."""
+    try:
+        answer = json.loads(line)
+    except ValueError:
+        return None
+    return answer if isinstance(answer, dict) and ("ready" in answer or "error" in answer) else None

@@ -22,6 +22,7 @@ use crate::cli::{Record, Replay};
 use crate::config;
 use crate::export::{self, RunInfo};
 use crate::log::Log;
+use crate::printer::Printer;
 use crate::recording::{follow, replay};
 
 /// Serves worlds of an arm on the first GPU, which is lost after so many runs.
@@ -64,10 +65,12 @@ fn serve(paths: &DaemonPaths, log: &Path, runs: u64, ready: impl FnOnce()) {
         Arc::new(AtomicBool::new(false)),
     )
     .unwrap();
-    let mut log = Log::open(Some(log), true).unwrap();
+    let stderr = Printer::start(std::io::sink()).unwrap();
+    let log = Log::open(Some(log), true, &stderr).unwrap();
     lose_after(runs);
     ready();
-    super::run(simulation, &mut host, &mut log).unwrap();
+    super::run(simulation, &mut host, &log).unwrap();
+    log.flush();
     host.client_cleanup().clean();
 }
 
