@@ -43,14 +43,16 @@ pub(crate) enum CliCommand {
     /// Record every command that a daemon executes into a file for `replay`.
     ///
     /// Writes states, commands, resets, parameters and digests of frames until Ctrl-C or until the daemon ends. The
-    /// daemon never waits for the recorder. Lost entries become a gap in the file, and the recorder reports it.
+    /// daemon never waits for the recorder. Lost entries become a gap in the file: the recorder reports it, and goes on
+    /// from the state behind it.
     ///
     /// Example: tightloop record franka run.tlrec --frames 10000
     Record(Record),
     /// Replay a recording without a daemon, and compare every frame bit for bit.
     ///
     /// Exit code 0: all frames are equal. Exit code 1: a frame differs, or the recording has a gap. The message names
-    /// the first frame (counted from 0), world and field. Exit code 2: the file cannot be replayed.
+    /// the first frame (counted from 0), world and field, or the steps that are missing; frames behind a gap are compared,
+    /// too. Exit code 2: the file cannot be replayed.
     ///
     /// A recording does not contain robot files and meshes. They must be unchanged and at the same place.
     ///

@@ -109,14 +109,14 @@ pub enum DaemonError {
         problem: Box<DaemonError>,
     },
     /// Something that happened was not recorded.
-    #[error("{}: before frame {frames} a gap: {lost} entries were lost; the {frames} frames before it are equal, bit for bit", path.display())]
+    #[error("{}: {frames} frames are equal, bit for bit; {gaps}", path.display())]
     Gap {
         /// The file.
         path: std::path::PathBuf,
-        /// Frames before it.
+        /// Frames that were compared.
         frames: u64,
-        /// How many entries.
-        lost: u64,
+        /// Where gaps are, and what is missing.
+        gaps: String,
     },
     /// The manual pages cannot be written.
     #[error("manual pages in {}: {problem}", folder.display())]

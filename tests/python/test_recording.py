@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import queue
+import re
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -151,6 +154,41 @@ def test_a_recording_under_a_loop_that_goes_on_ends_when_it_is_told(pendulum, tm
             assert "no gaps" in said and 200 <= frames <= 200 + steps, said
             code, told = replay(tmp_path / f"{ending}.tlrec")
             assert code == 0 and f"{frames} frames" in told, told
+
+
+def test_a_recorder_that_stands_now_and_then_goes_on_and_the_steps_that_are_missing_are_named(pendulum, tmp_path):
+    out, news = tmp_path / "run.tlrec", queue.Queue()
+    with tl.launch(pendulum, worlds=WORLDS) as sim:
+        recorder = Recorder(sim, out)
+        errors = recorder.process.stderr
+        assert errors is not None
+        reader = threading.Thread(target=lambda: [news.put(line) for line in errors])
+        reader.start()
+        for _ in range(3):
+            recorder.process.send_signal(signal.SIGSTOP)
+            # far more than wait in shared memory
+            for _ in range(12_000):
+                sim.step(joint_f=np.ones(2))
+            recorder.process.send_signal(signal.SIGCONT)
+            # it has the state behind the gap once it says so, under a loop that goes on
+            while news.empty():
+                sim.step(joint_f=-np.ones(2))
+            assert "a gap: " in news.get()
+            for _ in range(100):
+                sim.step(joint_f=np.ones(2))
+        steps = int(sim.step().step[0])
+        recorder.process.send_signal(signal.SIGINT)
+        reader.join()
+        assert recorder.process.stdout is not None
+        said = recorder.process.stdout.read()
+        assert recorder.process.wait() == 0
+    frames = int(said.split(" frames")[0].split()[-1])
+    assert "gaps of " in said and frames >= 100, said
+    code, said = replay(out)
+    assert code == 1 and f"{frames} frames are equal, bit for bit" in said, said
+    missing = re.findall(r"of world 0 the steps (\d+) to (\d+)", said)
+    assert len(missing) >= 3, said
+    assert frames + sum(int(last) - int(first) + 1 for first, last in missing) == steps, said
 
 
 def test_a_killed_recorder_leaves_a_file_and_a_daemon_that_go_on(pendulum, tmp_path):

@@ -18,6 +18,11 @@ pub(super) const BLOCK_MAX: usize = 1 << 30;
 /// LZ4 makes at most so many bytes of one.
 const RATIO_MAX: usize = 256;
 
+/// Most bytes of records in a file of so many bytes.
+pub(super) fn most_records(file: u64) -> u64 {
+    file.saturating_mul(RATIO_MAX as u64)
+}
+
 /// How a recording begins.
 pub(super) fn head() -> [u8; HEAD] {
     let mut head = [0; HEAD];

@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use sim_model::files::{self, FileError};
+
 use super::blocks::{Blocks, Next};
 use super::failure::unreadable;
 use super::records::{self, Record};
@@ -26,6 +28,8 @@ pub(super) enum Entry<'a> {
 #[derive(Debug)]
 pub(super) struct Entries<R> {
     pub(super) path: PathBuf,
+    /// Its size when it was opened.
+    pub(super) bytes: u64,
     blocks: Blocks<R>,
     block: Vec<u64>,
     /// Words of the block that were read.
@@ -35,18 +39,17 @@ pub(super) struct Entries<R> {
 impl Entries<BufReader<File>> {
     /// Opens a file and checks its head.
     pub(super) fn open(path: &Path) -> Result<Self, DaemonError> {
-        let failed = |error: std::io::Error| unreadable(path, format!("cannot be read: {error}"));
-        let file = File::open(path).map_err(failed)?;
-        if file.metadata().map_err(failed)?.is_dir() {
-            return Err(unreadable(
-                path,
-                "is a folder; give the file of a recording",
-            ));
-        }
+        let failed = |error: FileError| match error {
+            FileError::NotAFile => unreadable(path, "is no file; give the file of a recording"),
+            error => unreadable(path, error.to_string()),
+        };
+        let file = files::open(path).map_err(failed)?;
+        let bytes = file.metadata().map_err(|error| failed(error.into()))?.len();
         let blocks =
             Blocks::open(BufReader::new(file)).map_err(|problem| unreadable(path, problem))?;
         Ok(Entries {
             path: path.to_owned(),
+            bytes,
             blocks,
             block: Vec::new(),
             read: 0,

@@ -9,7 +9,8 @@
 //! Numbers are little endian. Checksums are the lower halves of XXH3. A block ends after 256 kB of records
 //! or 0.1 s, so that a recorder that is killed loses no more; each holds whole records, hence whole frames. The first record
 //! is the head (JSON: the daemon's description), the second the state of all worlds; then come the commands in order,
-//! each with the digests of its frame, gaps where entries were lost, the state after each restore, and why the recording ended.
+//! each with the digests of its frame, and the state after each restore. Where entries were lost there is a gap, followed by
+//! the state behind it. The last record is why the recording ended.
 
 mod blocks;
 mod compare;

@@ -25,6 +25,8 @@ pub struct Playback {
     frames: u64,
     note: Option<String>,
     end: Option<String>,
+    /// Entries that are missing here; none where frames follow one another.
+    gap: Option<u64>,
 }
 
 impl Playback {
@@ -42,7 +44,8 @@ impl Playback {
             Entry::Record(Record::Head(json)) => Head::read(path, json)?,
             _ => return Err(unreadable(path, "ends before its head; copy it again")),
         };
-        let open = |device| Run::open(path, &head, fields.to_vec(), device, threads);
+        let bytes = entries.bytes;
+        let open = |device| Run::open(path, bytes, &head, fields.to_vec(), device, threads);
         let (run, note) = match head.daemon.adapter.as_str() {
             "" => (open(Device::Cpu)?, None),
             name => {
@@ -69,6 +72,7 @@ impl Playback {
             frames: 0,
             note,
             end: None,
+            gap: None,
         })
     }
 
@@ -87,7 +91,7 @@ impl Playback {
         self.end.as_deref()
     }
 
-    /// The next frame; none at the end of the recording, or where it has a gap or is damaged.
+    /// The next frame, also behind a gap; none at the end of the recording, or where it is damaged.
     ///
     /// # Errors
     /// A file that cannot be read, or whose records no recorder writes.
@@ -108,9 +112,13 @@ impl Playback {
                     return Ok(self.ended(why));
                 }
                 Record::Gap(lost) => {
-                    return Ok(self.ended(format!("{lost} frames are missing from here on")));
+                    self.gap = Some(self.gap.unwrap_or(0).saturating_add(lost));
+                    self.run.has_state = false;
                 }
-                Record::State(state) => self.run.restore(&path, state)?,
+                Record::State(state) => {
+                    self.run.restore(&path, state)?;
+                    self.gap = None;
+                }
                 Record::Command(command) if self.run.has_state => {
                     if let Some(advance) = self.run.command(&path, &command, self.frames)? {
                         self.frames += 1;
@@ -118,6 +126,8 @@ impl Playback {
                         return Ok(Some(&self.arrays));
                     }
                 }
+                // older releases wrote what came behind a gap without the state there
+                Record::Command(_) if self.gap.is_some() => {}
                 Record::Head(_) | Record::Command(_) => {
                     return Err(self.entries.damaged("its records are out of order"));
                 }
@@ -126,7 +136,10 @@ impl Playback {
     }
 
     fn ended(&mut self, why: String) -> Option<&Arrays> {
-        self.end = Some(why);
+        self.end = Some(match self.gap {
+            None => why,
+            Some(lost) => format!("{lost} or more frames are missing from here on"),
+        });
         None
     }
 }

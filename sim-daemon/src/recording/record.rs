@@ -1,14 +1,17 @@
 //! `tightloop record`: what a daemon does, from its journal into a file.
+//!
+//! A recorder that is too slow loses entries: a gap. It then takes a new journal, which begins with the state of all worlds,
+//! so that a replay goes on behind the gap.
 
 use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use sim_protocol::{
     AttachOptions, Client, Description, Journal, JournalEntry, ProtocolError, keep_waiting,
 };
@@ -19,6 +22,8 @@ use super::records::{Record, RecordedCommand};
 use super::writer::{Stopped, Writer};
 use crate::cli;
 use crate::error::DaemonError;
+use crate::output;
+use crate::printer::{self, Printer};
 
 /// Entries are waited for so long before anything else is looked at.
 const LOOK: Duration = Duration::from_millis(20);
@@ -32,8 +37,7 @@ const PROGRESS_PERIOD: Duration = Duration::from_millis(500);
 struct Tally {
     frames: u64,
     gaps: u64,
-    /// Frames before the first of them.
-    whole: u64,
+    /// Entries that are known to be lost; more may be.
     lost: u64,
 }
 
@@ -60,8 +64,6 @@ pub(crate) fn run(args: &cli::Record) -> Result<(), DaemonError> {
     for signal in [SIGTERM, SIGINT, SIGHUP] {
         catch(signal, &stop)?;
     }
-    // a file that may not grow is an error to report, no reason to be killed
-    catch(SIGXFSZ, &Arc::new(AtomicBool::new(false)))?;
     let mut hook = || match stop.load(Ordering::Relaxed) {
         true => ControlFlow::Break(()),
         false => ControlFlow::Continue(()),
@@ -87,6 +89,7 @@ pub(crate) fn follow(
         .filter(|name| !name.is_empty())
         .collect();
     let journal = client.journal(&fields, &mut hook)?;
+    let news = Printer::stderr()?;
     let file = create(args)?;
     let description = client.description();
     let writer = Writer::start(file, frame_bytes(description)).map_err(|error| {
@@ -99,16 +102,22 @@ pub(crate) fn follow(
     let mut recorder = Recorder {
         args,
         stop,
-        journal,
+        client,
+        fields: &fields,
+        journal: Some(journal),
         writer,
+        news: news.clone(),
         state: Vec::new(),
         tally: Tally::default(),
         has_begun: false,
+        gap: None,
         started: Instant::now(),
         reported: Instant::now(),
     };
-    let end = recorder.run(description, &fields);
-    recorder.close(end)
+    let end = recorder.run();
+    let result = recorder.close(end);
+    printer::flush([&news]);
+    result
 }
 
 fn check(args: &cli::Record) -> Result<(), DaemonError> {
@@ -166,7 +175,7 @@ fn create(args: &cli::Record) -> Result<File, DaemonError> {
         true => options.create(true).truncate(true),
         false => options.create_new(true),
     };
-    options.open(&args.out).map_err(|error| match error.kind() {
+    output::open(&args.out, &mut options).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => is_there(&args.out),
         ErrorKind::NotFound => failed(&args.out, "its folder is not there; make it first"),
         _ => failed(&args.out, format!("cannot be made: {error}")),
@@ -185,31 +194,36 @@ fn frame_bytes(description: &Description) -> usize {
 struct Recorder<'a> {
     args: &'a cli::Record,
     stop: &'a AtomicBool,
-    journal: Journal,
+    client: &'a Client,
+    /// Fields whose arrays are recorded whole.
+    fields: &'a [String],
+    /// None only while it is replaced.
+    journal: Option<Journal>,
     writer: Writer,
+    /// Lines for people; a terminal that stands must not make a gap.
+    news: Printer,
     /// The part of a state that has come.
     state: Vec<u8>,
     tally: Tally,
     has_begun: bool,
+    /// Entries lost since the last record of the file, while the state behind them has not come.
+    gap: Option<u64>,
     started: Instant,
     reported: Instant,
 }
 
 impl Recorder<'_> {
     /// Records until something ends it.
-    fn run(&mut self, description: &Description, fields: &[String]) -> End {
-        match self.go(description, fields) {
+    fn run(&mut self) -> End {
+        match self.go() {
             Err(end) => end,
             Ok(never) => match never {},
         }
     }
 
-    fn go(
-        &mut self,
-        description: &Description,
-        fields: &[String],
-    ) -> Result<std::convert::Infallible, End> {
-        let head = serde_json::json!({ "daemon": description, "observed": fields }).to_string();
+    fn go(&mut self) -> Result<std::convert::Infallible, End> {
+        let (daemon, observed): (&Description, _) = (&self.client.description(), self.fields);
+        let head = serde_json::json!({ "daemon": daemon, "observed": observed }).to_string();
         self.writer.put(&Record::Head(head.as_bytes()))?;
         loop {
             if self.stop.load(Ordering::Relaxed) {
@@ -224,8 +238,8 @@ impl Recorder<'_> {
                 self.take_what_waits()?;
                 return Err(End::Done("as many seconds as asked".to_owned()));
             }
-            match self.journal.next(LOOK, &mut keep_waiting()) {
-                Ok(Some(entry)) => self.take(&entry)?,
+            match self.journal().next(LOOK, &mut keep_waiting()) {
+                Ok(Some(entry)) => self.take(entry)?,
                 Ok(None) => {}
                 Err(
                     error @ (ProtocolError::DaemonLost { .. }
@@ -242,42 +256,33 @@ impl Recorder<'_> {
 
     /// What was done before the end is recorded, though it may still wait in the journal: no more than fits there.
     fn take_what_waits(&mut self) -> Result<(), End> {
-        for _ in 0..self.journal.depth() {
+        for _ in 0..self.journal().depth() {
             if self.args.frames == Some(self.tally.frames) {
                 break;
             }
-            let Ok(Some(entry)) = self.journal.next(LATE, &mut keep_waiting()) else {
+            let Ok(Some(entry)) = self.journal().next(LATE, &mut keep_waiting()) else {
                 break; // nothing waits any more; that the daemon has ended, too, changes nothing
             };
-            self.take(&entry)?;
+            self.take(entry)?;
         }
         Ok(())
     }
 
-    fn take(&mut self, entry: &JournalEntry) -> Result<(), End> {
-        let header = entry.header();
+    fn journal(&mut self) -> &mut Journal {
+        self.journal.as_mut().expect("it is replaced at once")
+    }
+
+    fn take(&mut self, entry: JournalEntry) -> Result<(), End> {
         if entry.lost > 0 {
-            self.state.clear();
-            if self.tally.gaps == 0 {
-                self.tally.whole = self.tally.frames;
-            }
-            self.tally.gaps += 1;
-            self.tally.lost += entry.lost;
-            self.log(&format!(
-                "after frame {} a gap: {} entries were lost, the recorder was too slow",
-                self.tally.frames, entry.lost
-            ));
-            self.writer.put(&Record::Gap(entry.lost))?;
+            return self.begin_again(entry);
         }
+        let entry = &entry;
+        let header = entry.header();
         if header.is_state() {
             return self.take_state(entry);
         }
         if header.is_end() {
-            let reason = entry.reason();
-            return Err(match self.has_begun {
-                true => End::Done(reason),
-                false => End::Failed(failed(&self.args.out, reason)),
-            });
+            return Err(self.end_of_daemon(entry.reason()));
         }
         self.writer.put(&Record::Command(RecordedCommand {
             op: header.op,
@@ -288,6 +293,76 @@ impl Recorder<'_> {
         }))?;
         self.tally.frames += u64::from(header.digests > 0);
         Ok(())
+    }
+
+    /// Entries were lost: what follows them is of no use without the state behind them, with which a new journal begins.
+    fn begin_again(&mut self, first: JournalEntry) -> Result<(), End> {
+        self.state.clear();
+        let mut lost = first.lost;
+        let mut next = Some(first);
+        // no more than fits in the journal, since a daemon at work fills it again
+        for _ in 0..self.journal().depth() {
+            let Some(entry) = next.take() else {
+                break;
+            };
+            if entry.header().is_end() {
+                self.gap = Some(self.gap.unwrap_or(0) + lost);
+                return Err(self.end_of_daemon(entry.reason()));
+            }
+            lost += u64::from(!entry.header().is_state());
+            drop(entry);
+            // a daemon that is gone is seen when the new journal is asked for
+            next = self
+                .journal()
+                .next(Duration::ZERO, &mut keep_waiting())
+                .unwrap_or(None);
+            lost += next.as_ref().map_or(0, |entry| entry.lost);
+        }
+        drop(next);
+        self.gap = Some(self.gap.unwrap_or(0) + lost);
+        // as much room as there can be, or the next gap would come at once
+        self.writer.catch_up()?;
+        // it is one of a few places, and its memory is shared
+        self.journal = None;
+        let stop = self.stop;
+        let mut hook = || match stop.load(Ordering::Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        };
+        match self.client.journal(self.fields, &mut hook) {
+            Ok(journal) => self.journal = Some(journal),
+            Err(ProtocolError::Interrupted) => {
+                return Err(End::Done("stopped by a signal".to_owned()));
+            }
+            Err(
+                error @ (ProtocolError::DaemonLost { .. } | ProtocolError::DaemonRestarted { .. }),
+            ) => return Err(self.end_of_daemon(error.to_string())),
+            Err(error) => return Err(End::Failed(error.into())),
+        }
+        Ok(())
+    }
+
+    /// The daemon said or showed that nothing comes any more.
+    fn end_of_daemon(&self, reason: String) -> End {
+        match self.has_begun {
+            true => End::Done(reason),
+            false => End::Failed(failed(&self.args.out, reason)),
+        }
+    }
+
+    /// Records that entries were lost, if any were.
+    fn put_gap(&mut self) -> Result<(), Stopped> {
+        // before the first state nothing is missing
+        let Some(lost) = self.gap.take().filter(|_| self.has_begun) else {
+            return Ok(());
+        };
+        self.tally.gaps += 1;
+        self.tally.lost += lost;
+        self.log(&format!(
+            "after frame {} a gap: {lost} or more entries were lost, the recorder was too slow",
+            self.tally.frames
+        ));
+        self.writer.put(&Record::Gap(lost))
     }
 
     /// Puts the pieces of a state together.
@@ -301,12 +376,13 @@ impl Recorder<'_> {
             );
             return Err(End::Failed(failed(&self.args.out, problem)));
         }
-        // the rest of one that began in a gap is of no use
+        // no daemon sends pieces out of order
         if header.first != self.state.len() as u64 {
             return Ok(());
         }
         self.state.extend(entry.piece());
         if self.state.len() as u64 == header.bytes {
+            self.put_gap()?;
             self.writer.put(&Record::State(&self.state))?;
             self.state.clear();
             if !self.has_begun {
@@ -330,15 +406,10 @@ impl Recorder<'_> {
         };
         // what stops it meanwhile is what `close` reports
         let _ = self
-            .writer
-            .put(&Record::End(&why))
+            .put_gap()
+            .and_then(|()| self.writer.put(&Record::End(&why)))
             .and_then(|()| self.writer.flush());
-        let Tally {
-            frames,
-            gaps,
-            lost,
-            whole,
-        } = self.tally;
+        let Tally { frames, gaps, lost } = self.tally;
         let out = &self.args.out;
         let bytes = self.writer.close().map_err(|error| {
             let problem = format!(
@@ -351,32 +422,26 @@ impl Recorder<'_> {
         }
         let gaps = match gaps {
             0 => "no gaps".to_owned(),
-            1 => format!(
-                "1 gap of {lost} lost entries, before which a replay stops: after {whole} frames"
-            ),
-            _ => format!(
-                "{gaps} gaps of {lost} lost entries, at the first of which a replay stops: after {whole} frames"
-            ),
+            1 => format!("1 gap of {lost} or more lost entries"),
+            _ => format!("{gaps} gaps of {lost} or more lost entries"),
         };
         let megabytes = bytes as f64 / 1e6;
-        // whoever reads us may have stopped reading
-        let _ = writeln!(
-            std::io::stdout(),
-            "{}: {frames} frames, {megabytes:.1} MB, {gaps}; {why}",
+        let line = format!(
+            "{}: {frames} frames, {megabytes:.1} MB, {gaps}; {why}\n",
             out.display()
         );
-        Ok(())
+        output::print(line.as_bytes()).map_err(DaemonError::stdout)
     }
 
     fn log(&self, line: &str) {
-        let _ = writeln!(std::io::stderr(), "tightloop: {line}");
+        self.news.print(format!("tightloop: {line}\n"));
     }
 
     /// On a terminal, how far it is.
     fn report_progress(&mut self) {
         if self.reported.elapsed() > PROGRESS_PERIOD && std::io::stderr().is_terminal() {
             self.reported = Instant::now();
-            let _ = write!(std::io::stderr(), "\r{} frames ", self.tally.frames);
+            self.news.print(format!("\r{} frames ", self.tally.frames));
         }
     }
 }

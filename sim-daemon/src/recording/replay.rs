@@ -1,5 +1,6 @@
 //! `tightloop replay`: a recording, run again and compared bit for bit. No daemon and no shared memory.
 
+use std::fmt;
 use std::fs::File;
 use std::io::{BufReader, IsTerminal, Read, Write};
 use std::path::Path;
@@ -17,10 +18,14 @@ use super::records::{Record, RecordedCommand};
 use super::run::{Head, Run};
 use crate::cli;
 use crate::error::DaemonError;
-use crate::export;
+use crate::export::{self, Advance};
+use crate::output;
 
 /// A terminal shows the progress this often.
 const PROGRESS_PERIOD: Duration = Duration::from_millis(500);
+
+/// Gaps that an error lists.
+const GAPS_LISTED: usize = 8;
 
 /// Why a replay ends before anything differs.
 #[derive(Debug, PartialEq, Eq)]
@@ -33,8 +38,41 @@ pub(super) enum End {
     Cut,
     /// A block is not as it was written.
     Damaged,
-    /// Entries are missing.
-    Gap(u64),
+}
+
+/// Entries that are missing.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Gap {
+    /// Frames before it.
+    pub(super) frames: u64,
+    /// Entries that the recorder knows to be lost.
+    pub(super) lost: u64,
+    /// Steps that world 0 had done since its reset, before it.
+    pub(super) from: u64,
+    /// As `from`, behind it; none while the recording has no state there.
+    pub(super) to: Option<u64>,
+}
+
+impl fmt::Display for Gap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Gap {
+            frames, lost, from, ..
+        } = self;
+        write!(
+            f,
+            "a gap after frame {frames}: {lost} or more entries are missing, "
+        )?;
+        match self.to {
+            None => write!(f, "and no state behind them, so nothing more was compared"),
+            Some(to) if to > *from => {
+                write!(f, "of world 0 the steps {} to {to}", from + 1)
+            }
+            Some(to) => write!(
+                f,
+                "among them a reset of world 0, which goes on at step {to}"
+            ),
+        }
+    }
 }
 
 /// Runs the command. Prints one line to stdout when all frames are equal.
@@ -69,6 +107,7 @@ pub(super) fn open(args: &cli::Replay) -> Result<Replay<'_, BufReader<File>>, Da
         entries: Entries::open(path)?,
         compared: None,
         frames: 0,
+        gaps: Vec::new(),
         reported: Instant::now(),
     })
 }
@@ -80,13 +119,14 @@ pub(super) struct Replay<'a, R> {
     compared: Option<Compared>,
     /// Frames that were equal.
     pub(super) frames: u64,
+    pub(super) gaps: Vec<Gap>,
     reported: Instant,
 }
 
 impl<R: Read> Replay<'_, R> {
     /// Does the recording again, to its end or to the first frame that differs.
     pub(super) fn go(&mut self) -> Result<End, DaemonError> {
-        let path = self.args.file.as_path();
+        let (path, bytes) = (self.args.file.as_path(), self.entries.bytes);
         let mut ended = None;
         loop {
             // what follows belongs to no frame that was asked for, but for the end
@@ -100,27 +140,54 @@ impl<R: Read> Replay<'_, R> {
             };
             match (record, &mut self.compared) {
                 (Record::Head(json), run @ None) => {
-                    *run = Some(Compared::open(path, json, self.args.threads)?);
+                    *run = Some(Compared::open(path, bytes, json, self.args.threads)?);
                 }
                 (Record::End(why), _) => ended = Some(why.to_owned()),
-                (Record::Gap(lost), Some(_)) => return Ok(End::Gap(lost)),
-                (Record::State(state), Some(compared)) => compared.run.restore(path, state)?,
+                (Record::Gap(lost), Some(compared)) => {
+                    let is_new = compared.run.has_state;
+                    match self.gaps.last_mut().filter(|_| !is_new) {
+                        Some(gap) => gap.lost = gap.lost.saturating_add(lost),
+                        None => self.gaps.push(Gap {
+                            frames: self.frames,
+                            lost,
+                            from: compared.steps(),
+                            to: None,
+                        }),
+                    }
+                    compared.run.has_state = false;
+                }
+                (Record::State(state), Some(compared)) => {
+                    let is_behind_gap = !compared.run.has_state;
+                    compared.run.restore(path, state)?;
+                    if let Some(gap) = self.gaps.last_mut().filter(|_| is_behind_gap) {
+                        gap.to = Some(compared.steps());
+                    }
+                }
                 (Record::Command(command), Some(compared)) if compared.run.has_state => {
                     if compared.command(path, &command, self.frames)? {
                         self.frames += 1;
                     }
                 }
+                // older releases wrote what came behind a gap without the state there
+                (Record::Command(_), Some(_)) if !self.gaps.is_empty() => {}
                 _ => return Err(self.entries.damaged("its records are out of order")),
             }
             self.report_progress();
         }
     }
 
+    /// All worlds as they are now.
+    #[cfg(test)]
+    pub(super) fn snapshot(&self) -> Vec<u8> {
+        let compared = self.compared.as_ref().expect("it has begun");
+        compared.run.simulation.snapshot()
+    }
+
     /// Says what was compared, and how it ended.
     pub(super) fn tell_end(&self, end: End) -> Result<(), DaemonError> {
         let (path, frames) = (self.args.file.as_path(), self.frames);
-        let has_state = |compared: &&Compared| compared.run.has_state;
-        let Some(Compared { run, .. }) = self.compared.as_ref().filter(has_state) else {
+        let has_begun = |compared: &&Compared| compared.run.has_state || !self.gaps.is_empty();
+        let Some(Compared { run, .. }) = self.compared.as_ref().filter(has_begun) else {
             return Err(unreadable(
                 path,
                 "ends before the state of its worlds; its recorder was killed at once, or it was cut",
@@ -128,13 +195,6 @@ impl<R: Read> Replay<'_, R> {
         };
         let good = self.entries.good();
         let end = match end {
-            End::Gap(lost) => {
-                return Err(DaemonError::Gap {
-                    path: path.to_owned(),
-                    frames,
-                    lost,
-                });
-            }
             End::Damaged => {
                 return Err(unreadable(
                     path,
@@ -152,14 +212,19 @@ impl<R: Read> Replay<'_, R> {
                 "it ends within a block, behind its first {good} bytes: its recorder was killed, or it was cut"
             ),
         };
-        // whoever reads us may have stopped reading
-        let _ = writeln!(
-            std::io::stdout(),
-            "{}: {frames} frames of {} worlds are equal, bit for bit; {end}",
+        if !self.gaps.is_empty() {
+            return Err(DaemonError::Gap {
+                path: path.to_owned(),
+                frames,
+                gaps: listed(&self.gaps),
+            });
+        }
+        let line = format!(
+            "{}: {frames} frames of {} worlds are equal, bit for bit; {end}\n",
             path.display(),
             run.simulation.worlds()
         );
-        Ok(())
+        output::print(line.as_bytes()).map_err(DaemonError::stdout)
     }
 
     /// On a terminal, how far it is.
@@ -171,6 +236,15 @@ impl<R: Read> Replay<'_, R> {
             }
         }
     }
+}
+
+/// The first gaps, and how many more there are.
+fn listed(gaps: &[Gap]) -> String {
+    let mut all: Vec<String> = gaps.iter().take(GAPS_LISTED).map(Gap::to_string).collect();
+    if gaps.len() > GAPS_LISTED {
+        all.push(format!("{} more gaps", gaps.len() - GAPS_LISTED));
+    }
+    all.join("; ")
 }
 
 /// The worlds that do it again, and what they are compared with.
@@ -186,7 +260,12 @@ struct Compared {
 
 impl Compared {
     /// Builds the simulation that the head describes.
-    fn open(path: &Path, json: &[u8], threads: Option<usize>) -> Result<Compared, DaemonError> {
+    fn open(
+        path: &Path,
+        bytes: u64,
+        json: &[u8],
+        threads: Option<usize>,
+    ) -> Result<Compared, DaemonError> {
         let head = Head::read(path, json)?;
         // the bits of a GPU are its own
         let device = match head.daemon.adapter.as_str() {
@@ -196,7 +275,7 @@ impl Compared {
                 cache: cache_folder(),
             },
         };
-        let run = Run::open(path, &head, head.fields(path)?, device, threads)?;
+        let run = Run::open(path, bytes, &head, head.fields(path)?, device, threads)?;
         let table = export::frame_table(run.simulation.layout());
         let is_observed = |row: &&Row| head.observed.contains(&row.name);
         Ok(Compared {
@@ -206,6 +285,16 @@ impl Compared {
             table,
             run,
         })
+    }
+
+    /// Steps that world 0 has done since its reset.
+    fn steps(&mut self) -> u64 {
+        // a frame of what is there; it changes nothing
+        self.run.advance(Advance::Forward, &mut self.arena);
+        let row = self.table.row("step").expect("it is in every frame");
+        let first = row.offset - Table::head_bytes(self.table.rows().len());
+        let bytes: &[u8] = bytemuck::cast_slice(&self.arena);
+        bytemuck::pod_read_unaligned(&bytes[first..first + row.dtype.size()])
     }
 
     /// Does a command again; returns whether it made a frame, which then is equal.

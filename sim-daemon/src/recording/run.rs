@@ -5,18 +5,23 @@ use std::path::Path;
 use serde::Deserialize;
 use sim_engine::options::compile_limit;
 use sim_engine::simulation::{Device, Draws, Faults, Lanes, Options, Precision, Simulation};
+use sim_model::Model;
 use sim_physics::arrays::Field;
 use sim_protocol::host::{Inbox, free_memory};
 use sim_protocol::{CommandHeader, Description, Op};
 
+use super::blocks::most_records;
 use super::failure::unreadable;
 use super::records::RecordedCommand;
 use crate::config;
 use crate::error::DaemonError;
-use crate::export::{self, Advance};
+use crate::export::{self, Advance, RunInfo};
 
 /// Counts above this are damage; below it, sizes in bytes do not overflow.
 const WORLDS_MAX: usize = u32::MAX as usize;
+
+/// Bytes of a world's counters in a state; see `sim-core/engine/src/snapshot.rs`.
+const COUNTERS: u64 = 28;
 
 /// The head of a recording.
 #[derive(Debug, Deserialize)]
@@ -56,6 +61,16 @@ impl Head {
     }
 }
 
+/// Fewest bytes of the state of all worlds: their counters, positions and velocities.
+fn state_min(model: &Model, options: &Options) -> u64 {
+    let real = match options.precision {
+        Precision::F32 => 4,
+        Precision::F64 => 8,
+    };
+    let world = COUNTERS + (model.coords() + model.dofs()) as u64 * real;
+    world.saturating_mul(options.worlds as u64)
+}
+
 /// The worlds of a recording.
 pub(super) struct Run {
     pub(super) simulation: Simulation,
@@ -66,9 +81,10 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// Builds the simulation that the head describes, with frames of `fields`.
+    /// Builds the simulation that the head of a file of so many bytes describes, with frames of `fields`.
     pub(super) fn open(
         path: &Path,
+        bytes: u64,
         head: &Head,
         fields: Vec<Field>,
         device: Device,
@@ -79,12 +95,12 @@ impl Run {
         let scene = config::parse(&daemon.scene, "of the recording");
         let scene = scene.map_err(|error| failed(error.to_string()))?;
         let description = scene.describe(Path::new(&daemon.scene_folder));
+        let description = description.map_err(|error| {
+            failed(format!(
+                "needs the scene's robots and meshes where they were: {error}"
+            ))
+        })?;
         let model = description
-            .map_err(|error| {
-                failed(format!(
-                    "needs the scene's robots and meshes where they were: {error}"
-                ))
-            })?
             .compile()
             .map_err(|error| failed(error.to_string()))?;
         if model.hash() != daemon.model_hash {
@@ -127,16 +143,36 @@ impl Run {
                 .ok_or_else(|| failed(format!("draws by `{}`, unknown here", daemon.draws)))?,
             ..Options::default()
         };
-        let simulation =
-            Simulation::new(model, &options).map_err(|error| failed(error.to_string()))?;
-        let (needed, free) = (simulation.layout().bytes as u64, free_memory());
-        if needed > free {
+        // a head may claim any number of worlds; the state of all of them is in the file
+        if state_min(&model, &options) > most_records(bytes) {
             return Err(failed(format!(
-                "has frames of {needed} bytes and {free} bytes of memory are free; end other programs"
+                "has {} worlds in its head, more than its {bytes} bytes can hold; it was cut or forged",
+                daemon.worlds
             )));
         }
+        let frame = Simulation::layout_of(&model, &options).bytes as u64;
+        let needed = frame.saturating_add(Simulation::memory_of(&model, &options));
+        let free = free_memory();
+        if needed > free {
+            return Err(failed(format!(
+                "needs {needed} bytes of memory and {free} bytes are free; end other programs"
+            )));
+        }
+        let simulation =
+            Simulation::new(model, &options).map_err(|error| failed(error.to_string()))?;
+        let info = RunInfo {
+            scene: &description,
+            scene_text: String::new(),
+            scene_folder: String::new(),
+            device: String::new(),
+            threads: 1,
+            frames_held: 1,
+            watch_worlds: 1,
+        };
+        // what commands may have follows from the model, whatever the head says
+        let own = export::description(simulation.model(), &options, simulation.layout(), info);
         Ok(Run {
-            inbox: Inbox::for_commands_of(daemon),
+            inbox: Inbox::for_commands_of(&own),
             mask: Vec::with_capacity(daemon.worlds),
             simulation,
             has_state: false,

@@ -16,6 +16,8 @@ use crate::config;
 use crate::error::DaemonError;
 use crate::export::{self, RunInfo};
 
+mod gaps;
+
 const WORLDS: usize = 3;
 const DOFS: usize = 9;
 const FRAMES: usize = 12;
@@ -283,15 +285,6 @@ fn a_forged_frame_is_told_by_frame_world_and_field() {
 }
 
 #[test]
-fn replay_stops_at_a_gap() {
-    let mut recording = record();
-    let mut gap = Vec::new();
-    Record::Gap(17).write(&mut gap);
-    recording.blocks.insert(2 + 7, gap);
-    assert_eq!(recording.replay("gap").unwrap(), (7, End::Gap(17)));
-}
-
-#[test]
 fn nonsense_is_refused_with_its_reason() {
     let good = record();
     let says = |recording: &Recording, words: &str| {
@@ -333,6 +326,64 @@ fn nonsense_is_refused_with_its_reason() {
         let error = replay("format", bytes).unwrap_err();
         assert!(error.to_string().contains(words), "{error}");
     }
+}
+
+#[test]
+fn more_worlds_than_the_file_can_hold_are_refused_before_memory_is_taken() {
+    let mut recording = record();
+    let mut rest = recording.blocks[0].as_slice();
+    let Some(Record::Head(json)) = records::read(&mut rest) else {
+        panic!("a recording begins with its head");
+    };
+    let mut head: serde_json::Value = serde_json::from_slice(json).unwrap();
+    head["daemon"]["worlds"] = 100_000_000.into();
+    let mut forged = Vec::new();
+    Record::Head(head.to_string().as_bytes()).write(&mut forged);
+    recording.blocks[0] = forged;
+    let error = recording.replay("claims").unwrap_err();
+    let said = error.to_string();
+    assert!(
+        said.contains("has 100000000 worlds in its head, more than its"),
+        "{said}"
+    );
+    assert_eq!(error.exit_code(), 2);
+}
+
+#[test]
+fn columns_that_the_head_claims_take_no_memory() {
+    let mut recording = record();
+    let mut rest = recording.blocks[0].as_slice();
+    let Some(Record::Head(json)) = records::read(&mut rest) else {
+        panic!("a recording begins with its head");
+    };
+    let mut head: serde_json::Value = serde_json::from_slice(json).unwrap();
+    head["daemon"]["commands"][0]["columns"] = (1_u64 << 40).into();
+    let mut forged = Vec::new();
+    Record::Head(head.to_string().as_bytes()).write(&mut forged);
+    recording.blocks[0] = forged;
+    let frames = FRAMES as u64;
+    assert_eq!(
+        recording.replay("columns").unwrap(),
+        (frames, End::Recording(None))
+    );
+}
+
+#[test]
+fn what_is_no_file_is_refused_and_not_waited_for() {
+    let pipe = file("pipe");
+    let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
+    rustix::fs::mknodat(rustix::fs::CWD, &pipe, rustix::fs::FileType::Fifo, mode, 0).unwrap();
+    for path in [&pipe, Path::new("/dev/zero"), Path::new("/tmp")] {
+        let args = Replay {
+            file: path.to_owned(),
+            threads: Some(1),
+            frames: None,
+        };
+        let error = super::replay(&args).unwrap_err();
+        assert!(error.to_string().contains("is no file"), "{error}");
+        assert_eq!(error.exit_code(), 2);
+    }
+    std::fs::remove_file(pipe).unwrap();
 }
 
 proptest! {

@@ -25,6 +25,8 @@ pub(super) struct Writer {
     queue: Option<SyncSender<Vec<u64>>>,
     /// Buffers that were written, to be filled again.
     empty: Receiver<Vec<u64>>,
+    /// Blocks handed over whose buffers have not come back.
+    under_way: usize,
     thread: Option<JoinHandle<io::Result<u64>>>,
 }
 
@@ -49,6 +51,7 @@ impl Writer {
             since: Instant::now(),
             queue: Some(queue),
             empty,
+            under_way: 0,
             thread: Some(thread),
         })
     }
@@ -82,12 +85,30 @@ impl Writer {
         if self.block.is_empty() {
             return Ok(());
         }
-        let mut next = self.empty.try_recv().unwrap_or_default();
+        let mut next = match self.empty.try_recv() {
+            Ok(written) => {
+                self.under_way -= 1;
+                written
+            }
+            Err(_) => Vec::new(),
+        };
         next.clear();
         let block = std::mem::replace(&mut self.block, next);
         self.since = Instant::now();
         let queue = self.queue.as_ref().expect("it is open until it is closed");
-        queue.send(block).map_err(|_| Stopped)
+        queue.send(block).map_err(|_| Stopped)?;
+        self.under_way += 1;
+        Ok(())
+    }
+
+    /// Waits until everything handed over is in the file.
+    pub(super) fn catch_up(&mut self) -> Result<(), Stopped> {
+        self.flush()?;
+        while self.under_way > 0 {
+            self.empty.recv().map_err(|_| Stopped)?;
+            self.under_way -= 1;
+        }
+        Ok(())
     }
 
     /// Waits until everything is written; returns the bytes of the file.
