@@ -1,7 +1,8 @@
 //! Snapshots as files: written as a whole or not at all, and read only when there is room.
 
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::io::{ErrorKind, Read, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
 use sim_engine::simulation::Simulation;
@@ -32,6 +33,10 @@ pub(crate) fn save(simulation: &Simulation, inbox: &Inbox) -> Result<(), Refusal
     if let Some(lost) = simulation.lost() {
         return Err(refusal(RefusalKind::Backend, lost.to_string()));
     }
+    if let Some(mut file) = nameless(path) {
+        let written = file.write_all(&bytes);
+        return written.map_err(|problem| refuse(format!("cannot be written: {problem}")));
+    }
     let header = inbox.header();
     // no other command has this name
     let part = folder.join(format!(
@@ -54,6 +59,18 @@ pub(crate) fn save(simulation: &Simulation, inbox: &Inbox) -> Result<(), Refusal
             _ => format!("cannot be written: {problem}"),
         })
     })
+}
+
+/// An empty file without a name, which another process holds open for us: `/proc/PID/fd/N`. It goes with that process.
+///
+/// A process that gave up waiting may have another file at that number by now: one that holds something, or has a name.
+fn nameless(path: &Path) -> Option<File> {
+    if !path.starts_with("/proc") || !fs::metadata(path).ok()?.is_file() {
+        return None;
+    }
+    let file = OpenOptions::new().write(true).open(path).ok()?;
+    let status = file.metadata().ok()?;
+    (status.is_file() && status.nlink() == 0 && status.len() == 0).then_some(file)
 }
 
 /// Sets the worlds of the mask to those of the file that the command names, or to one of them.

@@ -316,3 +316,29 @@ def test_all_groups_share_the_threads_that_are_asked_for(pendulum):
             for sim in groups:
                 sim.step()
             assert wait_until(lambda pid=groups.pid, asked=asked: threads(pid) == asked, 2.0), threads(groups.pid)
+
+
+LIMITED = """
+import resource, sys, tightloop as tl
+resource.setrlimit(resource.RLIMIT_NOFILE, (int(sys.argv[2]), int(sys.argv[3])))
+scene = tl.Scene(dt=1 / 480, substeps=4)
+scene.add_urdf(sys.argv[1], name="arm")
+with tl.launch(scene, worlds=32, groups=32) as groups:
+    frames = [sim.step() for sim in groups]
+    print(len(frames))
+"""
+
+
+def with_limit(urdf: Path, soft: int, hard: int) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", LIMITED, str(urdf), str(soft), str(hard)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_a_soft_limit_of_open_files_is_raised_for_many_groups(pendulum_urdf):
+    done = with_limit(pendulum_urdf, 256, 4096)
+    assert done.stdout == "32\n", done.stderr
+
+
+def test_a_hard_limit_of_open_files_is_named_with_the_cure(pendulum_urdf):
+    done = with_limit(pendulum_urdf, 128, 128)
+    assert "may have 128 open" in done.stderr and "ulimit -n" in done.stderr, done.stderr

@@ -62,7 +62,7 @@ scene.add_urdf({urdf!r}, name="arm")
 sim = tl.launch(scene, worlds=4)
 sim.step()
 import resource
-resource.setrlimit(resource.RLIMIT_NOFILE, (256, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
 taken = []
 try:
     while True:

@@ -181,17 +181,23 @@ pub const ORDER: &[(&str, &[&str])] = &[
         &[
             "header",
             "journal_header",
-            "error",
+            "guard",
             "hash",
+            "mapping",
+            "storage",
+            "service",
+            "error",
             "description",
             "control",
             "hook",
             "paths",
             "daemon_lock",
+            "described",
             "liveness",
             "discovery",
             "table",
             "digest",
+            "descriptors",
             "transport",
             "turn",
             "connection",
@@ -246,7 +252,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
 ];
 
 /// The only door of each heavy package.
-pub const DOORS: [(&str, &str); 20] = [
+pub const DOORS: [(&str, &str); 21] = [
     ("ash", "sim-core/device/src/vulkan"),
     ("naga", "sim-core/device/src/module.rs"),
     ("wgpu", "sim-core/device/src"),
@@ -258,6 +264,7 @@ pub const DOORS: [(&str, &str); 20] = [
     ("rayon", "sim-core/engine/src/backend/cpu"),
     ("crc32fast", "sim-core/engine/src/snapshot.rs"),
     ("iceoryx2", "sim-daemon/protocol/src"),
+    ("iceoryx2_cal", "sim-daemon/protocol/src"),
     ("clap", "sim-daemon/src/cli"),
     ("clap_complete", "sim-daemon/src/cli/pages.rs"),
     ("clap_mangen", "sim-daemon/src/cli/pages.rs"),
@@ -270,7 +277,7 @@ pub const DOORS: [(&str, &str); 20] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-pub const UNSAFE: [&str; 24] = [
+pub const UNSAFE: [&str; 26] = [
     "py-client/src/frame.rs",                      // NumPy views
     "sim-core/device/src/memory.rs",               // imports pages of the host
     "sim-core/device/src/portable.rs",             // programs without checks at run time
@@ -293,6 +300,8 @@ pub const UNSAFE: [&str; 24] = [
     "sim-core/physics/src/lane/simd.rs", // intrinsics
     "sim-daemon/protocol/src/frame.rs", // views of a sample
     "sim-daemon/protocol/src/loaned.rs", // loaned samples
+    "sim-daemon/protocol/src/mapping.rs", // mapped files, and those that somebody cuts
+    "sim-daemon/protocol/src/storage.rs", // what mapped files hold
     "sim-daemon/src/environment.rs",    // a variable, set while there is one thread
     "sim-daemon/src/server.rs",         // samples that a device writes to
 ];

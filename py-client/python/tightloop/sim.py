@@ -308,9 +308,9 @@ class Sim:
         Raises:
             SnapshotError: There is not enough memory for it. Other errors are those of `step`.
         """
-        with transfer_file() as path:
-            self._client.snapshot(str(path))
-            return Snapshot.load(path)
+        with transfer_file() as (file, path):
+            self._client.snapshot(path)
+            return Snapshot(file.read(), "snapshot")
 
     def restore(
         self,
@@ -343,9 +343,8 @@ class Sim:
             raise CommandRefused(f"restore: snapshot is {type(snapshot).__name__}; give a tightloop.Snapshot")
         if from_world is not None:
             from_world = checks.integer("restore: from_world", from_world, least=0, error=CommandRefused)
-        with transfer_file() as path:
-            snapshot.save(path)
-            return self._client.restore(str(path), worlds, from_world)
+        with transfer_file(snapshot.to_bytes()) as (_, path):
+            return self._client.restore(path, worlds, from_world)
 
     @property
     def params(self) -> Params:

@@ -13,7 +13,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ _CHECKSUM, _COVERED, _COUNTERS = 12, 16, 28
 # largest file that is read: a million worlds of the largest robots have less
 _BYTES_MAX = 1 << 36
 _SHARED_MEMORY = Path("/dev/shm")
+_NO_ROOM = "snapshot: no room on its way to the daemon: {}"
 
 
 class Snapshot:
@@ -137,20 +138,29 @@ class Snapshot:
 
 
 @contextmanager
-def transfer_file() -> Iterator[Path]:
-    """Provide the path of a temporary file between client and daemon, in shared memory if possible.
+def transfer_file(data: bytes = b"") -> Iterator[tuple[BinaryIO, str]]:
+    """Provide a file between client and daemon, in shared memory if possible. It has no name and ends with this process.
+
+    Args:
+        data: What the daemon reads there.
+
+    Yields:
+        The file, and the path by which the daemon opens it.
 
     Raises:
-        SnapshotError: The folder of the file cannot be made.
+        SnapshotError: The file cannot be made.
     """
     try:
-        folder = tempfile.TemporaryDirectory(
-            prefix=f"tightloop-{os.getpid()}-", dir=_SHARED_MEMORY if _SHARED_MEMORY.is_dir() else None
-        )
+        file = tempfile.TemporaryFile(dir=_SHARED_MEMORY if _SHARED_MEMORY.is_dir() else None)
     except OSError as problem:
-        raise SnapshotError(f"snapshot: no room on its way to the daemon: {problem}") from None
-    with folder as path:
-        yield Path(path) / "snapshot"
+        raise SnapshotError(_NO_ROOM.format(problem)) from None
+    with file:
+        try:
+            file.write(data)
+            file.seek(0)
+        except OSError as problem:
+            raise SnapshotError(_NO_ROOM.format(problem)) from None
+        yield cast("BinaryIO", file), f"/proc/{os.getpid()}/fd/{file.fileno()}"
 
 
 def _read(file: Path) -> bytes:

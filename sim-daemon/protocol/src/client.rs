@@ -1,13 +1,14 @@
 //! A client: attaches to a running daemon, observes it, and controls it when it holds the lease.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::command::{Call, Command};
-use crate::connection::{ANSWER_MAX, Connection, S, malformed};
+use crate::connection::{ANSWER_MAX, Connection, malformed};
 use crate::control::{Request, Response};
 use crate::controller::Controller;
+use crate::described;
 use crate::discovery::{AttachOptions, find};
 use crate::frame::Alive;
 use crate::hook::Hook;
@@ -15,9 +16,8 @@ use crate::journal::Journal;
 use crate::liveness::Peer;
 use crate::observer::Observer;
 use crate::paths::{DaemonPaths, Presence};
-use crate::transport::{self, handshake};
 use crate::turn::{Held, Turn};
-use crate::{Description, Frame, Op, PROTOCOL_VERSION, ProtocolError};
+use crate::{Description, Frame, Op, ProtocolError};
 
 /// A connection to a daemon. All methods take `&self`, from any thread; calls that step wait for each other.
 #[derive(Debug)]
@@ -59,48 +59,29 @@ impl Client {
     }
 
     fn handshake(peer: Peer, hook: Hook<'_>) -> Result<Client, ProtocolError> {
-        let node =
-            transport::node::<S>(&peer.paths.transport_config(peer.beacon.session), "client")?;
         let name = peer.paths.name().to_owned();
-        let wake = transport::open_wake(&node, &name)?;
-        let announced = transport::attribute(&wake, handshake::PROTOCOL);
-        if announced != PROTOCOL_VERSION.to_string() {
-            let described = PROTOCOL_VERSION.to_string();
-            return Err(ProtocolError::Handshake {
-                name,
-                fact: "protocol version",
-                announced,
-                described,
-            });
-        }
-        let connection = Connection {
-            peer,
-            wake: transport::notifier(&wake)?,
-            asking: Turn::new(()),
-            requester: Mutex::new(transport::requester(&node)?),
-            node: Mutex::new(node),
-        };
-        let Response::Description(description) = connection.ask(&Request::Describe, hook)? else {
+        let (connection, announced) = Connection::open(&peer, hook)?;
+        let Response::Described = connection.ask(&Request::Describe, hook)? else {
             return Err(malformed("the answer to describe"));
         };
-        for (fact, key, described) in [
+        let description = described::read(&connection.peer.paths, connection.peer.beacon.session)?;
+        for (fact, announced, described) in [
             (
                 "schema hash",
-                handshake::SCHEMA,
+                announced.schema,
                 format!("{:016x}", description.schema_hash()),
             ),
             (
                 "number of worlds",
-                handshake::WORLDS,
+                announced.worlds,
                 description.worlds.to_string(),
             ),
             (
                 "number of dofs",
-                handshake::DOFS,
+                announced.dofs,
                 description.dof_names.len().to_string(),
             ),
         ] {
-            let announced = transport::attribute(&wake, key);
             if announced != described {
                 return Err(ProtocolError::Handshake {
                     name,
@@ -111,7 +92,7 @@ impl Client {
             }
         }
         Ok(Client {
-            description: Arc::new(*description),
+            description: Arc::new(description),
             controller: Turn::new(None),
             observer: Turn::new(None),
             release: AtomicBool::new(false),
@@ -384,7 +365,7 @@ impl Client {
     #[cfg(test)]
     pub(crate) fn raw(
         &self,
-        send: impl FnOnce(&crate::transport::CommandPublisher<S>, u64),
+        send: impl FnOnce(&crate::transport::CommandPublisher<crate::connection::S>, u64),
     ) -> Result<Frame, ProtocolError> {
         let mut held = self.controller.take(&mut crate::hook::keep_waiting())?;
         held.as_mut().expect("the lease is held").raw(send)

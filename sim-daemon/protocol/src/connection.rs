@@ -1,20 +1,22 @@
 //! How each part of a client reaches the daemon: node, control requests, wake-up.
 
 use std::sync::Mutex;
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::notifier::Notifier;
-use iceoryx2::prelude::{Node, ipc_threadsafe};
+use iceoryx2::prelude::Node;
 
-use crate::ProtocolError;
 use crate::control::{Request, Response};
 use crate::hook::Hook;
 use crate::liveness::Peer;
-use crate::transport::{Requester, SLICE};
+use crate::service::AnyThread;
+use crate::transport::{self, Requester, SLICE, handshake};
 use crate::turn::{Turn, lock};
+use crate::{PROTOCOL_VERSION, ProtocolError, mapping, storage};
 
 /// Clients are used from any thread.
-pub(crate) type S = ipc_threadsafe::Service;
+pub(crate) type S = AnyThread;
 
 /// How long control requests wait for a daemon that lives but is busy or stopped.
 pub(crate) const ANSWER_MAX: Duration = Duration::from_secs(30);
@@ -35,7 +37,74 @@ pub(crate) struct Connection {
     pub(crate) node: Mutex<Node<S>>,
 }
 
+/// Facts of the handshake, as the daemon announced them.
+#[derive(Debug)]
+pub(crate) struct Announced {
+    pub(crate) schema: String,
+    pub(crate) worlds: String,
+    pub(crate) dofs: String,
+}
+
 impl Connection {
+    /// Opens a client's ports, on a thread of its own: the transport trusts what it reads, and may not come back.
+    pub(crate) fn open(
+        peer: &Peer,
+        hook: Hook<'_>,
+    ) -> Result<(Connection, Announced), ProtocolError> {
+        let (sender, receiver) = mpsc::channel();
+        let theirs = peer.clone();
+        let open = move || {
+            // nobody waits any more for one that comes too late
+            let _ = sender.send(Connection::open_here(theirs));
+        };
+        std::thread::Builder::new()
+            .name("tightloop-attach".to_owned())
+            .spawn(open)
+            .map_err(|error| ProtocolError::transport("start a thread", error))?;
+        let start = Instant::now();
+        loop {
+            match receiver.recv_timeout(SLICE) {
+                Ok(opened) => return opened,
+                Err(RecvTimeoutError::Timeout) if start.elapsed() < ANSWER_MAX => {}
+                // it waits still, or it panicked
+                Err(_) => return Err(damaged(peer, "attach")),
+            }
+            peer.check()?;
+            if hook().is_break() {
+                return Err(ProtocolError::Interrupted);
+            }
+        }
+    }
+
+    fn open_here(peer: Peer) -> Result<(Connection, Announced), ProtocolError> {
+        let node =
+            transport::node::<S>(&peer.paths.transport_config(peer.beacon.session), "client")?;
+        let wake = transport::open_wake(&node, peer.paths.name())?;
+        let fact = |key| transport::attribute(&wake, key);
+        let (announced, described) = (fact(handshake::PROTOCOL), PROTOCOL_VERSION.to_string());
+        if announced != described {
+            return Err(ProtocolError::Handshake {
+                name: peer.paths.name().to_owned(),
+                fact: "protocol version",
+                announced,
+                described,
+            });
+        }
+        let announced = Announced {
+            schema: fact(handshake::SCHEMA),
+            worlds: fact(handshake::WORLDS),
+            dofs: fact(handshake::DOFS),
+        };
+        let connection = Connection {
+            peer,
+            wake: transport::notifier(&wake)?,
+            asking: Turn::new(()),
+            requester: Mutex::new(transport::requester(&node)?),
+            node: Mutex::new(node),
+        };
+        Ok((connection, announced))
+    }
+
     /// Asks and waits for the answer; control requests are rare, so waiting is by sleeping.
     pub(crate) fn ask(&self, request: &Request, hook: Hook<'_>) -> Result<Response, ProtocolError> {
         self.ask_within(ANSWER_MAX, request, hook)
@@ -68,6 +137,7 @@ impl Connection {
             (Instant::now(), Duration::from_micros(20), Instant::now());
         loop {
             if let Some(response) = pending.receive().map_err(|error| failed(&error))? {
+                intact(&self.peer)?;
                 return serde_json::from_slice(response.payload()).map_err(|error| {
                     ProtocolError::Malformed {
                         from: "the daemon",
@@ -77,6 +147,7 @@ impl Connection {
             }
             if polled.elapsed() > SLICE {
                 self.peer.check()?;
+                intact(&self.peer)?;
                 if hook().is_break() {
                     return Err(ProtocolError::Interrupted);
                 }
@@ -121,7 +192,7 @@ impl Connection {
     ///
     /// # Errors
     /// That of the last try; [`ProtocolError::DaemonLost`] and its kin, which explain it better; [`ProtocolError::Interrupted`].
-    pub(crate) fn open<T>(
+    pub(crate) fn ports<T>(
         &self,
         hook: Hook<'_>,
         ports: impl Fn(&Node<S>) -> Result<T, ProtocolError>,
@@ -149,6 +220,24 @@ pub(crate) fn pause(hook: Hook<'_>) -> Result<(), ProtocolError> {
     }
     std::thread::sleep(PAUSE);
     Ok(())
+}
+
+/// Errors when another program has cut a file of the daemon while it was mapped here.
+pub(crate) fn intact(peer: &Peer) -> Result<(), ProtocolError> {
+    match mapping::any_damaged()
+        && storage::is_damaged(&peer.paths.transport_config(peer.beacon.session))
+    {
+        true => Err(damaged(peer, "read shared memory")),
+        false => Ok(()),
+    }
+}
+
+/// The error of a daemon whose shared memory makes no sense.
+pub(crate) fn damaged(peer: &Peer, action: &str) -> ProtocolError {
+    ProtocolError::Damaged {
+        action: action.to_owned(),
+        path: peer.paths.shared_folder().display().to_string(),
+    }
 }
 
 pub(crate) fn malformed(problem: &str) -> ProtocolError {

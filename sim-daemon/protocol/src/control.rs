@@ -3,10 +3,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::Description;
-
 /// Longest request as JSON [bytes].
 pub(crate) const REQUEST_MAX: usize = 512;
+
+/// Longest response as JSON [bytes].
+pub(crate) const RESPONSE_MAX: usize = 2048;
 
 /// From client to daemon.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -42,8 +43,8 @@ pub enum Request {
 /// From daemon to client.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Response {
-    /// Answer to [`Request::Describe`].
-    Description(Box<Description>),
+    /// Answer to [`Request::Describe`]: the description is in the daemon's folder.
+    Described,
     /// Answer to [`Request::Controller`].
     Controller {
         /// Process in control, if any.

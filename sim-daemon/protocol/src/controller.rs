@@ -8,14 +8,14 @@ use iceoryx2::prelude::PortFactory;
 
 use crate::affinity::CoreAffinity;
 use crate::command::{Call, command_bytes};
-use crate::connection::{Connection, S, malformed, pause};
+use crate::connection::{Connection, S, damaged, intact, malformed, pause};
 use crate::control::{Request, Response};
 use crate::frame::{Alive, FrameSample};
+use crate::guard::guarded;
 use crate::heartbeat::HeartbeatThread;
 use crate::hook::{Hook, keep_waiting};
 use crate::liveness::{Peer, is_gone};
 use crate::loaned;
-use crate::memory::reserve;
 use crate::transport::{self, CommandPublisher, FrameService, FrameSubscriber};
 use crate::waiter::{Awaited, Waiter, cores};
 use crate::{ALIGNMENT, CommandHeader, Description, Frame, Op, ProtocolError, RefusalKind, Table};
@@ -185,10 +185,9 @@ impl Controller {
     fn publish(&mut self, call: &Call<'_>) -> Result<(), ProtocolError> {
         let failed =
             |error: &dyn std::fmt::Debug| ProtocolError::transport("send a command", error);
-        let mut loan = self
-            .publisher
-            .loan_slice_uninit(call.bytes(&self.description) / ALIGNMENT)
-            .map_err(|error| failed(&error))?;
+        let damaged = || damaged(&self.connection.peer, "send a command");
+        let lines = call.bytes(&self.description) / ALIGNMENT;
+        let mut loan = loaned::loan(&self.publisher, lines).map_err(|problem| failed(&problem))?;
         self.seq += 1;
         *loan.user_header_mut() = CommandHeader {
             session: self.connection.peer.beacon.session,
@@ -199,7 +198,8 @@ impl Controller {
             core: self.affinity.core(),
         };
         call.write(&self.description, loaned::words(loan.payload_mut()));
-        if loaned::send(loan).map_err(|error| failed(&error))? == 0 {
+        let sent = guarded(|| loaned::send(loan)).ok_or_else(damaged)?;
+        if sent.map_err(|error| failed(&error))? == 0 {
             self.connection.peer.check()?;
             return Err(self.connection.peer.lease_lost());
         }
@@ -230,7 +230,10 @@ impl Controller {
     /// Makes a frame of an answer, or an error of a refusal.
     fn open(&mut self, sample: FrameSample) -> Result<Frame, ProtocolError> {
         let header = *sample.user_header();
-        let payload = bytemuck::cast_slice(sample.payload());
+        let peer = &self.connection.peer;
+        intact(peer)?;
+        let payload =
+            loaned::received(sample.payload()).ok_or_else(|| damaged(peer, "read a frame"))?;
         if header.outcome != 0 {
             return Err(refusal(header.outcome, header.rows, payload));
         }
@@ -283,8 +286,6 @@ fn open_lease(
         // last: the daemon counts the lease as used once it sees this
         let commands = transport::open_commands(node, epoch)?;
         let publisher = transport::command_publisher(&commands, bytes)?;
-        let prefix = node.config().global.prefix.to_string();
-        reserve(&prefix, publisher.id().value(), "the commands of a lease")?;
         Ok((service, subscriber, listener, publisher))
     });
     if ports.is_err() {
@@ -324,7 +325,8 @@ struct Answer<'a> {
 impl Awaited<FrameSample> for Answer<'_> {
     fn poll(&mut self) -> Result<Option<FrameSample>, ProtocolError> {
         loop {
-            match self.subscriber.receive() {
+            let received = guarded(|| self.subscriber.receive());
+            match received.ok_or_else(|| damaged(self.peer, "receive a frame"))? {
                 Ok(None) => return Ok(None),
                 Ok(Some(sample)) => {
                     let header = sample.user_header();
@@ -342,6 +344,7 @@ impl Awaited<FrameSample> for Answer<'_> {
             return Err(ProtocolError::Interrupted);
         }
         self.peer.check()?;
+        intact(self.peer)?;
         if self.service.dynamic_config().number_of_publishers() == 0 {
             return Err(self.peer.lease_lost());
         }

@@ -1,14 +1,15 @@
 //! The lock of a daemon's name, and cleaning up after a daemon that died.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{self, File, TryLockError};
 use std::io::Write;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
-use std::os::unix::fs::{FileExt, MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::paths::{
-    DaemonPaths, Presence, SHARED_MEMORY, STARTING, default_root, names_with_lock, private_folder,
+    DaemonPaths, Presence, SHARED_MEMORY, STARTING, default_root, names_with_lock, private,
+    private_folder,
 };
 use crate::{PROTOCOL_VERSION, ProtocolError};
 
@@ -16,6 +17,9 @@ use crate::{PROTOCOL_VERSION, ProtocolError};
 const LOOK_MAX: Duration = Duration::from_millis(500);
 /// File in the transport's folder that names root and daemon, and is locked as long as the daemon lives.
 const PLACE: &str = "place";
+
+/// Folders that the transport would make itself, readable to the group.
+const TRANSPORT_FOLDERS: [&str; 2] = ["nodes", "services"];
 
 /// The lock of a name. Holding it is being the daemon; dropping it removes what is left of the daemon's files.
 #[derive(Debug)]
@@ -58,13 +62,7 @@ impl DaemonLock {
     fn try_take(paths: &DaemonPaths) -> Result<Option<DaemonLock>, ProtocolError> {
         let path = paths.lock_path();
         let root_error = |error: std::io::Error| root_error(&path, &error);
-        let opened = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .mode(0o600)
-            .open(&path);
+        let opened = private().create(true).truncate(false).open(&path);
         let file = match opened {
             // the last daemon there took the folder with it
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
@@ -143,9 +141,12 @@ fn root_error(path: &Path, error: &std::io::Error) -> ProtocolError {
 /// Makes the transport's folder with its mark.
 fn mark(paths: &DaemonPaths) -> Result<File, ProtocolError> {
     let folder = private_folder(&paths.shared_folder())?;
+    for name in TRANSPORT_FOLDERS {
+        private_folder(&folder.join(name))?;
+    }
     let (new, path) = (folder.join("place.new"), folder.join(PLACE));
     let write = || {
-        let mut file = File::create(&new)?;
+        let mut file = private().create_new(true).open(&new)?;
         file.write_all(paths.root().as_os_str().as_bytes())?;
         file.write_all(b"\n")?;
         file.write_all(paths.name().as_bytes())?;
@@ -308,7 +309,8 @@ mod tests {
         let root = root("sweep");
         let paths = DaemonPaths::new(Some(&root), "dead").unwrap();
         fs::write(paths.lock_path(), "tightloop 1 1 0000000000000001\n").unwrap();
-        let shared = Path::new(SHARED_MEMORY).join(format!("{}_00000001_5.data", paths.stem()));
+        let shared = paths.shared_folder().join("00000001_5.data");
+        private_folder(&paths.shared_folder()).unwrap();
         fs::write(&shared, "x").unwrap();
         sweep(Some(&root)).unwrap();
         assert!(!shared.exists() && !paths.lock_path().exists());
@@ -325,7 +327,7 @@ mod tests {
             format!("{}\ndead", dead.root().display()),
         )
         .unwrap();
-        let shared = Path::new(SHARED_MEMORY).join(format!("{}_00000001_5.data", dead.stem()));
+        let shared = dead.shared_folder().join("00000001_5.data");
         fs::write(&shared, "x").unwrap();
         fs::remove_dir(&gone).unwrap();
         let paths = DaemonPaths::new(Some(&living), "living").unwrap();

@@ -1,6 +1,12 @@
 //! What can go wrong between a client and a daemon, with the culprit and the cure.
 
+use std::fs::File;
 use std::path::PathBuf;
+
+use rustix::io::Errno;
+use rustix::process::{Resource, getrlimit};
+
+use crate::storage::{Problem, take_problem};
 
 /// Everything that can go wrong for a client. The daemon's refusals arrive as [`ProtocolError::CommandRefused`].
 #[derive(Debug, thiserror::Error)]
@@ -21,17 +27,6 @@ pub enum ProtocolError {
     )]
     Root {
         /// The folder.
-        path: PathBuf,
-        /// What the system says.
-        problem: String,
-    },
-
-    /// Whether the daemon lives cannot be told: this process has no file descriptor left.
-    #[error(
-        "{path:?} cannot be opened: {problem}; raise the limit on open files (`ulimit -n 65536`), or close some"
-    )]
-    Descriptors {
-        /// The file.
         path: PathBuf,
         /// What the system says.
         problem: String,
@@ -253,6 +248,27 @@ pub enum ProtocolError {
         what: String,
     },
 
+    /// The process has as many files open as it may.
+    #[error(
+        "{action}: no file can be opened; this process may have {limit} open; raise the limit (`ulimit -n 65536`), or \
+         use fewer groups or simulations"
+    )]
+    Descriptors {
+        /// What was tried.
+        action: String,
+        /// The limit.
+        limit: u64,
+    },
+
+    /// Another program has changed a file of the daemon.
+    #[error("{action}: {path} was changed by another program; end the daemon and launch a new one")]
+    Damaged {
+        /// What was tried.
+        action: String,
+        /// The file.
+        path: String,
+    },
+
     /// Bytes from the other side make no sense.
     #[error(
         "malformed message from {from}: {problem}; use the same tightloop release on both sides"
@@ -307,11 +323,42 @@ pub enum ProtocolError {
 }
 
 impl ProtocolError {
-    /// A transport failure; `problem` is the transport's own error.
+    /// A transport failure; `problem` is the transport's own error, which often does not know the cause.
     pub fn transport(action: impl Into<String>, problem: impl std::fmt::Debug) -> Self {
-        ProtocolError::Transport {
-            action: action.into(),
-            problem: format!("{problem:?}"),
+        let action = action.into();
+        let exhausted = |errno| matches!(errno, Errno::MFILE | Errno::NFILE);
+        match take_problem() {
+            Some(Problem::Full {
+                folder,
+                free,
+                needed,
+            }) => ProtocolError::SharedMemory {
+                path: folder,
+                free,
+                needed,
+                what: action,
+            },
+            Some(Problem::Damaged { path }) => ProtocolError::Damaged { path, action },
+            Some(Problem::System(errno)) if !exhausted(errno) => ProtocolError::Transport {
+                action,
+                problem: format!("{problem:?}, {errno}"),
+            },
+            Some(Problem::System(_)) => ProtocolError::descriptors(action),
+            // what the transport opens itself
+            None if File::open("/")
+                .is_err_and(|error| Errno::from_io_error(&error).is_some_and(exhausted)) =>
+            {
+                ProtocolError::descriptors(action)
+            }
+            None => ProtocolError::Transport {
+                action,
+                problem: format!("{problem:?}"),
+            },
         }
+    }
+
+    pub(crate) fn descriptors(action: String) -> Self {
+        let limit = getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX);
+        ProtocolError::Descriptors { action, limit }
     }
 }

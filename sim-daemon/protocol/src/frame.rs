@@ -4,12 +4,12 @@ use std::fmt;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use iceoryx2::prelude::ipc_threadsafe;
 use iceoryx2::sample::Sample;
 
+use crate::connection::S;
 use crate::{Dtype, FrameHeader, Line, ProtocolError, Row, Table};
 
-pub(crate) type FrameSample = Sample<ipc_threadsafe::Service, [Line], FrameHeader>;
+pub(crate) type FrameSample = Sample<S, [Line], FrameHeader>;
 
 /// The state of all worlds (or, for an observer, of the first ones) at one instant.
 ///

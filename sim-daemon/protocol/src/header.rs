@@ -7,7 +7,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
 /// Version of everything in this crate that the other side must agree on.
-pub const PROTOCOL_VERSION: u32 = 2;
+pub const PROTOCOL_VERSION: u32 = 3;
 
 /// Alignment of a sample and of every array in it [bytes].
 pub const ALIGNMENT: usize = 64;

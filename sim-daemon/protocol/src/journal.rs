@@ -4,12 +4,13 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use iceoryx2::prelude::ipc_threadsafe;
 use iceoryx2::sample::Sample;
 
-use crate::connection::{Connection, S, malformed};
+use crate::connection::{Connection, S, damaged, intact, malformed};
 use crate::control::{Request, Response};
+use crate::guard::guarded;
 use crate::hook::Hook;
+use crate::loaned;
 use crate::memory::reserve;
 use crate::transport::{self, JournalSubscriber, SLICE};
 use crate::{ALIGNMENT, Description, JournalHeader, Line, ProtocolError, RefusalKind};
@@ -21,7 +22,7 @@ const NAP: Duration = Duration::from_millis(5);
 /// One entry of a journal, in shared memory until it is dropped.
 #[derive(Debug)]
 pub struct Entry {
-    sample: Sample<ipc_threadsafe::Service, [Line], JournalHeader>,
+    sample: Sample<S, [Line], JournalHeader>,
     parts: [usize; 3],
     /// Entries that were lost right before this one.
     pub lost: u64,
@@ -117,9 +118,9 @@ impl Journal {
             }
             _ => return Err(malformed("the answer to journal")),
         };
-        let subscriber = connection.open(hook, |node| {
-            let prefix = node.config().global.prefix.to_string();
-            reserve(&prefix, port, "the journal of a recorder")?;
+        let subscriber = connection.ports(hook, |node| {
+            let folder = connection.peer.paths.shared_folder();
+            reserve(&folder, port, "the journal of a recorder")?;
             transport::journal_subscriber(&transport::open_journal(node, journal)?)
         })?;
         // a daemon that sleeps begins the journal when it looks around
@@ -173,7 +174,9 @@ impl Journal {
     }
 
     fn receive(&mut self) -> Result<Option<Entry>, ProtocolError> {
-        let received = self.subscriber.receive();
+        let peer = &self.connection.peer;
+        let received = guarded(|| self.subscriber.receive())
+            .ok_or_else(|| damaged(peer, "receive an entry"))?;
         let sample = match received {
             Ok(None) => return Ok(None),
             Ok(Some(sample)) => sample,
@@ -183,13 +186,16 @@ impl Journal {
             }
         };
         let header = *sample.user_header();
+        intact(peer)?;
+        let payload =
+            loaned::received(sample.payload()).ok_or_else(|| damaged(peer, "read an entry"))?;
         if header.session != self.connection.peer.beacon.session || header.entry < self.next {
             return Err(malformed(
                 "the head of an entry: another session, or out of order",
             ));
         }
         let parts = header
-            .parts(size_of_val(sample.payload()))
+            .parts(size_of_val(payload))
             .ok_or_else(|| malformed("the head of an entry: its parts do not fit"))?;
         let lost = header.entry - self.next;
         self.next = header.entry + 1;

@@ -1,4 +1,4 @@
-//! Loaned samples: their payload as plain words, and how they are sent.
+//! Samples: their payload as plain words, checked where it was received, and how loans are sent.
 
 use std::fmt::Debug;
 use std::mem::MaybeUninit;
@@ -8,7 +8,37 @@ use iceoryx2::port::publisher::Publisher;
 use iceoryx2::prelude::{Service, ZeroCopySend};
 use iceoryx2::sample_mut_uninit::SampleMutUninit;
 
-use crate::Line;
+use crate::guard::guarded;
+use crate::{Line, mapping};
+
+/// A slot that is written to.
+type Loan<S, H> = SampleMutUninit<S, [MaybeUninit<Line>], H>;
+
+/// The words of a received sample; `None` where offset or length, which lie in shared memory too, lead out of it.
+pub(crate) fn received(payload: &[Line]) -> Option<&[u64]> {
+    mapping::holds(payload).then(|| bytemuck::cast_slice(payload))
+}
+
+/// A slot to write to, of so many lines.
+///
+/// # Errors
+/// What the transport says.
+pub(crate) fn loan<S: Service, H: Debug + Default + ZeroCopySend>(
+    publisher: &Publisher<S, [Line], H>,
+    lines: usize,
+) -> Result<Loan<S, H>, String> {
+    let mut loan = guarded(|| publisher.loan_slice_uninit(lines))
+        .ok_or("panicked")?
+        .map_err(|error| format!("{error:?}"))?;
+    match mapping::holds(loan.payload_mut()) {
+        true => Ok(loan),
+        // dropping it would write there
+        false => {
+            std::mem::forget(loan);
+            Err("a slot outside of shared memory".to_owned())
+        }
+    }
+}
 
 /// The words of a loan. Their content is whatever was in the slot before.
 pub(crate) fn words(lines: &mut [MaybeUninit<Line>]) -> &mut [u64] {
@@ -20,7 +50,7 @@ pub(crate) fn words(lines: &mut [MaybeUninit<Line>]) -> &mut [u64] {
 /// Sends a loan of `publisher` as it is, and returns its words, which stay as they are until the next loan.
 pub(crate) fn send_kept<S: Service, H: Debug + ZeroCopySend>(
     _publisher: &mut Publisher<S, [Line], H>,
-    mut loan: SampleMutUninit<S, [MaybeUninit<Line>], H>,
+    mut loan: Loan<S, H>,
 ) -> Result<&[u64], SendError> {
     let words: *const [u64] = words(loan.payload_mut());
     send(loan)?;
@@ -31,7 +61,7 @@ pub(crate) fn send_kept<S: Service, H: Debug + ZeroCopySend>(
 
 /// Sends a loan as it is; returns to how many.
 pub(crate) fn send<S: Service, H: Debug + ZeroCopySend>(
-    loan: SampleMutUninit<S, [MaybeUninit<Line>], H>,
+    loan: Loan<S, H>,
 ) -> Result<usize, SendError> {
     // SAFETY: as above, whatever was written or not is initialised.
     unsafe { loan.assume_init() }.send()

@@ -109,18 +109,17 @@ pub(crate) fn free() -> Free {
     }
 }
 
-/// Takes the pages of a port's data segment now, so that nobody else can: later writes cannot fail.
-pub(crate) fn reserve(prefix: &str, port: u128, what: &str) -> Result<(), ProtocolError> {
+/// Takes the pages of a journal's memory now, so that nobody else can: later writes cannot fail.
+pub(crate) fn reserve(folder: &Path, port: u128, what: &str) -> Result<(), ProtocolError> {
     let failed =
         |error: &dyn std::fmt::Debug| ProtocolError::transport(format!("reserve {what}"), error);
-    // the transport puts a hash of its own between prefix and port
     let ending = format!("_{port}.data");
-    let is_ours = |name: &str| name.starts_with(prefix) && name.ends_with(&ending);
-    let path = fs::read_dir(SHARED_MEMORY)
+    let is_ours = |name: &str| name.ends_with(&ending);
+    let path = fs::read_dir(folder)
         .map_err(|error| failed(&error))?
         .flatten()
         .find(|entry| entry.file_name().to_str().is_some_and(is_ours))
-        .ok_or_else(|| failed(&format!("no file {prefix}*{ending}")))?
+        .ok_or_else(|| failed(&format!("no file *{ending}")))?
         .path();
     let file = OpenOptions::new()
         .write(true)
@@ -129,31 +128,31 @@ pub(crate) fn reserve(prefix: &str, port: u128, what: &str) -> Result<(), Protoc
     let needed = file.metadata().map_err(|error| failed(&error))?.len();
     match fallocate(&file, FallocateFlags::empty(), 0, needed) {
         Ok(()) => Ok(()),
-        Err(rustix::io::Errno::NOSPC) => Err(ProtocolError::SharedMemory {
-            path: SHARED_MEMORY.to_owned(),
-            free: free().shared,
-            needed,
-            what: what.to_owned(),
-        }),
+        Err(rustix::io::Errno::NOSPC) => Err(full(needed, what)),
         Err(error) => Err(failed(&error)),
     }
 }
 
-/// Size of all files whose name begins with `stem` [bytes]; for tests and the log.
-pub(crate) fn used(stem: &str) -> u64 {
-    let Ok(entries) = fs::read_dir(SHARED_MEMORY) else {
+/// The file system of shared memory has no room for what was asked of it.
+pub(crate) fn full(needed: u64, what: &str) -> ProtocolError {
+    ProtocolError::SharedMemory {
+        path: SHARED_MEMORY.to_owned(),
+        free: free().shared,
+        needed,
+        what: what.to_owned(),
+    }
+}
+
+/// Size of all files in a daemon's folder [bytes]; for tests and the log.
+pub(crate) fn used(folder: &Path) -> u64 {
+    let Ok(entries) = fs::read_dir(folder) else {
         return 0;
     };
-    entries
-        .flatten()
-        .filter(|entry| {
-            entry
-                .file_name()
-                .to_str()
-                .is_some_and(|name| name.starts_with(stem))
-        })
-        .filter_map(|entry| Some(entry.metadata().ok()?.len()))
-        .sum()
+    let lengths = entries.flatten().filter_map(|entry| {
+        let status = entry.metadata().ok()?;
+        status.is_file().then_some(status.len())
+    });
+    lengths.sum()
 }
 
 #[cfg(test)]

@@ -6,10 +6,12 @@ use std::time::{Duration, Instant};
 
 use iceoryx2::port::listener::Listener;
 
-use crate::connection::{Connection, S, malformed};
+use crate::connection::{Connection, S, damaged, intact, malformed};
 use crate::controller::check_table;
 use crate::frame::{Alive, FrameSample};
+use crate::guard::guarded;
 use crate::hook::Hook;
+use crate::loaned;
 use crate::transport::{self, FrameSubscriber, SLICE};
 use crate::{Description, Frame, ProtocolError, Table};
 
@@ -30,7 +32,7 @@ impl Observer {
         description: &Arc<Description>,
         hook: Hook<'_>,
     ) -> Result<Observer, ProtocolError> {
-        let (subscriber, listener) = connection.open(hook, |node| {
+        let (subscriber, listener) = connection.ports(hook, |node| {
             let listener = transport::listener(&transport::open_event(node, "watch")?)?;
             Ok((
                 transport::frame_subscriber(&transport::open_watch(node)?, 1)?,
@@ -53,28 +55,29 @@ impl Observer {
         self.frames.check(self.description.frames_held)?;
         let Some(sample) = self.receive()? else {
             self.connection.peer.check()?;
+            intact(&self.connection.peer)?;
             return Ok(None);
         };
         let header = *sample.user_header();
+        let peer = &self.connection.peer;
+        intact(peer)?;
+        let payload =
+            loaned::received(sample.payload()).ok_or_else(|| damaged(peer, "read a frame"))?;
         if header.session != self.connection.peer.beacon.session
             || header.schema != self.description.schema
         {
             return Err(malformed("the head of a frame: another session or schema"));
         }
-        let table = check_table(
-            &mut self.table,
-            bytemuck::cast_slice(sample.payload()),
-            header.rows,
-        )?;
+        let table = check_table(&mut self.table, payload, header.rows)?;
         Ok(Some(Frame::new(sample, table, Arc::clone(&self.frames))))
     }
 
     /// The newest sample; older ones are dropped.
     fn receive(&self) -> Result<Option<FrameSample>, ProtocolError> {
         let mut newest = None;
-        while let Some(sample) = self
-            .subscriber
-            .receive()
+        let peer = &self.connection.peer;
+        while let Some(sample) = guarded(|| self.subscriber.receive())
+            .ok_or_else(|| damaged(peer, "receive a frame"))?
             .map_err(|error| ProtocolError::transport("receive a frame", error))?
         {
             drop(newest.replace(sample));

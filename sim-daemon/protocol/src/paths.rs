@@ -3,10 +3,10 @@
 //! ```text
 //! ROOT/NAME.lock            held by flock for the daemon's life; one line: protocol version, pid, session, how many groups if any
 //! ROOT/NAME.0.lock          of a daemon with groups: likewise for each of them, which has the rest below, too
-//! /dev/shm/tl<hash>/        nodes, services and sockets; `paths`, locked too, names ROOT and NAME; hash is over both
-//! /dev/shm/tl<hash>_*       shared memory; each session has a prefix of its own
+//! /dev/shm/tl<hash>/        nodes, services, sockets and shared memory, each session with a prefix of its own;
+//!                           `place`, locked too, names ROOT and NAME; hash is over both
 //! ```
-//! All of it is for one user only. Under systemd, `RemoveIPC=no` keeps a daemon's files when its user logs out.
+//! All of it is for one user only: folders have mode 0700 and files 0600, whatever the umask. Under systemd, `RemoveIPC=no` keeps a daemon's files when its user logs out.
 //! Whoever can take the lock may remove the rest. The transport folder is in /dev/shm whatever ROOT is, since the path
 //! of a Unix socket is limited to 107 bytes.
 
@@ -173,7 +173,7 @@ impl DaemonPaths {
         Path::new(SHARED_MEMORY).join(&self.stem)
     }
 
-    /// What every file of this daemon in [`SHARED_MEMORY`] begins with.
+    /// The name of this daemon's folder in [`SHARED_MEMORY`].
     pub fn stem(&self) -> &str {
         &self.stem
     }
@@ -207,7 +207,7 @@ impl DaemonPaths {
     pub(crate) fn open_lock(&self) -> Result<Option<File>, ProtocolError> {
         let opened = OpenOptions::new()
             .read(true)
-            .custom_flags(OFlags::NONBLOCK.bits() as i32)
+            .custom_flags((OFlags::NONBLOCK | OFlags::NOFOLLOW).bits() as i32)
             .open(self.lock_path());
         match opened {
             Ok(file) => Ok(Some(file)),
@@ -222,8 +222,10 @@ impl DaemonPaths {
 
     fn lock_error(&self, error: &std::io::Error) -> ProtocolError {
         let (path, problem) = (self.lock_path(), error.to_string());
-        match error.raw_os_error().map(Errno::from_raw_os_error) {
-            Some(Errno::MFILE | Errno::NFILE) => ProtocolError::Descriptors { path, problem },
+        match Errno::from_io_error(error) {
+            Some(Errno::MFILE | Errno::NFILE) => {
+                ProtocolError::descriptors(format!("read {}", path.display()))
+            }
             _ => ProtocolError::Root { path, problem },
         }
     }
@@ -231,11 +233,11 @@ impl DaemonPaths {
     /// The transport's settings for one session, explicit in full: its default would read a file from the working folder.
     pub(crate) fn transport_config(&self, session: u64) -> Config {
         let mut config = Config::default();
-        let prefix = format!("{}_{:08x}_", self.stem, session as u32);
+        let prefix = format!("{:08x}_", session as u32);
         let folder = format!("{SHARED_MEMORY}/{}/", self.stem);
-        // lengths: 28 + 28 bytes here, at most 45 more for a socket, 107 allowed
+        // lengths: 28 + 9 bytes here, at most 45 more for a socket, 107 allowed
         config.global.prefix =
-            FileName::new(prefix.as_bytes()).expect("letters, digits and underscores");
+            FileName::new(prefix.as_bytes()).expect("digits, letters and an underscore");
         config
             .global
             .set_root_path(&IoxPath::new(folder.as_bytes()).expect("letters, digits and slashes"));
@@ -245,24 +247,10 @@ impl DaemonPaths {
         config
     }
 
-    /// Removes every file in [`SHARED_MEMORY`] that belongs to this name. Only the lock's holder may.
+    /// Removes the transport's folder. Only the lock's holder may.
     pub(crate) fn remove_shared_files(&self) {
-        let Ok(entries) = fs::read_dir(SHARED_MEMORY) else {
-            return;
-        };
-        for entry in entries.flatten() {
-            let file_name = entry.file_name();
-            let Some(name) = file_name.to_str() else {
-                continue;
-            };
-            let rest = name.strip_prefix(self.stem.as_str());
-            // failures are left to the next start: another cleaner may have been faster
-            let _ = match rest {
-                Some("") => fs::remove_dir_all(entry.path()),
-                Some(rest) if rest.starts_with('_') => fs::remove_file(entry.path()),
-                _ => Ok(()),
-            };
-        }
+        // failures are left to the next start: another cleaner may have been faster
+        let _ = fs::remove_dir_all(self.shared_folder());
     }
 }
 
@@ -346,6 +334,15 @@ fn parse_beacon(text: &str) -> Option<Beacon> {
     })
 }
 
+/// How files of a daemon are opened: for their user only, and no links.
+pub(crate) fn private() -> OpenOptions {
+    let flags = OFlags::NOFOLLOW | OFlags::NONBLOCK;
+    let mut options = OpenOptions::new();
+    options.read(true).write(true).mode(0o600);
+    options.custom_flags(flags.bits() as i32);
+    options
+}
+
 /// Makes a folder that only we may use, and returns it absolute.
 pub(crate) fn private_folder(path: &Path) -> Result<PathBuf, ProtocolError> {
     let error = |problem: String| ProtocolError::Root {
@@ -366,6 +363,9 @@ pub(crate) fn private_folder(path: &Path) -> Result<PathBuf, ProtocolError> {
             Err(cause) => return Err(error(cause.to_string())),
         }
     };
+    if metadata.is_symlink() {
+        return Err(error("it is a link; remove it".to_owned()));
+    }
     if metadata.uid() != rustix::process::geteuid().as_raw() {
         return Err(error(format!("it belongs to user {}", metadata.uid())));
     }
@@ -377,7 +377,12 @@ pub(crate) fn private_folder(path: &Path) -> Result<PathBuf, ProtocolError> {
 
 fn made_folder(path: &Path) -> std::io::Result<(Metadata, PathBuf)> {
     DirBuilder::new().recursive(true).mode(0o700).create(path)?;
-    Ok((fs::metadata(path)?, fs::canonicalize(path)?))
+    // everybody may make links in shared memory, at names that can be guessed
+    let metadata = match path.starts_with(SHARED_MEMORY) {
+        true => fs::symlink_metadata(path)?,
+        false => fs::metadata(path)?,
+    };
+    Ok((metadata, fs::canonicalize(path)?))
 }
 
 #[cfg(test)]

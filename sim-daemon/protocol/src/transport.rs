@@ -1,6 +1,9 @@
 //! The services of one daemon and their limits, said once for both sides. The only file that knows iceoryx2's builders.
 
 use std::fmt::Debug;
+use std::fs::{self, Permissions};
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
 use std::sync::Once;
 use std::time::Duration;
 
@@ -16,6 +19,7 @@ use iceoryx2::prelude::*;
 use iceoryx2::service::builder::event::EventOpenError;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 
+use crate::descriptors;
 use crate::{ALIGNMENT, CommandHeader, FrameHeader, JournalHeader, Line, ProtocolError};
 
 /// Clients that may be attached at once, controllers and observers together.
@@ -56,14 +60,26 @@ pub(crate) fn node<S: Service>(config: &Config, role: &str) -> Result<Node<S>, P
     static QUIET: Once = Once::new();
     // our errors say it better; the transport's own log goes to stderr when IOX2_LOG_LEVEL asks for it
     QUIET.call_once(|| set_log_level_from_env_or(LogLevel::Fatal));
+    descriptors::make_room();
     let name =
         NodeName::new(role).map_err(|error| ProtocolError::transport("name a node", error))?;
-    NodeBuilder::new()
+    let node = NodeBuilder::new()
         .name(&name)
         .config(config)
         .signal_handling_mode(SignalHandlingMode::Disabled)
         .create::<S>()
-        .map_err(|error| ProtocolError::transport("create a node", error))
+        .map_err(|error| ProtocolError::transport("create a node", error))?;
+    close_folders(config);
+    Ok(node)
+}
+
+/// Takes from others what the transport's own folders of nodes leave them; the folder around them lets nobody in anyway.
+fn close_folders(config: &Config) {
+    let nodes = Path::new(config.global.node_dir().as_str()).read_dir();
+    for node in nodes.into_iter().flatten().flatten() {
+        // a node that ends meanwhile takes its folder with it
+        let _ = fs::set_permissions(node.path(), Permissions::from_mode(0o700));
+    }
 }
 
 fn service_name(name: &str) -> Result<ServiceName, ProtocolError> {
@@ -381,11 +397,8 @@ pub(crate) fn park<S: Service>(
     }
 }
 
-/// The daemon's end of the control service; `response_max` in bytes.
-pub(crate) fn responder<S: Service>(
-    node: &Node<S>,
-    response_max: usize,
-) -> Result<Responder<S>, ProtocolError> {
+/// The daemon's end of the control service.
+pub(crate) fn responder<S: Service>(node: &Node<S>) -> Result<Responder<S>, ProtocolError> {
     let failed =
         |error: &dyn std::fmt::Debug| ProtocolError::transport("create service control", error);
     let service = node
@@ -403,7 +416,8 @@ pub(crate) fn responder<S: Service>(
         .map_err(|error| failed(&error))?;
     service
         .server_builder()
-        .initial_max_slice_len(response_max)
+        .initial_max_slice_len(crate::control::RESPONSE_MAX)
+        .max_loaned_responses_per_request(1)
         .backpressure_strategy(BackpressureStrategy::DiscardData)
         .create()
         .map_err(|error| failed(&error))

@@ -8,9 +8,11 @@ use iceoryx2::prelude::{Node, PortFactory};
 use super::Inbox;
 use super::worlds::S;
 use crate::digest::{digest, digests_of};
+use crate::guard::guarded;
 use crate::journal_header::{ENDED, JournalHeader};
 use crate::loaned;
 use crate::memory;
+use crate::storage;
 use crate::transport::{self, JournalPublisher, JournalService, journal_slots};
 use crate::{ALIGNMENT, Description, ProtocolError, Row, Table};
 
@@ -76,6 +78,12 @@ impl Journals {
         (shared, description.state_bytes)
     }
 
+    /// Lets go of all recorders.
+    pub(super) fn lose(&mut self) {
+        let open = std::mem::take(&mut self.open);
+        guarded(|| drop(open));
+    }
+
     pub(super) fn are_full(&self) -> bool {
         self.open.len() >= RECORDERS_MAX
     }
@@ -92,7 +100,8 @@ impl Journals {
         let (slot_bytes, depth) = Journals::size(description, frame, observed);
         self.opened += 1;
         let service = transport::create_journal(node, self.opened, depth)?;
-        let publisher = transport::journal_publisher(&service, slot_bytes)?;
+        let make = || transport::journal_publisher(&service, slot_bytes);
+        let publisher = storage::reserved_by_reader(make)?;
         let port = publisher.id().value();
         self.open.push(Journal {
             service,
@@ -248,13 +257,14 @@ impl Journal {
     fn send(&mut self, header: JournalHeader, bytes: usize, fill: impl FnOnce(&mut [u8])) {
         let entry = self.entries;
         self.entries += 1;
-        let Ok(mut loan) = self.publisher.loan_slice_uninit(bytes.div_ceil(ALIGNMENT)) else {
+        let lines = bytes.div_ceil(ALIGNMENT);
+        let Ok(mut loan) = loaned::loan(&self.publisher, lines) else {
             return;
         };
         fill(bytemuck::cast_slice_mut(loaned::words(loan.payload_mut())));
         *loan.user_header_mut() = JournalHeader { entry, ..header };
         // a recorder that cannot be reached is one that went: the next look tells
-        let _ = loaned::send(loan);
+        guarded(|| loaned::send(loan));
     }
 }
 

@@ -7,7 +7,7 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{Node, PortFactory};
 
 use super::worlds::S;
-use crate::memory::{reserve, slot_bytes};
+use crate::memory::slot_bytes;
 use crate::transport::{self, CommandService, CommandSubscriber, FramePublisher};
 use crate::{ProtocolError, Table};
 
@@ -47,11 +47,6 @@ impl Lease {
     ) -> Result<Lease, ProtocolError> {
         let frames = transport::create_frames(node, epoch, frames_held)?;
         let publisher = transport::frame_publisher(&frames, slot_bytes(frame))?;
-        reserve(
-            &node.config().global.prefix.to_string(),
-            publisher.id().value(),
-            "the frames of a lease",
-        )?;
         let notifier = transport::notifier(&transport::create_event(
             node,
             &format!("obs/{epoch}"),

@@ -27,8 +27,9 @@ use self::observers::Observers;
 use self::state::{State, header};
 use self::worlds::S;
 use crate::affinity::CoreAffinity;
-use crate::control::Response;
 use crate::daemon_lock::DaemonLock;
+use crate::described;
+use crate::guard::guarded;
 use crate::memory;
 use crate::transport::{self, handshake};
 use crate::waiter::{Waiter, cores};
@@ -36,14 +37,16 @@ use crate::{Description, ProtocolError, RefusalKind, Table};
 
 /// While commands come without a pause, control requests are looked at this often.
 const AROUND_PERIOD: Duration = Duration::from_millis(20);
-/// Room for answers other than the description [bytes].
-const RESPONSE_MIN: usize = 1024;
+
+/// A daemon ends when the transport panics that many times in a row, with all clients lost after each.
+const PANICS_MAX: u32 = 8;
 
 /// The services of one daemon.
 pub struct Host {
     state: State,
     waiter: Waiter,
     listener: Listener<S>,
+    panics: u32,
     /// Last, so that its files go after everything that uses them.
     daemon_lock: DaemonLock,
 }
@@ -80,10 +83,8 @@ impl Host {
             (handshake::DOFS, description.dof_names.len().to_string()),
         ];
         let listener = transport::listener(&transport::create_event(&node, "wake", &attributes)?)?;
-        let description_json =
-            serde_json::to_vec(&Response::Description(Box::new(description.clone())))
-                .expect("descriptions are plain data");
-        let responder = transport::responder(&node, description_json.len().max(RESPONSE_MIN))?;
+        let responder = transport::responder(&node)?;
+        described::write(daemon_lock.paths(), &description)?;
         let observers = Observers::open(&node, &description, &frame)?;
         let lease = Lease::open(&node, 1, &frame, description.frames_held)?;
         // last: from here on clients may come
@@ -98,7 +99,6 @@ impl Host {
         let state = State {
             node,
             description,
-            description_json,
             frame,
             lease: Some(lease),
             journals: Journals::default(),
@@ -115,6 +115,7 @@ impl Host {
             state,
             waiter: Waiter::new(cores() > 1 + others),
             listener,
+            panics: 0,
             daemon_lock,
         })
     }
@@ -131,7 +132,7 @@ impl Host {
 
     /// Shared memory taken so far [bytes].
     pub fn shared_bytes(&self) -> u64 {
-        memory::used(self.daemon_lock.paths().stem())
+        memory::used(&self.daemon_lock.paths().shared_folder())
     }
 
     /// Something that cleans up after killed clients, to be run now and then on a thread of its own.
@@ -144,8 +145,30 @@ impl Host {
     /// Waits for the next thing to do.
     ///
     /// # Errors
-    /// [`ProtocolError::Transport`].
+    /// [`ProtocolError::Transport`]; [`ProtocolError::Damaged`] when other programs leave nothing to serve with.
     pub fn wait(&mut self) -> Result<Next, ProtocolError> {
+        loop {
+            if let Some(next) = guarded(|| self.look()) {
+                self.panics = 0;
+                return next;
+            }
+            self.panics += 1;
+            if self.panics > PANICS_MAX {
+                return Err(ProtocolError::Damaged {
+                    action: "serve clients".to_owned(),
+                    path: self
+                        .daemon_lock
+                        .paths()
+                        .shared_folder()
+                        .display()
+                        .to_string(),
+                });
+            }
+            self.state.lose_clients();
+        }
+    }
+
+    fn look(&mut self) -> Result<Next, ProtocolError> {
         if self.state.polled.elapsed() > AROUND_PERIOD
             && let Some(next) = self.state.poll_services()
         {

@@ -7,6 +7,7 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{Node, PortFactory};
 
 use super::worlds::{S, Worlds};
+use crate::guard::guarded;
 use crate::memory;
 use crate::transport::{self, FramePublisher, FrameService};
 use crate::{ALIGNMENT, Description, FrameHeader, ProtocolError, Table, loaned};
@@ -45,8 +46,6 @@ impl Observers {
         let table = memory::watch_table(description, frame);
         let service = transport::create_watch(node, description.frames_held)?;
         let publisher = transport::frame_publisher(&service, table.total_bytes())?;
-        let prefix = node.config().global.prefix.to_string();
-        memory::reserve(&prefix, publisher.id().value(), "the frames of observers")?;
         let notifier = transport::notifier(&transport::create_event(node, "watch", &[])?)?;
         Ok(Observers {
             table,
@@ -100,7 +99,7 @@ impl Observers {
     ) {
         (self.shown, self.unseen) = (Instant::now(), false);
         let lines = self.table.total_bytes() / ALIGNMENT;
-        let Ok(mut loan) = self.publisher.loan_slice_uninit(lines) else {
+        let Ok(mut loan) = loaned::loan(&self.publisher, lines) else {
             return; // observers keep every slot: they miss a frame
         };
         let words = loaned::words(loan.payload_mut());
@@ -123,7 +122,7 @@ impl Observers {
             ..head
         };
         // an observer that cannot be reached misses a frame; one that cannot be notified looks by itself after 50 ms
-        let _ = loaned::send(loan);
+        guarded(|| loaned::send(loan));
         let _ = self.notifier.notify();
         // one that took far longer waited for the processor
         let took = began.elapsed();

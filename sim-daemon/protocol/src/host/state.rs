@@ -13,6 +13,7 @@ use super::worlds::{Next, S, Worlds};
 use super::{ClientCleanup, Inbox};
 use crate::affinity::CoreAffinity;
 use crate::control::{Request, Response};
+use crate::guard::guarded;
 use crate::loaned;
 use crate::memory;
 use crate::transport::{self, Responder};
@@ -25,7 +26,6 @@ const HELD_UP: Duration = Duration::from_millis(200);
 pub(super) struct State {
     pub(super) node: Node<S>,
     pub(super) description: Description,
-    pub(super) description_json: Vec<u8>,
     pub(super) frame: Table,
     pub(super) lease: Option<Lease>,
     pub(super) journals: Journals,
@@ -43,16 +43,21 @@ impl State {
     /// Ends a lease that is over, makes the next one ready.
     fn renew(&mut self) {
         // the old slots go first: there may not be room for both
-        self.lease = None;
+        let old = self.lease.take();
+        guarded(|| drop(old));
         self.epochs += 1;
         // without room now, the next request for a lease tries again and reports why
-        self.lease = Lease::open(
-            &self.node,
-            self.epochs,
-            &self.frame,
-            self.description.frames_held,
-        )
-        .ok();
+        let open = || {
+            let held = self.description.frames_held;
+            Lease::open(&self.node, self.epochs, &self.frame, held)
+        };
+        self.lease = guarded(open).and_then(Result::ok);
+    }
+
+    /// Lets go of everybody who uses memory that makes no sense; they may come again.
+    pub(super) fn lose_clients(&mut self) {
+        self.journals.lose();
+        self.renew();
     }
 
     fn acquire(&mut self, pid: u32) -> Response {
@@ -137,13 +142,13 @@ impl State {
         // as with commands: a client that was killed while it connected is no reason to end
         while let Ok(Some(active)) = self.responder.receive() {
             let response = match serde_json::from_slice(active.payload()) {
-                Ok(Request::Describe) => None,
-                Ok(Request::Controller) => Some(Response::Controller {
+                Ok(Request::Describe) => Response::Described,
+                Ok(Request::Controller) => Response::Controller {
                     pid: self
                         .lease
                         .as_ref()
                         .and_then(|lease| Some(lease.holder.as_ref()?.pid)),
-                }),
+                },
                 // a release that waits unread came before: the requests of several clients come in no order
                 Ok(Request::Acquire { pid }) => {
                     later.push((active, pid));
@@ -164,28 +169,22 @@ impl State {
                     let lease = self.lease.as_mut().filter(|lease| lease.epoch == epoch);
                     let valid = lease.is_some();
                     lease.into_iter().for_each(Lease::joined);
-                    Some(Response::Lease { valid })
+                    Response::Lease { valid }
                 }
-                Ok(Request::Journal { observed }) => Some(self.journal(observed)),
+                Ok(Request::Journal { observed }) => self.journal(observed),
                 Ok(Request::Shutdown) => {
                     end = true;
-                    Some(Response::Ending)
+                    Response::Ending
                 }
-                Err(error) => Some(Response::Refused {
+                Err(error) => Response::Refused {
                     reason: format!("unreadable control request: {error}"),
-                }),
+                },
             };
-            let response = response
-                .map(|response| serde_json::to_vec(&response).expect("responses are plain data"));
-            let bytes = response.as_ref().unwrap_or(&self.description_json);
-            respond(&active, bytes);
+            respond(&active, &response);
         }
         for (active, pid) in later {
             let response = self.acquire(pid);
-            respond(
-                &active,
-                &serde_json::to_vec(&response).expect("responses are plain data"),
-            );
+            respond(&active, &response);
         }
         end.then_some(Next::End)
     }
@@ -194,10 +193,8 @@ impl State {
         let Some(lease) = &mut self.lease else {
             return self.record_inputs();
         };
-        let Ok(mut loan) = lease
-            .publisher
-            .loan_slice_uninit(self.frame.total_bytes() / ALIGNMENT)
-        else {
+        let lines = self.frame.total_bytes() / ALIGNMENT;
+        let Ok(mut loan) = loaned::loan(&lease.publisher, lines) else {
             // the holder keeps more frames than it said: it is told that its lease is lost
             self.record_inputs();
             return self.renew();
@@ -221,7 +218,7 @@ impl State {
         if let Some(holder) = &mut lease.holder {
             holder.beat = now;
         }
-        let Ok(sent) = loaned::send_kept(&mut lease.publisher, loan) else {
+        let Some(Ok(sent)) = guarded(|| loaned::send_kept(&mut lease.publisher, loan)) else {
             self.journals.skip();
             return self.renew(); // the holder cannot be reached: it is told that its lease is lost
         };
@@ -261,10 +258,8 @@ impl State {
         let end = reason.floor_char_boundary(room);
         let reason = &reason.as_bytes()[..end];
         let table = Table::lay_out([("reason".to_owned(), Dtype::U8, vec![reason.len()], 0)]);
-        let Ok(mut loan) = lease
-            .publisher
-            .loan_slice_uninit(table.total_bytes() / ALIGNMENT)
-        else {
+        let lines = table.total_bytes() / ALIGNMENT;
+        let Ok(mut loan) = loaned::loan(&lease.publisher, lines) else {
             return self.renew();
         };
         let words = loaned::words(loan.payload_mut());
@@ -279,7 +274,7 @@ impl State {
             core: self.affinity.core(),
             ..header(&self.description, &table, self.frames)
         };
-        if loaned::send(loan).is_err() {
+        if !matches!(guarded(|| loaned::send(loan)), Some(Ok(_))) {
             return self.renew();
         }
         let _ = lease.notifier.notify();
@@ -313,9 +308,10 @@ impl State {
 }
 
 /// Answers a request. A client that died or gave up while it waited is no trouble of ours.
-fn respond(active: &transport::Asked<S>, bytes: &[u8]) {
+fn respond(active: &transport::Asked<S>, response: &Response) {
+    let bytes = serde_json::to_vec(response).expect("responses are plain data");
     if let Ok(loan) = active.loan_slice_uninit(bytes.len()) {
-        let _ = loan.write_from_slice(bytes).send();
+        let _ = loan.write_from_slice(&bytes).send();
     }
 }
 
@@ -329,9 +325,9 @@ impl Awaited<Next> for State {
             return Ok(None);
         };
         let header = *sample.user_header();
-        let taken = self
-            .inbox
-            .take(header, bytemuck::cast_slice(sample.payload()));
+        // what leads out of shared memory is no table
+        let words = loaned::received(sample.payload()).unwrap_or_default();
+        let taken = self.inbox.take(header, words);
         drop(sample);
         if header.session != self.description.session
             || header.epoch != lease.epoch

@@ -14,7 +14,7 @@ use crate::{
     AttachOptions, Client, CommandHeader, Dtype, Frame, Hook, InputInfo, Op, keep_waiting,
 };
 
-type Clients = iceoryx2::prelude::ipc_threadsafe::Service;
+type Clients = crate::service::AnyThread;
 
 /// Bytes of the state of the daemon below: several entries long.
 const STATE: usize = 40_000;

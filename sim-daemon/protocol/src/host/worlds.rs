@@ -1,9 +1,9 @@
 //! What a host and the daemon's loop ask of each other.
 
-use iceoryx2::prelude::ipc;
+use crate::service::OneThread;
 
 /// The daemon uses its services from one thread.
-pub(super) type S = ipc::Service;
+pub(super) type S = OneThread;
 
 /// What a host asks for: frames, and for observers the state behind them.
 pub trait Worlds {

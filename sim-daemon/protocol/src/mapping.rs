@@ -1,0 +1,202 @@
+//! Mapped files of shared memory, and what happens when another program cuts one.
+//!
+//! Reading behind the end of a file raises SIGBUS, which ends a process. Here the missing page becomes a page of zeros of this
+//! process alone, and the daemon that the file belongs to is noted as damaged: its clients get an error at their next call.
+//! A fault at any other address goes to whoever handled the signal before.
+
+use std::ffi::c_void;
+use std::os::fd::OwnedFd;
+use std::ptr::{NonNull, null_mut};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Once, OnceLock};
+
+use rustix::io::Errno;
+use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
+
+/// Mappings of a process that are known here; further ones work, and end the process when they are cut.
+const MAPPINGS_MAX: usize = 8192;
+/// Owners of damaged files that are remembered.
+const DAMAGED_MAX: usize = 64;
+/// Lookups that are remembered, a power of two.
+const HINTS: usize = 64;
+/// Pages may be larger; then more than the missing part is replaced, all of which is missing.
+const PAGE: usize = 4096;
+
+struct Slot {
+    taken: AtomicBool,
+    start: AtomicUsize,
+    /// 0 while the slot describes nothing.
+    end: AtomicUsize,
+    owner: AtomicU64,
+}
+
+static SLOTS: [Slot; MAPPINGS_MAX] = [const {
+    Slot {
+        taken: AtomicBool::new(false),
+        start: AtomicUsize::new(0),
+        end: AtomicUsize::new(0),
+        owner: AtomicU64::new(0),
+    }
+}; MAPPINGS_MAX];
+/// Slots from this on were never taken.
+static USED: AtomicUsize = AtomicUsize::new(0);
+static DAMAGED: [AtomicU64; DAMAGED_MAX] = [const { AtomicU64::new(0) }; DAMAGED_MAX];
+static DAMAGES: AtomicUsize = AtomicUsize::new(0);
+static FOUND: [AtomicUsize; HINTS] = [const { AtomicUsize::new(0) }; HINTS];
+static PREVIOUS: OnceLock<libc::sigaction> = OnceLock::new();
+
+impl Slot {
+    fn holds(&self, first: usize, bytes: usize) -> bool {
+        let end = self.end.load(Ordering::Acquire);
+        let start = self.start.load(Ordering::Acquire);
+        // the same end twice: the slot did not change hands meanwhile
+        start <= first
+            && first.checked_add(bytes).is_some_and(|last| last <= end)
+            && self.end.load(Ordering::Acquire) == end
+    }
+}
+
+fn used() -> &'static [Slot] {
+    &SLOTS[..USED.load(Ordering::Acquire).min(MAPPINGS_MAX)]
+}
+
+/// A mapped file.
+#[derive(Debug)]
+pub(crate) struct Mapping {
+    start: NonNull<c_void>,
+    bytes: usize,
+    slot: Option<usize>,
+}
+
+impl Mapping {
+    /// Maps the first bytes of a file of `owner`.
+    pub(crate) fn new(
+        file: &OwnedFd,
+        bytes: usize,
+        protection: ProtFlags,
+        owner: u64,
+    ) -> Result<Mapping, Errno> {
+        static HANDLER: Once = Once::new();
+        HANDLER.call_once(handle_cut_files);
+        // SAFETY: the system chooses the place, so nothing else is there.
+        let start = unsafe { mmap(null_mut(), bytes, protection, MapFlags::SHARED, file, 0) }?;
+        let start = NonNull::new(start).ok_or(Errno::INVAL)?;
+        let slot = register(start.as_ptr() as usize, bytes, owner);
+        Ok(Mapping { start, bytes, slot })
+    }
+
+    pub(crate) fn start(&self) -> NonNull<c_void> {
+        self.start
+    }
+}
+
+impl Drop for Mapping {
+    fn drop(&mut self) {
+        if let Some(slot) = self.slot {
+            SLOTS[slot].end.store(0, Ordering::Release);
+            SLOTS[slot].taken.store(false, Ordering::Release);
+        }
+        // SAFETY: the mapping is ours, and whoever reads through it keeps it. One that cannot be removed stays.
+        let _ = unsafe { munmap(self.start.as_ptr(), self.bytes) };
+    }
+}
+
+fn register(start: usize, bytes: usize, owner: u64) -> Option<usize> {
+    let take = |slot: &Slot| !slot.taken.swap(true, Ordering::AcqRel);
+    let index = SLOTS.iter().position(take)?;
+    let slot = &SLOTS[index];
+    slot.start.store(start, Ordering::Release);
+    slot.owner.store(owner, Ordering::Release);
+    slot.end.store(start + bytes, Ordering::Release);
+    USED.fetch_max(index + 1, Ordering::AcqRel);
+    Some(index)
+}
+
+/// Whether bytes lie in one mapped file, as an offset or a length out of shared memory should make them.
+pub(crate) fn holds<T>(values: &[T]) -> bool {
+    let (first, bytes) = (values.as_ptr() as usize, size_of_val(values));
+    let hint = &FOUND[(first >> 16) % HINTS];
+    if SLOTS[hint.load(Ordering::Relaxed)].holds(first, bytes) {
+        return true;
+    }
+    let found = used().iter().position(|slot| slot.holds(first, bytes));
+    hint.store(found.unwrap_or(0), Ordering::Relaxed);
+    found.is_some()
+}
+
+/// Whether any mapped file was cut.
+pub(crate) fn any_damaged() -> bool {
+    DAMAGES.load(Ordering::Acquire) > 0
+}
+
+/// Whether a file of `owner` was cut while it was mapped.
+pub(crate) fn is_damaged(owner: u64) -> bool {
+    let count = DAMAGES.load(Ordering::Acquire).min(DAMAGED_MAX);
+    DAMAGED[..count]
+        .iter()
+        .any(|damaged| damaged.load(Ordering::Acquire) == owner)
+}
+
+fn handle_cut_files() {
+    // SAFETY: zero is a value of this plain struct, and the handler does only what a handler may.
+    unsafe {
+        let mut action: libc::sigaction = std::mem::zeroed();
+        action.sa_sigaction = on_bus_error as *const () as usize;
+        action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK;
+        let mut previous: libc::sigaction = std::mem::zeroed();
+        libc::sigaction(libc::SIGBUS, std::ptr::null(), &raw mut previous);
+        let _ = PREVIOUS.set(previous);
+        libc::sigaction(libc::SIGBUS, &raw const action, null_mut());
+    }
+}
+
+/// Runs at any instruction of any thread: it allocates nothing and takes no lock.
+extern "C" fn on_bus_error(signal: i32, info: *mut libc::siginfo_t, _: *mut c_void) {
+    // SAFETY: the system passes what it knows of the signal; of a fault, the address.
+    let (code, address) = unsafe { ((*info).si_code, (*info).si_addr() as usize) };
+    let is_fault = code > 0;
+    if is_fault && replace_page(address) {
+        return;
+    }
+    let Some(previous) = PREVIOUS.get() else {
+        return;
+    };
+    // SAFETY: the action was that of this process. A fault is raised again by itself, a signal that was sent is not.
+    unsafe {
+        libc::sigaction(signal, previous, null_mut());
+        if !is_fault {
+            libc::raise(signal);
+        }
+    }
+}
+
+/// Puts zeros in place of the page at `address`, if it is one of ours.
+fn replace_page(address: usize) -> bool {
+    let Some(slot) = used().iter().find(|slot| slot.holds(address, 1)) else {
+        return false;
+    };
+    let page = address & !(PAGE - 1);
+    let protection = libc::PROT_READ | libc::PROT_WRITE;
+    let flags = libc::MAP_PRIVATE | libc::MAP_ANONYMOUS | libc::MAP_FIXED;
+    // SAFETY: the page lies in a mapping of a file of ours, and nothing is there any more. errno is the interrupted code's.
+    let mapped = unsafe {
+        let errno = *libc::__errno_location();
+        let mapped = libc::mmap(page as *mut c_void, PAGE, protection, flags, -1, 0);
+        *libc::__errno_location() = errno;
+        mapped
+    };
+    if mapped == libc::MAP_FAILED {
+        return false;
+    }
+    note_damage(slot.owner.load(Ordering::Acquire));
+    true
+}
+
+fn note_damage(owner: u64) {
+    if !is_damaged(owner) {
+        let count = DAMAGES.load(Ordering::Acquire);
+        // of more than are remembered, the newest count
+        DAMAGED[count % DAMAGED_MAX].store(owner, Ordering::Release);
+        DAMAGES.store(count + 1, Ordering::Release);
+    }
+}
