@@ -184,6 +184,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "guard",
             "hash",
             "mapping",
+            "problem",
             "storage",
             "service",
             "error",

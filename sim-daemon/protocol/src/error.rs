@@ -1,12 +1,11 @@
 //! What can go wrong between a client and a daemon, with the culprit and the cure.
 
-use std::fs::File;
 use std::path::PathBuf;
 
 use rustix::io::Errno;
 use rustix::process::{Resource, getrlimit};
 
-use crate::storage::{Problem, take_problem};
+use crate::problem::{Problem, other_problem, take_problem};
 
 /// Everything that can go wrong for a client. The daemon's refusals arrive as [`ProtocolError::CommandRefused`].
 #[derive(Debug, thiserror::Error)]
@@ -326,8 +325,7 @@ impl ProtocolError {
     /// A transport failure; `problem` is the transport's own error, which often does not know the cause.
     pub fn transport(action: impl Into<String>, problem: impl std::fmt::Debug) -> Self {
         let action = action.into();
-        let exhausted = |errno| matches!(errno, Errno::MFILE | Errno::NFILE);
-        match take_problem() {
+        match take_problem().or_else(other_problem) {
             Some(Problem::Full {
                 folder,
                 free,
@@ -339,17 +337,13 @@ impl ProtocolError {
                 what: action,
             },
             Some(Problem::Damaged { path }) => ProtocolError::Damaged { path, action },
-            Some(Problem::System(errno)) if !exhausted(errno) => ProtocolError::Transport {
+            Some(Problem::System(Errno::MFILE | Errno::NFILE)) => {
+                ProtocolError::descriptors(action)
+            }
+            Some(Problem::System(errno)) => ProtocolError::Transport {
                 action,
                 problem: format!("{problem:?}, {errno}"),
             },
-            Some(Problem::System(_)) => ProtocolError::descriptors(action),
-            // what the transport opens itself
-            None if File::open("/")
-                .is_err_and(|error| Errno::from_io_error(&error).is_some_and(exhausted)) =>
-            {
-                ProtocolError::descriptors(action)
-            }
             None => ProtocolError::Transport {
                 action,
                 problem: format!("{problem:?}"),

@@ -20,6 +20,8 @@
 //!   lock-step with its own controller; the daemon's own name then only says how many there are.
 //! - A daemon's presence is a lock on `ROOT/NAME.lock` ([`paths`], [`daemon_lock`]); its run is a random `session`.
 //! - Clients know no physics: the [`Description`] names what can be sent and what frames carry.
+//! - Shared memory lies in files of the daemon's folder, which are complete before they have a name (`storage.rs`); a file
+//!   that somebody cuts costs a client or a frame (`mapping.rs`).
 //! - Every process here belongs to one user. A hostile process of that user is outside what shared memory can stop; against
 //!   mistakes, the daemon copies a command once and checks the copy, and the client checks each table before reading by it.
 //!
@@ -54,6 +56,7 @@ mod mapping;
 mod memory;
 mod observer;
 pub mod paths;
+mod problem;
 mod service;
 mod storage;
 pub mod table;

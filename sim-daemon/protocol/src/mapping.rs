@@ -19,8 +19,6 @@ const MAPPINGS_MAX: usize = 8192;
 const DAMAGED_MAX: usize = 64;
 /// Lookups that are remembered, a power of two.
 const HINTS: usize = 64;
-/// Pages may be larger; then more than the missing part is replaced, all of which is missing.
-const PAGE: usize = 4096;
 
 struct Slot {
     taken: AtomicBool,
@@ -175,13 +173,14 @@ fn replace_page(address: usize) -> bool {
     let Some(slot) = used().iter().find(|slot| slot.holds(address, 1)) else {
         return false;
     };
-    let page = address & !(PAGE - 1);
     let protection = libc::PROT_READ | libc::PROT_WRITE;
     let flags = libc::MAP_PRIVATE | libc::MAP_ANONYMOUS | libc::MAP_FIXED;
     // SAFETY: the page lies in a mapping of a file of ours, and nothing is there any more. errno is the interrupted code's.
     let mapped = unsafe {
         let errno = *libc::__errno_location();
-        let mapped = libc::mmap(page as *mut c_void, PAGE, protection, flags, -1, 0);
+        let bytes = libc::sysconf(libc::_SC_PAGESIZE) as usize;
+        let page = (address & !(bytes - 1)) as *mut c_void;
+        let mapped = libc::mmap(page, bytes, protection, flags, -1, 0);
         *libc::__errno_location() = errno;
         mapped
     };
@@ -198,5 +197,53 @@ fn note_damage(owner: u64) {
         // of more than are remembered, the newest count
         DAMAGED[count % DAMAGED_MAX].store(owner, Ordering::Release);
         DAMAGES.store(count + 1, Ordering::Release);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs::File;
+
+    #[test]
+    fn a_cut_file_reads_as_zeros_and_its_owner_is_noted() {
+        let path = std::env::temp_dir().join(format!("tightloop-cut-{}", std::process::id()));
+        let file = File::options()
+            .create_new(true)
+            .read(true)
+            .write(true)
+            .open(&path)
+            .unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let page = 1 << 16; // a multiple of every page
+        file.set_len(4 * page as u64).unwrap();
+        let (file, owner) = (OwnedFd::from(file), 0x5ca1_ab1e);
+        let protection = ProtFlags::READ | ProtFlags::WRITE;
+        let mapping = Mapping::new(&file, 4 * page, protection, owner).unwrap();
+        let bytes: *mut u8 = mapping.start().as_ptr().cast();
+        // SAFETY: four pages are mapped.
+        let at = |page_number: usize| unsafe { bytes.add(page_number * page) };
+        for number in 0..4 {
+            // SAFETY: as above.
+            unsafe { at(number).write_volatile(7) };
+        }
+        rustix::fs::ftruncate(&file, page as u64).unwrap();
+        assert!(!is_damaged(owner));
+        // SAFETY: as above; what is missing becomes zeros.
+        let read: [u8; 4] = std::array::from_fn(|number| unsafe { at(number).read_volatile() });
+        assert_eq!(read, [7, 0, 0, 0]);
+        assert!(is_damaged(owner) && !is_damaged(owner + 1));
+    }
+
+    #[test]
+    fn bytes_are_held_as_a_whole_or_not_at_all() {
+        let file = OwnedFd::from(File::open("/proc/self/exe").unwrap());
+        let mapping = Mapping::new(&file, 4096, ProtFlags::READ, 1).unwrap();
+        let start: *const u8 = mapping.start().as_ptr().cast();
+        // SAFETY: nothing is read through them.
+        let slice = |first, bytes| unsafe { std::slice::from_raw_parts(start.add(first), bytes) };
+        assert!(holds(slice(0, 4096)) && holds(slice(4000, 96)) && holds(slice(4096, 0)));
+        assert!(!holds(&[0_u8; 16]));
+        drop(mapping);
     }
 }

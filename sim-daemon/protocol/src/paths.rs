@@ -23,9 +23,8 @@ use rustix::io::Errno;
 
 use crate::ProtocolError;
 use crate::hash::Fnv;
+pub use crate::problem::SHARED_MEMORY;
 
-/// Where POSIX shared memory is on Linux.
-pub const SHARED_MEMORY: &str = "/dev/shm";
 /// The variable that names the folder of a login session.
 pub const RUNTIME_FOLDER: &str = "XDG_RUNTIME_DIR";
 /// What this process uses as the value of [`RUNTIME_FOLDER`] where that is unset.
@@ -402,6 +401,24 @@ mod tests {
                 "{name:?}"
             );
         }
+    }
+
+    #[test]
+    fn a_link_in_shared_memory_is_not_followed() {
+        let name = format!("tightloop-link-{}", std::process::id());
+        let (target, link) = (
+            std::env::temp_dir().join(&name),
+            Path::new(SHARED_MEMORY).join(&name),
+        );
+        fs::create_dir(&target).unwrap();
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        let refused = DaemonPaths::new(Some(&link), "name");
+        fs::remove_file(&link).unwrap();
+        fs::remove_dir(&target).unwrap();
+        assert!(
+            matches!(&refused, Err(ProtocolError::Root { problem, .. }) if problem.contains("link")),
+            "{refused:?}"
+        );
     }
 
     #[test]

@@ -6,12 +6,13 @@
 //! - a file whose length is not the one that it was made with is an error at once;
 //! - no descriptor stays open: a mapping needs none.
 
-use std::cell::{Cell, RefCell};
+use std::cell::Cell;
 use std::fmt::Debug;
 use std::marker::PhantomData;
 use std::mem::MaybeUninit;
+use std::os::fd::{AsRawFd, OwnedFd};
 use std::ptr::NonNull;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use iceoryx2::config::Config;
@@ -29,12 +30,13 @@ use iceoryx2_cal::named_concept::{
     NamedConceptDoesExistError, NamedConceptListError, NamedConceptMgmt,
     NamedConceptPathHintRemoveError, NamedConceptRemoveError, Path,
 };
-use rustix::fs::{self, CWD, FallocateFlags, FileType, Mode, OFlags, RenameFlags};
+use rustix::fs::{self, AtFlags, CWD, FallocateFlags, FileType, Mode, OFlags};
 use rustix::io::Errno;
 use rustix::mm::ProtFlags;
 
 use crate::hash::Fnv;
 use crate::mapping::{self, Mapping};
+use crate::problem::{Problem, failed, take_problem};
 
 /// At both ends of a segment whose pages the reader takes, what the transport itself writes [bytes].
 const MANAGEMENT: u64 = 1 << 20;
@@ -43,35 +45,8 @@ const MANAGEMENT: u64 = 1 << 20;
 pub trait Content: Debug + Send + Sync + ZeroCopySend {}
 impl<T: Debug + Send + Sync + ZeroCopySend> Content for T {}
 
-/// Why the last call of this thread failed.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Problem {
-    /// The file system is full.
-    Full {
-        /// Its folder.
-        folder: String,
-        /// Bytes free.
-        free: u64,
-        /// Bytes needed.
-        needed: u64,
-    },
-    /// The file is not the one that was made.
-    Damaged {
-        /// The file.
-        path: String,
-    },
-    /// The system refuses, for example since there are too many open files.
-    System(Errno),
-}
-
 thread_local! {
-    static PROBLEM: RefCell<Option<Problem>> = const { RefCell::new(None) };
     static READER_RESERVES: Cell<bool> = const { Cell::new(false) };
-}
-
-/// Why the last storage that this thread made or opened failed; once.
-pub(crate) fn take_problem() -> Option<Problem> {
-    PROBLEM.take()
 }
 
 /// Makes ports whose memory the reader takes, with [`crate::memory::reserve`], before anything is sent.
@@ -80,10 +55,6 @@ pub(crate) fn reserved_by_reader<T>(make: impl FnOnce() -> T) -> T {
     let made = make();
     READER_RESERVES.set(false);
     made
-}
-
-fn failed(problem: Problem) {
-    PROBLEM.replace(Some(problem));
 }
 
 /// What a file holds; the transport's own memory follows.
@@ -256,16 +227,7 @@ impl<'builder, T: Content> DynamicStorageBuilder<'builder, T, Storage<T>> for Bu
 
     fn create(mut self) -> Result<Storage<T>, DynamicStorageCreateError> {
         take_problem();
-        // the name under which nobody looks for it
-        static MADE: AtomicU64 = AtomicU64::new(0);
-        let number = MADE.fetch_add(1, Ordering::Relaxed);
-        let mut draft = self.config.get_path_hint().to_string();
-        draft += &format!("/.{}.{number}", std::process::id());
-        let made = self.make(&draft);
-        if made.is_err() {
-            let _ = fs::unlink(&draft);
-        }
-        made
+        self.make()
     }
 
     fn open(self, access: AccessMode) -> Result<Storage<T>, DynamicStorageOpenError> {
@@ -292,13 +254,18 @@ impl<'builder, T: Content> DynamicStorageBuilder<'builder, T, Storage<T>> for Bu
 }
 
 impl<T: Content> Builder<'_, T> {
-    /// Makes a file under a draft's name, fills it, and gives it its own name.
-    fn make(&mut self, draft: &str) -> Result<Storage<T>, DynamicStorageCreateError> {
+    /// Makes a file without a name, fills it, and gives it its name.
+    fn make(&mut self) -> Result<Storage<T>, DynamicStorageCreateError> {
         let bytes = size_of::<Data<T>>() + self.supplementary;
-        let mapping = new_file(draft, bytes, owner(&self.config)).map_err(|problem| {
+        let failed = |problem| {
             failed(problem);
             DynamicStorageCreateError::InternalError
-        })?;
+        };
+        let folder = self.config.get_path_hint().to_string();
+        let file = new_file(&folder, bytes as u64).map_err(failed)?;
+        let protection = ProtFlags::READ | ProtFlags::WRITE;
+        let mapping = Mapping::new(&file, bytes, protection, owner(&self.config))
+            .map_err(|error| failed(Problem::System(error)))?;
         let storage = Storage {
             mapping,
             config: self.config.clone(),
@@ -315,16 +282,15 @@ impl<T: Content> Builder<'_, T> {
         if !self.initializer.call(value, &mut allocator) {
             return Err(DynamicStorageCreateError::InitializationFailed);
         }
-        let path = self.config.path_for(&self.name);
-        fs::renameat_with(CWD, draft, CWD, path.as_bytes(), RenameFlags::NOREPLACE).map_err(
-            |error| match error {
-                Errno::EXIST => DynamicStorageCreateError::AlreadyExists,
-                error => {
-                    failed(Problem::System(error));
-                    DynamicStorageCreateError::InternalError
-                }
-            },
-        )?;
+        let (made, path) = (
+            format!("/proc/self/fd/{}", file.as_raw_fd()),
+            self.config.path_for(&self.name),
+        );
+        match fs::linkat(CWD, made, CWD, path.as_bytes(), AtFlags::SYMLINK_FOLLOW) {
+            Ok(()) => {}
+            Err(Errno::EXIST) => return Err(DynamicStorageCreateError::AlreadyExists),
+            Err(error) => return Err(failed(Problem::System(error))),
+        }
         if self.has_ownership {
             storage.acquire_ownership();
         }
@@ -391,29 +357,19 @@ pub(crate) fn is_damaged(config: &Config) -> bool {
     mapping::is_damaged(run(&folder.to_string(), &prefix.to_string()))
 }
 
-/// A new file with its pages, mapped.
-fn new_file(path: &str, bytes: usize, owner: u64) -> Result<Mapping, Problem> {
-    let flags = OFlags::RDWR | OFlags::CREATE | OFlags::EXCL | OFlags::NOFOLLOW | OFlags::CLOEXEC;
-    let file = fs::open(path, flags, Mode::RUSR | Mode::WUSR).map_err(Problem::System)?;
-    let length = bytes as u64;
+/// A new file with its pages, which has no name yet: whoever is killed now leaves nothing.
+fn new_file(folder: &str, bytes: u64) -> Result<OwnedFd, Problem> {
+    let flags = OFlags::RDWR | OFlags::TMPFILE | OFlags::CLOEXEC;
+    let file = fs::open(folder, flags, Mode::RUSR | Mode::WUSR).map_err(Problem::System)?;
     let take = |first, bytes| fs::fallocate(&file, FallocateFlags::empty(), first, bytes);
-    let taken = if READER_RESERVES.get() && length > 2 * MANAGEMENT {
-        take(0, MANAGEMENT).and_then(|()| take(length - MANAGEMENT, MANAGEMENT))
+    let taken = if READER_RESERVES.get() && bytes > 2 * MANAGEMENT {
+        take(0, MANAGEMENT).and_then(|()| take(bytes - MANAGEMENT, MANAGEMENT))
     } else {
-        take(0, length)
+        take(0, bytes)
     };
-    taken.map_err(|error| match error {
-        Errno::NOSPC => full(path, length),
-        error => Problem::System(error),
-    })?;
-    Mapping::new(&file, bytes, ProtFlags::READ | ProtFlags::WRITE, owner).map_err(Problem::System)
-}
-
-fn full(path: &str, needed: u64) -> Problem {
-    let folder = path.rsplit_once('/').map_or(path, |(folder, _)| folder);
-    Problem::Full {
-        folder: folder.to_owned(),
-        free: fs::statvfs(folder).map_or(0, |status| status.f_bavail * status.f_frsize),
-        needed,
+    match taken {
+        Ok(()) => Ok(file),
+        Err(Errno::NOSPC) => Err(Problem::full(folder, bytes)),
+        Err(error) => Err(Problem::System(error)),
     }
 }

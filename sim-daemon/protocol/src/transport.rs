@@ -20,12 +20,15 @@ use iceoryx2::service::builder::event::EventOpenError;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 
 use crate::descriptors;
+use crate::problem::{self, Problem};
 use crate::{ALIGNMENT, CommandHeader, FrameHeader, JournalHeader, Line, ProtocolError};
 
 /// Clients that may be attached at once, controllers and observers together.
 pub(crate) const CLIENTS_MAX: usize = 32;
 /// Control requests of one client that may be unread: two heartbeats, a release, and one that is waited for.
 const CONTROL_ACTIVE: usize = 4;
+/// Shared memory of a client without its commands, rounded up [bytes].
+const NODE_BYTES: u64 = 512 << 10;
 /// Longest time anybody sleeps without looking around.
 pub(crate) const SLICE: Duration = Duration::from_millis(50);
 
@@ -61,6 +64,20 @@ pub(crate) fn node<S: Service>(config: &Config, role: &str) -> Result<Node<S>, P
     // our errors say it better; the transport's own log goes to stderr when IOX2_LOG_LEVEL asks for it
     QUIET.call_once(|| set_log_level_from_env_or(LogLevel::Fatal));
     descriptors::make_room();
+    // past the end, what the transport writes beside its memory is lost without a word
+    if let Some(Problem::Full {
+        folder,
+        free,
+        needed,
+    }) = problem::no_room(NODE_BYTES)
+    {
+        return Err(ProtocolError::SharedMemory {
+            path: folder,
+            free,
+            needed,
+            what: format!("a {role}"),
+        });
+    }
     let name =
         NodeName::new(role).map_err(|error| ProtocolError::transport("name a node", error))?;
     let node = NodeBuilder::new()

@@ -1,0 +1,72 @@
+//! Why shared memory could not be made or opened: the transport's own errors rarely know.
+
+use std::cell::RefCell;
+use std::fs::File;
+
+use rustix::fs::statvfs;
+use rustix::io::Errno;
+
+/// Where POSIX shared memory is on Linux.
+pub const SHARED_MEMORY: &str = "/dev/shm";
+/// With less than this left, what the transport writes beside its memory does not fit either [bytes].
+const FREE_MIN: u64 = 64 << 10;
+
+/// Why the last call of this thread failed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Problem {
+    /// The file system is full.
+    Full {
+        /// Its folder.
+        folder: String,
+        /// Bytes free.
+        free: u64,
+        /// Bytes needed.
+        needed: u64,
+    },
+    /// The file is not the one that was made.
+    Damaged {
+        /// The file.
+        path: String,
+    },
+    /// The system refuses, for example since there are too many open files.
+    System(Errno),
+}
+
+thread_local! {
+    static PROBLEM: RefCell<Option<Problem>> = const { RefCell::new(None) };
+}
+
+/// Why the last storage that this thread made or opened failed; once.
+pub(crate) fn take_problem() -> Option<Problem> {
+    PROBLEM.take()
+}
+
+/// The problem of a call that made a file without us, if there is one with the file system.
+pub(crate) fn other_problem() -> Option<Problem> {
+    match File::open("/") {
+        Err(error) => Errno::from_io_error(&error).map(Problem::System),
+        Ok(_) => no_room(FREE_MIN),
+    }
+}
+
+/// The problem of a shared memory with less than so many bytes left.
+pub(crate) fn no_room(needed: u64) -> Option<Problem> {
+    let problem = Problem::full(SHARED_MEMORY, needed);
+    matches!(problem, Problem::Full { free, .. } if free < needed).then_some(problem)
+}
+
+/// Notes why a call fails.
+pub(crate) fn failed(problem: Problem) {
+    PROBLEM.replace(Some(problem));
+}
+
+impl Problem {
+    /// The file system of a folder is full.
+    pub(crate) fn full(folder: &str, needed: u64) -> Problem {
+        Problem::Full {
+            folder: folder.to_owned(),
+            free: statvfs(folder).map_or(0, |status| status.f_bavail * status.f_frsize),
+            needed,
+        }
+    }
+}
