@@ -5,6 +5,7 @@ A daemon cannot be safe from its own user: changed bytes may still end it. Cut f
 
 from __future__ import annotations
 
+import contextlib
 import os
 import random
 import signal
@@ -92,10 +93,8 @@ def attacked(scene: tl.Scene, seed: int, attack) -> tuple[str, str, str]:
         if alive(sim.pid):
             os.kill(sim.pid, signal.SIGKILL)
         wait_until(lambda: not alive(sim.pid), HANG)
-        try:
+        with contextlib.suppress(tl.TightloopError):
             sim.close()
-        except tl.TightloopError:
-            pass
 
 
 @pytest.mark.parametrize("seed", range(SEEDS))

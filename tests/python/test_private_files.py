@@ -62,7 +62,10 @@ def busy_daemon(scene: tl.Scene, tmp_path: Path) -> Iterator[tuple[tl.Sim, list[
             assert "recording" in recorder.stderr.readline()
             sim.step()
             sim.snapshot()
-            yield sim, [path for path in under(*folders_of(sim.pid), Path(os.environ["TIGHTLOOP_ROOT"])) if path.exists()]
+            yield (
+                sim,
+                [path for path in under(*folders_of(sim.pid), Path(os.environ["TIGHTLOOP_ROOT"])) if path.exists()],
+            )
         finally:
             recorder.send_signal(signal.SIGINT)
             recorder.communicate()

@@ -186,6 +186,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "mapping",
             "problem",
             "storage",
+            "port",
             "service",
             "error",
             "description",
@@ -278,7 +279,7 @@ pub const DOORS: [(&str, &str); 21] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-pub const UNSAFE: [&str; 26] = [
+pub const UNSAFE: [&str; 27] = [
     "py-client/src/frame.rs",                      // NumPy views
     "sim-core/device/src/memory.rs",               // imports pages of the host
     "sim-core/device/src/portable.rs",             // programs without checks at run time
@@ -302,6 +303,7 @@ pub const UNSAFE: [&str; 26] = [
     "sim-daemon/protocol/src/frame.rs", // views of a sample
     "sim-daemon/protocol/src/loaned.rs", // loaned samples
     "sim-daemon/protocol/src/mapping.rs", // mapped files, and those that somebody cuts
+    "sim-daemon/protocol/src/port.rs",  // ports that are dropped or left alone
     "sim-daemon/protocol/src/storage.rs", // what mapped files hold
     "sim-daemon/src/environment.rs",    // a variable, set while there is one thread
     "sim-daemon/src/server.rs",         // samples that a device writes to

@@ -139,7 +139,7 @@ class Snapshot:
 
 @contextmanager
 def transfer_file(data: bytes = b"") -> Iterator[tuple[BinaryIO, str]]:
-    """Provide a file between client and daemon, in shared memory if possible. It has no name and ends with this process.
+    """Provide a file without a name between client and daemon, in shared memory if possible; it ends with this process.
 
     Args:
         data: What the daemon reads there.
@@ -151,7 +151,9 @@ def transfer_file(data: bytes = b"") -> Iterator[tuple[BinaryIO, str]]:
         SnapshotError: The file cannot be made.
     """
     try:
-        file = tempfile.TemporaryFile(dir=_SHARED_MEMORY if _SHARED_MEMORY.is_dir() else None)
+        file = tempfile.TemporaryFile(  # noqa: SIM115 (closed below; here its errors are caught)
+            dir=_SHARED_MEMORY if _SHARED_MEMORY.is_dir() else None
+        )
     except OSError as problem:
         raise SnapshotError(_NO_ROOM.format(problem)) from None
     with file:

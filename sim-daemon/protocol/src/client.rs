@@ -1,7 +1,7 @@
 //! A client: attaches to a running daemon, observes it, and controls it when it holds the lease.
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::command::{Call, Command};

@@ -4,14 +4,15 @@ use std::sync::Mutex;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::Node;
 
 use crate::control::{Request, Response};
+use crate::guard::guarded;
 use crate::hook::Hook;
 use crate::liveness::Peer;
+use crate::port::Port;
 use crate::service::AnyThread;
-use crate::transport::{self, Requester, SLICE, handshake};
+use crate::transport::{self, Requester, SLICE, Waker, handshake};
 use crate::turn::{Turn, lock};
 use crate::{PROTOCOL_VERSION, ProtocolError, mapping, storage};
 
@@ -30,11 +31,11 @@ const PAUSE: Duration = Duration::from_millis(10);
 #[derive(Debug)]
 pub(crate) struct Connection {
     pub(crate) peer: Peer,
-    pub(crate) wake: Notifier<S>,
+    pub(crate) wake: Waker<S>,
     /// One request is waited for at a time.
     pub(crate) asking: Turn<()>,
     pub(crate) requester: Mutex<Requester<S>>,
-    pub(crate) node: Mutex<Node<S>>,
+    pub(crate) node: Mutex<Port<Node<S>>>,
 }
 
 /// Facts of the handshake, as the daemon announced them.
@@ -122,21 +123,25 @@ impl Connection {
         let failed = |error: &dyn std::fmt::Debug| {
             ProtocolError::transport(format!("send {request:?}"), error)
         };
+        let damaged = || damaged(&self.peer, "ask the daemon");
         let pending = {
             // not while waiting: the hook runs the caller's code
             let requester = lock(&self.requester);
-            let loan = requester
-                .loan_slice_uninit(text.len())
+            let loan = guarded(|| requester.loan_slice_uninit(text.len()))
+                .ok_or_else(damaged)?
                 .map_err(|error| failed(&error))?;
-            loan.write_from_slice(&text)
-                .send()
-                .map_err(|error| failed(&error))?
+            let pending = guarded(|| loan.write_from_slice(&text).send())
+                .ok_or_else(damaged)?
+                .map_err(|error| failed(&error))?;
+            Port::of(requester.owner(), pending)
         };
         self.notify();
         let (start, mut nap, mut polled) =
             (Instant::now(), Duration::from_micros(20), Instant::now());
         loop {
-            if let Some(response) = pending.receive().map_err(|error| failed(&error))? {
+            let received = guarded(|| pending.receive()).ok_or_else(damaged)?;
+            if let Some(response) = received.map_err(|error| failed(&error))? {
+                let response = Port::of(pending.owner(), response);
                 intact(&self.peer)?;
                 return serde_json::from_slice(response.payload()).map_err(|error| {
                     ProtocolError::Malformed {
@@ -172,15 +177,17 @@ impl Connection {
     pub(crate) fn post(&self, request: &Request) {
         let requester = lock(&self.requester);
         let text = serde_json::to_vec(request).expect("requests are plain data");
-        if let Ok(loan) = requester.loan_slice_uninit(text.len()) {
-            let _ = loan.write_from_slice(&text).send();
-        }
+        guarded(|| {
+            if let Ok(loan) = requester.loan_slice_uninit(text.len()) {
+                let _ = loan.write_from_slice(&text).send();
+            }
+        });
     }
 
     /// Wakes the daemon if it sleeps.
     pub(crate) fn notify(&self) {
         // a daemon that cannot be notified looks by itself after 50 ms
-        let _ = self.wake.notify();
+        guarded(|| self.wake.notify());
     }
 
     /// Opens ports, or does something else with the node.

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use iceoryx2::port::listener::Listener;
 use iceoryx2::prelude::PortFactory;
 
 use crate::affinity::CoreAffinity;
@@ -16,7 +15,8 @@ use crate::heartbeat::HeartbeatThread;
 use crate::hook::{Hook, keep_waiting};
 use crate::liveness::{Peer, is_gone};
 use crate::loaned;
-use crate::transport::{self, CommandPublisher, FrameService, FrameSubscriber};
+use crate::port::Port;
+use crate::transport::{self, CommandPublisher, FrameService, FrameSubscriber, Sleeper};
 use crate::waiter::{Awaited, Waiter, cores};
 use crate::{ALIGNMENT, CommandHeader, Description, Frame, Op, ProtocolError, RefusalKind, Table};
 
@@ -33,7 +33,7 @@ const RELEASE_MAX: Duration = Duration::from_millis(250);
 type Ports = (
     FrameService<S>,
     FrameSubscriber<S>,
-    Listener<S>,
+    Sleeper<S>,
     CommandPublisher<S>,
 );
 
@@ -63,7 +63,7 @@ pub(crate) struct Controller {
     frames: Arc<Alive>,
     publisher: CommandPublisher<S>,
     subscriber: FrameSubscriber<S>,
-    listener: Listener<S>,
+    listener: Sleeper<S>,
     service: FrameService<S>,
     /// Last, so that it ends last: the daemon must not think us gone before the ports are.
     _heartbeat: HeartbeatThread,
@@ -329,6 +329,7 @@ impl Awaited<FrameSample> for Answer<'_> {
             match received.ok_or_else(|| damaged(self.peer, "receive a frame"))? {
                 Ok(None) => return Ok(None),
                 Ok(Some(sample)) => {
+                    let sample = Port::of(self.subscriber.owner(), sample);
                     let header = sample.user_header();
                     if header.ack_seq == self.seq && header.epoch == self.epoch {
                         return Ok(Some(sample));

@@ -7,9 +7,10 @@ use std::sync::{Arc, Mutex};
 use iceoryx2::sample::Sample;
 
 use crate::connection::S;
+use crate::port::Port;
 use crate::{Dtype, FrameHeader, Line, ProtocolError, Row, Table};
 
-pub(crate) type FrameSample = Sample<S, [Line], FrameHeader>;
+pub(crate) type FrameSample = Port<Sample<S, [Line], FrameHeader>>;
 
 /// The state of all worlds (or, for an observer, of the first ones) at one instant.
 ///

@@ -12,6 +12,7 @@ use crate::guard::guarded;
 use crate::hook::Hook;
 use crate::loaned;
 use crate::memory::reserve;
+use crate::port::Port;
 use crate::transport::{self, JournalSubscriber, SLICE};
 use crate::{ALIGNMENT, Description, JournalHeader, Line, ProtocolError, RefusalKind};
 
@@ -22,7 +23,7 @@ const NAP: Duration = Duration::from_millis(5);
 /// One entry of a journal, in shared memory until it is dropped.
 #[derive(Debug)]
 pub struct Entry {
-    sample: Sample<S, [Line], JournalHeader>,
+    sample: Port<Sample<S, [Line], JournalHeader>>,
     parts: [usize; 3],
     /// Entries that were lost right before this one.
     pub lost: u64,
@@ -179,7 +180,7 @@ impl Journal {
             .ok_or_else(|| damaged(peer, "receive an entry"))?;
         let sample = match received {
             Ok(None) => return Ok(None),
-            Ok(Some(sample)) => sample,
+            Ok(Some(sample)) => Port::of(self.subscriber.owner(), sample),
             Err(error) => {
                 self.connection.peer.check()?;
                 return Err(ProtocolError::transport("receive an entry", error));

@@ -56,6 +56,7 @@ mod mapping;
 mod memory;
 mod observer;
 pub mod paths;
+mod port;
 mod problem;
 mod service;
 mod storage;

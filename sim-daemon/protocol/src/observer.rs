@@ -4,15 +4,14 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use iceoryx2::port::listener::Listener;
-
 use crate::connection::{Connection, S, damaged, intact, malformed};
 use crate::controller::check_table;
 use crate::frame::{Alive, FrameSample};
 use crate::guard::guarded;
 use crate::hook::Hook;
 use crate::loaned;
-use crate::transport::{self, FrameSubscriber, SLICE};
+use crate::port::Port;
+use crate::transport::{self, FrameSubscriber, SLICE, Sleeper};
 use crate::{Description, Frame, ProtocolError, Table};
 
 /// A subscription to the observers' service.
@@ -23,7 +22,7 @@ pub(crate) struct Observer {
     table: Option<Arc<Table>>,
     frames: Arc<Alive>,
     subscriber: FrameSubscriber<S>,
-    listener: Listener<S>,
+    listener: Sleeper<S>,
 }
 
 impl Observer {
@@ -80,7 +79,7 @@ impl Observer {
             .ok_or_else(|| damaged(peer, "receive a frame"))?
             .map_err(|error| ProtocolError::transport("receive a frame", error))?
         {
-            drop(newest.replace(sample));
+            drop(newest.replace(Port::of(self.subscriber.owner(), sample)));
         }
         Ok(newest)
     }

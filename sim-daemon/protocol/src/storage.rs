@@ -353,8 +353,13 @@ fn run(folder: &str, prefix: &str) -> u64 {
 
 /// Whether another program has cut a file of a run while it was mapped here.
 pub(crate) fn is_damaged(config: &Config) -> bool {
+    mapping::is_damaged(run_of(config))
+}
+
+/// The number of a run of a daemon.
+pub(crate) fn run_of(config: &Config) -> u64 {
     let (folder, prefix) = (config.global.root_path(), config.global.prefix);
-    mapping::is_damaged(run(&folder.to_string(), &prefix.to_string()))
+    run(&folder.to_string(), &prefix.to_string())
 }
 
 /// A new file with its pages, which has no name yet: whoever is killed now leaves nothing.

@@ -20,6 +20,7 @@ use iceoryx2::service::builder::event::EventOpenError;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 
 use crate::descriptors;
+use crate::port::Port;
 use crate::problem::{self, Problem};
 use crate::{ALIGNMENT, CommandHeader, FrameHeader, JournalHeader, Line, ProtocolError};
 
@@ -33,33 +34,42 @@ const NODE_BYTES: u64 = 512 << 10;
 pub(crate) const SLICE: Duration = Duration::from_millis(50);
 
 /// Frames on their way out: from the daemon.
-pub(crate) type FramePublisher<S> = Publisher<S, [Line], FrameHeader>;
+pub(crate) type FramePublisher<S> = Port<Publisher<S, [Line], FrameHeader>>;
 /// Frames on their way in: at a client.
-pub(crate) type FrameSubscriber<S> = Subscriber<S, [Line], FrameHeader>;
+pub(crate) type FrameSubscriber<S> = Port<Subscriber<S, [Line], FrameHeader>>;
 /// Commands on their way out: from a client.
-pub(crate) type CommandPublisher<S> = Publisher<S, [Line], CommandHeader>;
+pub(crate) type CommandPublisher<S> = Port<Publisher<S, [Line], CommandHeader>>;
 /// Commands on their way in: at the daemon.
-pub(crate) type CommandSubscriber<S> = Subscriber<S, [Line], CommandHeader>;
+pub(crate) type CommandSubscriber<S> = Port<Subscriber<S, [Line], CommandHeader>>;
 /// Entries of a journal on their way out: from the daemon.
-pub(crate) type JournalPublisher<S> = Publisher<S, [Line], JournalHeader>;
+pub(crate) type JournalPublisher<S> = Port<Publisher<S, [Line], JournalHeader>>;
 /// Entries of a journal on their way in: at a recorder.
-pub(crate) type JournalSubscriber<S> = Subscriber<S, [Line], JournalHeader>;
+pub(crate) type JournalSubscriber<S> = Port<Subscriber<S, [Line], JournalHeader>>;
+/// A service that wakes.
+pub(crate) type EventService<S> = Port<event::PortFactory<S>>;
+/// The end of such a service that sleeps.
+pub(crate) type Sleeper<S> = Port<Listener<S>>;
+/// The end of such a service that wakes.
+pub(crate) type Waker<S> = Port<Notifier<S>>;
 /// Service that carries the entries of a journal.
-pub(crate) type JournalService<S> = publish_subscribe::PortFactory<S, [Line], JournalHeader>;
+pub(crate) type JournalService<S> = Port<publish_subscribe::PortFactory<S, [Line], JournalHeader>>;
 /// Service that carries frames.
-pub(crate) type FrameService<S> = publish_subscribe::PortFactory<S, [Line], FrameHeader>;
+pub(crate) type FrameService<S> = Port<publish_subscribe::PortFactory<S, [Line], FrameHeader>>;
 /// Service that carries commands.
-pub(crate) type CommandService<S> = publish_subscribe::PortFactory<S, [Line], CommandHeader>;
+pub(crate) type CommandService<S> = Port<publish_subscribe::PortFactory<S, [Line], CommandHeader>>;
 /// Requests from a client.
-pub(crate) type Requester<S> = ControlClient<S, [u8], (), [u8], ()>;
+pub(crate) type Requester<S> = Port<ControlClient<S, [u8], (), [u8], ()>>;
 /// Requests at the daemon.
-pub(crate) type Responder<S> = Server<S, [u8], (), [u8], ()>;
+pub(crate) type Responder<S> = Port<Server<S, [u8], (), [u8], ()>>;
 
 /// A request that awaits its answer, at the daemon.
 pub(crate) type Asked<S> = ActiveRequest<S, [u8], (), [u8], ()>;
 
 /// A node: one process's membership in the transport of one daemon.
-pub(crate) fn node<S: Service>(config: &Config, role: &str) -> Result<Node<S>, ProtocolError> {
+pub(crate) fn node<S: Service>(
+    config: &Config,
+    role: &str,
+) -> Result<Port<Node<S>>, ProtocolError> {
     static QUIET: Once = Once::new();
     // our errors say it better; the transport's own log goes to stderr when IOX2_LOG_LEVEL asks for it
     QUIET.call_once(|| set_log_level_from_env_or(LogLevel::Fatal));
@@ -87,7 +97,7 @@ pub(crate) fn node<S: Service>(config: &Config, role: &str) -> Result<Node<S>, P
         .create::<S>()
         .map_err(|error| ProtocolError::transport("create a node", error))?;
     close_folders(config);
-    Ok(node)
+    Ok(Port::new(config, node))
 }
 
 /// Takes from others what the transport's own folders of nodes leave them; the folder around them lets nobody in anyway.
@@ -155,11 +165,12 @@ pub(crate) fn open_frames<S: Service>(
 fn open_lines<S: Service, H: Debug + ZeroCopySend>(
     node: &Node<S>,
     name: &str,
-) -> Result<publish_subscribe::PortFactory<S, [Line], H>, ProtocolError> {
+) -> Result<Port<publish_subscribe::PortFactory<S, [Line], H>>, ProtocolError> {
     node.service_builder(&service_name(name)?)
         .publish_subscribe::<[Line]>()
         .user_header::<H>()
         .open()
+        .map(|service| Port::new(node.config(), service))
         .map_err(|error| ProtocolError::transport(format!("open service {name}"), error))
 }
 
@@ -169,7 +180,7 @@ fn create_lines<S: Service, H: Debug + ZeroCopySend>(
     name: &str,
     depth: usize,
     held: usize,
-) -> Result<publish_subscribe::PortFactory<S, [Line], H>, ProtocolError> {
+) -> Result<Port<publish_subscribe::PortFactory<S, [Line], H>>, ProtocolError> {
     node.service_builder(&service_name(name)?)
         .publish_subscribe::<[Line]>()
         .user_header::<H>()
@@ -181,21 +192,23 @@ fn create_lines<S: Service, H: Debug + ZeroCopySend>(
         .max_subscribers(1)
         .max_nodes(4)
         .create()
+        .map(|service| Port::new(node.config(), service))
         .map_err(|error| ProtocolError::transport(format!("create service {name}"), error))
 }
 
 /// The end of a service that sends up to so many lines at once; `what` it sends is for messages.
 fn publisher<S: Service, H: Debug + Default + ZeroCopySend>(
-    service: &publish_subscribe::PortFactory<S, [Line], H>,
+    service: &Port<publish_subscribe::PortFactory<S, [Line], H>>,
     lines: usize,
     what: &str,
-) -> Result<Publisher<S, [Line], H>, ProtocolError> {
+) -> Result<Port<Publisher<S, [Line], H>>, ProtocolError> {
     service
         .publisher_builder()
         .initial_max_slice_len(lines)
         .max_loaned_samples(LOANS)
         .backpressure_strategy(BackpressureStrategy::DiscardData)
         .create()
+        .map(|port| Port::of(service.owner(), port))
         .map_err(|error| ProtocolError::transport(format!("create a {what} publisher"), error))
 }
 
@@ -215,6 +228,7 @@ pub(crate) fn create_watch<S: Service>(
         .max_subscribers(CLIENTS_MAX)
         .max_nodes(CLIENTS_MAX + 1)
         .create()
+        .map(|service| Port::new(node.config(), service))
         .map_err(|error| ProtocolError::transport("create service watch", error))
 }
 
@@ -241,6 +255,7 @@ pub(crate) fn frame_subscriber<S: Service>(
         .buffer_size(BUFFER)
         .history_request(history)
         .create()
+        .map(|port| Port::of(service.owner(), port))
         .map_err(|error| ProtocolError::transport("create a frame subscriber", error))
 }
 
@@ -275,6 +290,7 @@ pub(crate) fn command_subscriber<S: Service>(
     service
         .subscriber_builder()
         .create()
+        .map(|port| Port::of(service.owner(), port))
         .map_err(|error| ProtocolError::transport("create a command subscriber", error))
 }
 
@@ -315,6 +331,7 @@ pub(crate) fn journal_subscriber<S: Service>(
     service
         .subscriber_builder()
         .create()
+        .map(|port| Port::of(service.owner(), port))
         .map_err(|error| ProtocolError::transport("create a journal subscriber", error))
 }
 
@@ -323,7 +340,7 @@ pub(crate) fn create_event<S: Service>(
     node: &Node<S>,
     name: &str,
     attributes: &[(&str, String)],
-) -> Result<event::PortFactory<S>, ProtocolError> {
+) -> Result<EventService<S>, ProtocolError> {
     let failed = |error: &dyn std::fmt::Debug| {
         ProtocolError::transport(format!("create event {name}"), error)
     };
@@ -342,6 +359,7 @@ pub(crate) fn create_event<S: Service>(
         .max_nodes(CLIENTS_MAX + 1)
         .event_id_max_value(1)
         .create_with_attributes(&specifier)
+        .map(|service| Port::new(node.config(), service))
         .map_err(|error| failed(&error))
 }
 
@@ -349,10 +367,11 @@ pub(crate) fn create_event<S: Service>(
 pub(crate) fn open_event<S: Service>(
     node: &Node<S>,
     name: &str,
-) -> Result<event::PortFactory<S>, ProtocolError> {
+) -> Result<EventService<S>, ProtocolError> {
     node.service_builder(&service_name(name)?)
         .event()
         .open()
+        .map(|service| Port::new(node.config(), service))
         .map_err(|error| ProtocolError::transport(format!("open event {name}"), error))
 }
 
@@ -360,8 +379,9 @@ pub(crate) fn open_event<S: Service>(
 pub(crate) fn open_wake<S: Service>(
     node: &Node<S>,
     name: &str,
-) -> Result<event::PortFactory<S>, ProtocolError> {
+) -> Result<EventService<S>, ProtocolError> {
     let service = node.service_builder(&service_name("wake")?).event().open();
+    let service = service.map(|service| Port::new(node.config(), service));
     service.map_err(|error| match error {
         EventOpenError::ExceedsMaxNumberOfNodes => ProtocolError::TooManyClients {
             name: name.to_owned(),
@@ -372,7 +392,7 @@ pub(crate) fn open_wake<S: Service>(
 }
 
 /// An attribute of an event service.
-pub(crate) fn attribute<S: Service>(service: &event::PortFactory<S>, key: &str) -> String {
+pub(crate) fn attribute<S: Service>(service: &EventService<S>, key: &str) -> String {
     let found = service
         .attributes()
         .iter()
@@ -384,22 +404,20 @@ pub(crate) fn attribute<S: Service>(service: &event::PortFactory<S>, key: &str) 
 }
 
 /// Creates a listener.
-pub(crate) fn listener<S: Service>(
-    service: &event::PortFactory<S>,
-) -> Result<Listener<S>, ProtocolError> {
+pub(crate) fn listener<S: Service>(service: &EventService<S>) -> Result<Sleeper<S>, ProtocolError> {
     service
         .listener_builder()
         .create()
+        .map(|port| Port::of(service.owner(), port))
         .map_err(|error| ProtocolError::transport("create a listener", error))
 }
 
 /// Creates a notifier.
-pub(crate) fn notifier<S: Service>(
-    service: &event::PortFactory<S>,
-) -> Result<Notifier<S>, ProtocolError> {
+pub(crate) fn notifier<S: Service>(service: &EventService<S>) -> Result<Waker<S>, ProtocolError> {
     service
         .notifier_builder()
         .create()
+        .map(|port| Port::of(service.owner(), port))
         .map_err(|error| ProtocolError::transport("create a notifier", error))
 }
 
@@ -437,6 +455,7 @@ pub(crate) fn responder<S: Service>(node: &Node<S>) -> Result<Responder<S>, Prot
         .max_loaned_responses_per_request(1)
         .backpressure_strategy(BackpressureStrategy::DiscardData)
         .create()
+        .map(|port| Port::new(node.config(), port))
         .map_err(|error| failed(&error))
 }
 
@@ -452,5 +471,6 @@ pub(crate) fn requester<S: Service>(node: &Node<S>) -> Result<Requester<S>, Prot
         .initial_max_slice_len(crate::control::REQUEST_MAX)
         .backpressure_strategy(BackpressureStrategy::DiscardData)
         .create()
+        .map(|port| Port::new(node.config(), port))
         .map_err(|error| ProtocolError::transport("create a control client", error))
 }

@@ -2,13 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{Node, PortFactory};
 
 use super::worlds::S;
 use crate::memory::slot_bytes;
-use crate::transport::{self, CommandService, CommandSubscriber, FramePublisher};
+use crate::transport::{self, CommandService, CommandSubscriber, FramePublisher, Waker};
 use crate::{ProtocolError, Table};
 
 /// A holder whose heartbeats stopped for this long loses the lease when somebody else asks for it.
@@ -24,7 +23,7 @@ pub(super) struct Lease {
     pub(super) last_seq: u64,
     pub(super) subscriber: CommandSubscriber<S>,
     pub(super) publisher: FramePublisher<S>,
-    pub(super) notifier: Notifier<S>,
+    pub(super) notifier: Waker<S>,
     commands: CommandService<S>,
 }
 

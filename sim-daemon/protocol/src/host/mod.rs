@@ -15,8 +15,6 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use iceoryx2::port::listener::Listener;
-
 pub use cleanup::ClientCleanup;
 pub use inbox::{Inbox, Numbers};
 pub use worlds::{Next, Worlds};
@@ -31,7 +29,7 @@ use crate::daemon_lock::DaemonLock;
 use crate::described;
 use crate::guard::guarded;
 use crate::memory;
-use crate::transport::{self, handshake};
+use crate::transport::{self, Sleeper, handshake};
 use crate::waiter::{Waiter, cores};
 use crate::{Description, ProtocolError, RefusalKind, Table};
 
@@ -45,7 +43,7 @@ const PANICS_MAX: u32 = 8;
 pub struct Host {
     state: State,
     waiter: Waiter,
-    listener: Listener<S>,
+    listener: Sleeper<S>,
     panics: u32,
     /// Last, so that its files go after everything that uses them.
     daemon_lock: DaemonLock,

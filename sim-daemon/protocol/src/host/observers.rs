@@ -2,14 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{Node, PortFactory};
 
 use super::worlds::{S, Worlds};
 use crate::guard::guarded;
 use crate::memory;
-use crate::transport::{self, FramePublisher, FrameService};
+use crate::transport::{self, FramePublisher, FrameService, Waker};
 use crate::{ALIGNMENT, Description, FrameHeader, ProtocolError, Table, loaned};
 
 /// Observers see a frame that comes this long after the one before, so that of 60 a second they see all, early ones too ...
@@ -26,7 +25,7 @@ pub(super) struct Observers {
     table: Table,
     publisher: FramePublisher<S>,
     service: FrameService<S>,
-    notifier: Notifier<S>,
+    notifier: Waker<S>,
     period: Duration,
     count: usize,
     /// The state has changed since they were shown one.

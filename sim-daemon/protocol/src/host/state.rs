@@ -16,6 +16,7 @@ use crate::control::{Request, Response};
 use crate::guard::guarded;
 use crate::loaned;
 use crate::memory;
+use crate::port::Port;
 use crate::transport::{self, Responder};
 use crate::waiter::Awaited;
 use crate::{ALIGNMENT, Description, Dtype, FrameHeader, ProtocolError, RefusalKind, Table};
@@ -24,7 +25,7 @@ use crate::{ALIGNMENT, Description, Dtype, FrameHeader, ProtocolError, RefusalKi
 const HELD_UP: Duration = Duration::from_millis(200);
 /// Everything of a host but the waiting.
 pub(super) struct State {
-    pub(super) node: Node<S>,
+    pub(super) node: Port<Node<S>>,
     pub(super) description: Description,
     pub(super) frame: Table,
     pub(super) lease: Option<Lease>,
@@ -141,6 +142,7 @@ impl State {
         let (mut end, mut later) = (false, Vec::new());
         // as with commands: a client that was killed while it connected is no reason to end
         while let Ok(Some(active)) = self.responder.receive() {
+            let active = Port::of(self.responder.owner(), active);
             let response = match serde_json::from_slice(active.payload()) {
                 Ok(Request::Describe) => Response::Described,
                 Ok(Request::Controller) => Response::Controller {
@@ -324,6 +326,7 @@ impl Awaited<Next> for State {
         let Ok(Some(sample)) = lease.subscriber.receive() else {
             return Ok(None);
         };
+        let sample = Port::of(lease.subscriber.owner(), sample);
         let header = *sample.user_header();
         // what leads out of shared memory is no table
         let words = loaned::received(sample.payload()).unwrap_or_default();
