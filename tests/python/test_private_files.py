@@ -1,4 +1,4 @@
-"""Files, folders and sockets of a daemon and its clients are for their user only, and what others plant is not followed."""
+"""Files, folders and sockets of a daemon and its clients are for their user only, and go with them."""
 
 from __future__ import annotations
 

@@ -152,13 +152,15 @@ def transfer_file(data: bytes = b"") -> Iterator[tuple[BinaryIO, str]]:
     """
     try:
         file = tempfile.TemporaryFile(  # noqa: SIM115 (closed below; here its errors are caught)
-            dir=_SHARED_MEMORY if _SHARED_MEMORY.is_dir() else None
+            dir=_SHARED_MEMORY if _SHARED_MEMORY.is_dir() else None, buffering=0
         )
     except OSError as problem:
         raise SnapshotError(_NO_ROOM.format(problem)) from None
     with file:
         try:
-            file.write(data)
+            rest = memoryview(data)
+            while rest:
+                rest = rest[file.write(rest) :]
             file.seek(0)
         except OSError as problem:
             raise SnapshotError(_NO_ROOM.format(problem)) from None
