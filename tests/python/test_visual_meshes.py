@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from pathlib import Path
 
@@ -249,6 +250,14 @@ def test_hostile_and_strange_files_are_refused(tmp_path):
         (tmp_path / "thin.obj").write_text(text + "f 1 1 2\n")
         with pytest.raises(SceneError, match="area"):
             visual_mesh.read(tmp_path / "thin.obj")
+
+
+@pytest.mark.parametrize("image", ["pipe", "/dev/zero"])
+def test_an_image_that_is_no_file_is_noted_and_not_waited_for(tmp_path, image):
+    os.mkfifo(tmp_path / "pipe")
+    mesh = visual_mesh.read(looks.obj(tmp_path / "box.obj", mtl=f"newmtl red\nmap_Kd {image}\n"))
+    (note,) = (note for note in mesh.notes if "image" in note)
+    assert image in note and "it is not a file" in note
 
 
 def test_a_missing_library_is_named(monkeypatch, tmp_path):

@@ -40,15 +40,26 @@ def image_mean(image: Any) -> tuple[int, int, int, int]:
     return int(red), int(green), int(blue), int(alpha)
 
 
+def open_image(path: str | Path) -> Any:
+    """An image file as an image of pillow's.
+
+    Raises:
+        OSError: It cannot be read, or is no file: a pipe would be waited for.
+    """
+    from PIL import Image
+
+    if Path(path).exists() and not Path(path).is_file():
+        raise OSError("it is not a file")
+    return Image.open(path)
+
+
 def file_mean(path: str | Path) -> tuple[int, int, int, int]:
     """Mean colour of an image file.
 
     Raises:
         OSError: It cannot be read.
     """
-    from PIL import Image
-
-    with Image.open(path) as image:
+    with open_image(path) as image:
         return image_mean(image)
 
 

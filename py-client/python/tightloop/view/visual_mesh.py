@@ -77,5 +77,5 @@ def read(path: str | PathLike[str]) -> VisualMesh:
 def _sampled(image: str | bytes, uv: NDArray[np.float32] | None) -> NDArray[Any]:
     from PIL import Image
 
-    with Image.open(BytesIO(image) if isinstance(image, bytes) else image) as opened:
+    with Image.open(BytesIO(image)) if isinstance(image, bytes) else paint.open_image(image) as opened:
         return np.array(paint.image_mean(opened)) if uv is None else paint.from_texture(opened, uv)
