@@ -27,7 +27,7 @@ def run(*line: str | Path, limit: int | None = None, environment: dict[str, str]
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
     done = subprocess.run(
-        [*COMMAND, *map(os.fspath, line)],
+        [*COMMAND, *(os.fspath(word) for word in line)],
         capture_output=True,
         timeout=PATIENCE,
         check=False,
