@@ -222,7 +222,7 @@ impl Recorder<'_> {
     }
 
     fn go(&mut self) -> Result<std::convert::Infallible, End> {
-        let (daemon, observed): (&Description, _) = (&self.client.description(), self.fields);
+        let (daemon, observed): (&Description, _) = (self.client.description(), self.fields);
         let head = serde_json::json!({ "daemon": daemon, "observed": observed }).to_string();
         self.writer.put(&Record::Head(head.as_bytes()))?;
         loop {
