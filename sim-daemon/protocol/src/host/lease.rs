@@ -91,6 +91,14 @@ impl Lease {
         publishers == 0 && (holder.joined || holder.since.elapsed() > JOIN_MAX)
     }
 
+    /// The holder's process, unless it is gone.
+    pub(super) fn present_holder(&mut self) -> Option<u32> {
+        if self.is_over() {
+            return None;
+        }
+        self.holder.as_ref().map(|holder| holder.pid)
+    }
+
     /// Whether the holder has been silent for too long.
     pub(super) fn is_silent(&self) -> bool {
         self.holder

@@ -146,10 +146,7 @@ impl State {
             let response = match serde_json::from_slice(active.payload()) {
                 Ok(Request::Describe) => Response::Described,
                 Ok(Request::Controller) => Response::Controller {
-                    pid: self
-                        .lease
-                        .as_ref()
-                        .and_then(|lease| Some(lease.holder.as_ref()?.pid)),
+                    pid: self.lease.as_mut().and_then(Lease::present_holder),
                 },
                 // a release that waits unread came before: the requests of several clients come in no order
                 Ok(Request::Acquire { pid }) => {
