@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use iceoryx2::prelude::Node;
 
 use crate::control::{Request, Response};
+use crate::described;
 use crate::guard::guarded;
 use crate::hook::Hook;
 use crate::liveness::Peer;
@@ -52,6 +53,7 @@ impl Connection {
         peer: &Peer,
         hook: Hook<'_>,
     ) -> Result<(Connection, Announced), ProtocolError> {
+        intact_there(peer)?;
         let (sender, receiver) = mpsc::channel();
         let theirs = peer.clone();
         let open = move || {
@@ -152,7 +154,7 @@ impl Connection {
             }
             if polled.elapsed() > SLICE {
                 self.peer.check()?;
-                intact(&self.peer)?;
+                intact_there(&self.peer)?;
                 if hook().is_break() {
                     return Err(ProtocolError::Interrupted);
                 }
@@ -191,8 +193,12 @@ impl Connection {
     }
 
     /// Opens ports, or does something else with the node.
-    pub(crate) fn with_node<T>(&self, call: impl FnOnce(&Node<S>) -> T) -> T {
-        call(&lock(&self.node))
+    pub(crate) fn with_node<T>(
+        &self,
+        call: impl FnOnce(&Node<S>) -> Result<T, ProtocolError>,
+    ) -> Result<T, ProtocolError> {
+        let node = lock(&self.node);
+        guarded(|| call(&node)).unwrap_or_else(|| Err(damaged(&self.peer, "open services")))
     }
 
     /// Opens ports. What the daemon is just making or removing is tried again.
@@ -236,6 +242,14 @@ pub(crate) fn intact(peer: &Peer) -> Result<(), ProtocolError> {
     {
         true => Err(damaged(peer, "read shared memory")),
         false => Ok(()),
+    }
+}
+
+/// As [`intact`], and asks the daemon's files, which takes a few microseconds.
+pub(crate) fn intact_there(peer: &Peer) -> Result<(), ProtocolError> {
+    match described::is_damaged(&peer.paths, peer.beacon.session) {
+        true => Err(damaged(peer, "wait for the daemon")),
+        false => intact(peer),
     }
 }
 

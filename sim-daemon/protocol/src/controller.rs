@@ -7,7 +7,7 @@ use iceoryx2::prelude::PortFactory;
 
 use crate::affinity::CoreAffinity;
 use crate::command::{Call, command_bytes};
-use crate::connection::{Connection, S, damaged, intact, malformed, pause};
+use crate::connection::{Connection, S, damaged, intact, intact_there, malformed, pause};
 use crate::control::{Request, Response};
 use crate::frame::{Alive, FrameSample};
 use crate::guard::guarded;
@@ -345,8 +345,9 @@ impl Awaited<FrameSample> for Answer<'_> {
             return Err(ProtocolError::Interrupted);
         }
         self.peer.check()?;
-        intact(self.peer)?;
-        if self.service.dynamic_config().number_of_publishers() == 0 {
+        intact_there(self.peer)?;
+        let publishers = guarded(|| self.service.dynamic_config().number_of_publishers());
+        if publishers.ok_or_else(|| damaged(self.peer, "look for the daemon"))? == 0 {
             return Err(self.peer.lease_lost());
         }
         if self.since.elapsed() > ANSWER_MAX {

@@ -1,4 +1,5 @@
-//! The description of a daemon: a file in its folder, since it may be large and every client reads it once.
+//! What a daemon says of itself in files of its folder: its description, which may be large and which every client reads once, and
+//! that its shared memory is damaged.
 
 use std::io::{Read, Write};
 use std::path::PathBuf;
@@ -41,4 +42,21 @@ pub(crate) fn read(paths: &DaemonPaths, session: u64) -> Result<Description, Pro
         action: "read the description".to_owned(),
         path: path.display().to_string(),
     })
+}
+
+fn mark(paths: &DaemonPaths, session: u64) -> PathBuf {
+    paths
+        .shared_folder()
+        .join(format!("{session:016x}.damaged"))
+}
+
+/// Tells clients that shared memory of the daemon was changed by another program.
+pub(crate) fn mark_damaged(paths: &DaemonPaths, session: u64) {
+    // one that cannot be told finds out, or waits for as long as it does
+    let _ = private().create(true).open(mark(paths, session));
+}
+
+/// Whether the daemon has found that out. A few microseconds.
+pub(crate) fn is_damaged(paths: &DaemonPaths, session: u64) -> bool {
+    mark(paths, session).exists()
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use iceoryx2::sample::Sample;
 
-use crate::connection::{Connection, S, damaged, intact, malformed};
+use crate::connection::{Connection, S, damaged, intact, intact_there, malformed};
 use crate::control::{Request, Response};
 use crate::guard::guarded;
 use crate::hook::Hook;
@@ -156,6 +156,7 @@ impl Journal {
             }
             if self.polled.elapsed() > SLICE {
                 self.polled = Instant::now();
+                intact_there(&self.connection.peer)?;
                 if let Err(gone) = self.connection.peer.check() {
                     // what it said last may have come between the two looks
                     return self

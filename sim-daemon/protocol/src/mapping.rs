@@ -26,6 +26,8 @@ struct Slot {
     /// 0 while the slot describes nothing.
     end: AtomicUsize,
     owner: AtomicU64,
+    /// The file was made here, and not by another process.
+    is_made: AtomicBool,
 }
 
 static SLOTS: [Slot; MAPPINGS_MAX] = [const {
@@ -34,6 +36,7 @@ static SLOTS: [Slot; MAPPINGS_MAX] = [const {
         start: AtomicUsize::new(0),
         end: AtomicUsize::new(0),
         owner: AtomicU64::new(0),
+        is_made: AtomicBool::new(false),
     }
 }; MAPPINGS_MAX];
 /// Slots from this on were never taken.
@@ -67,19 +70,19 @@ pub(crate) struct Mapping {
 }
 
 impl Mapping {
-    /// Maps the first bytes of a file of `owner`.
+    /// Maps the first bytes of a file of an owner, made here or not.
     pub(crate) fn new(
         file: &OwnedFd,
         bytes: usize,
         protection: ProtFlags,
-        owner: u64,
+        (owner, is_made): (u64, bool),
     ) -> Result<Mapping, Errno> {
         static HANDLER: Once = Once::new();
         HANDLER.call_once(handle_cut_files);
         // SAFETY: the system chooses the place, so nothing else is there.
         let start = unsafe { mmap(null_mut(), bytes, protection, MapFlags::SHARED, file, 0) }?;
         let start = NonNull::new(start).ok_or(Errno::INVAL)?;
-        let slot = register(start.as_ptr() as usize, bytes, owner);
+        let slot = register(start.as_ptr() as usize, bytes, owner, is_made);
         Ok(Mapping { start, bytes, slot })
     }
 
@@ -99,12 +102,13 @@ impl Drop for Mapping {
     }
 }
 
-fn register(start: usize, bytes: usize, owner: u64) -> Option<usize> {
+fn register(start: usize, bytes: usize, owner: u64, is_made: bool) -> Option<usize> {
     let take = |slot: &Slot| !slot.taken.swap(true, Ordering::AcqRel);
     let index = SLOTS.iter().position(take)?;
     let slot = &SLOTS[index];
     slot.start.store(start, Ordering::Release);
     slot.owner.store(owner, Ordering::Release);
+    slot.is_made.store(is_made, Ordering::Release);
     slot.end.store(start + bytes, Ordering::Release);
     USED.fetch_max(index + 1, Ordering::AcqRel);
     Some(index)
@@ -125,6 +129,11 @@ pub(crate) fn holds<T>(values: &[T]) -> bool {
 /// Whether any mapped file was cut.
 pub(crate) fn any_damaged() -> bool {
     DAMAGES.load(Ordering::Acquire) > 0
+}
+
+/// Whether a file of `owner` that was made here was cut while it was mapped.
+pub(crate) fn is_own_damaged(owner: u64) -> bool {
+    is_damaged(!owner)
 }
 
 /// Whether a file of `owner` was cut while it was mapped.
@@ -187,7 +196,11 @@ fn replace_page(address: usize) -> bool {
     if mapped == libc::MAP_FAILED {
         return false;
     }
-    note_damage(slot.owner.load(Ordering::Acquire));
+    let owner = slot.owner.load(Ordering::Acquire);
+    note_damage(owner);
+    if slot.is_made.load(Ordering::Acquire) {
+        note_damage(!owner);
+    }
     true
 }
 
@@ -219,7 +232,7 @@ mod tests {
         file.set_len(4 * page as u64).unwrap();
         let (file, owner) = (OwnedFd::from(file), 0x5ca1_ab1e);
         let protection = ProtFlags::READ | ProtFlags::WRITE;
-        let mapping = Mapping::new(&file, 4 * page, protection, owner).unwrap();
+        let mapping = Mapping::new(&file, 4 * page, protection, (owner, false)).unwrap();
         let bytes: *mut u8 = mapping.start().as_ptr().cast();
         // SAFETY: four pages are mapped.
         let at = |page_number: usize| unsafe { bytes.add(page_number * page) };
@@ -232,13 +245,13 @@ mod tests {
         // SAFETY: as above; what is missing becomes zeros.
         let read: [u8; 4] = std::array::from_fn(|number| unsafe { at(number).read_volatile() });
         assert_eq!(read, [7, 0, 0, 0]);
-        assert!(is_damaged(owner) && !is_damaged(owner + 1));
+        assert!(is_damaged(owner) && !is_damaged(owner + 1) && !is_own_damaged(owner));
     }
 
     #[test]
     fn bytes_are_held_as_a_whole_or_not_at_all() {
         let file = OwnedFd::from(File::open("/proc/self/exe").unwrap());
-        let mapping = Mapping::new(&file, 4096, ProtFlags::READ, 1).unwrap();
+        let mapping = Mapping::new(&file, 4096, ProtFlags::READ, (1, false)).unwrap();
         let start: *const u8 = mapping.start().as_ptr().cast();
         // SAFETY: nothing is read through them.
         let slice = |first, bytes| unsafe { std::slice::from_raw_parts(start.add(first), bytes) };

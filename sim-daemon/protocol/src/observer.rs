@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::connection::{Connection, S, damaged, intact, malformed};
+use crate::connection::{Connection, S, damaged, intact, intact_there, malformed};
 use crate::controller::check_table;
 use crate::frame::{Alive, FrameSample};
 use crate::guard::guarded;
@@ -54,7 +54,7 @@ impl Observer {
         self.frames.check(self.description.frames_held)?;
         let Some(sample) = self.receive()? else {
             self.connection.peer.check()?;
-            intact(&self.connection.peer)?;
+            intact_there(&self.connection.peer)?;
             return Ok(None);
         };
         let header = *sample.user_header();

@@ -264,7 +264,7 @@ impl<T: Content> Builder<'_, T> {
         let folder = self.config.get_path_hint().to_string();
         let file = new_file(&folder, bytes as u64).map_err(failed)?;
         let protection = ProtFlags::READ | ProtFlags::WRITE;
-        let mapping = Mapping::new(&file, bytes, protection, owner(&self.config))
+        let mapping = Mapping::new(&file, bytes, protection, (owner(&self.config), true))
             .map_err(|error| failed(Problem::System(error)))?;
         let storage = Storage {
             mapping,
@@ -316,7 +316,9 @@ impl<T: Content> Builder<'_, T> {
         let bytes = status.st_size as usize;
         let is_file = FileType::from_raw_mode(status.st_mode) == FileType::RegularFile;
         let mapping = (is_file && bytes >= size_of::<Data<T>>())
-            .then(|| Mapping::new(&file, bytes, protection, owner(&self.config)).map_err(system))
+            .then(|| {
+                Mapping::new(&file, bytes, protection, (owner(&self.config), false)).map_err(system)
+            })
             .transpose()?;
         // SAFETY: the mapping is long enough, and any bits are a number.
         let whole = |mapping: &Mapping| unsafe {

@@ -96,6 +96,8 @@ impl Host {
         let inbox = Inbox::for_commands_of(&description);
         let state = State {
             node,
+            paths: daemon_lock.paths().clone(),
+            is_damaged: false,
             description,
             frame,
             lease: Some(lease),

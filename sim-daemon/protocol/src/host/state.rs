@@ -13,9 +13,12 @@ use super::worlds::{Next, S, Worlds};
 use super::{ClientCleanup, Inbox};
 use crate::affinity::CoreAffinity;
 use crate::control::{Request, Response};
+use crate::described;
 use crate::guard::guarded;
 use crate::loaned;
+use crate::mapping;
 use crate::memory;
+use crate::paths::DaemonPaths;
 use crate::port::Port;
 use crate::transport::{self, Responder};
 use crate::waiter::Awaited;
@@ -26,6 +29,9 @@ const HELD_UP: Duration = Duration::from_millis(200);
 /// Everything of a host but the waiting.
 pub(super) struct State {
     pub(super) node: Port<Node<S>>,
+    pub(super) paths: DaemonPaths,
+    /// Clients were told that our own memory is damaged.
+    pub(super) is_damaged: bool,
     pub(super) description: Description,
     pub(super) frame: Table,
     pub(super) lease: Option<Lease>,
@@ -279,6 +285,15 @@ impl State {
         let _ = lease.notifier.notify();
     }
 
+    /// Tells clients once when another program has cut our own memory: some of them would wait for what cannot come.
+    fn mark_damage(&mut self) {
+        let owner = self.node.owner();
+        if !self.is_damaged && mapping::any_damaged() && mapping::is_own_damaged(owner) {
+            self.is_damaged = true;
+            described::mark_damaged(&self.paths, self.description.session);
+        }
+    }
+
     /// Looks at control requests, leases, observers and recorders.
     pub(super) fn poll_services(&mut self) -> Option<Next> {
         let gap = self.polled.elapsed();
@@ -294,14 +309,21 @@ impl State {
         if self.stop.load(Ordering::Relaxed) {
             return Some(Next::End);
         }
-        let next = self.control();
-        if self.lease.as_mut().is_some_and(Lease::is_over) {
+        // what panics over damaged memory loses those who use it, and nobody else
+        self.mark_damage();
+        let next = guarded(|| self.control()).flatten();
+        let is_over = guarded(|| self.lease.as_mut().is_some_and(Lease::is_over));
+        if is_over.unwrap_or(true) {
             self.renew();
         }
-        self.lease.iter().for_each(Lease::refresh);
+        guarded(|| self.lease.iter().for_each(Lease::refresh));
         // new observers get the frame shown last, dead ones give their slots back
-        self.observers.refresh();
-        let waits = self.journals.refresh(self.description.session);
+        guarded(|| self.observers.refresh());
+        let session = self.description.session;
+        let waits = guarded(|| self.journals.refresh(session)).unwrap_or_else(|| {
+            self.journals.lose();
+            false
+        });
         next.or(waits.then_some(Next::Record))
     }
 }
