@@ -168,9 +168,11 @@ impl DaemonError {
                 | BackendError::DoubleOnGpu,
             ) => "ArgumentError",
             Backend(BackendError::Memory { .. } | BackendError::DeviceMemory { .. })
-            | Protocol(ProtocolError::SharedMemory { .. } | ProtocolError::Memory { .. }) => {
-                "ResourceError"
-            }
+            | Protocol(
+                ProtocolError::SharedMemory { .. }
+                | ProtocolError::Memory { .. }
+                | ProtocolError::Descriptors { .. },
+            ) => "ResourceError",
             Read { .. } | Config(_) | Model(_) | Refused { .. } => "SceneError",
             Recording { .. } | Replay { .. } | Differs { .. } | Gap { .. } => "RecordingError",
             State { .. } => "SnapshotError",

@@ -22,10 +22,11 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let part = beside(&target);
     let write = || {
         let mut file = File::create_new(&part)?;
-        file.write_all(bytes)?;
+        // first: what it replaces may be private
         if let Ok(there) = fs::metadata(&target) {
             file.set_permissions(there.permissions())?;
         }
+        file.write_all(bytes)?;
         // or a power cut might leave the name with nothing behind it
         file.sync_all()?;
         fs::rename(&part, &target)

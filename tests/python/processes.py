@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import time
 from collections.abc import Callable
@@ -15,9 +16,12 @@ def stems_of(pid: int) -> set[str]:
 
 
 def left_of(stems: set[str]) -> list[str]:
-    """Return the shared-memory files with these prefixes."""
+    """Return the shared-memory files with these prefixes, and what is in those that are folders."""
     assert stems, "a running daemon has shared memory"
-    return sorted(path.name for path in Path("/dev/shm").iterdir() if path.name.startswith(tuple(stems)))
+    found = [str(path) for path in Path("/dev/shm").iterdir() if path.name.startswith(tuple(stems))]
+    # unlike Path.rglob, it passes over a folder that goes meanwhile
+    inside = [f"{folder}/{name}" for top in found for folder, _, names in os.walk(top) for name in names]
+    return sorted(found + inside)
 
 
 def alive(pid: int) -> bool:

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -137,3 +138,41 @@ def test_control_comes_free_as_soon_as_its_holder_is_killed(pendulum):
             sim.step()
             sim.release()
             holder.communicate()
+
+
+ELSEWHERE = """
+import sys, tightloop as tl
+with tl.attach(sys.argv[1]) as sim:
+    sim.step()
+    kept = sim.snapshot()
+    sim.restore(kept)
+    print(kept.to_bytes() == sim.snapshot().to_bytes())
+"""
+
+
+def test_a_client_of_another_container_passes_snapshots(pendulum):
+    # processes have other numbers there
+    unshare = ["unshare", "--pid", "--fork", "--mount-proc", "--kill-child"]
+    if subprocess.run([*unshare, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("no process namespace can be made here")
+    with tl.launch(pendulum, worlds=4) as sim:
+        sim.release()
+        command = [*unshare, sys.executable, "-c", ELSEWHERE, sim.name]
+        process = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        assert process.stdout.strip() == "True", process.stderr
+        sim.step()
+
+
+def test_a_step_that_was_interrupted_before_control_came_can_be_made_again(pendulum):
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    with tl.launch(pendulum, worlds=4) as sim:
+        sim.release()
+        os.kill(sim.pid, signal.SIGSTOP)
+        try:
+            assert wait_until(lambda: stopped(sim.pid), 5.0)
+            threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+            with pytest.raises(KeyboardInterrupt):
+                sim.step()
+        finally:
+            os.kill(sim.pid, signal.SIGCONT)
+        sim.step()

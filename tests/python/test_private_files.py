@@ -128,13 +128,16 @@ def as_nobody(paths: list[Path]) -> dict[str, list[str]]:
 def test_another_user_can_read_write_and_connect_to_nothing(pendulum, tmp_path, umask_0):
     root = Path(os.environ["TIGHTLOOP_ROOT"])
     with busy_daemon(pendulum, tmp_path) as (sim, paths):
-        # the walk sees what an open door is
-        door = tmp_path / "door"
-        door.touch(mode=0o666)
-        assert SHARED_MEMORY.stat().st_mode & 0o007 == 0o007
         assert root.stat().st_mode & 0o077 == 0
-        reached = {path: done for path, done in as_nobody(paths).items() if done}
-        assert not reached
+        # the walk sees what an open door is
+        door = SHARED_MEMORY / f"door-{os.getpid()}"
+        door.touch()
+        try:
+            door.chmod(0o666)
+            reached = {path for path, done in as_nobody([*paths, door]).items() if done}
+        finally:
+            door.unlink()
+        assert reached == {str(door)}
         assert sim.step().step.min() > 0
 
 

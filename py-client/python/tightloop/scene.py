@@ -24,7 +24,6 @@ from tightloop.scene_mujoco import HULL_VERTICES, check_options, keep_beside, re
 from tightloop.scene_options import Cone, Solver, capacity
 from tightloop.scene_randomization import SceneRandomization
 from tightloop.shapes import ORIGIN, UPRIGHT, Shape, Surface, checked_surface
-from tightloop.whole_files import whole_file
 
 if TYPE_CHECKING:
     # typing has it from Python 3.11 on, the package runs on 3.10
@@ -414,11 +413,7 @@ class Scene(SceneRandomization):
         """
         file = checks.path("save: path", path)
         kept = {model.name: keep_beside(file, model) for model in self.models.values()}
-        with whole_file(file, SceneError) as part:
-            try:
-                _core.save_scene(self._json(kept), str(part))
-            except SceneError as problem:
-                raise SceneError(str(problem).replace(str(part), str(file))) from None
+        _core.save_scene(self._json(kept), str(file))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Scene:

@@ -7,6 +7,7 @@ import json
 import os
 import weakref
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -308,9 +309,9 @@ class Sim:
         Raises:
             SnapshotError: There is not enough memory for it. Other errors are those of `step`.
         """
-        with transfer_file() as (file, path):
+        with transfer_file(self.pid) as path:
             self._client.snapshot(path)
-            return Snapshot(file.read(), "snapshot")
+            return Snapshot(Path(path).read_bytes(), "snapshot")
 
     def restore(
         self,
@@ -343,7 +344,7 @@ class Sim:
             raise CommandRefused(f"restore: snapshot is {type(snapshot).__name__}; give a tightloop.Snapshot")
         if from_world is not None:
             from_world = checks.integer("restore: from_world", from_world, least=0, error=CommandRefused)
-        with transfer_file(snapshot.to_bytes()) as (_, path):
+        with transfer_file(self.pid, snapshot.to_bytes()) as path:
             return self._client.restore(path, worlds, from_world)
 
     @property

@@ -5,6 +5,7 @@ A snapshot is a header of 40 bytes, then a record per world; `sim-core/engine/sr
 
 from __future__ import annotations
 
+import functools
 import os
 import stat
 import struct
@@ -13,7 +14,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,22 +139,26 @@ class Snapshot:
 
 
 @contextmanager
-def transfer_file(data: bytes = b"") -> Iterator[tuple[BinaryIO, str]]:
-    """Provide a file without a name between client and daemon, in shared memory if possible; it ends with this process.
+def transfer_file(daemon: int, data: bytes = b"") -> Iterator[str]:
+    """Provide a file between client and daemon, in shared memory if possible.
+
+    It has no name and ends with this process, unless the daemon is in another container and cannot see this process.
 
     Args:
+        daemon: Process id of the daemon.
         data: What the daemon reads there.
 
     Yields:
-        The file, and the path by which the daemon opens it.
+        The path by which both open it.
 
     Raises:
         SnapshotError: The file cannot be made.
     """
+    folder = _SHARED_MEMORY if _SHARED_MEMORY.is_dir() else None
+    nameless = _is_beside(daemon)
+    kind = tempfile.TemporaryFile if nameless else functools.partial(tempfile.NamedTemporaryFile, prefix="tightloop-")
     try:
-        file = tempfile.TemporaryFile(  # noqa: SIM115 (closed below; here its errors are caught)
-            dir=_SHARED_MEMORY if _SHARED_MEMORY.is_dir() else None, buffering=0
-        )
+        file = kind(dir=folder, buffering=0)
     except OSError as problem:
         raise SnapshotError(_NO_ROOM.format(problem)) from None
     with file:
@@ -161,10 +166,17 @@ def transfer_file(data: bytes = b"") -> Iterator[tuple[BinaryIO, str]]:
             rest = memoryview(data)
             while rest:
                 rest = rest[file.write(rest) :]
-            file.seek(0)
         except OSError as problem:
             raise SnapshotError(_NO_ROOM.format(problem)) from None
-        yield cast("BinaryIO", file), f"/proc/{os.getpid()}/fd/{file.fileno()}"
+        yield f"/proc/{os.getpid()}/fd/{file.fileno()}" if nameless else str(file.name)
+
+
+def _is_beside(process: int) -> bool:
+    """Return whether a process knows this one by the same id."""
+    try:
+        return Path("/proc/self/ns/pid").readlink() == Path(f"/proc/{process}/ns/pid").readlink()
+    except OSError:
+        return False
 
 
 def _read(file: Path) -> bytes:

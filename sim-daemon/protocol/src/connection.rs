@@ -1,6 +1,7 @@
 //! How each part of a client reaches the daemon: node, control requests, wake-up.
 
 use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
@@ -35,6 +36,8 @@ pub(crate) struct Connection {
     pub(crate) wake: Waker<S>,
     /// One request is waited for at a time.
     pub(crate) asking: Turn<()>,
+    /// A lease was asked for, and its answer not waited for.
+    pub(crate) abandoned: AtomicBool,
     pub(crate) requester: Mutex<Requester<S>>,
     pub(crate) node: Mutex<Port<Node<S>>>,
 }
@@ -102,6 +105,7 @@ impl Connection {
             peer,
             wake: transport::notifier(&wake)?,
             asking: Turn::new(()),
+            abandoned: AtomicBool::new(false),
             requester: Mutex::new(transport::requester(&node)?),
             node: Mutex::new(node),
         };

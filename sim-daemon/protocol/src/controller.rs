@@ -1,6 +1,8 @@
 //! The controlling end of a client: one lease, one command in flight.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use iceoryx2::prelude::PortFactory;
@@ -12,7 +14,7 @@ use crate::control::{Request, Response};
 use crate::frame::{Alive, FrameSample};
 use crate::guard::guarded;
 use crate::heartbeat::HeartbeatThread;
-use crate::hook::{Hook, keep_waiting};
+use crate::hook::Hook;
 use crate::liveness::{Peer, is_gone};
 use crate::loaned;
 use crate::port::Port;
@@ -89,7 +91,10 @@ impl Controller {
             // dead holder late
             let again = match error {
                 ProtocolError::Transport { .. } => true,
-                ProtocolError::LeaseHeld { pid, .. } => is_gone(pid),
+                ProtocolError::LeaseHeld { pid, .. } => {
+                    is_gone(pid, connection.peer.beacon.pid)
+                        || pid == std::process::id() && connection.abandoned.load(Ordering::Relaxed)
+                }
                 _ => false,
             };
             if !again || start.elapsed() > ACQUIRE_MAX {
@@ -250,8 +255,16 @@ impl Controller {
 /// Asks for the lease once.
 fn ask_for_lease(connection: &Connection, hook: Hook<'_>) -> Result<u64, ProtocolError> {
     let pid = std::process::id();
-    match connection.ask(&Request::Acquire { pid }, hook)? {
-        Response::Granted { epoch } => Ok(epoch),
+    let asked = connection.ask(&Request::Acquire { pid }, hook);
+    if asked.is_err() {
+        // the daemon may grant it yet, and waits for us in vain then
+        connection.abandoned.store(true, Ordering::Relaxed);
+    }
+    match asked? {
+        Response::Granted { epoch } => {
+            connection.abandoned.store(false, Ordering::Relaxed);
+            Ok(epoch)
+        }
         Response::Held { pid } => Err(ProtocolError::LeaseHeld {
             name: connection.peer.paths.name().to_owned(),
             pid,
@@ -304,10 +317,18 @@ fn open_lease(
 impl Drop for Controller {
     fn drop(&mut self) {
         // a daemon that is told only while we go may not find the message any more, and would wait for us to come
-        let release = Request::Release { epoch: self.epoch };
-        let _ = self
-            .connection
-            .ask_within(RELEASE_MAX, &release, &mut keep_waiting());
+        let (release, start) = (Request::Release { epoch: self.epoch }, Instant::now());
+        let asked = self.connection.ask_within(RELEASE_MAX, &release, &mut || {
+            if start.elapsed() > RELEASE_MAX {
+                return ControlFlow::Break(());
+            }
+            ControlFlow::Continue(())
+        });
+        // another call may be waiting for its own answer for longer
+        if asked.is_err() {
+            self.connection.post(&release);
+            self.connection.notify();
+        }
     }
 }
 

@@ -40,7 +40,7 @@ impl DaemonLock {
         loop {
             if let Some(mut daemon_lock) = DaemonLock::try_take(paths)? {
                 daemon_lock.say(STARTING)?;
-                paths.remove_shared_files();
+                remove_shared_files(paths);
                 daemon_lock._mark = Some(mark(paths)?);
                 return Ok(daemon_lock);
             }
@@ -79,6 +79,12 @@ impl DaemonLock {
         // the file may have been removed between open and lock: then the lock is on nothing
         let ours = file.metadata().map_err(root_error)?.ino();
         if !fs::metadata(&path).is_ok_and(|there| there.ino() == ours) {
+            return Ok(None);
+        }
+        // after a logout, a daemon whose lock file is gone holds only its mark
+        let mark = private().open(paths.shared_folder().join(PLACE));
+        if mark.is_ok_and(|mark| mark.try_lock_shared().is_err()) {
+            let _ = fs::remove_file(&path);
             return Ok(None);
         }
         // clients of a dead predecessor see that it is gone as soon as the line is
@@ -120,7 +126,7 @@ impl DaemonLock {
 
 impl Drop for DaemonLock {
     fn drop(&mut self) {
-        self.paths.remove_shared_files();
+        remove_shared_files(&self.paths);
         // the file goes before the lock does, so nobody can lock a file that is about to go
         let _ = fs::remove_file(self.paths.lock_path());
         // our own folder in shared memory goes with the last daemon; any other is the user's
@@ -136,6 +142,27 @@ fn root_error(path: &Path, error: &std::io::Error) -> ProtocolError {
         path: path.to_owned(),
         problem: error.to_string(),
     }
+}
+
+/// Removes the files of a name in shared memory. Only the lock's holder may. Failures are left to the next start, which
+/// finds what is left by the mark: that goes last.
+fn remove_shared_files(paths: &DaemonPaths) {
+    let folder = paths.shared_folder();
+    let remove = |entry: fs::DirEntry| match entry.file_type()?.is_dir() {
+        true => fs::remove_dir_all(entry.path()),
+        false => fs::remove_file(entry.path()),
+    };
+    if let Ok(entries) = fs::read_dir(&folder) {
+        let mut others = entries.flatten().filter(|entry| entry.file_name() != PLACE);
+        if others.all(|entry| remove(entry).is_ok()) {
+            let _ = fs::remove_file(folder.join(PLACE));
+        }
+    }
+    // without a descriptor, what is empty can be removed still
+    for name in TRANSPORT_FOLDERS {
+        let _ = fs::remove_dir(folder.join(name));
+    }
+    let _ = fs::remove_dir(&folder);
 }
 
 /// Makes the transport's folder with its mark.
@@ -228,6 +255,7 @@ fn sweep_folder(folder: &Path) {
     if mark.try_lock().is_err() {
         return;
     }
+    drop(mark);
     let had_root = root.exists();
     let Ok(paths) = DaemonPaths::new(Some(&root), name) else {
         return;
@@ -315,6 +343,25 @@ mod tests {
         sweep(Some(&root)).unwrap();
         assert!(!shared.exists() && !paths.lock_path().exists());
         fs::remove_dir(&root).unwrap();
+    }
+
+    #[test]
+    fn a_daemon_without_its_root_folder_keeps_its_name() {
+        let root = root("logout");
+        let paths = DaemonPaths::new(Some(&root), "kept").unwrap();
+        let daemon_lock = DaemonLock::take(&paths).unwrap();
+        fs::remove_dir_all(&root).unwrap();
+        let paths = DaemonPaths::new(Some(&root), "kept").unwrap();
+        let second = DaemonLock::take(&paths).map(|_| ());
+        assert!(
+            matches!(second, Err(ProtocolError::NameTaken { .. })),
+            "{second:?}"
+        );
+        assert!(paths.shared_folder().join(PLACE).exists());
+        drop(daemon_lock);
+        assert!(!paths.shared_folder().exists());
+        drop(DaemonLock::take(&paths).unwrap());
+        fs::remove_dir_all(&root).unwrap();
     }
 
     #[test]

@@ -73,9 +73,13 @@ fn lost(paths: &DaemonPaths, beacon: Beacon) -> ProtocolError {
     }
 }
 
-/// Whether a process of this machine is gone, or has only its exit code left. One that cannot be seen from here, such as in
-/// another container, counts as gone.
-pub(crate) fn is_gone(pid: u32) -> bool {
+/// Whether a process is gone, or has only its exit code left, as far as can be seen beside the daemon: in another
+/// container, processes have other numbers.
+pub(crate) fn is_gone(pid: u32, daemon: u32) -> bool {
+    let namespace = |process: &str| std::fs::read_link(format!("/proc/{process}/ns/pid")).ok();
+    if namespace("self") != namespace(&daemon.to_string()) {
+        return false;
+    }
     let Ok(status) = std::fs::read_to_string(format!("/proc/{pid}/stat")) else {
         return true;
     };

@@ -245,12 +245,6 @@ impl DaemonPaths {
         config.global.service.cleanup_dead_nodes_on_open = false;
         config
     }
-
-    /// Removes the transport's folder. Only the lock's holder may.
-    pub(crate) fn remove_shared_files(&self) {
-        // failures are left to the next start: another cleaner may have been faster
-        let _ = fs::remove_dir_all(self.shared_folder());
-    }
 }
 
 /// Names of the daemons that run under `root`, sorted.
