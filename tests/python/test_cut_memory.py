@@ -5,20 +5,19 @@ A daemon cannot be safe from its own user: changed bytes may still end it. Cut f
 
 from __future__ import annotations
 
-import contextlib
 import os
 import random
-import signal
 import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import tightloop as tl
-from processes import alive, stems_of, wait_until
+from processes import stems_of
 
 SHARED_MEMORY = Path("/dev/shm")
 #: Seconds after which a call hangs, on a loaded machine too.
@@ -79,35 +78,42 @@ def outcome(process: subprocess.Popen[str]) -> str:
     return last[0] if last else "fine" if process.returncode == 0 else "exception"
 
 
-def attacked(scene: tl.Scene, seed: int, attack) -> tuple[str, str, str]:
+@pytest.fixture
+def scene_file(pendulum: tl.Scene, tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    pendulum.save(path)
+    return path
+
+
+def attacked(scene_file: Path, name: str, seed: int, attack: Callable[[random.Random, Path], None]) -> list[str]:
     """Attack a running daemon; return the outcomes for its client, for the next one and for itself."""
     rng = random.Random(seed)
-    sim = tl.launch(scene, worlds=3)
-    try:
-        sim.release()
-        first = client(sim.name)
+    # not of this process, which would have the damaged memory too
+    command = [sys.executable, "-m", "tightloop", "serve", str(scene_file), "--worlds=3", f"--name={name}"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as daemon:
+        assert daemon.stdout is not None and daemon.stdout.readline()
+        first = client(name)
         assert first.stdout is not None and first.stdout.readline() == "ready\n"
-        attack(rng, rng.choice(files_of(sim.pid)))
-        return outcome(first), outcome(client(sim.name)), "alive" if alive(sim.pid) else "dead"
-    finally:
-        if alive(sim.pid):
-            os.kill(sim.pid, signal.SIGKILL)
-        wait_until(lambda: not alive(sim.pid), HANG)
-        with contextlib.suppress(tl.TightloopError):
-            sim.close()
+        attack(rng, rng.choice(files_of(daemon.pid)))
+        ends = [outcome(first), outcome(client(name)), "alive" if daemon.poll() is None else "dead"]
+        daemon.kill()
+    # what it left goes with the next start of any daemon
+    subprocess.run([sys.executable, "-m", "tightloop", "stop", name], capture_output=True, check=False)
+    return ends
 
 
 @pytest.mark.parametrize("seed", range(SEEDS))
-def test_a_cut_file_costs_no_process_and_no_hang(pendulum, seed):
-    first, second, daemon = attacked(pendulum, seed, cut)
+def test_a_cut_file_costs_no_process_and_no_hang(scene_file, unique, seed):
+    first, second, daemon = attacked(scene_file, unique(), seed, cut)
     assert daemon == "alive"
     for end in (first, second):
         assert not end.startswith(("signal", "hang", "exception")), (first, second)
 
 
-def test_changed_bytes_hang_nobody(pendulum):
-    ends = [attacked(pendulum, seed, flip) for seed in range(SEEDS)]
-    print(Counter(end[0] for end in ends), Counter(end[1] for end in ends), Counter(end[2] for end in ends))
+def test_changed_bytes_hang_nobody(scene_file, unique):
+    ends = [attacked(scene_file, unique(), seed, flip) for seed in range(SEEDS)]
+    for who, outcomes in zip(("client", "next client", "daemon"), zip(*ends, strict=True), strict=True):
+        print(who, dict(Counter(outcomes)))
     assert not [end for end in ends if "hang" in end or "exception" in end]
 
 

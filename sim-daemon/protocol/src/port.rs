@@ -6,6 +6,7 @@ use std::ops::{Deref, DerefMut};
 
 use iceoryx2::config::Config;
 
+use crate::guard::guarded;
 use crate::{mapping, storage};
 
 /// A port, a service or a sample of a run.
@@ -50,7 +51,7 @@ impl<T> Drop for Port<T> {
     fn drop(&mut self) {
         if !mapping::is_damaged(self.owner) {
             // SAFETY: this is the only place that drops it, and nobody uses it afterwards.
-            unsafe { ManuallyDrop::drop(&mut self.inner) };
+            guarded(|| unsafe { ManuallyDrop::drop(&mut self.inner) });
         }
     }
 }

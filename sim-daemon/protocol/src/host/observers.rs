@@ -122,7 +122,7 @@ impl Observers {
         };
         // an observer that cannot be reached misses a frame; one that cannot be notified looks by itself after 50 ms
         guarded(|| loaned::send(loan));
-        let _ = self.notifier.notify();
+        guarded(|| self.notifier.notify());
         // one that took far longer waited for the processor
         let took = began.elapsed();
         self.cost = Some(

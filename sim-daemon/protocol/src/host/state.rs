@@ -148,7 +148,6 @@ impl State {
         let (mut end, mut later) = (false, Vec::new());
         // as with commands: a client that was killed while it connected is no reason to end
         while let Ok(Some(active)) = self.responder.receive() {
-            let active = Port::of(self.responder.owner(), active);
             let response = match serde_json::from_slice(active.payload()) {
                 Ok(Request::Describe) => Response::Described,
                 Ok(Request::Controller) => Response::Controller {
@@ -228,7 +227,7 @@ impl State {
             return self.renew(); // the holder cannot be reached: it is told that its lease is lost
         };
         // a holder that cannot be notified looks by itself after 50 ms
-        let _ = lease.notifier.notify();
+        guarded(|| lease.notifier.notify());
         // last: nobody waits for it
         let head = Table::head_bytes(self.frame.rows().len()) / 8;
         if is_good && self.observers.is_due() {
@@ -282,7 +281,7 @@ impl State {
         if !matches!(guarded(|| loaned::send(loan)), Some(Ok(_))) {
             return self.renew();
         }
-        let _ = lease.notifier.notify();
+        guarded(|| lease.notifier.notify());
     }
 
     /// Tells clients once when another program has cut our own memory: some of them would wait for what cannot come.
@@ -345,12 +344,12 @@ impl Awaited<Next> for State {
         let Ok(Some(sample)) = lease.subscriber.receive() else {
             return Ok(None);
         };
-        let sample = Port::of(lease.subscriber.owner(), sample);
         let header = *sample.user_header();
         // what leads out of shared memory is no table
         let words = loaned::received(sample.payload()).unwrap_or_default();
         let taken = self.inbox.take(header, words);
-        drop(sample);
+        // the next command needs its slot, also where memory of another client was cut
+        guarded(|| drop(sample));
         if header.session != self.description.session
             || header.epoch != lease.epoch
             || header.seq <= lease.last_seq
