@@ -20,8 +20,8 @@ import tightloop as tl
 from processes import stems_of
 
 SHARED_MEMORY = Path("/dev/shm")
-#: Seconds after which a call hangs, on a loaded machine too.
-HANG = 60
+#: Seconds after which a call hangs: no wait is longer than 120.
+HANG = 150
 SEEDS = int(os.environ.get("TIGHTLOOP_CASES", "8"))
 
 #: Steps and looks for two seconds, and reports the error that ended it.
@@ -111,7 +111,7 @@ def test_a_cut_file_costs_no_process_and_no_hang(scene_file, unique, seed):
 
 
 def test_changed_bytes_hang_nobody(scene_file, unique):
-    ends = [attacked(scene_file, unique(), seed, flip) for seed in range(SEEDS)]
+    ends = [attacked(scene_file, unique(), seed, flip) for seed in range(SEEDS // 2)]
     for who, outcomes in zip(("client", "next client", "daemon"), zip(*ends, strict=True), strict=True):
         print(who, dict(Counter(outcomes)))
     assert not [end for end in ends if "hang" in end or "exception" in end]

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use iceoryx2::prelude::Node;
 
 use crate::control::{Request, Response};
-use crate::described;
+use crate::described::{self, Damage};
 use crate::guard::guarded;
 use crate::hook::Hook;
 use crate::liveness::Peer;
@@ -251,7 +251,7 @@ pub(crate) fn intact(peer: &Peer) -> Result<(), ProtocolError> {
 
 /// As [`intact`], and asks the daemon's files, which takes a few microseconds.
 pub(crate) fn intact_there(peer: &Peer) -> Result<(), ProtocolError> {
-    match described::is_damaged(&peer.paths, peer.beacon.session) {
+    match described::is_damaged(&peer.paths, peer.beacon.session, Damage::Daemon) {
         true => Err(damaged(peer, "wait for the daemon")),
         false => intact(peer),
     }

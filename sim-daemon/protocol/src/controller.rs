@@ -11,6 +11,7 @@ use crate::affinity::CoreAffinity;
 use crate::command::{Call, command_bytes};
 use crate::connection::{Connection, S, damaged, intact, intact_there, malformed, pause};
 use crate::control::{Request, Response};
+use crate::described::{self, Damage};
 use crate::frame::{Alive, FrameSample};
 use crate::guard::guarded;
 use crate::heartbeat::HeartbeatThread;
@@ -367,6 +368,10 @@ impl Awaited<FrameSample> for Answer<'_> {
         }
         self.peer.check()?;
         intact_there(self.peer)?;
+        let (session, lease) = (self.peer.beacon.session, Damage::Lease(self.epoch));
+        if described::is_damaged(&self.peer.paths, session, lease) {
+            return Err(damaged(self.peer, "wait for a frame"));
+        }
         let publishers = guarded(|| self.service.dynamic_config().number_of_publishers());
         if publishers.ok_or_else(|| damaged(self.peer, "look for the daemon"))? == 0 {
             return Err(self.peer.lease_lost());

@@ -44,19 +44,33 @@ pub(crate) fn read(paths: &DaemonPaths, session: u64) -> Result<Description, Pro
     })
 }
 
-fn mark(paths: &DaemonPaths, session: u64) -> PathBuf {
-    paths
-        .shared_folder()
-        .join(format!("{session:016x}.damaged"))
+/// What of shared memory another program has changed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Damage {
+    /// That of the daemon.
+    Daemon,
+    /// That of a client, while somebody held this lease.
+    Lease(u64),
 }
 
-/// Tells clients that shared memory of the daemon was changed by another program.
-pub(crate) fn mark_damaged(paths: &DaemonPaths, session: u64) {
+fn mark(paths: &DaemonPaths, session: u64, damage: Damage) -> PathBuf {
+    let name = match damage {
+        Damage::Daemon => format!("{session:016x}.damaged"),
+        Damage::Lease(epoch) => format!("{session:016x}.{epoch}.damaged"),
+    };
+    paths.shared_folder().join(name)
+}
+
+/// Tells clients of a damage.
+pub(crate) fn mark_damaged(paths: &DaemonPaths, session: u64, damage: Damage) {
     // one that cannot be told finds out, or waits for as long as it does
-    let _ = private().create(true).open(mark(paths, session));
+    let _ = private()
+        .create(true)
+        .truncate(false)
+        .open(mark(paths, session, damage));
 }
 
-/// Whether the daemon has found that out. A few microseconds.
-pub(crate) fn is_damaged(paths: &DaemonPaths, session: u64) -> bool {
-    mark(paths, session).exists()
+/// Whether the daemon has found a damage. A few microseconds.
+pub(crate) fn is_damaged(paths: &DaemonPaths, session: u64, damage: Damage) -> bool {
+    mark(paths, session, damage).exists()
 }

@@ -43,6 +43,7 @@ static SLOTS: [Slot; MAPPINGS_MAX] = [const {
 static USED: AtomicUsize = AtomicUsize::new(0);
 static DAMAGED: [AtomicU64; DAMAGED_MAX] = [const { AtomicU64::new(0) }; DAMAGED_MAX];
 static DAMAGES: AtomicUsize = AtomicUsize::new(0);
+static FAULTS: AtomicUsize = AtomicUsize::new(0);
 static FOUND: [AtomicUsize; HINTS] = [const { AtomicUsize::new(0) }; HINTS];
 static PREVIOUS: OnceLock<libc::sigaction> = OnceLock::new();
 
@@ -131,6 +132,11 @@ pub(crate) fn any_damaged() -> bool {
     DAMAGES.load(Ordering::Acquire) > 0
 }
 
+/// Pages that were missing so far.
+pub(crate) fn faults() -> usize {
+    FAULTS.load(Ordering::Acquire)
+}
+
 /// Whether a file of `owner` that was made here was cut while it was mapped.
 pub(crate) fn is_own_damaged(owner: u64) -> bool {
     is_damaged(!owner)
@@ -196,6 +202,7 @@ fn replace_page(address: usize) -> bool {
     if mapped == libc::MAP_FAILED {
         return false;
     }
+    FAULTS.fetch_add(1, Ordering::AcqRel);
     let owner = slot.owner.load(Ordering::Acquire);
     note_damage(owner);
     if slot.is_made.load(Ordering::Acquire) {

@@ -28,6 +28,7 @@ use crate::affinity::CoreAffinity;
 use crate::daemon_lock::DaemonLock;
 use crate::described;
 use crate::guard::guarded;
+use crate::mapping;
 use crate::memory;
 use crate::transport::{self, Sleeper, handshake};
 use crate::waiter::{Waiter, cores};
@@ -97,7 +98,7 @@ impl Host {
         let state = State {
             node,
             paths: daemon_lock.paths().clone(),
-            is_damaged: false,
+            faults: mapping::faults(),
             description,
             frame,
             lease: Some(lease),

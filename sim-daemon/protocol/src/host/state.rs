@@ -13,7 +13,7 @@ use super::worlds::{Next, S, Worlds};
 use super::{ClientCleanup, Inbox};
 use crate::affinity::CoreAffinity;
 use crate::control::{Request, Response};
-use crate::described;
+use crate::described::{self, Damage};
 use crate::guard::guarded;
 use crate::loaned;
 use crate::mapping;
@@ -30,8 +30,8 @@ const HELD_UP: Duration = Duration::from_millis(200);
 pub(super) struct State {
     pub(super) node: Port<Node<S>>,
     pub(super) paths: DaemonPaths,
-    /// Clients were told that our own memory is damaged.
-    pub(super) is_damaged: bool,
+    /// Missing pages that clients were told of.
+    pub(super) faults: usize,
     pub(super) description: Description,
     pub(super) frame: Table,
     pub(super) lease: Option<Lease>,
@@ -284,12 +284,20 @@ impl State {
         guarded(|| lease.notifier.notify());
     }
 
-    /// Tells clients once when another program has cut our own memory: some of them would wait for what cannot come.
+    /// Tells clients when another program has cut memory: some of them would wait for what cannot come.
     fn mark_damage(&mut self) {
-        let owner = self.node.owner();
-        if !self.is_damaged && mapping::any_damaged() && mapping::is_own_damaged(owner) {
-            self.is_damaged = true;
-            described::mark_damaged(&self.paths, self.description.session);
+        let faults = mapping::faults();
+        if faults == self.faults {
+            return;
+        }
+        self.faults = faults;
+        let (session, owner) = (self.description.session, self.node.owner());
+        if mapping::is_own_damaged(owner) {
+            described::mark_damaged(&self.paths, session, Damage::Daemon);
+        } else if mapping::is_damaged(owner) {
+            // whose it was is not known; most likely the controller's
+            described::mark_damaged(&self.paths, session, Damage::Lease(self.epochs));
+            self.lose_clients();
         }
     }
 
