@@ -59,7 +59,7 @@ def busy_daemon(scene: tl.Scene, tmp_path: Path) -> Iterator[tuple[tl.Sim, list[
         command = [sys.executable, "-m", "tightloop", "record", sim.name, str(tmp_path / "out.tlrec")]
         recorder = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
         try:
-            assert "recording" in recorder.stderr.readline()
+            assert recorder.stderr is not None and "recording" in recorder.stderr.readline()
             sim.step()
             sim.snapshot()
             yield (
@@ -167,7 +167,7 @@ def test_killed_clients_leave_nothing_of_their_snapshots(pendulum):
         sim.release()
         for round_ in range(8):
             child = subprocess.Popen([sys.executable, "-c", BUSY, sim.name], stdout=subprocess.PIPE)
-            assert child.stdout.readline() == b"ready\n"
+            assert child.stdout is not None and child.stdout.readline() == b"ready\n"
             time.sleep(0.05 + 0.01 * round_)
             assert child.poll() is None
             child.kill()
