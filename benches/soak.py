@@ -102,7 +102,7 @@ def work(sim: tl.Sim, guests: Guests, seconds: float, steps: Iterator[int]) -> l
     clock, took = time.perf_counter_ns, []
     end = time.monotonic() + seconds
     for step in steps:
-        action = targets(step % FRAMES, np.ones(1))
+        action = targets(step % FRAMES, np.ones(WORLDS))
         start = clock()
         sim.step(joint_target_q=action)
         took.append((clock() - start) / 1e3)

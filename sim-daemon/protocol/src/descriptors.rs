@@ -16,11 +16,17 @@ pub(crate) fn make_room() {
     // a list that cannot be opened is one too many
     let open = fs::read_dir("/proc/self/fd").map_or(soft, |files| files.count() as u64);
     if open + OF_A_NODE > soft {
-        let raised = rustix::process::Rlimit {
-            current: limit.maximum,
-            ..limit
-        };
-        // where the hard limit is reached too, the file that cannot be opened tells
-        let _ = setrlimit(Resource::Nofile, raised);
+        raise_limit();
     }
+}
+
+/// Raises this process's soft limit of open files to the hard one: in a daemon, whose groups begin all at once, at its start.
+pub fn raise_limit() {
+    let limit = getrlimit(Resource::Nofile);
+    let raised = rustix::process::Rlimit {
+        current: limit.maximum,
+        ..limit
+    };
+    // where the hard limit is reached too, the file that cannot be opened tells
+    let _ = setrlimit(Resource::Nofile, raised);
 }

@@ -37,7 +37,7 @@ mod controller;
 pub mod daemon_lock;
 mod described;
 mod description;
-mod descriptors;
+pub mod descriptors;
 pub mod digest;
 mod discovery;
 mod error;
