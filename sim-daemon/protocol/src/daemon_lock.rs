@@ -15,6 +15,8 @@ use crate::{PROTOCOL_VERSION, ProtocolError};
 
 /// Clients and sweepers hold a lock for microseconds; whoever finds it held that long finds a daemon.
 const LOOK_MAX: Duration = Duration::from_millis(500);
+/// A daemon has made the mark of its folder this long after the folder.
+const START_MAX: Duration = Duration::from_secs(60);
 /// File in the transport's folder that names root and daemon, and is locked as long as the daemon lives.
 const PLACE: &str = "place";
 
@@ -239,7 +241,7 @@ pub fn sweep(root: Option<&Path>) -> Result<(), ProtocolError> {
 /// Removes a dead daemon's files, found by the mark in its transport folder. What fails is left to the next sweep.
 fn sweep_folder(folder: &Path) {
     let Ok(bytes) = fs::read(folder.join(PLACE)) else {
-        return;
+        return sweep_remains(folder);
     };
     let Some(end) = bytes.iter().position(|&byte| byte == b'\n') else {
         return;
@@ -265,6 +267,23 @@ fn sweep_folder(folder: &Path) {
     }
     if !had_root {
         let _ = fs::remove_dir(&root);
+    }
+}
+
+/// Removes a folder without a mark: its daemon could not remove it whole, for example since it had too many open files.
+fn sweep_remains(folder: &Path) {
+    let is_named = folder.file_name().is_some_and(|name| {
+        let digits = name.as_bytes().strip_prefix(b"tl").unwrap_or_default();
+        digits.len() == 16 && digits.iter().all(u8::is_ascii_hexdigit)
+    });
+    // one that starts makes its mark at once
+    let modified = fs::symlink_metadata(folder.join(PLACE))
+        .is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound)
+        .then(|| fs::metadata(folder).and_then(|status| status.modified()));
+    let is_old = modified
+        .is_some_and(|time| time.is_ok_and(|time| time.elapsed().is_ok_and(|age| age > START_MAX)));
+    if is_named && is_old {
+        let _ = fs::remove_dir_all(folder);
     }
 }
 
@@ -362,6 +381,27 @@ mod tests {
         assert!(!paths.shared_folder().exists());
         drop(DaemonLock::take(&paths).unwrap());
         fs::remove_dir_all(&root).unwrap();
+    }
+
+    #[test]
+    fn an_old_folder_without_a_mark_is_swept_and_a_new_one_is_spared() {
+        let root = root("remains");
+        let folders = ["old", "new"].map(|name| {
+            let folder = DaemonPaths::new(Some(&root), name).unwrap().shared_folder();
+            private_folder(&folder.join("nodes")).unwrap();
+            folder
+        });
+        let hour = Duration::from_secs(3600);
+        File::open(&folders[0])
+            .and_then(|folder| folder.set_modified(std::time::SystemTime::now() - hour))
+            .unwrap();
+        sweep(Some(&root)).unwrap();
+        assert_eq!(
+            folders.each_ref().map(|folder| folder.exists()),
+            [false, true]
+        );
+        fs::remove_dir_all(&folders[1]).unwrap();
+        fs::remove_dir(&root).unwrap();
     }
 
     #[test]
