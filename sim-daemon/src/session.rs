@@ -10,7 +10,7 @@ use sim_engine::options::{self, Adapter};
 use sim_engine::simulation::{Device, Draws, Faults, Lanes, Options, Precision, Simulation};
 use sim_physics::arrays::Field;
 use sim_protocol::daemon_lock::DaemonLock;
-use sim_protocol::descriptors::raise_limit;
+use sim_protocol::descriptors::make_room_for;
 use sim_protocol::host::{Host, check_memory};
 use sim_protocol::paths::DaemonPaths;
 use sim_protocol::{Description, ProtocolError, Table};
@@ -214,7 +214,7 @@ fn open(serve: &Serve) -> Result<Opened, DaemonError> {
         let _ = std::fs::remove_dir(&path);
         return Err(ProtocolError::Root { path, problem }.into());
     }
-    raise_limit();
+    make_room_for(count)?;
     sim_protocol::sweep(None)?;
     let daemon_lock = DaemonLock::take(&paths)?;
     let (daemon, locks) = match count {

@@ -341,4 +341,5 @@ def test_a_soft_limit_of_open_files_is_raised_for_many_groups(pendulum_urdf):
 
 def test_a_hard_limit_of_open_files_is_named_with_the_cure(pendulum_urdf):
     done = with_limit(pendulum_urdf, 128, 128)
+    assert "ResourceError" in done.stderr, done.stderr
     assert "may have 128 open" in done.stderr and "ulimit -n" in done.stderr, done.stderr

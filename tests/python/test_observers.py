@@ -197,6 +197,6 @@ def test_a_recording_is_played_back_frame_by_frame(tmp_path: Path) -> None:
 
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     (tmp_path / "text").write_text("not a recording at all")
-    for path, reason in [("text", "no recording"), ("missing", "cannot be read"), (".", "folder")]:
+    for path, reason in [("text", "no recording"), ("missing", "cannot be read"), (".", "is no file")]:
         with pytest.raises(tl.RecordingError, match=reason):
             Recorded(tmp_path / path)
