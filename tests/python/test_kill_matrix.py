@@ -27,17 +27,22 @@ PATIENCE = float(os.environ.get("TIGHTLOOP_PATIENCE", "10"))
 CONTROLLER = """
 import sys, tightloop as tl
 sim = tl.attach(sys.argv[1])
+sim.step()
+print("ready", flush=True)
 while True:
     sim.step(); sim.params.gravity; sim.restore(sim.snapshot()); sim.reset()
 """
 OBSERVER = """
 import sys, tightloop as tl
+print("ready", flush=True)
 while True:
     sim = tl.attach(sys.argv[1])
     for _ in range(20):
         sim.latest(0.05)
     sim.close()
 """
+#: What each says once it is at work.
+READY = {"controller": "ready", "observer": "ready", "recorder": "recording", "viewer": "http"}
 CLIENTS: dict[str, list[str]] = {
     "controller": ["-c", CONTROLLER],
     "observer": ["-c", OBSERVER],
@@ -46,12 +51,26 @@ CLIENTS: dict[str, list[str]] = {
 }
 
 
-def start(victim: str, name: str, folder: Path) -> subprocess.Popen[bytes]:
+def start(victim: str, name: str, folder: Path) -> subprocess.Popen[str]:
     out = [str(folder / f"{victim}.tlrec"), "--force"] if victim == "recorder" else []
-    arguments = [sys.executable, *CLIENTS[victim], name, *out]
     return subprocess.Popen(
-        arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=os.environ | {"TMPDIR": str(folder)}
+        [sys.executable, *CLIENTS[victim], name, *out],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=os.environ | {"TMPDIR": str(folder)},
     )
+
+
+def await_ready(victim: str, process: subprocess.Popen[str]) -> None:
+    """Wait until a client is at work."""
+    assert process.stdout is not None
+    said = []
+    for line in process.stdout:
+        said.append(line)
+        if READY[victim] in line:
+            return
+    pytest.fail(f"the {victim} ended before it was ready: {''.join(said)}")
 
 
 def hit(pid: int, how: str, draw: random.Random) -> None:
@@ -89,18 +108,24 @@ def test_a_client_that_is_hit_hinders_nobody(pendulum, tmp_path, victim, how):
         shared, victims, temporary = stems_of(sim.pid), set[int](), tmp_path / "temporary"
         temporary.mkdir()
         files = len(left_of(shared))
-        for _ in range(ROUNDS):
+        for round_ in range(ROUNDS):
             sim.release()
             process = start(victim, sim.name, temporary)
             victims.add(process.pid)
-            time.sleep(draw.uniform(0.0, 1.2))
+            # every other one at work, the others while they start
+            if round_ % 2:
+                await_ready(victim, process)
+            time.sleep(draw.uniform(0.0, 0.6))
+            assert process.poll() is None, process.communicate()[0]
             hit(process.pid, how, draw)
             with tl.attach(sim.name) as onlooker:
-                if how == "stop" and victim != "controller":
-                    # one that goes on beside us
-                    promptly(onlooker.step)
+                if how == "stop":
+                    if victim != "controller":
+                        promptly(onlooker.step)
+                    time.sleep(draw.uniform(0.0, 0.3))
+                    assert process.poll() is None, f"it goes on: {process.communicate()[0]}"
                 process.kill()
-                process.wait()
+                process.communicate()
                 promptly(onlooker.step)
                 promptly(lambda onlooker=onlooker: onlooker.latest(1.0))
             promptly(sim.snapshot)
