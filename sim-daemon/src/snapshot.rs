@@ -10,6 +10,7 @@ use sim_model::files::{self, FileError};
 use sim_protocol::RefusalKind;
 use sim_protocol::host::{Inbox, free_memory};
 
+use crate::output;
 use crate::refusal::{Refusal, refusal};
 
 const MB: u64 = 1 << 20;
@@ -37,21 +38,7 @@ pub(crate) fn save(simulation: &Simulation, inbox: &Inbox) -> Result<(), Refusal
         let written = file.write_all(&bytes);
         return written.map_err(|problem| refuse(format!("cannot be written: {problem}")));
     }
-    let header = inbox.header();
-    // no other command has this name
-    let part = folder.join(format!(
-        ".tightloop-{:016x}-{}-{}",
-        header.session, header.epoch, header.seq
-    ));
-    let write = || {
-        let mut file = File::create_new(&part)?;
-        file.write_all(&bytes)?;
-        // or a power cut might leave the name with nothing behind it
-        file.sync_all()?;
-        fs::rename(&part, path)
-    };
-    write().map_err(|problem| {
-        let _ = fs::remove_file(&part);
+    output::write(path, &bytes).map_err(|problem| {
         refuse(match problem.kind() {
             ErrorKind::NotFound => {
                 format!("there is no folder {}; make it first", folder.display())

@@ -106,3 +106,19 @@ def wait(first):
 """
     code = code.replace("told = []", "told = []" + helpers).replace("        proceed()", "        pass")
     assert said(code) == "NoneType True"
+
+
+def test_a_release_inside_a_call_that_is_interrupted_is_no_release_of_a_later_one(pendulum_urdf):
+    after = "sim.step(); told.append(str(sim.controller() == os.getpid()))"
+    code = SCRIPT.format(urdf=str(pendulum_urdf), inner="(sim.release(), interrupt())", outer="wait()", after=after)
+    helpers = """
+def interrupt():
+    raise KeyboardInterrupt
+def wait():
+    try:
+        sim.step()
+    except KeyboardInterrupt:
+        return None
+sim.release()
+"""
+    assert said(code.replace("told = []", "told = []" + helpers)) == "NoneType True"

@@ -192,7 +192,7 @@ impl Client {
     /// [`ProtocolError::LeaseLost`], [`ProtocolError::DaemonLost`], [`ProtocolError::DaemonRestarted`].
     pub fn recv(&self, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
         self.check_process()?;
-        let mut held = self.controller.take(hook)?;
+        let mut held = self.turn(hook)?;
         let Some(controller) = &mut *held else {
             self.check_alive()?;
             return Err(ProtocolError::NothingSent);
@@ -288,7 +288,7 @@ impl Client {
         call: impl FnOnce(&mut Controller, Hook<'_>) -> Result<T, ProtocolError>,
     ) -> Result<T, ProtocolError> {
         self.check_process()?;
-        let mut held = self.controller.take(hook)?;
+        let mut held = self.turn(hook)?;
         let controller = match &mut *held {
             Some(controller) => controller,
             empty => empty.insert(self.take_lease(hook)?),
@@ -296,6 +296,13 @@ impl Client {
         let result = call(controller, hook);
         self.settle(held, &result);
         result
+    }
+
+    /// Begins the use of a lease. A release that a hook asks for is that of this call.
+    fn turn(&self, hook: Hook<'_>) -> Result<Held<'_, Option<Box<Controller>>>, ProtocolError> {
+        let held = self.controller.take(hook)?;
+        self.release.store(false, Ordering::Relaxed);
+        Ok(held)
     }
 
     /// Ends the use of a lease. One that is lost can be asked for again; a lost daemon cannot come back.
@@ -306,7 +313,6 @@ impl Client {
     ) {
         let is_lost = matches!(result, Err(ProtocolError::LeaseLost { .. }));
         if is_lost || self.release.load(Ordering::Relaxed) {
-            self.release.store(false, Ordering::Relaxed);
             held.take();
         }
     }

@@ -29,6 +29,9 @@ const ANSWER_MAX: Duration = Duration::from_secs(120);
 /// How long a lease is asked for again that cannot be had though nobody alive holds it.
 const ACQUIRE_MAX: Duration = Duration::from_secs(10);
 
+/// How long a daemon is waited for that granted a lease to a call of ours which was interrupted: it misses the holder sooner.
+const ABANDONED_MAX: Duration = Duration::from_secs(2);
+
 /// How long a daemon is waited for that is told of a release.
 const RELEASE_MAX: Duration = Duration::from_millis(250);
 
@@ -80,6 +83,9 @@ impl Controller {
         hook: Hook<'_>,
     ) -> Result<Controller, ProtocolError> {
         let start = Instant::now();
+        // what an earlier call did not wait for may be granted yet, to nobody
+        let (own, abandoned) = (std::process::id(), &connection.abandoned);
+        let was_abandoned = abandoned.swap(false, Ordering::Relaxed);
         loop {
             let error = match ask_for_lease(connection, hook) {
                 Ok(epoch) => match open_lease(connection, description, frames, epoch) {
@@ -94,7 +100,11 @@ impl Controller {
                 ProtocolError::Transport { .. } => true,
                 ProtocolError::LeaseHeld { pid, .. } => {
                     is_gone(pid, connection.peer.beacon.pid)
-                        || pid == std::process::id() && connection.abandoned.load(Ordering::Relaxed)
+                        || was_abandoned && pid == own && start.elapsed() < ABANDONED_MAX
+                }
+                ProtocolError::Interrupted | ProtocolError::Timeout { .. } => {
+                    abandoned.store(true, Ordering::Relaxed);
+                    false
                 }
                 _ => false,
             };
@@ -256,16 +266,8 @@ impl Controller {
 /// Asks for the lease once.
 fn ask_for_lease(connection: &Connection, hook: Hook<'_>) -> Result<u64, ProtocolError> {
     let pid = std::process::id();
-    let asked = connection.ask(&Request::Acquire { pid }, hook);
-    if asked.is_err() {
-        // the daemon may grant it yet, and waits for us in vain then
-        connection.abandoned.store(true, Ordering::Relaxed);
-    }
-    match asked? {
-        Response::Granted { epoch } => {
-            connection.abandoned.store(false, Ordering::Relaxed);
-            Ok(epoch)
-        }
+    match connection.ask(&Request::Acquire { pid }, hook)? {
+        Response::Granted { epoch } => Ok(epoch),
         Response::Held { pid } => Err(ProtocolError::LeaseHeld {
             name: connection.peer.paths.name().to_owned(),
             pid,
