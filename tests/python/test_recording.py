@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -171,9 +172,10 @@ def test_a_recorder_that_stands_now_and_then_goes_on_and_the_steps_that_are_miss
                 sim.step(joint_f=np.ones(2))
             recorder.process.send_signal(signal.SIGCONT)
             # it has the state behind the gap once it says so, under a loop that goes on
-            while news.empty():
+            limit = time.monotonic() + 60
+            while news.empty() and time.monotonic() < limit:
                 sim.step(joint_f=-np.ones(2))
-            assert "a gap: " in news.get()
+            assert "a gap: " in news.get_nowait()
             for _ in range(100):
                 sim.step(joint_f=np.ones(2))
         steps = int(sim.step().step[0])
@@ -188,7 +190,9 @@ def test_a_recorder_that_stands_now_and_then_goes_on_and_the_steps_that_are_miss
     assert code == 1 and f"{frames} frames are equal, bit for bit" in said, said
     missing = re.findall(r"of world 0 the steps (\d+) to (\d+)", said)
     assert len(missing) >= 3, said
-    assert frames + sum(int(last) - int(first) + 1 for first, last in missing) == steps, said
+    named = frames + sum(int(last) - int(first) + 1 for first, last in missing)
+    # where others take the processor, there may be more gaps than are listed
+    assert named == steps or (named < steps and "more gaps" in said), said
 
 
 def test_a_killed_recorder_leaves_a_file_and_a_daemon_that_go_on(pendulum, tmp_path):

@@ -203,7 +203,9 @@ impl Controller {
             |error: &dyn std::fmt::Debug| ProtocolError::transport("send a command", error);
         let damaged = || damaged(&self.connection.peer, "send a command");
         let lines = call.bytes(&self.description) / ALIGNMENT;
-        let mut loan = loaned::loan(&self.publisher, lines).map_err(|problem| failed(&problem))?;
+        let mut loan = loaned::loan(&self.publisher, lines)
+            .ok_or_else(damaged)?
+            .map_err(|error| failed(&error))?;
         self.seq += 1;
         *loan.user_header_mut() = CommandHeader {
             session: self.connection.peer.beacon.session,
@@ -234,9 +236,12 @@ impl Controller {
             hook,
             since: Instant::now(),
         };
-        let sample = self.waiters[waiter].wait(&self.listener, &mut awaited)?;
+        let (waiter, peer) = (&mut self.waiters[waiter], &self.connection.peer);
+        let sample = guarded(|| waiter.wait(&self.listener, &mut awaited))
+            .ok_or_else(|| damaged(peer, "wait for a frame"))??;
         self.flight = Flight::Landed;
-        let shared = sample.user_header().core == self.affinity.core();
+        let head = loaned::head(&sample).ok_or_else(|| damaged(peer, "read a frame"))?;
+        let shared = head.core == self.affinity.core();
         self.waiters
             .iter_mut()
             .for_each(|waiter| waiter.share(shared));
@@ -245,11 +250,10 @@ impl Controller {
 
     /// Makes a frame of an answer, or an error of a refusal.
     fn open(&mut self, sample: FrameSample) -> Result<Frame, ProtocolError> {
-        let header = *sample.user_header();
         let peer = &self.connection.peer;
         intact(peer)?;
-        let payload =
-            loaned::received(sample.payload()).ok_or_else(|| damaged(peer, "read a frame"))?;
+        let (header, payload) =
+            loaned::received(&sample).ok_or_else(|| damaged(peer, "read a frame"))?;
         if header.outcome != 0 {
             return Err(refusal(header.outcome, header.rows, payload));
         }
@@ -259,7 +263,8 @@ impl Controller {
             return Err(malformed("the head of a frame: another session or schema"));
         }
         let table = check_table(&mut self.table, payload, header.rows)?;
-        Ok(Frame::new(sample, table, Arc::clone(&self.frames)))
+        let base = payload.as_ptr() as usize;
+        Ok(Frame::new((header, base), sample, table, &self.frames))
     }
 }
 
@@ -335,7 +340,7 @@ impl Drop for Controller {
     }
 }
 
-/// The wait for the answer to a command.
+/// The wait for the answer to a command; where the transport panics over what it reads, so does the wait.
 struct Answer<'a> {
     seq: u64,
     epoch: u64,
@@ -349,12 +354,12 @@ struct Answer<'a> {
 impl Awaited<FrameSample> for Answer<'_> {
     fn poll(&mut self) -> Result<Option<FrameSample>, ProtocolError> {
         loop {
-            let received = guarded(|| self.subscriber.receive());
-            match received.ok_or_else(|| damaged(self.peer, "receive a frame"))? {
+            match self.subscriber.receive() {
                 Ok(None) => return Ok(None),
                 Ok(Some(sample)) => {
                     let sample = Port::of(self.subscriber.owner(), sample);
-                    let header = sample.user_header();
+                    let header = loaned::head(&sample)
+                        .ok_or_else(|| damaged(self.peer, "receive a frame"))?;
                     if header.ack_seq == self.seq && header.epoch == self.epoch {
                         return Ok(Some(sample));
                     }
@@ -374,8 +379,7 @@ impl Awaited<FrameSample> for Answer<'_> {
         if described::is_damaged(&self.peer.paths, session, lease) {
             return Err(damaged(self.peer, "wait for a frame"));
         }
-        let publishers = guarded(|| self.service.dynamic_config().number_of_publishers());
-        if publishers.ok_or_else(|| damaged(self.peer, "look for the daemon"))? == 0 {
+        if self.service.dynamic_config().number_of_publishers() == 0 {
             return Err(self.peer.lease_lost());
         }
         if self.since.elapsed() > ANSWER_MAX {

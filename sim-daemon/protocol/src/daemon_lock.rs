@@ -47,9 +47,9 @@ impl DaemonLock {
                 return Ok(daemon_lock);
             }
             let pid = match paths.presence()? {
-                Presence::Running(beacon) => beacon.pid,
-                Presence::Starting => 0,
-                _ if start.elapsed() > LOOK_MAX => 0,
+                Presence::Running(beacon) => Some(beacon.pid),
+                Presence::Starting => None,
+                _ if start.elapsed() > LOOK_MAX => None,
                 _ => {
                     std::thread::sleep(Duration::from_millis(2));
                     continue;

@@ -55,12 +55,13 @@ pub enum ProtocolError {
     },
 
     /// Another daemon has the name.
-    #[error("daemon {name:?} is already running (pid {pid}); choose another name or stop it")]
+    #[error("daemon {name:?} is already running{}; choose another name or stop it",
+        .pid.map_or_else(String::new, |pid| format!(" (pid {pid})")))]
     NameTaken {
         /// The name.
         name: String,
-        /// The process that holds it.
-        pid: u32,
+        /// The process that holds it, where it says so.
+        pid: Option<u32>,
     },
 
     /// Daemon and client speak different versions of this protocol.

@@ -67,16 +67,20 @@ pub struct View<'a> {
 }
 
 impl Frame {
-    /// Wraps a sample whose table was checked against its payload.
-    pub(crate) fn new(sample: FrameSample, table: Arc<Table>, alive: Arc<Alive>) -> Frame {
+    /// Wraps a sample whose table was checked against its payload; with its head, and the address of its payload.
+    pub(crate) fn new(
+        (header, base): (FrameHeader, usize),
+        sample: FrameSample,
+        table: Arc<Table>,
+        alive: &Arc<Alive>,
+    ) -> Frame {
         alive.count.fetch_add(1, Ordering::Acquire);
-        let (header, base) = (*sample.user_header(), sample.payload().as_ptr() as usize);
         Frame {
             header,
             table,
             base,
             sample: Mutex::new(Some(sample)),
-            alive,
+            alive: Arc::clone(alive),
         }
     }
 

@@ -24,6 +24,7 @@ const NAP: Duration = Duration::from_millis(5);
 #[derive(Debug)]
 pub struct Entry {
     sample: Port<Sample<S, [Line], JournalHeader>>,
+    header: JournalHeader,
     parts: [usize; 3],
     /// Entries that were lost right before this one.
     pub lost: u64,
@@ -32,7 +33,7 @@ pub struct Entry {
 impl Entry {
     /// What it is.
     pub fn header(&self) -> &JournalHeader {
-        self.sample.user_header()
+        &self.header
     }
 
     /// The command: field table and arrays, as the daemon took them.
@@ -187,10 +188,9 @@ impl Journal {
                 return Err(ProtocolError::transport("receive an entry", error));
             }
         };
-        let header = *sample.user_header();
         intact(peer)?;
-        let payload =
-            loaned::received(sample.payload()).ok_or_else(|| damaged(peer, "read an entry"))?;
+        let (header, payload) =
+            loaned::received(&sample).ok_or_else(|| damaged(peer, "read an entry"))?;
         if header.session != self.connection.peer.beacon.session || header.entry < self.next {
             return Err(malformed(
                 "the head of an entry: another session, or out of order",
@@ -205,6 +205,7 @@ impl Journal {
             sample,
             parts,
             lost,
+            header,
         }))
     }
 }

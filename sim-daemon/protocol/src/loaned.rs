@@ -4,8 +4,9 @@ use std::fmt::Debug;
 use std::mem::MaybeUninit;
 
 use iceoryx2::port::SendError;
-use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::publisher::{LoanError, Publisher};
 use iceoryx2::prelude::{Service, ZeroCopySend};
+use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut_uninit::SampleMutUninit;
 
 use crate::guard::guarded;
@@ -14,30 +15,41 @@ use crate::{Line, mapping};
 /// A slot that is written to.
 type Loan<S, H> = SampleMutUninit<S, [MaybeUninit<Line>], H>;
 
-/// The words of a received sample; `None` where offset or length, which lie in shared memory too, lead out of it.
-pub(crate) fn received(payload: &[Line]) -> Option<&[u64]> {
-    mapping::holds(payload).then(|| bytemuck::cast_slice(payload))
+/// The head of a received sample; `None` where its offset, which lies in shared memory too, leads out of it.
+pub(crate) fn head<S: Service, H: Debug + Copy + ZeroCopySend>(
+    sample: &Sample<S, [Line], H>,
+) -> Option<H> {
+    let head: *const H = sample.user_header();
+    // SAFETY: nothing is read before it is known to be mapped.
+    (head.is_aligned() && mapping::holds_bytes(head as usize, size_of::<H>()))
+        .then(|| unsafe { head.read() })
 }
 
-/// A slot to write to, of so many lines.
-///
-/// # Errors
-/// What the transport says.
+/// The head and the words of a received sample; `None` where offset or length lead out of shared memory.
+pub(crate) fn received<S: Service, H: Debug + Copy + ZeroCopySend>(
+    sample: &Sample<S, [Line], H>,
+) -> Option<(H, &[u64])> {
+    // the length lies beside the head
+    let head = head(sample)?;
+    let payload = sample.payload();
+    mapping::holds(payload).then(|| (head, bytemuck::cast_slice(payload)))
+}
+
+/// A slot to write to, of so many lines; `None` where shared memory makes no sense.
 pub(crate) fn loan<S: Service, H: Debug + Default + ZeroCopySend>(
     publisher: &Publisher<S, [Line], H>,
     lines: usize,
-) -> Result<Loan<S, H>, String> {
-    let mut loan = guarded(|| publisher.loan_slice_uninit(lines))
-        .ok_or("panicked")?
-        .map_err(|error| format!("{error:?}"))?;
-    match mapping::holds(loan.payload_mut()) {
-        true => Ok(loan),
-        // dropping it would write there
-        false => {
-            std::mem::forget(loan);
-            Err("a slot outside of shared memory".to_owned())
-        }
+) -> Option<Result<Loan<S, H>, LoanError>> {
+    let mut loan = match guarded(|| publisher.loan_slice_uninit(lines))? {
+        Ok(loan) => loan,
+        Err(error) => return Some(Err(error)),
+    };
+    if mapping::holds(loan.payload_mut()) {
+        return Some(Ok(loan));
     }
+    // dropping it would write there
+    std::mem::forget(loan);
+    None
 }
 
 /// The words of a loan. Their content is whatever was in the slot before.

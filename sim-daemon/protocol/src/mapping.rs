@@ -7,13 +7,13 @@
 use std::ffi::c_void;
 use std::os::fd::OwnedFd;
 use std::ptr::{NonNull, null_mut};
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Once, OnceLock};
+use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use rustix::io::Errno;
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 
-/// Mappings of a process that are known here; further ones work, and end the process when they are cut.
+/// Mappings that a process can have at once; a client has some tens.
 const MAPPINGS_MAX: usize = 8192;
 /// Owners of damaged files that are remembered.
 const DAMAGED_MAX: usize = 64;
@@ -45,7 +45,9 @@ static DAMAGED: [AtomicU64; DAMAGED_MAX] = [const { AtomicU64::new(0) }; DAMAGED
 static DAMAGES: AtomicUsize = AtomicUsize::new(0);
 static FAULTS: AtomicUsize = AtomicUsize::new(0);
 static FOUND: [AtomicUsize; HINTS] = [const { AtomicUsize::new(0) }; HINTS];
-static PREVIOUS: OnceLock<libc::sigaction> = OnceLock::new();
+/// What handled the signal before us, and whether a fault was handed on to it.
+static PREVIOUS: AtomicPtr<libc::sigaction> = AtomicPtr::new(null_mut());
+static HANDED_ON: AtomicBool = AtomicBool::new(false);
 
 impl Slot {
     fn holds(&self, first: usize, bytes: usize) -> bool {
@@ -67,23 +69,29 @@ fn used() -> &'static [Slot] {
 pub(crate) struct Mapping {
     start: NonNull<c_void>,
     bytes: usize,
-    slot: Option<usize>,
+    slot: usize,
 }
 
 impl Mapping {
     /// Maps the first bytes of a file of an owner, made here or not.
+    ///
+    /// # Errors
+    /// Those of the system; `NOMEM` also for more mappings than are known here.
     pub(crate) fn new(
         file: &OwnedFd,
         bytes: usize,
         protection: ProtFlags,
         (owner, is_made): (u64, bool),
     ) -> Result<Mapping, Errno> {
-        static HANDLER: Once = Once::new();
-        HANDLER.call_once(handle_cut_files);
+        handle_cut_files();
         // SAFETY: the system chooses the place, so nothing else is there.
         let start = unsafe { mmap(null_mut(), bytes, protection, MapFlags::SHARED, file, 0) }?;
         let start = NonNull::new(start).ok_or(Errno::INVAL)?;
-        let slot = register(start.as_ptr() as usize, bytes, owner, is_made);
+        let Some(slot) = register(start.as_ptr() as usize, bytes, owner, is_made) else {
+            // SAFETY: nobody else knows of it.
+            let _ = unsafe { munmap(start.as_ptr(), bytes) };
+            return Err(Errno::NOMEM);
+        };
         Ok(Mapping { start, bytes, slot })
     }
 
@@ -94,10 +102,8 @@ impl Mapping {
 
 impl Drop for Mapping {
     fn drop(&mut self) {
-        if let Some(slot) = self.slot {
-            SLOTS[slot].end.store(0, Ordering::Release);
-            SLOTS[slot].taken.store(false, Ordering::Release);
-        }
+        SLOTS[self.slot].end.store(0, Ordering::Release);
+        SLOTS[self.slot].taken.store(false, Ordering::Release);
         // SAFETY: the mapping is ours, and whoever reads through it keeps it. One that cannot be removed stays.
         let _ = unsafe { munmap(self.start.as_ptr(), self.bytes) };
     }
@@ -117,7 +123,11 @@ fn register(start: usize, bytes: usize, owner: u64, is_made: bool) -> Option<usi
 
 /// Whether bytes lie in one mapped file, as an offset or a length out of shared memory should make them.
 pub(crate) fn holds<T>(values: &[T]) -> bool {
-    let (first, bytes) = (values.as_ptr() as usize, size_of_val(values));
+    holds_bytes(values.as_ptr() as usize, size_of_val(values))
+}
+
+/// The same for bytes that may not be there at all.
+pub(crate) fn holds_bytes(first: usize, bytes: usize) -> bool {
     let hint = &FOUND[(first >> 16) % HINTS];
     if SLOTS[hint.load(Ordering::Relaxed)].holds(first, bytes) {
         return true;
@@ -150,15 +160,23 @@ pub(crate) fn is_damaged(owner: u64) -> bool {
         .any(|damaged| damaged.load(Ordering::Acquire) == owner)
 }
 
+/// Sees to it that the signal comes to us first; others, such as Python's `faulthandler`, may have put themselves before.
 fn handle_cut_files() {
+    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+    let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let ours = on_bus_error as *const () as usize;
     // SAFETY: zero is a value of this plain struct, and the handler does only what a handler may.
     unsafe {
+        let mut present: libc::sigaction = std::mem::zeroed();
+        libc::sigaction(libc::SIGBUS, std::ptr::null(), &raw mut present);
+        if present.sa_sigaction == ours {
+            return;
+        }
+        // never freed: a handler may be reading the one before
+        PREVIOUS.store(Box::into_raw(Box::new(present)), Ordering::Release);
         let mut action: libc::sigaction = std::mem::zeroed();
-        action.sa_sigaction = on_bus_error as *const () as usize;
+        action.sa_sigaction = ours;
         action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK;
-        let mut previous: libc::sigaction = std::mem::zeroed();
-        libc::sigaction(libc::SIGBUS, std::ptr::null(), &raw mut previous);
-        let _ = PREVIOUS.set(previous);
         libc::sigaction(libc::SIGBUS, &raw const action, null_mut());
     }
 }
@@ -171,12 +189,15 @@ extern "C" fn on_bus_error(signal: i32, info: *mut libc::siginfo_t, _: *mut c_vo
     if is_fault && replace_page(address) {
         return;
     }
-    let Some(previous) = PREVIOUS.get() else {
-        return;
-    };
+    let previous = PREVIOUS.load(Ordering::Acquire);
     // SAFETY: the action was that of this process. A fault is raised again by itself, a signal that was sent is not.
     unsafe {
-        libc::sigaction(signal, previous, null_mut());
+        // one that hands it back to us, since it came later and keeps us as its own previous one, gets no second turn
+        if previous.is_null() || HANDED_ON.swap(true, Ordering::AcqRel) {
+            libc::signal(signal, libc::SIG_DFL);
+        } else {
+            libc::sigaction(signal, previous, null_mut());
+        }
         if !is_fault {
             libc::raise(signal);
         }
@@ -213,10 +234,9 @@ fn replace_page(address: usize) -> bool {
 
 fn note_damage(owner: u64) {
     if !is_damaged(owner) {
-        let count = DAMAGES.load(Ordering::Acquire);
-        // of more than are remembered, the newest count
-        DAMAGED[count % DAMAGED_MAX].store(owner, Ordering::Release);
-        DAMAGES.store(count + 1, Ordering::Release);
+        // several threads may be here; of more owners than are remembered, the newest count
+        let index = DAMAGES.fetch_add(1, Ordering::AcqRel) % DAMAGED_MAX;
+        DAMAGED[index].store(owner, Ordering::Release);
     }
 }
 

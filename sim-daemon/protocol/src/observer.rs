@@ -57,18 +57,19 @@ impl Observer {
             intact_there(&self.connection.peer)?;
             return Ok(None);
         };
-        let header = *sample.user_header();
         let peer = &self.connection.peer;
         intact(peer)?;
-        let payload =
-            loaned::received(sample.payload()).ok_or_else(|| damaged(peer, "read a frame"))?;
+        let (header, payload) =
+            loaned::received(&sample).ok_or_else(|| damaged(peer, "read a frame"))?;
         if header.session != self.connection.peer.beacon.session
             || header.schema != self.description.schema
         {
             return Err(malformed("the head of a frame: another session or schema"));
         }
         let table = check_table(&mut self.table, payload, header.rows)?;
-        Ok(Some(Frame::new(sample, table, Arc::clone(&self.frames))))
+        let base = payload.as_ptr() as usize;
+        let frame = Frame::new((header, base), sample, table, &self.frames);
+        Ok(Some(frame))
     }
 
     /// The newest sample; older ones are dropped.
@@ -103,7 +104,8 @@ impl Observer {
             if let ControlFlow::Break(()) = hook() {
                 return Err(ProtocolError::Interrupted);
             }
-            transport::park(&self.listener, left)?;
+            guarded(|| transport::park(&self.listener, left))
+                .ok_or_else(|| damaged(&self.connection.peer, "wait for a frame"))??;
         }
     }
 }

@@ -51,10 +51,16 @@ thread_local! {
 
 /// Makes ports whose memory the reader takes, with [`crate::memory::reserve`], before anything is sent.
 pub(crate) fn reserved_by_reader<T>(make: impl FnOnce() -> T) -> T {
+    /// Also when the transport panics.
+    struct Reset;
+    impl Drop for Reset {
+        fn drop(&mut self) {
+            READER_RESERVES.set(false);
+        }
+    }
+    let _reset = Reset;
     READER_RESERVES.set(true);
-    let made = make();
-    READER_RESERVES.set(false);
-    made
+    make()
 }
 
 /// What a file holds; the transport's own memory follows.

@@ -258,7 +258,7 @@ impl Journal {
         let entry = self.entries;
         self.entries += 1;
         let lines = bytes.div_ceil(ALIGNMENT);
-        let Ok(mut loan) = loaned::loan(&self.publisher, lines) else {
+        let Some(Ok(mut loan)) = loaned::loan(&self.publisher, lines) else {
             return;
         };
         fill(bytemuck::cast_slice_mut(loaned::words(loan.payload_mut())));

@@ -98,7 +98,7 @@ impl Observers {
     ) {
         (self.shown, self.unseen) = (Instant::now(), false);
         let lines = self.table.total_bytes() / ALIGNMENT;
-        let Ok(mut loan) = loaned::loan(&self.publisher, lines) else {
+        let Some(Ok(mut loan)) = loaned::loan(&self.publisher, lines) else {
             return; // observers keep every slot: they miss a frame
         };
         let words = loaned::words(loan.payload_mut());

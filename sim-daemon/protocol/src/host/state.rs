@@ -198,7 +198,7 @@ impl State {
             return self.record_inputs();
         };
         let lines = self.frame.total_bytes() / ALIGNMENT;
-        let Ok(mut loan) = loaned::loan(&lease.publisher, lines) else {
+        let Some(Ok(mut loan)) = loaned::loan(&lease.publisher, lines) else {
             // the holder keeps more frames than it said: it is told that its lease is lost
             self.record_inputs();
             return self.renew();
@@ -263,7 +263,7 @@ impl State {
         let reason = &reason.as_bytes()[..end];
         let table = Table::lay_out([("reason".to_owned(), Dtype::U8, vec![reason.len()], 0)]);
         let lines = table.total_bytes() / ALIGNMENT;
-        let Ok(mut loan) = loaned::loan(&lease.publisher, lines) else {
+        let Some(Ok(mut loan)) = loaned::loan(&lease.publisher, lines) else {
             return self.renew();
         };
         let words = loaned::words(loan.payload_mut());
@@ -352,9 +352,12 @@ impl Awaited<Next> for State {
         let Ok(Some(sample)) = lease.subscriber.receive() else {
             return Ok(None);
         };
-        let header = *sample.user_header();
-        // what leads out of shared memory is no table
-        let words = loaned::received(sample.payload()).unwrap_or_default();
+        let Some((header, words)) = loaned::received(&sample) else {
+            // its holder is told that its lease is lost
+            guarded(|| drop(sample));
+            self.renew();
+            return Ok(None);
+        };
         let taken = self.inbox.take(header, words);
         // the next command needs its slot, also where memory of another client was cut
         guarded(|| drop(sample));
