@@ -472,5 +472,17 @@ pub trait Cx: Sized {
     fn stop(&mut self, mask: MaskOf<Self>) -> bool;
 }
 
+/// Applies a function to each entry of an array.
+///
+/// `array::map`, `array::from_fn` and long closures may become functions of their own, which have none of the vector
+/// instructions of their caller: then each operation of [`simd`] is a call. This never does; keep `f` short.
+#[inline(always)]
+pub fn map<A: Copy, const N: usize>(mut xs: [A; N], mut f: impl FnMut(A) -> A) -> [A; N] {
+    for x in &mut xs {
+        *x = f(*x);
+    }
+    xs
+}
+
 /// The mask of an execution context's scalars.
 pub type MaskOf<C> = <<C as Cx>::F as Num>::Mask;

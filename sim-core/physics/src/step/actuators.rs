@@ -190,21 +190,42 @@ fn force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize, in
     }
     b.work.actuator_length[k] = length;
     b.work.actuator_velocity[k] = velocity;
-    let law = |which: Param, own: [<C::F as Num>::Real; 3]| {
-        let varies = m.varying.first(which).is_some();
-        let factor = |i: usize| param(m, &b.params, which, 3 * k + i, own[i]);
-        let mut sum = factor(0);
-        // most actuators have no such term
-        if varies || own[1].to_f64() != 0.0 {
-            sum = length.fma(factor(1), sum);
-        }
-        if varies || own[2].to_f64() != 0.0 {
-            sum = velocity.fma(factor(2), sum);
-        }
-        sum
-    };
-    let gain = law(Param::ActuatorGain, actuator.gain);
-    gain.fma(input, law(Param::ActuatorBias, actuator.bias))
+    let gain = law(
+        m,
+        &b.params,
+        Param::ActuatorGain,
+        (k, actuator.gain),
+        [length, velocity],
+    );
+    let bias = law(
+        m,
+        &b.params,
+        Param::ActuatorBias,
+        (k, actuator.bias),
+        [length, velocity],
+    );
+    gain.fma(input, bias)
+}
+
+/// A gain or bias of an actuator: constant, per length, per velocity.
+#[inline(always)]
+fn law<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    which: Param,
+    (k, own): (usize, [F::Real; 3]),
+    [length, velocity]: [F; 2],
+) -> F {
+    let varies = m.varying.first(which).is_some();
+    let mut sum = param(m, params, which, 3 * k, own[0]);
+    // most actuators have no such term
+    if varies || own[1].to_f64() != 0.0 {
+        sum = length.fma(param(m, params, which, 3 * k + 1, own[1]), sum);
+    }
+    if varies || own[2].to_f64() != 0.0 {
+        sum = velocity.fma(param(m, params, which, 3 * k + 2, own[2]), sum);
+    }
+    sum
 }
 
 #[inline(always)]

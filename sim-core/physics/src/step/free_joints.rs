@@ -22,7 +22,7 @@ use crate::arrays::{Block, Workspace};
 use crate::constants::mujoco::Integrator;
 use crate::constants::params::Param;
 use crate::constants::{Constants, Motion};
-use crate::lane::{Cx, Num, Real};
+use crate::lane::{Cx, Num, Real, map};
 use crate::math::spatial::Inertia;
 use crate::math::vec3::Vec3;
 
@@ -199,7 +199,7 @@ pub(super) fn add_damping<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut BlockOf<C>)
     let dt = C::F::k(m.dt);
     for &body in &m.mujoco.free_joints {
         let first = m.bodies[body].dof;
-        let damping = of_dofs(m, &b.params, Param::JointDamping, body).map(|x| x * dt);
+        let damping = map(of_dofs(m, &b.params, Param::JointDamping, body), |x| x * dt);
         let spin = spin(cx, b, first);
         let w = &mut b.work;
         let (rotation, origin) = (w.rotation[body], w.origin[body]);

@@ -163,7 +163,13 @@ pub(super) fn mocap_quat<F: Num>(all: &[F], k: usize) -> quat::Quat<F> {
     let scale = F::c(1.0).div(F::select(still, F::c(1.0), square).sqrt());
     let [zero, one] = [F::c(0.0), F::c(1.0)];
     let turned = [x * scale, y * scale, z * scale, w * scale];
-    std::array::from_fn(|i| F::select(still, if i == 3 { one } else { zero }, turned[i]))
+    let [x, y, z, w] = turned;
+    [
+        F::select(still, zero, x),
+        F::select(still, zero, y),
+        F::select(still, zero, z),
+        F::select(still, one, w),
+    ]
 }
 
 /// Inertia of a body about a point, from which its origin is given; where masses vary, the sum of those of its links.

@@ -19,7 +19,7 @@ use crate::constants::mujoco_frames::MujocoBody;
 use crate::constants::params::Param;
 use crate::constants::ties::{Frames, Measure};
 use crate::each;
-use crate::lane::{Cx, Num, Real};
+use crate::lane::{Cx, Num, Real, map};
 use crate::math::spatial::{ANGULAR, Spatial};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
 
@@ -64,7 +64,8 @@ impl Stage for Forces {
                 .filter(|(k, body)| body.parent != *k)
             {
                 let given = &b.params[first + 6 * body.link..first + 6 * body.link + 6];
-                let [force, torque] = [0, 3].map(|i| Vec3([given[i], given[i + 1], given[i + 2]]));
+                let force = Vec3([given[0], given[1], given[2]]);
+                let torque = Vec3([given[3], given[4], given[5]]);
                 let point = position(&b.work, &body.inertial);
                 add(m, b, k, point, force, torque);
             }
@@ -201,13 +202,16 @@ fn contact_wrenches<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let list = class_list(cx, t, number);
         each!(cx, r in list, {
             let pair = cx.load(t.memory.rows, r, row::PAIR);
-            let sides = [0, 1].map(|side| cx.pick(m.mujoco.pair_bodies, pair, side));
+            let sides = [
+                cx.pick(m.mujoco.pair_bodies, pair, 0),
+                cx.pick(m.mujoco.pair_bodies, pair, 1),
+            ];
             let [point, force, torque] = contact_force(cx, m, number, r);
             let there = b.work.reference[class.trees.1];
             for (place, &k) in bodies.iter().enumerate() {
                 let body = &m.mujoco.frames.bodies[k];
                 let slot = C::F::c((place + 1) as f64);
-                let [first, second] = sides.map(|side| {
+                let [first, second] = map(sides, |side| {
                     let is_it = (side - slot).abs().lt(half);
                     C::F::select(is_it, one, zero)
                 });
@@ -232,8 +236,11 @@ fn contact_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, number: usize, r: C::I) 
     let t = &m.contacts;
     let rows = t.memory.rows;
     let point = load_vec3(cx, rows, r, row::POINT);
-    let frame =
-        Mat3([row::NORMAL, row::TANGENTS, row::TANGENTS + 3].map(|k| load_vec3(cx, rows, r, k)));
+    let frame = Mat3([
+        load_vec3(cx, rows, r, row::NORMAL),
+        load_vec3(cx, rows, r, row::TANGENTS),
+        load_vec3(cx, rows, r, row::TANGENTS + 3),
+    ]);
     let force = load_vec3(cx, rows, r, row::FORCE);
     let mut torque = Vec3::zero();
     if let Some(block) = t.classes[number].turns {

@@ -91,5 +91,8 @@ pub fn free_bodies<R>(m: &Constants<R>) -> impl Iterator<Item = (usize, usize)> 
 /// The linear and the angular part of six scalars.
 #[inline(always)]
 pub fn halves<F: Num>(six: &[F]) -> [Vec3<F>; 2] {
-    [0, 3].map(|first| Vec3(std::array::from_fn(|i| six[first + i])))
+    [
+        Vec3([six[0], six[1], six[2]]),
+        Vec3([six[3], six[4], six[5]]),
+    ]
 }

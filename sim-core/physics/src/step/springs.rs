@@ -17,7 +17,7 @@ use crate::constants::Constants;
 use crate::constants::Motion;
 use crate::constants::mujoco::{PoseSpring, Tendon};
 use crate::constants::params::Param;
-use crate::lane::{Cx, Num, Real};
+use crate::lane::{Cx, Num, Real, map};
 use crate::math::quat::{self, conjugate, mul};
 use crate::math::vec3::Vec3;
 
@@ -124,7 +124,7 @@ fn add_springs<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [
     for spring in &m.mujoco.pose_springs {
         let body = &m.bodies[spring.body];
         let stiffness = C::F::k(spring.stiffness);
-        let [slide, turn] = pose_stretch(cx, m, b, spring).map(|x| x * stiffness);
+        let [slide, turn] = map(pose_stretch(cx, m, b, spring), |x| x * stiffness);
         let (rotation, origin) = (b.work.rotation[spring.body], b.work.origin[spring.body]);
         let force = &mut to[body.dofs()];
         if body.motion == Motion::Free {

@@ -54,11 +54,12 @@ pub(super) fn of_frames<C: Cx>(
     frames: &Frames<<C::F as Num>::Real>,
 ) -> Found<C::F> {
     let mounts = [&frames.first, &frames.second];
-    let [first, second] = mounts.map(|mount| placed(&b.work, mount));
+    let first = placed(&b.work, mounts[0]);
+    let second = placed(&b.work, mounts[1]);
     let apart = (first.point - second.point) + (first.reference - second.reference);
     let mut found = Found::at(&apart.0);
-    let [one, other] = [(mounts[0], &first), (mounts[1], &second)]
-        .map(|(mount, placed)| moving(m, &b.work, mount, placed));
+    let one = moving(m, &b.work, mounts[0], &first);
+    let other = moving(m, &b.work, mounts[1], &second);
     found.swing[..3].copy_from_slice(&*(one.acceleration[LINEAR] - other.acceleration[LINEAR]));
     let turned = frames.torque_scale.map(|scale| {
         let quat = between(&first.rotation, &second.rotation);
@@ -155,7 +156,8 @@ pub(super) fn torque<F: Num>(
     scale: F::Real,
     force: Vec3<F>,
 ) -> Vec3<F> {
-    let [first, second] = [&frames.first, &frames.second].map(|mount| sites::axes(w, mount));
+    let first = sites::axes(w, &frames.first);
+    let second = sites::axes(w, &frames.second);
     let [x, y, z, real] = between(&first, &second);
     let own = Vec3([x, y, z]).cross_add(force, force * real);
     second.mul_add(own * (F::k(scale) * F::c(0.5)), Vec3::zero())

@@ -10,7 +10,7 @@
 //! A moment is ∂l̇/∂q̇ of a dof. As in MuJoCo, dofs that move both sites have none.
 
 use super::kinematics::read_quat;
-use super::tied_frames::{Placed, between, carries, placed};
+use super::tied_frames::{between, carries, placed};
 use super::{BlockOf, ConstantsOf};
 use crate::arrays::Workspace;
 use crate::constants::Constants;
@@ -78,19 +78,21 @@ fn of_sites<F: Num>(
     let axes = &reference.as_ref().unwrap_or(&site).rotation;
     let push = Spatial([axes * along, axes * about]);
     for (k, &dof) in length.dofs.iter().enumerate() {
-        let motion = w.motion[dof];
-        let of = |placed: &Placed<F>| {
-            let Spatial([linear, angular]) = motion;
-            Spatial([angular.cross_add(placed.point, linear), angular]).dot(push)
-        };
+        let Spatial([linear, angular]) = w.motion[dof];
         let mut moment = F::c(0.0);
-        if carries(m, sites.site.body, dof) {
-            moment = of(&site);
-        }
-        if let (Some(mount), Some(reference)) = (&sites.reference, &reference)
-            && carries(m, mount.body, dof)
-        {
-            moment = moment - of(reference);
+        // the velocity of each that the dof carries
+        let carried = [
+            (Some(&sites.site), Some(&site), 1.0),
+            (sites.reference.as_ref(), reference.as_ref(), -1.0),
+        ];
+        for (mount, placed, sign) in carried {
+            let (Some(mount), Some(placed)) = (mount, placed) else {
+                continue;
+            };
+            if carries(m, mount.body, dof) {
+                let velocity = Spatial([angular.cross_add(placed.point, linear), angular]);
+                moment = F::c(sign).fma(velocity.dot(push), moment);
+            }
         }
         w.actuator_moment[length.first + k] = moment;
     }

@@ -30,7 +30,11 @@ impl<F: Lane> World<'_, F> {
 
     #[inline(always)]
     fn three(&self, row: usize, k: usize) -> [F::Real; 3] {
-        [0, 1, 2].map(|i| self.number(row, k + i))
+        [
+            self.number(row, k),
+            self.number(row, k + 1),
+            self.number(row, k + 2),
+        ]
     }
 
     #[inline(always)]
@@ -55,8 +59,8 @@ impl<F: Lane> World<'_, F> {
     #[inline(always)]
     fn force(&self, row: usize) -> [f64; 3] {
         let along = self.three(row, row::FORCE).map(Real::to_f64);
-        let axes = [row::NORMAL, row::TANGENTS, row::TANGENTS + 3]
-            .map(|k| self.three(row, k).map(Real::to_f64));
+        let first = [row::NORMAL, row::TANGENTS, row::TANGENTS + 3];
+        let axes = first.map(|k| self.three(row, k).map(Real::to_f64));
         [0, 1, 2].map(|i| (0..3).map(|a| along[a] * axes[a][i]).sum())
     }
 }

@@ -78,7 +78,11 @@ pub(in crate::step) fn inertia_times<F: Num, V>(
         None => {
             let turn: Mat3<F> = axes(w, &body.inertial);
             let Vec3(along) = turn.transpose_mul(v);
-            let moment = Vec3(std::array::from_fn(|i| along[i] * F::k(body.moments[i])));
+            let moment = Vec3([
+                along[0] * F::k(body.moments[0]),
+                along[1] * F::k(body.moments[1]),
+                along[2] * F::k(body.moments[2]),
+            ]);
             turn.mul_add(moment, Vec3::zero())
         }
     };
@@ -100,7 +104,8 @@ fn turned<F: Num>(rotation: &Mat3<F>, inertia: [F; 6]) -> [F; 6] {
     let inertia = matrix(inertia);
     // columns of I Rᵀ are I times the rows of R
     let row = |i: usize| Vec3([rotation[0][i], rotation[1][i], rotation[2][i]]);
-    let column = |i: usize| rotation * (inertia * row(i));
-    let (x, y, z) = (column(0), column(1), column(2));
+    let x = rotation * (inertia * row(0));
+    let y = rotation * (inertia * row(1));
+    let z = rotation * (inertia * row(2));
     [x[0], y[1], z[2], x[1], x[2], y[2]]
 }

@@ -20,7 +20,7 @@ use crate::constants::Constants;
 use crate::constants::contact::{row, turning};
 use crate::constants::sensors::{ContactSensor, Reduction, Sensor, SensorKind, TouchSensor, Zone};
 use crate::each;
-use crate::lane::{Cx, MaskOf, Num, Real};
+use crate::lane::{Cx, MaskOf, Num, Real, map};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
 use crate::step::contact_rows::{class_list, tangents};
 use crate::step::sites::{position, reference, to_local};
@@ -99,7 +99,11 @@ fn contact<C: Cx>(
     let t = &m.contacts;
     let rows = t.memory.rows;
     let pair = cx.load(rows, r, row::PAIR);
-    let frame = [row::NORMAL, row::TANGENTS, row::TANGENTS + 3].map(|k| load_vec3(cx, rows, r, k));
+    let frame = [
+        load_vec3(cx, rows, r, row::NORMAL),
+        load_vec3(cx, rows, r, row::TANGENTS),
+        load_vec3(cx, rows, r, row::TANGENTS + 3),
+    ];
     let mut torque = Vec3::zero();
     if let Some(block) = t.classes[class].turns {
         let twist = cx.pick(t.turning, pair, 0);
@@ -175,15 +179,18 @@ fn turn<F: Num, V>(
         };
         let is_it = (pair - F::c(number as f64)).abs().lt(F::c(0.5));
         let before = along.unwrap_or(Vec3::zero());
-        along = Some(Vec3(std::array::from_fn(|i| {
-            F::select(is_it, axis[i], before[i])
-        })));
+        along = Some(Vec3([
+            F::select(is_it, axis[0], before[0]),
+            F::select(is_it, axis[1], before[1]),
+            F::select(is_it, axis[2], before[2]),
+        ]));
     }
     let normal = own.frame[0];
     let [first, second] = tangents(normal, along);
     let frame = Mat3([normal, first, second]);
-    let turned = |v: Vec3<F>| frame.transpose_mul(own.frame.mul_add(v, Vec3::zero()));
-    (own.force, own.torque) = (turned(own.force), turned(own.torque));
+    [own.force, own.torque] = map([own.force, own.torque], |v| {
+        frame.transpose_mul(own.frame.mul_add(v, Vec3::zero()))
+    });
     own.frame = frame;
 }
 
@@ -272,7 +279,7 @@ fn records<C: Cx>(
         let is_there = C::F::c(slot as f64 + 0.5).lt(found);
         let kept: [C::F; RECORD] =
             std::array::from_fn(|k| cx.get(&b.contact_records[slot * SLOT + k]));
-        let shown = kept.map(|x| C::F::select(is_there, x, zero));
+        let shown = map(kept, |x| C::F::select(is_there, x, zero));
         let count = C::F::select(is_there, found, zero);
         show(&mut b.work.sensordata, sensor, own, slot, count, &shown);
     }
@@ -327,10 +334,9 @@ fn net_force<C: Cx>(
         each!(cx, r in list, {
             let contact = contact(cx, m, b, (class, own.column), r);
             let is_found = matches::<C>(b, own, &contact);
-            let world = |v: Vec3<C::F>| {
+            let [force, torque] = map([contact.force, contact.torque], |v| {
                 contact.frame.mul_add(v, Vec3::zero()) * contact.sense
-            };
-            let (force, torque) = (world(contact.force), world(contact.torque));
+            });
             let moment = contact.point.cross_add(force, torque);
             let weight = force.dot(force).sqrt();
             let point = contact.point * weight;
@@ -363,6 +369,6 @@ fn net_force<C: Cx>(
     for (first, part) in parts {
         record[first..first + 3].copy_from_slice(&part.0);
     }
-    let record = record.map(|x| C::F::select(is_there, x, zero));
+    let record = map(record, |x| C::F::select(is_there, x, zero));
     show(&mut b.work.sensordata, sensor, own, 0, sums[0], &record);
 }

@@ -3,7 +3,7 @@
 //! A ray p + t d, t ≥ 0, is in a solid for an interval of t: the part that those of its slabs and quadrics share.
 
 use crate::constants::sensors::{Zone, ZoneKind};
-use crate::lane::Num;
+use crate::lane::{Num, map};
 use crate::math::vec3::Vec3;
 
 /// Larger than any parameter of a ray that matters [–].
@@ -32,7 +32,7 @@ impl<F: Num> Span<F> {
     #[inline(always)]
     fn or(self, other: Span<F>) -> Span<F> {
         let (far, none) = (F::c(FAR), F::c(-FAR));
-        let [one, two] = [self, other].map(|span| {
+        let [one, two] = map([self, other], |span| {
             let is_empty = span.last.lt(span.first);
             Span {
                 first: F::select(is_empty, far, span.first),
@@ -84,13 +84,15 @@ fn inside<F: Num>(kind: ZoneKind, size: [F::Real; 3], point: Vec3<F>, along: Vec
             ball(scale(point), scale(along), F::c(1.0))
         }
         ZoneKind::Box => {
-            let [x, y, z] = [(0, a), (1, b), (2, c)].map(|(i, h)| slab(point[i], along[i], h));
+            let x = slab(point[0], along[0], a);
+            let y = slab(point[1], along[1], b);
+            let z = slab(point[2], along[2], c);
             x.and(y).and(z)
         }
         ZoneKind::Cylinder => tube(point, along, a, b),
         ZoneKind::Capsule => {
             let end = |sign: f64| Vec3([point[0], point[1], b.fnma(F::c(sign), point[2])]);
-            let ends = [1.0, -1.0].map(|sign| ball(end(sign), along, a));
+            let ends = [ball(end(1.0), along, a), ball(end(-1.0), along, a)];
             tube(point, along, a, b).or(ends[0]).or(ends[1])
         }
     }

@@ -1,6 +1,6 @@
 //! Jᵀ W J of contacts, in the packed triangle of the system.
 
-use super::contacts::{ClassOf, ContactsOf, add_turning, block_of, law_at};
+use super::contacts::{ClassOf, ContactsOf, add_turning, block_of, law_at, only};
 use super::turning;
 use crate::constants::contact::{Run, row, turning as more};
 use crate::each;
@@ -30,7 +30,11 @@ pub(super) fn assemble<C: Cx, const TURNS: bool>(
         let law = law_at(cx, t, r, jar);
         cx.fill(t.memory.rows, r, row::STATE, law.state);
         // in worlds without this contact, J too is -0: W J is 0 there
-        let [nn, nx, ny, xx, xy, yy] = law.stiffness.map(|x| cx.or_nothing(x));
+        let mut stiffness = law.stiffness;
+        for x in &mut stiffness {
+            *x = cx.or_nothing(*x);
+        }
+        let [nn, nx, ny, xx, xy, yy] = stiffness;
         let rows = [[nn, nx, ny], [nx, xx, xy], [ny, xy, yy]];
         // worlds without this contact add 0
         let mut pull = law.force;
@@ -142,7 +146,7 @@ fn assemble_turning<C: Cx>(
     for (c, entries) in class.entries.iter().enumerate() {
         let (first, other) = (row::JACOBIAN + 3 * c, block + more::JACOBIAN + 3 * c);
         let own = turning::six(cx, t, r, first, other);
-        let [a, b, d, e, f, g] = law.times(own).map(|x| cx.only(x));
+        let [a, b, d, e, f, g] = only(cx, law.times(own));
         for run in entries {
             let cells = &mut hessian[run.places()];
             let (first, other) = (

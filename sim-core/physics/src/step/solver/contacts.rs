@@ -13,6 +13,15 @@ use crate::each;
 use crate::lane::{Cx, MaskOf, Num};
 use crate::step::contact_rows::class_list;
 
+/// Values in the active worlds, 0 elsewhere.
+#[inline(always)]
+pub(super) fn only<C: Cx, const N: usize>(cx: &mut C, mut xs: [C::F; N]) -> [C::F; N] {
+    for x in &mut xs {
+        *x = cx.only(*x);
+    }
+    xs
+}
+
 pub(super) type ContactsOf<C> = Contacts<<<C as Cx>::F as Num>::Real>;
 pub(super) type ClassOf<C> = Class<<<C as Cx>::F as Num>::Real>;
 
@@ -179,7 +188,7 @@ pub(super) fn add_turning<C: Cx>(
     force: [C::F; 6],
     to: &mut [C::V],
 ) {
-    let [a, b, c, d, e, f] = force.map(|x| cx.only(x));
+    let [a, b, c, d, e, f] = only(cx, force);
     for run in &class.runs {
         let (first, other) = (
             row::JACOBIAN + 3 * run.column,
@@ -233,7 +242,8 @@ pub(super) fn forces<C: Cx, const TURNS: bool>(cx: &mut C, t: &ContactsOf<C>, jo
         each!(cx, r in list, {
             if let Some(block) = block_of::<_, TURNS>(class) {
                 let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
-                let force = turning::law_at(cx, t, r, block, jar).force.map(|x| cx.only(x));
+                let law = turning::law_at(cx, t, r, block, jar);
+                let force = only(cx, law.force);
                 let [a, b, c, d, e, f] = force;
                 cx.fill_all(t.memory.rows, r, row::FORCE, [a, b, c]);
                 cx.fill_all(t.memory.rows, r, block + more::FORCE, [d, e, f]);
@@ -241,7 +251,8 @@ pub(super) fn forces<C: Cx, const TURNS: bool>(cx: &mut C, t: &ContactsOf<C>, jo
             } else {
                 // f = -s' at the accelerations found
                 let jar = cx.load3(t.memory.rows, r, row::JAR);
-                let force = law_at(cx, t, r, jar).force.map(|x| cx.only(x));
+                let law = law_at(cx, t, r, jar);
+                let force = only(cx, law.force);
                 cx.fill_all(t.memory.rows, r, row::FORCE, force);
                 for run in &class.runs {
                     let first = row::JACOBIAN + 3 * run.column;

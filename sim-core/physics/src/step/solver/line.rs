@@ -33,6 +33,24 @@ pub(super) struct Line<'a, F> {
     jv: &'a [F],
 }
 
+/// What the rows add up to at the start of a line. No closure: one that the compiler keeps as a function has none of the
+/// vector instructions of its caller.
+struct Sums<F> {
+    descent: F,
+    size: F,
+    terms: F,
+}
+
+impl<F: Num> Sums<F> {
+    #[inline(always)]
+    fn add(&mut self, law: Law<F>, jar: F, jv: F, aref: F) {
+        self.descent = (law.stiffness * jv).fma(jv, self.descent);
+        self.size = self.size + (law.force * jv).abs();
+        let rounded = (jar + aref).abs() + aref.abs();
+        self.terms = (law.stiffness * rounded).fma(rounded, self.terms);
+    }
+}
+
 /// First and second derivative of the cost along a line, and the size of the terms of the first.
 struct Derivative<F> {
     slope: F,
@@ -56,30 +74,34 @@ impl<'a, F: Num> Line<'a, F> {
         let (weight, aref) = (&w.row_weight, &w.row_aref);
         let (jar, jv) = (&w.jar, &w.jar_minimum);
         let epsilon = F::c(<F::Real as Real>::EPSILON);
-        let (mut descent, mut size) = (curvature, curvature);
-        let mut terms = power;
-        let mut add = |law: Law<F>, r: usize| {
-            descent = (law.stiffness * jv[r]).fma(jv[r], descent);
-            size = size + (law.force * jv[r]).abs();
-            let rounded = (jar[r] + aref[r]).abs() + aref[r].abs();
-            terms = (law.stiffness * rounded).fma(rounded, terms);
+        let mut sums = Sums {
+            descent: curvature,
+            size: curvature,
+            terms: power,
         };
         let (frictions, limits) = (m.equalities.len(), m.equalities.len() + m.frictions.len());
         for r in 0..frictions {
-            add(equality(jar[r], weight[r]), r);
+            sums.add(equality(jar[r], weight[r]), jar[r], jv[r], aref[r]);
         }
         for (r, friction) in (frictions..limits).zip(&m.frictions) {
             let [zone, loss] = bounds(m, params, friction);
-            add(dry_friction(jar[r], weight[r], zone, loss), r);
+            let law = dry_friction(jar[r], weight[r], zone, loss);
+            sums.add(law, jar[r], jv[r], aref[r]);
         }
         for run in acting.runs() {
             for r in limits + run.start..limits + run.end {
-                add(one_sided(jar[r], weight[r]), r);
+                sums.add(one_sided(jar[r], weight[r]), jar[r], jv[r], aref[r]);
             }
         }
         for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.mujoco.tie_of_row) {
-            add(ties::law(&m.mujoco.ties[*tie].law, jar[r], weight[r]), r);
+            let law = ties::law(&m.mujoco.ties[*tie].law, jar[r], weight[r]);
+            sums.add(law, jar[r], jv[r], aref[r]);
         }
+        let Sums {
+            mut descent,
+            size,
+            terms,
+        } = sums;
         let mut noise = size * epsilon;
         if let Some(corrects) = corrects {
             let (mut sum, mut all) = (cx.var(descent), cx.var(terms));

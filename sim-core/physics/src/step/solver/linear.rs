@@ -61,8 +61,10 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
         }
     }
     // of the worlds that are still solved for
-    let some = coupling.filter(|some| cx.anywhere(*some));
-    let couples = some.is_some();
+    let couples = match coupling {
+        Some(some) => cx.anywhere(some),
+        None => false,
+    };
     // the larger system has the same solution where nothing couples: a block in lockstep solves one of the two
     let solves_both = couples && !C::LOCKSTEP;
     let mut stiffening = cx.var(C::F::c(1.0));
@@ -71,7 +73,7 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
         if larger && !couples {
             break;
         }
-        if let (true, Some(some)) = (larger, some) {
+        if let (true, Some(some)) = (larger, coupling) {
             when!(cx, some, {
                 let smaller = &*cx.cells(&mut w.hessian, &mut b.system);
                 let cells = cx.cells(&mut w.coupled_hessian, &mut b.coupled_system);
@@ -89,7 +91,7 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
                 assembly::assemble::<_, TURNS>(cx, t, k, cells, &mut b.pull, pulls);
             }
         }
-        if let (true, Some(some)) = (solves_both, some) {
+        if let (true, Some(some)) = (solves_both, coupling) {
             let solves = if larger { some } else { !some };
             when!(cx, solves, {
                 cx.get_values(matrix, system);

@@ -194,7 +194,7 @@ pub(super) fn residual<F: Num>(
 
 /// f + W J a, or f alone where the solver `corrects`.
 #[inline(always)]
-fn pull<F: Num>(law: &Law<F>, jar: F, aref: F, corrects: Option<F::Mask>) -> F {
+pub(super) fn pull<F: Num>(law: &Law<F>, jar: F, aref: F, corrects: Option<F::Mask>) -> F {
     let whole = law.stiffness.fma(jar + aref, law.force);
     match corrects {
         Some(corrects) => F::select(corrects, law.force, whole),
@@ -249,8 +249,8 @@ pub(super) fn assemble<F: Num>(
             rhs[l.dof] = side.fma(pull, rhs[l.dof]);
         }
     }
-    let pull = |law: &Law<F>, r: usize| pull(law, jar[r], aref[r], corrects);
-    ties::assemble(m, &w.row_jacobian, [weight, jar], hessian, rhs, pull);
+    let of_rows = [weight, jar, aref].map(Vec::as_slice);
+    ties::assemble(m, &w.row_jacobian, of_rows, hessian, rhs, corrects);
 }
 
 /// The count of rows on another piece of their cost, and of dry frictions that slide the other way.

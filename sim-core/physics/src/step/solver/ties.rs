@@ -1,6 +1,6 @@
 //! Sums over the rows of ties, whose Jacobians are in `row_jacobian`.
 
-use super::rows::{Law, dry_cost, dry_friction, equality, one_sided};
+use super::rows::{Law, dry_cost, dry_friction, equality, one_sided, pull};
 use crate::constants::Constants;
 use crate::constants::ties::TieLaw;
 use crate::lane::Num;
@@ -59,16 +59,16 @@ pub(super) fn residual<F: Num>(
 pub(super) fn assemble<F: Num>(
     m: &Constants<F::Real>,
     jacobian: &[F],
-    [weight, jar]: [&[F]; 2],
+    [weight, jar, aref]: [&[F]; 3],
     hessian: &mut [F],
     rhs: &mut [F],
-    pull: impl Fn(&Law<F>, usize) -> F,
+    corrects: Option<F::Mask>,
 ) {
     let mut r = m.joint_rows();
     for tie in &m.mujoco.ties {
         for row in 0..tie.rows {
             let law = law(&tie.law, jar[r], weight[r]);
-            let pull = pull(&law, r);
+            let pull = pull(&law, jar[r], aref[r], corrects);
             let own = &jacobian[tie.jacobian(row)];
             let mut places = tie.places.iter();
             for (i, &dof) in tie.dofs.iter().enumerate() {
