@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 import re
@@ -9,19 +10,19 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, SupportsFloat, SupportsIndex
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tightloop import _core, checks
 from tightloop.body import Body
-from tightloop.checks import Triple, Vector
+from tightloop.checks import Vector
 from tightloop.errors import SceneError
 from tightloop.mujoco_model import MujocoModel
 from tightloop.robot import PER_DOF, Robot
 from tightloop.scene_mujoco import HULL_VERTICES, check_options, keep_beside, read_file, read_model
-from tightloop.scene_options import Cone, Solver, capacity
+from tightloop.scene_options import FrictionCombine
 from tightloop.scene_randomization import SceneRandomization
 from tightloop.shapes import ORIGIN, UPRIGHT, Shape, Surface, checked_surface
 
@@ -47,21 +48,14 @@ class Scene(SceneRandomization):
         params: Model parameters that vary between worlds, besides those named at launch; see `launch`.
         command_delay_max: Largest ``command_delay`` of a world, if it varies [substeps]; None is four control frames.
             Each control frame of it takes memory for one frame of commands in every world.
+        friction_combine: How the coefficients of friction of two shapes combine: ``"max"``, ``"mean"``, ``"min"`` or
+            ``"product"``. A contact with a geom of a MuJoCo model keeps MuJoCo's rule.
 
     Raises:
         SceneError: A value is out of range; the message names it.
     """
 
-    __slots__ = (
-        "_command_delay_max",
-        "_contacts_max",
-        "_dt",
-        "_gravity",
-        "_params",
-        "_rows_max",
-        "_solver",
-        "_substeps",
-    )
+    __slots__ = ()
 
     def __init__(
         self,
@@ -73,6 +67,7 @@ class Scene(SceneRandomization):
         rows_max: int | None = None,
         params: Iterable[str] = (),
         command_delay_max: int | None = None,
+        friction_combine: FrictionCombine = "max",
     ) -> None:
         super().__init__()
         self.dt = dt
@@ -82,105 +77,7 @@ class Scene(SceneRandomization):
         self.rows_max = rows_max
         self.params = params
         self.command_delay_max = command_delay_max
-        self._solver = Solver()
-
-    @property
-    def dt(self) -> float:
-        """Length of a physics step [s]."""
-        return self._dt
-
-    @dt.setter
-    def dt(self, dt: SupportsFloat) -> None:
-        self._dt = checks.number("Scene: dt", dt, above=0.0)
-
-    @property
-    def substeps(self) -> int:
-        """Physics steps per control frame."""
-        return self._substeps
-
-    @substeps.setter
-    def substeps(self, substeps: SupportsIndex) -> None:
-        self._substeps = checks.integer("Scene: substeps", substeps)
-
-    @property
-    def gravity(self) -> Triple:
-        """Acceleration of gravity [m/s²], world axes."""
-        return self._gravity
-
-    @gravity.setter
-    def gravity(self, gravity: Vector) -> None:
-        self._gravity = checks.triple("Scene: gravity", gravity)
-
-    @property
-    def params(self) -> tuple[str, ...]:
-        """Model parameters that vary between worlds, besides those named at launch; see `launch`."""
-        return self._params
-
-    @params.setter
-    def params(self, params: Iterable[str]) -> None:
-        if isinstance(params, str) or not isinstance(params, Iterable):
-            raise SceneError(f"Scene: params is {params!r}; give a list of names")
-        self._params = tuple(checks.text("Scene: an entry of params", param) for param in params)
-
-    @property
-    def command_delay_max(self) -> int | None:
-        """Largest ``command_delay`` of a world [substeps]; None is four control frames."""
-        return self._command_delay_max
-
-    @command_delay_max.setter
-    def command_delay_max(self, command_delay_max: SupportsIndex | None) -> None:
-        most = 1000 * self.substeps
-        self._command_delay_max = capacity("command_delay_max", command_delay_max, most)
-
-    @property
-    def contacts_max(self) -> int | None:
-        """Capacity for contacts of a world; None is as many as its shapes can have, at most 512."""
-        return self._contacts_max
-
-    @contacts_max.setter
-    def contacts_max(self, contacts_max: SupportsIndex | None) -> None:
-        self._contacts_max = capacity("contacts_max", contacts_max, 4096)
-
-    @property
-    def rows_max(self) -> int | None:
-        """Capacity for constraint rows of contacts of a world; None is as many as its contacts need."""
-        return self._rows_max
-
-    @rows_max.setter
-    def rows_max(self, rows_max: SupportsIndex | None) -> None:
-        self._rows_max = capacity("rows_max", rows_max, 16384)
-
-    def solver(
-        self,
-        *,
-        iterations: int = 20,
-        ls_iterations: int = 100,
-        tolerance: float = 1e-8,
-        cone: Cone = "elliptic",
-        impratio: float = 1000.0,
-    ) -> None:
-        """Set the options of the constraint solver (primal Newton with exact line search).
-
-        Args:
-            iterations: Largest number of Newton iterations per physics step.
-            ls_iterations: Largest number of line-search iterations per Newton iteration.
-            tolerance: The solver stops when its scaled improvement is smaller [–]; at 0 only rounding stops it.
-            cone: Friction cone of contacts, ``"elliptic"`` or ``"pyramidal"``.
-            impratio: Ratio of frictional to normal impedance of contacts [–], above 0, at most 1e5. In float32, the
-                edges of a pyramidal cone are at most 1e4 times as stiff as its normal. MuJoCo's edges exceed this limit
-                if ``mu`` is below 0.22 at an impratio of 1000.
-
-        Raises:
-            SceneError: A value is out of range; the message names it.
-        """
-        checks.choice("cone", cone, ("elliptic", "pyramidal"))
-        self._solver = Solver(
-            iterations=checks.integer("solver: iterations", iterations),
-            ls_iterations=checks.integer("solver: ls_iterations", ls_iterations),
-            tolerance=checks.number("solver: tolerance", tolerance, least=0.0),
-            cone=cone,
-            impratio=checks.number("solver: impratio", impratio, above=0.0),
-        )
+        self.friction_combine = friction_combine
 
     def add_urdf(
         self,
@@ -433,8 +330,8 @@ class Scene(SceneRandomization):
     def _read(cls, file: Path, folder: Path) -> Scene:
         """Read a scene file whose paths are relative to a given folder."""
         data = json.loads(_core.load_scene(str(file)))
-        options = ("dt", "substeps", "gravity", "contacts_max", "rows_max", "params", "command_delay_max")
-        scene = cls(**{option: data[option] for option in options if option in data})
+        given = inspect.signature(cls).parameters
+        scene = cls(**{option: data[option] for option in given if option in data})
         scene.solver(**data["solver"])
         for table in data.get("robot", ()):
             joints = {name: table.pop(name) for name in PER_DOF if name in table}
@@ -477,6 +374,7 @@ class Scene(SceneRandomization):
                 "gravity": self.gravity,
                 "params": self.params,
                 "command_delay_max": self.command_delay_max,
+                "friction_combine": self.friction_combine,
                 "contacts_max": self.contacts_max,
                 "rows_max": self.rows_max,
                 "contact_filters": self.filters,

@@ -13,6 +13,7 @@ from tightloop.checks import Vector
 from tightloop.errors import SceneError
 from tightloop.mujoco_model import MujocoModel
 from tightloop.robot import Link, Robot
+from tightloop.scene_options import SceneOptions
 from tightloop.shapes import ORIGIN, UPRIGHT, Shape, ShapeType, Surface, checked, checked_scale, checked_surface
 
 if TYPE_CHECKING:
@@ -22,12 +23,13 @@ if TYPE_CHECKING:
 Collidable = Shape | Robot | Body | Link | str
 
 
-class SceneShapes:
+class SceneShapes(SceneOptions):
     """Mixin of `Scene` with its shapes."""
 
     __slots__ = ("bodies", "filters", "models", "robots", "shapes")
 
     def __init__(self) -> None:
+        super().__init__()
         self.robots: dict[str, Robot] = {}
         self.models: dict[str, MujocoModel] = {}
         self.bodies: dict[str, Body] = {}

@@ -54,7 +54,7 @@ pub use model::{KeyState, Model, RobotRange, SensedShapes, Start};
 pub use mujoco::{MujocoContents, MujocoElement, MujocoOptions};
 pub use pose::Pose;
 pub use rigid_body::Body;
-pub use sim_physics::constants::contact::Cone;
+pub use sim_physics::constants::contact::{Cone, FrictionCombine};
 pub use softness::Softness;
 pub use surface::Surface;
 pub use urdf::UrdfOptions;

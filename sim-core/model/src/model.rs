@@ -4,6 +4,7 @@ use crate::description::ParamDraw;
 use crate::distribution::Distribution;
 use sim_physics::constants::Constants;
 use sim_physics::constants::Sizes;
+use sim_physics::constants::contact::FrictionCombine;
 use sim_physics::constants::mujoco::Mujoco;
 use sim_physics::lane::Fixed;
 use std::ops::Range;
@@ -266,11 +267,18 @@ impl Model {
             .replace(", turns: None", "")
             .replace(", link_axes: None", "")
             .replace(&format!(", turning: {:?}", Fixed::default()), "")
-            .replace(&no_clusters(), "");
+            .replace(&no_clusters(), "")
+            .replace(&largest_friction(), "");
         text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| {
             (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
         })
     }
+}
+
+/// What the `Debug` text of a model says where the larger friction of two shapes counts.
+fn largest_friction() -> String {
+    let (combine, none) = (FrictionCombine::Max, Fixed::default());
+    format!(", combine: {combine:?}, keeps_max: {none:?}")
 }
 
 /// What the `Debug` text of a model says where no hull has clusters of vertices.

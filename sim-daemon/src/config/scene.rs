@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sim_engine::dynamics::Dynamics;
 use sim_model::files;
-use sim_model::{Cone, Description, Solver};
+use sim_model::{Cone, Description, FrictionCombine, Solver};
 
 use super::bodies::BodyTable;
 use super::error::ConfigError;
@@ -52,6 +52,9 @@ pub struct SceneFile {
     /// Most constraint rows of contacts that a world has room for; left out, as many as its contacts need.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rows_max: Option<usize>,
+    /// How the coefficients of friction of two shapes combine.
+    #[serde(default, skip_serializing_if = "CombineName::is_max")]
+    pub friction_combine: CombineName,
     /// Pairs that never touch: `shape`, `body/shape` or `robot/link/shape`, or a robot, body or link for all its shapes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub contact_filters: Vec<[String; 2]>,
@@ -126,6 +129,27 @@ pub enum ConeName {
     Elliptic,
     /// A pyramid inside it.
     Pyramidal,
+}
+
+/// How friction combines, by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CombineName {
+    /// The larger coefficient counts.
+    #[default]
+    Max,
+    /// The mean.
+    Mean,
+    /// The smaller one.
+    Min,
+    /// The product.
+    Product,
+}
+
+impl CombineName {
+    fn is_max(&self) -> bool {
+        *self == CombineName::Max
+    }
 }
 
 /// Reads a scene file.
@@ -247,6 +271,12 @@ impl SceneFile {
         for name in &self.params {
             description.params.insert(param(name)?);
         }
+        description.friction_combine = match self.friction_combine {
+            CombineName::Max => FrictionCombine::Max,
+            CombineName::Mean => FrictionCombine::Mean,
+            CombineName::Min => FrictionCombine::Min,
+            CombineName::Product => FrictionCombine::Product,
+        };
         description.filters = self.contact_filters.clone();
         description.command_delay_max = self.command_delay_max;
         description.contacts_max = self.contacts_max;

@@ -89,7 +89,9 @@ impl ContactBuilder<'_> {
         row[pair::MARGIN] = margin;
         let mu = geom
             .as_ref()
-            .map_or(s.mu.max(t.mu), |geom| geom.friction[0]);
+            .map_or(self.scene.friction_combine.of(s.mu, t.mu), |geom| {
+                geom.friction[0]
+            });
         row[pair::MU] = mu.max(MU_MIN);
         let condim = geom
             .as_ref()
@@ -143,7 +145,11 @@ impl ContactBuilder<'_> {
     }
 
     /// What the contact of two shapes is like where one of them is a geom of MuJoCo's.
-    fn geom_pair(&self, x: &PlacedShape<'_>, y: &PlacedShape<'_>) -> Option<GeomContact> {
+    pub(super) fn geom_pair(
+        &self,
+        x: &PlacedShape<'_>,
+        y: &PlacedShape<'_>,
+    ) -> Option<GeomContact> {
         if let Some(pair) = named_pair(x, y, self.rules) {
             return Some(pair.contact);
         }

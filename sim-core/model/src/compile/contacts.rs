@@ -6,7 +6,9 @@ use super::contact_pieces::{PlacedShape, Rules, contacts_of, pairs, pieces};
 use super::mujoco_contacts::add_touched_bodies;
 use crate::description::Description;
 use crate::error::ModelError;
-use sim_physics::constants::contact::{Class, Column, Contacts, Group, Pair, Run, pair, row};
+use sim_physics::constants::contact::{
+    Class, Column, Contacts, FrictionCombine, Group, Pair, Run, pair, row,
+};
 use sim_physics::constants::{Constants, Coupled, Impedance};
 use sim_physics::lane::Fixed;
 use sim_physics::math::factor::Pattern;
@@ -120,6 +122,7 @@ impl ContactBuilder<'_> {
             };
             contacts.tables.numbers.extend(ratios.as_flattened());
         }
+        self.add_combine(contacts, pairs);
         let coupled = self.coupled(contacts);
         for class in &mut contacts.classes {
             let pattern = match class.couples {
@@ -193,6 +196,27 @@ impl ContactBuilder<'_> {
             }
         }
         contacts.classes.iter().any(|class| class.turns.is_some())
+    }
+
+    /// Notes how friction combines, and which pairs keep MuJoCo's rule: those that are of MuJoCo's geoms.
+    fn add_combine(&self, contacts: &mut Contacts<f64>, pairs: &[(usize, usize)]) {
+        contacts.combine = self.scene.friction_combine;
+        let keeps: Vec<f64> = pairs
+            .iter()
+            .map(|&(a, b)| {
+                let [a, b] = [a, b].map(|piece| &self.shapes[self.pieces[piece].shape]);
+                f64::from(u8::from(self.geom_pair(a, b).is_some()))
+            })
+            .collect();
+        if contacts.combine == FrictionCombine::Max || !keeps.contains(&1.0) {
+            return;
+        }
+        contacts.keeps_max = Fixed {
+            base: contacts.tables.numbers.len(),
+            stride: 1,
+            rows: pairs.len(),
+        };
+        contacts.tables.numbers.extend(keeps);
     }
 
     fn bound(&self, (a, b): (usize, usize)) -> usize {

@@ -10,7 +10,7 @@ use crate::error::ModelError;
 use crate::geometry::Shape;
 use crate::pose::Pose;
 use crate::surface::Surface;
-use sim_physics::constants::contact::Cone;
+use sim_physics::constants::contact::{Cone, FrictionCombine};
 use sim_physics::constants::params::Param;
 
 /// Default capacity for delays of commands [control frames].
@@ -27,6 +27,8 @@ pub struct Description {
     pub gravity: [f64; 3],
     /// Options of the constraint solver.
     pub solver: Solver,
+    /// How the friction of two shapes combines; geoms of MuJoCo models keep MuJoCo's rule among each other.
+    pub friction_combine: FrictionCombine,
     /// Robots, in the order of their dofs.
     pub robots: Vec<Robot>,
     /// Shapes that never move.
@@ -141,6 +143,7 @@ impl Description {
             substeps,
             gravity: [0.0, 0.0, -9.81],
             solver: Solver::default(),
+            friction_combine: FrictionCombine::Max,
             robots: Vec::new(),
             shapes: Vec::new(),
             filters: Vec::new(),

@@ -3,7 +3,7 @@
 use super::clip::Cut;
 use super::hull::HullTables;
 use super::recast::{Recast, recast, same};
-use crate::lane::{Fixed, Real, Table, Tables};
+use crate::lane::{Fixed, Num, Real, Table, Tables};
 
 /// Shape of the friction cone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -92,6 +92,37 @@ recast! {
         pub memory: Memory,
         /// Of each pair, torsional and rolling friction over sliding friction; without rows where no pair has any.
         pub turning: Fixed,
+        /// How the friction of two shapes combines.
+        pub combine: FrictionCombine,
+        /// Of each pair, 1 where the larger friction counts all the same; without rows where that is so of none or of all.
+        pub keeps_max: Fixed,
+    }
+}
+
+/// How the coefficients of friction of two shapes that touch combine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FrictionCombine {
+    /// The larger one (MuJoCo: `mj_contactParam`).
+    #[default]
+    Max,
+    /// Their mean.
+    Mean,
+    /// The smaller one.
+    Min,
+    /// Their product.
+    Product,
+}
+
+impl FrictionCombine {
+    /// The coefficient of a pair.
+    #[inline(always)]
+    pub fn of<F: Num>(self, a: F, b: F) -> F {
+        match self {
+            FrictionCombine::Max => a.max(b),
+            FrictionCombine::Mean => (a + b) * F::c(0.5),
+            FrictionCombine::Min => a.min(b),
+            FrictionCombine::Product => a * b,
+        }
     }
 }
 
@@ -426,6 +457,8 @@ impl<R: Real> Contacts<R> {
                 len: 0,
             },
             turning: Fixed::default(),
+            combine: FrictionCombine::Max,
+            keeps_max: Fixed::default(),
         }
     }
 
@@ -436,4 +469,4 @@ impl<R: Real> Contacts<R> {
     }
 }
 
-same! { Fixed, Cone, Kind, Group, Pair, Column, Run, Handles, HullTables, Memory }
+same! { Fixed, Cone, FrictionCombine, Kind, Group, Pair, Column, Run, Handles, HullTables, Memory }

@@ -258,14 +258,19 @@ fn boxes_overlap<F: Num>(
     gap.lt(F::c(0.0))
 }
 
-/// Coefficient of friction of a pair where those of shapes vary: the larger (MuJoCo: `mj_contactParam`).
+/// Coefficient of friction of a pair where those of shapes vary.
 #[inline(always)]
 fn friction<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) -> C::F {
     let (indices, table) = (t.handles.pair_indices, t.memory.mu);
     let a = cx.index(indices, p, pair::SOLID_A, table.rows);
     let b = cx.index(indices, p, pair::SOLID_B, table.rows);
     let (a, b) = (cx.load(table, a, 0), cx.load(table, b, 0));
-    a.max(b).max(C::F::c(MU_MIN))
+    let mut mu = t.combine.of(a, b);
+    if t.keeps_max.rows > 0 {
+        let keeps = C::F::c(0.5).lt(cx.constant(t.keeps_max, p, 0));
+        mu = C::F::select(keeps, a.max(b), mu);
+    }
+    mu.max(C::F::c(MU_MIN))
 }
 
 /// The list of a pair's contacts. Its rows count from the reference point of the pair's class.
