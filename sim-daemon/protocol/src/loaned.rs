@@ -3,8 +3,8 @@
 use std::fmt::Debug;
 use std::mem::MaybeUninit;
 
-use iceoryx2::port::SendError;
-use iceoryx2::port::publisher::{LoanError, Publisher};
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::{LoanError, SendError};
 use iceoryx2::prelude::{Service, ZeroCopySend};
 use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut_uninit::SampleMutUninit;
