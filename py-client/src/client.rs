@@ -1,9 +1,12 @@
 //! A client of one daemon, as Python holds it: steps without the interpreter lock, and listens to Ctrl-C meanwhile.
 
+use std::ffi::CString;
 use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sim_protocol::{AttachOptions, Client as Connection, Description, Hook, ProtocolError};
@@ -19,6 +22,8 @@ pub(crate) struct Client {
     // None once closed; a step that runs in another thread keeps its own reference until it returns
     connection: Mutex<Option<Arc<Connection>>>,
     process: u32,
+    /// It was said that targets have no effect.
+    told_of_targets: AtomicBool,
 }
 
 #[pymethods]
@@ -39,6 +44,7 @@ impl Client {
             description: Arc::clone(connection.description()),
             connection: Mutex::new(Some(connection.into())),
             process: std::process::id(),
+            told_of_targets: AtomicBool::new(false),
         })
     }
 
@@ -208,7 +214,27 @@ impl Client {
             inputs.add(field, Axis::Dofs, value)?;
         }
         inputs.add("ctrl", Axis::Actuators, ctrl)?;
+        if let Some(field) = inputs.aimless()
+            && !self.told_of_targets.swap(true, Ordering::Relaxed)
+        {
+            self.tell_of_targets(more.py(), field)?;
+        }
         Ok(inputs)
+    }
+
+    /// Warns of targets that nothing follows.
+    #[cold]
+    fn tell_of_targets(&self, py: Python<'_>, field: &str) -> PyResult<()> {
+        let cure = match self.description.actuator_names.is_empty() {
+            true => {
+                "set joint_target_ke and joint_target_kd of the robot before launch, or send joint_f"
+            }
+            false => "actuators of a MuJoCo model follow ctrl",
+        };
+        let problem =
+            format!("{field} has no effect, since none of these joints has gains: {cure}");
+        let problem = CString::new(problem).expect("names of fields have no zero");
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &problem, 2)
     }
 
     fn connection(&self, py: Python<'_>) -> PyResult<Arc<Connection>> {

@@ -188,6 +188,22 @@ impl<'a, 'py> Inputs<'a, 'py> {
         Ok(())
     }
 
+    /// Targets among the arrays that no drive follows, as far as older daemons say.
+    pub(crate) fn aimless(&self) -> Option<&'a str> {
+        let driven = &self.description.driven;
+        let mut targets = self.arrays.iter().filter(|array| {
+            matches!(array.field, "joint_target_q" | "joint_target_qd") && !array.columns.is_empty()
+        });
+        let is_in_vain = |columns: Range<usize>| {
+            driven
+                .get(columns)?
+                .iter()
+                .all(|&one| one == 0)
+                .then_some(())
+        };
+        targets.find_map(|array| is_in_vain(array.columns.clone()).map(|()| array.field))
+    }
+
     /// The arrays as the protocol takes them.
     pub(crate) fn commands(&self) -> PyResult<Vec<Command<'_>>> {
         self.arrays.iter().map(Input::command).collect()

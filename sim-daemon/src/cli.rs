@@ -10,6 +10,11 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::error::DaemonError;
 
+/// Largest |joint_q| unless another is asked for, that of MuJoCo (`mjMAXVAL`) [rad or m].
+const JOINT_Q_MAX: f64 = 1e10;
+/// Largest |joint_qd| unless another is asked for: no turbine turns so fast [rad/s or m/s].
+const JOINT_QD_MAX: f64 = 1e5;
+
 /// Step many robot worlds at once, and serve them over shared memory.
 #[derive(Debug, Parser)]
 #[command(name = "tightloop", version, propagate_version = true)]
@@ -134,12 +139,12 @@ pub(crate) struct Serve {
     #[arg(long, value_delimiter = ',')]
     pub(crate) params: Vec<String>,
 
-    /// Largest |joint_q| [rad or m]; a world beyond it is frozen at its state before that frame.
-    #[arg(long, value_name = "Q", default_value_t = f64::INFINITY)]
+    /// Largest |joint_q| [rad or m]; a world beyond it is frozen at its state before that frame. inf is no bound.
+    #[arg(long, value_name = "Q", default_value_t = JOINT_Q_MAX)]
     pub(crate) joint_q_max: f64,
 
-    /// Largest |joint_qd| [rad/s or m/s]; a world beyond it is frozen at its state before that frame.
-    #[arg(long, value_name = "QD", default_value_t = f64::INFINITY)]
+    /// Largest |joint_qd| [rad/s or m/s]; a world beyond it is frozen at its state before that frame. inf is no bound.
+    #[arg(long, value_name = "QD", default_value_t = JOINT_QD_MAX)]
     pub(crate) joint_qd_max: f64,
 
     /// What happens to a faulted world: freeze keeps it until a reset, reset resets it before its next step.

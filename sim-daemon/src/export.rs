@@ -167,6 +167,8 @@ pub(crate) fn description(
         scene_folder: info.scene_folder,
         model_hash: model.hash(),
         notes: notes(info.scene),
+        warnings: Vec::new(),
+        driven: driven(model),
         frames_held: info.frames_held,
         watch_worlds: info.watch_worlds.min(options.worlds),
         watch_state_bytes: 0,
@@ -186,6 +188,17 @@ pub(crate) fn description(
         state_bytes: 0,
         schema: 0,
     }
+}
+
+/// Of each dof, whether a drive moves it or could: it has gains, or worlds may get some.
+fn driven(model: &Model) -> Vec<u8> {
+    let gains = [Param::JointTargetKe, Param::JointTargetKd];
+    let vary = gains
+        .iter()
+        .any(|&gain| model.constants().varying.first(gain).is_some());
+    let dofs = model.constants().dofs.iter();
+    dofs.map(|dof| u8::from(vary || dof.ke > 0.0 || dof.kd > 0.0))
+        .collect()
 }
 
 /// JSON has no infinity.

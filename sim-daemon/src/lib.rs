@@ -3,6 +3,7 @@
 //!
 //! [`serve`] is the whole command line as one function, so that a Python wheel can carry it.
 
+mod advice;
 mod arrays;
 mod bench;
 mod cli;

@@ -15,6 +15,7 @@ use sim_protocol::host::{Host, check_memory};
 use sim_protocol::paths::DaemonPaths;
 use sim_protocol::{Description, ProtocolError, Table};
 
+use crate::advice::advice;
 use crate::cli::Serve;
 use crate::config::{self, SceneFile};
 use crate::error::DaemonError;
@@ -173,6 +174,9 @@ impl Door<'_> {
             self.bytes as f64 / 1e6,
             description.pid,
         ));
+        for warning in &description.warnings {
+            self.log.write(&format!("warning: {warning}"));
+        }
         description
             .notes
             .iter()
@@ -246,6 +250,7 @@ fn open(serve: &Serve) -> Result<Opened, DaemonError> {
     announced.groups = count;
     // before anything large is taken: memory that is missing kills instead of failing
     check_memory(&announced, &table, Simulation::memory_of(&model, &options))?;
+    announced.warnings = advice(&description, &model);
     let simulations = Simulation::groups(model, &options, count)?;
     announced.state_bytes = simulations[0].snapshot_bytes(announced.worlds) as u64;
     announced.watch_state_bytes = simulations[0].snapshot_bytes(announced.watch_worlds) as u64;
@@ -379,7 +384,7 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
         ("joint-qd-max", serve.joint_qd_max),
     ] {
         if value <= 0.0 || value.is_nan() {
-            let problem = "give a number above 0, or leave it out for none".to_owned();
+            let problem = "give a number above 0; inf is no bound".to_owned();
             return wrong(argument, &value, problem);
         }
     }

@@ -233,6 +233,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "snapshot",
             "export",
             "arrays",
+            "advice",
             "recording",
             "observe",
             "groups",

@@ -31,16 +31,17 @@ def number(
     *,
     above: float | None = None,
     least: float | None = None,
+    infinite: bool = False,
     error: type[Exception] = SceneError,
 ) -> float:
-    """Check a finite float, optionally with a lower bound."""
+    """Check a finite float, optionally with a lower bound, or with infinity as a value."""
     try:
         checked = float(value)
     except (TypeError, ValueError):
         raise error(f"{what} is {value!r}; give a number") from None
     except OverflowError:  # an int with more than 308 digits
         raise error(f"{what} is larger than any float; give a finite number") from None
-    if not math.isfinite(checked):
+    if not math.isfinite(checked) and not (infinite and checked == math.inf):
         raise error(f"{what} is {checked}; give a finite number")
     if above is not None and checked <= above:
         raise error(f"{what} is {checked:g}; it must be above {above:g}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import secrets
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, overload
 
@@ -97,7 +98,8 @@ def launch(
             ``"joint_friction"``, ``"command_delay"``, ``"gyro_noise"``; `Sim.params` lists them all. Parameters that
             the scene names and those that `Scene.randomize` draws vary too.
         bounds: Largest absolute ``"joint_q"`` [rad or m] and ``"joint_qd"`` [rad/s or m/s]. A world beyond a bound
-            faults: it keeps its state before that frame, with bit 8 of ``status``. No bounds if left out.
+            faults: it keeps its state before that frame, with bit 8 of ``status``. What is left out is 1e10, as in
+            MuJoCo, and 1e5; ``inf`` is no bound.
         on_fault: What happens to a faulted world: ``"freeze"`` keeps its state until it is reset, ``"reset"`` resets it
             before its next step, so that one frame shows its ``status``.
         on_nan: What happens to a command that is NaN or infinite in some world: ``"refuse"`` refuses it for all worlds,
@@ -115,6 +117,9 @@ def launch(
 
     Returns:
         A `Sim`, or with ``groups`` the `Groups`, a sequence of them.
+
+    Warns:
+        UserWarning: A value of the scene is valid and most likely a mistake; the message names it and the cure.
 
     Raises:
         ArgumentError: An argument is not valid; the message lists what is valid.
@@ -150,13 +155,7 @@ def launch(
     arguments["on-fault"] = checks.text("launch: on_fault", on_fault, error=ArgumentError)
     arguments["on-nan"] = checks.text("launch: on_nan", on_nan, error=ArgumentError)
     arguments["draws"] = checks.text("launch: draws", draws, error=ArgumentError)
-    if bounds is not None and not isinstance(bounds, Mapping):
-        raise ArgumentError(f'launch: bounds is {bounds!r}; give a dict, such as {{"joint_qd": 50.0}}')
-    for bound, value in (bounds or {}).items():
-        if bound not in ("joint_q", "joint_qd"):
-            raise ArgumentError(f"launch: bounds has {bound!r}; give joint_q and joint_qd, or one of them")
-        name_of = f"launch: bounds of {bound}"
-        arguments[f"{bound.replace('_', '-')}-max"] = checks.number(name_of, value, above=0.0, error=ArgumentError)
+    arguments |= _bounds(bounds)
     if threads is not None:
         arguments["threads"] = checks.integer("launch: threads", threads, error=ArgumentError)
     if log is not None:
@@ -164,10 +163,26 @@ def launch(
     daemon = Daemon.start(scene.to_toml(), arguments, users=count)
     try:
         sims = [Sim(_core.Client(own, lease=True), daemon) for own in _names(arguments["name"], count)]
+        for warning in sims[0].info["warnings"]:
+            warnings.warn(warning, stacklevel=2)
     except BaseException:
         daemon.stop()
         raise
     return sims[0] if groups is None else Groups(arguments["name"], sims)
+
+
+def _bounds(bounds: Mapping[str, float] | None) -> dict[str, float]:
+    """Return the arguments of the daemon for bounds."""
+    if bounds is not None and not isinstance(bounds, Mapping):
+        raise ArgumentError(f'launch: bounds is {bounds!r}; give a dict, such as {{"joint_qd": 50.0}}')
+    arguments = {}
+    for bound, value in (bounds or {}).items():
+        if bound not in ("joint_q", "joint_qd"):
+            raise ArgumentError(f"launch: bounds has {bound!r}; give joint_q and joint_qd, or one of them")
+        name_of = f"launch: bounds of {bound}"
+        checked = checks.number(name_of, value, above=0.0, infinite=True, error=ArgumentError)
+        arguments[f"{bound.replace('_', '-')}-max"] = checked
+    return arguments
 
 
 def _joined(argument: str, names: Iterable[str]) -> str:

@@ -97,6 +97,12 @@ pub struct Description {
     pub model_hash: u64,
     /// What was ignored or mended while the scene was read, one sentence each.
     pub notes: Vec<String>,
+    /// What is most likely a mistake in the scene, a sentence or two each. Older recordings have none.
+    #[serde(default)]
+    pub warnings: Vec<String>,
+    /// Of each dof, 1 if its drive has gains or worlds may get some, else 0. Older recordings have none.
+    #[serde(default)]
+    pub driven: Vec<u8>,
     /// Frames that the controller, or one observer, may hold at once.
     pub frames_held: usize,
     /// Worlds that observers see: the first ones.

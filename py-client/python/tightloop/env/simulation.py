@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -87,8 +88,11 @@ def _check(task: Task, scene: tl.Scene, sim: tl.Sim, fields: tuple[str, ...]) ->
     missing = [field for field in fields if field not in sim.fields]
     if missing:
         raise ArgumentError(f"daemon `{sim.name}` does not show {', '.join(missing)}; {cure}")
-    # compare with what the daemon's description reports; a bound that is not given is infinite
-    bounds = {f"{name}_max": value for name, value in task.launch_options.get("bounds", {}).items()}
+    # compare with what the daemon's description reports, which has no infinity
+    bounds = {
+        f"{name}_max": None if math.isinf(value) else value
+        for name, value in task.launch_options.get("bounds", {}).items()
+    }
     reported = {name: value for name, value in (DAEMON_OPTIONS | task.launch_options).items() if name in sim.info}
     for option, value in (reported | bounds).items():
         if sim.info[option] != value:

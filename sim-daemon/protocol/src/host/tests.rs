@@ -75,6 +75,8 @@ fn description() -> Description {
         scene_folder: String::new(),
         model_hash: 0,
         notes: Vec::new(),
+        warnings: Vec::new(),
+        driven: Vec::new(),
         frames_held: 2,
         watch_worlds: 1,
         watch_state_bytes: STATE as u64,

@@ -1,0 +1,149 @@
+//! Values with the wrong unit or order, and drives that cannot act.
+
+use std::f64::consts::TAU;
+
+use sim_model::{Description, Joint, JointDof, JointKind, Pose, Robot, TargetMode};
+use sim_physics::constants::params::Param;
+
+use super::some;
+
+/// Physics steps longer than this are rare [s].
+const DT_USUAL: f64 = 0.05;
+/// How far outside of its range a joint may start, as a part of that range.
+const OUTSIDE: f64 = 0.01;
+/// The identity, as libraries write it that put w first.
+const W_FIRST: [f64; 4] = [1.0, 0.0, 0.0, 0.0];
+
+/// Advice on numbers of the scene.
+pub(super) fn advice(scene: &Description) -> Vec<String> {
+    let mut all: Vec<String> = step(scene).into_iter().collect();
+    let shapes = scene.shapes.iter();
+    all.extend(shapes.filter_map(|shape| turned(&format!("shape `{}`", shape.name), &shape.pose)));
+    // what MuJoCo compiled has its own conventions, and its own warnings
+    for robot in scene.robots.iter().filter(|robot| robot.mujoco.is_none()) {
+        let kind = match robot.urdf {
+            Some(_) => "robot",
+            None => "body",
+        };
+        let name = format!("{kind} `{}`", robot.name);
+        let base = robot.joints.iter().find(|joint| joint.parent.is_none());
+        let start = base.filter(|joint| joint.kind == JointKind::Free);
+        let pose = start.map_or(robot.pose, |joint| Pose {
+            pos: robot.pose.pos,
+            quat: [joint.q[3], joint.q[4], joint.q[5], joint.q[6]],
+        });
+        all.extend(turned(&name, &pose));
+        all.extend(outside(robot, &name));
+        all.extend(powerless(scene, robot, &name));
+        all.extend(aimless(scene, robot, &name));
+    }
+    all
+}
+
+/// A time step that is far too long.
+fn step(scene: &Description) -> Option<String> {
+    let dt = scene.dt;
+    (dt > DT_USUAL).then(|| {
+        format!("dt is {dt} s. Simulations are seldom stable at it; 0.001 to 0.01 s are usual.")
+    })
+}
+
+/// A half turn about x that was most likely to be no turn.
+fn turned(what: &str, pose: &Pose) -> Option<String> {
+    (pose.quat == W_FIRST).then(|| {
+        format!(
+            "{what} is turned by 180° about x: quat is (1, 0, 0, 0), and the order is (x, y, z, w). Give (0, 0, 0, 1) for no turn, \
+             or (-1, 0, 0, 0) if the half turn is meant."
+        )
+    })
+}
+
+/// Joints that start outside of their limits.
+fn outside(robot: &Robot, what: &str) -> Option<String> {
+    let mut found = Vec::new();
+    let mut is_large = false;
+    for joint in moving(robot) {
+        let (Some([lower, upper]), [q]) = (joint.range, joint.q.as_slice()) else {
+            continue;
+        };
+        let slack = OUTSIDE * (upper - lower);
+        if joint.mimic.is_none() && (*q < lower - slack || *q > upper + slack) {
+            let is_angle = joint.kind == JointKind::Revolute;
+            is_large |= is_angle && q.abs() > TAU;
+            let unit = if is_angle { "rad" } else { "m" };
+            found.push(format!(
+                "`{}` at {q:.4} {unit} ({lower:.4} to {upper:.4})",
+                joint.name
+            ));
+        }
+    }
+    (!found.is_empty()).then(|| {
+        let cure = match is_large {
+            true => "Angles are in radians: np.radians converts degrees.",
+            false => "The limits will push them back: set joint_q.",
+        };
+        format!(
+            "{what} starts outside of joint limits: {}. {cure}",
+            some(&found)
+        )
+    })
+}
+
+/// Drives with gains that may not use any effort.
+fn powerless(scene: &Description, robot: &Robot, what: &str) -> Option<String> {
+    if varies(scene, Param::JointEffortLimit) {
+        return None;
+    }
+    let names: Vec<String> = moving(robot)
+        .filter(|joint| {
+            let is_powerless = |dof: &JointDof| {
+                dof.effort_limit == Some(0.0) && (dof.target_ke > 0.0 || dof.target_kd > 0.0)
+            };
+            joint.dofs.iter().any(is_powerless)
+        })
+        .map(|joint| format!("`{}`", joint.name))
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{what}: the drives of {} have gains and an effort limit of 0, so they do nothing. Set joint_effort_limit; inf is no limit.",
+            some(&names)
+        )
+    })
+}
+
+/// Targets of drives without gains.
+fn aimless(scene: &Description, robot: &Robot, what: &str) -> Option<String> {
+    if varies(scene, Param::JointTargetKe) || varies(scene, Param::JointTargetKd) {
+        return None;
+    }
+    let names: Vec<String> = moving(robot)
+        .filter(|joint| {
+            joint.dofs.iter().enumerate().any(|(part, dof)| {
+                let start = joint.q.get(part).copied().unwrap_or(0.0);
+                let aims =
+                    dof.target_q.is_some_and(|target| target != start) || dof.target_qd != 0.0;
+                let is_velocity = dof.target_mode == TargetMode::Velocity;
+                aims && dof.target_kd == 0.0 && (is_velocity || dof.target_ke == 0.0)
+            })
+        })
+        .map(|joint| format!("`{}`", joint.name))
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{what}: {} have targets and no gains, so they ignore them. Set joint_target_ke and joint_target_kd.",
+            some(&names)
+        )
+    })
+}
+
+/// Whether worlds have values of their own.
+fn varies(scene: &Description, param: Param) -> bool {
+    scene.params.contains(&param) || scene.param_ranges.contains_key(&param)
+}
+
+fn moving(robot: &Robot) -> impl Iterator<Item = &Joint> {
+    robot
+        .moving_joints()
+        .into_iter()
+        .map(|joint| &robot.joints[joint])
+}
