@@ -117,15 +117,16 @@ TABLES = (
         ("randomize",),
         "[randomize]\n",
         '[[body]]\nname = "cube"\npos = [0, 0, 0.05]\n\n[[shape]]\nbody = "cube"\ntype = "box"\n'
-        'half_extents = [0.02, 0.02, 0.02]\n\n[[shape]]\nname = "ground"\ntype = "plane"\n\n'
+        'half_extents = [0.02, 0.02, 0.02]\n\n[[shape]]\nname = "ground"\ntype = "plane"\nmu = 0.2\n\n'
         "[randomize.body_q]\ncube = { x = { uniform = [-0.05, 0.05] }, yaw = { normal = [0, 0.3] } }\n\n"
-        "[randomize.params]\nshape_mu = { ground = { uniform = [0.2, 1.0] } }\n",
+        "[randomize.params]\nshape_mu = { cube = { uniform = [0.2, 1.0] } }\n",
         "A distribution is `{ uniform = [low, high] }` or `{ normal = [mean, standard deviation] }`. "
         "Draws depend only on seed, world and episode. Parameters with a range vary between worlds.",
     ),
 )
 # Words that a key may be, and which key of which table.
 WORDS = (
+    ("scene.rs", "CombineName", "The file itself", "friction_combine"),
     ("scene.rs", "ConeName", "[solver]", "cone"),
     ("robots.rs", "ModeName", "[[robot]]", "joint_target_mode"),
     ("shapes.rs", "ShapeName", "[[shape]]", "type"),
@@ -147,6 +148,7 @@ TYPES = {
     "Vec<[String; 2]>": "list of pairs of text",
     "PerDof<Number>": "number, or a list",
     "PerDof<ModeName>": "word, or a list",
+    "CombineName": "word",
     "ConeName": "word",
     "ShapeName": "word",
     "Named<DistributionTable>": "distributions by name",
