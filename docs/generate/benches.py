@@ -155,8 +155,8 @@ Keep in mind:
 - MuJoCo keeps all vertices of a hull, tightloop at most 64. So the two find different contact points on meshes.
 - The solver dominates under random targets. A SIMD register waits for the slowest of its 16 worlds, and each world can
   need a dozen Newton iterations when contacts begin or slide.
-- For that reason, tightloop groups worlds with similar contacts in the same registers. The run on 2 cores predates this
-  (commit 2fca836), so its `random` row is slower.
+- For that reason, tightloop groups worlds with similar contacts in the same registers.
+- The machine with 2 cores is shared. On another day it was 1.6 times as fast for MuJoCo, and twice for tightloop.
 """,
         {"demo": "demo", "worlds_alike": "commands", "worlds": "worlds", **_BESIDE_MUJOCO},
         _COMMANDS,
