@@ -1,7 +1,7 @@
 //! A client of one daemon, as Python holds it: steps without the interpreter lock, and listens to Ctrl-C meanwhile.
 
 use std::ffi::CString;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -214,26 +214,39 @@ impl Client {
             inputs.add(field, Axis::Dofs, value)?;
         }
         inputs.add("ctrl", Axis::Actuators, ctrl)?;
-        if let Some(field) = inputs.aimless()
+        if let Some((field, columns)) = inputs.aimless()
             && !self.told_of_targets.swap(true, Ordering::Relaxed)
         {
-            self.tell_of_targets(more.py(), field)?;
+            self.tell_of_targets(more.py(), field, &columns)?;
         }
         Ok(inputs)
     }
 
     /// Warns of targets that nothing follows.
     #[cold]
-    fn tell_of_targets(&self, py: Python<'_>, field: &str) -> PyResult<()> {
-        let cure = match self.description.actuator_names.is_empty() {
-            true => {
-                "set joint_target_ke and joint_target_kd of the robot before launch, or send joint_f"
-            }
-            false => "actuators of a MuJoCo model follow ctrl",
+    fn tell_of_targets(&self, py: Python<'_>, field: &str, dofs: &Range<usize>) -> PyResult<()> {
+        let robots = self.description.robots.iter();
+        let own = robots.filter(|robot| robot.dofs[0] < dofs.end && dofs.start < robot.dofs[1]);
+        let (models, others): (Vec<_>, Vec<_>) =
+            own.partition(|robot| robot.actuators[0] < robot.actuators[1]);
+        let gains = match field {
+            "joint_target_q" => "joint_target_ke and joint_target_kd",
+            _ => "joint_target_kd, and joint_target_mode \"velocity\" or \"both\",",
         };
-        let problem =
-            format!("{field} has no effect, since none of these joints has gains: {cure}");
-        let problem = CString::new(problem).expect("names of fields have no zero");
+        let cure = match others.is_empty() {
+            true => "actuators of a MuJoCo model follow ctrl".to_owned(),
+            false => format!("set {gains} of the robot before launch, or send joint_f"),
+        };
+        let names: Vec<_> = others
+            .iter()
+            .chain(&models)
+            .map(|robot| format!("`{}`", robot.name))
+            .collect();
+        let problem = format!(
+            "{field} has no effect, since no drive of {} follows it: {cure}",
+            names.join(", ")
+        );
+        let problem = CString::new(problem).expect("names have no zero");
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &problem, 2)
     }
 

@@ -188,20 +188,19 @@ impl<'a, 'py> Inputs<'a, 'py> {
         Ok(())
     }
 
-    /// Targets among the arrays that no drive follows, as far as older daemons say.
-    pub(crate) fn aimless(&self) -> Option<&'a str> {
+    /// Targets among the arrays that no drive follows, as far as older daemons say, and whose they are.
+    pub(crate) fn aimless(&self) -> Option<(&'a str, Range<usize>)> {
         let driven = &self.description.driven;
-        let mut targets = self.arrays.iter().filter(|array| {
-            matches!(array.field, "joint_target_q" | "joint_target_qd") && !array.columns.is_empty()
-        });
-        let is_in_vain = |columns: Range<usize>| {
-            driven
-                .get(columns)?
-                .iter()
-                .all(|&one| one == 0)
-                .then_some(())
-        };
-        targets.find_map(|array| is_in_vain(array.columns.clone()).map(|()| array.field))
+        self.arrays.iter().find_map(|array| {
+            let bit = match array.field {
+                "joint_target_q" => 1,
+                "joint_target_qd" => 2,
+                _ => return None,
+            };
+            let own = driven.get(array.columns.clone())?;
+            let is_in_vain = !own.is_empty() && own.iter().all(|follows| follows & bit == 0);
+            is_in_vain.then(|| (array.field, array.columns.clone()))
+        })
     }
 
     /// The arrays as the protocol takes them.

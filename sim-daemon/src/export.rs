@@ -190,15 +190,17 @@ pub(crate) fn description(
     }
 }
 
-/// Of each dof, whether a drive moves it or could: it has gains, or worlds may get some.
+/// Which targets the drive of each dof follows: 1 positions, 2 velocities, 3 both. It has gains, or worlds may get some.
 fn driven(model: &Model) -> Vec<u8> {
-    let gains = [Param::JointTargetKe, Param::JointTargetKd];
-    let vary = gains
-        .iter()
-        .any(|&gain| model.constants().varying.first(gain).is_some());
+    let varies = |param| model.constants().varying.first(param).is_some();
+    let [ke, kd] = [Param::JointTargetKe, Param::JointTargetKd].map(varies);
     let dofs = model.constants().dofs.iter();
-    dofs.map(|dof| u8::from(vary || dof.ke > 0.0 || dof.kd > 0.0))
-        .collect()
+    dofs.map(|dof| {
+        let positions = dof.follows_position && (ke || dof.ke > 0.0);
+        let velocities = dof.follows_velocity && (kd || dof.kd > 0.0);
+        u8::from(positions) | u8::from(velocities) << 1
+    })
+    .collect()
 }
 
 /// JSON has no infinity.

@@ -107,7 +107,7 @@ def test_a_client_that_is_hit_hinders_nobody(pendulum, tmp_path, victim, how):
         sim.step()
         shared, victims, temporary = stems_of(sim.pid), set[int](), tmp_path / "temporary"
         temporary.mkdir()
-        files = len(left_of(shared))
+        before = left_of(shared)
         for round_ in range(ROUNDS):
             sim.release()
             process = start(victim, sim.name, temporary)
@@ -130,7 +130,9 @@ def test_a_client_that_is_hit_hinders_nobody(pendulum, tmp_path, victim, how):
                 promptly(lambda onlooker=onlooker: onlooker.latest(1.0))
             promptly(sim.snapshot)
         assert strays(victims, temporary) == []
-        assert wait_until(lambda: len(left_of(shared)) <= files, PATIENCE), "the dead leave nothing with the living"
+        wait_until(lambda: len(left_of(shared)) <= len(before), PATIENCE)
+        left = [path for path in left_of(shared) if path not in before]
+        assert len(left_of(shared)) <= len(before), f"the dead left something with the living, among {left}"
         assert alive(sim.pid)
 
 

@@ -45,8 +45,9 @@ def told(scene: tl.Scene, **options: object) -> list[str]:
 def test_a_scene_without_traps_is_not_warned_of(tmp_path):
     scene = tl.Scene()
     scene.add_ground()
-    robot(scene, tmp_path, floating=True).joint_target_ke = 5.0
-    scene.robots["hinge"].joint_q = [0, 0, 0.11, 0, 0, 0, 1, 0.3]
+    hinge = robot(scene, tmp_path, floating=True)
+    hinge.joint_target_ke, hinge.joint_target_q = 5.0, 0.4
+    hinge.joint_q = [0, 0, 0.5, 0, 0, 0, 1, 0.3]
     scene.add_cube(pos=(1, 0, 0.025))
     scene.randomize(params={"shape_mu": {"ground": tl.Uniform(0.5, 1.5)}})
     assert told(scene) == []
@@ -118,13 +119,22 @@ def test_targets_of_a_step_that_nothing_follows_are_told_once(tmp_path):
     scene = tl.Scene()
     robot(scene, tmp_path)
     with tl.launch(scene, worlds=2) as sim:
-        with pytest.warns(UserWarning, match="joint_target_q has no effect.*joint_target_ke") as caught:
+        with pytest.warns(UserWarning, match="joint_target_q has no effect.*`hinge`.*joint_target_ke") as caught:
             sim.step(joint_target_q=np.ones((2, 1)))
         assert caught[0].filename == __file__
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             sim.step(joint_target_q=np.ones((2, 1)))
             sim.step(joint_f=np.ones((2, 1)))
+
+
+def test_velocity_targets_of_a_drive_that_holds_positions(tmp_path):
+    scene = tl.Scene()
+    robot(scene, tmp_path).joint_target_ke = 5.0
+    with tl.launch(scene, worlds=1) as sim:
+        with pytest.warns(UserWarning, match="joint_target_qd has no effect.*joint_target_mode"):
+            sim.step(joint_target_qd=[1.0])
+        assert sim.step(joint_target_q=[1.0]).step[0] == 2
 
 
 def test_a_warning_that_is_an_error_leaves_the_simulation_usable(tmp_path):

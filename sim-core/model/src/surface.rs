@@ -11,7 +11,7 @@ const LENGTH_MAX: f64 = 1e6;
 /// Contact parameters of a shape. Margins and gaps of two shapes are added; the other values are combined as MuJoCo does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
-    /// Coefficient of sliding friction; the larger of two shapes counts [–].
+    /// Coefficient of sliding friction; of two shapes the larger counts, or what the scene's rule makes of both [–].
     pub mu: f64,
     /// Stiffness, Newton's shape `ke`: with `kd` it is MuJoCo's `solref` (2/kd, kd/(2 √ke)), per unit of effective mass [1/s²].
     pub ke: f64,

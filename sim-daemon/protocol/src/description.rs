@@ -100,7 +100,7 @@ pub struct Description {
     /// What is most likely a mistake in the scene, a sentence or two each. Older recordings have none.
     #[serde(default)]
     pub warnings: Vec<String>,
-    /// Of each dof, 1 if its drive has gains or worlds may get some, else 0. Older recordings have none.
+    /// Which targets the drive of each dof follows: 1 positions, 2 velocities, 3 both. Older recordings have none.
     #[serde(default)]
     pub driven: Vec<u8>,
     /// Frames that the controller, or one observer, may hold at once.

@@ -174,6 +174,7 @@ fn handle_cut_files() {
         }
         // never freed: a handler may be reading the one before
         PREVIOUS.store(Box::into_raw(Box::new(present)), Ordering::Release);
+        HANDED_ON.store(false, Ordering::Release);
         let mut action: libc::sigaction = std::mem::zeroed();
         action.sa_sigaction = ours;
         action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK;

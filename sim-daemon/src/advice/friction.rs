@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use sim_model::{Distribution, FrictionCombine, Model};
+use sim_model::{Description, Distribution, FrictionCombine, Model};
 use sim_physics::constants::params::Param;
 
 use super::some;
@@ -11,7 +11,9 @@ use super::some;
 const DEVIATIONS: f64 = 4.0;
 
 /// Advice on draws of `shape_mu` without an effect.
-pub(super) fn advice(model: &Model) -> Vec<String> {
+pub(super) fn advice(scene: &Description, model: &Model) -> Vec<String> {
+    // contacts with geoms of MuJoCo models keep the larger one, whatever the rule
+    let has_geoms = scene.robots.iter().any(|robot| robot.mujoco.is_some());
     let draws = model.start().params.iter();
     let drawn: BTreeMap<usize, [f64; 2]> = draws
         .filter(|draw| draw.param == Param::ShapeMu)
@@ -32,8 +34,8 @@ pub(super) fn advice(model: &Model) -> Vec<String> {
     }
     let (word, other_rule) = match model.constants().contacts.combine {
         FrictionCombine::Max => ("larger", "min"),
-        FrictionCombine::Min => ("smaller", "max"),
-        FrictionCombine::Mean | FrictionCombine::Product => return Vec::new(),
+        FrictionCombine::Min if !has_geoms => ("smaller", "max"),
+        _ => return Vec::new(),
     };
     let names = model.shape_names();
     let mut all = Vec::new();
@@ -56,10 +58,15 @@ pub(super) fn advice(model: &Model) -> Vec<String> {
                 format!("`{}` with {number}", names[other])
             })
             .collect();
+        let rule = match has_geoms {
+            true => String::new(),
+            false => {
+                format!(", or choose another rule, such as friction_combine=\"{other_rule}\"")
+            }
+        };
         all.push(format!(
             "shape `{}`: the friction drawn for it, {low} to {high}, has no effect, since of two shapes the {word} coefficient \
-             counts, and it touches {}. Draw that of the others too, or choose another rule, such as \
-             friction_combine=\"{other_rule}\".",
+             counts, and it touches {}. Draw that of the others too{rule}.",
             names[shape],
             some(&others)
         ));

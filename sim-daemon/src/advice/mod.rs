@@ -14,8 +14,8 @@ const NAMED: usize = 3;
 /// Advice on a scene and its model, a sentence or two each.
 pub(crate) fn advice(scene: &Description, model: &Arc<Model>) -> Vec<String> {
     let mut all = values::advice(scene);
-    all.extend(friction::advice(model));
-    all.extend(start::advice(model));
+    all.extend(friction::advice(scene, model));
+    all.extend(start::advice(scene, model));
     all
 }
 

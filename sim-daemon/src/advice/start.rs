@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use sim_engine::simulation::{Options, Precision, Simulation};
-use sim_model::Model;
+use sim_model::{Description, Model};
 use sim_physics::arrays::Field;
 
 /// Depth at the start that is told [m]: grippers and feet are made with less.
@@ -12,11 +12,11 @@ const DEPTH: f64 = 0.01;
 const NAMED: usize = 3;
 
 /// Advice on where bodies start. A model that cannot be evaluated has none; the simulation says why.
-pub(super) fn advice(model: &Arc<Model>) -> Vec<String> {
-    deep_pairs(model).unwrap_or_default()
+pub(super) fn advice(scene: &Description, model: &Arc<Model>) -> Vec<String> {
+    deep_pairs(scene, model).unwrap_or_default()
 }
 
-fn deep_pairs(model: &Arc<Model>) -> Option<Vec<String>> {
+fn deep_pairs(scene: &Description, model: &Arc<Model>) -> Option<Vec<String>> {
     if model.contacts_max() == 0 {
         return Some(Vec::new());
     }
@@ -46,9 +46,16 @@ fn deep_pairs(model: &Arc<Model>) -> Option<Vec<String>> {
     let distances: &[f64] = bytemuck::cast_slice(words(Field::ContactDistance)?);
     let pairs: &[i32] = bytemuck::cast_slice(words(Field::ContactPair)?);
     let mut deep: Vec<(f64, [i32; 2])> = Vec::new();
+    // models from MuJoCo begin where their makers put them, often at a keyframe
+    let names = model.shape_names();
+    let is_geom = |shape: i32| {
+        let owner = names[shape as usize].split('/').next();
+        let mut models = scene.robots.iter().filter(|robot| robot.mujoco.is_some());
+        models.any(|robot| Some(robot.name.as_str()) == owner)
+    };
     let found = distances.iter().zip(pairs.as_chunks().0).take(count);
     for (&distance, &pair) in found {
-        if distance > -DEPTH {
+        if distance > -DEPTH || pair.into_iter().all(is_geom) {
             continue;
         }
         match deep.iter_mut().find(|(_, other)| *other == pair) {
@@ -57,7 +64,6 @@ fn deep_pairs(model: &Arc<Model>) -> Option<Vec<String>> {
         }
     }
     deep.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let names = model.shape_names();
     let named: Vec<String> = deep
         .iter()
         .take(NAMED)

@@ -69,7 +69,9 @@ fn outside(robot: &Robot, what: &str) -> Option<String> {
         };
         let is_angle = joint.kind == JointKind::Revolute;
         let slack = if is_angle { OUTSIDE[0] } else { OUTSIDE[1] };
-        if joint.mimic.is_none() && (*q < lower - slack || *q > upper + slack) {
+        // draws are clamped to the limits
+        let is_drawn = joint.dofs.iter().any(|dof| dof.offset_q.is_some());
+        if joint.mimic.is_none() && !is_drawn && (*q < lower - slack || *q > upper + slack) {
             is_large |= is_angle && q.abs() > TAU;
             let unit = if is_angle { "rad" } else { "m" };
             found.push(format!(
@@ -118,11 +120,11 @@ fn aimless(scene: &Description, robot: &Robot, what: &str) -> Option<String> {
         return None;
     }
     let names: Vec<String> = moving(robot)
+        .filter(|joint| matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic))
         .filter(|joint| {
-            joint.dofs.iter().enumerate().any(|(part, dof)| {
-                let start = joint.q.get(part).copied().unwrap_or(0.0);
+            joint.dofs.iter().zip(&joint.q).any(|(dof, start)| {
                 let aims =
-                    dof.target_q.is_some_and(|target| target != start) || dof.target_qd != 0.0;
+                    dof.target_q.is_some_and(|target| target != *start) || dof.target_qd != 0.0;
                 let is_velocity = dof.target_mode == TargetMode::Velocity;
                 aims && dof.target_kd == 0.0 && (is_velocity || dof.target_ke == 0.0)
             })

@@ -27,7 +27,7 @@ pub struct Description {
     pub gravity: [f64; 3],
     /// Options of the constraint solver.
     pub solver: Solver,
-    /// How the friction of two shapes combines; geoms of MuJoCo models keep MuJoCo's rule among each other.
+    /// How the friction of two shapes combines; contacts with geoms of MuJoCo models keep MuJoCo's rule.
     pub friction_combine: FrictionCombine,
     /// Robots, in the order of their dofs.
     pub robots: Vec<Robot>,

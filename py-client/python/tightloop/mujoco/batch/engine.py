@@ -9,8 +9,8 @@ The rows of a batch are the truth. A world of the simulation is in one of three 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from math import gcd
 from typing import Any
 
 import numpy as np
@@ -107,7 +107,7 @@ class Engine:
 
         It is the greatest common divisor of all calls, so that a simulation is launched again a few times at most.
         """
-        self._common = gcd(self._common, steps)
+        self._common = math.gcd(self._common, steps)
         most = min(self._common, _SUBSTEPS_MAX)
         self.substeps = next(count for count in range(most, 0, -1) if self._common % count == 0)
         return steps // self.substeps
@@ -133,6 +133,8 @@ class Engine:
             fields=sorted(self._fields),
             params=sorted(self.params),
             watch_worlds=1,
+            # MuJoCo's own check of a state follows each step
+            bounds={"joint_q": math.inf, "joint_qd": math.inf},
             **self._options,
         )
         self._launched_with = (len(self._fields), len(self.params), self.substeps)
