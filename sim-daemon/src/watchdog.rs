@@ -26,7 +26,7 @@ impl Watchdog {
     pub(crate) fn start(
         stop: Arc<AtomicBool>,
         parent: Option<u32>,
-        cleanup: ClientCleanup,
+        mut cleanup: ClientCleanup,
     ) -> Result<Watchdog, DaemonError> {
         let end = Arc::new((Mutex::new(false), Condvar::new()));
         let theirs = Arc::clone(&end);

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
@@ -90,6 +92,17 @@ def strays(pids: set[int], folder: Path) -> list[Path]:
     return shared + [path for path in folder.iterdir() if path.suffix != ".tlrec"]
 
 
+def owners_of(files: list[str], daemon: int) -> Counter[str]:
+    """Count files by kind and by the processes that made them: ids of ports and nodes have them in bits 64 to 95."""
+    known = {daemon: "the daemon", os.getpid(): "the test"}
+
+    def owner(number: str) -> str:
+        return known.get(int(number) >> 64 & 0xFFFFFFFF, "a client")
+
+    ids = [re.findall(r"[0-9]{20,}", Path(file).name) for file in files]
+    return Counter(f"{Path(file).suffix} of {' to '.join(map(owner, own))}" for file, own in zip(files, ids, strict=True))
+
+
 def promptly(call: Callable[[], object]) -> None:
     """Make a call, which must neither fail nor take long."""
     began = time.monotonic()
@@ -131,8 +144,9 @@ def test_a_client_that_is_hit_hinders_nobody(pendulum, tmp_path, victim, how):
             promptly(sim.snapshot)
         assert strays(victims, temporary) == []
         wait_until(lambda: len(left_of(shared)) <= len(before), PATIENCE)
-        left = [path for path in left_of(shared) if path not in before]
-        assert len(left_of(shared)) <= len(before), f"the dead left something with the living, among {left}"
+        left = left_of(shared)
+        more = owners_of(left, sim.pid) - owners_of(before, sim.pid)
+        assert len(left) <= len(before), f"the dead left something with the living: {dict(more)}"
         assert alive(sim.pid)
 
 
@@ -169,3 +183,43 @@ def test_a_daemon_that_is_hit_is_told_rightly(pendulum, root, how):
             onlooker.close()
         assert not list(root.iterdir())
     assert left_of(stems) == []
+
+
+def test_a_client_that_died_without_details_is_cleaned_up_after(pendulum):
+    """As if it were killed between its node's monitor and the details, or between removing the two."""
+    with tl.launch(pendulum, worlds=1) as sim:
+        sim.step()
+        shared = stems_of(sim.pid)
+        before, nodes = left_of(shared), node_folders(shared)
+        with subprocess.Popen([sys.executable, "-c", OBSERVER, sim.name], stdout=subprocess.PIPE, text=True) as observer:
+            assert wait_until(lambda: len(node_folders(shared)) > len(nodes), PATIENCE)
+            os.kill(sim.pid, signal.SIGSTOP)
+            try:
+                observer.kill()
+                observer.wait()
+                [theirs] = node_folders(shared) - nodes
+                for details in theirs.glob("*node.details"):
+                    details.unlink()
+            finally:
+                os.kill(sim.pid, signal.SIGCONT)
+        assert wait_until(lambda: len(left_of(shared)) <= len(before), PATIENCE), left_of(shared)
+        sim.step()
+
+
+def test_a_connection_that_nobody_owns_is_removed(pendulum):
+    """As if a client were killed between making the file and marking it as its own."""
+    with tl.launch(pendulum, worlds=1) as sim:
+        sim.step()
+        shared = stems_of(sim.pid)
+        connection = Path(next(file for file in left_of(shared) if file.endswith(".connection")))
+        sender = re.findall(r"[0-9]{20,}", connection.name)[0]
+        orphan = connection.with_name(connection.name.replace(sender, str(int(sender) + (1 << 100))))
+        orphan.write_bytes(connection.read_bytes())
+        assert wait_until(lambda: not orphan.exists(), PATIENCE)
+        sim.step()
+        assert connection.exists()
+
+
+def node_folders(shared: set[str]) -> set[Path]:
+    """Folders of the nodes, one for each process, of a daemon's shared memory."""
+    return {Path(file).parent for file in left_of(shared) if file.endswith(".service_tag")}

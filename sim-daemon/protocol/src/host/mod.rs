@@ -138,9 +138,7 @@ impl Host {
 
     /// Something that cleans up after killed clients, to be run now and then on a thread of its own.
     pub fn client_cleanup(&self) -> ClientCleanup {
-        ClientCleanup {
-            config: self.state.node.config().clone(),
-        }
+        ClientCleanup::new(&self.state.node)
     }
 
     /// Waits for the next thing to do.

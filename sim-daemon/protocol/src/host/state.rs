@@ -71,10 +71,7 @@ impl State {
         if let Some(lease) = &mut self.lease
             && lease.holder.is_some()
         {
-            ClientCleanup {
-                config: self.node.config().clone(),
-            }
-            .clean();
+            ClientCleanup::new(&self.node).clean();
             if lease.is_over() || lease.is_silent() {
                 self.renew();
             }

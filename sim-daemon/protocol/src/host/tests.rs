@@ -111,7 +111,7 @@ fn serve(paths: &DaemonPaths, stop: Arc<AtomicBool>, ready: Sender<()>, takes: D
     let table = Table::over_arena([("count".to_owned(), Dtype::U64, vec![2], 0)], 64);
     let daemon_lock = DaemonLock::take(paths).unwrap();
     let mut host = Host::open(daemon_lock, description(), table, stop).unwrap();
-    let cleanup = host.client_cleanup();
+    let mut cleanup = host.client_cleanup();
     ready.send(()).unwrap();
     let mut count = 0;
     loop {
