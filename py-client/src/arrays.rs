@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use crate::errors::raise;
 
 /// Write parts, each `(worlds,)` or `(worlds, columns)`, side by side into `out`, `(worlds, size)`; numbers below `low` or
-/// above `high`, one a column, count as these. NaN stays NaN.
+/// above `high`, one a column, count as these. NaN stays NaN. Returns whether there is any.
 #[pyfunction]
 pub(crate) fn pack(
     py: Python<'_>,
@@ -17,7 +17,7 @@ pub(crate) fn pack(
     parts: Vec<Bound<'_, PyAny>>,
     low: PyReadonlyArray1<'_, f32>,
     high: PyReadonlyArray1<'_, f32>,
-) -> PyResult<()> {
+) -> PyResult<bool> {
     let (low, high) = (low.as_slice()?, high.as_slice()?);
     let size = low.len();
     let rows = out.as_array().nrows();
@@ -50,7 +50,8 @@ pub(crate) fn pack(
         let problem = format!("pack: {first} columns for {size}");
         return Err(raise(py, "ArgumentError", problem));
     }
-    Ok(())
+    // every number is looked at, which is faster than to stop at the first
+    Ok(out.iter().fold(false, |found, x| found | x.is_nan()))
 }
 
 /// Copies a part into the columns from `first` on; how many it has, or `None` if its type or shape is another.

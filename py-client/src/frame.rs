@@ -6,7 +6,8 @@ use numpy::ndarray::{ArrayViewD, IxDyn};
 use numpy::npyffi::flags::NPY_ARRAY_WRITEABLE;
 use numpy::{Element, PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyDict, PyType};
 use sim_protocol::{Dtype, View};
 
 use crate::errors::protocol;
@@ -53,7 +54,9 @@ impl PyFrame {
         if let Some(array) = find(&self.arrays()) {
             return Ok(array);
         }
-        let array = read_only(sample, &view);
+        static FRAME_ARRAY: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let kind = FRAME_ARRAY.import(py, "tightloop.written_arrays", "FrameArray")?;
+        let array = read_only(sample, &view).call_method1("view", (kind,))?;
         self.arrays()
             .push((name.to_owned(), array.clone().unbind()));
         Ok(array)
@@ -62,11 +65,9 @@ impl PyFrame {
     /// The frame's arrays in memory of their own, as attributes of the same names. Takes no slot.
     fn copy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let arrays = PyDict::new(py);
-        for view in self.sample.bind(py).get().0.fields() {
-            arrays.set_item(
-                view.name,
-                self.__getattr__(py, view.name)?.call_method0("copy")?,
-            )?;
+        let sample = self.sample.bind(py);
+        for view in sample.get().0.fields() {
+            arrays.set_item(view.name, read_only(sample, &view).call_method0("copy")?)?;
         }
         py.import("tightloop.frames")?
             .getattr("FrameCopy")?

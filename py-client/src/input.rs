@@ -5,7 +5,7 @@ use std::ops::Range;
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
-use sim_protocol::{Command, Description, Values};
+use sim_protocol::{Command, Description, RobotRange, Values};
 
 use crate::errors::raise;
 
@@ -15,6 +15,18 @@ pub(crate) enum Axis {
     Dofs,
     Coords,
     Actuators,
+}
+
+impl Axis {
+    /// The columns of a robot.
+    fn of(self, robot: &RobotRange) -> Range<usize> {
+        let [start, stop] = match self {
+            Axis::Dofs => robot.dofs,
+            Axis::Coords => robot.coords,
+            Axis::Actuators => robot.actuators,
+        };
+        start..stop
+    }
 }
 
 /// The arrays of one command.
@@ -106,7 +118,7 @@ impl<'a, 'py> Inputs<'a, 'py> {
                 self.add_robot(field, axis, &name, &value)?;
             }
         } else {
-            self.convert(field, None, columns, value)?;
+            self.convert((field, axis), None, columns, value)?;
         }
         Ok(())
     }
@@ -135,20 +147,33 @@ impl<'a, 'py> Inputs<'a, 'py> {
                 format!("{field}: no robot `{name}`; there are: {known}"),
             ));
         };
-        let [start, stop] = match axis {
-            Axis::Dofs => robot.dofs,
-            Axis::Coords => robot.coords,
-            Axis::Actuators => robot.actuators,
-        };
-        match self.ready(value, &(start..stop)) {
-            Some(array) => self.arrays.push(Input {
-                field,
-                columns: start..stop,
-                array,
-            }),
-            None => self.convert(field, Some(&robot.name), start..stop, value)?,
+        let Range {
+            start,
+            end: stop,
+        } = axis.of(robot);
+        let base = self.base(axis, &(start..stop));
+        for columns in [start..stop, start + base..stop] {
+            if let Some(array) = self.ready(value, &columns) {
+                self.arrays.push(Input {
+                    field,
+                    columns,
+                    array,
+                });
+                return Ok(());
+            }
         }
-        Ok(())
+        self.convert((field, axis), Some(&robot.name), start..stop, value)
+    }
+
+    /// How many of a robot's columns are of a floating base, which may be left out.
+    fn base(&self, axis: Axis, columns: &Range<usize>) -> usize {
+        let (names, first, size) = match axis {
+            Axis::Dofs => (&self.description.dof_names, ".vx", 6),
+            Axis::Coords => (&self.description.coord_names, ".x", 7),
+            Axis::Actuators => return 0,
+        };
+        let is_free = columns.len() > size && names[columns.start].ends_with(first);
+        if is_free { size } else { 0 }
     }
 
     /// The array itself, when it needs no conversion.
@@ -168,22 +193,31 @@ impl<'a, 'py> Inputs<'a, 'py> {
     /// The slow way, for everything else that NumPy can make an array of; or an error that says why not.
     fn convert(
         &mut self,
-        field: &'static str,
+        (field, axis): (&'static str, Axis),
         robot: Option<&str>,
         columns: Range<usize>,
         value: &Bound<'py, PyAny>,
     ) -> PyResult<()> {
+        let base = robot.map_or(0, |_| self.base(axis, &columns));
+        let robots = self.description.robots.iter();
+        let sizes: Vec<(&str, usize)> = robots
+            .map(|robot| (robot.name.as_str(), axis.of(robot).len()))
+            .collect();
         let arguments = (field, robot, value, self.description.worlds, columns.len());
+        let more = PyDict::new(value.py());
+        more.set_item("base", base)?;
+        more.set_item("robots", sizes)?;
         let array = value
             .py()
             .import("tightloop.inputs")?
             .getattr("as_array")?
-            .call1(arguments)?;
-        let array = Array::F64(array.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?);
+            .call(arguments, Some(&more))?;
+        let array = array.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?;
+        let size = array.shape()[1];
         self.arrays.push(Input {
             field,
-            columns,
-            array,
+            columns: columns.end - size..columns.end,
+            array: Array::F64(array),
         });
         Ok(())
     }

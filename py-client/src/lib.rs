@@ -57,7 +57,9 @@ mod core {
     #[pymodule_export]
     use super::rays::RayScene;
     #[pymodule_export]
-    use super::scene::{load_scene, read_mesh, read_mujoco, read_urdf, save_scene, scene_to_toml};
+    use super::scene::{
+        load_scene, parse_scene, read_mesh, read_mujoco, read_urdf, save_scene, scene_to_toml,
+    };
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

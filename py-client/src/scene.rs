@@ -85,6 +85,13 @@ pub(crate) fn load_scene(py: Python<'_>, path: PathBuf) -> PyResult<String> {
     Ok(scene.to_json().to_string())
 }
 
+/// Read TOML text, as `scene_to_toml` writes it, as JSON; paths stay as they are.
+#[pyfunction]
+pub(crate) fn parse_scene(py: Python<'_>, text: &str) -> PyResult<String> {
+    let scene = config::parse(text, "scene").map_err(|error| scene_error(py, &error))?;
+    Ok(scene.to_json().to_string())
+}
+
 fn from_json(py: Python<'_>, scene: &str) -> PyResult<SceneFile> {
     SceneFile::from_json(scene).map_err(|error| scene_error(py, &error))
 }

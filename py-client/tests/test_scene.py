@@ -64,9 +64,7 @@ def test_targets_are_the_start_positions_until_set(arm: tl.Robot):
     assert arm.joint_target_q.tolist() == [0, 0]
 
 
-def test_a_property_cannot_be_changed_in_place(arm: tl.Robot):
-    with pytest.raises(ValueError, match="read-only"):
-        arm.joint_q[0] = 1
+def test_a_property_is_not_the_array_that_was_given(arm: tl.Robot):
     given = np.zeros(2)
     arm.joint_q = given
     given[0] = 1
@@ -80,10 +78,10 @@ def test_a_property_cannot_be_changed_in_place(arm: tl.Robot):
         ("joint_q", [[1, 2]], r"joint_q has shape \(1, 2\)"),
         ("joint_q", [1, math.nan], r"joint_q of coordinate `arm/elbow` is nan"),
         ("joint_q", [math.inf, 0], r"joint_q of coordinate `arm/shoulder` is inf; give a finite number$"),
-        ("joint_q", ["a", "b"], r"joint_q has dtype <U1"),
-        ("joint_q", [1j, 0], r"joint_q has dtype complex128"),
+        ("joint_q", ["a", "b"], r"joint_q is \['a', 'b'\]; give real numbers"),
+        ("joint_q", [1j, 0], r"joint_q is \[1j, 0\]; give real numbers"),
         ("joint_q", [[1], [1, 2]], r"joint_q is no array"),
-        ("joint_effort_limit", -1, r"joint_effort_limit of dof `arm/shoulder` is -1\.0; it cannot be negative"),
+        ("joint_effort_limit", -1, r"joint_effort_limit of dof `arm/shoulder` is -1\.0; give a number of at least 0"),
         ("joint_target_kd", [1, -2], r"joint_target_kd of dof `arm/elbow` is -2\.0"),
         ("joint_target_mode", "force", r"joint_target_mode.*'force'.*'position', 'velocity', 'both'"),
         ("joint_target_mode", ["both"], r"joint_target_mode has 1 values; expected 2"),

@@ -134,7 +134,7 @@ NAN[2, 1] = np.nan
         ({"joint_f": F32.astype(str)}, r"joint_f.*<U"),
         ({"joint_f": F32.astype(bool)}, r"joint_f.*bool"),
         ({"joint_f": [[1.0], [1.0, 2.0]]}, r"joint_f"),
-        ({"joint_f": np.full((4, 2), None)}, r"joint_f.*object"),
+        ({"joint_f": np.full((4, 2), None)}, r"joint_f.*None"),
         ({"joint_f": NAN}, r"joint_f.*world 2.*arm/elbow"),
         ({"joint_f": NAN.astype(float)}, r"joint_f.*world 2.*arm/elbow"),
         ({"joint_f": np.full((4, 2), 1e300)}, r"joint_f.*world 0.*arm/shoulder"),

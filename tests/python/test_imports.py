@@ -27,12 +27,14 @@ Graph = dict[str, set[str]]
 LAYERS = (
     ("tightloop.errors",),
     (
+        "tightloop.attributes",
         "tightloop.checks",
         "tightloop.frames",
         "tightloop.inputs",
         "tightloop.keyframes",
         "tightloop.optional_imports",
         "tightloop.whole_files",
+        "tightloop.written_arrays",
     ),
     ("tightloop._core",),
     ("tightloop.mujoco",),
@@ -43,6 +45,7 @@ LAYERS = (
         "tightloop.entity",
         "tightloop.mujoco_model",
         "tightloop.robot",
+        "tightloop.robot_properties",
         "tightloop.scene_mujoco",
         "tightloop.scene_options",
         "tightloop.scene_randomization",
@@ -54,6 +57,7 @@ LAYERS = (
     ("tightloop.scene",),
     # what a running simulation is made of
     (
+        "tightloop.command_arrays",
         "tightloop.daemon",
         "tightloop.dynamics",
         "tightloop.params",

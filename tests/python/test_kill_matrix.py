@@ -100,7 +100,9 @@ def owners_of(files: list[str], daemon: int) -> Counter[str]:
         return known.get(int(number) >> 64 & 0xFFFFFFFF, "a client")
 
     ids = [re.findall(r"[0-9]{20,}", Path(file).name) for file in files]
-    return Counter(f"{Path(file).suffix} of {' to '.join(map(owner, own))}" for file, own in zip(files, ids, strict=True))
+    return Counter(
+        f"{Path(file).suffix} of {' to '.join(map(owner, own))}" for file, own in zip(files, ids, strict=True)
+    )
 
 
 def promptly(call: Callable[[], object]) -> None:
@@ -191,7 +193,9 @@ def test_a_client_that_died_without_details_is_cleaned_up_after(pendulum):
         sim.step()
         shared = stems_of(sim.pid)
         before, nodes = left_of(shared), node_folders(shared)
-        with subprocess.Popen([sys.executable, "-c", OBSERVER, sim.name], stdout=subprocess.PIPE, text=True) as observer:
+        with subprocess.Popen(
+            [sys.executable, "-c", OBSERVER, sim.name], stdout=subprocess.PIPE, text=True
+        ) as observer:
             assert wait_until(lambda: len(node_folders(shared)) > len(nodes), PATIENCE)
             os.kill(sim.pid, signal.SIGSTOP)
             try:

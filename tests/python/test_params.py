@@ -38,8 +38,6 @@ def test_each_is_read_as_it_was_written(sim):
     for number, name in enumerate(ALL):
         before = getattr(sim.params, name)
         assert before.shape[0] == WORLDS and before.dtype == dtype
-        with pytest.raises(ValueError, match="read-only"):
-            before[0] = 1.0
         given = np.random.default_rng(number).uniform(0.5, 2.0, before.shape)
         setattr(sim.params, name, given)
         np.testing.assert_array_equal(getattr(sim.params, name), given.astype(dtype))
@@ -127,7 +125,9 @@ def test_constants_and_wrong_values_are_refused_by_name(pendulum):
             _ = sim.params.gravity
         with pytest.raises(tl.CommandRefused, match=r'params=\("body_f",\)'):
             sim.step(body_f=np.zeros((3, 3, 6)))
-        with pytest.raises(tl.UnknownField, match=r"there is no parameter 'mass'; there are: gravity, "):
+        with pytest.raises(
+            tl.UnknownField, match=r"there is no parameter 'mass'; did you mean `body_mass`\? there are: gravity, "
+        ):
             sim.params.mass = 1.0
         with pytest.raises(tl.CommandRefused, match=r"expected shape \(3, 2\), \(2,\) .* got \(2, 2\)"):
             sim.params.joint_target_ke = np.zeros((2, 2))

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
         SnapshotError,
         TightloopError,
         TransportError,
+        UnknownAttribute,
         UnknownDaemon,
         UnknownField,
         UrdfError,
@@ -82,6 +83,7 @@ _HOMES = {
         "SnapshotError",
         "TightloopError",
         "TransportError",
+        "UnknownAttribute",
         "UnknownDaemon",
         "UnknownField",
         "UrdfError",
@@ -138,6 +140,7 @@ __all__ = [
     "TightloopError",
     "TransportError",
     "Uniform",
+    "UnknownAttribute",
     "UnknownDaemon",
     "UnknownField",
     "UrdfError",
@@ -152,7 +155,12 @@ def __getattr__(name: str) -> Any:
     # Lazy (PEP 562): the daemon also starts through this package, and must not wait for the import of NumPy.
     home = _HOME_OF.get(name)
     if home is None:
-        raise AttributeError(f"module `tightloop` has no attribute `{name}`")
+        if name.startswith("_"):
+            raise AttributeError(f"module `tightloop` has no attribute `{name}`")
+        from tightloop.attributes import suggestion
+        from tightloop.errors import UnknownAttribute
+
+        raise UnknownAttribute(f"module `tightloop` has no attribute `{name}`; {suggestion(name, __all__)}")
     from importlib import import_module
 
     value = globals()[name] = getattr(import_module(home), name)

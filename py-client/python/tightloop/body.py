@@ -17,17 +17,10 @@ from tightloop.errors import SceneError
 class Body(Entity):
     """A rigid body of a scene, made by `Scene.add_body`. ``scene.add_box(body=…)`` and the like give it shapes.
 
-    Attributes:
-        name: Name in the scene. ``sim.bodies[name]`` is its slice of ``body_q``, ``sim.dofs[name]`` that of
-            ``joint_qd``.
-        fixed: Whether the body does not move. Otherwise it has the six dofs ``name/free.vx`` … ``name/free.wz``.
-        mass: Mass [kg]; None takes it from the shapes.
-        com: Centre of mass in the body's frame [m]; None takes it from the shapes.
-        inertia: Inertia about the centre of mass, in body axes [kg·m²], 3 rows; None takes it from the shapes.
+    ``sim.bodies[name]`` is its slice of ``body_q``, ``sim.dofs[name]`` that of ``joint_qd``.
     """
 
-    # a misspelt property is an error
-    __slots__ = ("com", "fixed", "inertia", "mass")
+    __slots__ = ("_com", "_fixed", "_inertia", "_mass")
 
     kind = "body"
 
@@ -42,14 +35,52 @@ class Body(Entity):
         inertia: ArrayLike | None,
         fixed: bool,
     ) -> None:
-        what = f"body `{name}`"
         super().__init__(name, pos, quat)
-        self.fixed = bool(fixed)
-        self.mass = None if mass is None else checks.number(f"{what}: mass", mass, above=0.0)
-        self.com: Triple | None = None if com is None else checks.triple(f"{what}: com", com)
-        self.inertia = None if inertia is None else _tensor(f"{what}: inertia", inertia)
-        if inertia is not None and mass is None:
-            raise SceneError(f"{what} has an inertia but no mass; give mass= too")
+        self._inertia: list[Sequence[float]] | None = None
+        self.fixed = fixed
+        self.mass = mass
+        self.com = com
+        self.inertia = inertia
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the body does not move. Otherwise it has the six dofs ``name/free.vx`` … ``name/free.wz``."""
+        return self._fixed
+
+    @fixed.setter
+    def fixed(self, fixed: bool) -> None:
+        self._fixed = checks.flag(f"{self._subject()}: fixed", fixed)
+
+    @property
+    def mass(self) -> float | None:
+        """Mass [kg]; None takes it from the shapes."""
+        return self._mass
+
+    @mass.setter
+    def mass(self, mass: float | None) -> None:
+        if mass is None and self._inertia is not None:
+            raise SceneError(f"{self._subject()} has an inertia but no mass; give a mass, or set inertia to None first")
+        self._mass = None if mass is None else checks.number(f"{self._subject()}: mass", mass, above=0.0)
+
+    @property
+    def com(self) -> Triple | None:
+        """Centre of mass in the body's frame [m]; None takes it from the shapes."""
+        return self._com
+
+    @com.setter
+    def com(self, com: Vector | None) -> None:
+        self._com = None if com is None else checks.triple(f"{self._subject()}: com", com)
+
+    @property
+    def inertia(self) -> list[Sequence[float]] | None:
+        """Inertia about the centre of mass, in body axes [kg·m²], 3 rows; None takes it from the shapes."""
+        return self._inertia
+
+    @inertia.setter
+    def inertia(self, inertia: ArrayLike | None) -> None:
+        if inertia is not None and self._mass is None:
+            raise SceneError(f"{self._subject()} has an inertia but no mass; give mass= too")
+        self._inertia = None if inertia is None else _tensor(f"{self._subject()}: inertia", inertia)
 
     def table(self) -> dict[str, Any]:
         """Return the body in the form of a scene file."""
@@ -71,8 +102,8 @@ def _tensor(what: str, values: ArrayLike) -> list[Sequence[float]]:
     """Check a symmetric tensor, given by 3 rows or by its diagonal."""
     try:
         given = np.asarray(values, dtype=float)
-    except (TypeError, ValueError) as problem:
-        raise SceneError(f"{what} is no array: {problem}") from None
+    except (TypeError, ValueError):
+        raise SceneError(f"{what} is {values!r:.80}; give 3 principal moments or a (3, 3) tensor") from None
     if given.shape == (3,):
         given = np.diag(given)
     if given.shape != (3, 3):

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, SupportsFloat, SupportsIndex
 
+import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.errors import SceneError
@@ -36,6 +37,8 @@ def number(
 ) -> float:
     """Check a finite float, optionally with a lower bound, or with infinity as a value."""
     try:
+        if isinstance(value, str | bytes | bytearray):  # which `float` reads
+            raise TypeError
         checked = float(value)
     except (TypeError, ValueError):
         raise error(f"{what} is {value!r}; give a number") from None
@@ -63,6 +66,13 @@ def integer(what: str, value: SupportsIndex, *, least: int = 1, error: type[Exce
     return checked
 
 
+def flag(what: str, value: object, *, error: type[Exception] = SceneError) -> bool:
+    """Check a bool; 0 and 1 count, words such as ``"no"`` do not."""
+    if isinstance(value, bool | np.bool_) or (isinstance(value, int | np.integer) and value in (0, 1)):
+        return bool(value)
+    raise error(f"{what} is {value!r}; give True or False")
+
+
 def text(what: str, value: str, *, error: type[Exception] = SceneError) -> str:
     """Check a string for use in other programs: no lone surrogates, no zero bytes."""
     if not isinstance(value, str):
@@ -81,7 +91,7 @@ def path(what: str, value: str | os.PathLike[str], *, error: type[Exception] = S
     if not isinstance(given, str):
         raise error(f"{what} is {value!r}; give a path as str or pathlib.Path")
     if "\0" in given:
-        raise error(f"{what} is {given!r}; a path has no zero byte")
+        raise error(f"{what} is {given!r}; give a path without a zero byte")
     return Path(given).expanduser().absolute()
 
 

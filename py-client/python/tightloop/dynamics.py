@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import _core
+from tightloop import _core, checks
 from tightloop.errors import ArgumentError, SceneError
 from tightloop.inputs import reals
 from tightloop.scene import Scene
@@ -139,7 +139,9 @@ class Dynamics:
         """
         dofs = len(self.dof_names)
         many, q, qd, qdd = self._states(joint_q, joint_qd, joint_qdd)
-        forces = self._core.inverse_dynamics(q, qd, qdd, bool(damping))
+        forces = self._core.inverse_dynamics(
+            q, qd, qdd, checks.flag("inverse_dynamics: damping", damping, error=ArgumentError)
+        )
         return forces.reshape((*many, dofs))
 
     def _evaluate(self, field: str, shape: tuple[int, ...], joint_q: ArrayLike, joint_qd: ArrayLike | None) -> Array:

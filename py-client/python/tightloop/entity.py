@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import ClassVar
 
 from tightloop import checks
+from tightloop.attributes import Attributes
 from tightloop.checks import Quaternion, Triple, Vector
 
 
-class Entity:
+class Entity(Attributes):
     """A named part of a scene with a pose in the world."""
 
-    # a misspelt property is an error
     __slots__ = ("_name", "_pos", "_quat")
 
     #: Kind of entity, for messages.
@@ -21,6 +21,9 @@ class Entity:
         self._name = name
         self.pos = pos
         self.quat = quat
+
+    def _subject(self) -> str:
+        return f"{self.kind} `{self.name}`"
 
     @property
     def name(self) -> str:

@@ -94,6 +94,10 @@ class RecordingError(TightloopError, ValueError):
     """A recording cannot be read to its end, or the files of its scene are missing or have changed."""
 
 
+class UnknownAttribute(TightloopError, AttributeError):
+    """An object has no attribute of that name, or it can only be read; the message suggests another."""
+
+
 class UnknownField(TightloopError, AttributeError):
     """Frames of this run do not carry the field; add it to ``fields`` at launch."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,19 +12,42 @@ from numpy.typing import NDArray
 from tightloop.errors import ArgumentError, CommandRefused
 
 
-def as_array(field: str, robot: str | None, value: Any, worlds: int, columns: int) -> NDArray[np.float64]:
+def as_array(
+    field: str,
+    robot: str | None,
+    value: Any,
+    worlds: int,
+    columns: int,
+    *,
+    base: int = 0,
+    robots: Sequence[tuple[str, int]] = (),
+) -> NDArray[np.float64]:
     """Convert any array of real numbers to contiguous float64, shape ``(worlds, columns)``.
+
+    Args:
+        field: Name of the argument, for messages.
+        robot: Robot whose columns these are; None for the whole scene.
+        value: The array.
+        worlds: Number of worlds.
+        columns: Number of columns.
+        base: Number of columns of a floating base, which come first and may be left out.
+        robots: Robots of the scene and their numbers of columns, for messages.
 
     Raises:
         CommandRefused: The shape is neither ``(worlds, columns)`` nor ``(columns,)``, or the values are not real.
     """
     what = field if robot is None else f"{field} of robot `{robot}`"
     given = real_numbers(what, value)
-    if given.shape not in ((worlds, columns), (columns,)):
+    size = columns - base if given.shape[-1:] == (columns - base,) else columns
+    if given.shape not in ((worlds, size), (size,)):
         expected = f"expected shape {(worlds, columns)}, or {(columns,)} for every world alike"
-        raise CommandRefused(f"{what}: {expected}; got {given.shape}")
+        if base:
+            expected += f"; {columns - base} without the {base} of its floating base"
+        fitting = [name for name, own in robots if robot is None and given.shape in ((worlds, own), (own,))]
+        cure = f'. Robot `{fitting[0]}` has as many: give {{"{fitting[0]}": …}}' if fitting else ""
+        raise CommandRefused(f"{what}: {expected}; got {given.shape}{cure}")
     with np.errstate(over="ignore"):  # float128 may become inf, which the client refuses
-        return np.array(np.broadcast_to(given, (worlds, columns)), dtype=np.float64, order="C")
+        return np.array(np.broadcast_to(given, (worlds, size)), dtype=np.float64, order="C")
 
 
 def real_numbers(what: str, value: Any) -> NDArray[Any]:
@@ -34,7 +58,7 @@ def real_numbers(what: str, value: Any) -> NDArray[Any]:
     """
     given = _numpy(what, value)
     if given.dtype.kind not in "fiu":
-        raise CommandRefused(f"{what}: dtype {given.dtype} is not a real number; give float32 or float64")
+        raise CommandRefused(f"{what}: {_shown(value, given)} is not a real number; give float32 or float64")
     return given
 
 
@@ -46,10 +70,12 @@ def reals(what: str, value: Any) -> NDArray[Any]:
     """
     try:
         given = np.asarray(value)
-    except (ValueError, TypeError) as problem:
-        raise ArgumentError(f"{what} is no array: {problem}") from None
+    except (ValueError, TypeError):
+        raise ArgumentError(
+            f"{what} is {value!r:.80}; give an array of real numbers, with rows of one length"
+        ) from None
     if given.dtype.kind not in "fiu":
-        raise ArgumentError(f"{what} has dtype {given.dtype}; give real numbers")
+        raise ArgumentError(f"{what}: {_shown(value, given)} is not a real number; give float32 or float64")
     return given
 
 
@@ -71,7 +97,9 @@ def as_mask(name: str, value: Any, worlds: int) -> NDArray[np.bool_]:
     """
     given = _numpy(name, value)
     if given.dtype != np.bool_:
-        raise CommandRefused(f"{name}: dtype {given.dtype} is not bool; give True for the worlds meant")
+        raise CommandRefused(
+            f"{name}: {_shown(value, given)} is not bool; give an array with True for the worlds meant"
+        )
     if given.shape != (worlds,):
         raise CommandRefused(f"{name}: expected shape {(worlds,)}; got {given.shape}")
     return np.ascontiguousarray(given)
@@ -110,8 +138,15 @@ def whole_seed(value: Any) -> int | None:
     return seed if seed is not None and 0 <= seed < 2**64 else None
 
 
+def _shown(value: Any, given: NDArray[Any]) -> str:
+    """Return a value that has no dtype to speak of, or the dtype."""
+    return f"{value!r:.80}" if given.ndim == 0 or given.dtype == object else f"dtype {given.dtype}"
+
+
 def _numpy(what: str, value: Any) -> NDArray[Any]:
     try:
         return np.asarray(value)
-    except (ValueError, TypeError) as problem:
-        raise CommandRefused(f"{what}: is no array: {problem}") from None
+    except (ValueError, TypeError):
+        raise CommandRefused(
+            f"{what} is {value!r:.80}; give an array of real numbers, with rows of one length"
+        ) from None

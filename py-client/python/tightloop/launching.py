@@ -159,7 +159,9 @@ def launch(
     if threads is not None:
         arguments["threads"] = checks.integer("launch: threads", threads, error=ArgumentError)
     if log is not None:
-        arguments["log"] = checks.path("launch: log", log, error=ArgumentError)
+        file = arguments["log"] = checks.path("launch: log", log, error=ArgumentError)
+        if not file.parent.is_dir():
+            raise ArgumentError(f"launch: log is {file}, and there is no folder {file.parent}; make it first")
     daemon = Daemon.start(scene.to_toml(), arguments, users=count)
     try:
         sims = [Sim(_core.Client(own, lease=True), daemon) for own in _names(arguments["name"], count)]

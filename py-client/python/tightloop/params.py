@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core
 from tightloop._core import Frame
+from tightloop.attributes import nearest
 from tightloop.errors import CommandRefused, ConstantParameter, UnknownField
 from tightloop.inputs import real_numbers
+from tightloop.written_arrays import PropertyArray
 
 #: Values per body or site, of parameters with several.
 PARTS = {
@@ -30,9 +32,10 @@ class Params:
     """The varying parameters of a simulation, as attributes of `Sim.params`.
 
     A parameter varies if ``launch(params=...)`` or the scene names it, or if `Scene.randomize` draws it. Reading one
-    returns a read-only array, shape ``(worlds, ...)``. Assigning to one writes it in all worlds, `write` in some. A
-    written value takes effect at the next step and survives resets. Exceptions are ``body_f``, which a reset clears,
-    and parameters that `Scene.randomize` draws, which a reset draws again.
+    returns an array, shape ``(worlds, ...)``. Assigning to one, or to its entries (``params.shape_mu[0] = 0.5``),
+    writes it in all worlds, `write` in some. A written value takes effect at the next step and survives resets.
+    Exceptions are ``body_f``, which a reset clears, and parameters that `Scene.randomize` draws, which a reset draws
+    again.
 
     Free joints have no drive and no dry friction: their gains, effort limits, ``joint_friction`` and target noise have
     no effect. `Sim.inverse_dynamics` and the other functions of a state use the scene's values, not these. Reading
@@ -87,9 +90,11 @@ class Params:
         first = self._numbers - param["place"]
         rows = self._state()[:, -first:][:, : param["info"]["columns"]]
         array = np.array(rows).reshape(self._shape(name))
-        # writing into this copy would have no effect
-        array.flags.writeable = False
-        return array
+
+        def write(values: NDArray[Any]) -> None:
+            self.write(**{name: values})
+
+        return PropertyArray.of(array, write, lambda problem: CommandRefused(f"params.{name} {problem}"))
 
     def __setattr__(self, name: str, value: ArrayLike) -> None:
         self.write(**{name: value})
@@ -125,7 +130,8 @@ class Params:
 
     def _varying(self, name: str) -> dict[str, Any]:
         if name not in self._known:
-            raise UnknownField(f"there is no parameter {name!r}; there are: {', '.join(self._known)}")
+            near = "".join(f"did you mean `{other}`? " for other in nearest(name, self._known)[:1])
+            raise UnknownField(f"there is no parameter {name!r}; {near}there are: {', '.join(self._known)}")
         if self._known[name]["place"] is None:
             named = ", ".join(self.names) or "none does"
             raise ConstantParameter(

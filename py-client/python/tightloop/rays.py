@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import _core
+from tightloop import _core, checks
 from tightloop._core import Frame
 from tightloop.errors import ArgumentError, SceneError, UnknownField
 from tightloop.frames import FrameCopy
@@ -99,7 +99,7 @@ class Rays:
         check_lengths(directions)
         excluded = self._excluded(bodyexclude, shape[:2])
         dist, geomid, normal = self._core.cast(
-            self._chosen(geomgroup, bool(flg_static)),
+            self._chosen(geomgroup, checks.flag("rays: flg_static", flg_static, error=ArgumentError)),
             poses,
             np.broadcast_to(origins, shape),
             np.broadcast_to(directions, shape),

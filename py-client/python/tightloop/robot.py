@@ -2,164 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from tightloop import checks
+from tightloop.attributes import suggestion
 from tightloop.checks import Vector
 from tightloop.entity import Entity
 from tightloop.errors import SceneError
-
-MODES = ("position", "velocity", "both")
-
-
-class _PerDof:
-    """A property with one entry per dof; a single value is written to every dof with a drive."""
-
-    entry = "dof"
-
-    def __init__(self, doc: str) -> None:
-        self.__doc__ = doc
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name
-
-    def error(self, robot: Robot, problem: str) -> SceneError:
-        return SceneError(f"robot `{robot.name}`: {self.name} {problem}")
-
-    def names(self, robot: Robot) -> list[str]:
-        return robot.dof_names
-
-    def expected(self, robot: Robot) -> str:
-        names = self.names(robot)
-        return f"expected {len(names)}, one a {self.entry} ({_some(names)}), or a single one for all"
-
-
-class _Numbers(_PerDof):
-    def __init__(self, doc: str, *, otherwise: str | None = None, signed: bool = True, limit: bool = False) -> None:
-        super().__init__(doc)
-        self.otherwise, self.signed, self.limit = otherwise, signed, limit
-
-    @overload
-    def __get__(self, robot: None, owner: type) -> _Numbers: ...
-    @overload
-    def __get__(self, robot: Robot, owner: type) -> NDArray[np.float64]: ...
-    def __get__(self, robot: Robot | None, owner: type) -> _Numbers | NDArray[np.float64]:
-        if robot is None:
-            return self
-        own = robot._own.get(self.name)
-        if own is None and self.otherwise is not None:
-            own = robot._start_targets()
-        values = np.array(robot._urdf_values(self.name) if own is None else own, dtype=np.float64)
-        # `arm.joint_q[3] = 1` would change a copy, so it raises an error
-        values.flags.writeable = False
-        return values
-
-    def __set__(self, robot: Robot, values: ArrayLike) -> None:
-        try:
-            given = np.asarray(values)
-        except ValueError as problem:
-            raise self.error(robot, f"is no array: {problem}") from None
-        if given.dtype.kind not in "fiu":
-            raise self.error(robot, f"has dtype {given.dtype}; give real numbers")
-        names = self.names(robot)
-        if given.ndim != 0 and given.shape != (len(names),):
-            got = f"{given.shape[0]} values" if given.ndim == 1 else f"shape {given.shape}"
-            raise self.error(robot, f"has {got}; {self.expected(robot)}")
-        checked = np.full(len(names), given, dtype=np.float64)
-        if given.ndim == 0:
-            checked[~self.takes_single(robot)] = 0.0
-        for name, value in zip(names, checked, strict=True):
-            if not (np.isfinite(value) or (self.limit and value == np.inf)):
-                cure = "a finite number, or inf for no limit" if self.limit else "a finite number"
-                raise self.error(robot, f"of {self.entry} `{robot.name}/{name}` is {value}; give {cure}")
-            if value < 0.0 and not self.signed:
-                raise self.error(robot, f"of {self.entry} `{robot.name}/{name}` is {value}; it cannot be negative")
-        robot._own[self.name] = checked
-
-    def takes_single(self, robot: Robot) -> NDArray[np.bool_]:
-        return np.array(robot._summary["dof_driven"], dtype=bool)
-
-
-class _Positions(_Numbers):
-    """One entry per position coordinate; a joint that turns freely has a quaternion."""
-
-    entry = "coordinate"
-
-    def names(self, robot: Robot) -> list[str]:
-        return robot.coord_names
-
-    def takes_single(self, robot: Robot) -> NDArray[np.bool_]:
-        return np.ones(len(robot.coord_names), dtype=bool)
-
-
-class _Modes(_PerDof):
-    @overload
-    def __get__(self, robot: None, owner: type) -> _Modes: ...
-    @overload
-    def __get__(self, robot: Robot, owner: type) -> tuple[str, ...]: ...
-    def __get__(self, robot: Robot | None, owner: type) -> _Modes | tuple[str, ...]:
-        return self if robot is None else robot._own.get(self.name) or tuple(robot._urdf_values(self.name))
-
-    def __set__(self, robot: Robot, values: str | Sequence[str]) -> None:
-        try:
-            modes = (values,) * robot.dofs if isinstance(values, str) else tuple(values)
-        except TypeError:
-            raise self.error(robot, f"is {values!r}; {self.expected(robot)}") from None
-        if len(modes) != robot.dofs:
-            raise self.error(robot, f"has {len(modes)} values; {self.expected(robot)}")
-        for name, mode in zip(robot.dof_names, modes, strict=True):
-            if mode not in MODES:
-                choices = ", ".join(map(repr, MODES))
-                raise self.error(robot, f"of dof `{robot.name}/{name}` is {mode!r}; choose one of {choices}")
-        robot._own[self.name] = modes
+from tightloop.robot_properties import Modes, Numbers, PerDof, Positions
 
 
 class Robot(Entity):
     """A robot of a scene, made by `Scene.add_urdf`.
 
     Properties have one entry per dof, in the order of ``dof_names``; ``joint_q`` has one per coordinate, in the order
-    of ``coord_names``. A single value is written to all entries except those of free joints, which have no drive.
-    Properties that are not set keep the values of the URDF file.
+    of ``coord_names``. Properties that are not set keep the values of the URDF file. They are set
+
+    - by an array; of a floating robot, the entries of the floating base may be left out,
+    - by a single value, which is written to all entries except those of free joints, which have no drive,
+    - by a dict of values by name or pattern, ``{"knee": 0.4, ".*_hip": 0.1}``: a regular expression for whole names,
+      after which exact names count. Other entries keep their values,
+    - or by entries: ``arm.joint_q[:7] = 0.1``.
+
+    Where they are left out, ``pos`` and ``quat`` are the start of a floating base.
     """
 
-    # a misspelt property is an error
-    __slots__ = (
-        "_own",
-        "_summary",
-        "convex_decomposition",
-        "floating",
-        "mesh_max_hull_vertices",
-        "package_dirs",
-        "self_collisions",
-        "strict",
-        "surface",
-        "urdf",
-    )
+    __slots__ = ("_file", "_follows_pose", "_own", "_self_collisions", "_summary")
 
     kind = "robot"
 
-    joint_q = _Positions("Start positions [rad or m], shape ``(coords,)``.")
-    joint_target_q = _Numbers(
+    joint_q = Positions("Start positions [rad or m], shape ``(coords,)``.")
+    joint_target_q = Numbers(
         "Position targets of the drives at the start [rad or m], shape ``(dofs,)``; the start positions if not set.",
         otherwise="joint_q",
     )
-    joint_target_qd = _Numbers("Velocity targets of the drives at the start [rad/s or m/s], shape ``(dofs,)``.")
-    joint_target_mode = _Modes(
+    joint_target_qd = Numbers("Velocity targets of the drives at the start [rad/s or m/s], shape ``(dofs,)``.")
+    joint_target_mode = Modes(
         "Drive law of each dof: ``position``: ke (q* − q) − kd q̇; ``velocity``: kd (q̇* − q̇); ``both``: their sum."
     )
-    joint_target_ke = _Numbers("Proportional gains of the drives [N·m/rad or N/m], shape ``(dofs,)``.", signed=False)
-    joint_target_kd = _Numbers("Derivative gains of the drives [N·m·s/rad or N·s/m], shape ``(dofs,)``.", signed=False)
-    joint_effort_limit = _Numbers(
+    joint_target_ke = Numbers("Proportional gains of the drives [N·m/rad or N/m], shape ``(dofs,)``.", signed=False)
+    joint_target_kd = Numbers("Derivative gains of the drives [N·m·s/rad or N·s/m], shape ``(dofs,)``.", signed=False)
+    joint_effort_limit = Numbers(
         "Limit of a joint's drive force [N·m or N], shape ``(dofs,)``; inf is no limit. It does not limit ``joint_f``.",
         signed=False,
         limit=True,
     )
-    joint_armature = _Numbers("Inertia of the drives seen at the joint [kg·m² or kg], shape ``(dofs,)``.", signed=False)
+    joint_armature = Numbers("Inertia of the drives seen at the joint [kg·m² or kg], shape ``(dofs,)``.", signed=False)
 
     def __init__(
         self,
@@ -178,16 +71,65 @@ class Robot(Entity):
         summary: dict[str, Any],
     ) -> None:
         super().__init__(name, pos, quat)
-        self.urdf = urdf
-        self.package_dirs = package_dirs
-        self.floating = floating
+        # as the file was read, which cannot change afterwards
+        self._file: dict[str, Any] = {
+            "urdf": urdf,
+            "package_dirs": package_dirs,
+            "floating": floating,
+            "strict": strict,
+            "mesh_max_hull_vertices": mesh_max_hull_vertices,
+            "convex_decomposition": convex_decomposition,
+            "surface": surface,
+        }
         self.self_collisions = self_collisions
-        self.strict = strict
-        self.mesh_max_hull_vertices = mesh_max_hull_vertices
-        self.convex_decomposition = convex_decomposition
-        self.surface = surface
         self._summary = summary
         self._own: dict[str, Any] = {}
+        # whether `joint_q` was set and its base is that of `pos` and `quat`
+        self._follows_pose = False
+
+    @property
+    def urdf(self) -> Path:
+        """The URDF file."""
+        return self._file["urdf"]
+
+    @property
+    def package_dirs(self) -> list[Path]:
+        """Folders with the packages of ``package://`` paths; none if they are searched above the file."""
+        return list(self._file["package_dirs"])
+
+    @property
+    def floating(self) -> bool:
+        """Whether the root link moves freely."""
+        return self._file["floating"]
+
+    @property
+    def strict(self) -> bool:
+        """Whether an inertia that no body can have was refused."""
+        return self._file["strict"]
+
+    @property
+    def mesh_max_hull_vertices(self) -> int:
+        """Largest number of vertices of the convex hull of a collision mesh."""
+        return self._file["mesh_max_hull_vertices"]
+
+    @property
+    def convex_decomposition(self) -> bool:
+        """Whether concave collision meshes become several convex hulls."""
+        return self._file["convex_decomposition"]
+
+    @property
+    def surface(self) -> dict[str, Any]:
+        """Contact parameters of all shapes of the file; see `tightloop.Surface`."""
+        return dict(self._file["surface"])
+
+    @property
+    def self_collisions(self) -> bool:
+        """Whether links of this robot collide with each other; neighbours never do."""
+        return self._self_collisions
+
+    @self_collisions.setter
+    def self_collisions(self, self_collisions: bool) -> None:
+        self._self_collisions = checks.flag(f"robot `{self.name}`: self_collisions", self_collisions)
 
     @property
     def joint_names(self) -> list[str]:
@@ -222,6 +164,11 @@ class Robot(Entity):
         return list(self._summary["dof_names"])
 
     @property
+    def dof_driven(self) -> list[bool]:
+        """Whether each dof has a drive; those of free joints have none."""
+        return list(self._summary["dof_driven"])
+
+    @property
     def coord_names(self) -> list[str]:
         """Names of the position coordinates: the joint, or ``joint.part`` for a joint with several coordinates."""
         return list(self._summary["coord_names"])
@@ -249,7 +196,9 @@ class Robot(Entity):
             SceneError: There is no such link.
         """
         if name not in self._summary["link_names"]:
-            raise SceneError(f"robot `{self.name}` has no link {name!r}; there are: {_some(self.link_names, 20)}")
+            raise SceneError(
+                f"robot `{self.name}` has no link of the name {name!r}; {suggestion(str(name), self.link_names)}"
+            )
         return Link(self, name)
 
     @property
@@ -267,7 +216,7 @@ class Robot(Entity):
         # a single value skips free joints, but values set on their drives must reach the daemon, which refuses them
         single = all(self._summary["dof_driven"])
         own = {
-            name: values if isinstance(values, tuple) else _portable(values, single=single)
+            name: values if isinstance(values, tuple) else _portable(np.array(getattr(self, name)), single=single)
             for name, values in self._own.items()
         }
         packages = [str(folder) for folder in self.package_dirs]
@@ -285,20 +234,24 @@ class Robot(Entity):
             **self.surface,
         } | own
 
+    def _instead(self, name: str) -> str:
+        return "it is an argument of add_urdf"
+
     def _of_dofs(self, joints: list[Any]) -> NDArray[np.float64]:
         """Expand a list of values per moving joint to one per dof."""
         own = dict(zip(self.joint_names, joints, strict=True))
         return np.array([own[dof if dof in own else dof.rpartition(".")[0]] for dof in self.dof_names], dtype=float)
 
-    def _urdf_values(self, name: str) -> Any:
+    def file_values(self, name: str) -> Any:
+        """Return the values of the file for a property."""
         if name == "joint_target_mode":
             return ["position"] * self.dofs
         if name == "joint_q" and self.floating:
             return [*self.pos, *self.quat, *self._summary["joint_q"][7:]]
         return self._summary.get(name, [0.0] * self.dofs)
 
-    def _start_targets(self) -> list[float]:
-        """Return targets that hold the start position; the daemon sets those of ball and free joints."""
+    def start_targets(self) -> list[float]:
+        """Return the targets that hold the start position; the daemon sets those of ball and free joints."""
         start = dict(zip(self.coord_names, self.joint_q, strict=True))
         return [float(start.get(name, 0.0)) for name in self.dof_names]
 
@@ -322,14 +275,10 @@ class Link:
         return self.name
 
 
-PER_DOF = tuple(name for name, value in vars(Robot).items() if isinstance(value, _PerDof))
+PER_DOF = tuple(name for name, value in vars(Robot).items() if isinstance(value, PerDof))
 
 
 def _portable(values: NDArray[np.float64], *, single: bool) -> float | str | list[float | str]:
     """Convert values for JSON, which has no infinity; with ``single``, equal values become one."""
     entries = ["inf" if np.isinf(value) else float(value) for value in values]
     return entries[0] if single and entries and len(set(entries)) == 1 else entries
-
-
-def _some(names: list[str], most: int = 3) -> str:
-    return ", ".join(names[:most]) + (", …" if len(names) > most else "")

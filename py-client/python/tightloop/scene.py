@@ -134,8 +134,10 @@ class Scene(SceneRandomization):
                 )
         folders = [str(folder) for folder in packages]
         vertices = checks.integer("add_urdf: mesh_max_hull_vertices", mesh_max_hull_vertices)
-        decompose = bool(convex_decomposition)
-        summary = json.loads(_core.read_urdf(str(urdf), folders, bool(floating), bool(strict), vertices, decompose))
+        decompose = checks.flag("add_urdf: convex_decomposition", convex_decomposition)
+        floating, strict = checks.flag("add_urdf: floating", floating), checks.flag("add_urdf: strict", strict)
+        self_collisions = checks.flag("add_urdf: self_collisions", self_collisions)
+        summary = json.loads(_core.read_urdf(str(urdf), folders, floating, strict, vertices, decompose))
         own_name = re.sub(r"[^A-Za-z0-9_.\-]", "_", summary["name"])
         name = checks.name("robot", own_name if name is None else name, self._names())
         robot = Robot(
@@ -144,9 +146,9 @@ class Scene(SceneRandomization):
             package_dirs=packages,
             pos=pos,
             quat=quat,
-            floating=bool(floating),
-            self_collisions=bool(self_collisions),
-            strict=bool(strict),
+            floating=floating,
+            self_collisions=self_collisions,
+            strict=strict,
             mesh_max_hull_vertices=vertices,
             convex_decomposition=decompose,
             surface=touch,
@@ -185,6 +187,7 @@ class Scene(SceneRandomization):
             SceneError: MuJoCo cannot compile the model, or it has elements that are not supported, by their names.
             MissingLibrary: The extra ``mujoco`` is not installed.
         """
+        substeps = checks.integer("from_mujoco: substeps", substeps)
         found = read_model(model, name, (), mesh_max_hull_vertices=mesh_max_hull_vertices)
         options = found.options
         scene = cls(dt=options["dt"], substeps=substeps, gravity=options["gravity"])
@@ -324,12 +327,26 @@ class Scene(SceneRandomization):
             UrdfError: A robot of the scene cannot be read.
         """
         file = checks.path("load: path", path)
-        return cls._read(file, file.parent)
+        return cls._made_of(_core.load_scene(str(file)), file.parent)
 
     @classmethod
-    def _read(cls, file: Path, folder: Path) -> Scene:
-        """Read a scene file whose paths are relative to a given folder."""
-        data = json.loads(_core.load_scene(str(file)))
+    def from_toml(cls, text: str, folder: str | os.PathLike[str] = ".") -> Scene:
+        """Read the text of a scene file, as `to_toml` returns it, and the robots that it names.
+
+        Args:
+            text: The text.
+            folder: Folder that relative paths begin in.
+
+        Raises:
+            SceneError: An entry is not valid.
+            UrdfError: A robot of the scene cannot be read.
+        """
+        return cls._made_of(_core.parse_scene(checks.text("from_toml: text", text)), checks.path("folder", folder))
+
+    @classmethod
+    def _made_of(cls, tables: str, folder: Path) -> Scene:
+        """Make a scene of its tables as JSON, whose paths are relative to a folder."""
+        data = json.loads(tables)
         given = inspect.signature(cls).parameters
         scene = cls(**{option: data[option] for option in given if option in data})
         scene.solver(**data["solver"])

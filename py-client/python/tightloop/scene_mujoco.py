@@ -39,6 +39,7 @@ def read_model(
 ) -> MujocoModel:
     """Export a model and read it back, which checks it."""
     vertices = checks.integer("mesh_max_hull_vertices", mesh_max_hull_vertices)
+    pos, quat = checks.triple("add_mujoco: pos", pos), checks.quaternion("add_mujoco: quat", quat)
     compiled = export.compiled(model)
     own = compiled.names[: compiled.names.index(b"\0")].decode() or "model"
     own = re.sub(r"[^A-Za-z0-9_.\-]", "_", own)

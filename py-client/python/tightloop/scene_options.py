@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, SupportsFloat, SupportsIndex
 
 from tightloop import checks
+from tightloop.attributes import Attributes
 from tightloop.checks import Triple, Vector
 from tightloop.errors import SceneError
 
@@ -39,7 +40,7 @@ def capacity(what: str, value: SupportsIndex | None, most: int) -> int | None:
     return checked
 
 
-class SceneOptions:
+class SceneOptions(Attributes):
     """Mixin of `Scene` with its options."""
 
     __slots__ = (

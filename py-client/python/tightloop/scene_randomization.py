@@ -140,7 +140,7 @@ class SceneRandomization(SceneSensors):
         _check_complete(what, name)
         floating = [joint for joint, kind in kinds.items() if kind == "floating"]
         if not floating:
-            raise SceneError(f"{what}: it does not move freely; add_urdf(floating=True) lets a robot float")
+            raise SceneError(f"{what}: it does not move freely; add the robot with add_urdf(floating=True)")
         if joint not in floating and ("/" in name or len(floating) > 1):
             names = [f"{robot}/{joint}" for joint in floating]
             raise SceneError(f"{what}: name one of the floating joints: {_some(names)}")
@@ -178,7 +178,7 @@ def _check_complete(what: str, name: str) -> None:
 def _ranges(params: ParamRanges | None) -> dict[str, Any]:
     tables = {}
     for param, given in _items("randomize: params", params):
-        what = f"randomize: {param}"
+        what = f"randomize: params, {param}"
         if isinstance(given, Uniform | Normal):
             tables[param] = given.table()
         else:

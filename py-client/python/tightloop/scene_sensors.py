@@ -101,8 +101,8 @@ class SceneSensors(SceneShapes):
         what = f"contact sensor `{name}`"
         sensor = ContactSensor(
             name=name,
-            of=self._collidable(what, of),
-            against=None if against is None else self._collidable(what, against),
+            of=self._collidable(f"{what}: of", of),
+            against=None if against is None else self._collidable(f"{what}: against", against),
         )
         self.contact_sensors[name] = sensor
         return sensor

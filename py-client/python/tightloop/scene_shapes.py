@@ -155,7 +155,7 @@ class SceneShapes(SceneOptions):
         file = checks.path("add_mesh: path", path)
         factors = checked_scale("add_mesh", scale)
         vertices = checks.integer("add_mesh: max_hull_vertices", max_hull_vertices)
-        decompose = bool(convex_decomposition)
+        decompose = checks.flag("add_mesh: convex_decomposition", convex_decomposition)
         summary = json.loads(_core.read_mesh(str(file), factors, vertices, decompose))
         mesh = {
             "path": file,
@@ -206,7 +206,7 @@ class SceneShapes(SceneOptions):
             SceneError: ``a`` or ``b`` does not exist in the scene; add it before the filter.
         """
         what = "filter_contacts"
-        self.filters.append((self._collidable(what, a), self._collidable(what, b)))
+        self.filters.append((self._collidable(f"{what}: a", a), self._collidable(f"{what}: b", b)))
 
     def _add_shape(
         self,
@@ -246,7 +246,10 @@ class SceneShapes(SceneOptions):
         carrier = body.name if isinstance(body, (Body, Link)) else body
         robot, slash, link = carrier.partition("/")
         if slash and robot in self.robots:
-            self.robots[robot].link(link)
+            try:
+                self.robots[robot].link(link)
+            except SceneError as problem:
+                raise SceneError(f"{what}: body is {carrier!r}: {problem}") from None
         elif carrier in self.robots:
             raise SceneError(f"{what}: body is the robot {carrier!r}; give one of its links, as in robot.link(…)")
         elif carrier not in self.bodies:
@@ -273,7 +276,7 @@ class SceneShapes(SceneOptions):
         if thing not in names:
             known = ", ".join(f"`{name}`" for name in (*shapes, *self.robots, *self.bodies)) or "none yet"
             raise SceneError(
-                f"{what}: there is no shape, robot, body or link {thing!r}; there are: {known}, and the "
+                f"{what} is {thing!r}, which is no shape, robot, body or link; there are: {known}, and the "
                 "robots' links and shapes (robot.link_names, robot.shape_names)"
             )
         return thing

@@ -41,3 +41,11 @@ class ContactSensor:
     name: str
     of: str
     against: str | None
+
+
+def slices_by_name(names: list[str], places: list[list[int]]) -> dict[str, slice]:
+    """Return the slices of sensors by their names, and by the part after the model's name where it is unique."""
+    slices = {name: slice(*place) for name, place in zip(names, places, strict=True)}
+    short = [name.split("/", 1)[-1] for name in names]
+    alone = {name: slices[whole] for name, whole in zip(short, names, strict=True) if short.count(name) == 1}
+    return slices | {name: place for name, place in alone.items() if name not in slices}

@@ -6,7 +6,7 @@ import functools
 import json
 import os
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,21 +15,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core, checks, keyframes
 from tightloop._core import Frame
+from tightloop.attributes import Attributes, nearest
+from tightloop.command_arrays import Command, ready_arrays
 from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
-from tightloop.errors import ArgumentError, CommandRefused
+from tightloop.errors import ArgumentError, CommandRefused, SimClosed, UnknownAttribute
 from tightloop.frames import FrameCopy
-from tightloop.inputs import as_array, real_numbers, switches
 from tightloop.params import Params
 from tightloop.rays import RayHits, Rays, ray_poses
+from tightloop.sensors import slices_by_name
 from tightloop.snapshot import Snapshot, transfer_file
 from tightloop.viewer_process import Viewer
 
-#: An array ``(worlds, dofs)`` for the whole scene, ``(dofs,)`` for identical commands, or a dict of such by robot name.
-Command = ArrayLike | Mapping[str, ArrayLike]
 
-
-class Sim:
+class Sim(Attributes):
     """A simulation in a daemon. `launch` and `attach` make it; ``close`` or the end of a ``with`` block closes it.
 
     Attributes:
@@ -93,11 +92,12 @@ class Sim:
         self.equality_names: list[str] = self.info["equality_names"]
         self.keyframe_names: list[str] = [known["name"] for known in self.info["keyframes"]]
         self.sensor_names: list[str] = self.info["sensor_names"]
-        self.sensors: dict[str, slice] = _by_name(self.sensor_names, self.info["sensors"])
+        self.sensors: dict[str, slice] = slices_by_name(self.sensor_names, self.info["sensors"])
         self.dofs, self.coords, self.bodies = (
             {robot["name"]: slice(*robot[range_]) for robot in self.info["robots"]}
             for range_ in ("dofs", "coords", "bodies")
         )
+        self._sealed = True
 
     def step(
         self,
@@ -427,8 +427,12 @@ class Sim:
             The viewer: its ``url``, and ``close()``.
 
         Raises:
-            LaunchError: The viewer did not start; stderr has the reason.
+            SimClosed: The simulation was closed.
+            MissingLibrary: The extra ``view`` is not installed.
+            LaunchError: The viewer did not start; the message has the reason.
         """
+        if not self._end.alive:
+            raise SimClosed("view: the simulation was closed; launch or attach again")
         viewer = Viewer(self.name, port=port, worlds=worlds, open=open, hosts=hosts)
         self._viewers.append(viewer)
         return viewer
@@ -441,31 +445,29 @@ class Sim:
         self._end()
 
     def _arrays(self, group: str, **given: Command | None) -> dict[str, NDArray[np.float64]]:
-        """Return what is given as arrays, by the number of columns that ``info[group]`` lists."""
-        found = {}
-        for name, value in given.items():
-            if value is None:
-                continue
-            if name == "body_f":  # varies only where the run says so, which `Params` knows
-                found[name] = self.params.ready(name, value)
-                continue
-            columns = {known["name"]: known["columns"] for known in self.info[group]}
-            if name not in columns:
-                raise CommandRefused(f"{name}: no model of this scene has any")
-            found[name] = as_array(name, None, self._flat(name, value), self.worlds, columns[name])
-        return found
+        return ready_arrays(self.info, lambda: self.params, group, given)
 
-    def _flat(self, name: str, value: Command) -> Command:
-        """Return an array of mocap bodies with the entries of all of them in a row, and switches as numbers."""
-        if name == "eq_active":
-            return switches(name, value)
-        width = {"mocap_pos": 3, "mocap_quat": 4}.get(name)
-        if width is None:
-            return value
-        given = real_numbers(name, value)
-        if given.shape[-2:] != (len(self.mocap_names), width):
-            return given
-        return given.reshape(*given.shape[:-2], -1)
+    def _own_attributes(self) -> list[str]:
+        return [name for name in (*vars(self), *super()._own_attributes()) if name[0] != "_"]
+
+    def _subject(self) -> str:
+        return f"Sim `{self.name}`"
+
+    def _instead(self, name: str) -> str:
+        return "`write`, `params` and arguments of `step` change worlds, those of `launch` and the scene the rest"
+
+    def __getattr__(self, name: str) -> Any:
+        of_frames = nearest(name, self.__dict__.get("fields", ()))
+        if of_frames:
+            there = ", ".join(f"sim.forward().{field}" for field in of_frames)
+            raise UnknownAttribute(f"{self._subject()} has no attribute {name!r}; the frame of a call has: {there}")
+        return super().__getattr__(name)
+
+    def __reduce__(self) -> Any:
+        raise ArgumentError(
+            "a Sim cannot be copied or pickled: it holds a connection. Give the other process its name, for "
+            f"tightloop.attach({self.name!r}), or make a simulation there"
+        )
 
     def __enter__(self) -> Sim:
         return self
@@ -476,14 +478,6 @@ class Sim:
     def __repr__(self) -> str:
         state = "" if self._end.alive else ", closed"
         return f"Sim({self.name!r}, worlds={self.worlds}, device={self.device!r}, pid={self.pid}{state})"
-
-
-def _by_name(names: list[str], places: list[list[int]]) -> dict[str, slice]:
-    """Slices of sensors by their names, and by the part after the model's name where it is unique."""
-    slices = {name: slice(*place) for name, place in zip(names, places, strict=True)}
-    short = [name.split("/", 1)[-1] for name in names]
-    alone = {name: slices[whole] for name, whole in zip(short, names, strict=True) if short.count(name) == 1}
-    return slices | {name: place for name, place in alone.items() if name not in slices}
 
 
 def _end(client: _core.Client, daemon: Daemon | None, name: str, owner: int, viewers: list[Viewer]) -> None:

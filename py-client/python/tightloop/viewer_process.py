@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 import weakref
 from collections.abc import Sequence
 
-from tightloop.errors import LaunchError
+from tightloop import checks, errors
+from tightloop.errors import ArgumentError, LaunchError
 
 _STOP_SECONDS = 3.0
 
@@ -22,6 +24,12 @@ class Viewer:
     """
 
     def __init__(self, name: str, *, port: int, worlds: int, open: bool, hosts: Sequence[str] = ()) -> None:
+        checks.text("view: name", name, error=ArgumentError)
+        port = checks.integer("view: port", port, error=ArgumentError)
+        worlds = checks.integer("view: worlds", worlds, error=ArgumentError)
+        open = checks.flag("view: open", open, error=ArgumentError)
+        if isinstance(hosts, str) or not isinstance(hosts, Sequence) or not all(isinstance(h, str) for h in hosts):
+            raise ArgumentError(f"view: hosts is {hosts!r}; give a list of host names")
         command = [sys.executable, "-m", "tightloop", "view", name, f"--port={port}", f"--worlds={worlds}"]
         command += [f"--allow-host={host}" for host in hosts]
         command += [f"--parent={os.getpid()}", *(["--open"] if open else [])]
@@ -36,6 +44,11 @@ class Viewer:
                 process.kill()
                 code = process.wait()
             raise LaunchError(f"the viewer ended with exit code {code}; stderr says why")
+        if line.startswith("{"):
+            process.wait(_STOP_SECONDS)
+            problem = json.loads(line)["error"]
+            message = problem["message"].replace("--allow-host", "hosts")
+            raise getattr(errors, problem["kind"], LaunchError)(f"view: {message}")
         self.url = line
         self.pid = process.pid
         self._process = process

@@ -51,14 +51,18 @@ class _Joints:
             dofs: Names of the dofs, ``robot/joint``.
             scale: Effect of an action of 1, for all dofs or for each.
         """
-        if isinstance(dofs, str) or not dofs:
+        is_list = isinstance(dofs, Sequence) and not isinstance(dofs, str) and len(dofs) > 0
+        if not is_list or not all(isinstance(dof, str) for dof in dofs):
             raise ArgumentError(f"{type(self).__name__}: dofs is {dofs!r}; give a list of names, robot/joint")
         self._dofs = list(dofs)
         self.size = self._count = len(dofs)
         try:
             self._scale = np.ascontiguousarray(np.broadcast_to(np.asarray(scale, np.float32), (self.size,)))
-        except ValueError:
-            raise ArgumentError(f"{type(self).__name__}: scale must be a number, or {self.size} of them") from None
+        except (TypeError, ValueError):
+            self._scale = np.full(self.size, np.nan, np.float32)
+        if not np.isfinite(self._scale).all():
+            expected = f"give a finite number, or {self.size} of them"
+            raise ArgumentError(f"{type(self).__name__}: scale is {scale!r:.80}; {expected}")
 
     def bind(self, names: Names, commands: Commands) -> None:
         """Look up the dofs."""
@@ -88,7 +92,7 @@ class JointTorque(_Joints):
             hold: Whether to add ``bias_force`` at the start of the step, as a Franka's own controller does.
         """
         super().__init__(dofs, scale)
-        self._hold = hold
+        self._hold = checks.flag("JointTorque: hold", hold, error=ArgumentError)
         self.fields: tuple[str, ...] = ("bias_force",) if hold else ()
 
     def bind(self, names: Names, commands: Commands) -> None:
@@ -147,8 +151,12 @@ class Gripper(_Joints):
             high: Open target [m or rad].
             binary: Whether the gripper is only open or closed; it closes below 0.
         """
+        low, high = (
+            checks.number(f"Gripper: {name}", end, error=ArgumentError) for name, end in (("low", low), ("high", high))
+        )
         super().__init__(dofs, 0.5 * (high - low))
-        self.size, self._middle, self._binary = 1, 0.5 * (high + low), binary
+        self.size, self._middle = 1, 0.5 * (high + low)
+        self._binary = checks.flag("Gripper: binary", binary, error=ArgumentError)
 
     def bind(self, names: Names, commands: Commands) -> None:
         """Look up the fingers."""
@@ -185,7 +193,10 @@ class EndEffectorDelta(_Joints):
             rot_scale: Rotation per step of an action of 1, about world axes [rad].
         """
         super().__init__(dofs, 1.0)
-        self._site_name = site
+        pos_scale = checks.number("EndEffectorDelta: pos_scale", pos_scale, error=ArgumentError)
+        if rot_scale is not None:
+            rot_scale = checks.number("EndEffectorDelta: rot_scale", rot_scale, error=ArgumentError)
+        self._site_name = checks.text("EndEffectorDelta: site", site, error=ArgumentError)
         self.size = 3 if rot_scale is None else 6
         self._step = np.array([pos_scale] * 3 + [rot_scale or 0.0] * 3, np.float32)[: self.size]
 

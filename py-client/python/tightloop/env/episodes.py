@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core
 from tightloop.env.task import Task, Worlds
 from tightloop.errors import ArgumentError
-from tightloop.inputs import whole_seed
+from tightloop.inputs import reals, whole_seed
 
 #: Stream of random numbers for goals.
 _GOALS = 0
@@ -60,6 +60,18 @@ class Episodes:
         self._known = self._known or bool(mask.all())
         return self._seeds
 
+    def set_elapsed(self, steps: ArrayLike) -> None:
+        """Set the elapsed steps of all worlds.
+
+        Raises:
+            ArgumentError: They are no whole numbers of at least 0, one or one per world.
+        """
+        given = reals("elapsed", steps)
+        if given.shape not in ((), self.elapsed.shape) or (given < 0).any() or (given != given.astype(np.int32)).any():
+            expected = f"give whole numbers of at least 0, one or {len(self.elapsed)}"
+            raise ArgumentError(f"elapsed is {steps!r:.80}; {expected}")
+        self.elapsed[:] = given
+
     def next(self, mask: NDArray[np.bool_]) -> None:
         """Count the next episode of the worlds in the mask, as `Sim.reset` without seeds does."""
         self._episodes[mask] += 1
@@ -96,6 +108,15 @@ class Episodes:
         self.goal[rows] = goal
 
 
+def check_seeds(seed: Any, worlds: int) -> None:
+    """Check the seeds of a reset.
+
+    Raises:
+        ArgumentError: A seed is not valid, or there are not as many as environments.
+    """
+    _seeds(seed, worlds, 0)
+
+
 def _seeds(seed: Any, worlds: int, first: int) -> list[int | None]:
     if seed is None:
         return [None] * worlds
@@ -107,7 +128,9 @@ def _seeds(seed: Any, worlds: int, first: int) -> list[int | None]:
     else:
         raise ArgumentError(f"reset: seed is {seed!r}; give a whole number, or a list with one an environment")
     if len(entries) != worlds:
-        raise ArgumentError(f"reset: {len(entries)} seeds for {worlds} environments; give a number, or one each")
+        raise ArgumentError(
+            f"reset: seed has {len(entries)} entries for {worlds} environments; give a number, or one each"
+        )
     for world, entry in enumerate(entries):
         if entry is not None and whole_seed(entry) is None:
             raise ArgumentError(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tightloop.env.array_pool import ArrayPool
 from tightloop.env.observations import ObservationPacker
+from tightloop.env.results import check_metric_names
 from tightloop.env.task import Array, Task, Worlds
 from tightloop.errors import ArgumentError
 
@@ -41,9 +42,9 @@ class Evaluation:
             array.flags.writeable = False
         self.worlds = Worlds(**shown, **{name: self._pool.wrap(getattr(frame, name)) for name in self._task.fields})
 
-    def observe(self, out: NDArray[np.float32]) -> None:
-        """Write the observations, shape ``(worlds, size)``."""
-        self._packer.pack(self.call("observe"), out)
+    def observe(self, out: NDArray[np.float32]) -> bool:
+        """Write the observations, shape ``(worlds, size)``; returns whether any is NaN."""
+        return self._packer.pack(self.call("observe"), out)
 
     def reward(self, out: NDArray[np.float32]) -> None:
         """Write the rewards, shape ``(worlds,)``."""
@@ -59,8 +60,9 @@ class Evaluation:
         first = "metrics" not in self._tapes
         metrics = self.call("metrics")
         if first and not isinstance(metrics, Mapping):
-            raise ArgumentError(f"{self._name('metrics')}: got {type(metrics).__name__}; return a dict by name")
+            raise ArgumentError(f"{self.function_name('metrics')}: got {type(metrics).__name__}; return a dict by name")
         if first:
+            check_metric_names(self.function_name("metrics"), [*metrics])
             for name, value in metrics.items():
                 self._check(f"metrics, {name!r}", value, _ANY)
         success = self._checked("success", _BOOL, optional=True)
@@ -80,12 +82,17 @@ class Evaluation:
         return value
 
     def _check(self, what: str, value: Any, kinds: str) -> None:
-        got = value.shape if isinstance(value, np.ndarray) else type(value).__name__
-        if got != (self._count,):
-            raise ArgumentError(f"{self._name(what)}: got {got}; return an array of shape ({self._count},)")
+        got = f"an array of shape {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
+        if not isinstance(value, np.ndarray) or value.shape != (self._count,):
+            raise ArgumentError(f"{self.function_name(what)}: got {got}; return an array of shape ({self._count},)")
         if value.dtype.kind not in kinds:
             expected = "bool" if kinds == _BOOL else "real numbers"
-            raise ArgumentError(f"{self._name(what)}: dtype {value.dtype}; return {expected}")
+            raise ArgumentError(f"{self.function_name(what)}: dtype {value.dtype}; return {expected}")
 
-    def _name(self, function: str) -> str:
+    def part_name(self, wrong: NDArray[np.bool_]) -> str:
+        """Return the name of the first part that is wrong, of observations of shape ``(n, size)``, for messages."""
+        column = int(np.argmax(np.any(wrong, axis=0)))
+        return f"{self.function_name('observe')}: `{self._packer.part(column)}`"
+
+    def function_name(self, function: str) -> str:
         return f"{type(self._task).__name__}.{function}"

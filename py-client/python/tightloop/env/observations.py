@@ -31,14 +31,20 @@ class ObservationPacker:
         self._low, self._high = (np.ascontiguousarray(np.concatenate([p.bounds[end] for p in parts])) for end in (0, 1))
         self.space = Box(self._low, self._high, dtype=np.float32)
 
-    def pack(self, arrays: Sequence[Array], out: NDArray[np.float32]) -> None:
-        """Write the parts into ``out``, shape ``(worlds, size)``; NaN stays NaN.
+    def part(self, column: int) -> str:
+        """Return the name of the part that has a column."""
+        ends = np.cumsum([part.size for part in self._parts])
+        return self._parts[int(np.searchsorted(ends, column, side="right"))].name
+
+    def pack(self, arrays: Sequence[Array], out: NDArray[np.float32]) -> bool:
+        """Write the parts into ``out``, shape ``(worlds, size)``; NaN stays NaN. Returns whether any is NaN.
 
         Raises:
             ArgumentError: There are more or fewer parts than `Task.observed` lists, or one has another shape.
         """
         if not isinstance(arrays, Sequence):
-            raise ArgumentError(f"observe: got {type(arrays).__name__}; return the parts as a tuple")
+            got = "one array" if isinstance(arrays, np.ndarray) else type(arrays).__name__
+            raise ArgumentError(f"observe: got {got}; return the parts as a tuple")
         if len(arrays) != len(self._parts):
             raise ArgumentError(f"observe: {len(arrays)} parts; `observed` lists {len(self._parts)}")
         for part, array in zip(self._parts, arrays, strict=True):
@@ -48,4 +54,4 @@ class ObservationPacker:
             shape = (len(out),) if part.size == 1 and array.ndim == 1 else (len(out), part.size)
             if array.shape != shape:
                 raise ArgumentError(f"observe: `{part.name}` has shape {array.shape}; `observed` says {shape}")
-        _core.pack(out, [np.asarray(array) for array in arrays], self._low, self._high)
+        return _core.pack(out, [np.asarray(array) for array in arrays], self._low, self._high)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from inspect import Parameter, signature
 from pathlib import Path
 from typing import Any
 
+from tightloop.env.controls import Control
 from tightloop.env.task import Task
 from tightloop.errors import ArgumentError
 
@@ -48,10 +49,28 @@ def make_task(task: Task | type[Task] | str, options: Mapping[str, Any]) -> Task
     return task(**options)
 
 
+def controls_of(task: Task) -> list[Control]:
+    """Return the controls of a task.
+
+    Raises:
+        ArgumentError: They are no list of controls.
+    """
+    controls = task.controls()
+    own = f"{type(task).__name__}.controls"
+    if not isinstance(controls, Sequence) or isinstance(controls, str):
+        raise ArgumentError(f"{own}: got {type(controls).__name__}; return a list of controls")
+    for control in controls:
+        if isinstance(control, type) or not hasattr(control, "apply"):
+            raise ArgumentError(f"{own}: got {control!r} in the list; return controls, such as JointTarget(dofs, 0.5)")
+    return list(controls)
+
+
 def _named(task: str) -> type[Task]:
     file, _, name = task.rpartition(":")
     if file.endswith(".py"):
         return _of_file(Path(file), name)
+    # the name in gymnasium's registry
+    task = task.removeprefix("tightloop/").removesuffix("-v0")
     if task not in TASKS:
         known = ", ".join(TASKS)
         raise ArgumentError(f"there is no task {task!r}; there are: {known}, and those of your own, FILE.py:CLASS")

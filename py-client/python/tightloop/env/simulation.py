@@ -50,6 +50,8 @@ def open_simulation(
     if daemon is None:
         options = options_of(task, controls, device=device, precision=precision, threads=threads, fields=fields)
         return scene, tl.launch(scene, worlds=1 if worlds is None else worlds, **options)
+    if not isinstance(daemon, str | tl.Sim | tl.Groups):
+        raise ArgumentError(f"daemon is {daemon!r}; give the name of a running one, or a Sim")
     sim = tl.attach(daemon) if isinstance(daemon, str) else daemon
     try:
         if isinstance(sim, tl.Groups):
@@ -77,7 +79,7 @@ def options_of(
 ) -> dict[str, Any]:
     """Return the arguments of `launch` for a task, without the number of worlds."""
     read = tuple(dict.fromkeys([*fields_of(task, controls), *fields]))
-    own = {"fields": read, "device": device, "precision": precision or "f32", "threads": threads}
+    own = {"fields": read, "device": device, "precision": "f32" if precision is None else precision, "threads": threads}
     return own | DAEMON_OPTIONS | task.launch_options
 
 

@@ -10,6 +10,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import ArrayLike, NDArray
 
 from tightloop.env.rendering import MODES
+from tightloop.env.results import check_options
 from tightloop.env.task import Task
 from tightloop.env.vector import VectorEnv
 
@@ -43,7 +44,16 @@ class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start an episode: the first one of a seed, or the next one. Returns the observation and an empty dict."""
+        """Start an episode: the first one of a seed, or the next one. Returns the observation and an empty dict.
+
+        Args:
+            seed: Seed of the episode; the next episode if left out.
+            options: There are none: a dict with any entry is refused.
+
+        Raises:
+            ArgumentError: The seed or an option is not valid.
+        """
+        check_options(options, ())
         super().reset(seed=seed)
         obs, _ = self.vector.reset(seed=seed)
         return obs[0], {}

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tightloop import checks
 from tightloop.env.controls import Control
 from tightloop.env.names import Names
 from tightloop.errors import ArgumentError
@@ -19,6 +20,8 @@ from tightloop.scene import Scene
 Array = Any
 #: A namespace of array functions: ``numpy``, ``array_api_compat.torch``, ``jax.numpy``.
 Namespace = Any
+# Values of a part of an observation, which is far beyond any
+_SIZE_MAX = 2**20
 
 
 class Worlds:
@@ -70,9 +73,14 @@ class Observed:
     bounds: NDArray[np.float32] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        name = checks.text("Observed: name", self.name, error=ArgumentError)
+        checks.text(f"observation `{name}`: unit", self.unit, error=ArgumentError)
+        size = checks.integer(f"observation `{name}`: size", self.size, error=ArgumentError)
+        if size > _SIZE_MAX:
+            raise ArgumentError(f"observation `{name}`: size is {size}; give at most {_SIZE_MAX}")
         try:
             low, high = (np.broadcast_to(np.asarray(end, np.float32), (self.size,)) for end in (self.low, self.high))
-        except ValueError:
+        except (TypeError, ValueError):
             raise ArgumentError(
                 f"observation `{self.name}`: low and high must be numbers, or {self.size} each"
             ) from None

@@ -15,12 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop import checks
 from tightloop.env.actions import Actions
-from tightloop.env.episodes import Episodes
+from tightloop.env.episodes import Episodes, check_seeds
 from tightloop.env.evaluation import Evaluation
 from tightloop.env.names import Names
-from tightloop.env.registry import make_task
+from tightloop.env.registry import controls_of, make_task
 from tightloop.env.rendering import FIELDS, MODES, Rendering, marks
 from tightloop.env.rendering import check as check_mode
+from tightloop.env.results import TASK_FAULT, OnNan, check_on_nan, check_options, refuse
 from tightloop.env.simulation import open_simulation
 from tightloop.env.step_buffers import BufferRing, StepBuffers
 from tightloop.env.task import Task, episode_steps
@@ -40,7 +41,8 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
     ``infos["success"]`` says which worlds fulfil the task now, if the task defines success. The values of
     `Task.metrics` are in ``infos`` too. ``infos["_success"]`` and its like say which rows are valid; rows of worlds
     that have just begun an episode are not. A faulted world (not finite, or beyond the task's bounds) is terminated,
-    and ``infos["fault"]`` has the bits of its ``status``.
+    and ``infos["fault"]`` has the bits of its ``status``. With ``on_nan="fault"`` bit 16 stands for NaN in the task's
+    own results.
 
     Attributes:
         sim: The simulation.
@@ -65,6 +67,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         precision: str | None = None,
         threads: int | None = None,
         max_episode_steps: float | None = None,
+        on_nan: OnNan = "raise",
         daemon: str | Sim | None = None,
         first_env: int = 0,
         render_mode: str | None = None,
@@ -85,6 +88,9 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             threads: Largest number of threads of a step; all cores if left out.
             max_episode_steps: Steps after which an episode is truncated, ``math.inf`` for never; the task's if left
                 out.
+            on_nan: What happens where `Task.reward` or `Task.observe` is NaN, or the reward infinite, in a world that
+                is not faulted: ``"raise"`` raises an error that names the function and the world; ``"fault"``
+                terminates the world, with reward 0, observation 0 and bit 16 of ``infos["fault"]``.
             daemon: Name of a running daemon to join, which ``python -m tightloop.env serve`` started for the task. It
                 continues when this process ends. Or a simulation of your own, such as one of `Groups`, which `close`
                 then closes. None launches a daemon that ends with this process.
@@ -98,15 +104,17 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             LaunchError: The daemon did not start. Other errors are those of `launch` and `attach`.
         """
         self.render_mode = check_mode(render_mode)
+        self._faults_nan = check_on_nan(on_nan)
         slots = checks.integer("slots", slots, least=2, error=ArgumentError)
         first_env = checks.integer("first_env", first_env, least=0, error=ArgumentError)
+        copy = checks.flag("copy", copy, error=ArgumentError)
         if num_envs is not None:
             num_envs = checks.integer("num_envs", num_envs, error=ArgumentError)
         # a task is bound to one environment: two environments would share its arrays
         self.task = copying.deepcopy(make_task(task, options))
         self.autoreset_mode = _mode(autoreset_mode)
         self.max_episode_steps = episode_steps(self.task, max_episode_steps)
-        controls = list(self.task.controls())
+        controls = controls_of(self.task)
         scene, self.sim = open_simulation(
             self.task,
             controls,
@@ -152,7 +160,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
     @elapsed.setter
     def elapsed(self, steps: ArrayLike) -> None:
         self._check_idle("elapsed")
-        self._episodes.elapsed[:] = steps
+        self._episodes.set_elapsed(steps)
 
     @property
     def frame(self) -> Any:
@@ -182,11 +190,12 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             Observations, shape ``(num_envs, size)``, and an empty dict.
 
         Raises:
-            ArgumentError: The mask or the seed is not valid.
+            ArgumentError: The mask, the seed or an option is not valid, or an observation is NaN.
         """
-        super().reset(seed=seed if isinstance(seed, int) else None)
         self._check_idle("reset")
         mask = self._mask(options)
+        check_seeds(seed, self.num_envs)
+        super().reset(seed=seed if isinstance(seed, int) else None)
         seeds = self._episodes.seed(seed, mask, self.np_random)
         self._begin(mask, self.sim.reset(mask=mask, seed=seeds))
         self._done[mask] = False
@@ -230,6 +239,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
 
         Raises:
             CommandRefused: No step is in flight.
+            ArgumentError: A function of the task returned something that does not fit, or NaN.
             DaemonLost: The daemon went away; its state is lost.
         """
         if not self._in_flight:
@@ -317,11 +327,14 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         )
 
     def _observe(self, out: NDArray[np.float32]) -> None:
-        self.evaluation.observe(out)
-        faulted = self._frame.status & FAULTED
-        if faulted.any():
-            # observations of a faulted world may not be finite
-            out[faulted > 0] = np.nan_to_num(out[faulted > 0], nan=0.0)
+        if not self.evaluation.observe(out):
+            return
+        # observations of a faulted world may be NaN
+        wrong = np.isnan(out)
+        healthy = (self._frame.status & FAULTED) == 0
+        if not self._faults_nan and wrong[healthy].any():
+            raise refuse(self.evaluation.part_name(wrong[healthy]), wrong.any(axis=1) & healthy)
+        out[wrong] = 0.0
 
     def _score(self, buffers: StepBuffers, infos: dict[str, Any], begun: NDArray[np.bool_] | None) -> None:
         """Write rewards and ends of the step; worlds that have just begun an episode have neither."""
@@ -331,7 +344,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             buffers.truncated[:] = False
         else:
             np.greater_equal(self._episodes.elapsed, self.max_episode_steps, out=buffers.truncated)
-        fault = self._frame.status & FAULTED
+        fault = self._faults(buffers, begun)
         if fault.any():
             failed = fault > 0
             buffers.terminated |= failed
@@ -343,21 +356,41 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         for name, value in self.evaluation.infos().items():
             infos[name], infos[f"_{name}"] = value, self._all.copy() if begun is None else ~begun
 
+    def _faults(self, buffers: StepBuffers, begun: NDArray[np.bool_] | None) -> NDArray[Any]:
+        """Return the bits of ``infos["fault"]`` of each world; the results of a task are checked here."""
+        fault = self._frame.status & FAULTED
+        wrong = ~np.isfinite(buffers.reward)
+        if not wrong.any() and not self._faults_nan:
+            return fault
+        healthy = fault == 0 if begun is None else (fault == 0) & ~begun
+        wrong &= healthy
+        if not self._faults_nan and wrong.any():
+            value = str(buffers.reward[wrong][0])
+            raise refuse(self.evaluation.function_name("reward"), wrong, value)
+        if self._faults_nan and self.evaluation.observe(buffers.final_obs):
+            wrong |= np.isnan(buffers.final_obs).any(axis=1) & healthy
+        return fault | wrong * fault.dtype.type(TASK_FAULT)
+
     def _next_buffers(self) -> StepBuffers:
         if self._ring is None:
             return StepBuffers(self.num_envs, self.evaluation.observed)
         return self._ring.next()
 
     def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
-        if options is None or "reset_mask" not in options:
+        check_options(options, ("reset_mask",))
+        if not options:
             return self._all
         mask = options["reset_mask"]
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            raise ArgumentError(f"reset_mask: give a NumPy array of bool, shape {(self.num_envs,)}; got {mask!r}")
+            raise ArgumentError(
+                f"reset: options, reset_mask: give a NumPy array of bool, shape {(self.num_envs,)}; got {mask!r}"
+            )
         if not mask.any():
-            raise ArgumentError("reset_mask: no environment is to be reset; set at least one to True")
+            raise ArgumentError("reset: options, reset_mask: no environment is to be reset; set at least one to True")
         if not self._ready and not mask.all():
-            raise ArgumentError("reset_mask: the first reset is of all environments; leave the mask out")
+            raise ArgumentError(
+                "reset: options, reset_mask: the first reset is of all environments; leave the mask out"
+            )
         return mask
 
     def _check_idle(self, call: str) -> None:

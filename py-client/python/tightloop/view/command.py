@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import os
 import signal
 import socket
@@ -11,6 +12,7 @@ import sys
 import threading
 import webbrowser
 from pathlib import Path
+from typing import NoReturn
 
 from tightloop.errors import TightloopError
 from tightloop.view import dependencies, gate
@@ -58,7 +60,7 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: list[str]) -> int:
     """Run the subcommand; returns its exit code: 0 done, 1 failed, 2 misused."""
-    given = parser().parse_args(arguments)
+    given = _parsed(arguments)
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.set())
@@ -70,7 +72,10 @@ def main(arguments: list[str]) -> int:
         names = given.allow_host
         server = Server(given.target, host=given.host, port=given.port, worlds=given.worlds, names=names)
     except (TightloopError, OSError) as problem:
-        print(f"tightloop: {problem}", file=sys.stderr)
+        if given.parent is None:
+            print(f"tightloop: {problem}", file=sys.stderr)
+        else:
+            _answer(type(problem).__name__, str(problem))
         return 1
     try:
         if server.port != given.port:
@@ -82,6 +87,24 @@ def main(arguments: list[str]) -> int:
     finally:
         server.close()
     return 0
+
+
+def _parsed(arguments: list[str]) -> argparse.Namespace:
+    """Read the arguments; what is wrong with them is told to a process that waits for an answer."""
+    made = parser()
+    if any(argument.startswith("--parent") for argument in arguments):
+
+        def tell(message: str) -> NoReturn:
+            _answer("ArgumentError", message)
+            raise SystemExit(2)
+
+        made.error = tell
+    return made.parse_args(arguments)
+
+
+def _answer(kind: str, message: str) -> None:
+    """Tell `tightloop.viewer_process.Viewer` why there is no page."""
+    print(json.dumps({"error": {"kind": kind, "message": message}}), flush=True)
 
 
 def _give_way() -> None:

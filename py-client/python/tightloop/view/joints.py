@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -85,7 +83,4 @@ def at_targets(info: dict[str, Any], driven: Sequence[Joint], joint_q: Array, ta
 
 
 def _scene(info: dict[str, Any]) -> Scene:
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "scene.toml"
-        file.write_text(info["scene"])
-        return Scene._read(file, Path(info["scene_folder"]))
+    return Scene.from_toml(info["scene"], info["scene_folder"])

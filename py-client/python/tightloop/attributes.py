@@ -1,0 +1,109 @@
+"""Attributes that do not exist: the error suggests the one that was probably meant."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+from tightloop.errors import UnknownAttribute
+
+#: What other simulators call these attributes, or what their names are without a prefix.
+SYNONYMS = {
+    "angular_velocity": ("joint_qd", "body_qd"),
+    "armature": ("joint_armature",),
+    "control": ("joint_f", "joint_target_q", "ctrl"),
+    "damping": ("joint_target_kd",),
+    "dof_pos": ("joint_q",),
+    "dof_vel": ("joint_qd",),
+    "effort": ("joint_effort_limit", "joint_f"),
+    "effort_limit": ("joint_effort_limit",),
+    "friction": ("shape_mu", "joint_friction"),
+    "joint_pos": ("joint_q",),
+    "joint_positions": ("joint_q",),
+    "joint_vel": ("joint_qd",),
+    "joint_velocities": ("joint_qd",),
+    "joint_limits": ("joint_range",),
+    "kd": ("joint_target_kd",),
+    "ke": ("joint_target_ke",),
+    "kp": ("joint_target_ke",),
+    "kv": ("joint_target_kd",),
+    "limits": ("joint_range",),
+    "mu": ("shape_mu",),
+    "num_envs": ("worlds",),
+    "num_worlds": ("worlds",),
+    "nworld": ("worlds",),
+    "orientation": ("quat",),
+    "position": ("pos", "joint_q"),
+    "qpos": ("joint_q",),
+    "qvel": ("joint_qd",),
+    "rot": ("quat",),
+    "rotation": ("quat",),
+    "stiffness": ("joint_target_ke",),
+    "target": ("joint_target_q",),
+    "timestep": ("dt",),
+    "torque": ("joint_f", "joint_torque"),
+    "velocity": ("joint_qd", "joint_target_qd"),
+    "xform": ("body_q",),
+    "xpos": ("body_q",),
+    "xquat": ("body_q",),
+}
+# difflib's measure of likeness, from 0 to 1
+_LIKENESS = 0.6
+
+
+def nearest(name: str, known: Iterable[str]) -> list[str]:
+    """Return up to three of the known names that a wrong one may have meant."""
+    known = [*known]
+    meant = [synonym for synonym in SYNONYMS.get(name.removeprefix("set_"), ()) if synonym in known]
+    return meant or difflib.get_close_matches(name, known, cutoff=_LIKENESS)
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Return the end of a message: the nearest known names, or all of them."""
+    known = sorted(known)
+    near = nearest(name, known)
+    if near:
+        return "did you mean " + " or ".join(f"`{other}`" for other in near) + "?"
+    return f"there are: {', '.join(known)}"
+
+
+class Attributes:
+    """Base of classes whose attributes have fixed names: another name raises `UnknownAttribute`."""
+
+    __slots__ = ()
+
+    def _own_attributes(self) -> list[str]:
+        """Names of the public attributes that hold values."""
+        return [name for name in dir(type(self)) if name[0] != "_" and not callable(getattr(type(self), name))]
+
+    def _subject(self) -> str:
+        """What this is, for messages."""
+        return type(self).__name__
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
+        methods = [method for method in dir(type(self)) if method[0] != "_"]
+        known = {*self._own_attributes(), *methods}
+        raise UnknownAttribute(f"{self._subject()} has no attribute {name!r}; {suggestion(name, known)}")
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        # a sealed object has a dict, which would take any name
+        if name[0] != "_" and "_sealed" in getattr(self, "__dict__", ()):
+            raise self._refused(name)
+        try:
+            object.__setattr__(self, name, value)
+        except AttributeError:
+            raise self._refused(name) from None
+
+    def _refused(self, name: str) -> UnknownAttribute:
+        """Return the error of setting an attribute that does not exist, or cannot be set."""
+        known = self._own_attributes()
+        if name in known or hasattr(type(self), name):
+            return UnknownAttribute(f"{self._subject()}: `{name}` can only be read; {self._instead(name)}")
+        return UnknownAttribute(f"{self._subject()} has no attribute {name!r}; {suggestion(name, known)}")
+
+    def _instead(self, name: str) -> str:
+        """What to do instead of setting an attribute that can only be read."""
+        return "give it to the call that makes the object"

@@ -1,0 +1,58 @@
+"""Commands that are named in the daemon's description: those of MuJoCo models, and forces on bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tightloop.errors import CommandRefused
+from tightloop.inputs import as_array, real_numbers, switches
+from tightloop.params import Params
+
+#: An array ``(worlds, dofs)`` for the whole scene, ``(dofs,)`` for identical commands, or a dict of such by robot name.
+Command = ArrayLike | Mapping[str, ArrayLike]
+
+
+def ready_arrays(
+    info: Mapping[str, Any], params: Callable[[], Params], group: str, given: Mapping[str, Command | None]
+) -> dict[str, NDArray[np.float64]]:
+    """Return what is given as arrays, shape ``(worlds, columns)``, by name.
+
+    Args:
+        info: The daemon's description.
+        params: Returns the parameters of the simulation.
+        group: Entry of ``info`` that lists names and numbers of columns, ``"commands"`` or ``"writes"``.
+        given: Values by name; None is left out.
+
+    Raises:
+        CommandRefused: A shape or dtype is wrong, or no model of the scene has the name.
+    """
+    found = {}
+    for name, value in given.items():
+        if value is None:
+            continue
+        if name == "body_f":  # varies only where the run says so, which `Params` knows
+            found[name] = params().ready(name, value)
+            continue
+        columns = {known["name"]: known["columns"] for known in info[group]}
+        if name not in columns:
+            raise CommandRefused(f"{name}: no model of this scene has any; leave it out")
+        flat = _flat(name, value, len(info["mocap_names"]))
+        found[name] = as_array(name, None, flat, info["worlds"], columns[name])
+    return found
+
+
+def _flat(name: str, value: Command, mocaps: int) -> Command:
+    """Return an array of mocap bodies with the entries of all of them in a row, and switches as numbers."""
+    if name == "eq_active":
+        return switches(name, value)
+    width = {"mocap_pos": 3, "mocap_quat": 4}.get(name)
+    if width is None:
+        return value
+    given = real_numbers(name, value)
+    if given.shape[-2:] != (mocaps, width):
+        return given
+    return given.reshape(*given.shape[:-2], -1)
