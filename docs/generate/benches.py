@@ -32,7 +32,7 @@ machine, the others from a 4-core machine.
 - **EnvPool's scene is lighter.** Of its arm, only the hand and the fingers collide. Its solver stops after 5
   iterations.
 - **mjbatch has [its own table](#mujoco-models-beside-mjbatch-on-one-thread).** It steps MuJoCo C. That machine has
-  AVX2, with 8 worlds in a register.
+  AVX-512 too.
 - **Contacts cost more than joints.** Robots on the ground gain less than arms in the air: worlds that share a register
   wait for the one with the most contacts.
 """
