@@ -186,19 +186,19 @@ llvm-cov: | $(PYTHON)
 
 # What a target will install, printed before it does.
 announce-demo:
-	@.ci/announce demo "demo" ""
+	@.ci/needs demo && .ci/announce demo "demo" ""
 announce-test:
-	@.ci/announce test "demo dev docs" "$(VULKAN) $(BROWSER)"
+	@.ci/needs test && .ci/announce test "demo dev docs" "$(VULKAN) $(BROWSER)"
 announce-docs:
-	@.ci/announce docs "demo dev docs" ""
+	@.ci/needs docs && .ci/announce docs "demo dev docs" ""
 announce-test-rl:
-	@.ci/announce test-rl "demo dev rl" ""
+	@.ci/needs test-rl && .ci/announce test-rl "demo dev rl" ""
 announce-train:
-	@.ci/announce train "demo dev rl" ""
+	@.ci/needs train && .ci/announce train "demo dev rl" ""
 announce-bench-env:
-	@.ci/announce bench-env "demo dev peers" ""
+	@.ci/needs bench-env && .ci/announce bench-env "demo dev peers" ""
 announce-coverage:
-	@.ci/announce coverage "demo dev coverage" "$(VULKAN) $(BROWSER)"
+	@.ci/needs coverage && .ci/announce coverage "demo dev coverage" "$(VULKAN) $(BROWSER)"
 
 # Installs Debian packages; other systems are left to you, and the tests name what is missing.
 define debian

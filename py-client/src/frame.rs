@@ -86,6 +86,13 @@ impl PyFrame {
             .collect()
     }
 
+    fn _repr_html_<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py()
+            .import("tightloop.notebook")?
+            .getattr("frame_html")?
+            .call1((slf,))
+    }
+
     fn __dir__(&self, py: Python<'_>) -> Vec<String> {
         let mut names = self.fields(py);
         names.extend(["copy", "fields"].map(str::to_owned));

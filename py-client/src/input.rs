@@ -147,10 +147,7 @@ impl<'a, 'py> Inputs<'a, 'py> {
                 format!("{field}: no robot `{name}`; there are: {known}"),
             ));
         };
-        let Range {
-            start,
-            end: stop,
-        } = axis.of(robot);
+        let Range { start, end: stop } = axis.of(robot);
         let base = self.base(axis, &(start..stop));
         for columns in [start..stop, start + base..stop] {
             if let Some(array) = self.ready(value, &columns) {

@@ -67,10 +67,20 @@ pub(crate) enum CliCommand {
     ///
     /// Example: tightloop devices
     Devices,
-    /// List the running daemons, one name per line.
+    /// List the running daemons with their worlds, device, process, users, steps per second and age.
+    ///
+    /// Steps are counted for half a second.
     ///
     /// Example: tightloop list
-    List,
+    List {
+        /// Print the names alone, one per line, at once.
+        #[arg(long)]
+        names: bool,
+
+        /// Print JSON.
+        #[arg(long, conflicts_with = "names")]
+        json: bool,
+    },
     /// Stop a daemon with all its groups, and wait until it has ended.
     ///
     /// Example: tightloop stop franka

@@ -9,7 +9,7 @@ use sim_protocol::{AttachOptions, Client, keep_waiting};
 
 use crate::cli::{self, CliCommand};
 use crate::error::DaemonError;
-use crate::{bench, devices, inspect, output, recording, session};
+use crate::{bench, devices, inspect, list, recording, session};
 
 /// Runs a command line; the exit code is 0 done, 1 failed, 2 misused.
 pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
@@ -26,7 +26,7 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
         CliCommand::Record(args) => recording::record(args),
         CliCommand::Replay(args) => recording::replay(args),
         CliCommand::Devices => devices::run(),
-        CliCommand::List => list(),
+        CliCommand::List { names, json } => list::run(*names, *json),
         CliCommand::Stop { name } => stop(name),
         CliCommand::Python(command) => command.run(),
         CliCommand::Completions { shell } => cli::completions(*shell),
@@ -42,12 +42,6 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
             error.exit_code()
         }
     }
-}
-
-fn list() -> Result<(), DaemonError> {
-    let names = sim_protocol::running(None)?;
-    let lines: String = names.iter().map(|name| format!("{name}\n")).collect();
-    output::print(lines.as_bytes()).map_err(DaemonError::stdout)
 }
 
 fn stop(name: &str) -> Result<(), DaemonError> {

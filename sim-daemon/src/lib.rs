@@ -16,6 +16,7 @@ mod export;
 mod fault_log;
 mod groups;
 mod inspect;
+mod list;
 mod log;
 pub mod observe;
 mod output;

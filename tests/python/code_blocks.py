@@ -123,7 +123,7 @@ class PageRunner:
 
 def wait_for(name: str, environment: dict[str, str]) -> None:
     """Wait until a daemon of that name runs."""
-    command = [sys.executable, "-m", "tightloop", "list"]
+    command = [sys.executable, "-m", "tightloop", "list", "--names"]
 
     def runs() -> bool:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)

@@ -15,7 +15,7 @@ from PIL import Image
 from conftest import REPOSITORY
 from tightloop.demo import lesson, tour
 from tightloop.demo.command import main
-from tightloop.demo.policy import Policy
+from tightloop.assets import Policy
 from tightloop.demo.scenes import SCENES, DemoScene, Grasp, Many, Target, Torque, Trained
 from tightloop.errors import MissingLibrary
 from tightloop.view import dependencies

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import tightloop as tl
+from tightloop import env
 from tightloop.env import VectorEnv
+from tightloop.tasks.reach import FrankaReach
 
 # A body with two legs of two joints each
 DOG = """<robot name="dog">
@@ -243,3 +245,56 @@ def test_a_viewer_after_the_end_or_without_its_library_says_why(scene, monkeypat
 def test_environments_take_the_name_of_gymnasiums_registry():
     envs = VectorEnv("tightloop/CartPoleBalance-v0", 1)
     envs.close()
+
+
+def test_dofs_in_another_order(scene, dog):
+    order = dog.order(["right_knee", "left_knee", "right_hip", "left_hip"])
+    dog.joint_q = {"left_hip": 0.1, "left_knee": 0.2, "right_hip": 0.3, "right_knee": 0.4}
+    with tl.launch(scene, worlds=2, fields=("joint_q", "joint_qd", "joint_target_q")) as sim:
+        frame = sim.forward()
+        read = order.read(frame.joint_q[:, sim.coords["dog"]])
+        np.testing.assert_allclose(read, [[0.4, 0.2, 0.3, 0.1]] * 2, rtol=1e-6)
+        assert order.read(frame.joint_qd[:, sim.dofs["dog"]]).shape == (2, 4)
+        frame = sim.step(joint_target_q={"dog": order.write(read)})
+        np.testing.assert_allclose(frame.joint_target_q[0, 6:], [0.1, 0.2, 0.3, 0.4], rtol=1e-6)
+    with pytest.raises(tl.SceneError, match=r"order: names lacks 'left_knee', 'right_hip', 'right_knee'"):
+        dog.order(["left_hip"])
+
+
+@pytest.mark.parametrize("control", ["JointTarget", "JointDelta", "JointTorque"])
+def test_controls_take_dofs_in_any_order(control):
+    """The same motion, whatever the order of the action."""
+
+    def episode(order: list[int]) -> np.ndarray:
+        class Ordered(FrankaReach):
+            def controls(self):
+                dofs = [f"arm/fr3_joint{joint + 1}" for joint in order]
+                return [getattr(env, control)(dofs, 0.1)]
+
+        envs = VectorEnv(Ordered, 3, device="cpu")
+        try:
+            envs.reset(seed=4)
+            actions = np.random.default_rng(1).uniform(-1, 1, (8, 3, 7))
+            for action in actions:
+                envs.step(action[:, order])
+            return envs.frame.joint_q.copy()
+        finally:
+            envs.close()
+
+    np.testing.assert_array_equal(episode([*range(7)]), episode([3, 1, 4, 0, 6, 5, 2]))
+
+
+def test_files_that_come_with_the_package():
+    assert tl.assets.FR3.is_file() and tl.assets.CARTPOLE.is_file()
+    assert set(tl.assets.POLICIES) >= {"CartPoleSwingUp", "FrankaReach", "FrankaPickCube"}
+    with pytest.raises(tl.ArgumentError, match="did you mean `FrankaReach`"):
+        tl.assets.policy("FrankaReech")
+    envs = VectorEnv("CartPoleSwingUp", 16)
+    try:
+        policy = tl.assets.policy("CartPoleSwingUp")
+        obs, _ = envs.reset(seed=1)
+        for _ in range(400):
+            obs, _, _, _, infos = envs.step(policy(obs))
+        assert infos["success"].mean() > 0.8
+    finally:
+        envs.close()

@@ -185,7 +185,7 @@ def test_a_daemon_with_groups_is_one_line_of_the_list_and_one_stop(drawn, tmp_pa
             stems = stems_of(process.pid)
             taken = subprocess.run(serve, capture_output=True, text=True, check=False)
             assert "already running" in taken.stdout and str(process.pid) in taken.stdout
-            listed = subprocess.run([*COMMAND, "list"], capture_output=True, text=True, check=True)
+            listed = subprocess.run([*COMMAND, "list", "--names"], capture_output=True, text=True, check=True)
             assert [line for line in listed.stdout.splitlines() if name in line] == [name]
             recorded = subprocess.run(
                 [*COMMAND, "record", name, str(tmp_path / "no")], capture_output=True, text=True, check=False

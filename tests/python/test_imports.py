@@ -27,11 +27,13 @@ Graph = dict[str, set[str]]
 LAYERS = (
     ("tightloop.errors",),
     (
+        "tightloop.assets",
         "tightloop.attributes",
         "tightloop.checks",
         "tightloop.frames",
         "tightloop.inputs",
         "tightloop.keyframes",
+        "tightloop.notebook",
         "tightloop.optional_imports",
         "tightloop.whole_files",
         "tightloop.written_arrays",
@@ -43,6 +45,7 @@ LAYERS = (
         "tightloop.body",
         "tightloop.distributions",
         "tightloop.entity",
+        "tightloop.joint_order",
         "tightloop.mujoco_model",
         "tightloop.robot",
         "tightloop.robot_properties",

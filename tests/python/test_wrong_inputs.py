@@ -96,6 +96,7 @@ def world(tmp_path_factory) -> Iterator[Any]:
             restore=restore,
             envs=envs,
             snapshot=snapshot,
+            order=(arm := scene().robots["arm"]).order(arm.dof_names[::-1]),
             dynamics=tl.Dynamics(scene()),
             picture=SimpleNamespace(render=render),
             folder=tmp_path_factory.mktemp("films"),

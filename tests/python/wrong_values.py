@@ -181,6 +181,8 @@ KINDS: dict[str, tuple[Any, ...]] = {
         {"fr3_joint.": 1.0, ".*joint1": 2.0},
     ),
     "modes": ("force", 3, ["position"], ["force"] * 9, THING, {"nothing": "both"}, {"fr3_joint1": "force"}, None),
+    "order": ("abc", 3, [], ["nowhere"], [3], THING, ["fr3_joint1"] * 9, ["fr3_joint1"], None),
+    "ordered": ("abc", THING, np.zeros(8), np.zeros((2, 15)), 3.0, [None] * 9, [[1.0], [1.0, 2.0]]),
     "dofs": ("arm/fr3_joint1", 3, [], [3], THING, [["arm/fr3_joint1"]]),
     "observed bound": ("abc", [1.0, 2.0, 3.0], THING, NAN),
     "scene": (3, "abc", THING, None, {}),
@@ -333,6 +335,9 @@ CALLS: dict[str, Call] = {
     "Scene.add_mujoco": of_scene(
         "add_mujoco", POSE | {"model": "model", "name": "name", "mesh_max_hull_vertices": "count"}, model=BALL
     ),
+    "Robot.order": Call(lambda world: world.scene().robots["arm"].order, {"names": "order"}),
+    "JointOrder.read": Call(lambda world: world.order.read, {"values": "ordered"}),
+    "JointOrder.write": Call(lambda world: world.order.write, {"values": "ordered"}),
     "Robot.link": Call(lambda world: world.scene().robots["arm"].link, {"name": "link"}),
     "Uniform": Call(lambda _: tl.Uniform, {"low": "number", "high": "number"}, {"low": 0.0, "high": 1.0}),
     "Normal": Call(lambda _: tl.Normal, {"mean": "number", "std": "least 0"}, {"mean": 0.0, "std": 1.0}),
@@ -450,6 +455,7 @@ LEFT = {
     "Frame": "Sim.step makes it",
     "FrameCopy": "Frame.copy makes it",
     "Groups": "launch makes it",
+    "JointOrder": "Robot.order makes it",
     "Link": "Robot.link makes it",
     "RayHits": "Sim.rays makes it",
     "Robot": "Scene.add_urdf makes it",

@@ -228,6 +228,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "cli",
             "environment",
             "devices",
+            "list",
             "inspect",
             "refusal",
             "snapshot",

@@ -15,6 +15,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tightloop import assets as assets
     from tightloop._core import Frame, __version__
     from tightloop.body import Body
     from tightloop.distributions import Normal, Uniform
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     )
     from tightloop.frames import FrameCopy
     from tightloop.groups import Groups
+    from tightloop.joint_order import JointOrder
     from tightloop.launching import attach, launch
     from tightloop.rays import RayHits
     from tightloop.robot import Link, Robot
@@ -91,6 +93,7 @@ _HOMES = {
     ),
     "tightloop.frames": ("FrameCopy",),
     "tightloop.groups": ("Groups",),
+    "tightloop.joint_order": ("JointOrder",),
     "tightloop.launching": ("attach", "launch"),
     "tightloop.rays": ("RayHits",),
     "tightloop.robot": ("Link", "Robot"),
@@ -116,6 +119,7 @@ __all__ = [
     "FrameCopy",
     "FramesHeld",
     "Groups",
+    "JointOrder",
     "LaunchError",
     "LeaseHeld",
     "LeaseLost",
@@ -153,6 +157,10 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     # Lazy (PEP 562): the daemon also starts through this package, and must not wait for the import of NumPy.
+    if name == "assets":
+        import tightloop.assets
+
+        return tightloop.assets
     home = _HOME_OF.get(name)
     if home is None:
         if name.startswith("_"):
@@ -168,4 +176,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted([*__all__, "assets"])

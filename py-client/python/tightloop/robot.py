@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from tightloop.attributes import suggestion
 from tightloop.checks import Vector
 from tightloop.entity import Entity
 from tightloop.errors import SceneError
+from tightloop.joint_order import JointOrder
+from tightloop.notebook import picture_html, table
 from tightloop.robot_properties import Modes, Numbers, PerDof, Positions
 
 
@@ -201,6 +204,22 @@ class Robot(Entity):
             )
         return Link(self, name)
 
+    def order(self, names: Sequence[str]) -> JointOrder:
+        """Declare an order of the dofs, such as that of a policy trained in another simulator, to convert arrays.
+
+        Args:
+            names: Names of all dofs, without those of a floating base, in that order.
+
+        Raises:
+            SceneError: A name is unknown, missing or there twice, or a joint has several coordinates.
+        """
+        base = 6 if self.floating else 0
+        dofs, coords = self.dof_names[base:], self.coord_names[base + 1 if base else 0 :]
+        if dofs != coords:
+            ball = next(name for name in coords if name not in dofs)
+            raise SceneError(f"robot `{self.name}`: order: `{ball}` has no dof of its own; order its columns by hand")
+        return JointOrder(self.name, names, dofs, base)
+
     @property
     def notes(self) -> list[str]:
         """What the URDF reader ignored or repaired, one sentence each."""
@@ -254,6 +273,19 @@ class Robot(Entity):
         """Return the targets that hold the start position; the daemon sets those of ball and free joints."""
         start = dict(zip(self.coord_names, self.joint_q, strict=True))
         return [float(start.get(name, 0.0)) for name in self.dof_names]
+
+    def _repr_html_(self) -> str:
+        names, effort = self.dof_names, self.joint_effort_limit
+        rows = [
+            (name, f"{low:.4g} … {high:.4g}", f"{limit:.4g}", f"{ke:.4g}", f"{kd:.4g}", mode)
+            for name, (low, high), limit, ke, kd, mode in zip(
+                names, self.joint_range, effort, self.joint_target_ke, self.joint_target_kd, self.joint_target_mode,
+                strict=True,
+            )
+        ]
+        head = ("dof", "range [rad or m]", "effort limit", "target_ke", "target_kd", "target_mode")
+        title = f"{self.name}: {self.dofs} dofs, {len(self.link_names)} links"
+        return table(title, head, rows, picture_html("of_robot", self))
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, dofs={self.dofs}, urdf={str(self.urdf)!r})"

@@ -20,6 +20,7 @@ from tightloop.body import Body
 from tightloop.checks import Vector
 from tightloop.errors import SceneError
 from tightloop.mujoco_model import MujocoModel
+from tightloop.notebook import picture_html, table
 from tightloop.robot import PER_DOF, Robot
 from tightloop.scene_mujoco import HULL_VERTICES, check_options, keep_beside, read_file, read_model
 from tightloop.scene_options import FrictionCombine
@@ -376,6 +377,14 @@ class Scene(SceneRandomization):
     def to_toml(self) -> str:
         """Return the text of a scene file with absolute paths, as a daemon gets it."""
         return _core.scene_to_toml(self._json())
+
+    def _repr_html_(self) -> str:
+        rows = [("robot", name, f"{robot.dofs} dofs") for name, robot in self.robots.items()]
+        rows += [("MuJoCo model", name, f"{len(model.dof_names)} dofs") for name, model in self.models.items()]
+        rows += [("body", name, "fixed" if body.fixed else "free") for name, body in self.bodies.items()]
+        rows += [("shape", shape.full_name, shape.type) for shape in self.shapes.values()]
+        title = f"Scene: {self.substeps} steps of {self.dt:.6g} s per frame"
+        return table(title, (), rows, picture_html("of_scene", self))
 
     def __repr__(self) -> str:
         parts = f"robots={[*self.robots]}, models={[*self.models]}, bodies={[*self.bodies]}, shapes={[*self.shapes]}"

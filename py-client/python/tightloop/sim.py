@@ -21,6 +21,7 @@ from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
 from tightloop.errors import ArgumentError, CommandRefused, SimClosed, UnknownAttribute
 from tightloop.frames import FrameCopy
+from tightloop.notebook import Shown
 from tightloop.params import Params
 from tightloop.rays import RayHits, Rays, ray_poses
 from tightloop.sensors import slices_by_name
@@ -28,7 +29,7 @@ from tightloop.snapshot import Snapshot, transfer_file
 from tightloop.viewer_process import Viewer
 
 
-class Sim(Attributes):
+class Sim(Shown, Attributes):
     """A simulation in a daemon. `launch` and `attach` make it; ``close`` or the end of a ``with`` block closes it.
 
     Attributes:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import weakref
 from collections.abc import Sequence
+from html import escape
 
 from tightloop import checks, errors
 from tightloop.errors import ArgumentError, LaunchError
@@ -62,6 +63,9 @@ class Viewer:
     def close(self) -> None:
         """End the viewer; the simulation continues."""
         self._end()
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{escape(self.url)}" width="100%" height="600" style="border:0"></iframe>'
 
     def __repr__(self) -> str:
         return f"Viewer({self.url!r}, pid={self.pid}{'' if self.open else ', closed'})"

@@ -16,6 +16,7 @@ use crate::journal::Journal;
 use crate::liveness::Peer;
 use crate::observer::Observer;
 use crate::paths::{DaemonPaths, Presence};
+use crate::transport;
 use crate::turn::{Held, Turn};
 use crate::{Description, Frame, Op, ProtocolError};
 
@@ -337,6 +338,17 @@ impl Client {
         hook: Hook<'_>,
     ) -> Result<Option<Frame>, ProtocolError> {
         self.with_observer(hook, |observer, hook| observer.wait_newer(timeout, hook))
+    }
+
+    /// How many other clients observe the worlds.
+    ///
+    /// # Errors
+    /// As [`Client::latest`].
+    pub fn observers(&self, hook: Hook<'_>) -> Result<usize, ProtocolError> {
+        let all = self.with_observer(hook, |_, hook| {
+            self.connection.ports(hook, transport::watchers)
+        })?;
+        Ok(all.saturating_sub(1))
     }
 
     fn with_observer<T>(

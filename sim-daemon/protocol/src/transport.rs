@@ -237,6 +237,11 @@ pub(crate) fn open_watch<S: Service>(node: &Node<S>) -> Result<FrameService<S>, 
     open_lines(node, "watch")
 }
 
+/// How many observe the worlds.
+pub(crate) fn watchers<S: Service>(node: &Node<S>) -> Result<usize, ProtocolError> {
+    Ok(open_watch(node)?.dynamic_config().number_of_subscribers())
+}
+
 /// The end of a service of frames that sends.
 pub(crate) fn frame_publisher<S: Service>(
     service: &FrameService<S>,

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tightloop as tl
+from tightloop.assets import FR3
 
 FRAMES = 180  # 3 s at 60 Hz
-URDF = Path(__file__).parents[1] / "assets/fr3/fr3_franka_hand.urdf"
+URDF = FR3
 #: Runs of MuJoCo C 3.17 in float64, ``target``, ``torque`` and ``grasp``: coordinates of frames 0 to 180 [rad, m; the
 #: cube's quaternion w first]; and ``goals``, targets of the grasp's 180 frames. `tests/data/demo.py` makes the file.
 RECORD = Path(__file__).with_name("record.npz")

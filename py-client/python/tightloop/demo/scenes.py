@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from abc import ABC, abstractmethod
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 import tightloop as tl
 from tightloop.demo import lesson
-from tightloop.demo.policy import Policy
+from tightloop.assets import policy
 
 # Where the goal stands in observations of `tightloop.tasks.pick_cube`, in the world's axes [m].
 _GOAL = slice(26, 29)
@@ -234,7 +233,7 @@ class Trained(DemoScene):
         class Named(FrankaPickCube):
             launch_options = FrankaPickCube.launch_options | {"name": name}
 
-        self._policy = Policy(Path(__file__).with_name("pick_cube.npz"))
+        self._policy = policy("FrankaPickCube")
         self._env = VectorEnv(
             Named(), self.worlds, autoreset_mode=AutoresetMode.DISABLED, device=device, threads=threads
         )

@@ -48,7 +48,7 @@ class _Joints:
         """Make a control of some dofs.
 
         Args:
-            dofs: Names of the dofs, ``robot/joint``.
+            dofs: Names of the dofs, ``robot/joint``, in any order, which is that of the action.
             scale: Effect of an action of 1, for all dofs or for each.
         """
         is_list = isinstance(dofs, Sequence) and not isinstance(dofs, str) and len(dofs) > 0
@@ -67,15 +67,25 @@ class _Joints:
     def bind(self, names: Names, commands: Commands) -> None:
         """Look up the dofs."""
         places = [names.dof(name) for name in self._dofs]
-        if places != list(range(places[0], places[0] + self._count)):
-            raise ArgumentError(f"{type(self).__name__}: dofs must stand side by side, in the order of the robot's")
         self._array, self._first = commands.array(self._field, places), places[0]
+        # dofs that stand side by side, in the order of the robot's, are written where they are
+        self._side_by_side = places == list(range(places[0], places[0] + self._count))
+        self._columns: slice | NDArray[np.intp] = np.array(places)
+        if self._side_by_side:
+            self._columns = slice(places[0], places[0] + self._count)
+        self._own = np.empty((0 if self._side_by_side else len(self._array), self._count), np.float32)
         self._start = np.ascontiguousarray(commands.start[places])
         self._low, self._high = (np.ascontiguousarray(end) for end in commands.range[places].T)
 
     def _drive(self, action: NDArray[np.float32], start: NDArray[np.float32] | None) -> None:
         """Write ``start + scale * action`` or, without a start, add ``scale * action`` to it, within limits."""
-        _core.drive(self._array, self._first, action, self._scale, start, self._low, self._high)
+        if self._side_by_side:
+            _core.drive(self._array, self._first, action, self._scale, start, self._low, self._high)
+            return
+        if start is None:
+            self._own[:] = self._array[:, self._columns]
+        _core.drive(self._own, 0, action, self._scale, start, self._low, self._high)
+        self._array[:, self._columns] = self._own
 
 
 class JointTorque(_Joints):
@@ -87,7 +97,7 @@ class JointTorque(_Joints):
         """Make a torque control of some dofs.
 
         Args:
-            dofs: Names of the dofs, ``robot/joint``.
+            dofs: Names of the dofs, ``robot/joint``, in any order, which is that of the action.
             scale: Torque of an action of 1 [N·m or N], for all dofs or for each.
             hold: Whether to add ``bias_force`` at the start of the step, as a Franka's own controller does.
         """
@@ -104,8 +114,7 @@ class JointTorque(_Joints):
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
         """Write the torques."""
         if self._hold:
-            dofs = slice(self._first, self._first + self._count)
-            np.copyto(self._array[:, dofs], frame.bias_force[:, dofs], casting="same_kind")
+            self._array[:, self._columns] = frame.bias_force[:, self._columns]
         self._drive(action, None if self._hold else self._start)
 
 
@@ -210,8 +219,7 @@ class EndEffectorDelta(_Joints):
 
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
         """Increment the targets."""
-        dofs = slice(self._first, self._first + self._count)
-        inverse = frame.site_inverse_jacobian[:, self._site, dofs, : self.size]
+        inverse = frame.site_inverse_jacobian[:, self._site, self._columns, : self.size]
         np.multiply(action, self._step, out=self._displacement)
         np.einsum("wdk,wk->wd", inverse, self._displacement, out=self._turn, casting="same_kind")
         self._drive(self._turn, None)

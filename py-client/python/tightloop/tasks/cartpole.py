@@ -20,15 +20,15 @@ pole within 0.2 rad of upright that turns slower than 1 rad/s.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
 import tightloop as tl
+from tightloop.assets import CARTPOLE
 from tightloop.env.controls import Control, JointTorque
 from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
 
-URDF = Path(__file__).parents[1] / "assets" / "cartpole.urdf"
+URDF = CARTPOLE
 TRACK = 2.4  # [m]
 
 

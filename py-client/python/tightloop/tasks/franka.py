@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import tightloop as tl
+from tightloop.assets import FR3
 from tightloop.checks import Vector
 from tightloop.env.controls import Control, EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
 from tightloop.env.task import Observed
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     # typing has it from Python 3.11 on, the package runs on 3.10
     from typing_extensions import Unpack
 
-URDF = Path(__file__).parents[1] / "assets" / "fr3" / "fr3_franka_hand.urdf"
+URDF = FR3
 #: The arm's dofs, and the fingers'.
 ARM = [f"arm/fr3_joint{number}" for number in range(1, 8)]
 FINGERS = ["arm/fr3_finger_joint1", "arm/fr3_finger_joint2"]
