@@ -7,12 +7,13 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import tightloop as tl
-from tightloop.adapters.environment import adapted_environment, library
+from tightloop.adapters.environment import adapted_environment, library, set_torch_threads
 from tightloop.env import AutoresetMode, VectorEnv
 
 
@@ -42,6 +43,22 @@ def test_tightloop_imports_no_library_of_reinforcement_learning():
     heavy = {"torch", "stable_baselines3", "rsl_rl", "skrl", "torchrl", "ray"}
     code = f"import sys, tightloop.env, tightloop.adapters; print({heavy} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
+
+
+def test_threads_of_torch_are_set_only_where_it_computes_on_the_cpu():
+    told: list[int] = []
+    torch = SimpleNamespace(
+        device=lambda name: SimpleNamespace(type=str(name).partition(":")[0]), set_num_threads=told.append
+    )
+    set_torch_threads(torch, 1)
+    set_torch_threads(torch, 3, "cpu:0")
+    set_torch_threads(torch, None)
+    set_torch_threads(torch, 1, "cuda:0")
+    assert told == [1, 3]
+    for wrong in (0, 1.5):
+        with pytest.raises(tl.ArgumentError, match="torch_threads"):
+            set_torch_threads(torch, wrong)  # type: ignore[arg-type]
+    assert told == [1, 3]
 
 
 def test_an_environment_is_taken_as_it_is_or_refused(env):

@@ -94,3 +94,19 @@ def test_another_autoreset_mode_is_refused(hasty: Any, vector: Callable[..., Any
         RslRlVecEnv(vector(hasty, 2))
     with pytest.raises(tl.ArgumentError, match="max_episode_steps"):
         RslRlVecEnv(vector(hasty, 2, autoreset_mode="SAME_STEP", max_episode_steps=float("inf")))
+
+
+def test_torch_has_one_thread_unless_told_otherwise(hasty: Any, made: Callable[[Any], Any]) -> None:
+    for given, expected in (({}, 1), ({"torch_threads": 2}, 2), ({"torch_threads": None}, 3)):
+        torch.set_num_threads(3)
+        made(RslRlVecEnv(hasty, 2, **given))
+        assert torch.get_num_threads() == expected
+    with pytest.raises(tl.ArgumentError, match="torch_threads is 0"):
+        RslRlVecEnv(hasty, 2, torch_threads=0)
+
+
+def test_torch_keeps_its_threads_where_it_computes_on_a_gpu(hasty: Any, made: Callable[[Any], Any]) -> None:
+    torch.set_num_threads(3)
+    # no tensor is made before the first reset, so no GPU is needed
+    made(RslRlVecEnv(hasty, 2, torch_device="cuda:0"))
+    assert torch.get_num_threads() == 3

@@ -124,3 +124,12 @@ def test_options_of_a_reset_are_refused_once(hasty: Any, made: Callable[[Any], A
 def test_another_autoreset_mode_is_refused(hasty: Any, vector: Callable[..., Any]) -> None:
     with pytest.raises(tl.ArgumentError, match="SAME_STEP"):
         Sb3VecEnv(vector(hasty, 2))
+
+
+def test_torch_has_one_thread_unless_told_otherwise(hasty: Any, made: Callable[[Any], Any]) -> None:
+    for given, expected in (({}, 1), ({"torch_threads": 2}, 2), ({"torch_threads": None}, 3)):
+        torch.set_num_threads(3)
+        made(Sb3VecEnv(hasty, 2, **given))
+        assert torch.get_num_threads() == expected
+    with pytest.raises(tl.ArgumentError, match="torch_threads is 0"):
+        Sb3VecEnv(hasty, 2, torch_threads=0)

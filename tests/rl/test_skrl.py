@@ -107,3 +107,12 @@ def test_steps_are_those_of_the_environment(
 def test_another_autoreset_mode_is_refused(hasty: Any, vector: Callable[..., Any]) -> None:
     with pytest.raises(tl.ArgumentError, match="NEXT_STEP"):
         SkrlEnv(vector(hasty, 2, autoreset_mode="SAME_STEP"))
+
+
+def test_torch_has_one_thread_unless_told_otherwise(hasty: Any, made: Callable[[Any], Any]) -> None:
+    for given, expected in (({}, 1), ({"torch_threads": 2}, 2), ({"torch_threads": None}, 3)):
+        torch.set_num_threads(3)
+        made(SkrlEnv(hasty, 2, **given))
+        assert torch.get_num_threads() == expected
+    with pytest.raises(tl.ArgumentError, match="torch_threads is 0"):
+        SkrlEnv(hasty, 2, torch_threads=0)

@@ -78,3 +78,12 @@ def test_a_reset_without_a_mask_is_of_all_worlds(hasty: Any, made: Callable[[Any
 def test_another_autoreset_mode_is_refused(hasty: Any, vector: Callable[..., Any]) -> None:
     with pytest.raises(tl.ArgumentError, match="DISABLED"):
         TorchRlEnv(vector(hasty, 2))
+
+
+def test_torch_has_one_thread_unless_told_otherwise(hasty: Any, made: Callable[[Any], Any]) -> None:
+    for given, expected in (({}, 1), ({"torch_threads": 2}, 2), ({"torch_threads": None}, 3)):
+        torch.set_num_threads(3)
+        made(TorchRlEnv(hasty, 2, **given))
+        assert torch.get_num_threads() == expected
+    with pytest.raises(tl.ArgumentError, match="torch_threads is 0"):
+        TorchRlEnv(hasty, 2, torch_threads=0)

@@ -10,4 +10,8 @@
 
 All take a `tightloop.env.VectorEnv`, or a task and further arguments of `VectorEnv`; `register` takes a task. They
 return copies, which the library may keep or overwrite, also if the environment has ``copy=False``.
+
+The first four set torch's threads to 1, since several would take cores from the simulation. Their argument
+``torch_threads`` sets another number, and ``torch_threads=None`` changes nothing. Ray sets the threads of RLlib's
+workers itself.
 """

@@ -6,6 +6,7 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
+from tightloop import checks
 from tightloop.env import Task, VectorEnv
 from tightloop.errors import ArgumentError
 from tightloop.optional_imports import optional_import
@@ -25,6 +26,27 @@ def library(module: str, *, install: str) -> Any:
         MissingLibrary: The library is not installed.
     """
     return optional_import(module, f"there is no module `{{}}`: pip install '{install}'")
+
+
+def set_torch_threads(torch: Any, threads: int | None, device: str = "cpu") -> None:
+    """Set the number of threads that torch computes with, in the whole process.
+
+    Torch starts with a thread per core. These threads wait for each other by spinning, and take the cores from the
+    simulation: on two busy cores Stable-Baselines3's PPO was 4 to 10 times as slow as with one thread.
+
+    Args:
+        torch: The module.
+        threads: Number of threads, at least 1; None changes nothing.
+        device: Device of torch's tensors. Nothing changes if it is not the CPU.
+
+    Raises:
+        ArgumentError: ``threads`` is not a whole number of at least 1.
+    """
+    if threads is None:
+        return
+    count = checks.integer("torch_threads", threads, least=1, error=ArgumentError)
+    if torch.device(device).type == "cpu":
+        torch.set_num_threads(count)
 
 
 def adapted_environment(given: Given, num_envs: int | None, mode: AutoresetMode, options: dict[str, Any]) -> VectorEnv:

@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from tightloop.adapters.environment import Given, adapted_environment, library
+from tightloop.adapters.environment import Given, adapted_environment, library, set_torch_threads
 from tightloop.errors import ArgumentError
 
 rsl_env = library("rsl_rl.env", install="rsl-rl-lib")
@@ -39,18 +39,30 @@ class RslRlVecEnv(rsl_env.VecEnv):
         cfg: Configuration of the environment, for logs.
     """
 
-    def __init__(self, env: Given, num_envs: int | None = None, *, torch_device: str = "cpu", **options: Any) -> None:
+    def __init__(
+        self,
+        env: Given,
+        num_envs: int | None = None,
+        *,
+        torch_device: str = "cpu",
+        torch_threads: int | None = 1,
+        **options: Any,
+    ) -> None:
         """Adapt an environment of the mode ``SAME_STEP``, or make one for a task.
 
         Args:
             env: A `VectorEnv`, or a task.
             num_envs: Number of worlds, for a task.
             torch_device: Device of torch's tensors, such as ``"cuda:0"``; ``device`` is that of the physics.
+            torch_threads: Threads of torch in this process, if ``torch_device`` is the CPU. Several take the
+                cores from the simulation, and training is several times as slow. None changes nothing.
             **options: Further arguments of `VectorEnv`, for a task.
 
         Raises:
-            ArgumentError: The environment has another autoreset mode, or endless episodes.
+            ArgumentError: The environment has another autoreset mode, or endless episodes, or ``torch_threads`` is
+                below 1.
         """
+        set_torch_threads(torch, torch_threads, torch_device)
         self.env = adapted_environment(env, num_envs, AutoresetMode.SAME_STEP, options)
         if self.env.max_episode_steps is None:
             raise ArgumentError("max_episode_steps: rsl_rl needs episodes that end; give a number")

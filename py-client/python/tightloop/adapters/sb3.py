@@ -3,7 +3,7 @@
 >>> from stable_baselines3 import PPO
 >>> from tightloop.adapters.sb3 import Sb3VecEnv
 >>> env = Sb3VecEnv("FrankaReach", 512)
->>> PPO("MlpPolicy", env, n_steps=24, batch_size=3072, gamma=0.9).learn(1_000_000)
+>>> PPO("MlpPolicy", env, n_steps=24, batch_size=3072, gamma=0.9, device="cpu").learn(1_000_000)
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from tightloop.adapters.environment import Given, adapted_environment, library
+from tightloop.adapters.environment import Given, adapted_environment, library, set_torch_threads
 from tightloop.errors import ArgumentError
 
 vec_env = library("stable_baselines3.common.vec_env", install="stable-baselines3")
+torch = library("torch", install="torch")
 
 
 class Sb3VecEnv(vec_env.VecEnv):
@@ -31,17 +32,22 @@ class Sb3VecEnv(vec_env.VecEnv):
         env: The `VectorEnv`.
     """
 
-    def __init__(self, env: Given, num_envs: int | None = None, **options: Any) -> None:
+    def __init__(
+        self, env: Given, num_envs: int | None = None, *, torch_threads: int | None = 1, **options: Any
+    ) -> None:
         """Adapt an environment of the mode ``SAME_STEP``, or make one for a task.
 
         Args:
             env: A `VectorEnv`, or a task.
             num_envs: Number of worlds, for a task.
+            torch_threads: Threads of torch in this process. Several take the cores from the simulation, and
+                training is several times as slow. None changes nothing.
             **options: Further arguments of `VectorEnv`, for a task.
 
         Raises:
-            ArgumentError: The environment has another autoreset mode.
+            ArgumentError: The environment has another autoreset mode, or ``torch_threads`` is below 1.
         """
+        set_torch_threads(torch, torch_threads)
         self.env = adapted_environment(env, num_envs, AutoresetMode.SAME_STEP, options)
         super().__init__(self.env.num_envs, self.env.single_observation_space, self.env.single_action_space)
 

@@ -16,7 +16,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from tightloop.adapters.environment import Given, adapted_environment, library
+from tightloop.adapters.environment import Given, adapted_environment, library, set_torch_threads
 
 envs = library("torchrl.envs", install="torchrl")
 specs = library("torchrl.data", install="torchrl")
@@ -35,18 +35,29 @@ class TorchRlEnv(envs.EnvBase):
         infos: Infos of the last step.
     """
 
-    def __init__(self, env: Given, num_envs: int | None = None, *, torch_device: str = "cpu", **options: Any) -> None:
+    def __init__(
+        self,
+        env: Given,
+        num_envs: int | None = None,
+        *,
+        torch_device: str = "cpu",
+        torch_threads: int | None = 1,
+        **options: Any,
+    ) -> None:
         """Adapt an environment of the mode ``DISABLED``, or make one for a task.
 
         Args:
             env: A `VectorEnv`, or a task.
             num_envs: Number of worlds, for a task.
             torch_device: Device of torch's tensors, such as ``"cuda:0"``; ``device`` is that of the physics.
+            torch_threads: Threads of torch in this process, if ``torch_device`` is the CPU. Several take the
+                cores from the simulation, and training is several times as slow. None changes nothing.
             **options: Further arguments of `VectorEnv`, for a task.
 
         Raises:
-            ArgumentError: The environment has another autoreset mode.
+            ArgumentError: The environment has another autoreset mode, or ``torch_threads`` is below 1.
         """
+        set_torch_threads(torch, torch_threads, torch_device)
         inner = adapted_environment(env, num_envs, AutoresetMode.DISABLED, options)
         super().__init__(device=torch.device(torch_device), batch_size=torch.Size([inner.num_envs]))
         self.env = inner
