@@ -83,7 +83,7 @@ docs: announce-docs wheel $(VENV)/.docs ## the site into out/site: guides, refer
 test-rl: announce-test-rl wheel $(VENV)/.dev $(VENV)/.rl ## adapters of RL libraries, short trainings (installs 6 GB)
 	OMP_NUM_THREADS=1 $(PYTEST) tests/rl
 
-train: announce-train wheel $(VENV)/.rl ## train a policy, into out/train (TASK=FrankaReach SEED=0 MINUTES=3 RESUME=1)
+train: announce-train wheel $(VENV)/.rl ## train a policy, into out/ppo (TASK=FrankaReach SEED=0 MINUTES=3 RESUME=1)
 	$(PYTHON) examples/ppo.py $(TASK) --seed $(SEED) $(if $(MINUTES),--minutes $(MINUTES)) $(if $(RESUME),--resume)
 
 # Not part of `test`, which runs a few rounds: 200 take half an hour. Set the patience for a machine under load.

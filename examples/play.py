@@ -1,12 +1,13 @@
 """Runs a policy file in the loop, and draws what it did.
 
-    python examples/play.py FrankaReach out/train/FrankaReach-0/policy.onnx
+    pip install matplotlib onnxruntime
+    python examples/play.py FrankaReach out/ppo/FrankaReach-0/policy.onnx
     python examples/play.py FrankaPickCube examples/trained/FrankaPickCube.onnx --num-envs 16 --film out/pick.mp4
     python examples/play.py FrankaPickCube examples/trained/FrankaPickCube.onnx --num-envs 16 --view
 
 The file is ONNX with the input ``obs`` (worlds, size) and the output ``action`` (worlds, actions), as
 ``examples/ppo.py`` leaves it. Every world plays one episode; the picture has the rewards, the
-actions and the first observations of a few.
+actions and the first observations of a few. It is ``out/play/TASK.png`` if ``--out`` names no other.
 """
 
 from __future__ import annotations
@@ -15,17 +16,21 @@ import argparse
 from contextlib import nullcontext
 from pathlib import Path
 
-import matplotlib
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
+from training import needed
 
 from tightloop.env import AutoresetMode, VectorEnv
 from tightloop.view import Film
 
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
+with needed("matplotlib", "onnxruntime"):
+    import matplotlib
+    import onnxruntime
 
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+OUT = Path(__file__).resolve().parent.parent / "out" / "play"
 SHOWN = 8  # worlds in the picture
 FILMED = 16  # worlds in the film
 
@@ -83,9 +88,9 @@ def main() -> None:
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument("--view", action="store_true", help="show it in the browser, at the pace of the world")
     shown.add_argument("--film", type=Path, help=f"film of the first {FILMED} worlds: .mp4, .gif, .html or a folder")
-    parser.add_argument("--out", type=Path, help="picture (default: beside the policy, play.png)")
+    parser.add_argument("--out", type=Path, help="picture (default out/play/TASK.png)")
     args = parser.parse_args()
-    out = args.out or args.policy.with_name("play.png")
+    out = args.out or OUT / f"{args.task.rpartition(':')[2]}.png"
 
     policy = onnxruntime.InferenceSession(args.policy, providers=["CPUExecutionProvider"])
     mode = "human" if args.view else "rgb_array" if args.film else None

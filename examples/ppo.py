@@ -1,5 +1,6 @@
 """Proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347) in one file, made for the zero-copy loop.
 
+    pip install matplotlib onnxscript tensorboard torch tqdm
     python examples/ppo.py FrankaReach --seed 0
 
 Observations are read where the environment puts them, a ring of slots; each is copied once, into the rollout. What
@@ -7,10 +8,13 @@ an action led to is learned from with generalised advantages (arXiv 1506.02438);
 continued by the critic's value of its last observation. The learning rate follows the change of the policy (its KL
 divergence).
 
-In ``out/train/TASK-SEED`` it leaves a checkpoint every few seconds (``--resume`` goes on from it), the log for
-TensorBoard, the curve as CSV and PNG, and the policy as ONNX, which ``examples/play.py`` runs. With
-``--daemon NAME`` it joins worlds that ``python -m tightloop.env serve TASK --name NAME`` keeps, so that it can be
-killed and come back.
+In ``out/ppo/TASK-SEED`` it leaves a checkpoint every few seconds (``--resume`` goes on from it), the log for
+TensorBoard, the curve as CSV and PNG, and the policy as ONNX, which ``examples/play.py`` runs. It writes elsewhere only
+with ``--out``. With ``--daemon NAME`` it joins worlds that ``python -m tightloop.env serve TASK --name NAME`` keeps, so
+that it can be killed and come back.
+
+A terminal shows a progress bar; a file or a pipe gets a line per evaluation. The log has all metrics of the task. Terms
+of a reward are in it if `Task.metrics` returns them; a name should end with its unit, such as ``height_m``.
 """
 
 from __future__ import annotations
@@ -27,22 +31,26 @@ from typing import Any
 # Threads of torch that wait for each other by spinning take the processor from the simulation
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
-import matplotlib
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
-from torch.utils.tensorboard import SummaryWriter
-from tqdm import tqdm
+from training import needed, report
 
-from evaluation import evaluate, told
+from evaluation import evaluate, metrics, told, with_unit
 from tightloop.env import AutoresetMode, VectorEnv
 from tightloop.whole_files import whole_file
 
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
+# torch needs onnxscript only at the end, for the policy's file
+with needed("matplotlib", "onnxscript", "tensorboard", "torch", "tqdm"):
+    import matplotlib
+    import torch
+    from torch import Tensor, nn
+    from torch.utils.tensorboard import SummaryWriter
+    from tqdm import tqdm
 
-OUT = Path(__file__).resolve().parent.parent / "out" / "train"
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+OUT = Path(__file__).resolve().parent.parent / "out" / "ppo"
 
 
 @dataclass(frozen=True)
@@ -65,7 +73,8 @@ class Config:
     grad_max: float = 1.0  # norm of a gradient, at most
     evaluate: float = 15.0  # seconds between evaluations
     enough: float = 2.0  # success at which to stop before the time is over; above 1 it never does
-    threads: int = 2  # of torch and of the simulation
+    threads: int = 2  # of the simulation
+    torch_threads: int = 1  # more would take cores from the simulation
 
 
 PRESETS = {
@@ -165,11 +174,43 @@ class Rollout:
             following = self.value[step]
 
 
+class Statistics:
+    """What the worlds did during a rollout, for the log: means of rewards and metrics, and of ended episodes."""
+
+    def __init__(self, worlds: int) -> None:
+        self._return, self._steps = np.zeros(worlds), np.zeros(worlds, int)
+        self._values: dict[str, list[float]] = {}
+
+    def see(self, reward: NDArray[np.float32], done: NDArray[np.bool_], infos: dict[str, Any]) -> None:
+        """Take a step into account."""
+        self._return += reward
+        self._steps += 1
+        self._note("reward_per_step", reward)
+        for name, value in metrics(infos):
+            self._note(with_unit(name), value)
+        if done.any():
+            self._note("episode_return", self._return[done])
+            self._note("episode_length_steps", self._steps[done])
+            self._return[done], self._steps[done] = 0.0, 0
+
+    def take(self) -> dict[str, float]:
+        """Means since the last call, by name."""
+        means = {f"train/{name}": float(np.mean(values)) for name, values in self._values.items()}
+        self._values = {}
+        return means
+
+    def _note(self, name: str, values: NDArray[Any]) -> None:
+        # a faulted world may have no number
+        numbers = values[np.isfinite(values)]
+        if len(numbers):
+            self._values.setdefault(name, []).append(float(numbers.mean()))
+
+
 class Trainer:
     """A run: environment, agent, optimiser, and how far it is."""
 
     def __init__(self, task: str, seed: int, config: Config, folder: Path, *, daemon: str | None, device: str) -> None:
-        torch.set_num_threads(config.threads)
+        torch.set_num_threads(config.torch_threads)
         torch.manual_seed(seed)
         self.task, self.seed, self.config, self.folder = task, seed, config, folder
         options: dict[str, Any] = {"threads": config.threads} if daemon is None else {"daemon": daemon}
@@ -179,6 +220,7 @@ class Trainer:
         self.agent = Agent(inputs, actions, config).to(self.device)
         self.optimizer = torch.optim.Adam(self.agent.parameters(), lr=config.lr, eps=1e-5)
         self.rollout = Rollout(config.steps, config.num_envs, inputs, actions, self.device)
+        self.statistics = Statistics(config.num_envs)
         self.seconds, self.steps = 0.0, 0
         self.curve: list[dict[str, float]] = []
 
@@ -196,6 +238,7 @@ class Trainer:
             obs, reward, terminated, truncated, infos = self.envs.step(action.cpu().numpy())
             rollout.reward[step].copy_(torch.from_numpy(reward))
             rollout.done[step].copy_(torch.from_numpy(terminated | truncated))
+            self.statistics.see(reward, terminated | truncated, infos)
             cut = np.flatnonzero(truncated & ~terminated)
             if len(cut):
                 last = torch.from_numpy(infos["final_obs"][cut]).to(self.device)
@@ -234,7 +277,12 @@ class Trainer:
                 moved.append(kl)
                 losses.append(off.item())
         agent.normalizer.see(r.obs)
-        return {"kl": float(np.mean(moved)), "value_loss": float(np.mean(losses)), "std": float(std_old.mean())}
+        return {
+            "learn/kl_nats": float(np.mean(moved)),
+            "learn/value_loss": float(np.mean(losses)),
+            "learn/action_std": float(std_old.mean()),
+            "learn/learning_rate": self.optimizer.param_groups[0]["lr"],
+        }
 
     def _follow(self, kl: float) -> None:
         """Let the learning rate follow how much the policy changes."""
@@ -259,19 +307,23 @@ class Trainer:
             while self.seconds < limit and not (
                 self.curve and self.curve[-1].get("success", 0.0) >= self.config.enough
             ):
+                rollout_begun = time.perf_counter()
                 with torch.no_grad():
                     obs = self.collect(obs)
-                news = self.learn()
-                self.seconds = time.perf_counter() - begun
+                news = self.learn() | self.statistics.take()
+                now = time.perf_counter()
+                self.seconds = now - begun
+                news["time/steps_per_second"] = self.config.steps * self.config.num_envs / (now - rollout_begun)
+                news["time/training_s"] = self.seconds
                 bar.update(round(self.seconds) - bar.n)
                 if self.seconds - shown >= self.config.evaluate or self.seconds >= limit:
                     shown = self.seconds
                     found = evaluate(self.task, self.act, threads=self.config.threads)
-                    self.curve.append({"seconds": self.seconds, "steps": self.steps, **found})
+                    self.curve.append({**found, "seconds": self.seconds, "steps": self.steps})
                     self.save()
                     bar.set_postfix(told(found) | {"steps": f"{self.steps:,}"})
-                    news |= found
-                news |= {"reward": self.rollout.reward.mean().item(), "lr": self.optimizer.param_groups[0]["lr"]}
+                    report(self.task, f"{self.seconds:.0f} of {limit:.0f} s, {self.steps:,} steps", found)
+                    news |= {f"evaluation/{with_unit(name)}": value for name, value in found.items()}
                 for name, value in news.items():
                     log.add_scalar(name, value, self.steps)
 
@@ -324,8 +376,8 @@ class Trainer:
 
 
 def draw(curve: list[dict[str, float]], title: str, path: Path) -> None:
-    """The curve as CSV and PNG: return, and success or error, over minutes."""
-    names = [name for name in ("return", "success", "error") if name in curve[0]]
+    """The curve as CSV and PNG: return, success and metrics over minutes."""
+    names = [name for name in curve[-1] if name not in ("seconds", "steps")]
     with whole_file(path.with_suffix(".csv")) as part, part.open("w", newline="") as file:
         table = csv.DictWriter(file, ["seconds", "steps", *names], lineterminator="\n")
         table.writeheader()
@@ -333,7 +385,7 @@ def draw(curve: list[dict[str, float]], title: str, path: Path) -> None:
     figure, axes = plt.subplots(1, len(names), figsize=(4 * len(names), 3), constrained_layout=True, squeeze=False)
     minutes = [row["seconds"] / 60 for row in curve]
     for axis, name in zip(axes[0], names, strict=True):
-        axis.plot(minutes, [row[name] for row in curve], marker=".")
+        axis.plot(minutes, [row.get(name, math.nan) for row in curve], marker=".")
         axis.set(title=name, xlabel="time [min]")
         axis.grid(alpha=0.3)
     figure.suptitle(title)

@@ -1,6 +1,6 @@
 """Train a policy with rsl_rl's PPO.
 
-    pip install rsl-rl-lib tqdm
+    pip install onnxscript rsl-rl-lib torch tqdm
     python examples/train_rsl_rl.py CartPoleSwingUp --seed 0
 
 In ``out/rsl_rl/TASK-SEED`` it leaves ``model.pt`` for `OnPolicyRunner.load` and the policy as ``policy.onnx``.
@@ -13,15 +13,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from rsl_rl.runners import OnPolicyRunner
-from tqdm import tqdm
-from training import command_line
+from training import command_line, needed, report
 
 from evaluation import evaluate, told
-from tightloop.adapters.rsl_rl import GROUP, RslRlVecEnv
 from tightloop.whole_files import whole_file
+
+# torch needs onnxscript only at the end, for the policy's file
+with needed("onnxscript", "rsl_rl", "torch", "tqdm"):
+    import torch
+    from rsl_rl.runners import OnPolicyRunner
+    from tqdm import tqdm
+
+    from tightloop.adapters.rsl_rl import GROUP, RslRlVecEnv
 
 OUT = Path(__file__).resolve().parent.parent / "out" / "rsl_rl"
 EVALUATED = 25  # iterations between two evaluations
@@ -81,9 +85,8 @@ def configuration(preset: Preset, seed: int) -> dict[str, Any]:
 
 def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> dict[str, float]:
     """Train, show how it goes, and save; returns the last evaluation."""
-    # threads of torch wait for each other by spinning: on busy cores two were two to five times as slow as one
-    torch.set_num_threads(1)
     torch.manual_seed(seed)
+    # the adapter sets torch's threads to 1: more would take cores from the simulation
     env = RslRlVecEnv(task, preset.num_envs, threads=threads)
     try:
         env.reset(seed=seed)
@@ -102,6 +105,7 @@ def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> d
                 found = evaluate(task, act, threads=threads)
                 bar.update(count)
                 bar.set_postfix(told(found))
+                report(task, f"{done + count} of {preset.iterations} iterations", found)
         with whole_file(folder / "model.pt") as part:
             runner.save(str(part))
         runner.export_policy_to_onnx(str(folder))

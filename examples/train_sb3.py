@@ -1,6 +1,6 @@
 """Train a policy with Stable-Baselines3's PPO.
 
-    pip install stable-baselines3 tqdm
+    pip install stable-baselines3 torch tqdm
     python examples/train_sb3.py CartPoleSwingUp --seed 0
 
 In ``out/sb3/TASK-SEED`` it leaves ``model.zip`` for `PPO.load`, and ``normalize.pkl`` for `VecNormalize.load`, which
@@ -14,17 +14,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from stable_baselines3 import PPO
-from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.vec_env import VecNormalize
-from tqdm import tqdm
-from training import command_line
+from training import command_line, needed, report
 
 from evaluation import evaluate, told
-from tightloop.adapters.sb3 import Sb3VecEnv
 from tightloop.whole_files import whole_file
+
+with needed("stable_baselines3", "torch", "tqdm"):
+    import torch
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.callbacks import BaseCallback
+    from stable_baselines3.common.vec_env import VecNormalize
+    from tqdm import tqdm
+
+    from tightloop.adapters.sb3 import Sb3VecEnv
 
 OUT = Path(__file__).resolve().parent.parent / "out" / "sb3"
 EVALUATED = 20  # rollouts between two evaluations
@@ -57,7 +60,7 @@ PRESETS = {
 
 
 class Progress(BaseCallback):
-    """A progress bar, and an evaluation every so many rollouts."""
+    """A progress bar in a terminal, and an evaluation every so many rollouts."""
 
     def __init__(self, task: str, rollouts: int, normalize: VecNormalize, threads: int) -> None:
         super().__init__()
@@ -89,12 +92,12 @@ class Progress(BaseCallback):
         """Evaluate, and show it."""
         self.found = evaluate(self._task, self.act, threads=self._threads)
         self._bar.set_postfix(told(self.found))
+        report(self._task, f"{self._done} of {self._rollouts} rollouts", self.found)
 
 
 def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> dict[str, float]:
     """Train, show how it goes, and save; returns the last evaluation."""
-    # threads of torch wait for each other by spinning: on busy cores two were two to five times as slow as one
-    torch.set_num_threads(1)
+    # the adapter sets torch's threads to 1: more would take cores from the simulation
     env = VecNormalize(Sb3VecEnv(task, preset.num_envs, threads=threads), gamma=preset.gamma)
     try:
         model = PPO(

@@ -1,14 +1,51 @@
-"""The command line that ``train_sb3.py`` and ``train_rsl_rl.py`` have in common."""
+"""What the training examples have in common: libraries, reports, and the command line of two of them."""
 
 from __future__ import annotations
 
 import argparse
+import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Protocol, TypeVar
 
 from evaluation import told
+
+# Libraries whose name for pip is not that of their module
+PIP_NAMES = {"rsl_rl": "rsl-rl-lib", "stable_baselines3": "stable-baselines3"}
+
+
+@contextmanager
+def needed(*modules: str) -> Iterator[None]:
+    """Check that libraries are installed, also those that are imported only at the end of a training.
+
+    Args:
+        modules: Names of their modules.
+
+    Raises:
+        SystemExit: Some are missing; the message has the command that installs them.
+    """
+    missing = [module for module in modules if find_spec(module) is None]
+    if missing:
+        names = " ".join(PIP_NAMES.get(module, module) for module in missing)
+        raise SystemExit(f"{Path(sys.argv[0]).name}: there is no {', '.join(missing)}: pip install {names}")
+    yield
+
+
+def report(task: str, progress: str, found: Mapping[str, float]) -> None:
+    """Print a line for an evaluation, unless a progress bar shows it in a terminal.
+
+    Args:
+        task: Name of the task.
+        progress: How far the training is.
+        found: What `evaluation.evaluate` returned.
+    """
+    if sys.stdout.isatty() and sys.stderr.isatty():
+        return
+    # whoever follows a file or a pipe sees each line at once
+    print(f"{task}, {progress}: {', '.join(f'{name} {value}' for name, value in told(found).items())}", flush=True)
 
 
 class Sized(Protocol):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -28,6 +29,21 @@ TRAINING = {
     "train_rsl_rl.py": "tests/rl/test_train_examples.py",
     "train_sb3.py": "tests/rl/test_train_examples.py",
 }
+# Libraries that each needs, as pip names them.
+LIBRARIES = {
+    "play.py": "matplotlib onnxruntime",
+    "ppo.py": "matplotlib onnxscript tensorboard torch tqdm",
+    "train_rsl_rl.py": "onnxscript rsl-rl-lib torch tqdm",
+    "train_sb3.py": "stable-baselines3 torch tqdm",
+}
+# Runs an example where some modules seem to be missing.
+WITHOUT = """
+import importlib.util, runpy, sys
+find_spec = importlib.util.find_spec
+missing, sys.argv = sys.argv[1].split(), sys.argv[2:]
+importlib.util.find_spec = lambda name, package=None: None if name in missing else find_spec(name, package)
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
 # Modules of the others.
 PARTS = {"evaluation.py", "training.py"}
 
@@ -43,6 +59,18 @@ def test_an_example_runs(name, tmp_path):
     pictures = sorted((tmp_path / "out").glob("*.png"))
     assert [path.stem for path in pictures] == ([Path(name).stem] if name in PICTURES else [])
     assert all(path.stat().st_size > 10_000 for path in pictures)
+
+
+@pytest.mark.parametrize("name", LIBRARIES)
+def test_missing_libraries_are_named_at_the_start(name, tmp_path):
+    modules = LIBRARIES[name].replace("rsl-rl-lib", "rsl_rl").replace("-", "_")
+    command = [sys.executable, "-c", WITHOUT, modules, str(EXAMPLES / name), "CartPoleBalance", "--out", str(tmp_path)]
+    beside = os.environ | {"PYTHONPATH": os.pathsep.join([str(EXAMPLES), os.environ.get("PYTHONPATH", "")])}
+    done = subprocess.run(command, env=beside, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1 and not list(tmp_path.iterdir())
+    assert done.stderr == f"{name}: there is no {', '.join(modules.split())}: pip install {LIBRARIES[name]}\n"
+    # its page of use names the same
+    assert set(LIBRARIES) == set(TRAINING) and f"pip install {LIBRARIES[name]}\n" in (EXAMPLES / name).read_text()
 
 
 def test_every_example_has_a_test():

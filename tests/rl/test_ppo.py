@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -20,6 +23,23 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
 def curve(folder: Path) -> list[dict[str, str]]:
     with (folder / "curve.csv").open() as file:
         return list(csv.DictReader(file))
+
+
+OWN_TASK = """
+from tightloop.tasks.cartpole import CartPoleBalance
+
+
+class Leaning(CartPoleBalance):
+    max_episode_steps = 20
+
+    def metrics(self, xp, worlds):
+        angle = abs(worlds.joint_q[:, 1])
+        return {"error": worlds.joint_q[:, 0] * 0.0 + 0.25, "angle_rad": angle, "reward_upright": 1.0 - angle}
+
+    def success(self, xp, worlds):
+        return abs(worlds.joint_q[:, 1]) < 0.1
+"""
+METRICS = ["error", "angle_rad", "reward_upright"]  # in its order
 
 
 def test_it_learns_to_balance_and_its_policy_plays(tmp_path: Path) -> None:
@@ -41,12 +61,19 @@ def test_it_learns_to_balance_and_its_policy_plays(tmp_path: Path) -> None:
     # an untrained policy falls after some 40 steps of 500
     assert float(rows[0]["return"]) < 150 and float(rows[-1]["return"]) > 400, rows
     assert (folder / "curve.png").stat().st_size > 5000
-    assert list((folder / "log").glob("events.*"))
-    played = run(f"{EXAMPLES}/play.py", "CartPoleBalance", str(folder / "policy.onnx"), "--num-envs", "32")
+    # a file or a pipe gets a line per evaluation, and no bar
+    assert len(re.findall(r"^CartPoleBalance, \d+ of 30 s, [\d,]+ steps: return [\d.]+$", done.stdout, re.M)) == len(
+        rows
+    )
+    assert "%|" not in done.stderr
+    picture = folder / "play.png"
+    played = run(
+        f"{EXAMPLES}/play.py", "CartPoleBalance", f"{folder}/policy.onnx", "--num-envs", "32", "--out", str(picture)
+    )
     assert played.returncode == 0, played.stderr
     mean = float(played.stdout.split("return ")[1].split(" ±")[0])
     assert mean > 400, played.stdout
-    assert (folder / "play.png").stat().st_size > 10_000
+    assert picture.stat().st_size > 10_000
     film = folder / "film.gif"
     filmed = run(
         f"{EXAMPLES}/play.py", "CartPoleBalance", str(folder / "policy.onnx"), "--num-envs", "2", "--film", str(film)
@@ -54,6 +81,59 @@ def test_it_learns_to_balance_and_its_policy_plays(tmp_path: Path) -> None:
     assert filmed.returncode == 0 and film.stat().st_size > 10_000, filmed.stderr
     wrong = run(f"{EXAMPLES}/play.py", "FrankaReach", str(folder / "policy.onnx"))
     assert wrong.returncode == 1 and "takes 5 numbers, and FrankaReach has 32" in wrong.stderr
+
+
+def test_the_log_has_all_metrics_of_the_task_with_their_units(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(OWN_TASK)
+    done = run(
+        f"{EXAMPLES}/ppo.py", f"{tmp_path}/own.py:Leaning", "--minutes", "0.05", "--num-envs", "64", "--evaluate", "1",
+        "--out", str(tmp_path), "--threads", "1",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    log = EventAccumulator(str(tmp_path / "Leaning-0/log"))
+    log.Reload()
+    own = {"success", "error_m", "angle_rad", "reward_upright"}
+    assert set(log.Tags()["scalars"]) == {
+        *(f"train/{name}" for name in own | {"reward_per_step", "episode_return", "episode_length_steps"}),
+        *(f"evaluation/{name}" for name in own | {"return"}),
+        *(f"learn/{name}" for name in ("kl_nats", "value_loss", "action_std", "learning_rate")),
+        "time/steps_per_second",
+        "time/training_s",
+    }
+
+    def last(name: str) -> float:
+        return log.Scalars(name)[-1].value
+
+    assert last("train/error_m") == last("evaluation/error_m") == 0.25
+    # 1 a step; an episode has at most 20 steps
+    assert last("train/reward_per_step") == 1.0
+    assert last("train/episode_return") == last("train/episode_length_steps") <= 20
+    assert (
+        0.0 < last("train/angle_rad") < 1.0 and abs(last("train/angle_rad") + last("train/reward_upright") - 1) < 1e-5
+    )
+    assert [*curve(tmp_path / "Leaning-0")[-1]] == ["seconds", "steps", "return", "success", *METRICS]
+
+
+def test_torch_has_one_thread_if_the_simulation_has_two(tmp_path: Path) -> None:
+    code = (
+        "import ppo, torch; "
+        "trainer = ppo.Trainer('CartPoleBalance', 0, ppo.Config(num_envs=4), '.', daemon=None, device='cpu'); "
+        "print(trainer.config.threads, torch.get_num_threads()); trainer.close()"
+    )
+    beside = os.environ | {"PYTHONPATH": os.pathsep.join([str(EXAMPLES), os.environ.get("PYTHONPATH", "")])}
+    beside.pop("OMP_NUM_THREADS", None)
+    done = subprocess.run([sys.executable, "-c", code], env=beside, capture_output=True, text=True, check=True)
+    assert done.stdout == "2 1\n"
+
+
+def test_nothing_is_written_beside_the_trained_policies() -> None:
+    trained = EXAMPLES / "trained"
+    before = {path: path.stat().st_mtime_ns for path in trained.iterdir()}
+    policy = trained / "CartPoleSwingUp.onnx"
+    done = run(f"{EXAMPLES}/play.py", "CartPoleSwingUp", str(policy), "--num-envs", "8")
+    assert done.returncode == 0, done.stderr
+    assert {path: path.stat().st_mtime_ns for path in trained.iterdir()} == before
+    assert f"picture: {EXAMPLES.parent}/out/play/CartPoleSwingUp.png" in done.stdout
 
 
 def test_a_killed_trainer_goes_on_in_the_running_daemon(tmp_path: Path) -> None:
