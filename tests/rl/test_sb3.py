@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,8 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormali
 import tightloop as tl
 from tightloop.adapters.sb3 import Sb3VecEnv
 from tightloop.env import Env
+
+PAGE = Path(__file__).parents[2] / "docs/pages/rl-libraries.md"
 
 
 @pytest.mark.parametrize("task", ["CartPoleBalance", "CartPoleSwingUp", "FrankaReach"])
@@ -133,3 +137,16 @@ def test_torch_has_one_thread_unless_told_otherwise(hasty: Any, made: Callable[[
         assert torch.get_num_threads() == expected
     with pytest.raises(tl.ArgumentError, match="torch_threads is 0"):
         Sb3VecEnv(hasty, 2, torch_threads=0)
+
+
+def test_the_block_of_the_page_trains_and_saves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (block,) = re.findall(r'^```python title="needs stable-baselines3"\n(.*?)^```$', PAGE.read_text(), re.M | re.S)
+    # two rollouts instead of all
+    code, replaced = re.subn(r"model\.learn\([\d_]+\)", "model.learn(2 * 512 * 24)", block)
+    assert replaced == 1
+    monkeypatch.chdir(tmp_path)
+    torch.set_num_threads(2)
+    exec(code, {})
+    assert torch.get_num_threads() == 1
+    assert PPO.load("reach.zip", device="cpu").num_timesteps == 2 * 512 * 24
+    assert (tmp_path / "reach.pkl").stat().st_size > 1000

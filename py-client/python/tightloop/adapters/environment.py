@@ -32,7 +32,7 @@ def set_torch_threads(torch: Any, threads: int | None, device: str = "cpu") -> N
     """Set the number of threads that torch computes with, in the whole process.
 
     Torch starts with a thread per core. These threads wait for each other by spinning, and take the cores from the
-    simulation: on two busy cores Stable-Baselines3's PPO was 4 to 10 times as slow as with one thread.
+    simulation: on two busy cores Stable-Baselines3's PPO was 4 to 17 times as slow as with one thread.
 
     Args:
         torch: The module.
