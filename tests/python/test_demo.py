@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,10 +13,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from conftest import REPOSITORY
+import tightloop as tl
+from conftest import PENDULUM, REPOSITORY, URDF
+from tightloop.assets import Policy
 from tightloop.demo import lesson, tour
 from tightloop.demo.command import main
-from tightloop.assets import Policy
 from tightloop.demo.scenes import SCENES, DemoScene, Grasp, Many, Target, Torque, Trained
 from tightloop.errors import MissingLibrary
 from tightloop.view import dependencies
@@ -190,3 +192,28 @@ def test_one_page_follows_all_stops(tmp_path, monkeypatch, capsys):
     assert "http://nowhere" in capsys.readouterr().out
     # in real time: 0.3 s are 18 frames at 60 Hz, not thousands
     assert 1 <= stops[0].done <= 19
+
+
+@pytest.mark.parametrize("file", ["robot.urdf", "cart.xml", "scene.toml"])
+def test_any_file_has_a_demo_and_a_benchmark(tmp_path, file):
+    path = tmp_path / file
+    if file == "robot.urdf":
+        path.write_text(PENDULUM)
+    elif file == "cart.xml":
+        pytest.importorskip("mujoco")
+        shutil.copy(REPOSITORY / "examples/assets/cart/cart.xml", path)
+    else:
+        scene = tl.Scene()
+        scene.add_urdf(URDF, name="arm")
+        scene.save(path)
+    for command in (["demo", "--out", str(tmp_path / "out"), "--seconds", "1"], ["bench", "--worlds", "16", "--json"]):
+        line = [sys.executable, "-m", "tightloop", command[0], str(path), *command[1:]]
+        done = subprocess.run(line, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out" / f"{path.stem}.png").stat().st_size > 2000
+
+
+def test_a_file_that_is_none_is_told(tmp_path):
+    line = [sys.executable, "-m", "tightloop", "demo", str(tmp_path / "nowhere.urdf")]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert done.returncode == 1 and "nowhere.urdf" in done.stderr and "Traceback" not in done.stderr

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -343,3 +345,36 @@ def test_a_hard_limit_of_open_files_is_named_with_the_cure(pendulum_urdf):
     done = with_limit(pendulum_urdf, 128, 128)
     assert "ResourceError" in done.stderr, done.stderr
     assert "may have 128 open" in done.stderr and "ulimit -n" in done.stderr, done.stderr
+
+
+def test_a_list_says_who_uses_which_daemon(pendulum, unique):
+    name = unique()
+    with tl.launch(pendulum, worlds=3, groups=2, name=name) as groups, tl.attach(f"{name}.1") as observer:
+        observer.latest(0.5)
+        groups[0].step()
+        line = [*COMMAND, "list"]
+        [row] = [
+            row
+            for row in json.loads(subprocess.run([*line, "--json"], capture_output=True, text=True, check=True).stdout)
+            if row["name"] == name
+        ]
+        assert (row["worlds"], row["groups"], row["pid"]) == (6, 2, groups.pid)
+        assert row["controllers"] == [os.getpid()] * 2 and row["observers"] == 1
+        assert row["steps_per_s"] == 0 and 0 < row["age_s"] < 600 and row["device"].startswith("cpu")
+        stop = threading.Event()
+
+        def run() -> None:
+            while not stop.is_set():
+                groups[0].step()
+
+        stepping = threading.Thread(target=run)
+        stepping.start()
+        try:
+            table = subprocess.run(line, capture_output=True, text=True, check=True).stdout.splitlines()
+        finally:
+            stop.set()
+            stepping.join()
+        head, *rows = table
+        assert head.split()[:4] == ["NAME", "WORLDS", "GROUPS", "PID"]
+        [mine] = [row.split() for row in rows if row.startswith(name)]
+        assert mine[6] != "0", "it counts steps"

@@ -76,7 +76,8 @@ LAYERS = (
     ("tightloop.view",),
     ("tightloop.env",),
     ("tightloop.tasks", "tightloop.adapters"),
-    ("tightloop.demo", "tightloop.mujoco.serve"),
+    ("tightloop.scene_files",),
+    ("tightloop.demo",),
     ("tightloop.__main__",),
 )
 

@@ -72,9 +72,11 @@ def world(tmp_path_factory) -> Iterator[Any]:
     with (
         tl.launch(scene(), worlds=2, params=("gravity", "shape_mu", "body_f")) as sim,
         contextlib.closing(env.VectorEnv("CartPoleBalance", 2)) as envs,
+        contextlib.closing(env.Env("CartPoleBalance")) as single,
     ):
         sim.step()
         envs.reset(seed=1)
+        single.reset(seed=1)
         info, snapshot, frame = sim.info, sim.snapshot(), sim.forward().copy()
         picture = view.Picture(parts(info["scene"], info["scene_folder"], info["body_names"]), 64, 64)
 
@@ -95,6 +97,7 @@ def world(tmp_path_factory) -> Iterator[Any]:
             send=send,
             restore=restore,
             envs=envs,
+            single=single,
             snapshot=snapshot,
             order=(arm := scene().robots["arm"]).order(arm.dof_names[::-1]),
             dynamics=tl.Dynamics(scene()),
@@ -189,7 +192,19 @@ def test_every_public_callable_is_tried():
 
 
 #: Methods for the package's own use, which take what other parts of it make.
-OWN = ("bind", "apply", "close_extras", "of_daemon", "with_numbers", "with_worlds", "with_model", "rows", "add", "jac")
+OWN = (
+    "bind",
+    "file_values",
+    "apply",
+    "close_extras",
+    "of_daemon",
+    "with_numbers",
+    "with_worlds",
+    "with_model",
+    "rows",
+    "add",
+    "jac",
+)
 
 
 def untried(name: str, thing: Callable[..., Any]) -> list[str]:

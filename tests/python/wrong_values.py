@@ -193,6 +193,7 @@ KINDS: dict[str, tuple[Any, ...]] = {
     "size": ((8, 8), "abc", 3, (640,), (640, 480, 1), (1.5, 480), (-1, 480), THING, ("a", "b")),
     "some worlds": (0, -1, 1.5, "abc", [5], [0.5], THING, []),
     "keyframe": ("nowhere", 3, THING, 1.5, -1),
+    "frame": (3, "abc", THING, []),
     "hosts": ("localhost", [3], ["a b"], 3),
     "port": (0, -1, 70000, 1.5, "8080", THING),
     "model": ("/nowhere/x.xml", 3, THING, None, b"x"),
@@ -221,7 +222,7 @@ SURFACE = {
     "group": "group",
 }
 POSE = {"pos": "triple", "quat": "quaternion"}
-SHAPE = POSE | {"body": "body", "name": "name"} | SURFACE
+SHAPE = POSE | {"body": "body", "name": "name", "density": "positive"} | SURFACE
 COMMANDS = {name: "command" for name in ("joint_f", "joint_target_q", "joint_target_qd")}
 #: Arguments that stand for something that no model of the scene has.
 OF_MODELS = {name: "values" for name in ("ctrl", "mocap_pos", "mocap_quat", "eq_active")}
@@ -405,6 +406,10 @@ CALLS: dict[str, Call] = {
     "Sim.view": Call(
         lambda world: world.sim.view, {"port": "port", "worlds": "count", "open": "flag", "hosts": "hosts"}
     ),
+    "Sim.picture": Call(
+        lambda world: world.sim.picture,
+        {"worlds": "some worlds", "camera": "camera", "size": "size", "frame": "frame"},
+    ),
     "Params.write": Call(
         lambda world: world.sim.params.write, {"gravity": "vectors", "shape_mu": "values", "mask": "mask"}
     ),
@@ -470,6 +475,8 @@ KINDS |= {
     "steps": (0, -1, 1.5, "abc", NAN, True, THING, [1]),
     "env seed": (-1, 1.5, "abc", [1], 2**64, True, NAN, THING, [1, -1], [1, "a"]),
     "slots": (1, *COUNT),
+    "single seed": (-1, 1.5, "abc", True, NAN, THING, [1]),
+    "action": ("abc", np.zeros(2), np.zeros((1, 1)), [None], THING, np.zeros(1, complex)),
     "per dof": ("abc", [1.0, 2.0, 3.0], THING, NAN, [NAN], 1j, None),
     "elapsed": ("abc", np.zeros(3, int), THING, [1.5, 0.5], None),
 }
@@ -497,6 +504,8 @@ ENV_CALLS: dict[str, Call] = {
     "VectorEnv.send": Call(lambda world: world.envs.send, {"actions": "actions"}),
     "VectorEnv.step": Call(lambda world: world.envs.step, {"actions": "actions"}),
     "Env": Call(lambda _: env.Env, {"task": "task"}),
+    "Env.reset": Call(lambda world: world.single.reset, {"seed": "single seed", "options": "options"}),
+    "Env.step": Call(lambda world: world.single.step, {"action": "action"}),
     "JointTorque": Call(
         lambda _: env.JointTorque,
         {"dofs": "dofs", "scale": "per dof", "hold": "flag"},
@@ -527,7 +536,14 @@ ENV_CALLS: dict[str, Call] = {
     ),
     "make_groups": Call(
         lambda _: env.make_groups,
-        {"task": "task", "num_envs": "count", "groups": "count", "device": "choice", "threads": "count"},
+        {
+            "task": "task",
+            "num_envs": "count",
+            "groups": "count",
+            "device": "choice",
+            "precision": "choice",
+            "threads": "count",
+        },
         {"task": "CartPoleBalance", "num_envs": 4},
     ),
 }
@@ -556,7 +572,10 @@ VIEW_CALLS: dict[str, Call] = {
         lambda _: view.film, {"out": "path", "seconds": "positive", "worlds": "some worlds", "camera": "camera"}
     ),
     "Picture.render": Call(
-        lambda world: world.picture.render, {"worlds": "some worlds", "camera": "camera", "world": "index"}
+        lambda world: world.picture.render,
+        {"worlds": "some worlds", "camera": "camera", "world": "index", "contacts": "flag"},
+        {},
+        {name: "test_picture.py tries them" for name in ("shown", "ghost", "goals")},
     ),
     "Camera": Call(
         lambda _: view.Camera,

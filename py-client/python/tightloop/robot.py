@@ -279,7 +279,12 @@ class Robot(Entity):
         rows = [
             (name, f"{low:.4g} … {high:.4g}", f"{limit:.4g}", f"{ke:.4g}", f"{kd:.4g}", mode)
             for name, (low, high), limit, ke, kd, mode in zip(
-                names, self.joint_range, effort, self.joint_target_ke, self.joint_target_kd, self.joint_target_mode,
+                names,
+                self.joint_range,
+                effort,
+                self.joint_target_ke,
+                self.joint_target_kd,
+                self.joint_target_mode,
                 strict=True,
             )
         ]

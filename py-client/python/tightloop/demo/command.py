@@ -7,7 +7,8 @@ import signal
 import sys
 from pathlib import Path
 
-from tightloop.demo.scenes import SCENES
+from tightloop.demo.any_file import FileScene
+from tightloop.demo.scenes import SCENES, DemoScene
 from tightloop.demo.tour import Plan, tour
 from tightloop.errors import TightloopError
 
@@ -17,7 +18,11 @@ _EPILOG = """stops:
 examples:
   tightloop demo                           all stops, with a line and a picture each
   tightloop demo --view                    the same in the browser, in real time
-  tightloop demo --stop grasp --seconds 60 --view"""
+  tightloop demo --stop grasp --seconds 60 --view
+  tightloop demo robot.urdf --view         a robot of your own, whose joints follow waves"""
+
+# Of a file's demo.
+_WORLDS = 16
 
 
 def parser() -> argparse.ArgumentParser:
@@ -31,6 +36,9 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     names = [stop.name for stop, _ in SCENES]
+    made.add_argument(
+        "file", nargs="?", type=Path, metavar="FILE", help="show this URDF, MJCF or scene file instead of the tour"
+    )
     made.add_argument(
         "--stop", action="append", choices=names, metavar="NAME", help="show only this stop; can be repeated"
     )
@@ -49,9 +57,14 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: list[str]) -> int:
     """Run the subcommand; returns its exit code: 0 done, 1 failed, 2 misused, 130 ended by Ctrl-C."""
     given = parser().parse_args(arguments)
-    chosen = [stop(given.worlds or worlds) for stop, worlds in SCENES if not given.stop or stop.name in given.stop]
     plan = Plan(given.out, given.seconds, given.view, given.port, given.device, given.threads)
     try:
+        if given.file is not None:
+            chosen: list[DemoScene] = [FileScene(given.file, given.worlds or _WORLDS)]
+        else:
+            chosen = [
+                stop(given.worlds or worlds) for stop, worlds in SCENES if not given.stop or stop.name in given.stop
+            ]
         tour(chosen, plan)
     except (TightloopError, OSError) as problem:
         print(f"tightloop: {problem}", file=sys.stderr)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tightloop as tl
-from tightloop.demo import lesson
 from tightloop.assets import policy
+from tightloop.demo import lesson
 
 # Where the goal stands in observations of `tightloop.tasks.pick_cube`, in the world's axes [m].
 _GOAL = slice(26, 29)

@@ -88,7 +88,7 @@ def _paced(demo_scene: DemoScene, until: float | None, *, real_time: bool) -> It
 
 
 def _visit_summary(demo_scene: DemoScene, path: Path) -> str:
-    shown = f"{demo_scene.name:<8}{demo_scene.worlds} {demo_scene.title}"
+    shown = f"{demo_scene.name:<7} {demo_scene.worlds} {demo_scene.title}"
     line = f"{shown}: {demo_scene.rate():,.0f} physics steps/s; {demo_scene.summary()}"
     try:
         _draw(demo_scene, path)

@@ -179,6 +179,12 @@ def export(model: Any, path: str | os.PathLike[str]) -> None:
     _save(arrays(compiled(model)), Path(path))
 
 
+def cache_folder() -> Path:
+    """Return the folder of exported models and generated scene files in the user's cache; it may not exist yet."""
+    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(home) / "tightloop" / "mujoco"
+
+
 def cached(model: Any) -> Path:
     """Write an ``MjModel`` to a file in the user's cache, named by its content, and return the file.
 
@@ -189,8 +195,7 @@ def cached(model: Any) -> Path:
     for name in sorted(found):
         digest.update(f"{name} {found[name].dtype} {found[name].shape}\n".encode())
         digest.update(found[name].tobytes())
-    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    folder = Path(home) / "tightloop" / "mujoco"
+    folder = cache_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"{digest.hexdigest()[:32]}.safetensors"

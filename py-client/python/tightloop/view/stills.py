@@ -48,7 +48,11 @@ def of_robot(robot: Robot) -> str:
 def of_scene(scene: Scene) -> str:
     """Return a picture of a scene at its start as HTML; MuJoCo models stand where their joints are 0."""
     dynamics = Dynamics(scene)
-    start = {f"{robot.name}/{name}": q for robot in scene.robots.values() for name, q in zip(robot.coord_names, robot.joint_q, strict=True)}
+    start = {
+        f"{robot.name}/{name}": q
+        for robot in scene.robots.values()
+        for name, q in zip(robot.coord_names, robot.joint_q, strict=True)
+    }
     for body in scene.bodies.values():
         start |= {f"{body.name}/free.{name}": q for name, q in zip(_POSE, (*body.pos, *body.quat), strict=True)}
     upright = {name: 1.0 for name in dynamics.coord_names if name.endswith((".qw", ".w"))}

@@ -1,0 +1,72 @@
+"""The demo of a file of the user's: a robot, a MuJoCo model or a scene, whose joints follow waves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import tightloop as tl
+from tightloop.demo.scenes import DemoScene
+from tightloop.mujoco_model import MujocoModel
+from tightloop.scene_files import scene_of
+
+# Part of a joint's range that its target crosses, and of one without limits [rad or m]
+_SHARE, _FREE = 0.25, 0.5
+# Length of a wave [s], and of a round
+_PERIOD, _SECONDS = 4.0, 6.0
+
+
+class FileScene(DemoScene):
+    """Worlds of a file; each follows a wave of its own phase."""
+
+    shown = 16
+
+    def __init__(self, path: Path, worlds: int) -> None:
+        """Read the file.
+
+        Raises:
+            SceneError: It cannot be used.
+        """
+        super().__init__(worlds)
+        self.name, self.title = path.stem, f"worlds of {path.name}, which follow waves"
+        self._scene = scene_of(path)
+        self._ranges = {name: _controls(model) for name, model in self._scene.models.items()}
+        self.frames = max(round(_SECONDS / (self._scene.dt * self._scene.substeps)), 1)
+
+    def scene(self) -> tl.Scene:
+        return self._scene
+
+    def restart(self) -> None:
+        self.frame = self.sim.reset()
+        self._phases = np.linspace(0.0, 2.0 * np.pi, self.worlds, endpoint=False)[:, None]
+        self._faulted = 0
+
+    def step(self, frame: int) -> None:
+        time = frame * self.sim.dt * self.sim.substeps
+        # waves begin at 0, so that no target jumps
+        wave = np.sin(2.0 * np.pi * time / _PERIOD + self._phases) * min(time, 1.0)
+        commands = {}
+        for name, robot in self._scene.robots.items():
+            low, high = robot.joint_range.T
+            reach = np.where(np.isfinite(high - low), _SHARE * (high - low) / 2, _FREE) * robot.dof_driven
+            target = np.clip(robot.joint_target_q + wave * reach, low, high)
+            commands[name] = np.ascontiguousarray(target)
+        ctrl = {name: middle + wave * reach for name, (middle, reach) in self._ranges.items()}
+        given = {"joint_target_q": commands} if commands else {}
+        self.frame = self.sim.step(**given, **({"ctrl": ctrl} if ctrl else {}))
+        self._faulted = int(np.count_nonzero(self.frame.status & 9))
+
+    def summary(self) -> str:
+        return f"{self._faulted} of {self.worlds} worlds faulted"
+
+
+def _controls(model: MujocoModel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the middle of a wave and its reach for each actuator."""
+    from safetensors.numpy import load_file
+
+    kept = load_file(model.file)
+    low, high = kept["actuator_ctrlrange"].reshape(-1, 2).astype(float).T
+    limited = kept["actuator_ctrllimited"].astype(bool)
+    return np.where(limited, 0.5 * (low + high), 0.0), np.where(limited, _SHARE * (high - low) / 2, _SHARE)

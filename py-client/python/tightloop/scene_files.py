@@ -1,0 +1,124 @@
+"""Scenes of robot files, for the command line: ``tightloop serve``, ``bench`` and ``demo`` take any URDF or MJCF file."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tightloop.scene import Scene
+
+# The first element of a robot file begins within so many bytes.
+_HEAD_BYTES = 1 << 16
+_BEFORE_ELEMENTS = re.compile(r"\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>", re.DOTALL)
+_ELEMENT = re.compile(r"<(mujoco|robot)[\s>/]")
+# Drives of a robot from URDF follow their targets with this natural frequency [rad/s], critically damped.
+_FREQUENCY = 30.0
+
+
+def kind_of(path: Path) -> str | None:
+    """Return ``"mujoco"`` or ``"robot"``, the first element of an MJCF or URDF file; None for other files."""
+    try:
+        if not path.is_file():
+            return None
+        with path.open("rb") as file:
+            text = file.read(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
+    except (OSError, ValueError):  # an option's value that is too long for a path, or a file that Rust reports
+        return None
+    at = 0
+    while skipped := _BEFORE_ELEMENTS.match(text, at):
+        at = skipped.end()
+    found = _ELEMENT.match(text, at)
+    return found and found[1]
+
+
+def scene_of(path: Path) -> Scene:
+    """Return the scene of a scene file, or one with sensible defaults for a robot file.
+
+    A robot from URDF is fixed at its root link, and its drives hold its start: zero, or the middle of a joint's range
+    that does not contain zero. A MuJoCo model has its own options and actuators.
+
+    Raises:
+        SceneError: The file cannot be used.
+    """
+    from tightloop.scene import Scene
+
+    kind = kind_of(path)
+    if kind == "mujoco":
+        return Scene.from_mujoco(path)
+    return _driven(path) if kind == "robot" else Scene.load(path)
+
+
+def _driven(path: Path) -> Scene:
+    import numpy as np
+
+    from tightloop.dynamics import Dynamics
+    from tightloop.scene import Scene
+
+    scene = Scene()
+    robot = scene.add_urdf(path)
+    low, high = robot.joint_range.T
+    leaders = robot.joint_leaders
+    outside = {
+        name: float(0.5 * (least + most))
+        for name, least, most in zip(robot.dof_names, low, high, strict=True)
+        if (least > 0.0 or most < 0.0) and name in robot.coord_names and name not in leaders
+    }
+    if outside:
+        robot.joint_q = outside
+    inertia = np.diag(Dynamics(scene).mass_matrix(robot.joint_q))
+    driven = np.array(robot.dof_driven)
+    robot.joint_target_ke = np.where(driven, inertia * _FREQUENCY**2, 0.0)
+    robot.joint_target_kd = np.where(driven, 2.0 * inertia * _FREQUENCY, 0.0)
+    return scene
+
+
+def scene_file(argument: str) -> str:
+    """Return a scene file for a robot file, in the user's cache; any other argument stays as it is.
+
+    Raises:
+        SystemExit: The file cannot be used; the message says why.
+    """
+    kind = kind_of(Path(argument))
+    if kind is None:
+        return argument
+    from tightloop.mujoco.export import cache_folder
+    from tightloop.whole_files import whole_file
+
+    with _said():
+        text = scene_of(Path(argument)).to_toml()
+        folder = cache_folder().with_name("scenes")
+        folder.mkdir(parents=True, exist_ok=True)
+        file = folder / f"{Path(argument).stem}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.toml"
+        with whole_file(file) as part:
+            part.write_text(text)
+    return str(file)
+
+
+def exported_file(path: str) -> str:
+    """Return the exported model of an MJCF file, in the user's cache; the model may have what is not supported.
+
+    Raises:
+        SystemExit: MuJoCo cannot compile it; the message says why.
+    """
+    from tightloop.mujoco import export
+
+    with _said():
+        return str(export.cached(path))
+
+
+@contextmanager
+def _said() -> Iterator[None]:
+    """Print an error and end the process with exit code 1."""
+    from tightloop.errors import TightloopError
+
+    try:
+        yield
+    except TightloopError as error:
+        print(f"tightloop: {error}", file=sys.stderr)
+        raise SystemExit(1) from None
