@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,10 @@ PRESETS = {
     "follow": (1.0, -1.0, 0.7),
 }
 
-# Fraction of the picture that the target fills.
-_MARGIN = 0.9
+# Fraction of the picture's width or height that the subject fills; the rest is room for motion.
+_FILL = 0.8
+# A subject that moves is kept within this fraction of the picture.
+_KEEP = 0.96
 _LEAST_DISTANCE = 0.1
 
 
@@ -39,24 +41,82 @@ class Camera:
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
 
-def camera(preset: str, box: NDArray[np.float64], *, aspect: float = 1.0, fov: float = 0.7) -> Camera:
-    """Return a preset camera that shows a whole box.
+def camera(preset: str, points: NDArray[np.float64], *, aspect: float = 1.0, fov: float = 0.7) -> Camera:
+    """Return a preset camera whose picture some points fill, in width or in height.
 
     Args:
         preset: A name of `PRESETS`.
-        box: Lower and upper corner of the box [m], shape ``(2, 3)``.
+        points: The points [m], shape ``(n, 3)``, at least one.
         aspect: Width of the picture divided by its height.
         fov: Vertical field of view [rad].
     """
-    centre = box.mean(axis=0)
-    towards = np.array(PRESETS[preset]) / np.linalg.norm(PRESETS[preset])
-    across = np.cross((0.0, 0.0, 1.0), towards)
-    across /= np.linalg.norm(across)
-    upward = np.cross(towards, across)
-    corners = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3) - centre
-    # a corner is visible if its offset over its distance is at most the tangent of half the view angle, both ways
-    tangent = np.tan(fov / 2) * _MARGIN
-    needed = np.maximum(np.abs(corners @ across) / (tangent * aspect), np.abs(corners @ upward) / tangent)
-    distance = float(np.max(corners @ towards + needed))
-    x, y, z = (float(value) for value in centre + towards * max(distance, _LEAST_DISTANCE))
-    return Camera((x, y, z), (float(centre[0]), float(centre[1]), float(centre[2])), fov)
+    axes = _axes(np.array(PRESETS[preset]))
+    local = points @ axes.T
+    low, high, depth = _nearest(local, _tangents(fov, aspect, _FILL))
+    nearest, farthest = local[:, 2].min(), local[:, 2].max()
+    depth = min(depth, nearest - _LEAST_DISTANCE)
+    eye = np.array([*(0.5 * (high - low)), depth])
+    # browsers turn around the target, so it is in the middle of the points
+    target = np.array([*eye[:2], 0.5 * (nearest + farthest)])
+    return Camera(_point(eye @ axes), _point(target @ axes), fov)
+
+
+def kept(camera: Camera, points: NDArray[np.float64], *, aspect: float = 1.0) -> Camera:
+    """Return a camera moved sideways, and backwards if need be, by as little as shows all points.
+
+    Args:
+        camera: The camera; one that shows all points is returned as it is.
+        points: The points [m], shape ``(n, 3)``.
+        aspect: Width of the picture divided by its height.
+    """
+    if not len(points):
+        return camera
+    eye, target = np.array(camera.position), np.array(camera.target)
+    axes = _axes(eye - target)
+    tangents = _tangents(camera.fov, aspect, _KEEP)
+    low, high, depth = _nearest((points - eye) @ axes.T, tangents)
+    depth = min(depth, 0.0)
+    aside = np.clip(0.0, high + tangents * depth, -low - tangents * depth)
+    moved = np.array([*aside, depth]) @ axes
+    return camera if not moved.any() else replace(camera, position=_point(eye + moved), target=_point(target + moved))
+
+
+def shifted(camera: Camera, by: NDArray[np.float64]) -> Camera:
+    """Return a camera moved by a vector [m], which looks in the same direction."""
+    return replace(
+        camera,
+        position=_point(np.array(camera.position) + by),
+        target=_point(np.array(camera.target) + by),
+    )
+
+
+def _axes(towards: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the camera's axes to the right, up and into the picture, from a vector that points at the camera."""
+    into = -towards / np.linalg.norm(towards)
+    right = np.cross(into, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(right, into), into])
+
+
+def _tangents(fov: float, aspect: float, part: float) -> NDArray[np.float64]:
+    """Return the tangents of half the angles of view of a part of the picture, across and upwards."""
+    return np.tan(0.5 * fov) * part * np.array([aspect, 1.0])
+
+
+def _nearest(
+    local: NDArray[np.float64], tangents: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Return the bounds and the depth of the nearest camera that shows some points in its axes.
+
+    A point at (r, f) is visible from (x, z) if |r − x| ≤ t (f − z), so r − t f ≤ x − t z and −r − t f ≤ −x − t z. The
+    largest left sides, high and low, give z ≤ −(high + low) / 2t and high + t z ≤ x ≤ −low − t z.
+    """
+    forth = local[:, 2:] * tangents
+    high = (local[:, :2] - forth).max(axis=0)
+    low = (-local[:, :2] - forth).max(axis=0)
+    return low, high, float((-(high + low) / (2.0 * tangents)).min())
+
+
+def _point(vector: NDArray[np.float64]) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in vector)
+    return x, y, z

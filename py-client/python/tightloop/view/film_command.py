@@ -51,11 +51,15 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--camera",
         choices=list(PRESETS),
-        default="three-quarter",
-        help="camera position; follow moves with the world (default three-quarter)",
+        help="camera position; follow moves with the robot (default follow for a single world whose robot floats, else "
+        "three-quarter)",
     )
     made.add_argument("--collision", action="store_true", help="show collision shapes instead of visuals")
-    made.add_argument("--no-contacts", action="store_true", help="hide contact points and forces")
+    made.add_argument(
+        "--no-contacts",
+        action="store_true",
+        help="hide contact points and forces, which more than four worlds do not show",
+    )
     return made
 
 
@@ -87,7 +91,7 @@ def main(arguments: list[str]) -> int:
             world=given.world,
             camera=given.camera,
             kind="collision" if given.collision else "visual",
-            contacts=not given.no_contacts,
+            contacts=False if given.no_contacts else None,
             progress=tell,
         )
     except (TightloopError, OSError) as problem:

@@ -58,9 +58,11 @@ class Film:
         fps: Pictures per second.
         worlds: How many worlds are shown, the first ones; or a list of them. A single one is ``world``.
         world: World that is shown alone, or that the camera ``"follow"`` follows.
-        camera: ``"three-quarter"``, ``"front"``, ``"side"``, ``"top"``, ``"follow"``, or a `Camera`.
+        camera: ``"three-quarter"``, ``"front"``, ``"side"``, ``"top"``, ``"follow"``, or a `Camera`. If left out, it
+            follows a single world whose robot floats, and else is ``"three-quarter"``.
         kind: ``"visual"``, or ``"collision"`` for collision shapes.
-        contacts: Whether to draw contacts, if frames have ``contact_count``, ``contact_pos``, ``contact_force``.
+        contacts: Whether to draw contacts, if frames have ``contact_count``, ``contact_pos``, ``contact_force``. If
+            left out, those of up to four worlds.
         speed: Seconds of the run per second of film.
 
     Raises:
@@ -78,9 +80,9 @@ class Film:
         fps: float = 30.0,
         worlds: int | Sequence[int] = 1,
         world: int = 0,
-        camera: str | Camera = "three-quarter",
+        camera: str | Camera | None = None,
         kind: Kind = "visual",
-        contacts: bool = True,
+        contacts: bool | None = None,
         speed: float = 1.0,
     ) -> None:
         path = checks.path("film: out", out, error=ArgumentError)
@@ -88,7 +90,7 @@ class Film:
             raise ArgumentError(f"film: out is {path}, and there is no folder {path.parent}; make it first")
         self._fps = checks.number("film: fps", fps, above=0.0, error=ArgumentError)
         self._speed = checks.number("film: speed", speed, above=0.0, error=ArgumentError)
-        if not isinstance(camera, Camera) and camera not in PRESETS:
+        if not (camera is None or isinstance(camera, Camera) or camera in PRESETS):
             raise ArgumentError(f"film: camera is {camera!r}; give a Camera or one of: {', '.join(PRESETS)}")
         if kind not in ("visual", "collision"):
             raise ArgumentError(f"film: kind is {kind!r}; give 'visual' or 'collision'")

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from tightloop.view.outlines import outline
 from tightloop.view.parts import Part
 from tightloop.view.poses import IDENTITY, Array, place
 
@@ -28,17 +29,17 @@ def extent(parts: Iterable[Part], body_q: Array) -> NDArray[np.float64]:
     Returns:
         Lower and upper corner, shape ``(2, 3)``; a cube about the origin if there are no parts.
     """
-    corners: list[Array] = []
+    found: list[Array] = []
     for part in parts:
-        low, high = part.mesh.vertices.min(axis=0), part.mesh.vertices.max(axis=0)
-        if part.body < 0 and np.max(high - low) > _FLOOR_SIZE:
+        points = outline(part.mesh)
+        if part.body < 0 and np.max(np.ptp(points, axis=0)) > _FLOOR_SIZE:
             continue
-        box = np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3)
-        inside = place(part.pose, box)
-        corners.append(place(IDENTITY if part.body < 0 else body_q[part.body], inside))
-    if not corners:
+        placed = place(IDENTITY if part.body < 0 else body_q[part.body], place(part.pose, points))
+        if np.isfinite(placed).all():
+            found.append(placed)
+    if not found:
         return np.array([[-1, -1, -1], [1, 1, 1]]) * _LEAST_SIZE
-    points = np.concatenate(corners)
+    points = np.concatenate(found)
     return np.stack([points.min(axis=0), points.max(axis=0)]).astype(np.float64)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from tightloop.view import guarded_server
 from tightloop.view.cameras import Camera, camera
+from tightloop.view.contact_marks import WORLDS_MAX
 from tightloop.view.display_options import DisplayOptions, Kind
 from tightloop.view.gate import Gate
 from tightloop.view.overlay import Overlay
@@ -33,9 +34,9 @@ class Html:
         parts: Parts of one world.
         bodies: Number of bodies of a world.
         fps: Frames per second.
-        view: First camera: a preset, or a `Camera`. ``"follow"`` does not move.
+        view: First camera: a preset, or a `Camera`; ``"three-quarter"`` if left out. ``"follow"`` does not move.
         kind: ``"visual"`` for visual meshes, ``"collision"`` for collision shapes.
-        contacts: Whether contacts are shown.
+        contacts: Whether contacts are shown; if left out, those of up to four worlds.
     """
 
     def __init__(
@@ -45,13 +46,13 @@ class Html:
         bodies: int,
         *,
         fps: float,
-        view: str | Camera = "three-quarter",
+        view: str | Camera | None = None,
         kind: Kind = "visual",
-        contacts: bool = True,
+        contacts: bool | None = None,
     ) -> None:
         self._path, self._parts, self._bodies = path, parts, bodies
-        self._fps, self._view = fps, view
-        self._options = DisplayOptions(kind=kind, contacts="all worlds" if contacts else "off")
+        self._fps, self._view, self._contacts = fps, view or "three-quarter", contacts
+        self._options = DisplayOptions(kind=kind)
         # viser records only what a server shows; nobody gets the token of this one
         self._server = guarded_server.start(Gate("127.0.0.1"), "127.0.0.1", 0)
         self._world_meshes: WorldMeshes | None = None
@@ -88,14 +89,15 @@ class Html:
 
     def _begin(self, body_q: Any) -> None:
         scene = self._server.scene
+        shows = len(body_q) <= WORLDS_MAX if self._contacts is None else self._contacts
+        self._options.choose(contacts="all worlds" if shows else "off")
         self._world_meshes = WorldMeshes(self._server, self._parts, len(body_q), self._options, body_q[0])
-        box, offsets = self._world_meshes.box, self._world_meshes.offsets
         self._overlay = Overlay(self._server, self._parts, self._options, self._world_meshes, bodies=self._bodies)
         scene.set_up_direction("+z")
         scene.add_grid(
             "/ground", infinite_grid=True, cell_size=0.1, section_size=1.0, fade_distance=40.0, shadow_opacity=0.2
         )
-        seen = np.stack([box[0] + offsets.min(axis=0), box[1] + offsets.max(axis=0)])
-        chosen = self._view if isinstance(self._view, Camera) else camera(self._view, seen, aspect=_ASPECT)
+        points = self._world_meshes.points(body_q)
+        chosen = self._view if isinstance(self._view, Camera) else camera(self._view, points, aspect=_ASPECT)
         first = self._server.initial_camera
         first.position, first.look_at, first.up, first.fov = chosen.position, chosen.target, chosen.up, chosen.fov

@@ -10,6 +10,7 @@ import viser
 from numpy.typing import NDArray
 
 from tightloop.view.batched_meshes import batched_meshes
+from tightloop.view.contact_marks import contact_marks
 from tightloop.view.display_options import DisplayOptions
 from tightloop.view.parts import Part
 from tightloop.view.poses import Array, wxyz
@@ -18,9 +19,8 @@ from tightloop.view.world_meshes import WorldMeshes
 _POINT_COLOR = (250, 190, 30)
 _FORCE_COLOR = (230, 60, 40)
 _GHOST_COLOR = (60, 170, 240)
-_POINT_SIZE = 0.008
-# Longest arrow [m]: without it, the first millisecond of an impact fills the page.
-_ARROW_MAX = 0.5
+# Sizes of marks as fractions of the robot's largest link: a point, and an arrow's shaft and head.
+_POINT_PART, _SHAFT_PART, _HEAD_PART = 0.025, 0.008, 0.02
 # Length of body axes as a fraction of the size of a world.
 _AXES_PART = 0.05
 
@@ -48,12 +48,13 @@ class Overlay:
         self._options = options
         self._offsets = world_meshes.offsets
         box = world_meshes.box
+        link = self._link = world_meshes.framing.link
         scene = server.scene
         self._points = scene.add_point_cloud(
             "/contacts/points",
             np.zeros((0, 3), np.float32),
             _POINT_COLOR,
-            point_size=_POINT_SIZE,
+            point_size=_POINT_PART * link,
             point_shape="circle",
             precision="float32",
             visible=False,
@@ -62,9 +63,9 @@ class Overlay:
             "/contacts/forces",
             np.zeros((0, 2, 3), np.float32),
             _FORCE_COLOR,
-            shaft_radius=0.004,
-            head_radius=0.01,
-            head_length=0.02,
+            shaft_radius=_SHAFT_PART * link,
+            head_radius=_HEAD_PART * link,
+            head_length=2 * _HEAD_PART * link,
             visible=False,
         )
         # a dragged body is connected to the pointer by a line
@@ -113,14 +114,9 @@ class Overlay:
         if not wanted:
             return
         chosen = [self._options.world] if self._options.contacts == "followed world" else list(worlds)
-        counts = np.asarray(shown.contact_count)[chosen]
-        used = np.arange(shown.contact_pos.shape[1]) < counts[:, None]
-        points = (shown.contact_pos[chosen] + self._offsets[chosen, None])[used].astype(np.float32)
-        arrows = shown.contact_force[chosen][used] * self._options.force_scale
-        length = np.linalg.norm(arrows, axis=-1, keepdims=True)
-        arrows = arrows * np.minimum(1.0, _ARROW_MAX / np.maximum(length, _ARROW_MAX))
-        self._points.points = points
-        self._forces.points = np.stack([points, points + arrows], axis=1).astype(np.float32)
+        marks = contact_marks(shown, chosen, self._offsets[chosen], scale=self._options.force_scale, longest=self._link)
+        self._points.points = marks.points.astype(np.float32)
+        self._forces.points = np.stack([marks.points, marks.points + marks.arrows], axis=1).astype(np.float32)
 
     def show_axes(self, body_q: Array) -> None:
         """Show the body axes of the followed world, if the options ask for them; ``body_q`` is of all worlds."""

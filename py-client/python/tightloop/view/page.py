@@ -27,8 +27,6 @@ from tightloop.view.world_meshes import WorldMeshes
 _FOLLOW_PART = 0.1
 # The camera ignores smaller movements [m].
 _FOLLOW_LEAST = 1e-5
-# The panel covers the right of the page.
-_PANEL_PART = 0.25
 
 
 class Page:
@@ -52,7 +50,7 @@ class Page:
         notes = [str(note) for note in (*stream.notes, *info.get("notes", ()), *scene_parts.notes)]
         self._dynamics, self._driven = _dynamics(info, notes)
         body_q = np.asarray(first.body_q)
-        self._world_meshes = WorldMeshes(server, scene_parts.parts, stream.worlds, self.options, body_q[0])
+        self._world_meshes = WorldMeshes(server, scene_parts, stream.worlds, self.options, body_q[0])
         self._overlay = Overlay(
             server, scene_parts.parts, self.options, self._world_meshes, bodies=len(info["body_names"])
         )
@@ -60,6 +58,8 @@ class Page:
         self._world_meshes.on_click(lambda world, _: self._panel.follow(world))
         if isinstance(stream.driver, LiveDriver) and stream.driver.can_push and self._dynamics is not None:
             self._world_meshes.on_drag(self._drag)
+        # beside the scene, not over it: cameras then aim at what the panel leaves free
+        server.gui.main_panel.dock_right()
         self._preset = "three-quarter"
         server.scene.set_up_direction("+z")
         # at viser's own brightness colours are pale
@@ -120,27 +120,20 @@ class Page:
 
     def aim_client(self, client: viser.ClientHandle) -> None:
         """Point the camera of one browser, for example when it connects."""
-        box = self._world_meshes.box
-        offsets = self._world_meshes.offsets
-        if self.options.alone or self._preset == "follow":
-            offsets = offsets[[self.options.world]]
-        seen = np.stack([box[0] + offsets.min(axis=0), box[1] + offsets.max(axis=0)])
-        bodies = np.asarray(self._shown.body_q)[self.options.world, :, :3]
-        bodies = bodies[np.isfinite(bodies).all(axis=-1)]
-        if self._preset == "follow" and len(bodies):
-            # bodies may be far from their start
-            seen = seen + 0.5 * (bodies.min(axis=0) + bodies.max(axis=0)) - box.mean(axis=0)
+        world = self.options.world if self._preset == "follow" else None
+        points = self._world_meshes.points(np.asarray(self._shown.body_q), world)
         with client.atomic():
-            chosen = camera(self._preset, seen, aspect=client.camera.aspect * (1 - _PANEL_PART), fov=client.camera.fov)
+            chosen = camera(self._preset, points, aspect=client.camera.aspect, fov=client.camera.fov)
             client.camera.up_direction = chosen.up
             client.camera.position = chosen.position
             client.camera.look_at = chosen.target
 
     def _follow(self, body_q: Array) -> None:
-        """Move the cameras with the mean position of the followed world's bodies."""
-        if not len(body_q):
+        """Move the cameras with the mean position of the followed world's robot."""
+        middle = self._world_meshes.framing.middle(body_q)
+        if middle is None:
             return
-        centre = body_q[:, :3].mean(axis=0, dtype=np.float64) + self._world_meshes.offsets[self.options.world]
+        centre = middle + self._world_meshes.offsets[self.options.world]
         if self._centre is None:
             self._centre = centre
         moved = _FOLLOW_PART * (centre - self._centre)

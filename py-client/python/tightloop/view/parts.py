@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from tightloop import _core
 from tightloop.errors import SceneError
 from tightloop.view import paint, sheets, visual_mesh
+from tightloop.view.subject import Subject, subject
 from tightloop.view.visual_mesh import VisualMesh
 
 Kind = Literal["visual", "collision"]
@@ -71,10 +72,12 @@ class Parts:
     Attributes:
         parts: All parts, the world's first.
         notes: What could not be shown as its file has it, a sentence each.
+        subject: The bodies that cameras frame and follow.
     """
 
     parts: list[Part]
     notes: list[str]
+    subject: Subject
 
     def __iter__(self) -> Iterator[Part]:
         return iter(self.parts)
@@ -101,7 +104,9 @@ def parts(scene_toml: str, folder: str | PathLike[str], body_names: Sequence[str
     """
     text, surfaces = _core.parts(scene_toml, fspath(folder))
     told = json.loads(text)
-    return _Assembly(surfaces, body_names).whole(told["parts"], told["notes"])
+    assembly = _Assembly(surfaces, body_names)
+    made, own_notes = assembly.whole(told["parts"], told["notes"])
+    return Parts(made, own_notes, subject(scene_toml, folder, body_names))
 
 
 class _Assembly:
@@ -115,7 +120,7 @@ class _Assembly:
         self._meshes: dict[Any, Mesh] = {}
         self._notes: list[str] = []
 
-    def whole(self, told: Sequence[dict[str, Any]], notes: Sequence[str]) -> Parts:
+    def whole(self, told: Sequence[dict[str, Any]], notes: Sequence[str]) -> tuple[list[Part], list[str]]:
         collisions = [entry for entry in told if entry["kind"] == "collision"]
         touching = {entry["body"] for entry in collisions}
         visuals = [entry for entry in told if entry["kind"] == "visual"]
@@ -150,7 +155,7 @@ class _Assembly:
             if body not in lost:
                 made.extend(own)
         made.sort(key=lambda part: part.body)
-        return Parts(made, self._notes)
+        return made, self._notes
 
     def _visual(self, entry: dict[str, Any]) -> Part:
         if "problem" in entry:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal
 
@@ -12,11 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop import _core, checks
 from tightloop.errors import ArgumentError
 from tightloop.frames import FAULTED
-from tightloop.view import grid
-from tightloop.view.cameras import PRESETS, Camera, camera
+from tightloop.view import cameras, grid
+from tightloop.view.cameras import PRESETS, Camera
+from tightloop.view.contact_marks import WORLDS_MAX, contact_marks
+from tightloop.view.framing import Framing
 from tightloop.view.goal_markers import goal_marker
-from tightloop.view.parts import Mesh, Part
+from tightloop.view.parts import Mesh, Part, Parts
 from tightloop.view.poses import Array, compose
+from tightloop.view.source import CONTACT_FIELDS
+from tightloop.view.subject import whole
 
 _RED = (225, 40, 40, 180)
 _GHOST = (60, 170, 240, 190)
@@ -24,11 +27,12 @@ _GHOST_OPACITY = 0.35
 _PLAIN = (0, 0, 0, 0)
 _POINT = (250, 190, 30, 255)
 _FORCE = (230, 60, 40, 255)
-_POINT_WIDTH, _FORCE_WIDTH = 6.0, 2.5
-# Length of a force arrow [m/N], and its limit: the first millisecond of an impact would fill the picture [m].
-_FORCE_SCALE, _FORCE_MAX = 0.01, 1.0
-# The camera does not move, so leave room for motion.
-_ROOM = 1.1
+# Length of a force arrow [m/N].
+_FORCE_SCALE = 0.01
+# Widths of points and arrows as fractions of the largest link, and their limits [pixels].
+_POINT_PART, _FORCE_PART = 0.05, 0.02
+_WIDTH_MIN, _WIDTH_MAX = 1.5, 12.0
+_FOV = 0.6
 # Distances of lines on the floor [m], and about how many of them cross the scene.
 _SPACINGS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 _LINES = 12
@@ -39,7 +43,8 @@ _FLOOR_SIZE = 4.0
 class Picture:
     """Draws the worlds of a frame or a `Shown`; the same worlds give the same bytes.
 
-    The first picture sets the camera of a preset, which does not move in later pictures.
+    The first picture sets the camera of a preset, whose picture robots and free bodies fill. In later pictures of a
+    single world it moves only to keep a robot with a fixed base in the picture.
 
     Attributes:
         width: Width of pictures [pixels].
@@ -73,10 +78,14 @@ class Picture:
             checks.integer(f"picture: {name}", size, least=16, error=ArgumentError) for name, size in sizes
         )
         self._renderer = _core.Renderer(self.width, self.height, threads)
-        own = [part for part in parts if part.kind == kind]
+        every = list(parts)
+        bodies = 1 + max((part.body for part in every), default=-1)
+        self._subject = parts.subject if isinstance(parts, Parts) else whole(bodies)
+        own = [part for part in every if part.kind == kind]
         # a floor is drawn as infinite; a slope is drawn as its mesh
         self._floors = [float(part.pose[2]) for part in own if _is_floor(part)]
         self._parts = [part for part in own if not _is_floor(part)]
+        self._framing = Framing(self._parts, self._subject)
         numbers: dict[int, int] = {}
         for part in self._parts:
             if id(part.mesh) not in numbers:
@@ -84,6 +93,7 @@ class Picture:
         self._meshes = np.array([numbers[id(part.mesh)] for part in self._parts], np.uint32)
         self._bodies = np.array([part.body for part in self._parts], np.intp)
         self._poses = np.array([part.pose for part in self._parts], float).reshape(-1, 7)
+        self._cameras: dict[tuple[Any, ...], tuple[Camera, Array]] = {}
         self._markers: dict[tuple[float, tuple[int, ...]], int] = {}
         self._stands: dict[tuple[Any, ...], tuple[NDArray[np.float64], NDArray[np.float64], float]] = {}
         self.offsets: NDArray[np.float32] = np.zeros((0, 3), np.float32)
@@ -93,9 +103,9 @@ class Picture:
         shown: Any,
         *,
         worlds: int | Sequence[int] | None = None,
-        camera: str | Camera = "three-quarter",
+        camera: str | Camera | None = None,
         world: int = 0,
-        contacts: bool = True,
+        contacts: bool | None = None,
         ghost: ArrayLike | None = None,
         goals: Mapping[str, tuple[ArrayLike, float, Sequence[int]]] | None = None,
     ) -> NDArray[np.uint8]:
@@ -106,9 +116,10 @@ class Picture:
                 ``contact_pos`` and ``contact_force``, contacts are drawn.
             worlds: How many worlds are drawn on a grid, the first ones; or a list of them. All if left out.
             camera: A preset, ``"three-quarter"``, ``"front"``, ``"side"``, ``"top"`` or ``"follow"``, which follows
-                ``world``; or a `Camera`.
+                ``world``; or a `Camera`. If left out, it follows a single world whose robot floats, and else is
+                ``"three-quarter"``.
             world: World of the ghost, and of the camera ``"follow"``.
-            contacts: Whether to draw contacts.
+            contacts: Whether to draw contacts; if left out, those of up to four worlds.
             ghost: Target poses of the bodies of ``world``, shape ``(bodies, 7)``, drawn translucent.
             goals: Translucent balls by name: centres [m], shape ``(worlds, 3)`` or ``(worlds, n, 3)``, in the axes of
                 each world, radius [m], and colour as red, green, blue.
@@ -122,6 +133,8 @@ class Picture:
         """
         body_q = np.asarray(shown.body_q, float)
         chosen = self._chosen(worlds, len(body_q))
+        if camera is None:
+            camera = "follow" if self._subject.floats and len(chosen) == 1 else "three-quarter"
         if world not in chosen:
             if world != 0 or camera == "follow" or ghost is not None:
                 raise ArgumentError(f"picture: world is {world!r}; these are drawn: {_listed(chosen)}")
@@ -138,8 +151,9 @@ class Picture:
             layers.append(self._ghost(np.asarray(ghost, float), offsets[place]))
         for name, goal in (goals or {}).items():
             layers.append(self._goal(name, goal, chosen, offsets))
-        lines = self._contacts(shown, chosen, offsets) if contacts else _no_lines()
-        view, around = self._view(camera, box, body_q[world], offsets[place])
+        view, around = self._view(camera, box, body_q, chosen, place)
+        shows = len(chosen) <= WORLDS_MAX if contacts is None else contacts
+        lines = self._contacts(shown, chosen, view) if shows else _no_lines()
         reach = around[3]
         spacing = next((step for step in _SPACINGS if step * _LINES >= reach), _SPACINGS[-1])
         meshes, poses, tints, opacities = (np.concatenate(column) for column in zip(*layers, strict=True))
@@ -225,46 +239,58 @@ class Picture:
         tints = np.zeros((count, 4), np.uint8)
         return np.full(count, self._markers[key], np.uint32), poses, tints, np.full(count, 0.45, np.float32)
 
-    def _contacts(self, shown: Any, chosen: NDArray[np.intp], offsets: Array) -> tuple[Array, Array, Array]:
-        fields = [_field(shown, name) for name in ("contact_count", "contact_pos", "contact_force")]
-        if any(field is None for field in fields):
+    def _contacts(self, shown: Any, chosen: NDArray[np.intp], view: Camera) -> tuple[Array, Array, Array]:
+        if any(_field(shown, name) is None for name in CONTACT_FIELDS if name != "contact_normal"):
             return _no_lines()
-        counts, places, forces = (np.asarray(field)[chosen] for field in fields)
-        used = np.arange(places.shape[1]) < counts.reshape(-1, 1)
-        points = (places + offsets[:, None])[used].astype(float)
-        arrows = forces[used].astype(float) * _FORCE_SCALE
-        length = np.linalg.norm(arrows, axis=-1, keepdims=True)
-        arrows = arrows * np.minimum(1.0, _FORCE_MAX / np.maximum(length, _FORCE_MAX))
-        count = len(points)
-        ends = np.concatenate([np.hstack([points, points + arrows]), np.hstack([points, points])])
+        link = self._framing.link
+        marks = contact_marks(shown, chosen, self.offsets, scale=_FORCE_SCALE, longest=link)
+        count = len(marks.points)
+        ends = np.concatenate([np.hstack([marks.points, marks.points + marks.arrows]), np.tile(marks.points, 2)])
         colors = np.repeat(np.array([_FORCE, _POINT], np.uint8), count, axis=0)
-        widths = np.repeat(np.array([_FORCE_WIDTH, _POINT_WIDTH], np.float32), count)
-        return np.ascontiguousarray(ends), colors, widths
+        away = np.linalg.norm(np.subtract(view.position, view.target))
+        pixels = link * 0.5 * self.height / (np.tan(0.5 * view.fov) * max(away, 1e-9))
+        own = np.clip(pixels * np.array([_FORCE_PART, _POINT_PART]), _WIDTH_MIN, _WIDTH_MAX)
+        return np.ascontiguousarray(ends), colors, np.repeat(own.astype(np.float32), count)
 
     def _view(
-        self, given: str | Camera, box: Array, body_q: Array, offset: Array
+        self, given: str | Camera, box: Array, body_q: Array, chosen: NDArray[np.intp], place: int
     ) -> tuple[Camera, tuple[float, float, float, float]]:
         """Return the camera, and centre and radius of the scene."""
         places = self.offsets.astype(float)
         whole = np.stack([box[0] + places.min(axis=0), box[1] + places.max(axis=0)])
-        middle = whole.mean(axis=0)
         if given == "follow":
             # bodies may be far from their start
-            bodies = body_q[np.isfinite(body_q).all(axis=-1)]
-            centre = (
-                (0.5 * (bodies[:, :3].min(axis=0) + bodies[:, :3].max(axis=0))) if len(bodies) else box.mean(axis=0)
-            )
-            whole = box - box.mean(axis=0) + centre + offset
-            middle = whole.mean(axis=0)
+            centre = self._framing.middle(body_q[chosen[place]])
+            whole = box + places[place] + (0.0 if centre is None else centre - box.mean(axis=0))
+        view = given if isinstance(given, Camera) else self._preset(given, box, body_q[chosen], chosen, place)
+        middle = whole.mean(axis=0)
         size = float(np.linalg.norm(whole[1] - whole[0])) / 2
-        around = (float(middle[0]), float(middle[1]), float(middle[2]), max(1.6 * size, 1e-3))
-        if isinstance(given, Camera):
-            return given, around
-        if given not in PRESETS:
+        return view, (float(middle[0]), float(middle[1]), float(middle[2]), max(1.6 * size, 1e-3))
+
+    def _preset(self, name: str, box: Array, body_q: Array, chosen: NDArray[np.intp], place: int) -> Camera:
+        """Return the camera of a preset for the chosen worlds, of which ``place`` is followed."""
+        if name not in PRESETS:
             known = ", ".join(PRESETS)
-            raise ArgumentError(f"picture: camera is {given!r}; give a tightloop.view.Camera or one of: {known}")
-        roomy = middle + (whole - middle) * _ROOM
-        return dataclasses.replace(camera(given, roomy, aspect=self.width / self.height, fov=0.6)), around
+            raise ArgumentError(f"picture: camera is {name!r}; give a tightloop.view.Camera or one of: {known}")
+        aspect, places = self.width / self.height, self.offsets.astype(float)
+        follows = name == "follow"
+        if follows:
+            body_q, places = body_q[[place]], places[[place]]
+        key = (name, place if follows else -1, *chosen.tolist())
+        centre = self._framing.middle(body_q[0])
+        if key not in self._cameras:
+            points = self._framing.points(body_q, places, robot=follows)
+            if not len(points):
+                # do not keep a camera of worlds that are not finite
+                return cameras.camera(name, box + places.mean(axis=0), aspect=aspect, fov=_FOV)
+            first = np.zeros(3) if centre is None else centre
+            self._cameras[key] = cameras.camera(name, points, aspect=aspect, fov=_FOV), first
+        view, first = self._cameras[key]
+        if follows and centre is not None:
+            view = cameras.shifted(view, centre - first)
+        if follows or (len(body_q) == 1 and not self._subject.floats):
+            view = cameras.kept(view, self._framing.points(body_q, places, robot=True), aspect=aspect)
+        return view
 
 
 def _is_floor(part: Part) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,8 @@ from tightloop.frames import FAULTED
 from tightloop.view import grid
 from tightloop.view.batched_meshes import BatchedMesh, batched_meshes
 from tightloop.view.display_options import DisplayOptions
-from tightloop.view.parts import Part
+from tightloop.view.framing import Framing
+from tightloop.view.parts import Part, Parts
 from tightloop.view.poses import IDENTITY, Array, wxyz
 
 _RED = np.array([200, 0, 0])
@@ -44,6 +45,7 @@ class WorldMeshes:
     Attributes:
         box: Bounding box of one world at the start [m], shape ``(2, 3)``.
         offsets: Position of each world on the grid [m], shape ``(worlds, 3)``.
+        framing: The outlines of a world's robots and free bodies.
 
     Args:
         server: Server of the page.
@@ -54,17 +56,28 @@ class WorldMeshes:
     """
 
     def __init__(
-        self, server: viser.ViserServer, parts: Iterable[Part], worlds: int, options: DisplayOptions, first: Array
+        self, server: viser.ViserServer, parts: Parts, worlds: int, options: DisplayOptions, first: Array
     ) -> None:
-        parts = list(parts)
         self._server = server
         self._options = options
+        self.framing = Framing(parts.of("visual") or parts.of("collision"), parts.subject)
         self.box = grid.extent(parts, first)
         self.offsets = grid.offsets(worlds, self.box)
         self._batches = {
             kind: self._batches_of(kind, [part for part in parts if part.kind == kind])
             for kind in ("visual", "collision")
         }
+
+    def points(self, body_q: Array, world: int | None = None) -> NDArray[np.float64]:
+        """Return points around the robots and free bodies on the grid [m], shape ``(n, 3)``.
+
+        Args:
+            body_q: Body poses, shape ``(worlds, bodies, 7)``.
+            world: The only world whose robot counts, or None for all visible worlds.
+        """
+        shown = list(self.shown(len(body_q))) if world is None else [world]
+        found = self.framing.points(body_q[shown], self.offsets[shown], robot=world is not None)
+        return found if len(found) else self.box + self.offsets[shown].mean(axis=0)
 
     def _batches_of(self, kind: str, parts: Sequence[Part]) -> list[_Batch]:
         fine = len(self.offsets) <= _FINE_WORLDS

@@ -1,0 +1,75 @@
+"""Points around the subject of a scene, to which cameras are fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop.view import grid
+from tightloop.view.outlines import outline
+from tightloop.view.parts import Part
+from tightloop.view.poses import Array, place, rotate
+from tightloop.view.subject import Subject
+
+# Among many worlds, a body this far from its usual place is lost and not framed, in sizes of a world.
+_STRAY = 4.0
+
+
+class Framing:
+    """The outlines of a scene's bodies.
+
+    Attributes:
+        link: Size of the largest body of the main robot [m]; 0.5 if nothing is seen of it.
+
+    Args:
+        parts: Parts of one world, of one kind.
+        subject: The bodies that count.
+    """
+
+    def __init__(self, parts: Iterable[Part], subject: Subject) -> None:
+        self._parts = list(parts)
+        self._subject = subject
+        own: dict[int, list[NDArray[np.float64]]] = {body: [] for body in subject.bodies.tolist()}
+        for part in self._parts:
+            if part.body in own:
+                own[part.body].append(place(part.pose, outline(part.mesh)))
+        self._outlines = {body: np.concatenate(points) for body, points in own.items() if points}
+        robot = self._outlines.keys() & set(subject.robot.tolist())
+        self.link = max((float(np.ptp(self._outlines[body], axis=0).max()) for body in robot), default=0.5)
+
+    def points(self, body_q: Array, offsets: Array, *, robot: bool = False) -> NDArray[np.float64]:
+        """Return points around the subject in some worlds [m], shape ``(n, 3)``.
+
+        They are corners of a box around a world if no body of the subject is seen, and none if no pose is finite.
+
+        Args:
+            body_q: Body poses of these worlds, shape ``(worlds, bodies, 7)``.
+            offsets: Position of each of these worlds on the grid [m], shape ``(worlds, 3)``.
+            robot: Whether only the main robot counts.
+        """
+        body_q, offsets = np.asarray(body_q, float), np.asarray(offsets, float)
+        box = grid.extent(self._parts, body_q[0])
+        if not self._outlines:
+            corners = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3)
+            return (corners + offsets[:, None]).reshape(-1, 3)
+        wanted = self._outlines.keys() & set((self._subject.robot if robot else self._subject.bodies).tolist())
+        found = [np.zeros((0, 3))]
+        for body in sorted(wanted or self._outlines):
+            poses = body_q[:, body]
+            kept = np.isfinite(poses).all(axis=-1)
+            usual = np.median(poses[kept, :3], axis=0) if kept.any() else np.zeros(3)
+            kept[kept] = np.linalg.norm(poses[kept, :3] - usual, axis=-1) <= _STRAY * np.linalg.norm(box[1] - box[0])
+            moved = rotate(poses[kept, None, 3:], self._outlines[body])
+            found.append((moved + (poses[kept, :3] + offsets[kept])[:, None]).reshape(-1, 3))
+        return np.concatenate(found)
+
+    def middle(self, body_q: Array) -> NDArray[np.float64] | None:
+        """Return the mean position of the main robot's bodies in a world [m], or None if it is not finite.
+
+        Args:
+            body_q: Body poses of the world, shape ``(bodies, 7)``.
+        """
+        middle = np.asarray(body_q, float)[self._subject.robot, :3].mean(axis=0) if len(self._subject.robot) else None
+        return middle if middle is not None and np.isfinite(middle).all() else None
