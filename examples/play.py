@@ -22,6 +22,8 @@ from training import needed
 
 from tightloop.env import AutoresetMode, VectorEnv
 from tightloop.view import Film
+from tightloop.view.cameras import PRESETS
+from tightloop.view.subject import subject
 
 with needed("matplotlib", "onnxruntime"):
     import matplotlib
@@ -32,7 +34,7 @@ with needed("matplotlib", "onnxruntime"):
 
 OUT = Path(__file__).resolve().parent.parent / "out" / "play"
 SHOWN = 8  # worlds in the picture
-FILMED = 16  # worlds in the film
+FILMED = 16  # worlds in the film, if their robots stay where they are
 
 
 def play(
@@ -57,6 +59,14 @@ def play(
             kept[name].append(np.where(going.reshape(-1, *[1] * (np.ndim(array) - 1)), array, np.nan))
         going &= ~(terminated | truncated)
     return {name: np.array(arrays) for name, arrays in kept.items()}
+
+
+def film_of(envs: VectorEnv, path: Path, camera: str | None) -> Film:
+    """A film of several worlds side by side, or of one whose robot walks away: the camera follows it."""
+    info = envs.sim.info
+    floats = subject(info["scene"], info["scene_folder"], info["body_names"]).floats
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return Film(path, envs.sim, worlds=1 if floats else min(FILMED, envs.num_envs), camera=camera)
 
 
 def draw(path: Path, kept: dict[str, NDArray[np.float64]], envs: VectorEnv, title: str) -> None:
@@ -87,7 +97,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the episodes (default 0)")
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument("--view", action="store_true", help="show it in the browser, at the pace of the world")
-    shown.add_argument("--film", type=Path, help=f"film of the first {FILMED} worlds: .mp4, .gif, .html or a folder")
+    shown.add_argument("--film", type=Path, help="film of the first worlds: .mp4, .gif, .html or a folder")
+    parser.add_argument("--camera", choices=list(PRESETS), help="of the film (default: follow if the robot floats)")
     parser.add_argument("--out", type=Path, help="picture (default out/play/TASK.png)")
     args = parser.parse_args()
     out = args.out or OUT / f"{args.task.rpartition(':')[2]}.png"
@@ -100,10 +111,7 @@ def main() -> None:
         expected = policy.get_inputs()[0].shape[1]
         if expected != size:
             raise SystemExit(f"{args.policy} takes {expected} numbers, and {args.task} has {size}")
-        if args.film:
-            args.film.parent.mkdir(parents=True, exist_ok=True)
-        filmed = Film(args.film, envs.sim, worlds=min(FILMED, args.num_envs)) if args.film else nullcontext()
-        with filmed as film:
+        with film_of(envs, args.film, args.camera) if args.film else nullcontext() as film:
             kept = play(envs, policy, args.seed, film)
         returns = np.nansum(kept["reward"], axis=0)
         last = np.isfinite(kept["reward"]).sum(axis=0) - 1

@@ -65,18 +65,21 @@ def test_a_floor_does_not_push_worlds_apart():
 @pytest.mark.parametrize("aspect", [0.5, 1.0, 2.0])
 def test_every_preset_sees_the_whole_box_and_not_much_else(preset, aspect):
     box = np.array([[-1.0, 2.0, 0.0], [3.0, 3.0, 1.5]])
-    seen = cameras.camera(preset, box, aspect=aspect)
+    points = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3)
+    seen = cameras.camera(preset, points, aspect=aspect)
     position, target = np.array(seen.position), np.array(seen.target)
     forward = (target - position) / np.linalg.norm(target - position)
     right = np.cross(forward, seen.up)
     right /= np.linalg.norm(right)
-    corners = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3) - position
+    corners = points - position
     depth = corners @ forward
     x = corners @ right / depth / np.tan(seen.fov / 2) / aspect
     y = corners @ np.cross(right, forward) / depth / np.tan(seen.fov / 2)
     assert depth.min() > 0
+    # four fifths, and the same room on both sides
     extreme = max(np.abs(x).max(), np.abs(y).max())
-    assert 0.8 < extreme < 1.0
+    assert extreme == pytest.approx(0.8)
+    assert max(np.ptp(x), np.ptp(y)) == pytest.approx(1.6)
 
 
 def test_bodies_that_look_alike_share_a_skin_and_each_colour_is_one():

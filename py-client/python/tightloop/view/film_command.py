@@ -58,7 +58,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--no-contacts",
         action="store_true",
-        help="hide contact points and forces, which more than four worlds do not show",
+        help="hide contact points and forces; above 4 worlds they are hidden",
     )
     return made
 

@@ -123,7 +123,8 @@ class Page:
         world = self.options.world if self._preset == "follow" else None
         points = self._world_meshes.points(np.asarray(self._shown.body_q), world)
         with client.atomic():
-            chosen = camera(self._preset, points, aspect=client.camera.aspect, fov=client.camera.fov)
+            chosen = camera(self._preset, points, aspect=client.camera.aspect)
+            client.camera.fov = chosen.fov
             client.camera.up_direction = chosen.up
             client.camera.position = chosen.position
             client.camera.look_at = chosen.target

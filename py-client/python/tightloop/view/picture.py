@@ -43,8 +43,8 @@ _FLOOR_SIZE = 4.0
 class Picture:
     """Draws the worlds of a frame or a `Shown`; the same worlds give the same bytes.
 
-    The first picture sets the camera of a preset, whose picture robots and free bodies fill. In later pictures of a
-    single world it moves only to keep a robot with a fixed base in the picture.
+    Robots and free bodies fill the first picture of a preset, which sets the camera. In later pictures of a single
+    world it moves only to keep a robot with a fixed base, and its goals, in the picture.
 
     Attributes:
         width: Width of pictures [pixels].
@@ -133,12 +133,12 @@ class Picture:
         """
         body_q = np.asarray(shown.body_q, float)
         chosen = self._chosen(worlds, len(body_q))
-        if camera is None:
-            camera = "follow" if self._subject.floats and len(chosen) == 1 else "three-quarter"
         if world not in chosen:
             if world != 0 or camera == "follow" or ghost is not None:
                 raise ArgumentError(f"picture: world is {world!r}; these are drawn: {_listed(chosen)}")
             world = int(chosen[0])
+        if camera is None:
+            camera = "follow" if self._subject.floats and len(chosen) == 1 else "three-quarter"
         box, offsets, floor = self._stand(chosen, body_q)
         self.offsets = offsets.astype(np.float32)
         place = int(np.argmax(chosen == world))
@@ -149,9 +149,12 @@ class Picture:
         layers = [(meshes, poses, tints, np.ones(len(meshes), np.float32))]
         if ghost is not None:
             layers.append(self._ghost(np.asarray(ghost, float), offsets[place]))
+        aims = [np.zeros((0, 3))]
         for name, goal in (goals or {}).items():
-            layers.append(self._goal(name, goal, chosen, offsets))
-        view, around = self._view(camera, box, body_q, chosen, place)
+            layer, centres = self._goal(name, goal, chosen, offsets)
+            layers.append(layer)
+            aims += [centres[place] + goal[1] * axis for axis in (*np.eye(3), *-np.eye(3))]
+        view, around = self._view(camera, box, body_q, chosen, place, np.concatenate(aims))
         shows = len(chosen) <= WORLDS_MAX if contacts is None else contacts
         lines = self._contacts(shown, chosen, view) if shows else _no_lines()
         reach = around[3]
@@ -224,7 +227,8 @@ class Picture:
 
     def _goal(
         self, name: str, goal: tuple[ArrayLike, float, Sequence[int]], chosen: NDArray[np.intp], offsets: Array
-    ) -> tuple[Any, ...]:
+    ) -> tuple[tuple[Any, ...], Array]:
+        """Return the balls of a goal, and their centres, shape ``(worlds, n, 3)``."""
         middles, radius, color = goal
         middles = np.asarray(middles, float)
         if middles.ndim not in (2, 3) or middles.shape[-1] != 3:
@@ -237,7 +241,8 @@ class Picture:
         poses[:, :3], poses[:, 6] = middles.reshape(-1, 3), 1.0
         count = len(poses)
         tints = np.zeros((count, 4), np.uint8)
-        return np.full(count, self._markers[key], np.uint32), poses, tints, np.full(count, 0.45, np.float32)
+        opacities = np.full(count, 0.45, np.float32)
+        return (np.full(count, self._markers[key], np.uint32), poses, tints, opacities), middles
 
     def _contacts(self, shown: Any, chosen: NDArray[np.intp], view: Camera) -> tuple[Array, Array, Array]:
         if any(_field(shown, name) is None for name in CONTACT_FIELDS if name != "contact_normal"):
@@ -253,7 +258,7 @@ class Picture:
         return np.ascontiguousarray(ends), colors, np.repeat(own.astype(np.float32), count)
 
     def _view(
-        self, given: str | Camera, box: Array, body_q: Array, chosen: NDArray[np.intp], place: int
+        self, given: str | Camera, box: Array, body_q: Array, chosen: NDArray[np.intp], place: int, aims: Array
     ) -> tuple[Camera, tuple[float, float, float, float]]:
         """Return the camera, and centre and radius of the scene."""
         places = self.offsets.astype(float)
@@ -262,13 +267,15 @@ class Picture:
             # bodies may be far from their start
             centre = self._framing.middle(body_q[chosen[place]])
             whole = box + places[place] + (0.0 if centre is None else centre - box.mean(axis=0))
-        view = given if isinstance(given, Camera) else self._preset(given, box, body_q[chosen], chosen, place)
+        view = given if isinstance(given, Camera) else self._preset(given, box, body_q[chosen], chosen, place, aims)
         middle = whole.mean(axis=0)
         size = float(np.linalg.norm(whole[1] - whole[0])) / 2
         return view, (float(middle[0]), float(middle[1]), float(middle[2]), max(1.6 * size, 1e-3))
 
-    def _preset(self, name: str, box: Array, body_q: Array, chosen: NDArray[np.intp], place: int) -> Camera:
-        """Return the camera of a preset for the chosen worlds, of which ``place`` is followed."""
+    def _preset(
+        self, name: str, box: Array, body_q: Array, chosen: NDArray[np.intp], place: int, aims: Array
+    ) -> Camera:
+        """Return the camera of a preset for the chosen worlds, of which ``place`` is followed and has these goals."""
         if name not in PRESETS:
             known = ", ".join(PRESETS)
             raise ArgumentError(f"picture: camera is {name!r}; give a tightloop.view.Camera or one of: {known}")
@@ -289,7 +296,10 @@ class Picture:
         if follows and centre is not None:
             view = cameras.shifted(view, centre - first)
         if follows or (len(body_q) == 1 and not self._subject.floats):
-            view = cameras.kept(view, self._framing.points(body_q, places, robot=True), aspect=aspect)
+            points = self._framing.points(body_q, places, robot=True)
+            if not self._subject.floats:
+                points = np.concatenate([points, aims[np.isfinite(aims).all(axis=-1)]])
+            view = cameras.kept(view, points, aspect=aspect)
         return view
 
 
