@@ -23,7 +23,7 @@ PATIENCE_SECONDS = 120.0
 # What viser 1.1.1 itself makes Chromium say when something is dragged; it does no harm.
 _OF_VISER = "Unable to preventDefault inside passive event listener invocation."
 _FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-# The panel covers the right of a page; the scene is seen in the rest.
+# The panel is at the right of a page, with its frame; the scene is seen in the rest.
 WIDTH, WIDE, HEIGHT, PANEL_WIDTH = 840, 1200, 520, 360
 
 
@@ -85,6 +85,13 @@ class View:
                 return self.shot(name)
             assert time.monotonic() < deadline, "the page does not come to rest"
             before = now
+
+    @property
+    def scene(self) -> tuple[float, float]:
+        """Width and height of the scene, which begins at the upper left of the page [pixels]."""
+        box = self.page.locator("canvas").first.bounding_box()
+        assert box is not None and (box["x"], box["y"]) == (0, 0)
+        return box["width"], box["height"]
 
     def wait(self, condition: Callable[[], Any], what: str) -> Any:
         """Wait for something to be true in the page."""

@@ -54,7 +54,8 @@ def test_goals_are_marked() -> None:
     seen = []
     for task in ("FrankaReach", Unmarked):
         envs = VectorEnv(task, 1, render_mode="rgb_array")
-        envs.reset(seed=2)
+        # a goal beside the arm, for which the camera does not move
+        envs.reset(seed=1)
         pictures = envs.render()
         assert pictures is not None
         seen.append(pictures[0].astype(int))

@@ -153,6 +153,22 @@ def test_256_worlds_are_seen_and_a_frozen_one_is_red(box, look, unique):
         view.wait(lambda: len(spots(is_red(view.shot()))) == 1, "one is left")
 
 
+@pytest.mark.parametrize("worlds", [1, 16])
+def test_the_worlds_fill_what_the_panel_leaves_free(box, look, unique, worlds):
+    with tl.launch(box, worlds=worlds, name=unique(), on_nan="freeze", params=("body_f",)) as sim:
+        sim.step(body_f=np.full((worlds, len(sim.body_names), 6), np.nan))
+        view = look(sim.view(port=8300).url, WIDE)
+        view.close_notices()
+        view.wait(lambda: is_red(view.shot()).any(), "frozen worlds are red")
+        rows, columns = np.nonzero(is_red(view.still(f"fills_{worlds}")))
+        width, height = view.scene
+        assert width < WIDE - 250, "the panel is beside the scene"
+        across, upwards = np.ptp(columns) / width, np.ptp(rows) / height
+        assert max(across, upwards) > 2 / 3
+        assert columns.mean() / width == pytest.approx(0.5, abs=0.05)
+        assert rows.mean() / height == pytest.approx(0.5, abs=0.1)
+
+
 def test_contacts_ghosts_frames_shapes_and_plots_are_shown_when_they_are_chosen(arm, look, unique):
     with tl.launch(arm, worlds=1, name=unique()) as sim:
         for _ in range(30):
@@ -186,9 +202,8 @@ def test_a_body_is_pulled_with_shift_and_the_mouse(box, look, unique):
         view.choose("Camera", "front")
         view.still()
         page, start = view.page, observer.see().body_q[0, 0, :3].copy()
-        size = page.viewport_size
-        assert size is not None
-        x, y = size["width"] / 2, size["height"] / 2
+        width, height = view.scene
+        x, y = width / 2, height / 2
         page.keyboard.down("Shift")
         page.mouse.move(x, y)
         page.mouse.down()

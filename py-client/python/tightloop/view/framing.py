@@ -21,7 +21,7 @@ class Framing:
     """The outlines of a scene's bodies.
 
     Attributes:
-        link: Size of the largest body of the main robot [m]; 0.5 if nothing is seen of it.
+        link: Usual size of a body of the main robot [m], the median; 0.5 if nothing is seen of it.
 
     Args:
         parts: Parts of one world, of one kind.
@@ -36,8 +36,8 @@ class Framing:
             if part.body in own:
                 own[part.body].append(place(part.pose, outline(part.mesh)))
         self._outlines = {body: np.concatenate(points) for body, points in own.items() if points}
-        robot = self._outlines.keys() & set(subject.robot.tolist())
-        self.link = max((float(np.ptp(self._outlines[body], axis=0).max()) for body in robot), default=0.5)
+        robot = [self._outlines[body] for body in subject.robot.tolist() if body in self._outlines]
+        self.link = float(np.median([np.ptp(points, axis=0).max() for points in robot])) if robot else 0.5
 
     def points(self, body_q: Array, offsets: Array, *, robot: bool = False) -> NDArray[np.float64]:
         """Return points around the subject in some worlds [m], shape ``(n, 3)``.

@@ -19,7 +19,7 @@ from tightloop.view.world_meshes import WorldMeshes
 _POINT_COLOR = (250, 190, 30)
 _FORCE_COLOR = (230, 60, 40)
 _GHOST_COLOR = (60, 170, 240)
-# Sizes of marks as fractions of the robot's largest link: a point, and an arrow's shaft and head.
+# Sizes of marks as fractions of a link: a point, and an arrow's shaft and head.
 _POINT_PART, _SHAFT_PART, _HEAD_PART = 0.025, 0.008, 0.02
 # Length of body axes as a fraction of the size of a world.
 _AXES_PART = 0.05

@@ -29,7 +29,7 @@ _POINT = (250, 190, 30, 255)
 _FORCE = (230, 60, 40, 255)
 # Length of a force arrow [m/N].
 _FORCE_SCALE = 0.01
-# Widths of points and arrows as fractions of the largest link, and their limits [pixels].
+# Widths of points and arrows as fractions of a link, and their limits [pixels].
 _POINT_PART, _FORCE_PART = 0.05, 0.02
 _WIDTH_MIN, _WIDTH_MAX = 1.5, 12.0
 _FOV = 0.6
@@ -154,7 +154,7 @@ class Picture:
             layer, centres = self._goal(name, goal, chosen, offsets)
             layers.append(layer)
             aims += [centres[place] + goal[1] * axis for axis in (*np.eye(3), *-np.eye(3))]
-        view, around = self._view(camera, box, body_q, chosen, place, np.concatenate(aims))
+        view, around = self._view(camera, box, body_q, chosen, place, aims=np.concatenate(aims))
         shows = len(chosen) <= WORLDS_MAX if contacts is None else contacts
         lines = self._contacts(shown, chosen, view) if shows else _no_lines()
         reach = around[3]
@@ -258,7 +258,7 @@ class Picture:
         return np.ascontiguousarray(ends), colors, np.repeat(own.astype(np.float32), count)
 
     def _view(
-        self, given: str | Camera, box: Array, body_q: Array, chosen: NDArray[np.intp], place: int, aims: Array
+        self, given: str | Camera, box: Array, body_q: Array, chosen: NDArray[np.intp], place: int, *, aims: Array
     ) -> tuple[Camera, tuple[float, float, float, float]]:
         """Return the camera, and centre and radius of the scene."""
         places = self.offsets.astype(float)
@@ -267,13 +267,15 @@ class Picture:
             # bodies may be far from their start
             centre = self._framing.middle(body_q[chosen[place]])
             whole = box + places[place] + (0.0 if centre is None else centre - box.mean(axis=0))
-        view = given if isinstance(given, Camera) else self._preset(given, box, body_q[chosen], chosen, place, aims)
+        view = (
+            given if isinstance(given, Camera) else self._preset(given, box, body_q[chosen], chosen, place, aims=aims)
+        )
         middle = whole.mean(axis=0)
         size = float(np.linalg.norm(whole[1] - whole[0])) / 2
         return view, (float(middle[0]), float(middle[1]), float(middle[2]), max(1.6 * size, 1e-3))
 
     def _preset(
-        self, name: str, box: Array, body_q: Array, chosen: NDArray[np.intp], place: int, aims: Array
+        self, name: str, box: Array, body_q: Array, chosen: NDArray[np.intp], place: int, *, aims: Array
     ) -> Camera:
         """Return the camera of a preset for the chosen worlds, of which ``place`` is followed and has these goals."""
         if name not in PRESETS:
