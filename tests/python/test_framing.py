@@ -183,7 +183,8 @@ def test_the_camera_follows_what_floats_and_else_stands(tmp_path: Path) -> None:
     assert not reddened(picture, away, {"camera": "three-quarter"}).any()
     for case, camera in ((walking, "follow"), (standing, "three-quarter")):
         frame = SimpleNamespace(body_q=case.poses())
-        default, named = (Picture(case.parts, *SIZE).render(frame, **own) for own in ({}, {"camera": camera}))
+        default = Picture(case.parts, *SIZE).render(frame)
+        named = Picture(case.parts, *SIZE).render(frame, camera=camera)
         np.testing.assert_array_equal(default, named)
 
 
@@ -220,8 +221,7 @@ def test_contacts_are_off_above_four_worlds_unless_they_are_asked_for(tmp_path: 
         }
         frame = SimpleNamespace(body_q=case.poses(worlds), **contacts)
         plain, default, asked = (
-            Picture(case.parts, *SIZE).render(frame, **own).tobytes()
-            for own in ({"contacts": False}, {}, {"contacts": True})
+            Picture(case.parts, *SIZE).render(frame, contacts=on).tobytes() for on in (False, None, True)
         )
         assert plain != asked and default == (asked if shows else plain)
 

@@ -58,11 +58,12 @@ class Framing:
         found = [np.zeros((0, 3))]
         for body in sorted(wanted or self._outlines):
             poses = body_q[:, body]
-            kept = np.isfinite(poses).all(axis=-1)
-            usual = np.median(poses[kept, :3], axis=0) if kept.any() else np.zeros(3)
-            kept[kept] = np.linalg.norm(poses[kept, :3] - usual, axis=-1) <= _STRAY * np.linalg.norm(box[1] - box[0])
-            moved = rotate(poses[kept, None, 3:], self._outlines[body])
-            found.append((moved + (poses[kept, :3] + offsets[kept])[:, None]).reshape(-1, 3))
+            kept = np.flatnonzero(np.isfinite(poses).all(axis=-1))
+            usual = np.median(poses[kept, :3], axis=0) if len(kept) else np.zeros(3)
+            away = np.linalg.norm(poses[kept, :3] - usual, axis=-1)
+            kept = kept[away <= _STRAY * np.linalg.norm(box[1] - box[0])]
+            turned = rotate(poses[kept, None, 3:], self._outlines[body])
+            found.append((turned + (poses[kept, :3] + offsets[kept])[:, None]).reshape(-1, 3))
         return np.concatenate(found)
 
     def middle(self, body_q: Array) -> NDArray[np.float64] | None:

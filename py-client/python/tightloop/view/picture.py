@@ -248,7 +248,7 @@ class Picture:
         if any(_field(shown, name) is None for name in CONTACT_FIELDS if name != "contact_normal"):
             return _no_lines()
         link = self._framing.link
-        marks = contact_marks(shown, chosen, self.offsets, scale=_FORCE_SCALE, longest=link)
+        marks = contact_marks(shown, chosen.tolist(), self.offsets, scale=_FORCE_SCALE, longest=link)
         count = len(marks.points)
         ends = np.concatenate([np.hstack([marks.points, marks.points + marks.arrows]), np.tile(marks.points, 2)])
         colors = np.repeat(np.array([_FORCE, _POINT], np.uint8), count, axis=0)

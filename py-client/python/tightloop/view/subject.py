@@ -53,7 +53,7 @@ def subject(scene_toml: str, folder: str | PathLike[str], body_names: Sequence[s
     neutral = np.array([float(name.endswith(".qw")) for name in coord_names])
     shape = len(names), 6, len(dof_names)
     if 0 in shape:
-        return whole(len(names))
+        return Subject(np.arange(len(names)), np.arange(len(names)), False)
     # a dof moves a body if its column of the body's Jacobian is not zero
     jacobian = core.evaluate("body_jacobian", neutral, np.empty(0)).reshape(shape)
     moves = np.abs(jacobian).max(axis=1) > 0.0
@@ -64,12 +64,13 @@ def subject(scene_toml: str, folder: str | PathLike[str], body_names: Sequence[s
 def _of_trees(moves: NDArray[np.bool_], dof_names: list[str], body_names: list[str]) -> Subject:
     """Return the subject, given which dofs move which bodies, shape ``(bodies, dofs)``."""
     if not moves.any():
-        return whole(len(body_names))
+        every = np.arange(len(body_names))
+        return Subject(every, every, False)
     moving = moves.any(axis=1)
     trees = [moves[:, dof] for dof, name in enumerate(dof_names) if name.endswith(".vx")]
-    floating = np.logical_or.reduce(trees, axis=0) if trees else np.zeros(len(body_names), bool)
+    floating = np.array(trees).any(axis=0) if trees else np.zeros(len(body_names), bool)
     owners = np.array([name.partition("/")[0] for name in body_names])
-    fixed = moving & ~floating
+    fixed: NDArray[np.bool_] = np.asarray(moving & ~floating)
     # bodies stand in depth-first order, so the base of a fixed robot is right before what moves on it
     bases = np.zeros_like(moving)
     bases[:-1] = ~moving[:-1] & fixed[1:] & (owners[:-1] == owners[1:])
