@@ -211,6 +211,15 @@ def test_subjects_are_robots_with_their_bases_and_free_bodies(tmp_path: Path) ->
     assert "cube/body" not in names[subject.robot] and "arm/fr3_link0" in names[subject.robot]
 
 
+def test_loose_bodies_are_followed_together() -> None:
+    scene = tl.Scene(dt=1 / 480, substeps=8)
+    for k in range(3):
+        scene.add_box(half_extents=(0.1, 0.1, 0.1), body=scene.add_body(name=f"box{k}", pos=(k, 0, 0.1)))
+    case = Case(scene, [x for k in range(3) for x in (float(k), 0, 0.1, 0, 0, 0, 1)])
+    assert case.parts.subject.floats and case.parts.subject.robot.tolist() == [0, 1, 2]
+    assert case.span(case.poses()).max() > LEAST
+
+
 def test_contacts_are_off_above_four_worlds_unless_they_are_asked_for(tmp_path: Path) -> None:
     case = arm(tmp_path)
     for worlds, shows in ((4, True), (5, False)):

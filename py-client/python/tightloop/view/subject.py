@@ -16,7 +16,7 @@ from tightloop import _core
 class Subject:
     """The bodies that matter in a picture.
 
-    The main robot is the one with the most moving bodies.
+    The main robot is the one with the most moving bodies; floating robots that have as many count as one.
 
     Attributes:
         bodies: Bodies that a camera frames: robots with their bases, and free bodies. Indices into ``body_names``.
@@ -66,7 +66,7 @@ def _of_trees(moves: NDArray[np.bool_], dof_names: list[str], body_names: list[s
     if not moves.any():
         every = np.arange(len(body_names))
         return Subject(every, every, False)
-    moving = moves.any(axis=1)
+    moving: NDArray[np.bool_] = np.asarray(moves.any(axis=1))
     trees = [moves[:, dof] for dof, name in enumerate(dof_names) if name.endswith(".vx")]
     floating = np.array(trees).any(axis=0) if trees else np.zeros(len(body_names), bool)
     owners = np.array([name.partition("/")[0] for name in body_names])
@@ -77,6 +77,9 @@ def _of_trees(moves: NDArray[np.bool_], dof_names: list[str], body_names: list[s
     robots = [(tree, True) for tree in trees]
     robots += [(fixed & (owners == owner), False) for owner in dict.fromkeys(owners[fixed])]
     main, floats = max(robots, key=lambda robot: (np.count_nonzero(robot[0]), not robot[1]))
-    if not floats:
+    if floats:
+        # several floating robots of one size, or loose bodies, are followed together
+        main = np.array([tree for tree in trees if np.count_nonzero(tree) == np.count_nonzero(main)]).any(axis=0)
+    else:
         main = main | (bases & np.isin(owners, owners[main]))
     return Subject(np.flatnonzero(moving | bases), np.flatnonzero(main), floats)
