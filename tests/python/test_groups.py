@@ -349,7 +349,7 @@ def test_a_hard_limit_of_open_files_is_named_with_the_cure(pendulum_urdf):
 
 def test_a_list_says_who_uses_which_daemon(pendulum, unique):
     name = unique()
-    with tl.launch(pendulum, worlds=3, groups=2, name=name) as groups, tl.attach(f"{name}.1") as observer:
+    with tl.launch(pendulum, worlds=6, groups=2, name=name) as groups, tl.attach(f"{name}.1") as observer:
         observer.latest(0.5)
         groups[0].step()
         line = [*COMMAND, "list"]

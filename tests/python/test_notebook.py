@@ -30,8 +30,9 @@ def test_scenes_and_robots_show_a_table_and_a_picture(scene):
 
 
 def test_names_are_escaped(scene, monkeypatch):
-    monkeypatch.setitem(scene.robots["arm"]._summary, "dof_names", ["<b>x</b>"] * 9)
-    assert "<b>x</b>" not in scene.robots["arm"]._repr_html_()
+    monkeypatch.setattr(type(scene.robots["arm"]), "joint_target_mode", ["<b>x</b>"] * 9)
+    html = scene.robots["arm"]._repr_html_()
+    assert "<b>x</b>" not in html and "&lt;b&gt;x&lt;/b&gt;" in html
 
 
 def test_simulations_and_frames_show_tables(scene):

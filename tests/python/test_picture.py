@@ -195,7 +195,7 @@ def test_a_ghost_and_goals_are_drawn_over_it(arm: Arm) -> None:
     ("options", "said"),
     [
         ({"camera": "behind"}, "three-quarter"),
-        ({"worlds": [0, 7]}, "no world 7"),
+        ({"worlds": [0, 7]}, "worlds has 7"),
         ({"worlds": 0}, "worlds is 0"),
         ({"worlds": [0.5]}, "worlds"),
         ({"worlds": [0], "world": 1}, "world is 1"),

@@ -189,7 +189,7 @@ KINDS: dict[str, tuple[Any, ...]] = {
     "snapshot": (3, "abc", THING, None, b"abc"),
     "task": ("nothing", 3, THING, "file.py:Nothing", dict, "tightloop/Nothing-v0", None, []),
     "link": ("nowhere", 3, THING, None, "", b"x"),
-    "camera": ("nowhere", 3, THING, None, []),
+    "camera": ("nowhere", 3, THING, []),
     "size": ((8, 8), "abc", 3, (640,), (640, 480, 1), (1.5, 480), (-1, 480), THING, ("a", "b")),
     "some worlds": (0, -1, 1.5, "abc", [5], [0.5], THING, []),
     "keyframe": ("nowhere", 3, THING, 1.5, -1),
@@ -569,7 +569,17 @@ VIEW_CALLS: dict[str, Call] = {
         },
     ),
     "film": Call(
-        lambda _: view.film, {"out": "path", "seconds": "positive", "worlds": "some worlds", "camera": "camera"}
+        lambda _: view.film,
+        {
+            "out": "path",
+            "seconds": "positive",
+            "at": "least 0",
+            "worlds": "some worlds",
+            "world": "index",
+            "camera": "camera",
+        },
+        {},
+        {"progress": "a function of the caller's"},
     ),
     "Picture.render": Call(
         lambda world: world.picture.render,

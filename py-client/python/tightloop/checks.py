@@ -95,9 +95,9 @@ def path(what: str, value: str | os.PathLike[str], *, error: type[Exception] = S
     return Path(given).expanduser().absolute()
 
 
-def triple(what: str, values: Vector) -> Triple:
+def triple(what: str, values: Vector, *, error: type[Exception] = SceneError) -> Triple:
     """Check three finite floats."""
-    x, y, z = _numbers(what, values, 3)
+    x, y, z = _numbers(what, values, 3, error)
     return x, y, z
 
 
@@ -126,11 +126,11 @@ def choice(what: str, given: Any, known: Sequence[str]) -> None:
         raise SceneError(f"unknown {what} {given!r}; choose one of {', '.join(map(repr, known))}")
 
 
-def _numbers(what: str, values: Vector, count: int) -> tuple[float, ...]:
+def _numbers(what: str, values: Vector, count: int, error: type[Exception] = SceneError) -> tuple[float, ...]:
     try:
-        checked = tuple(number(what, value) for value in values)
+        checked = tuple(number(what, value, error=error) for value in values)
     except TypeError:
-        raise SceneError(f"{what} is {values!r}; give {count} numbers") from None
+        raise error(f"{what} is {values!r}; give {count} numbers") from None
     if len(checked) != count:
-        raise SceneError(f"{what} has {len(checked)} values; give {count}")
+        raise error(f"{what} has {len(checked)} values; give {count}")
     return checked

@@ -69,7 +69,7 @@ class Shown:
         self,
         *,
         worlds: int | Sequence[int] = 1,
-        camera: Any = "three-quarter",
+        camera: Any = None,
         size: tuple[int, int] = (640, 480),
         frame: Any = None,
     ) -> Image:
@@ -78,6 +78,7 @@ class Shown:
         Args:
             worlds: How many worlds are drawn on a grid, the first ones; or a list of them.
             camera: ``"three-quarter"``, ``"front"``, ``"side"``, ``"top"``, ``"follow"``, or a `tightloop.view.Camera`.
+                If left out, it follows a single world whose robot floats.
             size: Width and height [pixels].
             frame: A frame with ``body_q``; that of `forward` if left out.
 

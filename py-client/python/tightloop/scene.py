@@ -15,12 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tightloop import _core, checks
+from tightloop import _core, checks, notebook
 from tightloop.body import Body
 from tightloop.checks import Vector
 from tightloop.errors import SceneError
 from tightloop.mujoco_model import MujocoModel
-from tightloop.notebook import picture_html, table
 from tightloop.robot import PER_DOF, Robot
 from tightloop.scene_mujoco import HULL_VERTICES, check_options, keep_beside, read_file, read_model
 from tightloop.scene_options import FrictionCombine
@@ -384,7 +383,7 @@ class Scene(SceneRandomization):
         rows += [("body", name, "fixed" if body.fixed else "free") for name, body in self.bodies.items()]
         rows += [("shape", shape.full_name, shape.type) for shape in self.shapes.values()]
         title = f"Scene: {self.substeps} steps of {self.dt:.6g} s per frame"
-        return table(title, (), rows, picture_html("of_scene", self))
+        return notebook.table(title, (), rows, notebook.picture_html("of_scene", self))
 
     def __repr__(self) -> str:
         parts = f"robots={[*self.robots]}, models={[*self.models]}, bodies={[*self.bodies]}, shapes={[*self.shapes]}"

@@ -1,4 +1,4 @@
-"""Scenes of robot files, for the command line: ``tightloop serve``, ``bench`` and ``demo`` take any URDF or MJCF file."""
+"""Scenes of robot files, for the command line: ``serve``, ``bench`` and ``demo`` take any URDF or MJCF file."""
 
 from __future__ import annotations
 

@@ -90,21 +90,25 @@ pub(crate) struct Film {
     #[arg(long, default_value_t = 0)]
     world: usize,
 
-    /// Camera position; follow moves with the world.
-    #[arg(long, default_value = "three-quarter", value_parser = ["three-quarter", "front", "side", "top", "follow"])]
-    camera: String,
+    /// Camera position; follow moves with the world. Default: follow for a single world whose robot floats, else
+    /// three-quarter.
+    #[arg(long, value_parser = ["three-quarter", "front", "side", "top", "follow"])]
+    camera: Option<String>,
 
     /// Show collision shapes instead of visuals.
     #[arg(long)]
     collision: bool,
 
-    /// Hide contact points and forces.
+    /// Hide contact points and forces; above 4 worlds they are hidden.
     #[arg(long)]
     no_contacts: bool,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct Demo {
+    /// Show this URDF, MJCF or scene file instead of the tour.
+    file: Option<PathBuf>,
+
     /// Show only this stop, such as grasp; can be repeated.
     #[arg(long = "stop", value_name = "NAME")]
     stops: Vec<String>,

@@ -62,9 +62,8 @@ def main(arguments: list[str]) -> int:
         if given.file is not None:
             chosen: list[DemoScene] = [FileScene(given.file, given.worlds or _WORLDS)]
         else:
-            chosen = [
-                stop(given.worlds or worlds) for stop, worlds in SCENES if not given.stop or stop.name in given.stop
-            ]
+            stops = [entry for entry in SCENES if not given.stop or entry[0].name in given.stop]
+            chosen = [stop(given.worlds or worlds) for stop, worlds in stops]
         tour(chosen, plan)
     except (TightloopError, OSError) as problem:
         print(f"tightloop: {problem}", file=sys.stderr)

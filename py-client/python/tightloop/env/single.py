@@ -13,6 +13,8 @@ from tightloop.env.rendering import MODES
 from tightloop.env.results import check_options
 from tightloop.env.task import Task
 from tightloop.env.vector import VectorEnv
+from tightloop.errors import ArgumentError
+from tightloop.inputs import whole_seed
 
 
 class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -54,7 +56,9 @@ class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             ArgumentError: The seed or an option is not valid.
         """
         check_options(options, ())
-        super().reset(seed=seed)
+        if seed is not None and whole_seed(seed) is None:
+            raise ArgumentError(f"reset: seed is {seed!r}; give a whole number from 0 to 2**64 - 1")
+        super().reset(seed=None if seed is None else int(seed))
         obs, _ = self.vector.reset(seed=seed)
         return obs[0], {}
 
@@ -65,9 +69,15 @@ class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             action: Shape ``(actions,)``, clipped to ``action_space``.
 
         Returns:
-            ``obs, reward, terminated, truncated, info``. Raises as `VectorEnv.step` does.
+            ``obs, reward, terminated, truncated, info``.
+
+        Raises:
+            ArgumentError: The shape is wrong, or the values are not real numbers. Others are those of `VectorEnv.step`.
         """
-        obs, reward, terminated, truncated, infos = self.vector.step(np.asarray(action)[None])
+        given, size = np.asarray(action), self.action_space.shape
+        if given.shape != size or given.dtype.kind not in "fiu":
+            raise ArgumentError(f"step: action is {action!r:.80}; give real numbers of shape {size}")
+        obs, reward, terminated, truncated, infos = self.vector.step(given[None])
         info = {name: value[0] for name, value in infos.items() if not name.startswith("_") and infos[f"_{name}"][0]}
         return obs[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
 

@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tightloop import checks
+from tightloop.errors import ArgumentError
+
 #: Directions from the target to the camera, x forward, z up; "follow" is a "three-quarter" camera that moves along.
 PRESETS = {
     "three-quarter": (1.0, -1.0, 0.7),
@@ -33,12 +36,23 @@ class Camera:
         target: Point that it looks at [m].
         fov: Vertical field of view [rad].
         up: Direction that points up in the picture.
+
+    Raises:
+        ArgumentError: A value is not finite, or the field of view is not between 0 and π.
     """
 
     position: tuple[float, float, float]
     target: tuple[float, float, float]
     fov: float = 0.7
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        for name in ("position", "target", "up"):
+            given = checks.triple(f"Camera: {name}", getattr(self, name), error=ArgumentError)
+            object.__setattr__(self, name, given)
+        fov = checks.number("Camera: fov", self.fov, above=0.0, error=ArgumentError)
+        if fov >= np.pi:
+            raise ArgumentError(f"Camera: fov is {fov:g}; give less than π [rad]")
 
 
 def camera(preset: str, points: NDArray[np.float64], *, aspect: float = 1.0, fov: float = 0.7) -> Camera:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 from tightloop import checks
 from tightloop.errors import ArgumentError, DaemonLost, WaitTimeout
 from tightloop.view import dependencies
-from tightloop.view.cameras import PRESETS, Camera
+from tightloop.view.arguments import check_camera, check_contacts, check_size, check_worlds
+from tightloop.view.cameras import Camera
 from tightloop.view.display_options import Kind
 from tightloop.view.encoders import Encoder, GifEncoder, Mp4Encoder, PngFile, PngFolder
 from tightloop.view.parts import parts
@@ -90,8 +91,9 @@ class Film:
             raise ArgumentError(f"film: out is {path}, and there is no folder {path.parent}; make it first")
         self._fps = checks.number("film: fps", fps, above=0.0, error=ArgumentError)
         self._speed = checks.number("film: speed", speed, above=0.0, error=ArgumentError)
-        if not (camera is None or isinstance(camera, Camera) or camera in PRESETS):
-            raise ArgumentError(f"film: camera is {camera!r}; give a Camera or one of: {', '.join(PRESETS)}")
+        check_camera("film", camera)
+        check_worlds("film", worlds)
+        size, contacts = check_size("film", size), check_contacts("film", contacts)
         if kind not in ("visual", "collision"):
             raise ArgumentError(f"film: kind is {kind!r}; give 'visual' or 'collision'")
         info = sim.info
@@ -231,9 +233,11 @@ def film(
     at = 0.0 if at is None else checks.number("film: at", at, least=0.0, error=ArgumentError)
     if seconds is not None:
         seconds = checks.number("film: seconds", seconds, above=0.0, error=ArgumentError)
-    single = _ending(Path(os.fspath(out))) == ".png"
+    single = _ending(checks.path("film: out", out, error=ArgumentError)) == ".png"
+    check_worlds("film", worlds)
+    world = checks.integer("film: world", world, least=0, error=ArgumentError)
     name = source if isinstance(source, str | os.PathLike) else source.name
-    text = os.fspath(name)
+    text = str(name)
     most = most_worlds(worlds, world)
     recorded = is_recording(text)
     watched: Live | Recorded = Recorded(text, most, FIELDS) if recorded else Live(text, most, FIELDS)
@@ -315,7 +319,7 @@ def chosen_worlds(worlds: int | Sequence[int], world: int, there: int) -> list[i
         chosen = [checks.integer("film: an entry of worlds", each, least=0, error=ArgumentError) for each in worlds]
     for each in [*chosen, world]:
         if each >= there:
-            raise ArgumentError(f"film: there is no world {each} to be seen; there are {there}, from 0 on")
+            raise ArgumentError(f"film: worlds or world has {each}, which cannot be seen; there are {there}, from 0 on")
     if not chosen:
         raise ArgumentError("film: worlds is empty; give how many, or which ones")
     return chosen

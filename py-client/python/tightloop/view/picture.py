@@ -12,7 +12,8 @@ from tightloop import _core, checks
 from tightloop.errors import ArgumentError
 from tightloop.frames import FAULTED
 from tightloop.view import cameras, grid
-from tightloop.view.cameras import PRESETS, Camera
+from tightloop.view.arguments import check_camera, check_contacts
+from tightloop.view.cameras import Camera
 from tightloop.view.contact_marks import WORLDS_MAX, contact_marks
 from tightloop.view.framing import Framing
 from tightloop.view.goal_markers import goal_marker
@@ -131,11 +132,16 @@ class Picture:
             ArgumentError: A world or camera does not exist; the message names it.
             UnknownField: The frame carries no ``body_q``.
         """
+        check_camera("picture", camera)
+        contacts = check_contacts("picture", contacts)
+        world = checks.integer("picture: world", world, least=0, error=ArgumentError)
+        if not hasattr(shown, "body_q") and not hasattr(shown, "fields"):
+            raise ArgumentError(f"picture: frame is {shown!r:.60}; give a frame with body_q, or a copy of one")
         body_q = np.asarray(shown.body_q, float)
         chosen = self._chosen(worlds, len(body_q))
         if world not in chosen:
             if world != 0 or camera == "follow" or ghost is not None:
-                raise ArgumentError(f"picture: world is {world!r}; these are drawn: {_listed(chosen)}")
+                raise ArgumentError(f"picture: world is {world!r}; there are drawn: {_listed(chosen)}")
             world = int(chosen[0])
         if camera is None:
             camera = "follow" if self._subject.floats and len(chosen) == 1 else "three-quarter"
@@ -189,7 +195,7 @@ class Picture:
             raise ArgumentError(f"picture: worlds is {worlds!r}; give how many, or a list of which ones")
         wrong = chosen[(chosen < 0) | (chosen >= there)]
         if len(wrong):
-            raise ArgumentError(f"picture: there is no world {int(wrong[0])}; there are {there}, from 0 on")
+            raise ArgumentError(f"picture: worlds has {int(wrong[0])}; there are {there}, from 0 on")
         return chosen.astype(np.intp)
 
     def _stand(self, chosen: NDArray[np.intp], body_q: Array) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
@@ -278,9 +284,6 @@ class Picture:
         self, name: str, box: Array, body_q: Array, chosen: NDArray[np.intp], place: int, *, aims: Array
     ) -> Camera:
         """Return the camera of a preset for the chosen worlds, of which ``place`` is followed and has these goals."""
-        if name not in PRESETS:
-            known = ", ".join(PRESETS)
-            raise ArgumentError(f"picture: camera is {name!r}; give a tightloop.view.Camera or one of: {known}")
         aspect, places = self.width / self.height, self.offsets.astype(float)
         follows = name == "follow"
         if follows:

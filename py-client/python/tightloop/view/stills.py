@@ -14,6 +14,7 @@ from tightloop.dynamics import Dynamics
 from tightloop.robot import Robot
 from tightloop.scene import Scene
 from tightloop.view import dependencies
+from tightloop.view.arguments import check_size, check_worlds
 from tightloop.view.cameras import Camera
 from tightloop.view.parts import parts
 from tightloop.view.picture import Picture
@@ -33,6 +34,8 @@ def of_simulation(
     sim: Any, *, worlds: int | Sequence[int], camera: str | Camera, size: tuple[int, int], frame: Any
 ) -> Any:
     """Return a picture of worlds of a simulation; see `Sim.picture`."""
+    check_worlds("picture", worlds)
+    size = check_size("picture", size)
     info = sim.info
     picture = Picture(parts(info["scene"], info["scene_folder"], info["body_names"]), *size)
     return image(picture.render(sim.forward() if frame is None else frame, worlds=worlds, camera=camera))
