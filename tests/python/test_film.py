@@ -201,7 +201,7 @@ def test_a_daemon_is_filmed_as_it_runs(scene: tl.Scene, tmp_path: Path, unique: 
         ({"fps": 0}, "fps"),
         ({"speed": -1}, "speed"),
         ({"worlds": [0, 9]}, "world 9"),
-        ({"worlds": []}, "worlds is empty"),
+        ({"worlds": []}, r"worlds is \[\]"),
         ({"world": -1}, "world"),
         ({"camera": "behind"}, "three-quarter"),
         ({"kind": "nice"}, "collision"),

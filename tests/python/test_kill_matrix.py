@@ -227,3 +227,18 @@ def test_a_connection_that_nobody_owns_is_removed(pendulum):
 def node_folders(shared: set[str]) -> set[Path]:
     """Folders of the nodes, one for each process, of a daemon's shared memory."""
     return {Path(file).parent for file in left_of(shared) if file.endswith(".service_tag")}
+
+
+def test_details_of_a_node_that_never_was_are_removed(pendulum):
+    """As if a client were killed between its node's details and the monitor."""
+    with tl.launch(pendulum, worlds=1) as sim:
+        sim.step()
+        [folder, *_] = node_folders(stems_of(sim.pid))
+        with subprocess.Popen([sys.executable, "-c", ""]) as dead:
+            pass
+        unborn = folder.with_name(str((dead.pid << 64) + 7))
+        unborn.mkdir(mode=0o700)
+        (unborn / next(folder.glob("*node.details")).name).write_text("")
+        assert wait_until(lambda: not unborn.exists(), PATIENCE)
+        assert folder.exists()
+        sim.step()

@@ -319,7 +319,9 @@ def chosen_worlds(worlds: int | Sequence[int], world: int, there: int) -> list[i
         chosen = [checks.integer("film: an entry of worlds", each, least=0, error=ArgumentError) for each in worlds]
     for each in [*chosen, world]:
         if each >= there:
-            raise ArgumentError(f"film: worlds or world has {each}, which cannot be seen; there are {there}, from 0 on")
+            raise ArgumentError(
+                f"film: there is no world {each} for worlds or world to show; there are {there}, from 0 on"
+            )
     if not chosen:
         raise ArgumentError("film: worlds is empty; give how many, or which ones")
     return chosen

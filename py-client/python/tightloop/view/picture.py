@@ -195,7 +195,9 @@ class Picture:
             raise ArgumentError(f"picture: worlds is {worlds!r}; give how many, or a list of which ones")
         wrong = chosen[(chosen < 0) | (chosen >= there)]
         if len(wrong):
-            raise ArgumentError(f"picture: worlds has {int(wrong[0])}; there are {there}, from 0 on")
+            raise ArgumentError(
+                f"picture: there is no world {int(wrong[0])} for worlds to show; there are {there}, from 0 on"
+            )
         return chosen.astype(np.intp)
 
     def _stand(self, chosen: NDArray[np.intp], body_q: Array) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:

@@ -74,35 +74,51 @@ impl ClientCleanup {
         PathBuf::from(self.config.global.root_path().to_string())
     }
 
-    /// Removes files of ports that no node has any more, at the second look.
+    /// Removes files of ports that no node has any more, and of nodes that died before they had a monitor, at the second
+    /// look.
     ///
     /// iceoryx2 leaves a connection that its owner had made and not yet marked as its own when it was killed. A port has
     /// its tag in a node's folder before it has files, and removing a file that somebody still maps changes nothing.
     fn remove_orphans(&mut self) {
         let found = orphans(&self.folder()).unwrap_or_default();
         for file in found.intersection(&self.orphans) {
-            let _ = std::fs::remove_file(file);
+            let _ = std::fs::remove_file(file).or_else(|_| std::fs::remove_dir(file));
         }
         self.orphans = found;
     }
 }
 
-/// Files of ports without a tag.
+/// Files of ports without a tag, and of dead nodes without a monitor with their folders.
 fn orphans(folder: &Path) -> std::io::Result<HashSet<PathBuf>> {
     let files: Vec<PathBuf> = paths(folder)?;
-    let mut tagged = HashSet::new();
+    let (mut tagged, mut found) = (HashSet::new(), HashSet::new());
     // nodes are listed after the files, so that the port of a file that is seen has its tag
-    for node in paths(&folder.join("nodes"))? {
+    let nodes = paths(&folder.join("nodes"))?;
+    let monitors = nodes.iter().filter(|file| file.extension().is_some());
+    let monitored: HashSet<u128> = monitors.flat_map(|file| ports(file)).collect();
+    for node in &nodes {
         // a node may end meanwhile, and not all are folders
-        let tags = paths(&node).unwrap_or_default();
+        let tags = paths(node).unwrap_or_default();
         tagged.extend(tags.iter().flat_map(|tag| ports(tag)));
+        let id = node.file_name().and_then(|id| id.to_str()?.parse().ok());
+        if id.is_some_and(|id| !monitored.contains(&id) && !has_process(id)) {
+            found.extend(tags);
+            found.insert(node.clone());
+        }
     }
     let is_orphan = |file: &PathBuf| {
         let kind = file.extension().and_then(|kind| kind.to_str());
         kind.is_some_and(|kind| OF_PORTS.contains(&kind))
             && ports(file).iter().any(|port| !tagged.contains(port))
     };
-    Ok(files.into_iter().filter(is_orphan).collect())
+    found.extend(files.into_iter().filter(is_orphan));
+    Ok(found)
+}
+
+/// Whether the process of a node lives; its number is in bits 64 to 95 of the id.
+fn has_process(node: u128) -> bool {
+    let pid = (node >> 64) as u32;
+    Path::new(&format!("/proc/{pid}")).exists()
 }
 
 fn paths(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
@@ -142,7 +158,13 @@ mod tests {
         touch(folder.join(format!("12345678_{hash}_{DEAD}.dynamic")));
         let stray = folder.join(format!("12345678_{hash}_{DEAD}_{LIVING}.connection"));
         touch(stray.clone());
-        assert_eq!(orphans(&folder).unwrap(), HashSet::from([stray]));
+        // made before its monitor, by a process that cannot be
+        let unborn = folder.join(format!("nodes/{}", (u128::from(u32::MAX) << 64) + 7));
+        std::fs::create_dir(&unborn).unwrap();
+        let details = unborn.join("32bae2b4_node.details");
+        touch(details.clone());
+        let found = orphans(&folder).unwrap();
+        assert_eq!(found, HashSet::from([stray, unborn, details]));
         std::fs::remove_dir_all(&folder).unwrap();
     }
 }
