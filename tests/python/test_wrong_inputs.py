@@ -1,7 +1,7 @@
 """Wrong values for every argument and property of the public Python API: each is refused, by name and with a cure.
 
-`wrong_values.py` lists the callables with the kinds of their arguments, and wrong values by kind. A test compares that
-list with the package.
+`public_calls.py` lists the callables with the kinds of their arguments, and `wrong_values.py` the values by kind. A
+test compares that list with the package.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 import pytest
 import sample_meshes
-from wrong_values import CALLS, KINDS, LEFT, SETTERS
+from public_calls import CALLS, LEFT, SETTERS
+from wrong_values import KINDS
 
 import tightloop as tl
 from conftest import URDF

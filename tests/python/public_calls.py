@@ -1,0 +1,376 @@
+"""The public callables of the Python API with the kinds of their arguments, and the properties that can be set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from wrong_values import BALL, COMMANDS, OF_MODELS, POSE, SHAPE, START, SURFACE
+
+import tightloop as tl
+from conftest import URDF
+from tightloop import env, view
+
+
+@dataclass(frozen=True)
+class Call:
+    """A callable, with arguments that are right, and the kinds of those that are tried wrong.
+
+    Attributes:
+        make: Returns the callable, from what the fixture made.
+        kinds: Kind by argument.
+        right: Arguments that are needed besides.
+        left: Arguments that are not tried, with the reason.
+    """
+
+    make: Callable[[Any], Callable[..., Any]]
+    kinds: Mapping[str, str]
+    right: Mapping[str, Any] = field(default_factory=dict)
+    left: Mapping[str, str] = field(default_factory=dict)
+
+
+def of_scene(name: str, kinds: Mapping[str, str], /, **right: Any) -> Call:
+    """A method of a scene, which is another one for each case."""
+    return Call(lambda world: getattr(world.scene(), name), kinds, right)
+
+
+MANY = "any values: a set of names that only a few models have; tests/python/mujoco tries them"
+CALLS: dict[str, Call] = {
+    "Scene": Call(
+        lambda _: tl.Scene,
+        {
+            "dt": "positive",
+            "substeps": "count",
+            "gravity": "triple",
+            "contacts_max": "optional count",
+            "rows_max": "optional count",
+            "params": "list of names",
+            "command_delay_max": "optional count",
+            "friction_combine": "choice",
+        },
+    ),
+    "Scene.add_urdf": of_scene(
+        "add_urdf",
+        POSE
+        | SURFACE
+        | {
+            "path": "path",
+            "name": "name",
+            "floating": "flag",
+            "self_collisions": "flag",
+            "strict": "flag",
+            "mesh_max_hull_vertices": "count",
+            "convex_decomposition": "flag",
+            "package_dirs": "names",
+        },
+        path=URDF,
+        name="other",
+    ),
+    "Scene.add_box": of_scene("add_box", SHAPE | {"half_extents": "positive triple"}, half_extents=(1, 1, 1)),
+    "Scene.add_sphere": of_scene("add_sphere", SHAPE | {"radius": "positive"}, radius=1.0),
+    "Scene.add_cylinder": of_scene(
+        "add_cylinder", SHAPE | {"radius": "positive", "half_height": "positive"}, radius=1.0, half_height=1.0
+    ),
+    "Scene.add_capsule": of_scene(
+        "add_capsule", SHAPE | {"radius": "positive", "half_height": "positive"}, radius=1.0, half_height=1.0
+    ),
+    "Scene.add_mesh": of_scene(
+        "add_mesh",
+        SHAPE | {"path": "path", "scale": "scale", "max_hull_vertices": "count", "convex_decomposition": "flag"},
+        path="",  # a file of the fixture's
+    ),
+    "Scene.add_plane": of_scene("add_plane", POSE | SURFACE | {"name": "name"}),
+    "Scene.add_ground": of_scene("add_ground", SURFACE | {"z": "number", "name": "name"}),
+    "Scene.add_table": of_scene("add_table", SURFACE | {"name": "name"}),
+    "Scene.add_cube": of_scene("add_cube", POSE | SURFACE | {"name": "name"}, name="other"),
+    "Scene.add_body": of_scene(
+        "add_body",
+        POSE | {"mass": "positive", "com": "triple", "inertia": "inertia", "fixed": "flag", "name": "name"},
+        mass=1.0,
+    ),
+    "Scene.add_site": of_scene(
+        "add_site", POSE | {"body": "body", "relative_to": "body", "damping": "positive", "name": "name"}
+    ),
+    "Scene.add_contact_sensor": of_scene(
+        "add_contact_sensor", {"of": "collidable", "name": "name", "against": "optional collidable"}, of="cube"
+    ),
+    "Scene.filter_contacts": of_scene("filter_contacts", {"a": "collidable", "b": "collidable"}, a="cube", b="cube"),
+    "Scene.randomize": of_scene(
+        "randomize",
+        {"joint_q": "joints", "joint_qd": "joints", "body_q": "bodies", "body_qd": "bodies", "params": "ranges"},
+    ),
+    "Scene.solver": of_scene(
+        "solver",
+        {
+            "iterations": "count",
+            "ls_iterations": "count",
+            "tolerance": "least 0",
+            "cone": "choice",
+            "impratio": "positive",
+        },
+    ),
+    "Scene.save": of_scene("save", {"path": "new file"}),
+    "Scene.load": of_scene("load", {"path": "path"}),
+    "Scene.from_toml": of_scene("from_toml", {"text": "toml", "folder": "text"}, text="dt = 0.001\nsubsteps = 1"),
+    "Scene.from_mujoco": of_scene(
+        "from_mujoco",
+        {"model": "model", "name": "name", "substeps": "count", "mesh_max_hull_vertices": "count"},
+        model=BALL,
+    ),
+    "Scene.add_mujoco": of_scene(
+        "add_mujoco", POSE | {"model": "model", "name": "name", "mesh_max_hull_vertices": "count"}, model=BALL
+    ),
+    "Robot.order": Call(lambda world: world.scene().robots["arm"].order, {"names": "order"}),
+    "JointOrder.read": Call(lambda world: world.order.read, {"values": "ordered"}),
+    "JointOrder.write": Call(lambda world: world.order.write, {"values": "ordered"}),
+    "Robot.link": Call(lambda world: world.scene().robots["arm"].link, {"name": "link"}),
+    "Uniform": Call(lambda _: tl.Uniform, {"low": "number", "high": "number"}, {"low": 0.0, "high": 1.0}),
+    "Normal": Call(lambda _: tl.Normal, {"mean": "number", "std": "least 0"}, {"mean": 0.0, "std": 1.0}),
+    "Dynamics": Call(lambda _: tl.Dynamics, {"scene": "scene"}),
+    "Dynamics.forward_kinematics": Call(lambda world: world.dynamics.forward_kinematics, {"joint_q": "coordinates"}),
+    "Dynamics.body_velocity": Call(
+        lambda world: world.dynamics.body_velocity,
+        {"joint_q": "coordinates", "joint_qd": "velocities"},
+        {"joint_q": START, "joint_qd": np.zeros(15)},
+    ),
+    "Dynamics.body_jacobian": Call(lambda world: world.dynamics.body_jacobian, {"joint_q": "coordinates"}),
+    "Dynamics.mass_matrix": Call(lambda world: world.dynamics.mass_matrix, {"joint_q": "coordinates"}),
+    "Dynamics.inverse_dynamics": Call(
+        lambda world: world.dynamics.inverse_dynamics,
+        {"joint_q": "coordinates", "joint_qd": "velocities", "joint_qdd": "velocities", "damping": "flag"},
+        {"joint_q": START},
+    ),
+    "launch": Call(
+        lambda _: tl.launch,
+        {
+            "scene": "scene",
+            "worlds": "count",
+            "groups": "count",
+            "device": "choice",
+            "precision": "choice",
+            "threads": "count",
+            "fields": "fields",
+            "params": "fields",
+            "bounds": "bounds",
+            "on_fault": "choice",
+            "on_nan": "choice",
+            "draws": "choice",
+            "name": "label",
+            "log": "new file",
+            "frames_held": "count",
+            "watch_worlds": "count",
+        },
+        {"scene": tl.Scene(), "worlds": 1},
+    ),
+    "attach": Call(lambda _: tl.attach, {"name": "label"}),
+    "Sim.step": Call(lambda world: world.sim.step, COMMANDS | OF_MODELS | {"body_f": "values"}),
+    "Sim.send": Call(
+        lambda world: world.send,
+        COMMANDS | OF_MODELS | {"body_f": "values"},
+    ),
+    "Sim.write": Call(
+        lambda world: world.sim.write,
+        {"joint_q": "coordinates", "joint_qd": "command", "act": "values", "mask": "mask"} | OF_MODELS,
+    ),
+    "Sim.reset": Call(lambda world: world.sim.reset, {"mask": "mask", "seed": "seed", "keyframe": "keyframe"}),
+    "Sim.latest": Call(lambda world: world.sim.latest, {"timeout": "least 0"}),
+    "Sim.restore": Call(lambda world: world.restore, {"snapshot": "snapshot", "worlds": "mask", "from_world": "index"}),
+    "Sim.forward_kinematics": Call(lambda world: world.sim.forward_kinematics, {"joint_q": "coordinates"}),
+    "Sim.inverse_dynamics": Call(
+        lambda world: world.sim.inverse_dynamics,
+        {"joint_q": "coordinates", "joint_qd": "velocities", "joint_qdd": "velocities", "damping": "flag"},
+        {"joint_q": START},
+    ),
+    "Sim.rays": Call(
+        lambda world: world.sim.rays,
+        {},
+        {},
+        {name: MANY for name in ("pnt", "vec", "geomgroup", "flg_static", "bodyexclude", "frame")},
+    ),
+    "Sim.view": Call(
+        lambda world: world.sim.view, {"port": "port", "worlds": "count", "open": "flag", "hosts": "hosts"}
+    ),
+    "Sim.picture": Call(
+        lambda world: world.sim.picture,
+        {"worlds": "some worlds", "camera": "camera", "size": "size", "frame": "frame"},
+    ),
+    "Params.write": Call(
+        lambda world: world.sim.params.write, {"gravity": "vectors", "shape_mu": "values", "mask": "mask"}
+    ),
+    "Snapshot.from_bytes": Call(lambda _: tl.Snapshot.from_bytes, {"data": "bytes"}),
+    "Snapshot.load": Call(lambda _: tl.Snapshot.load, {"path": "path"}),
+    "Snapshot.save": Call(lambda world: world.snapshot.save, {"path": "new file"}),
+}
+#: Properties, by class, and how to get an object of it.
+SETTERS: dict[str, tuple[Callable[[Any], Any], dict[str, str]]] = {
+    "Scene": (
+        lambda world: world.scene(),
+        {
+            "dt": "positive",
+            "substeps": "count",
+            "gravity": "triple",
+            "contacts_max": "optional count",
+            "rows_max": "optional count",
+            "params": "list of names",
+            "command_delay_max": "optional count",
+            "friction_combine": "choice",
+        },
+    ),
+    "Robot": (
+        lambda world: world.scene().robots["arm"],
+        POSE
+        | {
+            "joint_q": "of dofs",
+            "joint_target_q": "of dofs",
+            "joint_target_qd": "of dofs",
+            "joint_target_mode": "modes",
+            "joint_target_ke": "of dofs",
+            "joint_target_kd": "of dofs",
+            "joint_effort_limit": "of dofs",
+            "joint_armature": "of dofs",
+            "self_collisions": "flag",
+        },
+    ),
+    "Body": (
+        lambda world: world.scene().bodies["cube"],
+        POSE | {"mass": "positive", "com": "triple", "inertia": "inertia", "fixed": "flag"},
+    ),
+    "Params": (lambda world: world.sim.params, {"gravity": "vectors", "shape_mu": "values"}),
+}
+#: Public names that are not called with arguments of a user's, and why.
+LEFT = {
+    "Body": "Scene.add_body makes it",
+    "ContactSensor": "Scene.add_contact_sensor makes it",
+    "Frame": "Sim.step makes it",
+    "FrameCopy": "Frame.copy makes it",
+    "Groups": "launch makes it",
+    "JointOrder": "Robot.order makes it",
+    "Link": "Robot.link makes it",
+    "RayHits": "Sim.rays makes it",
+    "Robot": "Scene.add_urdf makes it",
+    "Shape": "Scene.add_box makes it",
+    "Sim": "launch makes it",
+    "Site": "Scene.add_site makes it",
+    "Snapshot": "Sim.snapshot makes it",
+    "Surface": "types of keyword arguments",
+}
+
+ENV_CALLS: dict[str, Call] = {
+    "VectorEnv": Call(
+        lambda _: env.VectorEnv,
+        {
+            "task": "task",
+            "num_envs": "count",
+            "autoreset_mode": "choice",
+            "copy": "flag",
+            "slots": "slots",
+            "device": "choice",
+            "precision": "choice",
+            "threads": "count",
+            "max_episode_steps": "steps",
+            "on_nan": "choice",
+            "daemon": "label",
+            "first_env": "index",
+            "render_mode": "choice",
+        },
+        {"task": "CartPoleBalance"},
+    ),
+    "VectorEnv.reset": Call(lambda world: world.envs.reset, {"seed": "env seed", "options": "options"}),
+    "VectorEnv.send": Call(lambda world: world.envs.send, {"actions": "actions"}),
+    "VectorEnv.step": Call(lambda world: world.envs.step, {"actions": "actions"}),
+    "Env": Call(lambda _: env.Env, {"task": "task"}),
+    "Env.reset": Call(lambda world: world.single.reset, {"seed": "single seed", "options": "options"}),
+    "Env.step": Call(lambda world: world.single.step, {"action": "action"}),
+    "JointTorque": Call(
+        lambda _: env.JointTorque,
+        {"dofs": "dofs", "scale": "per dof", "hold": "flag"},
+        {"dofs": ["arm/fr3_joint1"], "scale": 1.0},
+    ),
+    "JointTarget": Call(
+        lambda _: env.JointTarget,
+        {"dofs": "dofs", "scale": "per dof", "limit": "positive"},
+        {"dofs": ["arm/fr3_joint1"], "scale": 1.0},
+    ),
+    "JointDelta": Call(
+        lambda _: env.JointDelta, {"dofs": "dofs", "scale": "per dof"}, {"dofs": ["arm/fr3_joint1"], "scale": 1.0}
+    ),
+    "Gripper": Call(
+        lambda _: env.Gripper,
+        {"dofs": "dofs", "low": "number", "high": "number", "binary": "flag"},
+        {"dofs": ["arm/fr3_joint1"], "low": 0.0, "high": 1.0},
+    ),
+    "EndEffectorDelta": Call(
+        lambda _: env.EndEffectorDelta,
+        {"site": "text", "dofs": "dofs", "pos_scale": "number", "rot_scale": "number"},
+        {"site": "tip", "dofs": ["arm/fr3_joint1"], "pos_scale": 1.0},
+    ),
+    "Observed": Call(
+        lambda _: env.Observed,
+        {"name": "text", "low": "observed bound", "high": "observed bound", "size": "count", "unit": "text"},
+        {"name": "angle", "low": -1.0, "high": 1.0},
+    ),
+    "make_groups": Call(
+        lambda _: env.make_groups,
+        {
+            "task": "task",
+            "num_envs": "count",
+            "groups": "count",
+            "device": "choice",
+            "precision": "choice",
+            "threads": "count",
+        },
+        {"task": "CartPoleBalance", "num_envs": 4},
+    ),
+}
+ENV_LEFT = {
+    "AutoresetMode": "gymnasium's",
+    "Names": "environments make it",
+    "Task": "users derive from it; test_env_tasks.py tries wrong ones",
+    "Worlds": "environments make it",
+}
+VIEW_CALLS: dict[str, Call] = {
+    "Film": Call(
+        lambda _: view.Film,
+        {
+            "out": "path",
+            "size": "size",
+            "fps": "positive",
+            "worlds": "some worlds",
+            "world": "index",
+            "camera": "camera",
+            "kind": "choice",
+            "contacts": "flag",
+            "speed": "positive",
+        },
+    ),
+    "film": Call(
+        lambda _: view.film,
+        {
+            "out": "path",
+            "seconds": "positive",
+            "at": "least 0",
+            "worlds": "some worlds",
+            "world": "index",
+            "camera": "camera",
+        },
+        {},
+        {"progress": "a function of the caller's"},
+    ),
+    "Picture.render": Call(
+        lambda world: world.picture.render,
+        {"worlds": "some worlds", "camera": "camera", "world": "index", "contacts": "flag"},
+        {},
+        {name: "test_picture.py tries them" for name in ("shown", "ghost", "goals")},
+    ),
+    "Camera": Call(
+        lambda _: view.Camera,
+        {"position": "triple", "target": "triple", "fov": "positive", "up": "triple"},
+        {"position": (1.0, 0.0, 0.0), "target": (0.0, 0.0, 0.0)},
+    ),
+}
+VIEW_LEFT = {"Picture": "its parts are made by tightloop.view.parts"}
+CALLS |= ENV_CALLS | VIEW_CALLS
+SETTERS["VectorEnv"] = (lambda world: world.envs, {"elapsed": "elapsed"})
+LEFT |= ENV_LEFT | VIEW_LEFT
