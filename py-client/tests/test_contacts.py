@@ -125,7 +125,7 @@ def test_a_wrong_bearer_is_named(scene, tmp_path):
     stranger = other.add_urdf(tmp_path / "arm.urdf", name="arm").link("hand")
     cases: list[tuple[Any, str]] = [
         ("arm", "body is the robot 'arm'; give one of its links"),
-        ("arm/foot", "robot `arm` has no link 'foot'; there are: base, hand"),
+        ("arm/foot", "robot `arm` has no link of the name 'foot'; there are: base, hand"),
         ("leg/foot", "body is 'leg/foot', which is no body of this scene; there are: `cube`"),
         (stranger, "link `arm/hand` is of another scene"),
         (7, "body is 7; give a body"),
@@ -135,7 +135,7 @@ def test_a_wrong_bearer_is_named(scene, tmp_path):
             scene.add_box(half_extents=(1, 1, 1), body=bearer)
     with pytest.raises(tl.SceneError, match="link `arm/hand` has the mass that its robot's file gives it"):
         scene.add_box(half_extents=(1, 1, 1), body="arm/hand", density=5)
-    with pytest.raises(tl.SceneError, match="robot `arm` has no link 'foot'"):
+    with pytest.raises(tl.SceneError, match="robot `arm` has no link of the name 'foot'"):
         scene.robots["arm"].link("foot")
     assert not scene.shapes
 
@@ -175,7 +175,10 @@ def test_filters_take_things_and_names(scene):
     ]:
         scene.filter_contacts(a, b)
         assert scene.filters[-1] == pair
-    with pytest.raises(tl.SceneError, match=r"'tabel'; there are: `table`, `cube/box`, `arm`, `cube`"):
+    with pytest.raises(
+        tl.SceneError,
+        match=r"a is 'tabel', which is no shape, robot, body or link; there are: `table`, `cube/box`, `arm`, `cube`",
+    ):
         scene.filter_contacts("tabel", cube)
     other = tl.Scene()
     with pytest.raises(tl.SceneError, match="shape `table` is of another scene"):

@@ -80,7 +80,7 @@ def test_a_property_is_not_the_array_that_was_given(arm: tl.Robot):
         ("joint_q", [math.inf, 0], r"joint_q of coordinate `arm/shoulder` is inf; give a finite number$"),
         ("joint_q", ["a", "b"], r"joint_q is \['a', 'b'\]; give real numbers"),
         ("joint_q", [1j, 0], r"joint_q is \[1j, 0\]; give real numbers"),
-        ("joint_q", [[1], [1, 2]], r"joint_q is no array"),
+        ("joint_q", [[1], [1, 2]], r"joint_q is \[\[1\], \[1, 2\]\]; give an array"),
         ("joint_effort_limit", -1, r"joint_effort_limit of dof `arm/shoulder` is -1\.0; give a number of at least 0"),
         ("joint_target_kd", [1, -2], r"joint_target_kd of dof `arm/elbow` is -2\.0"),
         ("joint_target_mode", "force", r"joint_target_mode.*'force'.*'position', 'velocity', 'both'"),

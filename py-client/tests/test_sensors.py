@@ -68,8 +68,8 @@ def test_wrong_ones_are_refused_by_name_and_leave_nothing(scene: tl.Scene):
     with pytest.raises(tl.SceneError, match=r"site name `tip` is taken"):
         scene.add_site(name="tip")
     for wrong, message in [
-        ({"of": "cup"}, r"contact sensor `contact`: there is no shape, robot, body or link 'cup'"),
-        ({"of": "cube", "against": "cup"}, r"there is no shape, robot, body or link 'cup'"),
+        ({"of": "cup"}, r"contact sensor `contact`: of is 'cup', which is no shape"),
+        ({"of": "cube", "against": "cup"}, r"against is 'cup', which is no shape"),
         ({"of": "cube", "name": ""}, r"contact sensor name ''"),
     ]:
         with pytest.raises(tl.SceneError, match=message):

@@ -120,7 +120,7 @@ def test_a_robot_that_cannot_move_has_poses(tmp_path):
         (([0.0] * 3,), r"joint_q has shape \(3,\); give \(12,\), or \(n, 12\)"),
         ((np.zeros((2, 12)), np.zeros((3, 10))), "arrays of 2 and 3 states"),
         ((np.zeros((0, 12)),), "arrays of 0 states"),
-        ((["a"] * 12,), "real numbers"),
+        ((["a"] * 12,), "joint_q: .*real number"),
         ((np.zeros(12),), "quaternion"),
         ((np.ones(12), np.full(10, np.nan)), "joint_qd` is NaN"),
         ((np.ones((3, 12)), np.eye(3, 10), np.full((3, 10), np.inf)), "joint_qdd"),

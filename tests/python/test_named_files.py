@@ -106,11 +106,24 @@ def test_a_scene_beyond_the_limit_is_refused_and_a_long_line_is_not_repeated(tmp
     assert done.returncode == 1 and b"larger than the limit of 32 MiB" in done.stdout
 
 
-@pytest.mark.parametrize("command", ["serve", "bench"])
-def test_a_robot_in_place_of_a_scene_is_an_error_with_the_cure(pendulum_urdf, command):
-    code, said = run(command, pendulum_urdf)
-    assert code == 1 and f"{pendulum_urdf}: this is XML and not a scene" in said, said
-    assert "TOML parse error" not in said and "name a URDF file in a scene file" in said
+def test_xml_that_is_no_robot_is_an_error_with_the_cure(tmp_path):
+    path = tmp_path / "page.xml"
+    path.write_text("<html></html>")
+    for command in ("serve", "bench"):
+        code, said = run(command, path)
+        assert code == 1 and f"{path}: this is XML and not a scene" in said, said
+        assert "TOML parse error" not in said and "name a URDF file in a scene file" in said
+
+
+def test_a_robot_is_served_as_it_is(pendulum_urdf, unique):
+    name = unique()
+    line = [sys.executable, "-m", "tightloop", "serve", str(pendulum_urdf), "--worlds", "2", "--name", name]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        assert process.stdout is not None
+        assert f'"name":"{name}"' in process.stdout.readline()
+        with tl.attach(name) as sim:
+            assert sim.step().joint_q.shape == (2, 2)
+        process.terminate()
 
 
 def test_a_snapshot_is_not_read_to_find_out_that_it_is_none(tmp_path):

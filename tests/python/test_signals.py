@@ -54,7 +54,7 @@ def test_a_call_from_a_handler_inside_a_call_is_refused_and_both_go_on(pendulum_
         urdf=str(pendulum_urdf), inner=inner, outer=outer, after="told.append(type(sim.step()).__name__)"
     )
     words = {"sim.step()": "Frame", "sim.snapshot()": "Snapshot", "sim.restore(kept)": "Frame", "sim.reset()": "Frame"}
-    assert said(code) == f"{REFUSED} {words.get(outer, 'ndarray')} Frame"
+    assert said(code) == f"{REFUSED} {words.get(outer, 'PropertyArray')} Frame"
 
 
 def test_a_handler_may_ask_who_is_in_control_and_look_on(pendulum_urdf):
