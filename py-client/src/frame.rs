@@ -10,7 +10,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
 use sim_protocol::{Dtype, View};
 
-use crate::errors::protocol;
+use crate::errors::{protocol, raise};
 
 /// Arrays made so far, each with its field's name: an empty field lies where the next one does.
 type Made = Vec<(String, Py<PyAny>)>;
@@ -60,6 +60,21 @@ impl PyFrame {
         self.arrays()
             .push((name.to_owned(), array.clone().unbind()));
         Ok(array)
+    }
+
+    fn __setattr__(&self, py: Python<'_>, name: &str, _value: &Bound<'_, PyAny>) -> PyResult<()> {
+        let problem = format!(
+            "`{name}` of a frame is read-only, since it is the daemon's memory: `sim.write(joint_q=…)` and `sim.params` change worlds"
+        );
+        Err(raise(py, "CommandRefused", problem))
+    }
+
+    fn __getitem__(&self, py: Python<'_>, key: &Bound<'_, PyAny>) -> PyResult<()> {
+        let problem = format!(
+            "a frame has no entries, such as {}: its fields are attributes, with the worlds first: write `frame.joint_q[world]`",
+            key.repr()?
+        );
+        Err(raise(py, "CommandRefused", problem))
     }
 
     /// The frame's arrays in memory of their own, as attributes of the same names. Takes no slot.

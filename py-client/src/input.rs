@@ -197,8 +197,15 @@ impl<'a, 'py> Inputs<'a, 'py> {
     ) -> PyResult<()> {
         let base = robot.map_or(0, |_| self.base(axis, &columns));
         let robots = self.description.robots.iter();
-        let sizes: Vec<(&str, usize)> = robots
-            .map(|robot| (robot.name.as_str(), axis.of(robot).len()))
+        let sizes: Vec<(&str, usize, usize)> = robots
+            .map(|robot| {
+                let columns = axis.of(robot);
+                (
+                    robot.name.as_str(),
+                    columns.len(),
+                    self.base(axis, &columns),
+                )
+            })
             .collect();
         let arguments = (field, robot, value, self.description.worlds, columns.len());
         let more = PyDict::new(value.py());

@@ -156,6 +156,12 @@ def test_commands_may_leave_the_base_out(scene, dog):
             tl.CommandRefused, match=r"of robot `dog`: .*4 without the 6 of its floating base; got \(5,\)"
         ):
             sim.step(joint_target_q={"dog": np.zeros(5)})
+        with pytest.raises(tl.CommandRefused, match=r"got \(4,\)\. Robot `dog` has as many: give \{\"dog\": …\}"):
+            sim.step(joint_target_q=targets[0])
+        with pytest.raises(
+            tl.CommandRefused, match=r"of robot `dog` is \{'left_hip': 0.1\}; give an array in the order"
+        ):
+            sim.step(joint_target_q={"dog": {"left_hip": 0.1}})
 
 
 def test_the_robot_with_as_many_dofs_is_named(scene):
@@ -180,6 +186,10 @@ def test_entries_of_parameters_and_frames(scene):
             frame.joint_q[0, 0] = 1.0
         with pytest.raises(tl.CommandRefused, match="read-only"):
             frame.joint_q += 1.0
+        with pytest.raises(tl.CommandRefused, match=r"`joint_q` of a frame is read-only.*sim\.write"):
+            frame.joint_q = 1.0
+        with pytest.raises(tl.CommandRefused, match=r"no entries, such as 'joint_q'.*frame\.joint_q\[world\]"):
+            frame["joint_q"]
         own = frame.joint_q.copy()
         own[0, 0] = 1.0
         own += 1.0
@@ -208,6 +218,13 @@ def test_an_attribute_that_does_not_exist_suggests_another(scene, get, name, mea
             with pytest.raises(AttributeError, match=f"{name}.*`{meant}`") as found:
                 use()
             assert isinstance(found.value, tl.TightloopError)
+
+
+def test_an_argument_that_does_not_exist_suggests_another(scene, file):
+    with pytest.raises(TypeError, match="unexpected argument 'fixed_base'; did you mean `floating`"):
+        scene.add_urdf(file, fixed_base=False)
+    with pytest.raises(TypeError, match="unexpected argument 'rpy'; did you mean `quat`"):
+        scene.add_urdf(file, rpy=(0, 0, 1))
 
 
 def test_what_can_only_be_read_says_so(scene, dog):

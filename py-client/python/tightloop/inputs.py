@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ def as_array(
     columns: int,
     *,
     base: int = 0,
-    robots: Sequence[tuple[str, int]] = (),
+    robots: Sequence[tuple[str, int, int]] = (),
 ) -> NDArray[np.float64]:
     """Convert any array of real numbers to contiguous float64, shape ``(worlds, columns)``.
 
@@ -31,7 +31,7 @@ def as_array(
         worlds: Number of worlds.
         columns: Number of columns.
         base: Number of columns of a floating base, which come first and may be left out.
-        robots: Robots of the scene and their numbers of columns, for messages.
+        robots: Robots of the scene with their numbers of columns, and those of a floating base, for messages.
 
     Raises:
         CommandRefused: The shape is neither ``(worlds, columns)`` nor ``(columns,)``, or the values are not real.
@@ -43,8 +43,8 @@ def as_array(
         expected = f"expected shape {(worlds, columns)}, or {(columns,)} for every world alike"
         if base:
             expected += f"; {columns - base} without the {base} of its floating base"
-        fitting = [name for name, own in robots if robot is None and given.shape in ((worlds, own), (own,))]
-        cure = f'. Robot `{fitting[0]}` has as many: give {{"{fitting[0]}": …}}' if fitting else ""
+        fitting = [name for name, own, base in robots if given.ndim and given.shape[-1] in (own, own - base)]
+        cure = f'. Robot `{fitting[0]}` has as many: give {{"{fitting[0]}": …}}' if fitting and robot is None else ""
         raise CommandRefused(f"{what}: {expected}; got {given.shape}{cure}")
     with np.errstate(over="ignore"):  # float128 may become inf, which the client refuses
         return np.array(np.broadcast_to(given, (worlds, size)), dtype=np.float64, order="C")
@@ -56,6 +56,8 @@ def real_numbers(what: str, value: Any) -> NDArray[Any]:
     Raises:
         CommandRefused: The value is no array, or its values are not real.
     """
+    if isinstance(value, Mapping):
+        raise CommandRefused(f"{what} is {value!r:.80}; give an array in the order of the names, such as sim.dof_names")
     given = _numpy(what, value)
     if given.dtype.kind not in "fiu":
         raise CommandRefused(f"{what}: {_shown(value, given)} is not a real number; give float32 or float64")

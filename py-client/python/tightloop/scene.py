@@ -123,7 +123,7 @@ class Scene(SceneRandomization):
             SceneError: An argument is not valid; the message names it.
         """
         urdf = checks.path("add_urdf: path", path)
-        touch = checked_surface("add_urdf", surface)
+        touch = checked_surface("add_urdf", surface, tuple(inspect.signature(self.add_urdf).parameters))
         if isinstance(package_dirs, str) or not isinstance(package_dirs, Sequence):
             raise SceneError(f"add_urdf: package_dirs is {package_dirs!r}; give a list of folders")
         packages = [checks.path("add_urdf: a folder of package_dirs", folder) for folder in package_dirs]

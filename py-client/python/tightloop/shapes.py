@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, SupportsFloat, TypedDict, cast
 
 from tightloop import checks
+from tightloop.attributes import suggestion
 from tightloop.checks import Quaternion, Triple, Vector
 from tightloop.errors import SceneError
 
@@ -120,8 +122,13 @@ def checked_scale(what: str, scale: Vector | SupportsFloat) -> Triple:
     return factors
 
 
-def checked_surface(what: str, given: Surface) -> dict[str, Any]:
+def checked_surface(what: str, given: Surface, others: Sequence[str] = ()) -> dict[str, Any]:
     """Check the given contact parameters.
+
+    Args:
+        what: What they are of, for messages.
+        given: The parameters by name.
+        others: Further arguments of the call, for messages.
 
     Raises:
         SceneError: A value is out of range.
@@ -130,7 +137,8 @@ def checked_surface(what: str, given: Surface) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for name, value in cast("dict[str, Any]", given).items():
         if name not in Surface.__annotations__:
-            raise TypeError(f"{what}: unexpected argument {name!r}; of a surface there are: {', '.join(_SURFACE)}")
+            near = suggestion(name, [*_SURFACE, *others])
+            raise TypeError(f"{what}: unexpected argument {name!r}; {near}")
         if value is None:
             continue
         entry = f"{what}: {name}"
