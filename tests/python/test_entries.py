@@ -126,6 +126,10 @@ def test_names_and_patterns(dog):
     assert dog.joint_target_mode[6:] == ("both", "both", "position", "position")
     dog.joint_effort_limit = {".*": np.inf, "left_hip": 3.0}
     assert dog.joint_effort_limit[6] == 3.0
+    dog.joint_target_ke = {".*": 50.0}  # patterns pass over the floating base
+    assert dog.joint_target_ke.tolist() == [0] * 6 + [50] * 4
+    np.add(dog.joint_target_ke, 1.0, out=dog.joint_target_ke, where=np.arange(10) > 8)
+    assert dog.joint_target_ke.tolist() == [0] * 6 + [50, 50, 50, 51]
     with pytest.raises(
         tl.SceneError, match=r"has the key 'left_hpi', which no coordinate matches; did you mean `left_hip`"
     ):

@@ -119,9 +119,9 @@ class PerDof:
         return values | {names.index(name): value for name, value in given.items() if name in names}
 
     def _matches(self, robot: Owner, pattern: str) -> list[int]:
-        names = self.names(robot)
+        names, base = self.names(robot), self.base(robot)
         try:
-            found = [place for place, name in enumerate(names) if re.fullmatch(pattern, name)]
+            found = [place for place, name in enumerate(names) if place >= base and re.fullmatch(pattern, name)]
         except re.error as problem:
             raise self.error(
                 robot, f"has the key {pattern!r}, which is no pattern ({problem}); give names or regular expressions"

@@ -96,7 +96,7 @@ def scene_file(argument: str) -> str:
         folder.mkdir(parents=True, exist_ok=True)
         file = folder / f"{Path(argument).stem}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.toml"
         with whole_file(file) as part:
-            part.write_text(text)
+            part.write_text(text, encoding="utf-8")
     return str(file)
 
 

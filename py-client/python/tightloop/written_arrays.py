@@ -65,9 +65,12 @@ class PropertyArray(np.ndarray[Any, np.dtype[Any]]):
         owned = [out for out in outs if isinstance(out, PropertyArray)]
         if not owned:
             return getattr(ufunc, method)(*plain, **options, **({"out": outs} if outs else {}))
-        result = getattr(ufunc, method)(*plain, **options)
-        owned[0][...] = result
-        return owned[0]
+        kept = tuple(np.array(out) if isinstance(out, PropertyArray) else out for out in outs)
+        getattr(ufunc, method)(*plain, **options, out=kept)
+        for out, values in zip(outs, kept, strict=True):
+            if isinstance(out, PropertyArray):
+                out[...] = values
+        return outs[0] if len(outs) == 1 else outs
 
     def __reduce__(self) -> Any:
         return np.array(self).__reduce__()
