@@ -164,12 +164,15 @@ impl<'a, 'py> Inputs<'a, 'py> {
 
     /// How many of a robot's columns are of a floating base, which may be left out.
     fn base(&self, axis: Axis, columns: &Range<usize>) -> usize {
-        let (names, first, size) = match axis {
-            Axis::Dofs => (&self.description.dof_names, ".vx", 6),
-            Axis::Coords => (&self.description.coord_names, ".x", 7),
+        // a planar base has an x, too
+        let (names, first, last, size) = match axis {
+            Axis::Dofs => (&self.description.dof_names, ".vx", ".wz", 6),
+            Axis::Coords => (&self.description.coord_names, ".x", ".qw", 7),
             Axis::Actuators => return 0,
         };
-        let is_free = columns.len() > size && names[columns.start].ends_with(first);
+        let is_free = columns.len() > size
+            && names[columns.start].ends_with(first)
+            && names[columns.start + size - 1].ends_with(last);
         if is_free { size } else { 0 }
     }
 
