@@ -229,16 +229,45 @@ def node_folders(shared: set[str]) -> set[Path]:
     return {Path(file).parent for file in left_of(shared) if file.endswith(".service_tag")}
 
 
-def test_details_of_a_node_that_never_was_are_removed(pendulum):
-    """As if a client were killed between its node's details and the monitor."""
+def monitor_files(folder: Path, node: int, *suffixes: str) -> list[Path]:
+    """Make files of a monitor, which iceoryx2 keeps beside a node's folder, as if nobody held them."""
+    [ours] = folder.parent.glob(f"*_{folder.name}.node_monitor")
+    files = [ours.with_name(ours.name.replace(folder.name, str(node)) + suffix) for suffix in suffixes]
+    for file in files:
+        file.write_bytes(bytes(16))
+    return files
+
+
+@pytest.mark.parametrize("suffixes", [(), ("_context",), ("_owner_lock", "_context")])
+def test_a_node_without_a_whole_monitor_is_removed(pendulum, suffixes):
+    """As if a client were killed between its node's details and the files of the monitor, or between removing them."""
     with tl.launch(pendulum, worlds=1) as sim:
         sim.step()
         [folder, *_] = node_folders(stems_of(sim.pid))
         with subprocess.Popen([sys.executable, "-c", ""]) as dead:
             pass
-        unborn = folder.with_name(str((dead.pid << 64) + 7))
-        unborn.mkdir(mode=0o700)
-        (unborn / next(folder.glob("*node.details")).name).write_text("")
-        assert wait_until(lambda: not unborn.exists(), PATIENCE)
+        node = (dead.pid << 64) + 7
+        half = folder.with_name(str(node))
+        half.mkdir(mode=0o700)
+        (half / next(folder.glob("*node.details")).name).write_text("")
+        files = monitor_files(folder, node, *suffixes)
+        assert wait_until(lambda: not any(path.exists() for path in [half, *files]), PATIENCE)
         assert folder.exists()
+        sim.step()
+
+
+def test_a_node_that_closes_while_the_daemon_looks_is_removed(pendulum):
+    """A closing node has a monitor without lock and no details, as a dead one: the daemon gives it details again."""
+    with tl.launch(pendulum, worlds=1) as sim:
+        sim.step()
+        [folder, *_] = node_folders(stems_of(sim.pid))
+        node = (os.getpid() << 64) + 7
+        closing = folder.with_name(str(node))
+        files = monitor_files(folder, node, "_owner_lock", "_context", "")
+        assert wait_until(closing.exists, PATIENCE)
+        os.kill(sim.pid, signal.SIGSTOP)
+        for file in files:
+            file.unlink(missing_ok=True)
+        os.kill(sim.pid, signal.SIGCONT)
+        assert wait_until(lambda: not closing.exists(), PATIENCE)
         sim.step()

@@ -6,6 +6,7 @@ mod inbox;
 mod journal;
 mod lease;
 mod observers;
+mod orphans;
 mod state;
 #[cfg(test)]
 mod tests;
