@@ -11,6 +11,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, TrySendError, channel};
 use std::time::{Duration, Instant};
 
+use nix::sys::signal::{SigSet, Signal};
+
 use crate::error::DaemonError;
 
 /// Messages that wait at most [–]: the notes of a large scene come at once.
@@ -62,7 +64,10 @@ impl Printer {
         let theirs = Arc::clone(&dropped);
         std::thread::Builder::new()
             .name("tightloop-printer".to_owned())
-            .spawn(move || print(target, &items, &theirs))
+            .spawn(move || {
+                keep_writing_in_the_background();
+                print(target, &items, &theirs);
+            })
             .map_err(|error| DaemonError::System {
                 action: "start a thread",
                 problem: error.to_string(),
@@ -90,6 +95,13 @@ impl Printer {
         // what is not written by then is lost
         let _ = written.recv_timeout(deadline.saturating_duration_since(Instant::now()));
     }
+}
+
+/// Lets this thread write to a terminal whose foreground is another job. Under `stty tostop` the terminal stops whole
+/// processes that write from the background, unless the writer blocks the signal.
+fn keep_writing_in_the_background() {
+    // a thread that keeps its mask is no worse than before
+    let _ = SigSet::from(Signal::SIGTTOU).thread_block();
 }
 
 /// Waits until everything handed over is written, or until that takes too long.

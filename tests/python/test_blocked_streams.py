@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import select
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -128,3 +130,38 @@ def test_a_launched_daemon_whose_streams_are_full_serves_and_ends(pendulum, full
     finally:
         os.dup2(kept, 2)
         os.close(kept)
+
+
+SHELL = """
+import fcntl, subprocess, sys, termios
+# a shell with job control: this terminal is ours, and stops jobs of the background that write to it
+fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+attributes = termios.tcgetattr(0)
+attributes[3] |= termios.TOSTOP
+termios.tcsetattr(0, termios.TCSANOW, attributes)
+daemon = subprocess.Popen([sys.executable, "-m", "tightloop", "serve", *sys.argv[1:]], process_group=0)
+print("daemon", daemon.pid, flush=True)
+sys.exit(daemon.wait())
+"""
+
+
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="process groups of subprocesses came with Python 3.11")
+def test_a_daemon_in_the_background_of_a_terminal_that_stops_writers(scene_file, unique):
+    name = unique()
+    terminal, theirs = os.openpty()
+    command = [sys.executable, "-c", SHELL, str(scene_file), "--name", name, "--worlds", "3"]
+    shell = subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True)
+    os.close(theirs)
+    said = ""
+    try:
+        while '"ready"' not in said or "3 worlds on cpu" not in said:
+            assert select.select([terminal], [], [], PATIENCE)[0], f"the daemon is stopped: {said}"
+            said += os.read(terminal, 4096).decode()
+        with tl.attach(name) as sim:
+            assert sim.step().status.tolist() == [0, 0, 0]
+    finally:
+        for pid in re.findall(r"daemon (\d+)", said):
+            os.kill(int(pid), signal.SIGCONT)
+            os.kill(int(pid), signal.SIGTERM)
+        assert ended(shell) == 0
+        os.close(terminal)
