@@ -13,6 +13,9 @@ use sim_protocol::{
 use crate::refusal::{Refusal, refusal};
 use crate::snapshot;
 
+// a frame can carry all fields, and an observer's the state besides
+const _: () = assert!(Field::ALL.len() < protocol::ROWS_MAX);
+
 /// What remains to be done for a frame once the inputs are set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Advance {

@@ -133,6 +133,17 @@ def test_a_field_that_was_not_asked_for_is_named_with_those_that_were(pendulum):
             _ = frame.joint_qd
 
 
+def test_a_frame_carries_every_field_there_is(pendulum):
+    with tl.launch(pendulum, worlds=1) as sim:
+        known = [field["name"] for field in sim.info["known_fields"]]
+    assert len(known) > 64
+    # a name that comes twice counts once
+    with tl.launch(pendulum, worlds=2, fields=known + known) as sim, tl.attach(sim.name) as observer:
+        assert set(sim.step().fields) == set(known)
+        frame = observer.latest(10.0)
+        assert frame is not None and set(frame.fields) == {*known, "state"}
+
+
 def test_stubs_and_field_table_name_the_same_fields(pendulum):
     stubs = ast.parse((Path(tl.__file__).parent / "_core.pyi").read_text())
     frame = next(node for node in stubs.body if isinstance(node, ast.ClassDef) and node.name == "Frame")

@@ -3,7 +3,7 @@
 use crate::{ALIGNMENT, Dtype, Row};
 
 /// Rows that a table may have.
-pub const ROWS_MAX: usize = 64;
+pub const ROWS_MAX: usize = 128;
 
 /// A checked field table.
 #[derive(Debug, Clone, PartialEq, Eq)]
