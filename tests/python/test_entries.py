@@ -65,6 +65,20 @@ def test_entries_of_a_property_are_assigned(dog):
     assert dog.table()["joint_target_ke"] == [0] * 6 + [200] * 4
 
 
+def test_arrays_that_are_held_at_once_keep_each_others_entries(dog):
+    held, other = dog.joint_q, dog.joint_q
+    held[7] = 0.1
+    other[8] = 0.2
+    part = held[9:]
+    dog.joint_q[10] = 0.3
+    part[0] = 0.4
+    dog.joint_q[7] = 0.5
+    other += 1.0
+    np.testing.assert_allclose(dog.joint_q[7:], [1.5, 1.2, 1.4, 1.3])
+    other[7:] = other[:6:-1]
+    np.testing.assert_allclose(dog.joint_q[7:], [1.3, 1.4, 1.2, 1.5])
+
+
 def test_what_a_property_is_computed_to_is_a_plain_array(dog):
     doubled = 2 * dog.joint_target_ke
     assert type(doubled) is np.ndarray and doubled.flags.writeable
@@ -183,6 +197,9 @@ def test_entries_of_parameters_and_frames(scene):
         sim.params.joint_damping[0] += 2.0
         assert sim.params.gravity[:, 2].tolist() == [0, -5, 0]
         assert sim.params.joint_damping[0].tolist()[6:] == [2] * 4
+        held, other = sim.params.gravity, sim.params.gravity
+        held[0, 0], other[0, 1] = 1.0, 2.0
+        assert sim.params.gravity[0].tolist() == [1, 2, 0]
         with pytest.raises(tl.CommandRefused, match=r"params.gravity cannot be assigned at \[5, 0\]"):
             sim.params.gravity[5, 0] = 1.0
         frame = sim.forward()

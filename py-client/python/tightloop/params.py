@@ -88,13 +88,15 @@ class Params:
         param = self._varying(name)
         # parameters are the last values of a world's record
         first = self._numbers - param["place"]
-        rows = self._state()[:, -first:][:, : param["info"]["columns"]]
-        array = np.array(rows).reshape(self._shape(name))
+        columns = param["info"]["columns"]
+
+        def read() -> NDArray[Any]:
+            return np.array(self._state()[:, -first:][:, :columns]).reshape(self._shape(name))
 
         def write(values: NDArray[Any]) -> None:
             self.write(**{name: values})
 
-        return PropertyArray.of(array, write, lambda problem: CommandRefused(f"params.{name} {problem}"))
+        return PropertyArray.of(read, write, lambda problem: CommandRefused(f"params.{name} {problem}"))
 
     def __setattr__(self, name: str, value: ArrayLike) -> None:
         self.write(**{name: value})

@@ -150,7 +150,7 @@ class Numbers(PerDof):
         def write(values: NDArray[Any]) -> None:
             self.__set__(robot, values)
 
-        return PropertyArray.of(self.values(robot), write, lambda problem: self.error(robot, problem))
+        return PropertyArray.of(lambda: self.values(robot), write, lambda problem: self.error(robot, problem))
 
     def values(self, robot: Owner) -> NDArray[np.float64]:
         """Return the values in force, in memory of their own."""

@@ -14,28 +14,34 @@ from tightloop.errors import CommandRefused
 class PropertyArray(np.ndarray[Any, np.dtype[Any]]):
     """The values of a property. Assigning to entries sets the property, also in place: ``arm.joint_q[:9] += 0.1``.
 
+    An assignment first reads the property again, so entries that were set elsewhere meanwhile keep their values.
     Results of calculations are plain arrays. Other ways to write into the memory, such as ``np.copyto``, raise an
     error, because they would change a copy.
     """
 
     _memory: NDArray[Any]
+    _read: Callable[[], NDArray[Any]]
     _write: Callable[[NDArray[Any]], None] | None = None
     _error: Callable[[str], Exception]
 
     @classmethod
     def of(
-        cls, values: NDArray[Any], write: Callable[[NDArray[Any]], None], error: Callable[[str], Exception]
+        cls,
+        read: Callable[[], NDArray[Any]],
+        write: Callable[[NDArray[Any]], None],
+        error: Callable[[str], Exception],
     ) -> PropertyArray:
         """Make the array of a property.
 
         Args:
-            values: Its values; the array takes them over.
+            read: Returns the property's values, in memory of their own, always of one shape.
             write: Sets the property to other values of that shape.
             error: Makes the exception of an assignment that does not fit, from the end of its message.
         """
+        values = read()
         made = values.view(cls)
         made.flags.writeable = False
-        made._memory, made._write, made._error = values, write, error
+        made._memory, made._read, made._write, made._error = values, read, write, error
         return made
 
     def __getitem__(self, key: Any) -> Any:
@@ -44,6 +50,7 @@ class PropertyArray(np.ndarray[Any, np.dtype[Any]]):
             if not np.may_share_memory(part, self):  # indices and masks copy
                 return np.array(part)
             part._memory, part._error = self._memory[key], self._error
+            part._read = lambda: self._read()[key]
             part._write = lambda values: self.__setitem__(key, values)
         return part
 
@@ -51,6 +58,8 @@ class PropertyArray(np.ndarray[Any, np.dtype[Any]]):
         if self._write is None:
             super().__setitem__(key, value)
             return
+        value = np.array(value) if isinstance(value, PropertyArray) else value  # before its memory changes
+        self._refresh()
         changed = self._memory.copy()
         try:
             changed[key] = value
@@ -59,12 +68,19 @@ class PropertyArray(np.ndarray[Any, np.dtype[Any]]):
         self._write(changed)
         self._memory[...] = changed
 
+    def _refresh(self) -> None:
+        """Read the property again."""
+        if self._write is not None:
+            self._memory[...] = self._read()
+
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         outs = options.pop("out", ())
         plain = [value.view(np.ndarray) if isinstance(value, PropertyArray) else value for value in inputs]
         owned = [out for out in outs if isinstance(out, PropertyArray)]
         if not owned:
             return getattr(ufunc, method)(*plain, **options, **({"out": outs} if outs else {}))
+        for out in owned:
+            out._refresh()
         kept = tuple(np.array(out) if isinstance(out, PropertyArray) else out for out in outs)
         getattr(ufunc, method)(*plain, **options, out=kept)
         for out, values in zip(outs, kept, strict=True):
