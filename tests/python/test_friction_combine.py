@@ -69,3 +69,21 @@ def test_geoms_of_a_mujoco_model_keep_mujocos_rule(varies):
                 frame = sim.step()
             ends.append(frame.joint_q[0, :7].copy())
     assert np.array_equal(*ends)
+
+
+@pytest.mark.parametrize("varies", [False, True])
+def test_a_cube_on_a_geom_of_a_mujoco_model_follows_mujocos_rule(varies):
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string("""<mujoco><option gravity="6 0 -8"/><worldbody>
+      <geom name="floor" type="plane" size="1 1 .1" friction=".25"/></worldbody></mujoco>""")
+    ends = {}
+    for rule, mu in (("max", CUBE), ("min", CUBE), ("max", GROUND)):
+        scene = tl.Scene.from_mujoco(model, name="m", substeps=8)
+        scene.friction_combine = rule
+        scene.add_cube(pos=(0, 0, 0.025), mu=mu, name="own")
+        with tl.launch(scene, worlds=1, params=("shape_mu",) if varies else ()) as sim:
+            for _ in range(30):
+                frame = sim.step()
+            ends[rule, mu] = frame.joint_q[0].copy()
+    assert np.array_equal(ends["max", CUBE], ends["min", CUBE])
+    assert ends["max", GROUND][0] > 1.5 * ends["max", CUBE][0], "the cube's own friction counts where it is larger"
