@@ -57,6 +57,12 @@ def test_nan_is_refused_by_function_and_world(task, named, mode):
         envs.step(actions)
         with pytest.raises(tl.ArgumentError, match=named):
             envs.step(actions)
+        with pytest.raises(tl.CommandRefused, match="the last step or reset failed; call reset first"):
+            envs.step(actions)
+        with pytest.raises(tl.ArgumentError, match="the first reset is of all environments"):
+            envs.reset(options={"reset_mask": np.arange(WORLDS) == 2})
+        envs.reset(seed=1)
+        envs.step(actions)
     finally:
         envs.close()
 
@@ -76,11 +82,58 @@ def test_nan_ends_its_episode_by_choice(task, mode):
         where = infos["final_info"] if mode == "SAME_STEP" else infos
         assert where["fault"].tolist() == [0, 0, 16, 0] and where["_fault"].tolist() == [False, False, True, False]
         assert np.isfinite(obs).all() and np.isfinite(reward).all()
+        last = infos["final_obs"] if mode == "SAME_STEP" else obs
+        assert reward[2] == 0 and not last[2].any(), "the whole observation, and a reward that is finite"
+        assert reward[1] != 0 and last[1].any() == (mode != "SAME_STEP")
         if mode == "SAME_STEP":
             assert np.isfinite(infos["final_obs"]).all() and envs.elapsed[2] == 0
         if mode == "NEXT_STEP":
             _, _, terminated, _, infos = envs.step(actions)
             assert not terminated[2] and envs.elapsed[2] == 0
+    finally:
+        envs.close()
+
+
+class SpoiledStart(CartPoleBalance):
+    """NaN in a part of the first observation of each episode of world 1."""
+
+    def observe(self, xp, worlds):
+        first, *others = super().observe(xp, worlds)
+        spoiled = np.array(first)
+        spoiled[1] = np.where(worlds.elapsed[1] == 0, np.nan, spoiled[1])
+        return (spoiled, *others)
+
+
+def test_nan_in_a_first_observation_is_refused():
+    envs = VectorEnv(SpoiledStart, WORLDS)
+    try:
+        with pytest.raises(tl.ArgumentError, match=r"SpoiledStart\.observe: `.+` is NaN in world 1; "):
+            envs.reset(seed=1)
+        with pytest.raises(tl.CommandRefused, match="the last step or reset failed; call reset first"):
+            envs.step(np.zeros((WORLDS, 1)))
+    finally:
+        envs.close()
+
+
+@pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP", "DISABLED"])
+def test_nan_in_a_first_observation_ends_its_episode_at_its_first_step(mode):
+    envs = VectorEnv(SpoiledStart, WORLDS, autoreset_mode=mode, on_nan="fault")
+    alone = np.arange(WORLDS) == 1
+    actions = np.zeros((WORLDS, 1))
+    try:
+        obs, _ = envs.reset(seed=1)
+        assert not obs[1].any() and obs[0].any()
+        for _ in range(2):
+            obs, reward, terminated, _, infos = envs.step(actions)
+            where = infos["final_info"] if mode == "SAME_STEP" else infos
+            assert terminated.tolist() == alone.tolist() and where["fault"].tolist() == (16 * alone).tolist()
+            assert reward[1] == 0 and not obs[1].any() and reward[0] != 0
+            if mode == "NEXT_STEP":
+                obs, _, terminated, _, infos = envs.step(actions)
+                assert not terminated.any() and not obs[1].any()
+            if mode == "DISABLED":
+                obs, _ = envs.reset(options={"reset_mask": alone})
+                assert not obs[1].any() and obs[0].any()
     finally:
         envs.close()
 

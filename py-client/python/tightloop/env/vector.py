@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy as copying
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import gymnasium
@@ -25,7 +26,7 @@ from tightloop.env.results import TASK_FAULT, OnNan, check_on_nan, check_options
 from tightloop.env.simulation import open_simulation
 from tightloop.env.step_buffers import BufferRing, StepBuffers
 from tightloop.env.task import Task, episode_steps
-from tightloop.errors import ArgumentError, CommandRefused
+from tightloop.errors import ArgumentError, CommandRefused, DaemonLost
 from tightloop.frames import FAULTED
 from tightloop.sim import Sim
 
@@ -89,8 +90,9 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             max_episode_steps: Steps after which an episode is truncated, ``math.inf`` for never; the task's if left
                 out.
             on_nan: What happens where `Task.reward` or `Task.observe` is NaN, or the reward infinite, in a world that
-                is not faulted: ``"raise"`` raises an error that names the function and the world; ``"fault"``
-                terminates the world, with reward 0, observation 0 and bit 16 of ``infos["fault"]``.
+                is not faulted: ``"raise"`` raises an error that names the function and the world, after which the
+                environment needs a `reset`; ``"fault"`` terminates the world, with reward 0, observation 0 and bit 16
+                of ``infos["fault"]``. NaN in the first observation of an episode terminates it at its first step.
             daemon: Name of a running daemon to join, which ``python -m tightloop.env serve`` started for the task. It
                 continues when this process ends. Or a simulation of your own, such as one of `Groups`, which `close`
                 then closes. None launches a daemon that ends with this process.
@@ -149,8 +151,10 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         self._ring = None if copy else BufferRing(self.num_envs, self.evaluation.observed, slots)
         self._done = np.zeros(self.num_envs, np.bool_)
         self._all = np.ones(self.num_envs, np.bool_)
+        # worlds whose results were NaN in this step, and those whose episode began with such an observation
+        self._spoiled, self._spoiled_start = np.zeros((2, self.num_envs), np.bool_)
         self._frame: Any = None
-        self._ready = self._in_flight = False
+        self._ready = self._failed = self._in_flight = False
 
     @property
     def elapsed(self) -> NDArray[np.int32]:
@@ -197,11 +201,12 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         check_seeds(seed, self.num_envs)
         super().reset(seed=seed if isinstance(seed, int) else None)
         seeds = self._episodes.seed(seed, mask, self.np_random)
-        self._begin(mask, self.sim.reset(mask=mask, seed=seeds))
-        self._done[mask] = False
-        self._ready = True
-        buffers = self._next_buffers()
-        self._observe(buffers.obs)
+        with self._all_or_none():
+            self._begin(mask, self.sim.reset(mask=mask, seed=seeds))
+            self._done[mask] = self._spoiled[mask] = self._spoiled_start[mask] = False
+            buffers = self._next_buffers()
+            self._observe(buffers.obs, begun=mask)
+        self._ready, self._failed = True, False
         return buffers.obs, {}
 
     def step(self, actions: ArrayLike) -> Step:
@@ -217,11 +222,13 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
 
         Raises:
             ArgumentError: The shape is wrong, or the values are not real numbers.
-            CommandRefused: There was no reset, or a step is in flight, or, without autoreset, an episode has ended.
+            CommandRefused: There was no reset, also after a step that failed, or a step is in flight, or, without
+                autoreset, an episode has ended.
         """
         self._check_idle("send")
         if not self._ready:
-            raise CommandRefused("send: no episode has begun; call reset first")
+            why = "the last step or reset failed" if self._failed else "no episode has begun"
+            raise CommandRefused(f"send: {why}; call reset first")
         if self.autoreset_mode is AutoresetMode.DISABLED and self._done.any():
             world = int(np.argmax(self._done))
             problem = f"send: the episode of environment {world} has ended"
@@ -248,10 +255,19 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             frame = self.sim.recv()
         except KeyboardInterrupt:
             raise  # `recv` may be called again
-        except BaseException:
+        except DaemonLost:  # no reset helps, and the next call says so again
             self._in_flight = False
             raise
+        except BaseException:
+            self._in_flight = self._ready = False
+            self._failed = True
+            raise
         self._in_flight = False
+        with self._all_or_none():
+            return self._results(frame)
+
+    def _results(self, frame: Any) -> Step:
+        """Return what a step returns, and start the next episodes."""
         if self._rendering is not None:
             self._rendering.pace(self.control_dt)
         buffers, infos = self._next_buffers(), {}
@@ -269,8 +285,8 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         if due is not None and (due := due & ~self._done).any():
             self._episodes.renew(due, self.evaluation.worlds)
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._done.any():
-            self._end(buffers, infos)
-        self._observe(buffers.obs)
+            begun = self._end(buffers, infos)
+        self._observe(buffers.obs, begun=begun)
         return buffers.obs, buffers.reward, buffers.terminated, buffers.truncated, infos
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -292,8 +308,8 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         if "sim" in vars(self):
             self.sim.close()
 
-    def _end(self, buffers: StepBuffers, infos: dict[str, Any]) -> None:
-        """Keep the last observations of episodes that ended, and start the next episodes."""
+    def _end(self, buffers: StepBuffers, infos: dict[str, Any]) -> NDArray[np.bool_]:
+        """Keep the last observations of episodes that ended, and start the next episodes, in the worlds returned."""
         ended = self._done.copy()
         self._observe(buffers.final_obs)
         buffers.final_obs[~ended] = 0.0
@@ -306,6 +322,16 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         infos["_final_info"] = ended.copy()
         self._episodes.next(ended)
         self._begin(ended, self.sim.reset(mask=ended))
+        return ended
+
+    @contextlib.contextmanager
+    def _all_or_none(self) -> Iterator[None]:
+        """Ask for a reset after an error: some worlds have changed, and the caller has not seen their results."""
+        try:
+            yield
+        except BaseException:
+            self._ready, self._failed = False, True
+            raise
 
     def _begin(self, mask: NDArray[np.bool_], frame: Any) -> None:
         """Start episodes of worlds that the daemon has reset."""
@@ -326,15 +352,21 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             elapsed=self._episodes.elapsed,
         )
 
-    def _observe(self, out: NDArray[np.float32]) -> None:
-        if not self.evaluation.observe(out):
-            return
-        # observations of a faulted world may be NaN
-        wrong = np.isnan(out)
-        healthy = (self._frame.status & FAULTED) == 0
-        if not self._faults_nan and wrong[healthy].any():
-            raise refuse(self.evaluation.part_name(wrong[healthy]), wrong.any(axis=1) & healthy)
-        out[wrong] = 0.0
+    def _observe(self, out: NDArray[np.float32], begun: NDArray[np.bool_] | None = None) -> None:
+        """Write observations; those of worlds in ``begun`` are the first ones of an episode."""
+        if self.evaluation.observe(out):
+            # observations of a faulted world may be NaN
+            wrong = np.isnan(out)
+            healthy = (self._frame.status & FAULTED) == 0
+            spoiled = wrong.any(axis=1) & healthy
+            if not self._faults_nan and spoiled.any():
+                raise refuse(self.evaluation.part_name(wrong[healthy]), spoiled)
+            out[wrong] = 0.0
+            out[spoiled] = 0.0
+            if begun is not None:
+                self._spoiled_start |= spoiled & begun
+        if self._spoiled.any():
+            out[self._spoiled if begun is None else self._spoiled & ~begun] = 0.0
 
     def _score(self, buffers: StepBuffers, infos: dict[str, Any], begun: NDArray[np.bool_] | None) -> None:
         """Write rewards and ends of the step; worlds that have just begun an episode have neither."""
@@ -349,6 +381,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             failed = fault > 0
             buffers.terminated |= failed
             buffers.reward[failed & ~np.isfinite(buffers.reward)] = 0.0
+            buffers.reward[self._spoiled] = 0.0
             infos["fault"], infos["_fault"] = fault, failed
         if begun is not None:
             buffers.reward[begun] = 0.0
@@ -360,6 +393,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         """Return the bits of ``infos["fault"]`` of each world; the results of a task are checked here."""
         fault = self._frame.status & FAULTED
         wrong = ~np.isfinite(buffers.reward)
+        self._spoiled[:] = False
         if not wrong.any() and not self._faults_nan:
             return fault
         healthy = fault == 0 if begun is None else (fault == 0) & ~begun
@@ -369,6 +403,10 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             raise refuse(self.evaluation.function_name("reward"), wrong, value)
         if self._faults_nan and self.evaluation.observe(buffers.final_obs):
             wrong |= np.isnan(buffers.final_obs).any(axis=1) & healthy
+        if self._faults_nan:
+            wrong |= self._spoiled_start & healthy
+            self._spoiled_start[:] = False
+            self._spoiled[:] = wrong
         return fault | wrong * fault.dtype.type(TASK_FAULT)
 
     def _next_buffers(self) -> StepBuffers:
