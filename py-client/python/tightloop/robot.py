@@ -55,6 +55,15 @@ class Robot(Entity):
         signed=False,
         limit=True,
     )
+    joint_limit_ke = Numbers(
+        "Stiffness of the joint limits [N·m/rad or N/m], shape ``(dofs,)``; 10000 if not set, as in Newton.",
+        signed=False,
+    )
+    joint_limit_kd = Numbers(
+        "Damping of the joint limits [N·m·s/rad or N·s/m], shape ``(dofs,)``; 10 if not set, as in Newton. More of it "
+        "makes joints bounce less.",
+        signed=False,
+    )
     joint_armature = Numbers("Inertia of the drives seen at the joint [kg·m² or kg], shape ``(dofs,)``.", signed=False)
 
     def __init__(

@@ -94,6 +94,12 @@ pub struct RobotTable {
     /// Largest drive efforts [N·m or N], `inf` for no limit; left out, those of the URDF file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint_effort_limit: Option<PerDof<Number>>,
+    /// Stiffness of the joint limits [N·m/rad or N/m], as Newton's `limit_ke`; left out, 10000.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_limit_ke: Option<PerDof<Number>>,
+    /// Damping of the joint limits [N·m·s/rad or N·s/m], as Newton's `limit_kd`; left out, 10.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_limit_kd: Option<PerDof<Number>>,
     /// Inertia of the drives [kg·m² or kg]; left out, 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint_armature: Option<PerDof<Number>>,
@@ -143,12 +149,14 @@ impl RobotTable {
 
     pub(super) fn set_joints(&self, robot: &mut Robot) -> Result<(), ModelError> {
         type Setter = fn(&mut Robot, &[f64]) -> Result<(), ModelError>;
-        let fields: [(&Option<PerDof<Number>>, Setter); 6] = [
+        let fields: [(&Option<PerDof<Number>>, Setter); 8] = [
             (&self.joint_target_q, Robot::set_joint_target_q),
             (&self.joint_target_qd, Robot::set_joint_target_qd),
             (&self.joint_target_ke, Robot::set_joint_target_ke),
             (&self.joint_target_kd, Robot::set_joint_target_kd),
             (&self.joint_effort_limit, Robot::set_joint_effort_limit),
+            (&self.joint_limit_ke, Robot::set_joint_limit_ke),
+            (&self.joint_limit_kd, Robot::set_joint_limit_kd),
             (&self.joint_armature, Robot::set_joint_armature),
         ];
         let driven = driven(robot);

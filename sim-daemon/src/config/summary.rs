@@ -13,7 +13,7 @@ use super::number::Number;
 ///
 /// Keys: `name`; one entry a moving joint: `joint_names`, `joint_types`, `joint_range` (pairs), `joint_velocity_limit`,
 /// `joint_mimic` (`null`, or an object with `joint`, `multiplier`, `offset`); one entry a coordinate: `coord_names`, `joint_q`;
-/// one entry a dof: `dof_names`, `dof_driven`, `joint_effort_limit`, `joint_damping`, `joint_friction`, `joint_armature`;
+/// one entry a dof: `dof_names`, `dof_driven`, `joint_effort_limit`, `joint_limit_ke`, `joint_limit_kd`, `joint_damping`, `joint_friction`, `joint_armature`;
 /// `link_names` (in body order), `shape_names` (`link/shape`), `notes`, `warnings`.
 ///
 /// # Errors
@@ -63,6 +63,8 @@ pub(crate) fn robot_summary(robot: &Robot) -> Value {
         "dof_names": robot.dof_names(),
         "dof_driven": driven,
         "joint_effort_limit": dofs(&|dof| limit(dof.effort_limit)),
+        "joint_limit_ke": dofs(&|dof| json!(dof.limit_gains()[0])),
+        "joint_limit_kd": dofs(&|dof| json!(dof.limit_gains()[1])),
         "joint_damping": dofs(&|dof| json!(dof.damping)),
         "joint_friction": dofs(&|dof| json!(dof.friction)),
         "joint_armature": dofs(&|dof| json!(dof.armature)),

@@ -252,6 +252,7 @@ impl BodyBuilder {
             self.start.joint_qd_offset.push(dof.offset_qd);
             self.joints.push(DofJoint {
                 range: joint.range,
+                limit_gains: dof.limit_gains(),
                 friction: dof.friction,
                 mimic: None,
                 mujoco: None,

@@ -13,14 +13,13 @@ pub(super) const IMPEDANCE: Impedance<f64> = Impedance {
 };
 /// MuJoCo's default `solref`: time constant [s], damping ratio.
 const SOLREF: [f64; 2] = [0.02, 1.0];
-/// Stiffness and damping of joint limits in force space, Newton's `limit_ke`, `limit_kd`.
-const LIMIT_KE: f64 = 1.0e4;
-const LIMIT_KD: f64 = 10.0;
 
 /// What the rows need of a dof's joint; mimic leaders already as dof numbers.
 #[derive(Clone, Copy, Default)]
 pub(super) struct DofJoint {
     pub range: Option<[f64; 2]>,
+    /// Stiffness and damping of the limits in force space, Newton's `limit_ke`, `limit_kd`.
+    pub limit_gains: [f64; 2],
     pub friction: f64,
     pub mimic: Option<(usize, f64, f64)>,
     pub mujoco: Option<SoftJoint>,
@@ -89,16 +88,11 @@ pub(super) fn add_rows(
             });
             constants.limits.extend(rows);
         } else if let Some([lower, upper]) = joint.range {
-            let f = weight * (1.0 - IMPEDANCE.d_max);
-            let solref = [
-                2.0 / (LIMIT_KD * f),
-                0.5 * LIMIT_KD * f * (1.0 / (LIMIT_KE * f)).sqrt(),
-            ];
             constants.limits.push(Limit {
                 dof,
                 lower,
                 upper,
-                soft: soft(solref, weight, dt),
+                soft: limit_soft(joint.limit_gains, weight, dt),
             });
         }
     }
@@ -134,6 +128,24 @@ fn soft(solref: [f64; 2], inverse_weight: f64, dt: f64) -> Soft<f64> {
         inverse_weight,
         impedance: IMPEDANCE,
     }
+}
+
+/// Softness of a limit with these gains in force space, as Newton's exporter gives it to MuJoCo: where it is not clamped to
+/// two steps, `solreflimit` is (-ke f, -kd f).
+fn limit_soft([ke, kd]: [f64; 2], inverse_weight: f64, dt: f64) -> Soft<f64> {
+    let d_max = IMPEDANCE.d_max;
+    let f = inverse_weight * (1.0 - d_max);
+    if ke == 0.0 || kd == 0.0 {
+        // which have no time constant
+        return Soft {
+            stiffness: ke * f / (d_max * d_max),
+            damping: kd * f / d_max,
+            inverse_weight,
+            impedance: IMPEDANCE,
+        };
+    }
+    let solref = [2.0 / (kd * f), 0.5 * kd * f * (1.0 / (ke * f)).sqrt()];
+    soft(solref, inverse_weight, dt)
 }
 
 /// Damping of a contact's friction rows from Newton's `kf`, for bodies of this inverse weight: MuJoCo's from

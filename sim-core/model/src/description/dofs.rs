@@ -220,6 +220,26 @@ impl Robot {
         })
     }
 
+    /// Sets the stiffness of the limits [N·m/rad or N/m] per dof.
+    ///
+    /// # Errors
+    /// Another number of values than dofs, or a value that is negative or not finite.
+    pub fn set_joint_limit_ke(&mut self, values: &[f64]) -> Result<(), ModelError> {
+        self.set("joint_limit_ke", values, not_negative, |dof, value| {
+            dof.limit_ke = Some(value)
+        })
+    }
+
+    /// Sets the damping of the limits [N·m·s/rad or N·s/m] per dof.
+    ///
+    /// # Errors
+    /// Another number of values than dofs, or a value that is negative or not finite.
+    pub fn set_joint_limit_kd(&mut self, values: &[f64]) -> Result<(), ModelError> {
+        self.set("joint_limit_kd", values, not_negative, |dof, value| {
+            dof.limit_kd = Some(value)
+        })
+    }
+
     /// Checks every value, then writes them all in dof order.
     fn set<T: Copy>(
         &mut self,

@@ -40,6 +40,10 @@ pub struct JointDof {
     pub friction: f64,
     /// Inertia of the drive seen at the joint [kg·m² or kg].
     pub armature: f64,
+    /// Stiffness of its limits, Newton's `limit_ke` [N·m/rad or N/m]; `None` is Newton's default.
+    pub limit_ke: Option<f64>,
+    /// Damping of its limits, Newton's `limit_kd` [N·m·s/rad or N·s/m]; `None` is Newton's default.
+    pub limit_kd: Option<f64>,
     /// Largest drive effort [N·m or N]; `None` is without limit.
     pub effort_limit: Option<f64>,
     /// Position target at the start [rad or m]; `None` is the start position. A ball's is a rotation vector.
@@ -58,6 +62,21 @@ pub struct JointDof {
     pub offset_q: Option<Distribution>,
     /// What a reset adds to the start velocity, which is 0 [rad/s or m/s].
     pub offset_qd: Option<Distribution>,
+}
+
+impl JointDof {
+    /// Newton's default of [`JointDof::limit_ke`] [N·m/rad or N/m].
+    pub const LIMIT_KE: f64 = 1.0e4;
+    /// Newton's default of [`JointDof::limit_kd`] [N·m·s/rad or N·s/m].
+    pub const LIMIT_KD: f64 = 10.0;
+
+    /// Stiffness and damping of its limits.
+    pub fn limit_gains(&self) -> [f64; 2] {
+        [
+            self.limit_ke.unwrap_or(JointDof::LIMIT_KE),
+            self.limit_kd.unwrap_or(JointDof::LIMIT_KD),
+        ]
+    }
 }
 
 /// Errors a drive acts on.

@@ -160,6 +160,8 @@ fn validate_dof(what: &str, dof: &JointDof) -> Result<(), ModelError> {
         ("damping", dof.damping),
         ("friction", dof.friction),
         ("joint_armature", dof.armature),
+        ("joint_limit_ke", dof.limit_gains()[0]),
+        ("joint_limit_kd", dof.limit_gains()[1]),
         ("joint_target_ke", dof.target_ke),
         ("joint_target_kd", dof.target_kd),
     ];
