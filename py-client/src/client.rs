@@ -1,16 +1,14 @@
 //! A client of one daemon, as Python holds it: steps without the interpreter lock, and listens to Ctrl-C meanwhile.
 
-use std::ffi::CString;
-use std::ops::{ControlFlow, Range};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sim_protocol::{AttachOptions, Client as Connection, Description, Hook, ProtocolError};
 
+use crate::advice::Advice;
 use crate::errors::{protocol, raise};
 use crate::frame::PyFrame;
 use crate::input::{Axis, Inputs, Mask, Seed};
@@ -22,8 +20,7 @@ pub(crate) struct Client {
     // None once closed; a step that runs in another thread keeps its own reference until it returns
     connection: Mutex<Option<Arc<Connection>>>,
     process: u32,
-    /// It was said that targets have no effect.
-    told_of_targets: AtomicBool,
+    advice: Advice,
 }
 
 #[pymethods]
@@ -42,9 +39,9 @@ impl Client {
         .map_err(|failure| failure.raised(py))?;
         Ok(Client {
             description: Arc::clone(connection.description()),
+            advice: Advice::new(connection.description()),
             connection: Mutex::new(Some(connection.into())),
             process: std::process::id(),
-            told_of_targets: AtomicBool::new(false),
         })
     }
 
@@ -65,7 +62,9 @@ impl Client {
         let connection = self.connection(py)?;
         let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], ctrl, more)?;
         let commands = inputs.commands()?;
-        self.frame(py, |hook| connection.step(&commands, hook))
+        self.advice.step(py, &self.description, &commands)?;
+        let frame = self.waiting(py, |hook| connection.step(&commands, hook))?;
+        self.advice.frame(py, &self.description, frame)
     }
 
     fn send(
@@ -80,12 +79,14 @@ impl Client {
         let connection = self.connection(py)?;
         let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], ctrl, more)?;
         let commands = inputs.commands()?;
+        self.advice.step(py, &self.description, &commands)?;
         self.waiting(py, |hook| connection.send(&commands, hook))
     }
 
     fn recv(&self, py: Python<'_>) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
-        self.frame(py, |hook| connection.recv(hook))
+        let frame = self.waiting(py, |hook| connection.recv(hook))?;
+        self.advice.frame(py, &self.description, frame)
     }
 
     fn write(
@@ -95,6 +96,7 @@ impl Client {
         joint_qd: Option<&Bound<'_, PyAny>>,
         more: &Bound<'_, PyDict>,
         mask: Option<&Bound<'_, PyAny>>,
+        is_known: bool,
     ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
         let mut inputs = Inputs::new(&self.description);
@@ -105,6 +107,10 @@ impl Client {
         inputs.add("joint_qd", Axis::Dofs, joint_qd)?;
         let mask = Mask::new("mask", mask, self.description.worlds)?;
         let (commands, mask) = (inputs.commands()?, mask.as_slice()?);
+        // a keyframe's values are those of its model
+        if !is_known {
+            self.advice.write(py, &self.description, &commands, mask)?;
+        }
         self.frame(py, |hook| connection.write(&commands, mask, hook))
     }
 
@@ -122,6 +128,7 @@ impl Client {
         }
         let mask = Mask::new("mask", mask, self.description.worlds)?;
         let (commands, mask) = (inputs.commands()?, mask.as_slice()?);
+        self.advice.write(py, &self.description, &commands, mask)?;
         self.frame(py, |hook| connection.write(&commands, mask, hook))
     }
 
@@ -214,40 +221,7 @@ impl Client {
             inputs.add(field, Axis::Dofs, value)?;
         }
         inputs.add("ctrl", Axis::Actuators, ctrl)?;
-        if let Some((field, columns)) = inputs.aimless()
-            && !self.told_of_targets.swap(true, Ordering::Relaxed)
-        {
-            self.tell_of_targets(more.py(), field, &columns)?;
-        }
         Ok(inputs)
-    }
-
-    /// Warns of targets that nothing follows.
-    #[cold]
-    fn tell_of_targets(&self, py: Python<'_>, field: &str, dofs: &Range<usize>) -> PyResult<()> {
-        let robots = self.description.robots.iter();
-        let own = robots.filter(|robot| robot.dofs[0] < dofs.end && dofs.start < robot.dofs[1]);
-        let (models, others): (Vec<_>, Vec<_>) =
-            own.partition(|robot| robot.actuators[0] < robot.actuators[1]);
-        let gains = match field {
-            "joint_target_q" => "joint_target_ke and joint_target_kd",
-            _ => "joint_target_kd, and joint_target_mode \"velocity\" or \"both\",",
-        };
-        let cure = match others.is_empty() {
-            true => "actuators of a MuJoCo model follow ctrl".to_owned(),
-            false => format!("set {gains} of the robot before launch, or send joint_f"),
-        };
-        let names: Vec<_> = others
-            .iter()
-            .chain(&models)
-            .map(|robot| format!("`{}`", robot.name))
-            .collect();
-        let problem = format!(
-            "{field} has no effect, since no drive of {} follows it: {cure}",
-            names.join(", ")
-        );
-        let problem = CString::new(problem).expect("names have no zero");
-        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &problem, 2)
     }
 
     fn connection(&self, py: Python<'_>) -> PyResult<Arc<Connection>> {

@@ -131,6 +131,14 @@ impl PyFrame {
         })
     }
 
+    /// The same frame as another object.
+    pub(crate) fn again(frame: &Bound<'_, PyFrame>) -> PyFrame {
+        PyFrame {
+            sample: frame.get().sample.clone_ref(frame.py()),
+            arrays: Mutex::default(),
+        }
+    }
+
     fn arrays(&self) -> std::sync::MutexGuard<'_, Made> {
         self.arrays.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -229,21 +229,6 @@ impl<'a, 'py> Inputs<'a, 'py> {
         Ok(())
     }
 
-    /// Targets among the arrays that no drive follows, as far as older daemons say, and whose they are.
-    pub(crate) fn aimless(&self) -> Option<(&'a str, Range<usize>)> {
-        let driven = &self.description.driven;
-        self.arrays.iter().find_map(|array| {
-            let bit = match array.field {
-                "joint_target_q" => 1,
-                "joint_target_qd" => 2,
-                _ => return None,
-            };
-            let own = driven.get(array.columns.clone())?;
-            let is_in_vain = !own.is_empty() && own.iter().all(|follows| follows & bit == 0);
-            is_in_vain.then(|| (array.field, array.columns.clone()))
-        })
-    }
-
     /// The arrays as the protocol takes them.
     pub(crate) fn commands(&self) -> PyResult<Vec<Command<'_>>> {
         self.arrays.iter().map(Input::command).collect()

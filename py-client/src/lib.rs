@@ -3,6 +3,7 @@
 //! Thin on purpose: arguments are checked in Python (`python/tightloop`), numbers by the daemon. What is here is what has
 //! to be fast (a step) or has to be Rust (views of shared memory, scene files, the command line).
 
+mod advice;
 mod arrays;
 mod client;
 mod dynamics;

@@ -22,12 +22,12 @@ def test_everything_exported_is_there():
         _ = tl.lunch  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def test_every_exception_is_exported_and_a_tightloop_error():
+def test_every_exception_is_exported_and_a_tightloop_error_or_warning():
     classes = [
         value for value in vars(errors).values() if isinstance(value, type) and value.__module__ == errors.__name__
     ]
     assert {error.__name__ for error in classes} <= set(tl.__all__)
-    assert all(issubclass(error, tl.TightloopError) and error.__doc__ for error in classes)
+    assert all(issubclass(error, tl.TightloopError | tl.TightloopWarning) and error.__doc__ for error in classes)
 
 
 def test_every_exception_that_rust_raises_exists():

@@ -2,7 +2,7 @@
 
 use sim_engine::backend::{Input, Values};
 use sim_engine::simulation::{Options, Precision, Simulation};
-use sim_model::{Description as Scene, KeyState, Model};
+use sim_model::{Description as Scene, JointKind, KeyState, Model};
 use sim_physics::arrays::{Dtype, Field, FieldDtype, FieldRow, Group, Layout};
 use sim_physics::constants::params::Param;
 use sim_protocol::host::{Inbox, Numbers};
@@ -172,6 +172,7 @@ pub(crate) fn description(
         notes: notes(info.scene),
         warnings: Vec::new(),
         driven: driven(model),
+        angle_range: angle_range(info.scene),
         frames_held: info.frames_held,
         watch_worlds: info.watch_worlds.min(options.worlds),
         watch_state_bytes: 0,
@@ -204,6 +205,23 @@ fn driven(model: &Model) -> Vec<u8> {
         u8::from(positions) | u8::from(velocities) << 1
     })
     .collect()
+}
+
+/// Limits of each dof that turns [rad], where it has any.
+fn angle_range(scene: &Scene) -> Vec<Option<[f64; 2]>> {
+    let mut ranges = Vec::new();
+    for robot in &scene.robots {
+        for joint in robot.moving_joints() {
+            let joint = &robot.joints[joint];
+            let turns = joint.kind == JointKind::Revolute;
+            let own = joint.range.filter(|range| {
+                let is_finite = range.iter().all(|end| end.is_finite());
+                turns && is_finite
+            });
+            ranges.resize(ranges.len() + joint.dofs.len(), own);
+        }
+    }
+    ranges
 }
 
 /// JSON has no infinity.

@@ -27,6 +27,7 @@ Graph = dict[str, set[str]]
 LAYERS = (
     ("tightloop.errors",),
     (
+        "tightloop.advice",
         "tightloop.assets",
         "tightloop.attributes",
         "tightloop.checks",

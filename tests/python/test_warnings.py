@@ -76,7 +76,7 @@ def test_a_start_outside_of_limits(tmp_path):
 
 @pytest.mark.parametrize("what", ["shape", "body", "robot", "floating", "joint_q"])
 def test_an_identity_with_w_first(tmp_path, what):
-    scene, turned = tl.Scene(), (1, 0, 0, 0)
+    scene, turned = tl.Scene(gravity=(0, 0, 0)), (1, 0, 0, 0)
     if what == "shape":
         scene.add_box(half_extents=(1, 1, 1), quat=turned, name="wall")
     elif what == "body":
@@ -119,7 +119,9 @@ def test_targets_of_a_step_that_nothing_follows_are_told_once(tmp_path):
     scene = tl.Scene()
     robot(scene, tmp_path)
     with tl.launch(scene, worlds=2) as sim:
-        with pytest.warns(UserWarning, match="joint_target_q has no effect.*`hinge`.*joint_target_ke") as caught:
+        with pytest.warns(
+            tl.TightloopWarning, match="joint_target_q has no effect.*`hinge`.*joint_target_ke"
+        ) as caught:
             sim.step(joint_target_q=np.ones((2, 1)))
         assert caught[0].filename == __file__
         with warnings.catch_warnings():
@@ -132,7 +134,7 @@ def test_velocity_targets_of_a_drive_that_holds_positions(tmp_path):
     scene = tl.Scene()
     robot(scene, tmp_path).joint_target_ke = 5.0
     with tl.launch(scene, worlds=1) as sim:
-        with pytest.warns(UserWarning, match="joint_target_qd has no effect.*joint_target_mode"):
+        with pytest.warns(tl.TightloopWarning, match="joint_target_qd has no effect.*joint_target_mode"):
             sim.step(joint_target_qd=[1.0])
         assert sim.step(joint_target_q=[1.0]).step[0] == 2
 
@@ -142,7 +144,7 @@ def test_a_warning_that_is_an_error_leaves_the_simulation_usable(tmp_path):
     robot(scene, tmp_path)
     with tl.launch(scene, worlds=1) as sim, warnings.catch_warnings():
         warnings.simplefilter("error")
-        with pytest.raises(UserWarning):
+        with pytest.raises(tl.TightloopWarning):
             sim.step(joint_target_qd={"hinge": [1.0]})
         assert sim.step(joint_f=[1.0]).step[0] == 1
 
@@ -151,7 +153,7 @@ def test_a_warning_at_launch_that_is_an_error_leaves_no_daemon():
     scene = tl.Scene(dt=0.5)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        with pytest.raises(UserWarning, match=r"dt is 0\.5 s"):
+        with pytest.raises(tl.TightloopWarning, match=r"dt is 0\.5 s"):
             tl.launch(scene, worlds=1, name="left-behind")
     with pytest.raises(tl.UnknownDaemon):
         tl.attach("left-behind")
@@ -212,7 +214,8 @@ def test_a_body_that_turns_faster_than_anything_faults_by_itself():
     push = np.zeros((3, 6))
     push[1, 3:] = 300.0
     with tl.launch(scene, worlds=3) as sim:
-        frame = sim.step(joint_f=push)
+        with pytest.warns(tl.TightloopWarning, match="1 world of 3 faulted"):
+            frame = sim.step(joint_f=push)
         assert frame.status.tolist() == [0, 8, 0] and np.abs(frame.joint_qd).max() == 0
     with tl.launch(scene, worlds=3, bounds={"joint_qd": np.inf}) as sim:
         frame = sim.step(joint_f=push)

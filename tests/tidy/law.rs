@@ -249,7 +249,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "py-client/src",
         &[
-            "errors", "parts", "input", "frame", "client", "scene", "dynamics", "arrays",
+            "errors", "parts", "input", "frame", "advice", "client", "scene", "dynamics", "arrays",
             "picture", "observe", "random", "rays",
         ],
     ),

@@ -1,4 +1,4 @@
-"""The exceptions of tightloop. Each message says what is wrong and how to fix it.
+"""The exceptions and the warning of tightloop. Each message says what is wrong and how to fix it.
 
 All derive from `TightloopError`. Where Python has a built-in exception for the mistake (`ValueError`, `TimeoutError`,
 …), the exception also derives from that one, so that ordinary `except` clauses work.
@@ -9,6 +9,13 @@ from __future__ import annotations
 
 class TightloopError(Exception):
     """Base class of all exceptions of this package."""
+
+
+class TightloopWarning(UserWarning):
+    """What is valid and most likely a mistake; the message names it and the cure. A simulation tells each one once.
+
+    ``warnings.simplefilter("error", tl.TightloopWarning)`` makes errors of them, ``"ignore"`` hides them.
+    """
 
 
 class ArgumentError(TightloopError, ValueError):

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 import secrets
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, overload
 
-from tightloop import _core, checks
+from tightloop import _core, advice, checks
 from tightloop.daemon import Daemon
 from tightloop.errors import ArgumentError
 from tightloop.groups import Groups
@@ -119,7 +118,7 @@ def launch(
         A `Sim`, or with ``groups`` the `Groups`, a sequence of them.
 
     Warns:
-        UserWarning: A value of the scene is valid and most likely a mistake; the message names it and the cure.
+        TightloopWarning: A value of the scene is valid and most likely a mistake; the message names it and the cure.
 
     Raises:
         ArgumentError: An argument is not valid; the message lists what is valid.
@@ -166,7 +165,7 @@ def launch(
     try:
         sims = [Sim(_core.Client(own, lease=True), daemon) for own in _names(arguments["name"], count)]
         for warning in sims[0].info["warnings"]:
-            warnings.warn(warning, stacklevel=2)
+            advice.warn(warning)
     except BaseException:
         daemon.stop()
         raise

@@ -6,7 +6,6 @@ import inspect
 import json
 import os
 import re
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tightloop import _core, checks, notebook
+from tightloop import _core, advice, checks, notebook
 from tightloop.body import Body
 from tightloop.checks import Vector
 from tightloop.errors import SceneError
@@ -116,7 +115,7 @@ class Scene(SceneRandomization):
             The robot, whose properties set start state, drives and limits.
 
         Warns:
-            UserWarning: Inertias were balanced, or visual meshes are missing; `Robot.notes` has all notes.
+            TightloopWarning: Inertias were balanced, or visual meshes are missing; `Robot.notes` has all notes.
 
         Raises:
             UrdfError: The file is missing, is not URDF, or describes a robot that cannot be simulated.
@@ -156,7 +155,7 @@ class Scene(SceneRandomization):
         )
         self.robots[name] = robot
         for warning in summary["warnings"]:
-            warnings.warn(f"robot `{name}`: {warning}", stacklevel=2)
+            advice.warn(f"robot `{name}`: {warning}")
         return robot
 
     @classmethod

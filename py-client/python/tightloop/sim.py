@@ -134,6 +134,9 @@ class Sim(Shown, Attributes):
         Returns:
             A frame of read-only views, which stays valid and unchanged until you drop it.
 
+        Warns:
+            TightloopWarning: Worlds faulted, or a value is most likely a mistake; each is told once.
+
         Raises:
             CommandRefused: A shape, dtype or value is wrong; no world changed.
             FramesHeld: ``frames_held`` frames are alive already.
@@ -227,7 +230,9 @@ class Sim(Shown, Attributes):
             return self._client.reset(mask, seed)
         state = keyframes.find(self.info["keyframes"], keyframe)
         self._client.reset(mask, seed)
-        return self.write(**keyframes.arrays(state), mask=mask)
+        more = keyframes.arrays(state)
+        joint_q, joint_qd = more.pop("joint_q", None), more.pop("joint_qd", None)
+        return self._client.write(joint_q, joint_qd, self._arrays("writes", **more), mask, True)
 
     def write(
         self,
@@ -265,7 +270,7 @@ class Sim(Shown, Attributes):
         more = self._arrays(
             "writes", act=act, ctrl=ctrl, mocap_pos=mocap_pos, mocap_quat=mocap_quat, eq_active=eq_active
         )
-        return self._client.write(joint_q, joint_qd, more, mask)
+        return self._client.write(joint_q, joint_qd, more, mask, False)
 
     def forward(self) -> Frame:
         """Return a frame at the current state and commands without a step. Raises as `step` does."""

@@ -103,6 +103,9 @@ pub struct Description {
     /// Which targets the drive of each dof follows: 1 positions, 2 velocities, 3 both. Older recordings have none.
     #[serde(default)]
     pub driven: Vec<u8>,
+    /// Limits of each dof that turns [rad]; null for the others. Older recordings have none.
+    #[serde(default)]
+    pub angle_range: Vec<Option<[f64; 2]>>,
     /// Frames that the controller, or one observer, may hold at once.
     pub frames_held: usize,
     /// Worlds that observers see: the first ones.

@@ -77,6 +77,7 @@ fn description() -> Description {
         notes: Vec::new(),
         warnings: Vec::new(),
         driven: Vec::new(),
+        angle_range: Vec::new(),
         frames_held: 2,
         watch_worlds: 1,
         watch_state_bytes: STATE as u64,

@@ -1,0 +1,236 @@
+"""What is valid while a simulation runs and most likely a mistake: told once, with the cure, at the user's line."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+import tightloop as tl
+from tightloop.env import VectorEnv
+from tightloop.tasks.cartpole import CartPoleBalance
+
+#: A joint with limits in the world, and a body that moves freely.
+ARM = """<robot name="arm">
+  <link name="base"><inertial><mass value="1"/>
+    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+  <link name="upper"><inertial><mass value="1"/>
+    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+  <link name="wheel"><inertial><mass value="1"/>
+    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-2.5" upper="2.5" effort="10" velocity="1"/></joint>
+  <joint name="roll" type="continuous"><parent link="upper"/><child link="wheel"/><axis xyz="0 1 0"/></joint>
+</robot>
+"""
+
+
+@pytest.fixture
+def scene(tmp_path) -> tl.Scene:
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM)
+    scene = tl.Scene()
+    arm = scene.add_urdf(path)
+    arm.joint_target_ke, arm.joint_target_kd = 10.0, 1.0
+    scene.add_cube(pos=(3, 0, 0.5))
+    return scene
+
+
+@contextmanager
+def told_once(pattern: str, file: str = __file__) -> Iterator[None]:
+    """Expect one warning, at a line of this file."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    messages = [str(warning.message) for warning in caught]
+    assert len(messages) == 1, messages
+    with pytest.warns(tl.TightloopWarning, match=pattern):
+        warnings.warn(messages[0], caught[0].category, stacklevel=1)
+    assert caught[0].filename == file
+
+
+@contextmanager
+def nothing_told() -> Iterator[None]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        yield
+
+
+def test_worlds_that_fault_are_told_once_with_number_first_reason_and_cure():
+    scene = tl.Scene(gravity=(0, 0, 0))
+    scene.add_cube()
+    push = np.zeros((4, 6))
+    with tl.launch(scene, worlds=4) as sim:
+        with nothing_told():
+            sim.step(joint_f=push)
+        push[[1, 3], 3:] = 300.0
+        with told_once(
+            r"2 worlds of 4 faulted: the first of them is world 1, after its step 1, .*joint_qd\| of 100000"
+        ):
+            sim.step(joint_f=push)
+        push[:, 3:] = 300.0
+        with nothing_told():
+            sim.reset()
+            sim.step(joint_f=push)
+
+
+def test_a_world_with_a_command_that_is_nan():
+    scene = tl.Scene()
+    scene.add_cube(pos=(0, 0, 1))
+    push = np.zeros((2, 6))
+    push[1, 0] = np.nan
+    with tl.launch(scene, worlds=2, on_nan="freeze", fields=("joint_q",)) as sim:
+        sim.send(joint_f=push)
+        with told_once(
+            r"1 world of 2 faulted: it is world 1, after its step 0, .*not finite, possibly of a command.*reset"
+        ):
+            sim.recv()
+
+
+def test_the_speed_before_a_fault_is_named():
+    scene = tl.Scene(gravity=(0, 0, 0))
+    scene.add_cube(name="top")
+    with tl.launch(scene, worlds=1, bounds={"joint_qd": 60.0}) as sim:
+        sim.write(joint_qd=[0, 0, 0, 0, 0, 50.0])
+        with told_once(r"`top/free\.wz` was fastest, at 58"):
+            for _ in range(3):
+                sim.step(joint_f=[0, 0, 0, 0, 0, 0.01])
+
+
+def test_a_fault_as_an_error_leaves_the_simulation_usable():
+    scene = tl.Scene(gravity=(0, 0, 0))
+    scene.add_cube()
+    with tl.launch(scene, worlds=1) as sim, nothing_told():
+        with pytest.raises(tl.TightloopWarning, match="1 world of 1 faulted"):
+            sim.step(joint_f=[0, 0, 0, 300, 300, 300])
+        assert sim.reset().status[0] == 0
+        assert sim.step(joint_f=np.zeros(6)).step[0] == 1
+
+
+def test_faults_of_an_environment_are_told_at_the_line_that_steps_it():
+    envs = VectorEnv(CartPoleBalance, 2)
+    try:
+        envs.reset(seed=1)
+        actions = np.zeros((2, 1))
+        actions[1] = np.nan
+        with told_once("1 world of 2 faulted: it is world 1"):
+            envs.step(actions)
+    finally:
+        envs.close()
+
+
+@pytest.mark.parametrize("send", [False, True])
+@pytest.mark.parametrize("by", ["array", "list", "robot"])
+def test_targets_in_degrees(scene, by, send):
+    targets = {"array": np.zeros((3, 8)), "list": [0.0] * 8, "robot": {"arm": np.zeros((3, 2), np.float32)}}[by]
+    with tl.launch(scene, worlds=3) as sim:
+        with nothing_told():
+            sim.step(joint_target_q=targets)
+        if by == "list":
+            targets[0] = 90
+        elif by == "robot":
+            targets["arm"][1, 0] = 90
+        else:
+            targets[1, 0] = 90
+        world = 0 if by == "list" else 1
+        with told_once(
+            rf"joint_target_q of `arm/turn` is 90 rad in world {world}, .* -2\.5000 to 2\.5000: .*np\.radians"
+        ):
+            if send:
+                sim.send(joint_target_q=targets)
+                sim.recv()
+            else:
+                sim.step(joint_target_q=targets)
+        with nothing_told():
+            sim.step(joint_target_q=targets)
+
+
+def test_targets_beyond_limits_and_turns_of_wheels_are_no_degrees(scene):
+    with tl.launch(scene, worlds=2) as sim, nothing_told():
+        sim.step(joint_target_q={"arm": [4.0, 90.0]})
+        sim.write(joint_q={"arm": [2.5, 400.0]})
+
+
+def test_positions_in_degrees(scene):
+    with tl.launch(scene, worlds=2) as sim:
+        with nothing_told():
+            sim.write(joint_q={"arm": [[132.0, 0.0], [0.0, 0.0]]}, mask=[False, True])
+        with told_once(r"joint_q of `arm/turn` is -132 rad in world 1, .*np\.radians"):
+            sim.write(joint_q={"arm": [[0.0, 0.0], [-132.0, 0.0]]})
+
+
+def test_noise_in_degrees(scene):
+    with tl.launch(scene, worlds=1, params=("joint_q_noise",)) as sim:
+        with nothing_told():
+            sim.params.joint_q_noise = [0.1, 0.1, *[0.0] * 6]
+        with told_once(r"params\.joint_q_noise of `arm/turn` is 5, which looks like degrees"):
+            sim.params.joint_q_noise = [5.0, 0.1, *[0.0] * 6]
+
+
+def test_a_quaternion_with_w_first(scene):
+    with tl.launch(scene, worlds=2) as sim:
+        with nothing_told():
+            sim.write(joint_q={"cube": [0, 0, 1, -1, 0, 0, 0]})
+            sim.write(joint_q={"cube": [0, 0, 1, 0, 0, 0, 1]})
+        with told_once(
+            r"joint_q of `cube.*` turns by 180°.*\(1, 0, 0, 0\).*\(x, y, z, w\).*\(0, 0, 0, 1\) for no turn"
+        ):
+            sim.write(joint_q=np.array([[0, 0, 0, 0, 1, 0, 0, 0, 1], [0, 0, 0, 0, 1, 1, 0, 0, 0]], float))
+
+
+def test_a_quaternion_of_a_mocap_body_with_w_last():
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string("""<mujoco>
+      <worldbody><body name="hand" mocap="true"><geom size=".1"/></body></worldbody>
+      <keyframe><key name="over" mquat="0 0 0 1"/></keyframe></mujoco>""")
+    with tl.launch(tl.Scene.from_mujoco(model, name="m"), worlds=2) as sim:
+        with nothing_told():
+            sim.step(mocap_quat=[[1, 0, 0, 0]])
+            sim.step(mocap_quat=[[0, 0, 0, -1]])
+            sim.reset(keyframe="over")
+        with told_once(
+            r"mocap_quat of `m/hand` .*\(0, 0, 0, 1\).*\(w, x, y, z\), as in MuJoCo.*\(1, 0, 0, 0\) for no turn"
+        ):
+            sim.step(mocap_quat=[[0, 0, 0, 1]])
+
+
+def test_gravity_that_is_one_number(scene):
+    with tl.launch(scene, worlds=2, params=("gravity",)) as sim:
+        with nothing_told():
+            sim.params.gravity = (0, 0, -5)
+            sim.params.gravity = 0
+        with told_once(r"params\.gravity is \(-9\.81, -9\.81, -9\.81\) in world 0.*\(0, 0, -9\.81\)"):
+            sim.params.gravity = -9.81
+
+
+def test_torques_against_drives_that_hold(scene):
+    with tl.launch(scene, worlds=2) as sim:
+        with nothing_told():
+            sim.step(joint_f={"cube": [0.1] * 6})
+        with told_once(r"joint_f acts on `arm/turn` beside its drive.*joint_target_ke and joint_target_kd.*to 0"):
+            sim.step(joint_f={"arm": [1.0, 0.0]})
+
+
+@pytest.mark.parametrize("aims", ["together", "before", "gains vary", "no gains"])
+def test_torques_that_are_meant_to_be_added(scene, aims):
+    arm = scene.robots["arm"]
+    if aims == "no gains":
+        arm.joint_target_ke = 0.0
+    with tl.launch(scene, worlds=2, params=("joint_target_ke",) if aims == "gains vary" else ()) as sim, nothing_told():
+        if aims == "before":
+            sim.step(joint_target_q={"arm": [0.1, 0.1]})
+        given = {"joint_target_q": {"arm": [0.1, 0.1]}} if aims == "together" else {}
+        sim.step(joint_f={"arm": [1.0, 0.0]}, **given)
+
+
+def test_only_the_first_calls_and_worlds_are_looked_at(scene):
+    late = np.zeros((20, 8))
+    late[17, 0] = 90.0
+    with tl.launch(scene, worlds=20) as sim, nothing_told():
+        sim.step(joint_target_q=late)
+        for _ in range(256):
+            sim.step(joint_target_q={"arm": [0.1, 0.1]})
+        sim.step(joint_target_q={"arm": [90.0, 0.1]})
