@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, SupportsFloat, SupportsIndex
 
+import numpy as np
+
 from tightloop import checks
 from tightloop.attributes import Attributes
 from tightloop.checks import Triple, Vector
@@ -83,6 +85,8 @@ class SceneOptions(Attributes):
 
     @gravity.setter
     def gravity(self, gravity: Vector) -> None:
+        if np.ndim(gravity) == 0:
+            raise SceneError(f"Scene: gravity is {gravity!r}; give 3 numbers, with z up, such as (0, 0, -9.81)")
         self._gravity = checks.triple("Scene: gravity", gravity)
 
     @property

@@ -1,6 +1,7 @@
 //! What is valid in a scene and most likely a mistake: told once, when a daemon starts, with the cure.
 
 mod friction;
+mod robots;
 mod start;
 mod values;
 
@@ -14,6 +15,7 @@ const NAMED: usize = 3;
 /// Advice on a scene and its model, a sentence or two each.
 pub(crate) fn advice(scene: &Description, model: &Arc<Model>) -> Vec<String> {
     let mut all = values::advice(scene);
+    all.extend(robots::advice(scene));
     all.extend(friction::advice(scene, model));
     all.extend(start::advice(scene, model));
     all

@@ -2,7 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use sim_model::{Description, Joint, JointDof, JointKind, Pose, Robot, TargetMode};
+use sim_model::{
+    Description, Distribution, Joint, JointDof, JointKind, Pose, Robot, Shape, TargetMode,
+};
 use sim_physics::constants::params::Param;
 
 use super::some;
@@ -12,14 +14,19 @@ const DT_USUAL: f64 = 0.05;
 /// How far outside of their limits joints may start, that turn [rad] and that slide [m]: Newton's lesson begins with the
 /// fingers 1 cm beyond theirs.
 const OUTSIDE: [f64; 2] = [0.2, 0.05];
+/// Limits between these look like degrees [rad]: robots turn twice about an axis, and exporters that know no limits write
+/// larger ones.
+const TURNS: [f64; 2] = [2.0 * TAU, 720.0];
 /// The identity, as libraries write it that put w first.
 const W_FIRST: [f64; 4] = [1.0, 0.0, 0.0, 0.0];
 
 /// Advice on numbers of the scene.
 pub(super) fn advice(scene: &Description) -> Vec<String> {
-    let mut all: Vec<String> = step(scene).into_iter().collect();
+    let mut all: Vec<String> = step(scene).into_iter().chain(upwards(scene)).collect();
     let shapes = scene.shapes.iter();
     all.extend(shapes.filter_map(|shape| turned(&format!("shape `{}`", shape.name), &shape.pose)));
+    let sites = scene.sites.iter();
+    all.extend(sites.filter_map(|site| turned(&format!("site `{}`", site.name), &site.pose)));
     // what MuJoCo compiled has its own conventions, and its own warnings
     for robot in scene.robots.iter().filter(|robot| robot.mujoco.is_none()) {
         let kind = match robot.urdf {
@@ -34,6 +41,8 @@ pub(super) fn advice(scene: &Description) -> Vec<String> {
             quat: [joint.q[3], joint.q[4], joint.q[5], joint.q[6]],
         });
         all.extend(turned(&name, &pose));
+        all.extend(turned_shapes(robot));
+        all.extend(degrees(robot, &name));
         all.extend(outside(robot, &name));
         all.extend(powerless(scene, robot, &name));
         all.extend(aimless(scene, robot, &name));
@@ -49,6 +58,17 @@ fn step(scene: &Description) -> Option<String> {
     })
 }
 
+/// Gravity that lifts what floats off its ground; an arm may well hang from a ceiling.
+fn upwards(scene: &Description) -> Option<String> {
+    let [x, y, z] = scene.gravity;
+    let mut joints = scene.robots.iter().flat_map(|robot| &robot.joints);
+    let floats = joints.any(|joint| joint.kind == JointKind::Free && joint.parent.is_none());
+    let has_ground = scene.shapes.iter().any(|shape| shape.shape == Shape::Plane);
+    (z > 0.0 && floats && has_ground).then(|| {
+        format!("gravity is ({x}, {y}, {z}), which points up, and z is up. Give (0, 0, -9.81).")
+    })
+}
+
 /// A half turn about x that was most likely to be no turn.
 fn turned(what: &str, pose: &Pose) -> Option<String> {
     (pose.quat == W_FIRST).then(|| {
@@ -57,6 +77,64 @@ fn turned(what: &str, pose: &Pose) -> Option<String> {
              or (-1, 0, 0, 0) if the half turn is meant."
         )
     })
+}
+
+/// Shapes on links with such a quaternion.
+fn turned_shapes(robot: &Robot) -> Vec<String> {
+    let shapes = robot.links.iter().flat_map(|link| {
+        let collisions = link.collisions.iter().enumerate();
+        collisions.map(move |(index, shape)| (link, index, shape))
+    });
+    shapes
+        .filter_map(|(link, index, shape)| {
+            let own = shape.name.clone().unwrap_or_else(|| index.to_string());
+            let what = format!("shape `{}/{}/{own}`", robot.name, link.name);
+            turned(&what, &shape.pose)
+        })
+        .collect()
+}
+
+/// Limits of a file, and draws of starts, that look like degrees.
+fn degrees(robot: &Robot, what: &str) -> Vec<String> {
+    let turning = || moving(robot).filter(|joint| joint.kind == JointKind::Revolute);
+    let limits: Vec<String> = turning()
+        .filter_map(|joint| {
+            let [lower, upper] = joint.range?;
+            let largest = lower.abs().max(upper.abs());
+            (TURNS[0] < largest && largest <= TURNS[1])
+                .then(|| format!("`{}` ({lower} to {upper})", joint.name))
+        })
+        .collect();
+    let draws: Vec<String> = turning()
+        .filter(|joint| joint.range.is_some())
+        .filter_map(|joint| {
+            let offset = joint.dofs.first()?.offset_q?;
+            (spread(&offset) > TAU)
+                .then(|| format!("`{}` by up to {}", joint.name, spread(&offset)))
+        })
+        .collect();
+    let mut all = Vec::new();
+    if !limits.is_empty() {
+        all.push(format!(
+            "{what}: limits of {} look like degrees: <limit> is in radians. Divide them by 57.29578 in the file.",
+            some(&limits)
+        ));
+    }
+    if !draws.is_empty() {
+        all.push(format!(
+            "{what}: a reset moves {}, which looks like degrees: angles are in radians, and np.radians converts degrees.",
+            some(&draws)
+        ));
+    }
+    all
+}
+
+/// The largest value of a distribution, nearly always.
+fn spread(distribution: &Distribution) -> f64 {
+    match *distribution {
+        Distribution::Uniform { low, high } => low.abs().max(high.abs()),
+        Distribution::Normal { mean, std } => mean.abs() + std,
+    }
 }
 
 /// Joints that start far outside of their limits.
