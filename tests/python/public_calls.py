@@ -229,6 +229,8 @@ SETTERS: dict[str, tuple[Callable[[Any], Any], dict[str, str]]] = {
             "joint_target_ke": "of dofs",
             "joint_target_kd": "of dofs",
             "joint_effort_limit": "of dofs",
+            "joint_limit_ke": "of dofs",
+            "joint_limit_kd": "of dofs",
             "joint_armature": "of dofs",
             "self_collisions": "flag",
         },
