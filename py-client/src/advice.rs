@@ -150,8 +150,9 @@ impl Advice {
                 "mocap_quat" => self.mocaps(py, of, &description.mocap_names, mask)?,
                 "gravity" => self.gravity(py, of, mask)?,
                 "joint_q_noise" | "joint_target_q_noise" => {
-                    let is_wrong =
-                        |at: usize, value: f64| self.dofs[at][0].is_finite() && value > NOISE;
+                    let is_angle =
+                        |at: usize| self.dofs.get(at).is_some_and(|of| of[0].is_finite());
+                    let is_wrong = |at: usize, value: f64| value > NOISE && is_angle(at);
                     if let Some((_, at, value)) = first(of, mask, is_wrong)
                         && self.is_new(Told::Degrees)
                     {
@@ -220,7 +221,10 @@ impl Advice {
         let Some(usual) = usual.get(of.columns.clone()) else {
             return Ok(()); // of a daemon that does not tell
         };
-        let is_wrong = |at: usize, value: f64| value < usual[at][0] || value > usual[at][1];
+        // the daemon refuses what is not finite
+        let is_wrong = |at: usize, value: f64| {
+            value.is_finite() && (value < usual[at][0] || value > usual[at][1])
+        };
         if let Some((world, at, value)) = first(of, mask, is_wrong)
             && self.is_new(Told::Degrees)
         {

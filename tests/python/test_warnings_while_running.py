@@ -152,6 +152,8 @@ def test_targets_beyond_limits_and_turns_of_wheels_are_no_degrees(scene):
     with tl.launch(scene, worlds=2) as sim, nothing_told():
         sim.step(joint_target_q={"arm": [4.0, 90.0]})
         sim.write(joint_q={"arm": [2.5, 400.0]})
+        with pytest.raises(tl.CommandRefused, match="inf"):
+            sim.step(joint_target_q={"arm": [np.inf, 0.0]})
 
 
 def test_positions_in_degrees(scene):
