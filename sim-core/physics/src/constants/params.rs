@@ -78,7 +78,7 @@ params! {
     JointTargetKe "joint_target_ke" Per::Dof, "N·m/rad or N/m" Some(0.0), "Proportional gain of the drive. Free joints have no drive.";
     JointTargetKd "joint_target_kd" Per::Dof, "N·m·s/rad or N·s/m" Some(0.0), "Derivative gain of the drive. Free joints have no drive.";
     JointEffortLimit "joint_effort_limit" Per::Dof, "N·m or N" Some(0.0), "Bound of the drive's force; 1e30 where there is none. Free joints have no drive.";
-    ShapeMu "shape_mu" Per::Shape, "–" Some(0.0), "Coefficient of sliding friction of each collision shape; of two shapes the larger counts.";
+    ShapeMu "shape_mu" Per::Shape, "–" Some(0.0), "Coefficient of sliding friction of each collision shape; of two shapes the larger counts, or what the scene's friction_combine makes of both.";
     CommandDelay "command_delay" Per::Entry(1), "substeps" Some(0.0), "Substeps from the start of a frame until its joint_f and targets act; a part of one counts as a whole one. Before the first have come, those of the reset act.";
     JointFNoise "joint_f_noise" Per::Dof, "N·m or N" Some(0.0), "Standard deviation of what is added to joint_f, drawn for each frame.";
     JointTargetQNoise "joint_target_q_noise" Per::Dof, "rad or m" Some(0.0), "Standard deviation of what is added to joint_target_q, drawn for each frame. Free joints have no drive.";
