@@ -116,7 +116,7 @@ def test_a_wrong_surface_names_shape_and_value(scene, wedge, surface, named):
 
 def test_a_misspelt_surface_is_an_error(scene):
     wrong: Any = {"friction": 0.5}
-    with pytest.raises(TypeError, match=r"'friction'; did you mean `mu`"):
+    with pytest.raises(TypeError, match=r"`friction`; did you mean `mu`"):
         scene.add_sphere(radius=1, **wrong)
 
 

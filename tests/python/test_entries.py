@@ -242,9 +242,9 @@ def test_an_attribute_that_does_not_exist_suggests_another(scene, get, name, mea
 
 
 def test_an_argument_that_does_not_exist_suggests_another(scene, file):
-    with pytest.raises(TypeError, match="unexpected argument 'fixed_base'; did you mean `floating`"):
+    with pytest.raises(TypeError, match="there is no argument `fixed_base`; did you mean `floating`"):
         scene.add_urdf(file, fixed_base=False)
-    with pytest.raises(TypeError, match="unexpected argument 'rpy'; did you mean `quat`"):
+    with pytest.raises(TypeError, match="there is no argument `rpy`; did you mean `quat`"):
         scene.add_urdf(file, rpy=(0, 0, 1))
 
 

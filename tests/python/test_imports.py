@@ -36,6 +36,7 @@ LAYERS = (
         "tightloop.keyframes",
         "tightloop.notebook",
         "tightloop.optional_imports",
+        "tightloop.signatures",
         "tightloop.whole_files",
         "tightloop.written_arrays",
     ),

@@ -103,6 +103,7 @@ def world(tmp_path_factory) -> Iterator[Any]:
             order=(arm := scene().robots["arm"]).order(arm.dof_names[::-1]),
             dynamics=tl.Dynamics(scene()),
             picture=SimpleNamespace(render=render),
+            own={"Sim.send": sim.send, "Sim.restore": sim.restore, "Picture.render": picture.render},
             folder=tmp_path_factory.mktemp("films"),
             mesh=sample_meshes.stl(tmp_path_factory.mktemp("meshes") / "box.stl"),
         )

@@ -45,6 +45,16 @@ def ready_arrays(
     return found
 
 
+def step_arrays(
+    sim: Any, mocap_pos: Any, mocap_quat: Any, eq_active: Any, body_f: Any
+) -> dict[str, NDArray[np.float64]]:
+    """Return those commands of a step of a `Sim` that `ready_arrays` prepares."""
+    if mocap_pos is mocap_quat is eq_active is body_f is None:  # most steps, which must not take longer
+        return {}
+    given = {"mocap_pos": mocap_pos, "mocap_quat": mocap_quat, "eq_active": eq_active, "body_f": body_f}
+    return ready_arrays(sim.info, lambda: sim.params, "commands", given)
+
+
 def _flat(name: str, value: Command, mocaps: int) -> Command:
     """Return an array of mocap bodies with the entries of all of them in a row, and switches as numbers."""
     if name == "eq_active":

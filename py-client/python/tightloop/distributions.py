@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 from tightloop import checks
 from tightloop.errors import SceneError
+from tightloop.signatures import checked_calls
 
 # the daemon has the same limit, which keeps draws within float32
 _MOST = 1e6
 
 
+@checked_calls
 @dataclass(frozen=True)
 class Uniform:
     """The uniform distribution from ``low`` to ``high``.
@@ -38,6 +40,7 @@ class Uniform:
         return {"uniform": [self.low, self.high]}
 
 
+@checked_calls
 @dataclass(frozen=True)
 class Normal:
     """The normal distribution with a mean and a standard deviation.

@@ -11,10 +11,12 @@ from tightloop import _core, checks
 from tightloop.errors import ArgumentError, SceneError
 from tightloop.inputs import reals
 from tightloop.scene import Scene
+from tightloop.signatures import checked_calls
 
 Array = NDArray[np.float64]
 
 
+@checked_calls
 class Dynamics:
     """A scene's kinematics and dynamics as functions, computed in this process and in double precision.
 

@@ -22,6 +22,10 @@ class ArgumentError(TightloopError, ValueError):
     """An argument of a function or class is not valid; the message names it and what is valid."""
 
 
+class SignatureError(TightloopError, TypeError):
+    """A call has an argument that does not exist, too many, or too few; the message names it and the call."""
+
+
 class SceneError(TightloopError, ValueError):
     """A scene, or a value written into one, is not valid. The message names the part and the fix."""
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import overload
 
+from tightloop.signatures import checked_calls
 from tightloop.sim import Sim
 
 
+@checked_calls
 class Groups(Sequence[Sim]):
     """The groups of a daemon's worlds: a sequence of `Sim`, each of which steps independently of the others.
 

@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop.attributes import suggestion
 from tightloop.errors import ArgumentError, SceneError
 from tightloop.inputs import reals
+from tightloop.signatures import checked_calls
 
 
+@checked_calls
 class JointOrder:
     """An order of a robot's dofs, made by `Robot.order`. It converts arrays from and to the robot's own order.
 

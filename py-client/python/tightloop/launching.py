@@ -12,6 +12,7 @@ from tightloop.daemon import Daemon
 from tightloop.errors import ArgumentError
 from tightloop.groups import Groups
 from tightloop.scene import Scene
+from tightloop.signatures import checked_calls
 from tightloop.sim import Sim
 
 
@@ -59,6 +60,7 @@ def launch(
 ) -> Groups: ...
 
 
+@checked_calls
 def launch(
     scene: Scene,
     *,
@@ -199,6 +201,7 @@ def _names(daemon: str, groups: int) -> list[str]:
     return [daemon] if groups == 1 else [f"{daemon}.{group}" for group in range(groups)]
 
 
+@checked_calls
 def attach(name: str) -> Sim | Any:
     """Join a running daemon, which continues when this client ends.
 

@@ -7,6 +7,8 @@ from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
+from tightloop.signatures import checked_calls
+
 if TYPE_CHECKING:
     from PIL.Image import Image
 
@@ -58,6 +60,7 @@ def frame_html(frame: Any) -> str:
     return table("Frame", ("field", "shape", "type", "least … largest"), rows)
 
 
+@checked_calls
 class Shown:
     """Mixin of `Sim`: how it shows itself in a notebook."""
 

@@ -13,6 +13,7 @@ from tightloop._core import Frame
 from tightloop.attributes import nearest
 from tightloop.errors import CommandRefused, ConstantParameter, UnknownField
 from tightloop.inputs import real_numbers
+from tightloop.signatures import checked_calls
 from tightloop.written_arrays import PropertyArray
 
 #: Values per body or site, of parameters with several.
@@ -28,6 +29,7 @@ PARTS = {
 SINGLE = ("command_delay",)
 
 
+@checked_calls
 class Params:
     """The varying parameters of a simulation, as attributes of `Sim.params`.
 

@@ -18,8 +18,10 @@ from tightloop.errors import SceneError
 from tightloop.joint_order import JointOrder
 from tightloop.notebook import picture_html, table
 from tightloop.robot_properties import Modes, Numbers, PerDof, Positions
+from tightloop.signatures import checked_calls
 
 
+@checked_calls
 class Robot(Entity):
     """A robot of a scene, made by `Scene.add_urdf`.
 

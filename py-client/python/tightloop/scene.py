@@ -23,7 +23,8 @@ from tightloop.robot import PER_DOF, Robot
 from tightloop.scene_mujoco import HULL_VERTICES, check_options, keep_beside, read_file, read_model
 from tightloop.scene_options import FrictionCombine
 from tightloop.scene_randomization import SceneRandomization
-from tightloop.shapes import ORIGIN, UPRIGHT, Shape, Surface, checked_surface
+from tightloop.shapes import ORIGIN, UPRIGHT, Shape, Surface, checked_surface, with_surface
+from tightloop.signatures import checked_calls
 
 if TYPE_CHECKING:
     # typing has it from Python 3.11 on, the package runs on 3.10
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from tightloop.scene_mujoco import Model
 
 
+@checked_calls
 class Scene(SceneRandomization):
     """A scene: robots, bodies and shapes, time step and solver options, and what varies between worlds.
 
@@ -78,6 +80,7 @@ class Scene(SceneRandomization):
         self.command_delay_max = command_delay_max
         self.friction_combine = friction_combine
 
+    @with_surface
     def add_urdf(
         self,
         path: str | os.PathLike[str],
@@ -122,7 +125,7 @@ class Scene(SceneRandomization):
             SceneError: An argument is not valid; the message names it.
         """
         urdf = checks.path("add_urdf: path", path)
-        touch = checked_surface("add_urdf", surface, tuple(inspect.signature(self.add_urdf).parameters))
+        touch = checked_surface("add_urdf", surface)
         if isinstance(package_dirs, str) or not isinstance(package_dirs, Sequence):
             raise SceneError(f"add_urdf: package_dirs is {package_dirs!r}; give a list of folders")
         packages = [checks.path("add_urdf: a folder of package_dirs", folder) for folder in package_dirs]
@@ -269,10 +272,12 @@ class Scene(SceneRandomization):
         self.bodies[name] = body
         return body
 
+    @with_surface
     def add_table(self, *, name: str = "table", **surface: Unpack[Surface]) -> Shape:
         """Add the table of the lesson: a static box of 0.8 × 0.8 × 0.1 m with its top at z = 0.1 m, at (0, -0.5) m."""
         return self.add_box(half_extents=(0.4, 0.4, 0.05), pos=(0.0, -0.5, 0.05), name=name, **surface)
 
+    @with_surface
     def add_cube(
         self,
         *,

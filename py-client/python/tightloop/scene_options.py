@@ -12,6 +12,7 @@ from tightloop import checks
 from tightloop.attributes import Attributes
 from tightloop.checks import Triple, Vector
 from tightloop.errors import SceneError
+from tightloop.signatures import checked_calls
 
 Cone = Literal["elliptic", "pyramidal"]
 FrictionCombine = Literal["max", "mean", "min", "product"]
@@ -42,6 +43,7 @@ def capacity(what: str, value: SupportsIndex | None, most: int) -> int | None:
     return checked
 
 
+@checked_calls
 class SceneOptions(Attributes):
     """Mixin of `Scene` with its options."""
 

@@ -10,6 +10,7 @@ from tightloop.distributions import Distribution, Normal, Uniform, from_table
 from tightloop.errors import SceneError
 from tightloop.robot import Robot
 from tightloop.scene_sensors import SceneSensors
+from tightloop.signatures import checked_calls
 
 _POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 _VELOCITY = ("vx", "vy", "vz", "wx", "wy", "wz")
@@ -19,6 +20,7 @@ BodyOffsets = Mapping[str, Mapping[str, Distribution]]
 ParamRanges = Mapping[str, Distribution | Mapping[str, Distribution]]
 
 
+@checked_calls
 class SceneRandomization(SceneSensors):
     """Mixin of `Scene` with its randomization."""
 

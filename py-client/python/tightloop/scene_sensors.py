@@ -12,8 +12,10 @@ from tightloop.robot import Link
 from tightloop.scene_shapes import Collidable, SceneShapes, free_name
 from tightloop.sensors import ContactSensor, Site
 from tightloop.shapes import ORIGIN, UPRIGHT
+from tightloop.signatures import checked_calls
 
 
+@checked_calls
 class SceneSensors(SceneShapes):
     """Mixin of `Scene` with its sensors."""
 

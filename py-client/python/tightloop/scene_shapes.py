@@ -14,7 +14,18 @@ from tightloop.errors import SceneError
 from tightloop.mujoco_model import MujocoModel
 from tightloop.robot import Link, Robot
 from tightloop.scene_options import SceneOptions
-from tightloop.shapes import ORIGIN, UPRIGHT, Shape, ShapeType, Surface, checked, checked_scale, checked_surface
+from tightloop.shapes import (
+    ORIGIN,
+    UPRIGHT,
+    Shape,
+    ShapeType,
+    Surface,
+    checked,
+    checked_scale,
+    checked_surface,
+    with_surface,
+)
+from tightloop.signatures import checked_calls
 
 if TYPE_CHECKING:
     # typing has it from Python 3.11 on, the package runs on 3.10
@@ -23,6 +34,7 @@ if TYPE_CHECKING:
 Collidable = Shape | Robot | Body | Link | str
 
 
+@checked_calls
 class SceneShapes(SceneOptions):
     """Mixin of `Scene` with its shapes."""
 
@@ -36,6 +48,7 @@ class SceneShapes(SceneOptions):
         self.shapes: dict[str, Shape] = {}
         self.filters: list[tuple[str, str]] = []
 
+    @with_surface
     def add_box(
         self,
         *,
@@ -69,6 +82,7 @@ class SceneShapes(SceneOptions):
         """
         return self._add_shape("box", name, body, density, surface, pos=pos, quat=quat, half_extents=half_extents)
 
+    @with_surface
     def add_sphere(
         self,
         *,
@@ -83,6 +97,7 @@ class SceneShapes(SceneOptions):
         """Add a sphere with a ``radius`` [m]; the other arguments are those of `add_box`."""
         return self._add_shape("sphere", name, body, density, surface, pos=pos, quat=quat, radius=radius)
 
+    @with_surface
     def add_cylinder(
         self,
         *,
@@ -100,6 +115,7 @@ class SceneShapes(SceneOptions):
             "cylinder", name, body, density, surface, pos=pos, quat=quat, radius=radius, half_height=half_height
         )
 
+    @with_surface
     def add_capsule(
         self,
         *,
@@ -117,6 +133,7 @@ class SceneShapes(SceneOptions):
             "capsule", name, body, density, surface, pos=pos, quat=quat, radius=radius, half_height=half_height
         )
 
+    @with_surface
     def add_mesh(
         self,
         path: str | os.PathLike[str],
@@ -166,6 +183,7 @@ class SceneShapes(SceneOptions):
         }
         return self._add_shape("mesh", name, body, density, surface, mesh=mesh, pos=pos, quat=quat)
 
+    @with_surface
     def add_plane(
         self,
         *,
@@ -187,6 +205,7 @@ class SceneShapes(SceneOptions):
         """
         return self._add_shape("plane", name, None, None, surface, pos=pos, quat=quat)
 
+    @with_surface
     def add_ground(self, *, z: float = 0.0, name: str | None = None, **surface: Unpack[Surface]) -> Shape:
         """Add an infinite horizontal ground at height ``z`` [m], named ``ground``; see `add_plane`."""
         height = checks.number("add_ground: z", z)

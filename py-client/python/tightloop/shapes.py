@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, SupportsFloat, TypedDict, cast
 
 from tightloop import checks
-from tightloop.attributes import suggestion
 from tightloop.checks import Quaternion, Triple, Vector
 from tightloop.errors import SceneError
+from tightloop.signatures import with_arguments
 
 ShapeType = Literal["plane", "box", "sphere", "cylinder", "capsule", "mesh"]
 
@@ -122,23 +121,18 @@ def checked_scale(what: str, scale: Vector | SupportsFloat) -> Triple:
     return factors
 
 
-def checked_surface(what: str, given: Surface, others: Sequence[str] = ()) -> dict[str, Any]:
+def checked_surface(what: str, given: Surface) -> dict[str, Any]:
     """Check the given contact parameters.
 
     Args:
         what: What they are of, for messages.
         given: The parameters by name.
-        others: Further arguments of the call, for messages.
 
     Raises:
         SceneError: A value is out of range.
-        TypeError: A parameter does not exist.
     """
     values: dict[str, Any] = {}
     for name, value in cast("dict[str, Any]", given).items():
-        if name not in Surface.__annotations__:
-            near = suggestion(name, [*_SURFACE, *others])
-            raise TypeError(f"{what}: unexpected argument {name!r}; {near}")
         if value is None:
             continue
         entry = f"{what}: {name}"
@@ -161,6 +155,7 @@ def checked_surface(what: str, given: Surface, others: Sequence[str] = ()) -> di
     return values
 
 
-_SURFACE = tuple(Surface.__annotations__)
+#: Marks methods that take the parameters of a `Surface` as keyword arguments.
+with_surface = with_arguments(*Surface.__annotations__)
 # The daemon reads groups into 32 bits.
 _GROUP_MAX = 2**31 - 1

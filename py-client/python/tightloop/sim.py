@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop import _core, checks, keyframes
 from tightloop._core import Frame
 from tightloop.attributes import Attributes, nearest
-from tightloop.command_arrays import Command, ready_arrays
+from tightloop.command_arrays import Command, ready_arrays, step_arrays
 from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
 from tightloop.errors import ArgumentError, CommandRefused, SimClosed, UnknownAttribute
@@ -25,10 +25,12 @@ from tightloop.notebook import Shown
 from tightloop.params import Params
 from tightloop.rays import RayHits, Rays, ray_poses
 from tightloop.sensors import slices_by_name
+from tightloop.signatures import checked_calls
 from tightloop.snapshot import Snapshot, transfer_file
 from tightloop.viewer_process import Viewer
 
 
+@checked_calls
 class Sim(Shown, Attributes):
     """A simulation in a daemon. `launch` and `attach` make it; ``close`` or the end of a ``with`` block closes it.
 
@@ -144,7 +146,7 @@ class Sim(Shown, Attributes):
             LeaseLost: This client lost control of the daemon.
             DaemonLost: The daemon went away; its state is lost.
         """
-        more = self._arrays("commands", mocap_pos=mocap_pos, mocap_quat=mocap_quat, eq_active=eq_active, body_f=body_f)
+        more = step_arrays(self, mocap_pos, mocap_quat, eq_active, body_f)
         return self._client.step(joint_f, joint_target_q, joint_target_qd, ctrl, more)
 
     def send(
@@ -178,7 +180,7 @@ class Sim(Shown, Attributes):
             CommandRefused: A shape or dtype is wrong, or a step is in flight; nothing was sent. `recv` reports a wrong
                 value, such as NaN. Other errors are those of `step`.
         """
-        more = self._arrays("commands", mocap_pos=mocap_pos, mocap_quat=mocap_quat, eq_active=eq_active, body_f=body_f)
+        more = step_arrays(self, mocap_pos, mocap_quat, eq_active, body_f)
         self._client.send(joint_f, joint_target_q, joint_target_qd, ctrl, more)
 
     def recv(self) -> Frame:

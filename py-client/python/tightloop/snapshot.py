@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from tightloop import checks
 from tightloop.errors import SnapshotError
+from tightloop.signatures import checked_calls
 from tightloop.whole_files import whole_file
 
 # magic, version, checksum, model hash, worlds, values per world, bytes per value; little endian
@@ -34,6 +35,7 @@ _SHARED_MEMORY = Path("/dev/shm")
 _NO_ROOM = "snapshot: no room on its way to the daemon: {}"
 
 
+@checked_calls
 class Snapshot:
     """All worlds of a simulation at one instant, for `Sim.restore`; immutable.
 

@@ -12,10 +12,12 @@ from html import escape
 
 from tightloop import checks, errors
 from tightloop.errors import ArgumentError, LaunchError
+from tightloop.signatures import checked_calls
 
 _STOP_SECONDS = 3.0
 
 
+@checked_calls
 class Viewer:
     """A viewer, started by `Sim.view`. It ends with the simulation, with this process, or by ``close``.
 

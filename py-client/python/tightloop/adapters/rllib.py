@@ -17,10 +17,12 @@ from gymnasium.vector import AutoresetMode
 from tightloop.adapters.environment import library
 from tightloop.env import Env, Task, VectorEnv
 from tightloop.errors import ArgumentError
+from tightloop.signatures import checked_calls
 
 registry = library("ray.tune.registry", install="ray[rllib]")
 
 
+@checked_calls
 def register(task: Task | type[Task] | str, *, name: str | None = None, **options: Any) -> str:
     """Register a task with Ray and all its workers.
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tightloop.adapters.environment import Given, adapted_environment, library, set_torch_threads
 from tightloop.errors import ArgumentError
+from tightloop.signatures import checked_calls
 
 rsl_env = library("rsl_rl.env", install="rsl-rl-lib")
 tensordicts = library("tensordict", install="rsl-rl-lib")
@@ -24,6 +25,7 @@ torch = library("torch", install="torch")
 GROUP = "policy"
 
 
+@checked_calls
 class RslRlVecEnv(rsl_env.VecEnv):
     """A `VectorEnv` as a `VecEnv` of rsl_rl, which starts the next episode in the same step.
 

@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 
 from tightloop.adapters.environment import Given, adapted_environment, library, set_torch_threads
 from tightloop.errors import ArgumentError
+from tightloop.signatures import checked_calls
 
 vec_env = library("stable_baselines3.common.vec_env", install="stable-baselines3")
 torch = library("torch", install="torch")
 
 
+@checked_calls
 class Sb3VecEnv(vec_env.VecEnv):
     """A `VectorEnv` as a `VecEnv` of Stable-Baselines3, which starts the next episode in the same step.
 

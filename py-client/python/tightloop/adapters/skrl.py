@@ -13,12 +13,14 @@ from typing import Any
 from gymnasium.vector import AutoresetMode
 
 from tightloop.adapters.environment import Given, adapted_environment, library, set_torch_threads
+from tightloop.signatures import checked_calls
 
 skrl = library("skrl", install="skrl")
 gymnasium_envs = library("skrl.envs.wrappers.torch.gymnasium_envs", install="skrl")
 torch = library("torch", install="torch")
 
 
+@checked_calls
 class SkrlEnv(gymnasium_envs.GymnasiumWrapper):
     """A `VectorEnv` in skrl's torch wrapper of vectorized environments.
 

@@ -17,6 +17,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from tightloop.adapters.environment import Given, adapted_environment, library, set_torch_threads
+from tightloop.signatures import checked_calls
 
 envs = library("torchrl.envs", install="torchrl")
 specs = library("torchrl.data", install="torchrl")
@@ -24,6 +25,7 @@ tensordicts = library("tensordict", install="torchrl")
 torch = library("torch", install="torch")
 
 
+@checked_calls
 class TorchRlEnv(envs.EnvBase):
     """A `VectorEnv` of batch size ``(num_envs,)``; torchrl resets the worlds whose episodes ended.
 

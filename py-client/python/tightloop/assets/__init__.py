@@ -12,6 +12,7 @@ from pathlib import Path
 from tightloop.assets.policy import Policy
 from tightloop.attributes import suggestion
 from tightloop.errors import ArgumentError
+from tightloop.signatures import checked_calls
 
 __all__ = ["CARTPOLE", "FR3", "POLICIES", "Policy", "policy"]
 
@@ -24,6 +25,7 @@ CARTPOLE = _FOLDER / "cartpole.urdf"
 POLICIES = {file.stem: file for file in sorted((_FOLDER / "policies").glob("*.npz"))}
 
 
+@checked_calls
 def policy(task: str) -> Policy:
     """Return a trained policy of a task; ``examples/trained/README.md`` says what it reaches.
 

@@ -16,6 +16,7 @@ from tightloop import _core, checks
 from tightloop.env.commands import Commands
 from tightloop.env.names import Names
 from tightloop.errors import ArgumentError
+from tightloop.signatures import checked_calls
 
 
 class Control(Protocol):
@@ -44,6 +45,7 @@ class _Joints:
     limit = 1.0
     _field = "joint_target_q"
 
+    @checked_calls
     def __init__(self, dofs: Sequence[str], scale: ArrayLike) -> None:
         """Make a control of some dofs.
 
@@ -93,6 +95,7 @@ class JointTorque(_Joints):
 
     _field = "joint_f"
 
+    @checked_calls
     def __init__(self, dofs: Sequence[str], scale: ArrayLike, *, hold: bool = False) -> None:
         """Make a torque control of some dofs.
 
@@ -121,6 +124,7 @@ class JointTorque(_Joints):
 class JointTarget(_Joints):
     """Drive targets relative to the scene's, ``start + scale * action`` [rad or m], clipped to the joint limits."""
 
+    @checked_calls
     def __init__(self, dofs: Sequence[str], scale: ArrayLike, *, limit: float = 1.0) -> None:
         """Make a target control of some dofs.
 
@@ -151,6 +155,7 @@ class JointDelta(_Joints):
 class Gripper(_Joints):
     """One action value for all fingers: their target is ``low`` at -1, ``high`` at 1, and linear in between."""
 
+    @checked_calls
     def __init__(self, dofs: Sequence[str], low: float, high: float, *, binary: bool = False) -> None:
         """Make a gripper control.
 
@@ -192,6 +197,7 @@ class EndEffectorDelta(_Joints):
 
     fields = ("site_inverse_jacobian",)
 
+    @checked_calls
     def __init__(self, site: str, dofs: Sequence[str], pos_scale: float, rot_scale: float | None = None) -> None:
         """Make a control of a site.
 

@@ -12,6 +12,7 @@ from tightloop.env.simulation import options_of
 from tightloop.env.task import Task
 from tightloop.env.vector import VectorEnv
 from tightloop.errors import ArgumentError
+from tightloop.signatures import checked_calls
 
 #: Keyword arguments of `VectorEnv`; all others are the task's.
 _OF_ENVIRONMENTS = {
@@ -19,6 +20,7 @@ _OF_ENVIRONMENTS = {
 }
 
 
+@checked_calls
 def make_groups(
     task: Task | type[Task] | str,
     num_envs: int,
@@ -64,7 +66,7 @@ def make_groups(
     for name in {"daemon", "first_env"} & set(options):
         raise ArgumentError(f"make_groups: {name} is not taken, since the groups have one of their own; leave it out")
     of_task = {name: options.pop(name) for name in set(options) - _OF_ENVIRONMENTS}
-    made = make_task(task, of_task)
+    made = make_task(task, of_task, make_groups)
     own = options_of(made, list(made.controls()), device=device, precision=precision, threads=threads)
     sims = tl.launch(made.scene(), worlds=num_envs, groups=groups, **own)
     try:

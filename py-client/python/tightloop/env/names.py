@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from tightloop.errors import ArgumentError
+from tightloop.signatures import checked_calls
 
 
+@checked_calls
 class Names:
     """Indices in the arrays of frames and commands, by name.
 

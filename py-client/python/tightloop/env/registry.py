@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from inspect import Parameter, signature
@@ -13,6 +13,7 @@ from typing import Any
 from tightloop.env.controls import Control
 from tightloop.env.task import Task
 from tightloop.errors import ArgumentError
+from tightloop.signatures import unknown_argument
 
 #: Module and class of each task that comes with tightloop.
 TASKS = {
@@ -25,15 +26,25 @@ TASKS = {
 }
 
 
-def make_task(task: Task | type[Task] | str, options: Mapping[str, Any]) -> Task:
+def make_task(
+    task: Task | type[Task] | str, options: Mapping[str, Any], environment: Callable[..., Any] | None = None
+) -> Task:
     """Make a task from a task, a class, the name of one of `tightloop.tasks`, or ``FILE.py:CLASS``.
 
+    Args:
+        task: The task.
+        options: Arguments of its class.
+        environment: What the options were given to, whose own arguments are suggested for a wrong one.
+
     Raises:
-        ArgumentError: There is no such task, or it does not take these options.
+        ArgumentError: There is no such task.
+        SignatureError: It does not take these options.
     """
+    of_environments = [] if environment is None else [*signature(environment).parameters][1:-1]
     if isinstance(task, Task):
         if options:
-            raise ArgumentError(f"{', '.join(options)}: unknown argument; options of a task go to its constructor")
+            what = f"environment of the task {type(task).__name__}, which is made already"
+            raise unknown_argument(what, next(iter(options)), of_environments)
         return task
     if isinstance(task, str):
         task = _named(task)
@@ -43,9 +54,7 @@ def make_task(task: Task | type[Task] | str, options: Mapping[str, Any]) -> Task
     if not any(parameter.kind is Parameter.VAR_KEYWORD for parameter in taken.values()):
         for name in options:
             if name not in taken:
-                known = ", ".join(taken) or "none"
-                problem = f"{name}: no argument of environments, nor of task {task.__name__}, whose are: {known}"
-                raise ArgumentError(problem)
+                raise unknown_argument(f"environment of the task {task.__name__}", name, [*of_environments, *taken])
     return task(**options)
 
 

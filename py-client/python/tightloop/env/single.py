@@ -15,8 +15,10 @@ from tightloop.env.task import Task
 from tightloop.env.vector import VectorEnv
 from tightloop.errors import ArgumentError
 from tightloop.inputs import whole_seed
+from tightloop.signatures import checked_calls
 
 
+@checked_calls
 class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     """A task in one world; each step returns new arrays.
 

@@ -15,6 +15,7 @@ from tightloop.env.controls import Control
 from tightloop.env.names import Names
 from tightloop.errors import ArgumentError
 from tightloop.scene import Scene
+from tightloop.signatures import checked_calls
 
 #: An array of NumPy, torch or JAX.
 Array = Any
@@ -53,6 +54,7 @@ class Worlds:
         return Worlds(**{name: np.asarray(array)[rows] for name, array in self.__dict__.items()})
 
 
+@checked_calls
 @dataclass(frozen=True)
 class Observed:
     """A part of the observation: name, size, bounds and unit.

@@ -28,11 +28,13 @@ from tightloop.env.step_buffers import BufferRing, StepBuffers
 from tightloop.env.task import Task, episode_steps
 from tightloop.errors import ArgumentError, CommandRefused, DaemonLost
 from tightloop.frames import FAULTED
+from tightloop.signatures import checked_calls
 from tightloop.sim import Sim
 
 Step = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 
 
+@checked_calls
 class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
     """A task in many worlds.
 
@@ -113,7 +115,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         if num_envs is not None:
             num_envs = checks.integer("num_envs", num_envs, error=ArgumentError)
         # a task is bound to one environment: two environments would share its arrays
-        self.task = copying.deepcopy(make_task(task, options))
+        self.task = copying.deepcopy(make_task(task, options, VectorEnv))
         self.autoreset_mode = _mode(autoreset_mode)
         self.max_episode_steps = episode_steps(self.task, max_episode_steps)
         controls = controls_of(self.task)

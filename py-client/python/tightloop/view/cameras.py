@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tightloop import checks
 from tightloop.errors import ArgumentError
+from tightloop.signatures import checked_calls
 
 #: Directions from the target to the camera, x forward, z up; "follow" is a "three-quarter" camera that moves along.
 PRESETS = {
@@ -27,6 +28,7 @@ _KEEP = 0.96
 _LEAST_DISTANCE = 0.1
 
 
+@checked_calls
 @dataclass(frozen=True)
 class Camera:
     """A point of view.

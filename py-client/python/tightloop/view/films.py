@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tightloop import checks
 from tightloop.errors import ArgumentError, DaemonLost, WaitTimeout
+from tightloop.signatures import checked_calls
 from tightloop.view import dependencies
 from tightloop.view.arguments import check_camera, check_contacts, check_size, check_worlds
 from tightloop.view.cameras import Camera
@@ -39,6 +40,7 @@ _GIF_FPS_MAX = 50
 _ENDINGS = (".png", ".gif", ".mp4", ".html")
 
 
+@checked_calls
 class Film:
     """Writes frames of a run into a picture or a film.
 
@@ -196,6 +198,7 @@ class Film:
         return int(seconds / self.spacing + _SLACK) + 1
 
 
+@checked_calls
 def film(
     source: str | os.PathLike[str] | Sim,
     out: str | os.PathLike[str],

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop import _core, checks
 from tightloop.errors import ArgumentError
 from tightloop.frames import FAULTED
+from tightloop.signatures import checked_calls
 from tightloop.view import cameras, grid
 from tightloop.view.arguments import check_camera, check_contacts
 from tightloop.view.cameras import Camera
@@ -41,6 +42,7 @@ _LINES = 12
 _FLOOR_SIZE = 4.0
 
 
+@checked_calls
 class Picture:
     """Draws the worlds of a frame or a `Shown`; the same worlds give the same bytes.
 

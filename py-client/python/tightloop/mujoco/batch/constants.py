@@ -59,7 +59,7 @@ def set_const(model: Any, expansions: Expansions, ids: NDArray[np.int64], num_si
         warnings.warn(
             "set_const: limits, contacts, equalities and dry friction keep the softness of the model, "
             "since tightloop does not vary body_invweight0, dof_invweight0 and tendon_invweight0",
-            stacklevel=3,
+            stacklevel=4,
         )
     if failed:
         raise RuntimeError(failed)

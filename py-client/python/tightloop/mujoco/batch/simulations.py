@@ -24,6 +24,7 @@ from tightloop.mujoco.batch.selection import Selection
 from tightloop.mujoco.batch.shapes import geoms_of_shapes
 from tightloop.mujoco.batch.stepping import Stepping
 from tightloop.mujoco.batch.views import NamedViews
+from tightloop.signatures import checked_calls
 from tightloop.sim import Sim
 
 Array = NDArray[Any]
@@ -32,6 +33,7 @@ Array = NDArray[Any]
 _SEEN_BY_RAYS = ("geom_rgba", "geom_matid", "geom_group", "mat_rgba")
 
 
+@checked_calls
 class Batch(NamedViews):
     """Many simulations of one MuJoCo model, read and written through live arrays.
 

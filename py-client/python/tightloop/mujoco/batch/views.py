@@ -9,6 +9,7 @@ from typing import Any
 from numpy.typing import DTypeLike, NDArray
 
 from tightloop.mujoco.batch.library import mujoco
+from tightloop.signatures import checked_calls
 
 Array = NDArray[Any]
 
@@ -49,6 +50,7 @@ class Site:
     xmat: Array
 
 
+@checked_calls
 class NamedViews(ABC):
     """Access by name to the bound fields of a batch. An unknown name is a KeyError that lists the names."""
 
