@@ -127,6 +127,14 @@ def test_one_world_fills_the_picture(tmp_path: Path, make: Callable[[Path], Case
     assert case.span(case.poses(), camera=camera).max() > LEAST
 
 
+def test_arms_that_stretch_out_later_stay_in_the_picture_in_each_of_several_worlds(tmp_path: Path) -> None:
+    case, picture = arm(tmp_path), Picture(arm(tmp_path).parts, 320, 200)
+    case.span(case.poses(4), picture, worlds=4)
+    for turned in (0.0, -0.8, 2.4):
+        case.joint_q = [turned, 1.4, 0, -0.1, 0, 2.4, 0.8, 0, 0]
+        case.span(case.poses(4), picture, worlds=4)
+
+
 @pytest.mark.parametrize("camera", ["three-quarter", "front", "side", "top"])
 @pytest.mark.parametrize("make", [pendulum, walker, arm])
 def test_a_grid_of_worlds_fills_the_picture(tmp_path: Path, make: Callable[[Path], Case], camera: str) -> None:

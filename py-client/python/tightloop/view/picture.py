@@ -46,8 +46,8 @@ _FLOOR_SIZE = 4.0
 class Picture:
     """Draws the worlds of a frame or a `Shown`; the same worlds give the same bytes.
 
-    Robots and free bodies fill the first picture of a preset, which sets the camera. In later pictures of a single
-    world it moves only to keep a robot with a fixed base, and its goals, in the picture.
+    Robots and free bodies fill the first picture of a preset, which sets the camera. In later pictures it moves only to
+    keep robots with a fixed base, and their goals, in the picture.
 
     Attributes:
         width: Width of pictures [pixels].
@@ -304,7 +304,7 @@ class Picture:
         view, first = self._cameras[key]
         if follows and centre is not None:
             view = cameras.shifted(view, centre - first)
-        if follows or (len(body_q) == 1 and not self._subject.floats):
+        if follows or not self._subject.floats:
             points = self._framing.points(body_q, places, robot=True)
             if not self._subject.floats:
                 points = np.concatenate([points, aims[np.isfinite(aims).all(axis=-1)]])
