@@ -98,10 +98,10 @@ def test_visuals_of_all_formats_are_where_their_links_are(tmp_path):
     base, upper, fixed, tip = found.of("visual")
     assert [dynamics.body_names[part.body] for part in found] == ["r/base", "r/upper", "r/fixed", "r/tip"]
     assert len(found) == 4 and {part.shape for part in found} == {"mesh"}
-    # colours: the robot's where the file has none, else the file's
+    # colours: the robot's, except of a file with several
     assert (base.mesh.colors == GREEN).all()
     assert sorted(map(tuple, np.unique(upper.mesh.colors, axis=0))) == [tuple(GREEN), tuple(RED)]
-    assert (fixed.mesh.colors == BLUE).all() and (tip.mesh.colors == GREEN).all()
+    assert (fixed.mesh.colors == GREEN).all() and (tip.mesh.colors == GREEN).all()
     # swung by 90° about x: y is up
     body_q = dynamics.forward_kinematics(np.array([np.pi / 2]))
     np.testing.assert_allclose(extent(in_world(base, body_q)), [[10, 0, 1], [11, 2, 4]], atol=ATOL)
@@ -272,9 +272,11 @@ def test_one_file_is_read_once_and_shared(tmp_path):
     looks.collada(tmp_path / "a.dae", diffuse="<color>1 0 0 1</color>")
     same = visual('<mesh filename="a.dae"/>', material='<material name="m"><color rgba="0 1 0 1"/></material>')
     links = link("l", same + visual('<mesh filename="a.dae"/>') + visual('<mesh filename="a.dae" scale="1 1 2"/>'))
-    one, two, tall = parts_of(scene_of(tmp_path, links)[0])
-    assert one.mesh is two.mesh and tall.mesh is not one.mesh
-    assert (one.mesh.colors == RED).all()
+    links += link("m", same)
+    joint = '<joint name="w" type="fixed"><parent link="l"/><child link="m"/></joint>'
+    one, two, tall, other = parts_of(scene_of(tmp_path, links, joint)[0])
+    assert one.mesh is other.mesh and tall.mesh is not two.mesh and one.mesh is not two.mesh
+    assert (two.mesh.colors == RED).all() and (one.mesh.colors == GREEN).all()
 
 
 def test_a_plane_is_a_sheet_of_checkers():

@@ -164,7 +164,7 @@ class _Assembly:
         if entry["shape"] == "plane":
             mesh = self._sheet(entry["half_extents"], own or paint.PLAIN)
         elif "file" in entry:
-            mesh = self._of_file(entry["file"], tuple(entry["scale"]), own or paint.PLAIN)
+            mesh = self._of_file(entry["file"], tuple(entry["scale"]), own)
         else:
             mesh = self._of_surface(entry["mesh"], own or paint.PLAIN)
         return self._part(entry, "visual", mesh)
@@ -183,7 +183,8 @@ class _Assembly:
                 return self._images[image]
         return None if entry["color"] is None else paint.of_floats(entry["color"])
 
-    def _of_file(self, file: str, scale: tuple[float, ...], color: Color) -> Mesh:
+    def _of_file(self, file: str, scale: tuple[float, ...], own: Color | None) -> Mesh:
+        """A mesh file, in the robot's colour where it has one and the mesh has not several of its own."""
         found = self._files.get(file)
         if found is None:
             try:
@@ -195,10 +196,12 @@ class _Assembly:
             self._files[file] = found
         if isinstance(found, SceneError):
             raise found
-        key = file, scale, None if found.painted.all() else color
+        # most files of one colour have it from an exporter's default
+        whole = own is not None and found.is_plain
+        key = file, scale, own if whole or not found.painted.all() else None
         if key not in self._meshes:
             scaled = found.scaled(scale)
-            self._meshes[key] = Mesh(scaled.vertices, scaled.faces, scaled.filled(color))
+            self._meshes[key] = Mesh(scaled.vertices, scaled.faces, scaled.filled(own or paint.PLAIN, whole=whole))
         return self._meshes[key]
 
     def _of_surface(self, place: int, color: Color) -> Mesh:

@@ -40,10 +40,16 @@ class VisualMesh:
         vertices = (self.vertices * np.asarray(scale)).astype(np.float32)
         return VisualMesh(vertices, np.ascontiguousarray(faces), self.colors, self.painted, self.notes)
 
-    def filled(self, color: tuple[int, int, int, int]) -> Colors:
-        """The colours, with this one where there is none."""
+    @property
+    def is_plain(self) -> bool:
+        """Whether the faces that have a colour in the file have the same one."""
+        own = self.colors[self.painted]
+        return not len(own) or bool((own == own[0]).all())
+
+    def filled(self, color: tuple[int, int, int, int], *, whole: bool = False) -> Colors:
+        """The colours, with this one where there is none, or everywhere."""
         colors = self.colors.copy()
-        colors[~self.painted] = color
+        colors[... if whole else ~self.painted] = color
         return colors
 
 
