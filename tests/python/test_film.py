@@ -6,6 +6,7 @@ import itertools
 import signal
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -233,6 +234,29 @@ def test_a_folder_with_files_stays_as_it_is(scene: tl.Scene, tmp_path: Path) -> 
             Film(tmp_path / "run.gif", sim, fps=60)
         assert "4 worlds" in " ".join(Film(tmp_path / "run.gif", sim, worlds=4, fps=20).notes)
     assert len(pictures_of(tmp_path)) == 1
+
+
+def test_an_error_in_the_block_says_that_the_film_is_lost(scene: tl.Scene, tmp_path: Path) -> None:
+    def fail(out: str) -> None:
+        with tl.launch(scene, worlds=1) as sim, Film(tmp_path / out, sim, size=SIZE, fps=20) as made:
+            for _ in range(10):
+                made.add(sim.step())
+            raise RuntimeError("mine")
+
+    for out in ("run.gif", "run.html"):
+        with (
+            pytest.warns(UserWarning, match=rf"{out} is not written.*RuntimeError.*after [2-9] picture.*close") as told,
+            pytest.raises(RuntimeError, match="mine"),
+        ):
+            fail(out)
+        assert Path(told[0].filename) == Path(__file__)
+        assert not list(tmp_path.iterdir())
+    # these have their pictures already
+    for out in ("run.png", "folder"):
+        with warnings.catch_warnings(), pytest.raises(RuntimeError, match="mine"):
+            warnings.simplefilter("error")
+            fail(out)
+        assert pictures_of(tmp_path / out)
 
 
 def test_a_page_is_one_file_that_needs_no_other(scene: tl.Scene, tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,7 +50,7 @@ class Film:
     second of the run.
 
     The file appears, or replaces an existing one, when the film is complete: at `close`, or at the end of a ``with``
-    block without an error. After an error there is no film, and an existing file is unchanged.
+    block without an error. After an error there is no film, a warning says so, and an existing file is unchanged.
 
     Attributes:
         pictures: Number of pictures so far.
@@ -121,6 +122,7 @@ class Film:
         else:
             self._encoder = _encoder(path, self._fps, size)
         self._single = _ending(path) == ".png"
+        self._out = path
         self.pictures = 0
         self._time: float | None = None
 
@@ -184,8 +186,19 @@ class Film:
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None:
             self.close()
-        else:
-            self.discard()
+            return
+        lost = self.pictures if self._would_lose() else 0
+        self.discard()
+        if lost:
+            warnings.warn(
+                f"film: {self._out} is not written, since {kind.__name__} ended it after {lost} picture(s); to "
+                "keep them, catch the error inside of the `with` block, or call close() there",
+                stacklevel=2,
+            )
+
+    def _would_lose(self) -> bool:
+        """Whether discarding loses pictures: a folder and a single picture have them already."""
+        return self._page is not None or isinstance(self._encoder, GifEncoder | Mp4Encoder)
 
     def _take(self) -> Encoder | Html | None:
         """Return what is to be finished, once."""
