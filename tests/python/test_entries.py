@@ -207,6 +207,8 @@ def test_entries_of_parameters_and_frames(scene):
             frame.joint_q[0, 0] = 1.0
         with pytest.raises(tl.CommandRefused, match="read-only"):
             frame.joint_q += 1.0
+        with pytest.raises(tl.CommandRefused, match=r"read-only.*copy"):
+            frame.status |= 1
         with pytest.raises(tl.CommandRefused, match=r"`joint_q` of a frame is read-only.*sim\.write"):
             frame.joint_q = 1.0
         with pytest.raises(tl.CommandRefused, match=r"no entries, such as 'joint_q'.*frame\.joint_q\[world\]"):

@@ -126,7 +126,21 @@ def _checked_in_place(name: str) -> Callable[[FrameArray, Any], Any]:
     return checked
 
 
-for _name in ("__iadd__", "__isub__", "__imul__", "__itruediv__", "__ifloordiv__", "__imod__", "__ipow__"):
+for _name in (
+    "__iadd__",
+    "__isub__",
+    "__imul__",
+    "__itruediv__",
+    "__ifloordiv__",
+    "__imod__",
+    "__ipow__",
+    "__iand__",
+    "__ior__",
+    "__ixor__",
+    "__ilshift__",
+    "__irshift__",
+    "__imatmul__",
+):
     setattr(FrameArray, _name, _checked_in_place(_name))
 
 
