@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from html import escape
 
 import numpy as np
 import pytest
@@ -38,7 +39,7 @@ def test_names_are_escaped(scene, monkeypatch):
 def test_simulations_and_frames_show_tables(scene):
     with tl.launch(scene, worlds=3) as sim:
         frame = sim.forward()
-        assert "AVX" in sim._repr_html_() and "arm, cube" in sim._repr_html_()
+        assert escape(sim.device) in sim._repr_html_() and "arm, cube" in sim._repr_html_()
         for shown in (frame, frame.copy()):
             html = shown._repr_html_()
             assert "joint_q" in html and "(3, 16)" in html and "float32" in html
