@@ -3,6 +3,8 @@
 The callables are those of `public_calls.py`, which `test_wrong_inputs.py` compares with the package.
 """
 
+# the calls are wrong on purpose
+# pyright: reportCallIssue=false, reportArgumentType=false
 from __future__ import annotations
 
 import contextlib

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from types import FunctionType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from tightloop.attributes import nearest
 from tightloop.errors import SignatureError
@@ -33,7 +33,7 @@ def checked_calls(thing: Checked) -> Checked:
                 setattr(thing, name, _wrapped(member))
             elif isinstance(member, classmethod | staticmethod):
                 setattr(thing, name, type(member)(_wrapped(member.__func__)))
-        return thing
+        return cast("Checked", thing)
     return _wrapped(thing)
 
 
@@ -53,6 +53,15 @@ def unknown_argument(call: str, name: str, accepted: Sequence[str]) -> Signature
 
 
 _FURTHER = "_further_arguments"
+#: What makes objects of classes that nobody calls.
+_MADE_BY = {
+    "Sim": "`tightloop.launch` and `tightloop.attach`",
+    "Groups": "`tightloop.launch(groups=…)` and `tightloop.attach`",
+    "Robot": "`Scene.add_urdf` and `Scene.load`",
+    "JointOrder": "calls of `Robot.order`",
+    "Params": "the properties `Sim.params`",
+    "Snapshot": "`Sim.snapshot` and `Snapshot.load`",
+}
 
 
 def _wrapped(function: Any) -> Any:
@@ -95,6 +104,8 @@ def _explained(function: FunctionType, given: Sequence[Any], named: Mapping[str,
         method = function.__name__
         call = call.removesuffix(".__init__") if method == "__init__" else f"{owner.__name__}.{method}"
         parameters, given = parameters[1:], given[1:]
+    if function.__name__ == "__init__" and call in _MADE_BY:
+        return SignatureError(f"{call}: {_MADE_BY[call]} make it; call those")
     further = getattr(function, _FURTHER, ())
     parameters = [one for one in parameters if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)]
     parameters += [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None) for name in further]
