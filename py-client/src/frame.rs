@@ -77,6 +77,11 @@ impl PyFrame {
         Err(raise(py, "CommandRefused", problem))
     }
 
+    fn __reduce__(&self, py: Python<'_>) -> PyResult<()> {
+        let problem = "a frame cannot be copied by `copy` or pickled, since it is the daemon's memory; `frame.copy()` can";
+        Err(raise(py, "CommandRefused", problem.to_owned()))
+    }
+
     /// The frame's arrays in memory of their own, as attributes of the same names. Takes no slot.
     fn copy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let arrays = PyDict::new(py);

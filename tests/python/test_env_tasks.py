@@ -225,7 +225,7 @@ def test_a_file_may_hold_the_task(tmp_path: Path, envs: Any) -> None:
     for name, said in ((f"{file}:Yours", "no class 'Yours'"), (f"{tmp_path}/no.py:Mine", "no file")):
         with pytest.raises(tl.ArgumentError, match=said):
             VectorEnv(name)
-    with pytest.raises(tl.ArgumentError, match=r"colour.*force"):
+    with pytest.raises(tl.SignatureError, match=r"colour.*force"):
         VectorEnv(f"{file}:Mine", colour="red")
     example = envs(f"{REPOSITORY}/examples/own_task.py:Circle", 4)
     example.reset(seed=0)

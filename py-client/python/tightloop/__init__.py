@@ -46,6 +46,7 @@ if TYPE_CHECKING:
         UnknownAttribute,
         UnknownDaemon,
         UnknownField,
+        UnknownName,
         UrdfError,
         WaitTimeout,
     )
@@ -92,6 +93,7 @@ _HOMES = {
         "UnknownAttribute",
         "UnknownDaemon",
         "UnknownField",
+        "UnknownName",
         "UrdfError",
         "WaitTimeout",
     ),
@@ -153,6 +155,7 @@ __all__ = [
     "UnknownAttribute",
     "UnknownDaemon",
     "UnknownField",
+    "UnknownName",
     "UrdfError",
     "WaitTimeout",
     "__version__",

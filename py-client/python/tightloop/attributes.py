@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
 
-from tightloop.errors import UnknownAttribute
+from tightloop.errors import UnknownAttribute, UnknownName
+
+Entry = TypeVar("Entry")
 
 #: What other simulators call these attributes, or what their names are without a prefix.
 SYNONYMS = {
@@ -26,6 +28,7 @@ SYNONYMS = {
     "extents": ("half_extents",),
     "file": ("path",),
     "filename": ("path",),
+    "frame": ("forward",),
     "friction": ("mu", "shape_mu", "joint_friction"),
     "half_size": ("half_extents",),
     "height": ("half_height",),
@@ -46,14 +49,18 @@ SYNONYMS = {
     "num_envs": ("worlds",),
     "num_worlds": ("worlds",),
     "nworld": ("worlds",),
+    "obs": ("forward",),
+    "observation": ("forward",),
     "orientation": ("quat",),
     "position": ("pos", "joint_q"),
     "qpos": ("joint_q",),
     "qvel": ("joint_qd",),
+    "render": ("picture", "view"),
     "rot": ("quat",),
     "rotation": ("quat",),
     "rpy": ("quat",),
     "size": ("half_extents", "radius"),
+    "state": ("forward", "snapshot"),
     "stiffness": ("joint_target_ke",),
     "target": ("joint_target_q",),
     "timestep": ("dt",),
@@ -83,6 +90,24 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     if near:
         return "did you mean " + " or ".join(f"`{other}`" for other in near) + "?"
     return f"there are: {', '.join(known)}"
+
+
+class ByName(dict[str, Entry]):
+    """What a scene or a simulation has, by name: a dict, whose error of a wrong name suggests another."""
+
+    def __init__(self, kind: str, entries: Mapping[str, Entry] | None = None) -> None:
+        super().__init__(entries or {})
+        self._kind = kind
+
+    def __missing__(self, name: Any) -> Any:
+        cure = suggestion(str(name), self) if self else "there is none yet"
+        raise UnknownName(f"there is no {self._kind} {name!r}; {cure}")
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
+        cure = f"write [{name!r}]" if name in self else 'entries are by name, such as ["arm"]'
+        raise UnknownAttribute(f"a dict of each {self._kind} by name has no attribute {name!r}; {cure}")
 
 
 class Attributes:
@@ -117,6 +142,10 @@ class Attributes:
     def _refused(self, name: str) -> UnknownAttribute:
         """Return the error of setting an attribute that does not exist, or cannot be set."""
         known = self._own_attributes()
+        if name in getattr(self, "fields", ()):
+            return UnknownAttribute(
+                f"{self._subject()} has no attribute {name!r}; `write` and arguments of `step` change worlds"
+            )
         if name in known or hasattr(type(self), name):
             return UnknownAttribute(f"{self._subject()}: `{name}` can only be read; {self._instead(name)}")
         return UnknownAttribute(f"{self._subject()} has no attribute {name!r}; {suggestion(name, known)}")

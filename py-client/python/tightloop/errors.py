@@ -109,6 +109,13 @@ class UnknownAttribute(TightloopError, AttributeError):
     """An object has no attribute of that name, or it can only be read; the message suggests another."""
 
 
+class UnknownName(TightloopError, KeyError):
+    """A scene or a simulation has nothing of that name; the message suggests another."""
+
+    def __str__(self) -> str:  # KeyError's has quotes around it
+        return str(self.args[0])
+
+
 class UnknownField(TightloopError, AttributeError):
     """Frames of this run do not carry the field; add it to ``fields`` at launch."""
 

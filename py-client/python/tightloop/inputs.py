@@ -40,6 +40,8 @@ def as_array(
     given = real_numbers(what, value)
     size = columns - base if given.shape[-1:] == (columns - base,) else columns
     if given.shape not in ((worlds, size), (size,)):
+        if not columns:
+            raise CommandRefused(f"{what}: nothing of this scene takes it; leave it out")
         expected = f"expected shape {(worlds, columns)}, or {(columns,)} for every world alike"
         if base:
             expected += f"; {columns - base} without the {base} of its floating base"

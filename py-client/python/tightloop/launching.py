@@ -129,7 +129,8 @@ def launch(
         LaunchError: The daemon did not start; the message has the reason.
     """
     if not isinstance(scene, Scene):
-        raise ArgumentError(f"launch: scene is {type(scene).__name__}; give a tightloop.Scene")
+        cure = "; Scene.load, add_urdf and from_mujoco read files" if isinstance(scene, str | os.PathLike) else ""
+        raise ArgumentError(f"launch: scene is {type(scene).__name__}; give a tightloop.Scene{cure}")
     for argument, names in (("fields", fields), ("params", params)):
         if isinstance(names, str):
             raise ArgumentError(f"launch: {argument} is {names!r}; give a list of names, such as ({names!r},)")

@@ -103,6 +103,9 @@ class Params:
     def __setattr__(self, name: str, value: ArrayLike) -> None:
         self.write(**{name: value})
 
+    def __getitem__(self, name: Any) -> Any:
+        raise UnknownField(f"params has no entries, such as {name!r}: parameters are attributes: write params.gravity")
+
     def write(self, *, mask: ArrayLike | None = None, **params: ArrayLike) -> Frame:
         """Set parameters in some worlds. All given parameters are written, or none after an error.
 
@@ -126,6 +129,10 @@ class Params:
         self._varying(name)
         shape = self._shape(name)
         given = real_numbers(name, value)
+        if name == "gravity" and given.shape == () and given != 0.0:
+            raise CommandRefused(
+                f"gravity is {value!r}, the same along each axis; give a vector, such as (0, 0, -9.81)"
+            )
         if given.shape not in (shape, shape[1:], ()):
             raise CommandRefused(
                 f"{name}: expected shape {shape}, {shape[1:]} for every world alike, or a number; got {given.shape}"

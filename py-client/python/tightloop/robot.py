@@ -165,7 +165,8 @@ class Robot(Entity):
     def joint_range(self) -> NDArray[np.float64]:
         """Lower and upper position limit of each dof [rad or m], shape ``(dofs, 2)``; infinite without a limit."""
         unlimited = [-np.inf, np.inf]
-        return self._of_dofs([unlimited if range_ is None else range_ for range_ in self._summary["joint_range"]])
+        known = [unlimited if range_ is None else range_ for range_ in self._summary["joint_range"]]
+        return self._of_dofs(known).reshape(-1, 2)
 
     @property
     def joint_velocity_limit(self) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tightloop import checks
+from tightloop.attributes import ByName
 from tightloop.body import Body
 from tightloop.checks import Vector
 from tightloop.errors import SceneError
@@ -23,8 +24,8 @@ class SceneSensors(SceneShapes):
 
     def __init__(self) -> None:
         super().__init__()
-        self.sites: dict[str, Site] = {}
-        self.contact_sensors: dict[str, ContactSensor] = {}
+        self.sites: dict[str, Site] = ByName("site")
+        self.contact_sensors: dict[str, ContactSensor] = ByName("contact sensor")
 
     def add_site(
         self,

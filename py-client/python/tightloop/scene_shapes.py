@@ -8,6 +8,7 @@ from collections.abc import Container
 from typing import TYPE_CHECKING, Any
 
 from tightloop import _core, checks
+from tightloop.attributes import ByName
 from tightloop.body import Body
 from tightloop.checks import Vector
 from tightloop.errors import SceneError
@@ -42,10 +43,10 @@ class SceneShapes(SceneOptions):
 
     def __init__(self) -> None:
         super().__init__()
-        self.robots: dict[str, Robot] = {}
-        self.models: dict[str, MujocoModel] = {}
-        self.bodies: dict[str, Body] = {}
-        self.shapes: dict[str, Shape] = {}
+        self.robots: dict[str, Robot] = ByName("robot")
+        self.models: dict[str, MujocoModel] = ByName("MuJoCo model")
+        self.bodies: dict[str, Body] = ByName("body")
+        self.shapes: dict[str, Shape] = ByName("shape")
         self.filters: list[tuple[str, str]] = []
 
     @with_surface

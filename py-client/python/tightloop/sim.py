@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core, checks, keyframes
 from tightloop._core import Frame
-from tightloop.attributes import Attributes, nearest
+from tightloop.attributes import Attributes, ByName, nearest
 from tightloop.command_arrays import Command, ready_arrays, step_arrays
 from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
-from tightloop.errors import ArgumentError, CommandRefused, SimClosed, UnknownAttribute
+from tightloop.errors import ArgumentError, CommandRefused, SimClosed, SnapshotError, UnknownAttribute
 from tightloop.frames import FrameCopy
 from tightloop.notebook import Shown
 from tightloop.params import Params
@@ -97,7 +97,7 @@ class Sim(Shown, Attributes):
         self.sensor_names: list[str] = self.info["sensor_names"]
         self.sensors: dict[str, slice] = slices_by_name(self.sensor_names, self.info["sensors"])
         self.dofs, self.coords, self.bodies = (
-            {robot["name"]: slice(*robot[range_]) for robot in self.info["robots"]}
+            ByName("robot", {robot["name"]: slice(*robot[range_]) for robot in self.info["robots"]})
             for range_ in ("dofs", "coords", "bodies")
         )
         self._sealed = True
@@ -352,6 +352,10 @@ class Sim(Shown, Attributes):
             raise CommandRefused(f"restore: snapshot is {type(snapshot).__name__}; give a tightloop.Snapshot")
         if from_world is not None:
             from_world = checks.integer("restore: from_world", from_world, least=0, error=CommandRefused)
+            if from_world >= snapshot.worlds:
+                raise SnapshotError(
+                    f"restore: from_world is {from_world}; the snapshot has worlds 0 to {snapshot.worlds - 1}"
+                )
         with transfer_file(self.pid, snapshot.to_bytes()) as path:
             return self._client.restore(path, worlds, from_world)
 

@@ -81,7 +81,7 @@ class Snapshot:
         try:
             data = _read(file)
         except OSError as problem:
-            raise SnapshotError(f"{file}: cannot be read: {problem.strerror}") from None
+            raise SnapshotError(f"{file}: cannot be read: {problem.strerror}; give a file that `save` wrote") from None
         return cls(data, str(file))
 
     @property

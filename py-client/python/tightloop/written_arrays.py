@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -142,6 +143,23 @@ for _name in (
     "__imatmul__",
 ):
     setattr(FrameArray, _name, _checked_in_place(_name))
+
+
+def _checked_method(name: str) -> Callable[..., Any]:
+    """Return NumPy's method that changes an array, with our message for memory that is read-only."""
+    method = getattr(np.ndarray, name)
+
+    @functools.wraps(method)
+    def checked(self: FrameArray, *given: Any, **named: Any) -> Any:
+        if not self.flags.writeable:
+            raise _read_only()
+        return method(self, *given, **named)
+
+    return checked
+
+
+for _name in ("fill", "partition", "put", "resize", "sort"):
+    setattr(FrameArray, _name, _checked_method(_name))
 
 
 def _read_only() -> CommandRefused:

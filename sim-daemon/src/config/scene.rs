@@ -27,7 +27,11 @@ const LINE_MAX: usize = 1000;
 /// What is said of a robot file in place of a scene.
 const XML: &str = "this is XML and not a scene; name a URDF file in a scene file (dt = 0.002, substeps = 4, [[robot]], \
                    name = \"arm\", urdf = \"robot.urdf\"), or give an MJCF file that ends in .xml to the command of the \
-                   Python package";
+                   Python package; in Python, `Scene.add_urdf` and `Scene.from_mujoco` read robot files";
+
+/// What is said of a file that has nothing of a scene.
+const NO_SCENE: &str = "; give a scene file, such as `Scene.save` writes (dt = 0.002, substeps = 4, [[robot]], \
+                        name = \"arm\", urdf = \"robot.urdf\")";
 
 /// A scene as a file holds it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -174,7 +178,11 @@ pub fn parse(text: &str, place: &str) -> Result<SceneFile, ConfigError> {
     if text.trim_start().starts_with('<') {
         return Err(syntax(place, XML));
     }
-    toml::from_str(text).map_err(|error| syntax(place, &error.to_string()))
+    toml::from_str(text).map_err(|error| {
+        let reason = error.to_string();
+        let cure = if text.contains("dt") { "" } else { NO_SCENE };
+        syntax(place, &format!("{}{cure}", reason.trim_end()))
+    })
 }
 
 fn syntax(place: &str, reason: &str) -> ConfigError {

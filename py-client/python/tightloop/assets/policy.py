@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tightloop.errors import ArgumentError
+
 _CLIP = 10.0  # of normalised observations, as in training
 
 
@@ -26,6 +28,9 @@ class Policy:
 
     def __call__(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
         """Actions, shape ``(worlds, actions)``, for observations of shape ``(worlds, size)``."""
+        size = len(self._mean)
+        if np.ndim(obs) != 2 or np.shape(obs)[1] != size:
+            raise ArgumentError(f"policy: obs has shape {np.shape(obs)}; give (worlds, {size}), as the task observes")
         x = np.clip((obs - self._mean) / self._scale, -_CLIP, _CLIP)
         for place, (weight, bias) in enumerate(self._layers):
             if place:

@@ -8,6 +8,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from gymnasium.vector import AutoresetMode
 
 from tightloop.env.controls import EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
@@ -33,5 +35,15 @@ __all__ = [
     "Worlds",
     "make_groups",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name.startswith("_"):
+        raise AttributeError(f"module `tightloop.env` has no attribute `{name}`")
+    from tightloop.attributes import suggestion
+    from tightloop.errors import UnknownAttribute
+
+    raise UnknownAttribute(f"module `tightloop.env` has no attribute `{name}`; {suggestion(name, __all__)}")
+
 
 register()

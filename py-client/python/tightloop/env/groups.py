@@ -62,7 +62,9 @@ def make_groups(
     num_envs = checks.integer("make_groups: num_envs", num_envs, error=ArgumentError)
     groups = checks.integer("make_groups: groups", groups, error=ArgumentError)
     if num_envs % groups:
-        raise ArgumentError(f"make_groups: {num_envs} environments cannot be shared out evenly among {groups} groups")
+        raise ArgumentError(
+            f"make_groups: {num_envs} environments cannot be shared out evenly among {groups} groups; give a divisor"
+        )
     for name in {"daemon", "first_env"} & set(options):
         raise ArgumentError(f"make_groups: {name} is not taken, since the groups have one of their own; leave it out")
     of_task = {name: options.pop(name) for name in set(options) - _OF_ENVIRONMENTS}

@@ -13,7 +13,7 @@ from tightloop.env.rendering import MODES
 from tightloop.env.results import check_options
 from tightloop.env.task import Task
 from tightloop.env.vector import VectorEnv
-from tightloop.errors import ArgumentError
+from tightloop.errors import ArgumentError, SignatureError
 from tightloop.inputs import whole_seed
 from tightloop.signatures import checked_calls
 
@@ -37,6 +37,8 @@ class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             task: As of `VectorEnv`.
             **options: As of `VectorEnv`, except ``num_envs`` and ``autoreset_mode``.
         """
+        for name in {"num_envs", "autoreset_mode"} & set(options):
+            raise SignatureError(f"Env: {name} is not taken, since it has one world; leave it out, or make a VectorEnv")
         if options.get("daemon") is None:
             options.setdefault("threads", 1)
         self.vector = VectorEnv(task, 1, autoreset_mode=AutoresetMode.DISABLED, **options)

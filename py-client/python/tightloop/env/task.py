@@ -91,6 +91,10 @@ class Observed:
         object.__setattr__(self, "bounds", np.stack([low, high]))
 
 
+class _Undefined(ArgumentError, NotImplementedError):
+    pass
+
+
 class Task:
     """The base class of tasks: a subclass defines scene, controls, observation and reward.
 
@@ -118,26 +122,26 @@ class Task:
 
     def scene(self) -> Scene:
         """Return the scene with its randomization. ``dt * substeps`` is the length of a control step."""
-        raise NotImplementedError(f"{type(self).__name__} has no `scene`")
+        raise _undefined(self, "scene")
 
     def controls(self) -> Sequence[Control]:
         """Return the controls, in the order of the action's values."""
-        raise NotImplementedError(f"{type(self).__name__} has no `controls`")
+        raise _undefined(self, "controls")
 
     def observed(self) -> Sequence[Observed]:
         """Return the parts of the observation, in the order of `observe`."""
-        raise NotImplementedError(f"{type(self).__name__} has no `observed`")
+        raise _undefined(self, "observed")
 
     def bind(self, names: Names) -> None:
         """Look up indices in the arrays; called once, before the other functions."""
 
     def observe(self, xp: Namespace, worlds: Worlds) -> Sequence[Array]:
         """Return the parts of the observation, of shape ``(worlds,)`` or ``(worlds, size)``, like `observed`."""
-        raise NotImplementedError(f"{type(self).__name__} has no `observe`")
+        raise _undefined(self, "observe")
 
     def reward(self, xp: Namespace, worlds: Worlds) -> Array:
         """Return the reward of the last step, shape ``(worlds,)``."""
-        raise NotImplementedError(f"{type(self).__name__} has no `reward`")
+        raise _undefined(self, "reward")
 
     def terminated(self, xp: Namespace, worlds: Worlds) -> Array | None:
         """Return which worlds are terminated, bool, shape ``(worlds,)``; None if the task never terminates."""
@@ -188,3 +192,10 @@ def episode_steps(task: Task, given: float | None) -> int | None:
     if not whole or steps != int(steps) or steps < 1:
         raise ArgumentError(f"max_episode_steps is {steps!r}; give a whole number of at least 1, or math.inf")
     return int(steps)
+
+
+def _undefined(task: Task, name: str) -> Exception:
+    kind = type(task).__name__
+    return _Undefined(
+        f"task {kind} has no `{name}`; derive a class from Task and define it, as examples/own_task.py does"
+    )

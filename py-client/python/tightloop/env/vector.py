@@ -15,6 +15,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from tightloop import checks
+from tightloop.attributes import suggestion
 from tightloop.env.actions import Actions
 from tightloop.env.episodes import Episodes, check_seeds
 from tightloop.env.evaluation import Evaluation
@@ -26,7 +27,7 @@ from tightloop.env.results import TASK_FAULT, OnNan, check_on_nan, check_options
 from tightloop.env.simulation import open_simulation
 from tightloop.env.step_buffers import BufferRing, StepBuffers
 from tightloop.env.task import Task, episode_steps
-from tightloop.errors import ArgumentError, CommandRefused, DaemonLost
+from tightloop.errors import ArgumentError, CommandRefused, DaemonLost, UnknownAttribute
 from tightloop.frames import FAULTED
 from tightloop.signatures import checked_calls
 from tightloop.sim import Sim
@@ -177,6 +178,12 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
     def marks(self) -> dict[str, Any] | None:
         """Current goals, as pictures of `tightloop.view` mark them; None if the task's goals have no position."""
         return marks(self.task, self._episodes.goal)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(f"VectorEnv has no attribute {name!r}")
+        known = {known for known in (*vars(self), *dir(type(self))) if known[0] != "_"}
+        raise UnknownAttribute(f"VectorEnv has no attribute {name!r}; {suggestion(name, known)}")
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None

@@ -26,7 +26,12 @@ def __getattr__(name: str) -> Any:
     # Lazy (PEP 562): a simulation without a viewer needs none of the libraries
     home = _HOMES.get(name)
     if home is None:
-        raise AttributeError(f"module `tightloop.view` has no attribute `{name}`")
+        if name.startswith("_"):
+            raise AttributeError(f"module `tightloop.view` has no attribute `{name}`")
+        from tightloop.attributes import suggestion
+        from tightloop.errors import UnknownAttribute
+
+        raise UnknownAttribute(f"module `tightloop.view` has no attribute `{name}`; {suggestion(name, __all__)}")
     from importlib import import_module
 
     return getattr(import_module(f"tightloop.view.{home}"), name)

@@ -26,6 +26,8 @@ _FILL = 0.8
 # A subject that moves is kept within this fraction of the picture.
 _KEEP = 0.96
 _LEAST_DISTANCE = 0.1
+# Least sine of the angle between the line of sight and what points up.
+_UPRIGHT = 1e-6
 
 
 @checked_calls
@@ -52,6 +54,11 @@ class Camera:
         for name in ("position", "target", "up"):
             given = checks.triple(f"Camera: {name}", getattr(self, name), error=ArgumentError)
             object.__setattr__(self, name, given)
+        line = np.subtract(self.target, self.position)
+        if not line.any():
+            raise ArgumentError(f"Camera: target is {self.target}, the position too; give another point to look at")
+        if np.linalg.norm(np.cross(line / np.linalg.norm(line), self.up)) < _UPRIGHT * np.linalg.norm(self.up):
+            raise ArgumentError(f"Camera: up is {self.up}, along the line of sight; give another, such as (0, 1, 0)")
         fov = checks.number("Camera: fov", self.fov, above=0.0, error=ArgumentError)
         if fov >= np.pi:
             raise ArgumentError(f"Camera: fov is {fov:g}; give less than π [rad]")

@@ -99,6 +99,10 @@ class Film:
         size, contacts = check_size("film", size), check_contacts("film", contacts)
         if kind not in ("visual", "collision"):
             raise ArgumentError(f"film: kind is {kind!r}; give 'visual' or 'collision'")
+        if not hasattr(sim, "info"):
+            raise ArgumentError(
+                f"film: sim is {sim!r:.80}; give a Sim, or the name of a daemon to `tightloop.view.film`"
+            )
         info = sim.info
         self._period: float = info["dt"] * info["substeps"]
         self._camera, self._world, self._contacts = camera, world, contacts
