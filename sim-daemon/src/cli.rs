@@ -6,6 +6,7 @@ mod python;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
+use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::error::DaemonError;
@@ -31,12 +32,12 @@ pub(crate) enum CliCommand {
     ///
     /// Example: tightloop serve scene.toml --worlds 4096 --name franka
     Serve(Box<Serve>),
-    /// Show what a robot file means: tree, dofs, masses, limits, repairs, and a picture.
+    /// Show what a robot file means: tree, dofs, masses, limits and repairs, and with --png a picture.
     ///
     /// Reads URDF and, with the Python package and MuJoCo, MJCF. Also lists what the reader ignored or refused. The picture
-    /// shows the collision shapes and goes to ROBOT.png in the working folder.
+    /// shows the collision shapes.
     ///
-    /// Example: tightloop inspect robot.urdf --package-dir ~/robots
+    /// Example: tightloop inspect robot.urdf --png robot.png
     Inspect(Inspect),
     /// Measure how fast a scene runs in this process, and where the time goes.
     ///
@@ -309,7 +310,7 @@ pub(crate) struct Inspect {
     pub(crate) convex_decomposition: bool,
 
     /// Draw the convex hulls that collide, instead of the meshes.
-    #[arg(long)]
+    #[arg(long, requires = "png")]
     pub(crate) hulls: bool,
 
     /// Joint positions of the picture [rad or m], one per coordinate, separated by commas; default: 0, or the start of a
@@ -318,25 +319,22 @@ pub(crate) struct Inspect {
         long,
         value_name = "Q",
         value_delimiter = ',',
-        allow_hyphen_values = true
+        allow_hyphen_values = true,
+        requires = "png"
     )]
     pub(crate) joint_q: Option<Vec<f64>>,
 
-    /// Also print frames, inertias and positions of shapes.
+    /// Also print frames, inertias and positions of shapes, and each note on a hull.
     #[arg(long)]
     pub(crate) long: bool,
 
-    /// Print JSON; write a picture only with --png.
+    /// Print JSON.
     #[arg(long, conflicts_with = "long")]
     pub(crate) json: bool,
 
-    /// Write the picture to this file.
+    /// Draw a picture into this file; one that is there is replaced.
     #[arg(long, value_name = "FILE")]
     pub(crate) png: Option<PathBuf>,
-
-    /// Write no picture.
-    #[arg(long, conflicts_with = "png")]
-    pub(crate) no_png: bool,
 }
 
 /// Parses a command line; where there is nothing to run, prints help or the mistake and returns the exit code.
@@ -345,10 +343,30 @@ pub(crate) fn parse(args: impl IntoIterator<Item = OsString>) -> Result<CliComma
         Ok(cli) => Ok(cli.command),
         Err(error) => {
             // help and version go to stdout with code 0, mistakes to stderr with code 2: clap knows
-            let _ = error.print();
+            if error.kind() == ErrorKind::ValueValidation {
+                eprint!("{}", in_our_words(&error.to_string()));
+            } else {
+                let _ = error.print();
+            }
             Err(error.exit_code())
         }
     }
+}
+
+/// A message of clap with what to give, where it repeats the words of Rust's parsers.
+fn in_our_words(message: &str) -> String {
+    message
+        .replace("invalid digit found in string", "give a whole number")
+        .replace(
+            "number too large to fit in target type",
+            "give a smaller number",
+        )
+        .replace("invalid float literal", "give a number")
+        .replace(
+            "cannot parse integer from empty string",
+            "give a whole number",
+        )
+        .replace("cannot parse float from empty string", "give a number")
 }
 
 /// Prints the completions of a shell.

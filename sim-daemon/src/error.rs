@@ -40,7 +40,7 @@ pub enum DaemonError {
     #[error(transparent)]
     Protocol(#[from] ProtocolError),
     /// The log file cannot be written.
-    #[error("log file {path:?}: {problem}")]
+    #[error("log file {path:?}: {problem}; name a file in a folder that is there")]
     Log {
         /// The file.
         path: std::path::PathBuf,

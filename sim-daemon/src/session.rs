@@ -303,7 +303,10 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
                 "each has at least one world, and there are {}",
                 serve.worlds
             ),
-            false => format!("{} worlds cannot be shared out evenly", serve.worlds),
+            false => format!(
+                "{} worlds cannot be shared out evenly; ask for a number that divides it",
+                serve.worlds
+            ),
         };
         return wrong("groups", &serve.groups, problem);
     }

@@ -48,7 +48,7 @@ def file_of(folder: Path, text: str, name: str = "robot.xml") -> str:
 
 
 def test_the_report_names_what_a_model_has(tmp_path):
-    done = inspected(tmp_path, file_of(tmp_path, ROBOT), "--no-png")
+    done = inspected(tmp_path, file_of(tmp_path, ROBOT))
     assert (done.returncode, done.stderr) == (0, "")
     rows = [" ".join(line.split()) for line in done.stdout.splitlines()]
     for row in (
@@ -109,16 +109,16 @@ def test_everything_that_is_refused_is_named(tmp_path):
 def test_a_saved_model_is_read_without_mujoco(tmp_path):
     scene = tl.Scene.from_mujoco(tmp_path / file_of(tmp_path, ROBOT))
     scene.save(tmp_path / "scene.toml")
-    done = inspected(tmp_path, "scene_models/two_joints.safetensors", "--no-png")
+    done = inspected(tmp_path, "scene_models/two_joints.safetensors")
     assert done.returncode == 0 and "Model      two_joints" in done.stdout
     # a file of an older version has no name
-    done = inspected(REPOSITORY, "examples/assets/cart/cart.safetensors", "--no-png")
+    done = inspected(REPOSITORY, "examples/assets/cart/cart.safetensors")
     assert done.returncode == 0 and "Model      cart" in done.stdout
 
 
 def test_a_picture_shows_it_at_a_position(tmp_path):
     path = file_of(tmp_path, ROBOT)
-    assert inspected(tmp_path, path).returncode == 0
+    assert inspected(tmp_path, path, "--png", "two_joints.png").returncode == 0
     assert inspected(tmp_path, path, "--joint-q", "0.5,-1", "--png", "moved.png").returncode == 0
     start, moved = ((tmp_path / name).read_bytes() for name in ("two_joints.png", "moved.png"))
     assert start.startswith(b"\x89PNG") and start != moved
@@ -131,7 +131,7 @@ def test_wrong_files_and_options_are_named(tmp_path):
         ("<mujocoinclude/>", (), 1, ("robot.xml", "Scene.from_mujoco")),
         ("<other/>", (), 1, ("robot.xml:1", "URDF")),
         (ROBOT, ("--floating",), 2, ("--floating", "robot.xml", "<freejoint/>")),
-        (ROBOT, ("--joint-q", "1,2,3"), 2, ("--joint-q", "3 values")),
+        (ROBOT, ("--joint-q", "1,2,3", "--png", "a.png"), 2, ("--joint-q", "3 values")),
         (ROBOT, ("--mesh-max-hull-vertices", "3"), 2, ("between 8 and 1024",)),
     ):
         done = inspected(tmp_path, file_of(tmp_path, text), *arguments)
@@ -145,5 +145,5 @@ def test_wrong_files_and_options_are_named(tmp_path):
 
 def test_a_urdf_file_may_end_in_xml(tmp_path):
     path = file_of(tmp_path, '<robot name="r"><link name="only"/></robot>')
-    done = inspected(tmp_path, path, "--no-png")
+    done = inspected(tmp_path, path)
     assert done.returncode == 0 and done.stdout.startswith("Robot      r\n")

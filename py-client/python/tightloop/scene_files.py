@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 _HEAD_BYTES = 1 << 16
 _BEFORE_ELEMENTS = re.compile(r"\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>", re.DOTALL)
 _ELEMENT = re.compile(r"<(mujoco|robot)[\s>/]")
+_ROBOT_ENDINGS = (".urdf", ".xacro", ".xml")
 # Drives of a robot from URDF follow their targets with this natural frequency [rad/s], critically damped.
 _FREQUENCY = 30.0
 
 
 def kind_of(path: Path) -> str | None:
-    """Return ``"mujoco"`` or ``"robot"``, the first element of an MJCF or URDF file; None for other files."""
+    """Return ``"mujoco"`` or ``"robot"``, what an MJCF or URDF file begins or is named as; None for other files."""
     try:
         if not path.is_file():
             return None
@@ -34,7 +35,8 @@ def kind_of(path: Path) -> str | None:
     while skipped := _BEFORE_ELEMENTS.match(text, at):
         at = skipped.end()
     found = _ELEMENT.match(text, at)
-    return found and found[1]
+    # the reader of URDF says what is wrong with any other
+    return found[1] if found else "robot" if path.suffix.lower() in _ROBOT_ENDINGS else None
 
 
 def scene_of(path: Path) -> Scene:

@@ -32,7 +32,9 @@ pub enum ProtocolError {
     },
 
     /// Nothing with this name runs.
-    #[error("no daemon named {name:?} runs under {root:?}; running: {running}")]
+    #[error(
+        "no daemon named {name:?} runs under {root:?}; running: {running}; `tightloop serve SCENE --name {name}` starts one"
+    )]
     NoDaemon {
         /// The name asked for.
         name: String,

@@ -11,12 +11,10 @@ mod text;
 mod tree;
 mod wrap;
 
-use std::path::{Path, PathBuf};
-
 use serde_json::json;
 use sim_engine::dynamics::Dynamics;
 use sim_model::geometry::{MeshOptions, triangles};
-use sim_model::{ModelError, MujocoContents, Pose, Robot, Shape};
+use sim_model::{ModelError, MujocoContents, Pose, Shape};
 
 use crate::cli::Inspect;
 use crate::config::hull_sides;
@@ -63,20 +61,16 @@ pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
     let start = model.start().joint_q.clone();
     let frames = Dynamics::new(model).forward_kinematics(&start)?;
     let properties = Properties::new(&scene.robots[0]);
-    let path = destination(args, properties.robot);
+    let path = &args.png;
     let drawn = path.as_deref().map_or(Ok(()), |path| {
-        // a name that we chose must not cost somebody a file
-        if args.png.is_none() && path.exists() && !picture::is_ours(path) {
-            let problem = "it is there already and no picture of ours; say with --png FILE where to write, or --no-png";
-            return Err(failed(path, problem.to_owned()));
-        }
         let drawing = drawing(&properties, &frames, args);
-        picture::write(&drawing.render(), path).map_err(|error| {
-            failed(path, format!("{error}; say with --png FILE where to write, or --no-png"))
+        picture::write(&drawing.render(), path).map_err(|error| DaemonError::Picture {
+            path: path.to_owned(),
+            problem: format!("{error}; say with --png FILE where to write, or leave it out"),
         })
     });
     let report = || text::document(&properties, contents.as_ref(), &args.file, args.long);
-    let said = match (args.json, &drawn, &path) {
+    let said = match (args.json, &drawn, path) {
         (true, Err(_), _) => String::new(),
         (true, Ok(()), _) => {
             let file = &args.file;
@@ -115,33 +109,6 @@ fn refused(args: &Inspect, contents: &MujocoContents, name: &str) -> DaemonError
         path: file.clone(),
         count: contents.refused.len(),
     })
-}
-
-fn failed(path: &Path, problem: String) -> DaemonError {
-    DaemonError::Picture {
-        path: path.to_owned(),
-        problem,
-    }
-}
-
-/// Where the picture goes, if anywhere.
-fn destination(args: &Inspect, robot: &Robot) -> Option<PathBuf> {
-    match &args.png {
-        Some(path) => Some(path.clone()),
-        None if args.no_png || args.json => None,
-        None => {
-            let plain = |letter: char| letter.is_alphanumeric() || "-_+.".contains(letter);
-            let name: String = robot
-                .name
-                .chars()
-                .map(|letter| if plain(letter) { letter } else { '_' })
-                .collect();
-            // a name that begins with a dot would hide the file
-            let name = name.trim_start_matches('.');
-            let name = if name.is_empty() { "robot" } else { name };
-            Some(Path::new(&format!("{name}.png")).to_owned())
-        }
-    }
 }
 
 /// What the picture shows. `frames` are position and quaternion of each link, in body order. `(bodies, 7)` [m, –]

@@ -3,12 +3,16 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use sim_model::{MujocoContents, Shape};
+use sim_model::geometry::HULL_NOTE;
+use sim_model::{MujocoContents, Robot, Shape};
 
 use super::properties::{Properties, count, kinds, short, tally, with_kinds};
 use super::wrap::wrapped;
 use super::{mujoco, table, tree};
 use crate::config::joint_type;
+
+/// Errors of hulls up to this need no line of their own [m]: contacts are as soft.
+const SMALL_ERROR: f64 = 5e-3;
 
 /// All there is to say of a robot, or of a model that MuJoCo compiled.
 pub(super) fn document(
@@ -29,7 +33,7 @@ pub(super) fn document(
     if let Some(contents) = contents {
         text += &mujoco::tables(contents, &properties.robot.name);
     }
-    text += &notes(properties);
+    text += &notes(properties, long);
     text
 }
 
@@ -77,16 +81,34 @@ fn head(properties: &Properties) -> String {
     text
 }
 
-/// What was ignored or mended, warnings first.
-fn notes(properties: &Properties) -> String {
+/// What was ignored or mended, warnings first; small errors of hulls in one line, unless it is to be long.
+fn notes(properties: &Properties, long: bool) -> String {
     let robot = properties.robot;
     let mut text = "Ignored or mended\n".to_owned();
     let rest = robot
         .notes
         .iter()
         .filter(|note| !robot.warnings.contains(note));
+    let small = small_hulls(robot);
+    let is_small = |note: &str| small.iter().any(|(end, _)| note.ends_with(end));
+    let (grouped, rest): (Vec<_>, Vec<_>) = rest.partition(|note| !long && is_small(note));
+    let error = small
+        .iter()
+        .fold(0.0, |most: f64, (_, error)| most.max(*error));
+    let (count, most) = (grouped.len(), format!("{:.1}", 1e3 * error));
+    let group = (count > 1).then(|| {
+        format!(
+            "the convex hulls of {count} meshes leave out up to {most} mm of them; see --mesh-max-hull-vertices, and --long for each"
+        )
+    });
+    let single = grouped.into_iter().filter(|_| count == 1);
     let all: Vec<(char, &String)> = (robot.warnings.iter().map(|warning| ('!', warning)))
-        .chain(rest.map(|note| ('-', note)))
+        .chain(
+            rest.into_iter()
+                .chain(single)
+                .chain(&group)
+                .map(|note| ('-', note)),
+        )
         .collect();
     if all.is_empty() {
         text += "  nothing\n";
@@ -95,4 +117,22 @@ fn notes(properties: &Properties) -> String {
         text += &wrapped(&format!("  {mark} "), "    ", note);
     }
     text
+}
+
+/// How the notes on hulls end whose errors are small, with the errors [m].
+fn small_hulls(robot: &Robot) -> Vec<(String, f64)> {
+    let shapes = robot.links.iter().flat_map(|link| &link.collisions);
+    let meshes = shapes.filter_map(|collision| match &collision.shape {
+        Shape::Mesh(mesh) => Some(mesh),
+        _ => None,
+    });
+    let errors = meshes.flat_map(|mesh| {
+        let error = mesh
+            .hulls
+            .iter()
+            .fold(0.0, |most: f64, hull| most.max(hull.error));
+        let own = mesh.notes.iter().filter(|note| note.ends_with(HULL_NOTE));
+        own.map(move |note| (format!("{} {note}", mesh.path.display()), error))
+    });
+    errors.filter(|(_, error)| *error <= SMALL_ERROR).collect()
 }

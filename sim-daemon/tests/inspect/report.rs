@@ -9,7 +9,7 @@ const KINDS: &str = "sim-daemon/tests/inspect/kinds.urdf";
 
 #[test]
 fn the_report_of_the_fr3_is_what_it_was() {
-    let said = inspect(&root(), &[FR3, "--no-png"]);
+    let said = inspect(&root(), &[FR3]);
     assert_eq!((said.code, said.err.as_str()), (0, ""));
     let lines: Vec<&str> = said.out.lines().collect();
     let expected: Vec<&str> = include_str!("fr3.txt").lines().collect();
@@ -18,7 +18,7 @@ fn the_report_of_the_fr3_is_what_it_was() {
 
 #[test]
 fn the_report_of_every_joint_kind_is_what_it_was() {
-    let said = inspect(&root(), &[KINDS, "--no-png", "--long", "--floating"]);
+    let said = inspect(&root(), &[KINDS, "--long", "--floating"]);
     assert_eq!((said.code, said.err.as_str()), (0, ""));
     let lines: Vec<&str> = said.out.lines().collect();
     let expected: Vec<&str> = include_str!("kinds.txt").lines().collect();
@@ -87,7 +87,7 @@ fn a_chain_of_a_thousand_links_is_no_wider_than_one_of_two() {
         );
     }
     folder.file("chain.urdf", &(text + "</robot>"));
-    let said = inspect(&folder.0, &["chain.urdf", "--no-png"]);
+    let said = inspect(&folder.0, &["chain.urdf"]);
     assert_eq!(said.code, 0, "{}", said.err);
     let last = said
         .out
@@ -95,6 +95,58 @@ fn a_chain_of_a_thousand_links_is_no_wider_than_one_of_two() {
         .find(|line| line.starts_with("○ l999"))
         .unwrap();
     assert_eq!(last, "○ l999   j999: fixed, part of l0");
+}
+
+/// A ball with so many vertices that its hull leaves some out, in the format OBJ.
+fn fine_ball(radius: f64) -> String {
+    const SIDES: usize = 24;
+    let angle = |step: usize| std::f64::consts::TAU * step as f64 / SIDES as f64;
+    let mut text = String::new();
+    for ring in 0..=SIDES / 2 {
+        for side in 0..SIDES {
+            let (z, across) = (angle(ring).cos(), angle(ring).sin());
+            let (x, y) = (across * angle(side).cos(), across * angle(side).sin());
+            text += &format!("v {} {} {}\n", radius * x, radius * y, radius * z);
+        }
+    }
+    for ring in 0..SIDES / 2 {
+        for side in 0..SIDES {
+            let corner = |ring: usize, side: usize| 1 + ring * SIDES + side % SIDES;
+            let (a, b) = (corner(ring, side), corner(ring, side + 1));
+            let (c, d) = (corner(ring + 1, side), corner(ring + 1, side + 1));
+            text += &format!("f {a} {c} {d}\nf {a} {d} {b}\n");
+        }
+    }
+    text
+}
+
+#[test]
+fn small_errors_of_hulls_are_one_line_and_large_ones_one_each() {
+    let folder = Folder::new("balls");
+    let mut shapes = String::new();
+    for (name, radius) in [("a", 0.05), ("b", 0.06), ("c", 0.04), ("big", 1.0)] {
+        folder.file(&format!("{name}.obj"), &fine_ball(radius));
+        shapes +=
+            &format!("<collision><geometry><mesh filename=\"{name}.obj\"/></geometry></collision>");
+    }
+    folder.file("r.urdf", &one_link("r", &shapes));
+    let said = inspect(&folder.0, &["r.urdf"]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    let (_, notes) = said.out.split_once("Ignored or mended\n").unwrap();
+    let in_one_line = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let joined = in_one_line(notes);
+    assert_eq!(joined.matches("leave").count(), 2, "{notes}");
+    assert!(
+        joined.contains("mesh big.obj has a hull of more"),
+        "{notes}"
+    );
+    assert!(
+        joined.contains("the convex hulls of 3 meshes leave out up to ")
+            && joined.contains(" mm of them; see --mesh-max-hull-vertices"),
+        "{notes}"
+    );
+    let long = in_one_line(&inspect(&folder.0, &["r.urdf", "--long"]).out);
+    assert_eq!(long.matches("has a hull of more").count(), 4, "{long}");
 }
 
 #[test]
@@ -138,14 +190,14 @@ fn a_wrong_inertia_is_mended_with_a_warning_or_refused() {
     let folder = Folder::new("strict");
     let inertia = "<inertial><mass value=\"1\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"3\"/></inertial>";
     folder.file("flat.urdf", &one_link("flat", inertia));
-    let mended = inspect(&folder.0, &["flat.urdf", "--no-png"]);
+    let mended = inspect(&folder.0, &["flat.urdf"]);
     assert_eq!(mended.code, 0, "{}", mended.err);
     assert!(
         mended.out.contains("\n  ! ") && mended.out.contains("`only`"),
         "{}",
         mended.out
     );
-    let refused = inspect(&folder.0, &["flat.urdf", "--no-png", "--strict"]);
+    let refused = inspect(&folder.0, &["flat.urdf", "--strict"]);
     assert_eq!(refused.code, 1);
     assert!(refused.err.contains("`only`"), "{}", refused.err);
 }
@@ -153,12 +205,15 @@ fn a_wrong_inertia_is_mended_with_a_warning_or_refused() {
 #[test]
 fn a_misused_command_line_is_told_so() {
     for (arguments, message) in [
-        (&["--joint-q", "1,2"][..], "has 2 values"),
-        (&["--joint-q", "0,0,0,0,0,0,0,0,NaN"], "NaN"),
+        (&["--joint-q", "1,2", "--png", "a.png"][..], "has 2 values"),
+        (
+            &["--joint-q", "0,0,0,0,0,0,0,0,NaN", "--png", "a.png"],
+            "NaN",
+        ),
         (&["--joint-q", "a"], "invalid value 'a'"),
         (&["--mesh-max-hull-vertices", "3"], "between 8 and 1024"),
         (&["--json", "--long"], "cannot be used with"),
-        (&["--png", "a.png", "--no-png"], "cannot be used with"),
+        (&["--hulls"], "--png <FILE>"),
         (&["--colour"], "unexpected argument"),
     ] {
         let arguments = [&[FR3], arguments].concat();

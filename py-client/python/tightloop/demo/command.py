@@ -57,6 +57,9 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: list[str]) -> int:
     """Run the subcommand; returns its exit code: 0 done, 1 failed, 2 misused, 130 ended by Ctrl-C."""
     given = parser().parse_args(arguments)
+    if given.out.exists() and not given.out.is_dir():
+        print(f"tightloop: --out {given.out} is a file; give a folder for the pictures", file=sys.stderr)
+        return 1
     plan = Plan(given.out, given.seconds, given.view, given.port, given.device, given.threads)
     try:
         if given.file is not None:
@@ -74,14 +77,20 @@ def main(arguments: list[str]) -> int:
 
 
 def _positive(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
     if not 0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+        raise argparse.ArgumentTypeError(f"{text!r} is not above 0; give a number of seconds")
     return value
 
 
 def _count(text: str) -> int:
-    value = int(text)
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
     if value < 1:
-        raise argparse.ArgumentTypeError(f"{text} is not at least 1")
+        raise argparse.ArgumentTypeError(f"{text!r} is not at least 1; give a whole number")
     return value

@@ -137,14 +137,20 @@ def _name(text: str) -> str:
 
 
 def _port(text: str) -> int:
-    port = int(text)
+    try:
+        port = int(text)
+    except ValueError:
+        port = 0
     if not 0 < port < 65536:
-        raise argparse.ArgumentTypeError(f"{port} is no port; give 1 to 65535")
+        raise argparse.ArgumentTypeError(f"{text!r} is no port; give 1 to 65535")
     return port
 
 
 def _worlds(text: str) -> int:
-    worlds = int(text)
+    try:
+        worlds = int(text)
+    except ValueError:
+        worlds = 0
     if not 0 < worlds <= _WORLDS_MAX:
-        raise argparse.ArgumentTypeError(f"{worlds} worlds cannot be shown; give 1 to {_WORLDS_MAX}")
+        raise argparse.ArgumentTypeError(f"{text!r} worlds cannot be shown; give 1 to {_WORLDS_MAX}")
     return worlds

@@ -6,6 +6,7 @@ import json
 import os
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
 from numpy.typing import NDArray
@@ -31,6 +32,20 @@ CONTACT_FIELDS = ("contact_count", "contact_pos", "contact_normal", "contact_for
 def is_recording(target: str) -> bool:
     """Return whether a target is a file, not the name of a daemon."""
     return target.endswith(".tlrec") or "/" in target
+
+
+def check_name(target: str) -> None:
+    """Refuse a file that is no recording where a daemon is named; groups have names such as ``franka.0``.
+
+    Raises:
+        ArgumentError: It is one.
+    """
+    ending = Path(target).suffix[1:]
+    if ending and not ending.isdigit() and Path(target).is_file():
+        raise ArgumentError(
+            f"{target} is a file and no recording (.tlrec); name a daemon, as `tightloop serve {target} --name NAME` "
+            f"starts it, or show a robot or scene by `tightloop demo {target} --view`"
+        )
 
 
 class Shown:
@@ -90,6 +105,7 @@ class Live:
         asked = checks.integer("view: worlds", worlds, least=1, error=ArgumentError)
         # with several groups, show the first one unless another is named
         named = checks.text("view: name", name, error=ArgumentError)
+        check_name(named)
         self._name = named if _core.groups(named) == 1 else f"{named}.0"
         #: When the newest frame arrived, on the monotonic clock [s].
         self.came = time.monotonic()

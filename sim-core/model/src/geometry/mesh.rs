@@ -23,6 +23,8 @@ const CONVEX: f64 = 1e-3;
 const NOTED_ERROR: f64 = 1e-3;
 /// The same, relative to the size [–].
 const NOTED_SHARE: f64 = 0.01;
+/// How notes on the error of a hull end.
+pub const HULL_NOTE: &str = "(see mesh_max_hull_vertices)";
 /// Bounds of `max_hull_vertices`: a box needs 8; more than a few hundred slow contacts down for little accuracy.
 const HULL_VERTICES: std::ops::RangeInclusive<usize> = 8..=1024;
 
@@ -163,7 +165,7 @@ impl Mesh {
             ));
         } else if whole.error > NOTED_ERROR || whole.error > NOTED_SHARE * size {
             self.notes.push(format!(
-                "has a hull of more than {most} vertices; that many leave {:.2e} m of it out (see mesh_max_hull_vertices)",
+                "has a hull of more than {most} vertices; that many leave {:.2e} m of it out {HULL_NOTE}",
                 whole.error
             ));
         }

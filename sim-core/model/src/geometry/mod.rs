@@ -20,7 +20,7 @@ mod visual;
 pub use hull::{Edge, Face, Hull};
 pub use load::{FILE_MAX, TRIANGLES_MAX};
 pub use mass::{DENSITY, mass_properties};
-pub use mesh::{Mesh, MeshOptions};
+pub use mesh::{HULL_NOTE, Mesh, MeshOptions};
 pub use polytope::NoHull;
 pub use ray_shape::{RAY_SMALL, RayShape};
 pub use shape::Shape;

@@ -16,7 +16,7 @@ use sim_model::Pose;
 use sim_model::geometry::TriMesh;
 
 pub(super) use canvas::Canvas;
-pub(super) use file::{is_ours, write};
+pub(super) use file::write;
 
 /// What a picture shows.
 #[derive(Clone, Debug, Default)]
