@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _HEAD_BYTES = 1 << 16
 _BEFORE_ELEMENTS = re.compile(r"\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>", re.DOTALL)
 _ELEMENT = re.compile(r"<(mujoco|robot)[\s>/]")
-_ROBOT_ENDINGS = (".urdf", ".xacro", ".xml")
+_ROBOT_ENDINGS = (".urdf", ".xacro")
 # Drives of a robot from URDF follow their targets with this natural frequency [rad/s], critically damped.
 _FREQUENCY = 30.0
 
