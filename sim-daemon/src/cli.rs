@@ -32,7 +32,7 @@ pub(crate) enum CliCommand {
     ///
     /// Example: tightloop serve scene.toml --worlds 4096 --name franka
     Serve(Box<Serve>),
-    /// Show what a robot file means: tree, dofs, masses, limits and repairs, and with --png a picture.
+    /// Show what a robot file means: tree, dofs, masses, limits, repairs, and a picture.
     ///
     /// Reads URDF and, with the Python package and MuJoCo, MJCF. Also lists what the reader ignored or refused. The picture
     /// shows the collision shapes.
