@@ -213,6 +213,7 @@ impl<'a> Stage<'a> {
             &casters,
             light_world.map(|row| row.map(|part| part as f32)),
             shot.reach as f32,
+            shot.floor.map(|[height, _]| (height - view.eye[2]) as f32),
             renderer.threads,
         );
         let fill = (0..3).fold([0.0; 3], |sum, k| {
@@ -315,7 +316,7 @@ impl<'a> Stage<'a> {
             FLOOR => {
                 let ray = self.rays.at(x, y);
                 let beside = [self.rays.at(x + 1.0, y), self.rays.at(x, y + 1.0)];
-                let behind = self.behind(&ray, at);
+                let behind = || self.behind(&ray, at);
                 let towards = beside.map(|ray| ray.towards);
                 (self.lights.floor(ray.towards, towards, behind), 1.0)
             }

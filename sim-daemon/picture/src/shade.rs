@@ -17,8 +17,12 @@ pub(crate) const KEY: [f64; 3] = [0.33, -0.52, 0.79];
 pub(crate) const FILL: [f64; 3] = [0.75, 0.1, -0.65];
 
 const SKY: Light = light([250, 251, 253]);
-const HORIZON: Light = light([232, 236, 241]);
-const FLOOR: Light = light([220, 224, 230]);
+const HORIZON: Light = light([226, 230, 236]);
+/// What the floor is of the light behind it: it has no edge, because it is a tone of what it fades into.
+const FLOOR: f32 = 0.95;
+/// Where the floor fades: distance from the middle over the reach, and how far a ray points down, its sine.
+const FADE_AWAY: [f32; 2] = [0.9, 3.0];
+const FADE_LEVEL: [f32; 2] = [0.0, 0.15];
 const LINE: Light = light([178, 185, 196]);
 /// Colours of the lines through the origin: along x, along y.
 const AXES: [Light; 2] = [light([206, 92, 84]), light([82, 158, 98])];
@@ -174,9 +178,7 @@ impl Lights {
         let facing = dot(flat, self.key);
         let key = dot(normal, self.key).max(0.0);
         let shadow = if key > 0.0 && facing > 0.0 {
-            // off the surface by two texels, where a slope would shadow itself
-            let off = along(point, 2.0 * self.shadow.texel, flat);
-            self.shadow.light(off, 0.5 * self.shadow.texel)
+            self.shadow.light(point, flat)
         } else {
             0.0
         };
@@ -195,18 +197,17 @@ impl Lights {
 
     /// Light from behind everything: the sky.
     pub fn sky(&self, ray: [f32; 3]) -> Light {
-        let rise = (2.0 * unit(ray)[2]).clamp(0.0, 1.0);
-        mix(HORIZON, SKY, rise)
+        mix(HORIZON, SKY, smooth_step(0.0, 0.6, unit(ray)[2]))
     }
 
     /// Light from the floor on a ray from the eye, which fades into the light `behind`; the other two rays are those of the
     /// next pixels.
-    pub fn floor(&self, ray: [f32; 3], beside: [[f32; 3]; 2], behind: Light) -> Light {
+    pub fn floor(&self, ray: [f32; 3], beside: [[f32; 3]; 2], behind: impl Fn() -> Light) -> Light {
         let Some(ground) = &self.ground else {
-            return behind;
+            return behind();
         };
         if ray[2] >= 0.0 {
-            return behind;
+            return behind();
         }
         let on = |ray: [f32; 3]| {
             let time = ground.height / ray[2].min(-1e-6);
@@ -215,11 +216,15 @@ impl Lights {
         let (point, [right, below]) = (on(ray), beside.map(on));
         let length = |x: f32, y: f32| (x * x + y * y).sqrt();
         let away = length(point[0] - ground.middle[0], point[1] - ground.middle[1]);
-        let fade = smooth_step(1.2, 3.2, away / ground.reach);
-        if fade >= 1.0 {
+        let [near, far] = FADE_AWAY;
+        let [level, down] = FADE_LEVEL;
+        let left = 1.0 - smooth_step(near, far, away / ground.reach);
+        let left = left * smooth_step(level, down, -ray[2] / dot(ray, ray).sqrt());
+        let behind = behind();
+        if left <= 0.0 {
             return behind;
         }
-        let mut own = FLOOR;
+        let mut own = behind.map(|part| FLOOR * part);
         for axis in 0..2 {
             // a pixel's width along this axis [lines]
             let pixel = length(right[axis] - point[axis], below[axis] - point[axis]);
@@ -240,13 +245,9 @@ impl Lights {
             own = mix(own, line, 0.8 * cover);
         }
         let at = [point[0], point[1], ground.height];
-        let shadow = self.shadow.light(at, self.shadow.texel);
+        let shadow = self.shadow.light(at, [0.0, 0.0, 1.0]);
         let lit = own.map(|part| part * (0.52 + 0.48 * shadow));
-        if fade > 0.0 {
-            mix(lit, behind, fade)
-        } else {
-            lit
-        }
+        mix(behind, lit, left)
     }
 }
 

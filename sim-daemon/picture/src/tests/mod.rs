@@ -1,6 +1,7 @@
 //! Pictures against geometry that can be worked out by hand.
 
 mod cover;
+mod light;
 mod normals;
 mod view;
 
