@@ -18,6 +18,8 @@ import tightloop as tl
 from browser import WIDE, WIDTH, View, chromium, differing, spots
 from processes import wait_until
 from tightloop import Frame
+from tightloop.view import Picture
+from tightloop.view.parts import parts
 
 START = [0.0, 0.0, 0.0, -2.4, 0.0, 2.4, 0.8, 0.04, 0.04]
 
@@ -67,6 +69,12 @@ def is_red(pixels: NDArray[np.int16]) -> NDArray[np.bool_]:
     return (red > 100) & (red > green + 35) & (red > blue + 35)
 
 
+def is_sand(pixels: NDArray[np.int16]) -> NDArray[np.bool_]:
+    """Where the table is seen: nothing else has less blue than red and green, and little less."""
+    red, green, blue = (pixels[..., channel] for channel in range(3))
+    return (red - blue > 6) & (red - blue < 60) & (red - green < 20)
+
+
 class Observer:
     """A client that only looks."""
 
@@ -95,6 +103,29 @@ def test_two_poses_of_an_arm_are_two_pictures_and_the_first_comes_back(arm, look
         sim.reset()
         view.wait(lambda: differing(view.shot(), second) > 0, "the arm moves back")
         assert differing(view.still(), first) == 0
+
+
+@pytest.mark.parametrize("preset", ["three-quarter", "front"])
+def test_page_and_film_have_one_ground_one_background_and_one_light(arm, look, unique, preset):
+    with tl.launch(arm, worlds=1, name=unique()) as sim:
+        frame = sim.reset()
+        view = look(sim.view(port=8300).url)
+        view.close_notices()
+        view.choose("Camera", preset)
+        page = view.still(f"stage_{preset}")
+        scene = parts(sim.info["scene"], sim.info["scene_folder"], sim.body_names)
+        film = Picture(scene, page.shape[1], page.shape[0]).render(frame, camera=preset).astype(np.int16)
+        # at the left edge, where lines are a few per cent of the ground
+        for name, rows in {"background": slice(0, 40), "ground": slice(290, 340)}.items():
+            seen, drawn = (np.median(pixels[rows, :60].reshape(-1, 3), axis=0) for pixels in (page, film))
+            assert np.abs(seen - drawn).max() <= 8, (name, seen, drawn)
+        # from the background to the ground no row stands out: the page has no horizon
+        left = np.median(page[:340, :20], axis=1)
+        assert np.abs(np.diff(left, axis=0)).max() <= 12
+        # the table top is the only thing that is sand-coloured; it is in light
+        seen, drawn = (pixels[is_sand(pixels)] for pixels in (page, film))
+        assert min(len(seen), len(drawn)) > 0.03 * page[..., 0].size
+        assert np.abs(np.median(seen, axis=0) - np.median(drawn, axis=0)).max() <= 20
 
 
 def test_a_slider_moves_the_arm_and_pause_gives_control_back(arm, look, unique):

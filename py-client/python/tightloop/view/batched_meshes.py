@@ -27,12 +27,14 @@ class BatchedMesh:
         faces: Shape ``(faces, 3)``.
         color: Red, green, blue and opacity, 0 to 255.
         bodies: Indices of the bodies in ``body_names``; (-1,) is the world.
+        closed: Whether the meshes of a body enclose it and face outwards, so that no face is seen from behind.
     """
 
     vertices: NDArray[np.float32]
     faces: NDArray[np.uint32]
     color: tuple[int, int, int, int]
     bodies: tuple[int, ...]
+    closed: bool
 
 
 def batched_meshes(parts: Sequence[Part]) -> list[BatchedMesh]:
@@ -53,10 +55,28 @@ def _meshes_of(parts: list[Part], bodies: tuple[int, ...]) -> list[BatchedMesh]:
     vertices = np.concatenate([place(np.asarray(part.pose), part.mesh.vertices) for part in parts])
     faces = np.concatenate([part.mesh.faces + first for part, first in zip(parts, counts, strict=False)])
     colors, which = _few(np.concatenate([part.mesh.colors for part in parts]))
+    closed = all(_is_closed(part.mesh.vertices, part.mesh.faces) for part in parts)
     return [
-        BatchedMesh(*_creased(vertices, faces[which == color]), (int(red), int(green), int(blue), int(opacity)), bodies)
+        BatchedMesh(
+            *_creased(vertices, faces[which == color]),
+            (int(red), int(green), int(blue), int(opacity)),
+            bodies,
+            closed,
+        )
         for color, (red, green, blue, opacity) in enumerate(colors)
     ]
+
+
+def _is_closed(vertices: NDArray[Any], faces: NDArray[Any]) -> bool:
+    """Whether each edge is run along as often in one direction as in the other, and the inside is behind the faces."""
+    places, same = np.unique(vertices.astype(np.float32), axis=0, return_inverse=True)
+    faces = same.ravel()[faces].astype(np.int64)
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    forth = np.sort(start * len(places) + end)
+    back = np.sort(end * len(places) + start)
+    corners = places[faces].astype(np.float64)
+    volume = np.sum(corners[:, 0] * np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    return bool(np.array_equal(forth, back) and volume > 0.0)
 
 
 def _few(colors: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.intp]]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tightloop.dynamics import Dynamics
 from tightloop.errors import TightloopError
+from tightloop.view import floor
 from tightloop.view.cameras import camera
 from tightloop.view.display_options import DisplayOptions
 from tightloop.view.drag_spring import DragSpring, drag_spring
@@ -21,6 +22,7 @@ from tightloop.view.panel import Panel
 from tightloop.view.parts import parts
 from tightloop.view.poses import Array
 from tightloop.view.source import CONTACT_FIELDS
+from tightloop.view.stage import add_stage
 from tightloop.view.world_meshes import WorldMeshes
 
 # In each frame a following camera moves by a tenth of its distance to the target, which avoids jerks.
@@ -62,11 +64,8 @@ class Page:
         server.gui.main_panel.dock_right()
         self._preset = "three-quarter"
         server.scene.set_up_direction("+z")
-        # at viser's own brightness colours are pale
-        server.scene.configure_environment_map(environment_intensity=0.4)
-        server.scene.add_grid(
-            "/ground", infinite_grid=True, cell_size=0.1, section_size=1.0, fade_distance=40.0, shadow_opacity=0.2
-        )
+        box = self._world_meshes.box
+        add_stage(server.scene, box, self._world_meshes.offsets, floor.height(scene_parts, box))
         self.show(first, new=True)
 
     def update(self, timeout: float) -> float | None:

@@ -12,7 +12,7 @@ from tightloop import _core, checks
 from tightloop.errors import ArgumentError
 from tightloop.frames import FAULTED
 from tightloop.signatures import checked_calls
-from tightloop.view import cameras, grid
+from tightloop.view import cameras, floor, grid
 from tightloop.view.arguments import check_camera, check_contacts
 from tightloop.view.cameras import Camera
 from tightloop.view.contact_marks import WORLDS_MAX, contact_marks
@@ -35,11 +35,6 @@ _FORCE_SCALE = 0.01
 _POINT_PART, _FORCE_PART = 0.05, 0.02
 _WIDTH_MIN, _WIDTH_MAX = 1.5, 12.0
 _FOV = 0.6
-# Distances of lines on the floor [m], and about how many of them cross the scene.
-_SPACINGS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
-_LINES = 12
-# Smaller horizontal planes are drawn with their edges [m].
-_FLOOR_SIZE = 4.0
 
 
 @checked_calls
@@ -86,8 +81,8 @@ class Picture:
         self._subject = parts.subject if isinstance(parts, Parts) else whole(bodies)
         own = [part for part in every if part.kind == kind]
         # a floor is drawn as infinite; a slope is drawn as its mesh
-        self._floors = [float(part.pose[2]) for part in own if _is_floor(part)]
-        self._parts = [part for part in own if not _is_floor(part)]
+        self._floors = [part for part in own if floor.is_floor(part)]
+        self._parts = [part for part in own if not floor.is_floor(part)]
         self._framing = Framing(self._parts, self._subject)
         numbers: dict[int, int] = {}
         for part in self._parts:
@@ -147,7 +142,7 @@ class Picture:
             world = int(chosen[0])
         if camera is None:
             camera = "follow" if self._subject.floats and len(chosen) == 1 else "three-quarter"
-        box, offsets, floor = self._stand(chosen, body_q)
+        box, offsets, height = self._stand(chosen, body_q)
         self.offsets = offsets.astype(np.float32)
         place = int(np.argmax(chosen == world))
         meshes, poses = self._instances(body_q[chosen], offsets)
@@ -165,14 +160,12 @@ class Picture:
         view, around = self._view(camera, box, body_q, chosen, place, aims=np.concatenate(aims))
         shows = len(chosen) <= WORLDS_MAX if contacts is None else contacts
         lines = self._contacts(shown, chosen, view) if shows else _no_lines()
-        reach = around[3]
-        spacing = next((step for step in _SPACINGS if step * _LINES >= reach), _SPACINGS[-1])
         meshes, poses, tints, opacities = (np.concatenate(column) for column in zip(*layers, strict=True))
         return self._renderer.render(
             (view.position, view.target, view.up),
             view.fov,
             around,
-            (floor, spacing),
+            (height, floor.spacing(around[3])),
             meshes,
             poses,
             tints,
@@ -210,13 +203,10 @@ class Picture:
             # do not keep a box of worlds that are not finite
             box = grid.extent(() if first is None else self._parts, body_q[0 if first is None else first])
             offsets = grid.offsets(len(chosen), box).astype(float)
-            # rounding may put the rim of an object below the floor
-            lowest = float(box[0, 2])
-            own = [floor for floor in self._floors if np.isfinite(floor)]
-            floor = max(own) if own else (lowest if lowest < -1e-3 else 0.0)
+            height = floor.height(self._floors, box)
             if first is None:
-                return box, offsets, floor
-            self._stands[key] = box, offsets, floor
+                return box, offsets, height
+            self._stands[key] = box, offsets, height
         return self._stands[key]
 
     def _instances(self, body_q: Array, offsets: Array) -> tuple[NDArray[np.uint32], Array]:
@@ -310,13 +300,6 @@ class Picture:
                 points = np.concatenate([points, aims[np.isfinite(aims).all(axis=-1)]])
             view = cameras.kept(view, points, aspect=aspect)
         return view
-
-
-def _is_floor(part: Part) -> bool:
-    """Return whether a part is a large horizontal plane that faces up."""
-    turned = np.abs(part.pose[3:5]).max()
-    is_flat = part.body < 0 and part.shape == "plane" and bool(turned < 1e-6)
-    return is_flat and bool(np.ptp(part.mesh.vertices[:, :2], axis=0).min() >= _FLOOR_SIZE)
 
 
 def _field(shown: Any, name: str, default: Any = None) -> Any:

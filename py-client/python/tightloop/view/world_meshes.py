@@ -14,6 +14,7 @@ from tightloop.frames import FAULTED
 from tightloop.view import grid
 from tightloop.view.batched_meshes import BatchedMesh, batched_meshes
 from tightloop.view.display_options import DisplayOptions
+from tightloop.view.floor import is_floor
 from tightloop.view.framing import Framing
 from tightloop.view.parts import Part, Parts
 from tightloop.view.poses import IDENTITY, Array, wxyz
@@ -64,7 +65,7 @@ class WorldMeshes:
         self.box = grid.extent(parts, first)
         self.offsets = grid.offsets(worlds, self.box)
         self._batches = {
-            kind: self._batches_of(kind, [part for part in parts if part.kind == kind])
+            kind: self._batches_of(kind, [part for part in parts if part.kind == kind and not is_floor(part)])
             for kind in ("visual", "collision")
         }
 
@@ -90,12 +91,13 @@ class WorldMeshes:
                     mesh.faces,
                     np.array([[1.0, 0, 0, 0]]),
                     np.zeros((1, 3)),
-                    batched_colors=np.array([mesh.color[:3]], np.uint8),
+                    batched_colors=_light(np.array([mesh.color[:3]])),
                     opacity=None if mesh.color[3] == 255 else mesh.color[3] / 255,
                     lod="off" if fine else "auto",
-                    # the winding of faces in robot files is not consistent
-                    side="double",
-                    cast_shadow=fine,
+                    # the browser compares shadows with the faces that are seen from behind where there are any, so that
+                    # a closed mesh does not shadow itself; a floor would
+                    side="front" if mesh.closed else "double",
+                    cast_shadow=fine and (mesh.closed or mesh.bodies != (-1,)),
                     receive_shadow=fine,
                     visible=False,
                 ),
@@ -178,5 +180,10 @@ def _tint(batch: _Batch, shown: tuple[int, ...], frozen: tuple[int, ...]) -> Non
         return
     color = np.array(batch.mesh.color[:3])
     red = np.repeat(np.isin(shown, frozen), len(batch.mesh.bodies))[:, None]
-    batch.handle.batched_colors = np.where(red, color + (_RED - color) * _TINT, color).astype(np.uint8)
+    batch.handle.batched_colors = _light(np.where(red, color + (_RED - color) * _TINT, color))
     batch.frozen = frozen
+
+
+def _light(colors: Array) -> NDArray[np.uint8]:
+    """Return colours as amounts of light, which viser takes for batches: a byte of a picture is the square root."""
+    return np.rint(255.0 * (np.asarray(colors) / 255.0) ** 2).astype(np.uint8)
