@@ -7,15 +7,20 @@ import re
 import subprocess
 import sys
 from collections import Counter
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image, ImageSequence
 
 import tightloop as tl
 from code_blocks import blocks, reading
 from conftest import REPOSITORY
 
 sys.path.insert(0, str(REPOSITORY / "docs"))
+import moving_picture
+
 from generate import command_line, pages, performance, scene_file
 
 PAGES = REPOSITORY / "docs/pages"
@@ -72,6 +77,22 @@ def test_the_readme_runs(tmp_path):
             if not block.needs:
                 reader.run(block)
         assert reader.names["sim"].worlds == 4096
+
+
+def test_the_first_picture_of_the_readme_moves():
+    text = (REPOSITORY / "README.md").read_text()
+    picture = re.search(r"!\[.+?\]\((.+?)\)", text)
+    assert picture is not None and picture.start() < text.index("\n## ")
+    path = REPOSITORY / picture[1]
+    assert path.stat().st_size < 1e6
+    with Image.open(path) as image:
+        frames = [np.asarray(frame.convert("RGB"), int) for frame in ImageSequence.Iterator(image)]
+    assert len(frames) > 30 and image.info["loop"] == 0
+    # each differs from the one before; where the arms follow the grasp, nearly everywhere
+    changes = [float(np.mean(np.abs(new - old) > 8)) for old, new in pairwise(frames)]
+    assert min(changes) > 1e-4 and max(changes) > 0.3
+    # and the script that draws it is there
+    assert path == moving_picture.FILE
 
 
 def test_the_site_builds_without_a_warning(tmp_path):
