@@ -18,7 +18,7 @@ import viser
 
 import tightloop as tl
 from processes import alive, wait_until
-from tightloop.view import cameras, dependencies, grid
+from tightloop.view import cameras, dependencies, floor, grid
 from tightloop.view.batched_meshes import batched_meshes
 from tightloop.view.command import main
 from tightloop.view.display_options import DisplayOptions
@@ -102,6 +102,29 @@ def test_a_mesh_of_many_colours_becomes_few_skins_of_near_ones():
     found = batched_meshes([part(0, mesh)])
     assert 1 < len(found) <= 6
     assert sum(len(mesh.faces) for mesh in found) == 12
+
+
+def test_a_mesh_is_closed_where_no_face_of_it_is_seen_from_behind():
+    colors = cube().colors
+    turned = CUBE_FACES.copy()
+    turned[0] = turned[0][::-1]
+    faces = {"whole": CUBE_FACES, "inwards": CUBE_FACES[:, ::-1], "open": CUBE_FACES[1:], "one turned": turned}
+    closed = {
+        name: batched_meshes([part(0, Mesh(CUBE, own, colors[: len(own)]))])[0].closed for name, own in faces.items()
+    }
+    # the browser hides what is behind the faces of a closed one
+    assert closed == {"whole": True, "inwards": False, "open": False, "one turned": False}
+
+
+def test_the_floor_of_a_page_is_the_highest_plane_or_below_everything():
+    plane = Mesh(CUBE * [100, 100, 0], CUBE_FACES, cube().colors)
+    high, low = (part(-1, plane, shape="plane") for _ in range(2))
+    high.pose[2], low.pose[2] = 0.3, -1.0
+    box = np.array([[-1, -1, -2.0], [1, 1, 1]])
+    assert floor.height([low, high, part(0, cube())], box) == 0.3
+    assert floor.height([part(0, cube())], box) == -2.0
+    assert floor.height([], np.abs(box)) == 0.0
+    assert floor.is_floor(low) and not floor.is_floor(part(0, cube()))
 
 
 def test_sliders_are_of_joints_with_drives_and_go_to_their_limits(lesson):
