@@ -194,7 +194,13 @@ impl Advice {
         let names = description.dof_names.clone();
         py.import("tightloop.advice")?
             .getattr("tell_of_faults")?
-            .call1((&frame, bounds, &description.on_nan, names))?;
+            .call1((
+                &frame,
+                bounds,
+                &description.on_nan,
+                &description.on_fault,
+                names,
+            ))?;
         Ok(PyFrame::again(&frame))
     }
 
@@ -309,7 +315,7 @@ impl Advice {
         {
             let name = &names[of.columns.start + at];
             let problem = format!(
-                "joint_f acts on `{name}` beside its drive, which holds joint_target_q at the start position. For torques alone, \
+                "joint_f acts on `{name}` beside its drive, which holds its target. For torques alone, \
                  set joint_target_ke and joint_target_kd of the robot to 0 before launch. To add torques to the drive, send \
                  joint_target_q too"
             );

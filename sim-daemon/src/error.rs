@@ -40,7 +40,7 @@ pub enum DaemonError {
     #[error(transparent)]
     Protocol(#[from] ProtocolError),
     /// The log file cannot be written.
-    #[error("log file {path:?}: {problem}; name a file in a folder that is there")]
+    #[error("log file {path:?}: {problem}; name a file in a folder that you may write to")]
     Log {
         /// The file.
         path: std::path::PathBuf,

@@ -246,6 +246,7 @@ mod tests {
             name: "one".to_owned(),
             news: None,
         };
-        assert!(table(&[row]).lines().count() == 2 && table(&[row]).contains("\none"));
+        let text = table(&[row]);
+        assert!(text.lines().count() == 2 && text.contains("\none"));
     }
 }

@@ -15,7 +15,7 @@ JOINT = """<robot name="one"><link name="a"/><link name="b"><inertial><mass valu
 
 # arguments, exit code, what the message says
 CASES = [
-    ("serve nowhere.toml", 1, r"nowhere\.toml: cannot be read: .*; give the path of an existing file"),
+    ("serve nowhere.toml", 1, r"nowhere\.toml: cannot be read: .*; give the path of a file that you may read"),
     ("serve folder", 1, "folder: cannot be read: it is not a file; give the path"),
     ("serve empty.toml", 1, r"empty\.toml: .*; give a scene file.*Scene\.save"),
     ("serve hello.txt", 1, r"hello\.txt: .*; give a scene file"),
@@ -25,7 +25,7 @@ CASES = [
     ("serve joint.urdf --worldz 3", 2, "'--worldz'.*'--worlds'"),
     ("serve joint.urdf --worlds 0", 2, 'worlds "0": ask for 1 to'),
     ("serve joint.urdf --groups 3 --worlds 4", 2, 'groups "3": 4 worlds .*; ask for a number that divides it'),
-    ("serve joint.urdf --log folder", 1, 'log file "folder": .*; name a file in a folder that is there'),
+    ("serve joint.urdf --log folder", 1, 'log file "folder": .*; name a file in a folder that you may write to'),
     ("serve joint.urdf --log no/where.log", 1, r'log file "no/where\.log": .*; name a file'),
     ("serve joint.urdf --device tpu", 2, 'device "tpu": unknown; use auto, cpu or gpu'),
     ("bench folder", 1, "folder: cannot be read: it is not a file; give the path"),
@@ -43,7 +43,7 @@ CASES = [
     ("record nobody a.tlrec", 1, 'no daemon named "nobody" .*`tightloop serve SCENE --name nobody` starts one'),
     ("replay nowhere.tlrec", 2, r"nowhere\.tlrec: cannot be read: .*; give"),
     ("replay hello.txt", 2, "is no recording; give a file"),
-    ("demo nowhere.urdf", 1, r"nowhere\.urdf: cannot be read: .*; give the path of an existing file"),
+    ("demo nowhere.urdf", 1, r"nowhere\.urdf: cannot be read: .*; give the path of a file that you may read"),
     ("demo empty.urdf", 1, r"empty\.urdf:1:1: broken XML: the file is empty"),
     ("demo --worlds many", 2, "--worlds: 'many' is not at least 1; give a whole number"),
     ("demo --seconds soon", 2, "--seconds: 'soon' is not above 0; give a number"),

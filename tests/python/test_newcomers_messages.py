@@ -143,7 +143,7 @@ tl.Scene.load(URDF)                                       | XML and not a scene.
 tl.Scene.from_mujoco(folder / "hello.txt")                | hello\.txt: MuJoCo cannot compile it
 tl.Scene.from_mujoco("<mujoco/>")                         | <mujoco/>.*give the path of an MJCF file
 mine.save(folder)                                         | cannot be written: .*name a file
-mine.save(folder / "no" / "scene.toml")                   | cannot be written: .*a folder that is there
+mine.save(folder / "no" / "scene.toml")                   | cannot be written: .*a folder that you may write to
 snapshot.save(folder / "no" / "x")                        | cannot be written
 tl.Snapshot.load(folder)                                  | cannot be read: .*give a file
 tl.Snapshot.load(folder / "hello.txt")                    | no snapshot; give
@@ -173,7 +173,7 @@ tl.launch(scene(), worlds=1, fields="joint_q")            | fields is 'joint_q';
 tl.launch(scene(), worlds=3, groups=2)                    | cannot be shared out evenly; ask for a number that divides
 tl.launch(scene(), worlds=10**9)                          | are needed.*use fewer worlds
 view.Camera((1, 1, 1), (1, 1, 1))                         | target is .*give another point
-view.Camera((0, 0, 1), (0, 0, 0))                         | up is .*along the line of sight; give another
+view.Camera((0, 0, 1), (0, 0, 0), up=(0, 0, 0))           | up has no direction; give one
 # environments
 env.VectorEnv("FrankaRech", 2)                            | no task 'FrankaRech'; there are: .*FrankaReach
 env.VectorEnv("CartPoleBalance", 2, daemon=sim.name)      | runs another scene.*start it with

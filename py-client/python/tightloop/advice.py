@@ -24,13 +24,16 @@ def warn(message: str) -> None:
     warnings.warn(message, TightloopWarning, stacklevel=_level())
 
 
-def tell_of_faults(frame: Any, bounds: tuple[float | None, float | None], on_nan: str, dof_names: list[str]) -> None:
+def tell_of_faults(
+    frame: Any, bounds: tuple[float | None, float | None], on_nan: str, on_fault: str, dof_names: list[str]
+) -> None:
     """Warn of the faulted worlds of a frame.
 
     Args:
         frame: The frame, with at least one such world.
         bounds: Largest |joint_q| and |joint_qd| of the run; None is no bound.
         on_nan: As of `launch`.
+        on_fault: As of `launch`.
         dof_names: As of `Sim`.
     """
     faulted = np.flatnonzero(frame.status & FAULTED)
@@ -47,12 +50,17 @@ def tell_of_faults(frame: Any, bounds: tuple[float | None, float | None], on_nan
         fastest = int(speeds.argmax())
         if speeds[fastest] > _FAST:
             state = f" Just before, `{dof_names[fastest]}` was fastest, at {frame.joint_qd[first, fastest]:.3g}."
+    cure = (
+        ""
+        if on_fault == "reset"
+        else " A faulted world keeps its last good state until a reset: reset(mask=(frame.status & 9) != 0) resets "
+        'such worlds, and launch(on_fault="reset") does so by itself.'
+    )
     warn(
         f"{worlds} of {len(frame.status)} faulted: {which} world {first}, after its step {frame.step[first]}, with "
-        f"{reason}.{state} A faulted world keeps its last good state until it is reset. Usual causes are a dt that is "
-        "too long, gains or forces that are too large for light links, and shapes that start inside of others: use a "
-        "smaller dt or more substeps, smaller gains, or joint_armature. reset(mask=(frame.status & 9) != 0) resets "
-        'such worlds, and launch(on_fault="reset") does so by itself. This is told once'
+        f"{reason}.{state} Usual causes are a long dt, gains too large for light links, and shapes that start inside "
+        f"of others. Use a smaller dt, more substeps, smaller gains, or joint_armature.{cure} Later faults are not "
+        "reported"
     )
 
 

@@ -111,7 +111,8 @@ class Params:
 
         Args:
             mask: Worlds to write, bool, shape ``(worlds,)``; all if left out.
-            **params: Arrays by name, each ``(worlds, ...)``, ``(...)`` for identical worlds, or one number for all.
+            **params: Arrays by name, each ``(worlds, ...)``, ``(...)`` for identical worlds, or one number for
+                all; gravity needs three.
 
         Returns:
             A frame at the current state. Raises as `Sim.step` does, and UnknownField.

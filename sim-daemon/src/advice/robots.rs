@@ -19,14 +19,22 @@ pub(super) fn advice(scene: &Description) -> Vec<String> {
     let mut all = Vec::new();
     let is_weightless = scene.gravity == [0.0; 3] || varies(scene, Param::Gravity);
     for robot in scene.robots.iter().filter(|robot| robot.mujoco.is_none()) {
-        all.extend(meshes(robot));
         if robot.urdf.is_none() {
             continue;
+        }
+        // a file without moving joints may be a landscape
+        if robot.floating
+            || robot
+                .joints
+                .iter()
+                .any(|joint| joint.kind != JointKind::Fixed)
+        {
+            all.extend(meshes(robot));
         }
         if robot.floating && !is_weightless {
             all.extend(falls(scene, robot));
         }
-        if !robot.floating && !scene.shapes.is_empty() {
+        if !robot.floating && has_floor(scene) {
             all.extend(stands(robot));
         }
     }
@@ -57,9 +65,15 @@ fn falls(scene: &Description, robot: &Robot) -> Option<String> {
     (scene.shapes.is_empty() && !is_caught).then(|| {
         format!(
             "robot `{name}` floats and nothing is below it, so it falls for ever. Add scene.add_ground(), leave out floating=True, \
-             or set gravity to (0, 0, 0)."
+             set gravity to (0, 0, 0), or hold it with joint_f."
         )
     })
+}
+
+/// Whether a robot could stand on something: on a table alone, one that is held is meant to be held.
+fn has_floor(scene: &Description) -> bool {
+    let mut shapes = scene.shapes.iter();
+    shapes.any(|shape| matches!(shape.shape, Shape::Plane))
 }
 
 /// A robot with feet that hangs at its base.
@@ -73,7 +87,8 @@ fn stands(robot: &Robot) -> Option<String> {
     let names: Vec<String> = feet.map(|link| format!("`{}`", link.name)).collect();
     (names.len() >= FEET).then(|| {
         format!(
-            "robot `{}` has legs ({}) and a fixed base, so it hangs in the air and cannot walk or fall. Load it with floating=True.",
+            "robot `{}` has legs ({}) and a fixed base, so it hangs in the air and cannot walk or fall. Load it with floating=True, \
+             unless it is to hang.",
             robot.name,
             some(&names)
         )
@@ -81,33 +96,36 @@ fn stands(robot: &Robot) -> Option<String> {
 }
 
 /// Meshes of links in another unit.
-fn meshes(robot: &Robot) -> Option<String> {
-    let mut names = Vec::new();
-    let mut is_large = false;
+fn meshes(robot: &Robot) -> Vec<String> {
+    let (mut large, mut tiny) = (Vec::new(), Vec::new());
     for link in &robot.links {
         for collision in &link.collisions {
             let Shape::Mesh(mesh) = &collision.shape else {
                 continue;
             };
             let extent = extent(&mesh.triangles.vertices);
-            if !(MESH_MIN..=MESH_MAX).contains(&extent) {
-                is_large = extent > MESH_MAX;
-                let file = mesh.path.file_name().unwrap_or(mesh.path.as_os_str());
-                names.push(format!(
-                    "`{}` of link `{}` is {extent:.4} m long",
-                    file.to_string_lossy(),
-                    link.name
-                ));
+            let file = mesh.path.file_name().unwrap_or(mesh.path.as_os_str());
+            let (file, link) = (file.to_string_lossy(), &link.name);
+            if extent > MESH_MAX {
+                large.push(format!("`{file}` of link `{link}` is {extent:.0} m long"));
+            } else if extent < MESH_MIN {
+                tiny.push(format!("`{file}` of link `{link}` is {extent:.1e} m long"));
             }
         }
     }
-    (!names.is_empty()).then(|| {
-        let cure = match is_large {
-            true => "It looks like millimetres: give the mesh scale=\"0.001 0.001 0.001\".",
-            false => "Its file looks like metres already: leave out the scale.",
-        };
-        format!("robot `{}`: mesh {}. {cure}", robot.name, some(&names))
-    })
+    let told = [
+        (
+            large,
+            "It looks like millimetres: give the mesh scale=\"0.001 0.001 0.001\".",
+        ),
+        (
+            tiny,
+            "Its file looks like metres already: leave out a scale of 0.001.",
+        ),
+    ];
+    let told = told.into_iter().filter(|(names, _)| !names.is_empty());
+    told.map(|(names, cure)| format!("robot `{}`: mesh {}. {cure}", robot.name, some(&names)))
+        .collect()
 }
 
 /// The longest edge of a box around points [m].

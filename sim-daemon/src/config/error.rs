@@ -9,7 +9,7 @@ use sim_model::ModelError;
 #[non_exhaustive]
 pub enum ConfigError {
     /// A scene file that cannot be read.
-    #[error("{}: cannot be read: {reason}; give the path of an existing file", path.display())]
+    #[error("{}: cannot be read: {reason}; give the path of a file that you may read", path.display())]
     Read {
         /// The file.
         path: PathBuf,
@@ -17,7 +17,7 @@ pub enum ConfigError {
         reason: String,
     },
     /// A scene file that cannot be written.
-    #[error("{}: cannot be written: {reason}; name a file in a folder that is there", path.display())]
+    #[error("{}: cannot be written: {reason}; name a file in a folder that you may write to", path.display())]
     Write {
         /// The file.
         path: PathBuf,

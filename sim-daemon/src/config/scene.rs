@@ -180,7 +180,12 @@ pub fn parse(text: &str, place: &str) -> Result<SceneFile, ConfigError> {
     }
     toml::from_str(text).map_err(|error| {
         let reason = error.to_string();
-        let cure = if text.contains("dt") { "" } else { NO_SCENE };
+        let is_scene = text.lines().any(|line| {
+            let line = line.trim_start();
+            line.starts_with("[[robot]]")
+                || line.split('=').next().is_some_and(|key| key.trim() == "dt")
+        });
+        let cure = if is_scene { "" } else { NO_SCENE };
         syntax(place, &format!("{}{cure}", reason.trim_end()))
     })
 }

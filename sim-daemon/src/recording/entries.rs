@@ -41,7 +41,7 @@ impl Entries<BufReader<File>> {
     pub(super) fn open(path: &Path) -> Result<Self, DaemonError> {
         let failed = |error: FileError| match error {
             FileError::NotAFile => unreadable(path, "is no file; give the file of a recording"),
-            error => unreadable(path, format!("{error}; give a recording that is there")),
+            error => unreadable(path, format!("{error}; give a recording that you may read")),
         };
         let file = files::open(path).map_err(failed)?;
         let bytes = file.metadata().map_err(|error| failed(error.into()))?.len();

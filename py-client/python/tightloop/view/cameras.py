@@ -26,8 +26,6 @@ _FILL = 0.8
 # A subject that moves is kept within this fraction of the picture.
 _KEEP = 0.96
 _LEAST_DISTANCE = 0.1
-# Least sine of the angle between the line of sight and what points up.
-_UPRIGHT = 1e-6
 
 
 @checked_calls
@@ -57,8 +55,8 @@ class Camera:
         line = np.subtract(self.target, self.position)
         if not line.any():
             raise ArgumentError(f"Camera: target is {self.target}, the position too; give another point to look at")
-        if np.linalg.norm(np.cross(line / np.linalg.norm(line), self.up)) < _UPRIGHT * np.linalg.norm(self.up):
-            raise ArgumentError(f"Camera: up is {self.up}, along the line of sight; give another, such as (0, 1, 0)")
+        if not any(self.up):
+            raise ArgumentError("Camera: up has no direction; give one, such as (0, 0, 1)")
         fov = checks.number("Camera: fov", self.fov, above=0.0, error=ArgumentError)
         if fov >= np.pi:
             raise ArgumentError(f"Camera: fov is {fov:g}; give less than π [rad]")

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tightloop import checks
-from tightloop.errors import ArgumentError, DaemonLost, WaitTimeout
+from tightloop import advice, checks
+from tightloop.errors import ArgumentError, DaemonLost, TightloopWarning, WaitTimeout
 from tightloop.signatures import checked_calls
 from tightloop.view import dependencies
 from tightloop.view.arguments import check_camera, check_contacts, check_size, check_worlds
@@ -194,11 +194,12 @@ class Film:
         lost = self.pictures if self._would_lose() else 0
         self.discard()
         if lost:
-            warnings.warn(
-                f"film: {self._out} is not written, since {kind.__name__} ended it after {lost} picture(s); to "
-                "keep them, catch the error inside of the `with` block, or call close() there",
-                stacklevel=2,
-            )
+            # where warnings are errors, the user's own error is the one to see
+            with contextlib.suppress(TightloopWarning):
+                advice.warn(
+                    f"film: {self._out} is not written, since {kind.__name__} ended it after {lost} picture(s); to "
+                    "keep them, catch the error inside of the `with` block, or call close() there"
+                )
 
     def _would_lose(self) -> bool:
         """Whether discarding loses pictures: a folder and a single picture have them already."""

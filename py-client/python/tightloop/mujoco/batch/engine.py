@@ -213,12 +213,17 @@ class Engine:
         if act.size:
             parts["act"] = act
         if changed.all():
-            return self.sim.write(**parts)
+            return self._write_states(parts)
         whole = {}
         for name, values in parts.items():
             whole[name] = np.zeros((self._sims, values.shape[1]))
             whole[name][changed] = values
-        return self.sim.write(**whole, mask=changed)
+        return self._write_states(whole, changed)
+
+    def _write_states(self, parts: dict[str, Array], mask: Mask | None = None) -> Frame:
+        """Write states of MuJoCo's order, which the warnings of quaternions in another order would not fit."""
+        joint_q, joint_qd = parts.pop("joint_q"), parts.pop("joint_qd")
+        return self.sim._client.write(joint_q, joint_qd, parts, mask, True)
 
     def _commands(self, mask: Mask) -> tuple[dict[str, Array], Array]:
         """What worlds shall hold, by name, and joint forces: of the rows in the mask, elsewhere what they hold."""
