@@ -98,6 +98,7 @@ sim.params.shape_mu                                       | `shape_mu`.*name it 
 sim.step(body_f=np.zeros((2, 12, 6)))                     | `body_f`.*name it at launch
 sim.params.friction                                       | 'friction'; did you mean `shape_mu`
 sim.params["gravity"]                                     | no entries, such as 'gravity'.*write params\.gravity
+sim.step(joint_target_q=np.zeros((3, 9)))                 | got \(3, 9\)\. The first axis is the worlds, which are 2
 sim.params.write(gravity=9.81)                            | gravity is 9\.81, the same along each axis; give a vector
 sim.params.write(gravity=(0, 0, -9.81, 0))                | gravity: expected shape
 # attributes and entries
@@ -153,6 +154,9 @@ view.Film(sim, folder / "x.gif")                          | film: out is Sim.*gi
 view.film(folder / "hello.txt", folder / "x.gif")         | is no recording; give
 env.VectorEnv("my_task.py:Task", 2)                       | no file my_task\.py; give
 # scenes
+tl.launch(scene(), worlds=1, params={"shape_mu": 0.1})    | params is a dict; .*sim\.params\.write
+tl.Scene(decimation=4)                                    | did you mean `substeps`
+mine.add_site(name="tcp", body="fr3_hand")                | no body .*A link of a robot is named with it, as in `arm/…`
 tl.Scene(gravity=-9.81)                                   | gravity is -9\.81; give 3 numbers
 tl.Scene(dt="1ms")                                        | dt is '1ms'; give a number
 tl.Scene(timestep=0.01)                                   | `timestep`; did you mean `dt`

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -236,3 +238,30 @@ def test_only_the_first_calls_and_worlds_are_looked_at(scene):
         for _ in range(256):
             sim.step(joint_target_q={"arm": [0.1, 0.1]})
         sim.step(joint_target_q={"arm": [90.0, 0.1]})
+
+
+def test_members_of_tasks_elsewhere():
+    with told_once(r"task Hurried: nothing uses its `is_terminated`; a Task has `terminated`"):
+
+        class Hurried(CartPoleBalance):
+            def is_terminated(self, xp, worlds):
+                return worlds.joint_q[:, 0] > 1.0
+
+    with nothing_told():
+
+        class Careful(CartPoleBalance):
+            def terminated(self, xp, worlds):
+                return worlds.joint_q[:, 0] > 1.0
+
+    assert Hurried is not Careful
+
+
+def test_a_gpu_that_is_a_software_driver(scene):
+    devices = subprocess.run([sys.executable, "-m", "tightloop", "devices"], capture_output=True, text=True, check=True)
+    # software drivers come last
+    if "llvmpipe" not in devices.stdout.partition("\n")[0]:
+        pytest.skip("a hardware GPU comes first on this machine, or there is no software driver")
+    with told_once(r"device is 'gpu', and the only one is the software driver .*llvmpipe.*device='cpu'"):
+        tl.launch(scene, worlds=1, device="gpu").close()
+    with nothing_told():
+        tl.launch(scene, worlds=1, device="gpu:0").close()

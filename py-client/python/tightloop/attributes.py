@@ -12,10 +12,12 @@ Entry = TypeVar("Entry")
 
 #: What other simulators call these attributes, or what their names are without a prefix.
 SYNONYMS = {
+    "actions": ("action", "joint_target_q"),
     "angular_velocity": ("joint_qd", "body_qd"),
     "armature": ("joint_armature",),
     "control": ("joint_f", "joint_target_q", "ctrl"),
     "controls": ("control", "joint_f", "joint_target_q", "ctrl"),
+    "decimation": ("substeps",),
     "damping": ("joint_target_kd",),
     "dof_pos": ("joint_q",),
     "dof_vel": ("joint_qd",),
@@ -47,7 +49,7 @@ SYNONYMS = {
     "mu": ("shape_mu",),
     "n_envs": ("num_envs", "worlds"),
     "num_envs": ("worlds",),
-    "num_worlds": ("worlds",),
+    "num_worlds": ("worlds", "num_envs"),
     "nworld": ("worlds",),
     "obs": ("forward",),
     "observation": ("forward",),
@@ -63,6 +65,7 @@ SYNONYMS = {
     "state": ("forward", "snapshot"),
     "stiffness": ("joint_target_ke",),
     "target": ("joint_target_q",),
+    "targets": ("joint_target_q",),
     "timestep": ("dt",),
     "torque": ("joint_f", "joint_torque"),
     "velocity": ("joint_qd", "joint_target_qd"),

@@ -45,8 +45,11 @@ def as_array(
         expected = f"expected shape {(worlds, columns)}, or {(columns,)} for every world alike"
         if base:
             expected += f"; {columns - base} without the {base} of its floating base"
-        fitting = [name for name, own, base in robots if given.ndim and given.shape[-1] in (own, own - base)]
+        has_worlds = given.shape[:-1] in ((), (worlds,))
+        fitting = [name for name, own, base in robots if given.shape and given.shape[-1] in (own, own - base)]
         cure = f'. Robot `{fitting[0]}` has as many: give {{"{fitting[0]}": …}}' if fitting and robot is None else ""
+        if given.ndim == 2 and not has_worlds:
+            cure = f". The first axis is the worlds, which are {worlds}"
         raise CommandRefused(f"{what}: {expected}; got {given.shape}{cure}")
     with np.errstate(over="ignore"):  # float128 may become inf, which the client refuses
         return np.array(np.broadcast_to(given, (worlds, size)), dtype=np.float64, order="C")

@@ -131,11 +131,8 @@ def launch(
     if not isinstance(scene, Scene):
         cure = "; Scene.load, add_urdf and from_mujoco read files" if isinstance(scene, str | os.PathLike) else ""
         raise ArgumentError(f"launch: scene is {type(scene).__name__}; give a tightloop.Scene{cure}")
-    for argument, names in (("fields", fields), ("params", params)):
-        if isinstance(names, str):
-            raise ArgumentError(f"launch: {argument} is {names!r}; give a list of names, such as ({names!r},)")
-        if not isinstance(names, Iterable):
-            raise ArgumentError(f"launch: {argument} is {names!r}; give a list of names, or () for none")
+    _check_names("fields", fields)
+    _check_names("params", params)
     # this checks types; the daemon checks values before it allocates anything
     arguments: dict[str, Any] = {
         "worlds": checks.integer("launch: worlds", worlds, error=ArgumentError),
@@ -169,10 +166,32 @@ def launch(
         sims = [Sim(_core.Client(own, lease=True), daemon) for own in _names(arguments["name"], count)]
         for warning in sims[0].info["warnings"]:
             advice.warn(warning)
+        if device == "gpu":
+            _warn_of_software(sims[0].info["adapter"])
     except BaseException:
         daemon.stop()
         raise
     return sims[0] if groups is None else Groups(arguments["name"], sims)
+
+
+def _check_names(argument: str, names: Any) -> None:
+    """Refuse what is no list of names."""
+    if isinstance(names, str):
+        raise ArgumentError(f"launch: {argument} is {names!r}; give a list of names, such as ({names!r},)")
+    if not isinstance(names, Iterable):
+        raise ArgumentError(f"launch: {argument} is {names!r}; give a list of names, or () for none")
+    if isinstance(names, Mapping):
+        cure = "sim.params.write sets values" if argument == "params" else "a frame has their values"
+        raise ArgumentError(f"launch: {argument} is a dict; give a list of names, and {cure} after the launch")
+
+
+def _warn_of_software(adapter: str) -> None:
+    """Warn where a GPU was asked for and the only one is a driver that computes on the CPU."""
+    if any(driver in adapter.lower() for driver in ("llvmpipe", "lavapipe", "swiftshader")):
+        advice.warn(
+            f"device is 'gpu', and the only one is the software driver {adapter}, which computes on the CPU: use "
+            "device='cpu', which is faster, or device='gpu:0' if it is what you want"
+        )
 
 
 def _bounds(bounds: Mapping[str, float] | None) -> dict[str, float]:

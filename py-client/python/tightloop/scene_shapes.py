@@ -274,7 +274,8 @@ class SceneShapes(SceneOptions):
             raise SceneError(f"{what}: body is the robot {carrier!r}; give one of its links, as in robot.link(…)")
         elif carrier not in self.bodies:
             known = ", ".join(f"`{body}`" for body in self.bodies) or "none yet; add_body makes one"
-            raise SceneError(f"{what}: body is {carrier!r}, which is no body of this scene; there are: {known}")
+            links = f". A link of a robot is named with it, as in `{next(iter(self.robots))}/…`" if self.robots else ""
+            raise SceneError(f"{what}: body is {carrier!r}, which is no body of this scene; there are: {known}{links}")
         return carrier
 
     def _collidable(self, what: str, thing: Collidable) -> str:

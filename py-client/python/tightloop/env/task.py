@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import checks
+from tightloop import advice, checks
 from tightloop.env.controls import Control
 from tightloop.env.names import Names
 from tightloop.errors import ArgumentError
@@ -95,6 +95,24 @@ class _Undefined(ArgumentError, NotImplementedError):
     pass
 
 
+#: Members of tasks elsewhere, or mistyped ones, and those of a Task that are most likely meant.
+_FOREIGN = {
+    "compute_reward": "reward",
+    "done": "terminated",
+    "dones": "terminated",
+    "get_obs": "observe",
+    "get_observation": "observe",
+    "get_observations": "observe",
+    "get_reward": "reward",
+    "is_done": "terminated",
+    "is_success": "success",
+    "is_terminated": "terminated",
+    "max_episode_length": "max_episode_steps",
+    "rewards": "reward",
+    "terminations": "terminated",
+}
+
+
 class Task:
     """The base class of tasks: a subclass defines scene, controls, observation and reward.
 
@@ -112,6 +130,12 @@ class Task:
         goal_radius: Radius of the ball that marks a goal in pictures [m], if the first three values of a goal are a
             position; None for no ball.
     """
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Warn of members that other libraries have, which nothing would call here."""
+        super().__init_subclass__(**options)
+        for name in vars(cls).keys() & _FOREIGN.keys():
+            advice.warn(f"task {cls.__name__}: nothing uses its `{name}`; a Task has `{_FOREIGN[name]}`")
 
     fields: ClassVar[Sequence[str]] = ("joint_q", "joint_qd")
     max_episode_steps: int = 500
