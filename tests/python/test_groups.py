@@ -168,7 +168,7 @@ def test_what_is_attached_are_the_groups_or_one_of_them(drawn, unique):
         for missing in (f"{name}.3", f"{name}.x", f"{name}.00"):
             with pytest.raises(tl.TightloopError, match=r"no daemon named|not allowed"):
                 tl.attach(missing)
-        with pytest.raises(tl.UnknownDaemon, match=rf"{name}$") as raised:
+        with pytest.raises(tl.UnknownDaemon, match=rf"running: {name}; ") as raised:
             tl.attach("nobody")
         assert f"{name}.0" not in str(raised.value)
 

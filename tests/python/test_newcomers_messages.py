@@ -99,7 +99,6 @@ sim.step(body_f=np.zeros((2, 12, 6)))                     | `body_f`.*name it at
 sim.params.friction                                       | 'friction'; did you mean `shape_mu`
 sim.params["gravity"]                                     | no entries, such as 'gravity'.*write params\.gravity
 sim.step(joint_target_q=np.zeros((3, 9)))                 | got \(3, 9\)\. The first axis is the worlds, which are 2
-sim.params.write(gravity=9.81)                            | gravity is 9\.81, the same along each axis; give a vector
 sim.params.write(gravity=(0, 0, -9.81, 0))                | gravity: expected shape
 # attributes and entries
 sim.joint_q                                               | no attribute 'joint_q'; .*sim\.forward\(\)\.joint_q

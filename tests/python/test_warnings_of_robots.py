@@ -106,7 +106,12 @@ def test_gravity_that_points_up():
 
 @pytest.mark.parametrize(
     ("size", "scale", "cure"),
-    [(100, 1, 'scale="0.001 0.001 0.001"'), (0.1, 0.001, "leave out the scale"), (100, 0.001, None), (0.1, 1, None)],
+    [
+        (100, 1, 'scale="0.001 0.001 0.001"'),
+        (0.1, 0.001, "leave out a scale of 0.001"),
+        (100, 0.001, None),
+        (0.1, 1, None),
+    ],
 )
 def test_meshes_in_another_unit(tmp_path, size, scale, cure):
     corners = [(x * size, y * size, z * size) for x in (0, 1) for y in (0, 1) for z in (0, 1)]

@@ -207,7 +207,7 @@ def test_gravity_that_is_one_number(scene):
             sim.params.gravity = (0, 0, -5)
             sim.params.gravity = 0
         with told_once(r"params\.gravity is \((-9\.81\d*(, )?){3}\) in world 0.*\(0, 0, -9\.81\)"):
-            sim.params.gravity[:] = -9.81
+            sim.params.gravity = -9.81
 
 
 def test_torques_against_drives_that_hold(scene):

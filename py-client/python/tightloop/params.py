@@ -111,8 +111,7 @@ class Params:
 
         Args:
             mask: Worlds to write, bool, shape ``(worlds,)``; all if left out.
-            **params: Arrays by name, each ``(worlds, ...)``, ``(...)`` for identical worlds, or one number for
-                all; gravity needs three.
+            **params: Arrays by name, each ``(worlds, ...)``, ``(...)`` for identical worlds, or one number for all.
 
         Returns:
             A frame at the current state. Raises as `Sim.step` does, and UnknownField.
@@ -130,10 +129,6 @@ class Params:
         self._varying(name)
         shape = self._shape(name)
         given = real_numbers(name, value)
-        if name == "gravity" and given.shape == () and given != 0.0:
-            raise CommandRefused(
-                f"gravity is {value!r}, the same along each axis; give a vector, such as (0, 0, -9.81)"
-            )
         if given.shape not in (shape, shape[1:], ()):
             raise CommandRefused(
                 f"{name}: expected shape {shape}, {shape[1:]} for every world alike, or a number; got {given.shape}"

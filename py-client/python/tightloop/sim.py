@@ -19,7 +19,7 @@ from tightloop.attributes import Attributes, ByName, nearest
 from tightloop.command_arrays import Command, ready_arrays, step_arrays
 from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
-from tightloop.errors import ArgumentError, CommandRefused, SimClosed, SnapshotError, UnknownAttribute
+from tightloop.errors import ArgumentError, CommandRefused, SimClosed, UnknownAttribute
 from tightloop.frames import FrameCopy
 from tightloop.notebook import Shown
 from tightloop.params import Params
@@ -230,9 +230,8 @@ class Sim(Shown, Attributes):
         """
         if keyframe is None:
             return self._client.reset(mask, seed)
-        state = keyframes.find(self.info["keyframes"], keyframe)
+        more = keyframes.arrays(keyframes.find(self.info["keyframes"], keyframe))
         self._client.reset(mask, seed)
-        more = keyframes.arrays(state)
         joint_q, joint_qd = more.pop("joint_q", None), more.pop("joint_qd", None)
         return self._client.write(joint_q, joint_qd, self._arrays("writes", **more), mask, True)
 
@@ -352,10 +351,7 @@ class Sim(Shown, Attributes):
             raise CommandRefused(f"restore: snapshot is {type(snapshot).__name__}; give a tightloop.Snapshot")
         if from_world is not None:
             from_world = checks.integer("restore: from_world", from_world, least=0, error=CommandRefused)
-            if from_world >= snapshot.worlds:
-                raise SnapshotError(
-                    f"restore: from_world is {from_world}; the snapshot has worlds 0 to {snapshot.worlds - 1}"
-                )
+            snapshot._check_world(from_world)
         with transfer_file(self.pid, snapshot.to_bytes()) as path:
             return self._client.restore(path, worlds, from_world)
 
@@ -469,8 +465,7 @@ class Sim(Shown, Attributes):
         return "`write`, `params` and arguments of `step` change worlds, those of `launch` and the scene the rest"
 
     def __getattr__(self, name: str) -> Any:
-        of_frames = nearest(name, self.__dict__.get("fields", ()))
-        if of_frames:
+        if of_frames := nearest(name, self.__dict__.get("fields", ())):
             there = ", ".join(f"sim.forward().{field}" for field in of_frames)
             raise UnknownAttribute(f"{self._subject()} has no attribute {name!r}; the frame of a call has: {there}")
         return super().__getattr__(name)

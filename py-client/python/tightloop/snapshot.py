@@ -84,6 +84,15 @@ class Snapshot:
             raise SnapshotError(f"{file}: cannot be read: {problem.strerror}; give a file that `save` wrote") from None
         return cls(data, str(file))
 
+    def _check_world(self, world: int) -> None:
+        """Refuse a world that this snapshot does not have.
+
+        Raises:
+            SnapshotError: There is no such world.
+        """
+        if world >= self.worlds:
+            raise SnapshotError(f"restore: from_world is {world}; the snapshot has worlds 0 to {self.worlds - 1}")
+
     @property
     def numbers(self) -> NDArray[Any]:
         """State, commands and parameters of each world, ``(worlds, values)``, read-only, in the daemon's layout."""
