@@ -82,13 +82,9 @@ def _wrapped(function: Any) -> Any:
 
     @functools.wraps(function)
     def call_with_further(*given: Any, **named: Any) -> Any:
-        if not named.keys() - known:
-            try:
-                return function(*given, **named)
-            except TypeError as problem:
-                if problem.__traceback__ is None or problem.__traceback__.tb_next is not None:
-                    raise
-        raise _explained(function, given, named)
+        if named.keys() - known:
+            raise _explained(function, given, named)
+        return call(*given, **named)
 
     return call_with_further
 
