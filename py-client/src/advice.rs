@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use sim_protocol::{Command, Description, Values};
 
 use crate::frame::PyFrame;
+use crate::not_finite::NotFinite;
 
 /// Calls whose arrays are looked at: a wrong unit or order is there from the first ones on.
 const CALLS: u32 = 256;
@@ -18,6 +19,8 @@ const WORLDS: usize = 16;
 const FAULTED: u32 = 1 | 8;
 /// How far outside of its limits a joint's target looks like degrees [rad]: policies that learn overshoot by less.
 const OUTSIDE: f64 = TAU;
+/// How far outside of its limits a joint may be written without a warning [rad], as a scene may start.
+const SLACK: f64 = 0.2;
 /// Standard deviations of angles above this look like degrees [rad].
 const NOISE: f64 = PI;
 /// No turn, as libraries write it that put w last, or first; each is a half turn in the other order.
@@ -32,6 +35,7 @@ enum Told {
     Torques = 8,
     Faults = 16,
     Gravity = 32,
+    Limits = 64,
 }
 
 /// What is looked at, and what was told already.
@@ -40,12 +44,17 @@ pub(crate) struct Advice {
     calls: AtomicU32,
     /// Targets were sent.
     aims: AtomicBool,
+    /// A mocap body got a rotation that is none in either order: whoever sends it knows the order.
+    turned: AtomicBool,
+    /// Commands that are not finite are looked for, since they fault their world alone.
+    spoils: bool,
+    spoiled: NotFinite,
     /// Positions of each dof and of each coordinate that look like degrees are outside of these [rad].
     dofs: Vec<[f64; 2]>,
     coords: Vec<[f64; 2]>,
     /// First coordinates of quaternions.
     quaternions: Vec<usize>,
-    /// Dofs whose drive holds a position, whatever clients write.
+    /// Dofs whose drive holds the start, whatever clients write; the scene gives it no target.
     holds: Vec<bool>,
 }
 
@@ -69,6 +78,9 @@ impl Advice {
             told: AtomicU8::new(0),
             calls: AtomicU32::new(0),
             aims: AtomicBool::new(false),
+            turned: AtomicBool::new(false),
+            spoils: description.on_nan == "freeze",
+            spoiled: NotFinite::default(),
             coords: names.iter().map(of_coord).collect(),
             quaternions: (0..names.len())
                 .filter(|&at| names[at].ends_with(".qx"))
@@ -76,7 +88,7 @@ impl Advice {
             holds: description
                 .driven
                 .iter()
-                .map(|follows| !varies && follows & 1 != 0)
+                .map(|follows| !varies && follows & 5 == 1)
                 .collect(),
             dofs,
         }
@@ -97,6 +109,9 @@ impl Advice {
         {
             warn(py, &of_targets(description, field, &columns))?;
         }
+        if self.spoils && !self.has_told(Told::Faults) {
+            self.spoiled.look(description, commands);
+        }
         if !self.looks() {
             return Ok(());
         }
@@ -111,7 +126,7 @@ impl Advice {
                 "joint_target_q" => {
                     self.degrees(py, of, &self.dofs, &description.dof_names, None)?
                 }
-                "mocap_quat" => self.mocaps(py, of, &description.mocap_names, None)?,
+                "mocap_quat" => self.mocaps(py, of, description, None)?,
                 "joint_f" if !self.aims.load(Ordering::Relaxed) => {
                     self.torques(py, of, &description.dof_names)?;
                 }
@@ -137,9 +152,15 @@ impl Advice {
                 "joint_q" => {
                     let names = &description.coord_names;
                     self.degrees(py, of, &self.coords, names, mask)?;
+                    self.limits(py, of, names, mask)?;
                     let first = of.columns.start;
-                    let own = self.quaternions.iter().filter(|at| of.columns.contains(at));
-                    for at in own.map(|at| at - first) {
+                    let is_whole = |at: &&usize| **at >= first && **at + 4 <= of.columns.end;
+                    for at in self
+                        .quaternions
+                        .iter()
+                        .filter(is_whole)
+                        .map(|at| at - first)
+                    {
                         let told = |world| {
                             let name = names[first + at].trim_end_matches(".qx");
                             of_order(&format!("joint_q of `{name}`"), world, "(x, y, z, w)", 0)
@@ -147,7 +168,7 @@ impl Advice {
                         self.order(py, of, at, mask, 1, told)?;
                     }
                 }
-                "mocap_quat" => self.mocaps(py, of, &description.mocap_names, mask)?,
+                "mocap_quat" => self.mocaps(py, of, description, mask)?,
                 "gravity" => self.gravity(py, of, mask)?,
                 "joint_q_noise" | "joint_target_q_noise" => {
                     let is_angle =
@@ -179,9 +200,8 @@ impl Advice {
         description: &Description,
         frame: sim_protocol::Frame,
     ) -> PyResult<PyFrame> {
-        let is_told = self.told.load(Ordering::Relaxed) & Told::Faults as u8 != 0;
         let bits = match frame.field("status") {
-            Ok(view) if !is_told => view.as_slice::<u32>().unwrap_or(&[]),
+            Ok(view) if !self.has_told(Told::Faults) => view.as_slice::<u32>().unwrap_or(&[]),
             _ => &[],
         };
         let has_faults = bits.iter().fold(0, |all, bits| all | bits) & FAULTED != 0;
@@ -200,6 +220,7 @@ impl Advice {
                 &description.on_nan,
                 &description.on_fault,
                 names,
+                self.spoiled.take(),
             ))?;
         Ok(PyFrame::again(&frame))
     }
@@ -208,6 +229,10 @@ impl Advice {
     fn looks(&self) -> bool {
         self.calls.load(Ordering::Relaxed) < CALLS
             && self.calls.fetch_add(1, Ordering::Relaxed) < CALLS
+    }
+
+    fn has_told(&self, what: Told) -> bool {
+        self.told.load(Ordering::Relaxed) & what as u8 != 0
     }
 
     /// Whether something was not told before; then it is now.
@@ -245,18 +270,65 @@ impl Advice {
         Ok(())
     }
 
-    /// Warns of quaternions of mocap bodies with w last: MuJoCo has it first.
-    fn mocaps(
+    /// Warns of positions far outside of limits.
+    fn limits(
         &self,
         py: Python<'_>,
         of: &Command<'_>,
         names: &[String],
         mask: Option<&[bool]>,
     ) -> PyResult<()> {
-        for (mocap, name) in names.iter().enumerate() {
+        let Some(usual) = self.coords.get(of.columns.clone()) else {
+            return Ok(());
+        };
+        let inner = OUTSIDE - SLACK;
+        let is_wrong = |at: usize, value: f64| {
+            value.is_finite() && (value < usual[at][0] + inner || value > usual[at][1] - inner)
+        };
+        if let Some((world, at, value)) = first(of, mask, is_wrong)
+            && !self.has_told(Told::Degrees)
+            && self.is_new(Told::Limits)
+        {
+            let name = &names[of.columns.start + at];
+            let [lower, upper] = [usual[at][0] + OUTSIDE, usual[at][1] - OUTSIDE];
+            let problem = format!(
+                "joint_q of `{name}` is {value:.4} rad in world {world}, far outside of its limits, {lower:.4} to {upper:.4}, which \
+                 will push it back: write a position within them"
+            );
+            warn(py, &problem)?;
+        }
+        Ok(())
+    }
+
+    /// Warns of quaternions of mocap bodies with w last: MuJoCo has it first. One that starts so, or follows others that
+    /// turn in either order, is meant.
+    fn mocaps(
+        &self,
+        py: Python<'_>,
+        of: &Command<'_>,
+        description: &Description,
+        mask: Option<&[bool]>,
+    ) -> PyResult<()> {
+        let [last, first] = NO_TURN;
+        for (mocap, name) in description.mocap_names.iter().enumerate() {
+            let place = 4 * mocap..4 * mocap + 4;
+            if description.mocap_quat.get(place.clone()) == Some(&last[..]) {
+                continue;
+            }
             let what = format!("mocap_quat of `{name}`");
             let told = |world| of_order(&what, world, "(w, x, y, z), as in MuJoCo", 1);
-            self.order(py, of, 4 * mocap, mask, 0, told)?;
+            if !self.turned.load(Ordering::Relaxed) {
+                self.order(py, of, place.start, mask, 0, told)?;
+            }
+            let width = of.columns.len();
+            let turns = worlds(of, mask).any(|world| {
+                let part = |at: usize| number(&of.values, world * width + place.start + at);
+                let own: [f64; 4] = std::array::from_fn(part);
+                own != last && own != first
+            });
+            if turns {
+                self.turned.store(true, Ordering::Relaxed);
+            }
         }
         Ok(())
     }

@@ -10,7 +10,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
 use sim_protocol::{Dtype, View};
 
-use crate::errors::{protocol, raise};
+use crate::errors::raise;
 
 /// Arrays made so far, each with its field's name: an empty field lies where the next one does.
 type Made = Vec<(String, Py<PyAny>)>;
@@ -39,11 +39,10 @@ pub(crate) struct PyFrame {
 impl PyFrame {
     fn __getattr__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let sample = self.sample.bind(py);
-        let view = sample
-            .get()
-            .0
-            .field(name)
-            .map_err(|error| protocol(py, &error))?;
+        let view = match sample.get().0.field(name) {
+            Ok(view) => view,
+            Err(_) => return Err(self.unknown(py, name)?),
+        };
         let find = |arrays: &Made| {
             arrays
                 .iter()
@@ -91,7 +90,7 @@ impl PyFrame {
         }
         py.import("tightloop.frames")?
             .getattr("FrameCopy")?
-            .call1((arrays,))
+            .call1((arrays, sim_daemon::field_names()))
     }
 
     /// Names of the fields that this frame carries.
@@ -142,6 +141,16 @@ impl PyFrame {
             sample: frame.get().sample.clone_ref(frame.py()),
             arrays: Mutex::default(),
         }
+    }
+
+    /// The error of a field that it does not carry.
+    #[cold]
+    fn unknown(&self, py: Python<'_>, name: &str) -> PyResult<PyErr> {
+        let error = py
+            .import("tightloop.frames")?
+            .getattr("unknown_field")?
+            .call1((name, self.fields(py), sim_daemon::field_names()))?;
+        Ok(PyErr::from_value(error))
     }
 
     fn arrays(&self) -> std::sync::MutexGuard<'_, Made> {

@@ -27,6 +27,15 @@ impl Axis {
         };
         start..stop
     }
+
+    /// Names of all columns.
+    fn names(self, description: &Description) -> &[String] {
+        match self {
+            Axis::Dofs => &description.dof_names,
+            Axis::Coords => &description.coord_names,
+            Axis::Actuators => &description.actuator_names,
+        }
+    }
 }
 
 /// The arrays of one command.
@@ -89,7 +98,7 @@ impl<'a, 'py> Inputs<'a, 'py> {
         Ok(())
     }
 
-    /// Takes an argument: nothing, an array for the whole scene, or a mapping of arrays by robot.
+    /// Takes an argument: nothing, an array for the whole scene, or a mapping of arrays by robot or name.
     pub(crate) fn add(
         &mut self,
         field: &'static str,
@@ -97,28 +106,77 @@ impl<'a, 'py> Inputs<'a, 'py> {
         value: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<()> {
         let Some(value) = value else { return Ok(()) };
-        let columns = match axis {
-            Axis::Dofs => 0..self.description.dof_names.len(),
-            Axis::Coords => 0..self.description.coord_names.len(),
-            Axis::Actuators => 0..self.description.actuator_names.len(),
-        };
+        let columns = 0..axis.names(self.description).len();
         if let Some(array) = self.ready(value, &columns) {
             self.arrays.push(Input {
                 field,
                 columns,
                 array,
             });
-        } else if let Ok(robots) = value.cast::<PyDict>() {
-            for (name, value) in robots {
-                self.add_robot(field, axis, &name, &value)?;
-            }
-        } else if let Ok(robots) = value.cast::<PyMapping>() {
-            for item in robots.items()? {
-                let (name, value): (Bound<'py, PyAny>, Bound<'py, PyAny>) = item.extract()?;
-                self.add_robot(field, axis, &name, &value)?;
-            }
+        } else if let Ok(named) = value.cast::<PyDict>() {
+            self.add_parts(field, axis, value, named.iter().collect())?;
+        } else if let Ok(named) = value.cast::<PyMapping>() {
+            let items = named.items()?;
+            let items = items.iter().map(|item| item.extract());
+            self.add_parts(field, axis, value, items.collect::<PyResult<_>>()?)?;
         } else {
             self.convert((field, axis), None, columns, value)?;
+        }
+        Ok(())
+    }
+
+    /// Takes a mapping: arrays by robot, or, where names of joints are among them, by these.
+    fn add_parts(
+        &mut self,
+        field: &'static str,
+        axis: Axis,
+        given: &Bound<'py, PyAny>,
+        items: Vec<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
+    ) -> PyResult<()> {
+        let robots = &self.description.robots;
+        let is_robot = |(name, value): &(Bound<'py, PyAny>, Bound<'py, PyAny>)| {
+            let name = name.extract::<&str>().ok();
+            name.is_some_and(|name| robots.iter().any(|robot| robot.name == name))
+                && value.cast::<PyMapping>().is_err()
+        };
+        if !items.iter().all(is_robot) {
+            return self.add_named(field, axis, given);
+        }
+        for (name, value) in items {
+            self.add_robot(field, axis, &name, &value)?;
+        }
+        Ok(())
+    }
+
+    /// Takes single columns by name or pattern, beside whole robots; the others keep what they had.
+    fn add_named(
+        &mut self,
+        field: &'static str,
+        axis: Axis,
+        given: &Bound<'py, PyAny>,
+    ) -> PyResult<()> {
+        let robots = self.description.robots.iter();
+        let robots: Vec<(&str, usize, usize, usize)> = robots
+            .map(|robot| {
+                let columns = axis.of(robot);
+                let base = self.base(axis, &columns);
+                (robot.name.as_str(), columns.start, columns.end, base)
+            })
+            .collect();
+        let (names, worlds) = (axis.names(self.description), self.description.worlds);
+        let parts = given
+            .py()
+            .import("tightloop.named_columns")?
+            .getattr("named_columns")?
+            .call1((field, given, worlds, names, robots))?;
+        for part in parts.try_iter()? {
+            let (first, array): (usize, Bound<'py, PyAny>) = part?.extract()?;
+            let array = array.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?;
+            self.arrays.push(Input {
+                field,
+                columns: first..first + array.shape()[1],
+                array: Array::F64(array),
+            });
         }
         Ok(())
     }
@@ -130,22 +188,10 @@ impl<'a, 'py> Inputs<'a, 'py> {
         name: &Bound<'py, PyAny>,
         value: &Bound<'py, PyAny>,
     ) -> PyResult<()> {
-        let robots = &self.description.robots;
-        let found = name
-            .extract::<&str>()
-            .ok()
-            .and_then(|name| robots.iter().find(|robot| robot.name == name));
-        let Some(robot) = found else {
-            let known: Vec<String> = robots
-                .iter()
-                .map(|robot| format!("`{}`", robot.name))
-                .collect();
-            let (known, name) = (known.join(", "), name.str()?);
-            return Err(raise(
-                name.py(),
-                "CommandRefused",
-                format!("{field}: no robot `{name}`; there are: {known}"),
-            ));
+        let mut robots = self.description.robots.iter();
+        let name: &str = name.extract()?;
+        let Some(robot) = robots.find(|robot| robot.name == name) else {
+            return Ok(()); // `add_parts` found it
         };
         let Range { start, end: stop } = axis.of(robot);
         let base = self.base(axis, &(start..stop));

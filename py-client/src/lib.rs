@@ -10,6 +10,7 @@ mod dynamics;
 mod errors;
 mod frame;
 mod input;
+mod not_finite;
 mod observe;
 mod parts;
 mod picture;
@@ -33,6 +34,18 @@ fn command_line(py: Python<'_>, arguments: Vec<OsString>) -> PyResult<i32> {
     Ok(py.detach(|| sim_daemon::serve(arguments)))
 }
 
+/// Names of all fields that frames may carry.
+#[pyfunction]
+fn field_names() -> Vec<&'static str> {
+    sim_daemon::field_names()
+}
+
+/// Names of all parameters that may vary between worlds.
+#[pyfunction]
+fn param_names() -> Vec<&'static str> {
+    sim_daemon::param_names()
+}
+
 #[pymodule(name = "_core")]
 mod core {
     use super::*;
@@ -41,8 +54,6 @@ mod core {
     use super::arrays::{drive, pack};
     #[pymodule_export]
     use super::client::{Client, groups, sweep};
-    #[pymodule_export]
-    use super::command_line;
     #[pymodule_export]
     use super::dynamics::Dynamics;
     #[pymodule_export]
@@ -61,6 +72,8 @@ mod core {
     use super::scene::{
         load_scene, parse_scene, read_mesh, read_mujoco, read_urdf, save_scene, scene_to_toml,
     };
+    #[pymodule_export]
+    use super::{command_line, field_names, param_names};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -106,6 +106,7 @@ pub(crate) fn description(
         actuator_names: model.actuator_names().to_vec(),
         activation_names: model.activation_names().to_vec(),
         mocap_names: model.mocap_names().to_vec(),
+        mocap_quat: model.start().mocap_quat.clone(),
         equality_names: model.equality_names().to_vec(),
         keyframes: model.keyframes().iter().map(keyframe).collect(),
         sensor_names: {
@@ -171,7 +172,7 @@ pub(crate) fn description(
         model_hash: model.hash(),
         notes: notes(info.scene),
         warnings: Vec::new(),
-        driven: driven(model),
+        driven: driven(model, info.scene),
         angle_range: angle_range(info.scene),
         frames_held: info.frames_held,
         watch_worlds: info.watch_worlds.min(options.worlds),
@@ -194,15 +195,21 @@ pub(crate) fn description(
     }
 }
 
-/// Which targets the drive of each dof follows: 1 positions, 2 velocities, 3 both. It has gains, or worlds may get some.
-fn driven(model: &Model) -> Vec<u8> {
+/// Which targets the drive of each dof follows: 1 positions, 2 velocities, 3 both; 4 more where the scene gives it one.
+/// It has gains, or worlds may get some.
+fn driven(model: &Model, scene: &Scene) -> Vec<u8> {
     let varies = |param| model.constants().varying.first(param).is_some();
     let [ke, kd] = [Param::JointTargetKe, Param::JointTargetKd].map(varies);
-    let dofs = model.constants().dofs.iter();
-    dofs.map(|dof| {
+    let joints = scene.robots.iter().flat_map(|robot| {
+        let moving = robot.moving_joints().into_iter();
+        moving.map(|joint| &robot.joints[joint])
+    });
+    let aims = joints.flat_map(|joint| joint.dofs.iter().map(|dof| dof.target_q.is_some()));
+    let dofs = model.constants().dofs.iter().zip(aims);
+    dofs.map(|(dof, aims)| {
         let positions = dof.follows_position && (ke || dof.ke > 0.0);
         let velocities = dof.follows_velocity && (kd || dof.kd > 0.0);
-        u8::from(positions) | u8::from(velocities) << 1
+        u8::from(positions) | u8::from(velocities) << 1 | u8::from(aims) << 2
     })
     .collect()
 }

@@ -30,6 +30,9 @@ mod watchdog;
 
 use std::ffi::OsString;
 
+use sim_physics::arrays::Field;
+use sim_physics::constants::params::Param;
+
 pub use error::DaemonError;
 
 /// Runs the command line `args` (the program's name first) and returns its exit code: 0 done, 1 failed, 2 misused.
@@ -39,4 +42,14 @@ pub fn serve(args: impl IntoIterator<Item = OsString>) -> i32 {
     let code = commands::run(args);
     sim_engine::options::leave(code);
     code
+}
+
+/// Names of all fields that frames may carry.
+pub fn field_names() -> Vec<&'static str> {
+    Field::ALL.iter().map(|field| field.row().name).collect()
+}
+
+/// Names of all parameters that may vary between worlds.
+pub fn param_names() -> Vec<&'static str> {
+    Param::ALL.iter().map(|param| param.row().name).collect()
 }

@@ -93,6 +93,19 @@ envs.step([[0], [1], [2]])                                | actions: expected
 envs.step("left")                                         | actions: expected
 single.step(0.5)                                          | action is 0\.5; give real numbers of shape \(1,\)
 assets.policy("FrankaReach")(np.zeros(3))                 | policy: obs has shape \(3,\); give \(worlds, \d+\)
+# single joints by name and pattern
+sim.step(joint_target_q={"arm/fr3_jiont1": 0.1})          | nothing matches; did you mean `arm/fr3_joint1`
+sim.step(joint_target_q={"amr/fr3_joint1": 0.1})          | there is no robot `amr`; did you mean `arm`
+sim.step(joint_target_q={"fr3_joint1": 0.1})              | no robot `fr3_joint1`; did you mean `arm/fr3_joint1`
+sim.step(joint_target_q={"arm/(": 0.1})                   | is no pattern .*give names or regular expressions
+sim.step(joint_target_q={"arm": {"leg_.*": 0.1}})         | nothing matches; there are: arm/fr3_joint1
+sim.step(joint_target_q={"arm": {1: 0.1}})                | robot `arm` has the key 1; give names or patterns
+sim.step(joint_target_q={0: 0.1})                         | has the key 0; give names of robots or of joints
+sim.step(joint_target_q={"arm/fr3_joint1": [1, 2, 3]})    | of `arm/fr3_joint1`: .* shape \(2,\); got \(3,\)
+sim.step(joint_target_q={"arm/fr3_joint1": "far"})        | of `arm/fr3_joint1`: 'far' is not a real number
+sim.step(joint_f={"arm/.*1": 1, "arm/fr3_joint[12]": 2})  | of `arm/fr3_joint1` has two values.*give one
+sim.step(ctrl={"arm/fr3_joint1": 1})                      | ctrl: nothing of this scene takes it
+sim.write(joint_q={"cube/free.qx": 0.1})                  | a part of a quaternion; give `cube/free\.qx` to `\.qw`
 # parameters
 sim.params.shape_mu                                       | `shape_mu`.*name it at launch: params=\("shape_mu",\)
 sim.step(body_f=np.zeros((2, 12, 6)))                     | `body_f`.*name it at launch
@@ -108,8 +121,10 @@ sim.obs                                                   | 'obs'; did you mean 
 sim.render()                                              | 'render'; did you mean `picture` or `view`
 sim.dofs["leg"]                                           | no robot 'leg'; there are: arm, cube
 frame["joint_q"]                                          | no entries, such as 'joint_q'.*frame\.joint_q\[world\]
-frame.joint_pos                                           | no field "joint_pos"; they carry: joint_q
-frame.contact_force                                       | no field "contact_force".*`fields` at launch
+frame.joint_pos                                           | no field `joint_pos`; did you mean `joint_q`\?
+frame.contact_force                                       | no `contact_force`; add .*`fields` at launch
+frame.contact_forces                                      | did you mean `contact_force`\? Add it to `fields`
+frame.copy().joint_pos                                    | no field `joint_pos`; did you mean `joint_q`
 frame.joint_q.fill(0)                                     | read-only.*\.copy\(\)
 frame.joint_q.sort()                                      | read-only.*\.copy\(\)
 frame.joint_q.__setitem__(0, 1)                           | read-only.*sim\.write
@@ -130,7 +145,7 @@ mine.add_urdf(folder / "hello.txt")                       | hello\.txt:1:1: brok
 mine.add_urdf(folder / "empty.urdf")                      | the file is empty; a URDF file holds
 mine.add_urdf(folder)                                     | it is not a file; give
 mine.add_urdf("robot.usd")                                | robot\.usd: cannot be read.*give the path
-mine.add_urdf(CART)                                       | <mujoco>.*from_mujoco
+mine.add_urdf(CART)                                       | cart\.xml is MuJoCo's MJCF: Scene\.from_mujoco
 mine.add_urdf(folder / "macro.urdf")                      | xacro.*run `xacro` on the file
 mine.add_urdf(URDF, "arm")                                | `path` without a name and got 2; .*name=
 mine.add_urdf(URDF, name="arm")                           | `arm` is taken; give another
@@ -139,9 +154,22 @@ mine.add_mesh(path=folder / "hello.txt")                  | `\.txt` is not read;
 mine.add_mesh(path=folder)                                | no ending; name the format
 tl.Scene.load(folder)                                     | it is not a file; give
 tl.Scene.load(folder / "hello.txt")                       | hello\.txt: .*give a scene file
-tl.Scene.load(URDF)                                       | XML and not a scene.*Scene\.add_urdf
+tl.Scene.load(URDF)                                       | hand\.urdf is a URDF file: scene\.add_urdf
+tl.Scene.load(CART)                                       | MJCF: Scene\.from_mujoco\(path\) or scene\.add_mujoco
+tl.Scene.load(MESH)                                       | part\.stl is a mesh: scene\.add_mesh
+mine.add_urdf(MESH)                                       | part\.stl is a mesh: scene\.add_mesh
+mine.add_urdf(folder / "some.toml")                       | is a scene file: Scene\.load
+mine.add_urdf(folder / "some.usda")                       | is USD: export the robot as URDF or MJCF
+mine.add_urdf(folder / "some.sdf")                        | is SDFormat: convert it
+mine.add_urdf("<robot name='a'/>")                        | is XML text; write it to a file
+mine.add_urdf("<mujoco/>")                                | is XML text; .*mujoco\.MjSpec\.from_string
+mine.add_mujoco(MESH)                                     | part\.stl is a mesh: scene\.add_mesh
+mine.add_mujoco(folder / "some.toml")                     | is a scene file: Scene\.load
+mine.add_mujoco(folder / "meshes.urdf")                   | is a URDF file: scene\.add_urdf
+mine.add_mesh(path=URDF)                                  | is a URDF file: scene\.add_urdf
+mine.add_mesh(path=CART)                                  | MJCF: Scene\.from_mujoco
 tl.Scene.from_mujoco(folder / "hello.txt")                | hello\.txt: MuJoCo cannot compile it
-tl.Scene.from_mujoco("<mujoco/>")                         | <mujoco/>.*give the path of an MJCF file
+tl.Scene.from_mujoco("<mujoco/>")                         | is XML text; give .* MJCF file.*from_xml_string
 mine.save(folder)                                         | cannot be written: .*name a file
 mine.save(folder / "no" / "scene.toml")                   | cannot be written: .*a folder that you may write to
 snapshot.save(folder / "no" / "x")                        | cannot be written
@@ -168,6 +196,20 @@ setattr(mine.robots["arm"], "joint_q", [1, 2, 3])         | joint_q has 3 values
 setattr(mine.robots["arm"], "joint_q", {"joint1": 0.5})   | 'joint1', .*did you mean `fr3_joint1`
 mine.randomize(joint_q={"arm": (0, 1)})                   | \(0, 1\); give a tightloop\.Uniform
 tl.Uniform((0, 1))                                        | Uniform: `high` is missing
+tl.launch(scene(), worlds=1, fields=("joint_pos",))       | there is no such field; did you mean `joint_q`
+tl.launch(scene(), worlds=1, params=("frictions",))       | no such parameter; did you mean `joint_friction`
+tl.launch(scene(), worlds=1, seed=1)                      | no argument `seed`; `sim\.reset\(seed=…\)`
+tl.launch(scene(), worlds=1, headless=True)               | no argument `headless`; leave it out: .*`sim\.view\(\)`
+tl.launch(scene(), worlds=1, render=True)                 | no argument `render`; a simulation has no window
+tl.launch(scene(), worlds=1, dt=0.01)                     | no argument `dt`; it is an argument of `tightloop\.Scene`
+tl.Scene(worlds=4)                                        | `worlds`; it is an argument of `tightloop\.launch`
+mine.add_urdf(URDF, joint_q=[0] * 9)                      | `joint_q`; set it on the robot .*`robot\.joint_q = …`
+mine.add_urdf(URDF, stiffness=100)                        | set it on the robot .*`robot\.joint_target_ke = …`
+mine.randomize(params={"shape_mus": tl.Uniform(0, 1)})    | no such parameter; did you mean `shape_mu`
+mine.randomize(joint_q={"arm/fr3_jiont1": tl.Uniform(0, 1)}) | no joint 'fr3_jiont1'; did you mean `fr3_joint1`
+mine.randomize(joint_q={"amr": tl.Uniform(0, 1)})         | no robot or body 'amr'; did you mean `arm`
+mine.randomize(body_q={"cube": {"rz": tl.Uniform(0, 1)}}) | no part 'rz'; did you mean `yaw`
+mine.filter_contacts("arm", "cub")                        | 'cub', which is no .*did you mean `cube`
 tl.launch("scene.toml", worlds=1)                         | scene is str; give .*Scene\.load
 tl.launch(tl.Scene, worlds=1)                             | scene is type; give
 tl.launch(scene(), worlds=1, device="cuda")               | "cuda": unknown; use auto, cpu or gpu
@@ -178,11 +220,13 @@ tl.launch(scene(), worlds=10**9)                          | are needed.*use fewe
 view.Camera((1, 1, 1), (1, 1, 1))                         | target is .*give another point
 view.Camera((0, 0, 1), (0, 0, 0), up=(0, 0, 0))           | up has no direction; give one
 # environments
-env.VectorEnv("FrankaRech", 2)                            | no task 'FrankaRech'; there are: .*FrankaReach
+env.VectorEnv("FrankaRech", 2)                            | no task 'FrankaRech'; did you mean 'FrankaReach'
 env.VectorEnv("CartPoleBalance", 2, daemon=sim.name)      | runs another scene.*start it with
 env.VectorEnv("CartPoleBalance", 2, render_mode="rgb")    | 'rgb'; give one of
 env.VectorEnv(env.Task(), 2)                              | task Task has no `\w+`; .*define it
 env.Env("CartPoleBalance", num_envs=2)                    | Env: num_envs is not taken.*leave it out
+env.Env("CartPoleBalance", num_env=2)                     | Env: num_env is not taken.*leave it out
+env.VectorEnv("CartPoleBalance", 2, seed=1)               | no argument `seed`; `envs\.reset\(seed=…\)`
 env.make_groups("CartPoleBalance", 5, 2)                  | 5 environments .*give a divisor
 env.JointTarget("arm/j", 1.0)                             | dofs is 'arm/j'; give a list
 """
@@ -206,6 +250,14 @@ def names(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
     (folder / "hello.txt").write_text("hello")
     (folder / "empty.urdf").write_text("")
     (folder / "macro.urdf").write_text('<robot name="m"><link name="a"/><xacro:include filename="b"/></robot>')
+    (folder / "meshes.urdf").write_text(
+        '<robot name="m"><link name="a"><collision><geometry><mesh filename="none.stl"/></geometry></collision></link>'
+        "</robot>"
+    )
+    (folder / "part.stl").write_bytes(bytes(84))
+    (folder / "some.toml").write_text("dt = 0.01")
+    (folder / "some.usda").write_text("#usda 1.0")
+    (folder / "some.sdf").write_text('<?xml version="1.0"?><sdf version="1.6"/>')
     closed = tl.launch(scene(), worlds=1)
     closed.close()
     ended = env.VectorEnv("CartPoleBalance", 1)
@@ -223,7 +275,7 @@ def names(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
             made = {"sim": sim, "second": second, "closed": closed, "frame": frame, "snapshot": sim.snapshot()}
             made |= {"envs": envs, "fresh": fresh, "single": single, "ended": ended, "dynamics": tl.Dynamics(scene())}
             made |= {"np": np, "tl": tl, "env": env, "view": view, "assets": tl.assets, "pickle": pickle, "copy": copy}
-            yield made | {"folder": folder, "scene": scene, "URDF": URDF, "CART": CART}
+            yield made | {"folder": folder, "scene": scene, "URDF": URDF, "CART": CART, "MESH": folder / "part.stl"}
 
 
 CART = REPOSITORY / "examples/assets/cart/cart.xml"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from pathlib import Path
 
@@ -79,6 +80,7 @@ def test_an_identity_with_w_first(tmp_path, what):
     scene, turned = tl.Scene(gravity=(0, 0, 0)), (1, 0, 0, 0)
     if what == "shape":
         scene.add_box(half_extents=(1, 1, 1), quat=turned, name="wall")
+        scene.add_body(fixed=True)
     elif what == "body":
         scene.add_cube(quat=turned, name="wall")
     else:
@@ -206,6 +208,51 @@ def test_friction_that_both_draw_counts():
     scene.add_cube(pos=(0, 0, 0.025))
     scene.randomize(params={"shape_mu": {"ground": tl.Uniform(0.1, 0.2), "cube": tl.Uniform(0.1, 0.2)}})
     assert told(scene) == []
+
+
+@pytest.mark.parametrize(
+    ("drawn", "said"),
+    [
+        ({"params": {"gravity": {"z": tl.Uniform(9.0, 10.0)}}}, "gravity of `z` is 9 or more, which points up"),
+        (
+            {"body_q": {"cube": {"yaw": tl.Uniform(-180, 180)}}},
+            "body `cube`: a reset moves .* by up to 180.*np.radians",
+        ),
+        ({"joint_q": {"hinge/turn": tl.Uniform(-90, 90)}}, "robot `hinge`: a reset moves `turn` by up to 90"),
+        (
+            {"params": {"joint_q_noise": {"hinge": tl.Uniform(0, 5)}}},
+            "joint_q_noise of `hinge` of up to 5 looks like deg",
+        ),
+        ({"params": {"body_mass_scale": {"cube": tl.Normal(1, 0.6)}}}, "body_mass_scale of `cube` is often 0.001"),
+        ({"params": {"body_mass": {"cube": tl.Normal(0.1, 0.1)}}}, "body_mass of `cube` is often 0, since draws below"),
+    ],
+)
+def test_what_a_reset_draws_is_checked_as_the_scene_is(tmp_path, drawn, said):
+    scene = tl.Scene()
+    scene.add_ground()
+    robot(scene, tmp_path).pos = (1, 0, 1)
+    scene.add_cube(pos=(0, 0, 0.025))
+    usual = {"gravity": {"z": tl.Normal(-9.81, 0.1)}, "body_mass": {"cube": tl.Normal(1.0, 0.1)}}
+    scene.randomize(
+        joint_q={"hinge": tl.Uniform(-3, 3)},
+        body_q={"cube": {"x": tl.Uniform(-20, 20), "yaw": tl.Uniform(-np.pi, np.pi)}},
+        params={
+            **usual,
+            "joint_q_noise": {"hinge": tl.Uniform(0, 0.1)},
+            "body_mass_scale": {"cube": tl.Uniform(0.5, 2)},
+        },
+    )
+    assert told(scene) == []
+    scene.randomize(**drawn)
+    [warning] = told(scene)
+    assert re.search(said, warning), warning
+
+
+def test_a_scene_without_anything_that_moves():
+    scene = tl.Scene()
+    scene.add_ground()
+    [warning] = told(scene)
+    assert "no robot and no body" in warning and "add_urdf" in warning
 
 
 def test_a_body_that_turns_faster_than_anything_faults_by_itself():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import subprocess
 import sys
 import warnings
@@ -87,7 +88,7 @@ def test_a_world_with_a_command_that_is_nan():
     with tl.launch(scene, worlds=2, on_nan="freeze", fields=("joint_q",)) as sim:
         sim.send(joint_f=push)
         with told_once(
-            r"1 world of 2 faulted: it is world 1, after its step 0, .*not finite, possibly of a command.*reset"
+            r"1 world of 2 faulted: it is world 1, after its step 0, since its joint_f of `cube/free\.vx` is NaN.*reset"
         ):
             sim.recv()
 
@@ -193,12 +194,24 @@ def test_a_quaternion_of_a_mocap_body_with_w_last():
     with tl.launch(tl.Scene.from_mujoco(model, name="m"), worlds=2) as sim:
         with nothing_told():
             sim.step(mocap_quat=[[1, 0, 0, 0]])
-            sim.step(mocap_quat=[[0, 0, 0, -1]])
             sim.reset(keyframe="over")
         with told_once(
             r"mocap_quat of `m/hand` .*\(0, 0, 0, 1\).*\(w, x, y, z\), as in MuJoCo.*\(1, 0, 0, 0\) for no turn"
         ):
             sim.step(mocap_quat=[[0, 0, 0, 1]])
+
+
+def test_a_mocap_body_that_turns_in_either_order_before_it_makes_half_a_turn():
+    mujoco = pytest.importorskip("mujoco")
+    text = '<mujoco><worldbody><body name="hand" mocap="true" quat="{}"><geom size=".1"/></body></worldbody></mujoco>'
+    turning = mujoco.MjModel.from_xml_string(text.format("1 0 0 0"))
+    for before in ([0.6, 0, 0, 0.8], [0, 0, 0, -1]):
+        with tl.launch(tl.Scene.from_mujoco(turning), worlds=2) as sim, nothing_told():
+            sim.step(mocap_quat=[before])
+            sim.step(mocap_quat=[[0, 0, 0, 1]])
+    turned = mujoco.MjModel.from_xml_string(text.format("0 0 0 1"))
+    with tl.launch(tl.Scene.from_mujoco(turned), worlds=2) as sim, nothing_told():
+        sim.step(mocap_quat=[[0, 0, 0, 1]])
 
 
 def test_gravity_that_is_one_number(scene):
@@ -218,16 +231,89 @@ def test_torques_against_drives_that_hold(scene):
             sim.step(joint_f={"arm": [1.0, 0.0]})
 
 
-@pytest.mark.parametrize("aims", ["together", "before", "gains vary", "no gains"])
+@pytest.mark.parametrize("aims", ["together", "before", "scene", "gains vary", "no gains"])
 def test_torques_that_are_meant_to_be_added(scene, aims):
     arm = scene.robots["arm"]
     if aims == "no gains":
         arm.joint_target_ke = 0.0
+    if aims == "scene":
+        arm.joint_target_q = 0.3
     with tl.launch(scene, worlds=2, params=("joint_target_ke",) if aims == "gains vary" else ()) as sim, nothing_told():
         if aims == "before":
             sim.step(joint_target_q={"arm": [0.1, 0.1]})
         given = {"joint_target_q": {"arm": [0.1, 0.1]}} if aims == "together" else {}
         sim.step(joint_f={"arm": [1.0, 0.0]}, **given)
+
+
+def test_positions_far_outside_of_limits(scene):
+    with tl.launch(scene, worlds=2) as sim:
+        with nothing_told():
+            sim.write(joint_q={"arm": [[2.6, 0.0], [0.0, 0.0]]})
+        with told_once(
+            r"joint_q of `arm/turn` is 3\.0000 rad in world 1, far outside of its limits, -2\.5000 to 2\.5000"
+        ):
+            sim.write(joint_q={"arm/turn": [0.0, 3.0]})
+
+
+def test_parameters_are_looked_at_as_the_scene_is(scene):
+    scene.add_ground()
+    names = ("gravity", "joint_effort_limit", "body_mass", "body_inertia", "shape_mu")
+    with tl.launch(scene, worlds=2, params=names) as sim:
+        with nothing_told():
+            sim.params.gravity = [[0, 0, -9.0], [0, 0, -10.0]]
+            sim.params.joint_effort_limit = 5.0
+            sim.params.body_mass = sim.params.body_mass * 1.1
+            sim.params.body_inertia = sim.params.body_inertia * 1.1
+            sim.params.shape_mu[:, 0] = 0.3
+            sim.params.shape_mu = 0.3
+        cube = sim.body_names.index("cube/cube") if "cube/cube" in sim.body_names else len(sim.body_names) - 1
+        with told_once(r"params\.gravity is \(0, 1, 9\.81\) in world 1, which points up, .*give \(0, 0, -9\.81\)"):
+            sim.params.gravity = [[0, 0, -9.0], [0, 1, 9.81]]
+        with told_once(
+            r"joint_effort_limit is 0 for all drives, such as `arm/turn`.*1e30 for none.*joint_target_kd to 0"
+        ):
+            sim.params.joint_effort_limit = 0.0
+        with told_once(r"body_mass of `cube.*` is 0 in world 1: .*Give a mass above 0"):
+            sim.params.body_mass[1, cube] = 0.0
+        with told_once(r"body_inertia of `cube.*` has the principal moments \(1, 1, 5\) in world 0.*no body has"):
+            sim.params.body_inertia[0, cube] = [1, 1, 5, 0, 0, 0]
+        with told_once(r"shape_mu of `ground` is 0\.1 in world 0 and has no effect: .* larger coefficient counts"):
+            sim.params.shape_mu = [0.1, *[0.9] * (len(sim.shape_names) - 1)]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            lambda scene, arm: setattr(arm, "joint_target_ke", 5.0),
+            r"robot `arm`: `joint_target_ke`.*sim\.params\.joint_target_ke",
+        ),
+        (lambda scene, arm: arm.joint_q.__setitem__(0, 0.5), r"`joint_q`.*call sim\.write\(joint_q=\{\"arm\": …\}\)"),
+        (lambda scene, arm: setattr(arm, "joint_target_q", 0.5), r"sim\.step\(joint_target_q=\{\"arm\": …\}\)"),
+        (
+            lambda scene, arm: setattr(arm, "joint_target_mode", "both"),
+            r"`joint_target_mode`.*set it before the launch",
+        ),
+        (lambda scene, arm: setattr(scene, "gravity", (0, 0, -1)), r"Scene: `gravity`.*write sim\.params\.gravity"),
+        (lambda scene, arm: setattr(scene.bodies["cube"], "mass", 2.0), r"body `cube`: `mass`.*sim\.params\.body_mass"),
+        (lambda scene, arm: setattr(scene.bodies["cube"], "pos", (0, 0, 2)), r"`pos`.*sim\.write\(joint_q=\{\"cube\""),
+        (lambda scene, arm: scene.add_ground(), r"Scene: `add_ground` changes the scene after the launch"),
+        (lambda scene, arm: scene.randomize(joint_q={"arm": tl.Uniform(0, 1)}), r"`randomize` changes the scene after"),
+    ],
+)
+def test_changes_of_a_scene_that_runs(scene, change, said):
+    arm = scene.robots["arm"]
+    with tl.launch(scene, worlds=1, name="running") as sim:
+        with told_once(rf"(?s){said}"):
+            change(scene, arm)
+        with nothing_told():
+            change(scene, arm)
+            sim.step()
+    with nothing_told():
+        arm.joint_target_ke = 7.0
+        copied = copy.deepcopy(scene)
+        with tl.launch(copied, worlds=1):
+            arm.joint_target_ke = 8.0
 
 
 def test_only_the_first_calls_and_worlds_are_looked_at(scene):

@@ -249,8 +249,20 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "py-client/src",
         &[
-            "errors", "parts", "input", "frame", "advice", "client", "scene", "dynamics", "arrays",
-            "picture", "observe", "random", "rays",
+            "errors",
+            "parts",
+            "input",
+            "frame",
+            "not_finite",
+            "advice",
+            "client",
+            "scene",
+            "dynamics",
+            "arrays",
+            "picture",
+            "observe",
+            "random",
+            "rays",
         ],
     ),
 ];

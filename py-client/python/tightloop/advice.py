@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 import sys
 import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -15,6 +18,8 @@ from tightloop.errors import TightloopWarning
 from tightloop.frames import FAULTED
 
 _OWN = f"{Path(__file__).parent}{os.sep}"
+#: What explains a command that is not finite: the actions of an environment.
+_SOURCE: ContextVar[Callable[[], tuple[int, str] | None] | None] = ContextVar("_SOURCE", default=None)
 #: Speeds above this say which dof went wrong [rad/s or m/s].
 _FAST = 20.0
 
@@ -24,8 +29,27 @@ def warn(message: str) -> None:
     warnings.warn(message, TightloopWarning, stacklevel=_level())
 
 
-def tell_of_faults(
-    frame: Any, bounds: tuple[float | None, float | None], on_nan: str, on_fault: str, dof_names: list[str]
+@contextmanager
+def explained_by(source: Callable[[], tuple[int, str] | None]) -> Iterator[None]:
+    """Name commands that are not finite by where they come from.
+
+    Args:
+        source: Returns the first world with such a value, and a text such as ``"action[2] is nan"``; None without one.
+    """
+    token = _SOURCE.set(source)
+    try:
+        yield
+    finally:
+        _SOURCE.reset(token)
+
+
+def tell_of_faults(  # noqa: PLR0917 (called from Rust, by place)
+    frame: Any,
+    bounds: tuple[float | None, float | None],
+    on_nan: str,
+    on_fault: str,
+    dof_names: list[str],
+    command: tuple[int, str] | None = None,
 ) -> None:
     """Warn of the faulted worlds of a frame.
 
@@ -35,11 +59,18 @@ def tell_of_faults(
         on_nan: As of `launch`.
         on_fault: As of `launch`.
         dof_names: As of `Sim`.
+        command: World and text of a command of this step that is not finite.
     """
     faulted = np.flatnonzero(frame.status & FAULTED)
     first = int(faulted[0])
-    worlds = "1 world" if len(faulted) == 1 else f"{len(faulted)} worlds"
-    which = "it is" if len(faulted) == 1 else "the first of them is"
+    if command is not None and command[0] in faulted:
+        source = _SOURCE.get()
+        given = None if source is None else source()
+        first, spoiled = command if given is None else given
+        after = f"{_worlds(faulted, frame)} world {first}, after its step {frame.step[first]}, since its {spoiled}. "
+        who = "the policy and its observations" if given is not None else "what computes it"
+        warn(f"{after}Check {who} for NaN and infinity.{_cure(on_fault)} Later faults are not reported")
+        return
     if frame.status[first] & 8:
         known = [f"|{name}| of {bound:g}" for name, bound in zip(("joint_q", "joint_qd"), bounds, strict=True) if bound]
         reason = f"a value beyond the bounds ({', '.join(known)})"
@@ -50,17 +81,25 @@ def tell_of_faults(
         fastest = int(speeds.argmax())
         if speeds[fastest] > _FAST:
             state = f" Just before, `{dof_names[fastest]}` was fastest, at {frame.joint_qd[first, fastest]:.3g}."
-    cure = (
-        ""
-        if on_fault == "reset"
-        else " A faulted world keeps its last good state until a reset: reset(mask=(frame.status & 9) != 0) resets "
-        'such worlds, and launch(on_fault="reset") does so by itself.'
-    )
     warn(
-        f"{worlds} of {len(frame.status)} faulted: {which} world {first}, after its step {frame.step[first]}, with "
+        f"{_worlds(faulted, frame)} world {first}, after its step {frame.step[first]}, with "
         f"{reason}.{state} Usual causes are a long dt, gains too large for light links, and shapes that start inside "
-        f"of others. Use a smaller dt, more substeps, smaller gains, or joint_armature.{cure} Later faults are not "
-        "reported"
+        f"of others. Use a smaller dt, more substeps, smaller gains, or joint_armature."
+        f"{_cure(on_fault)} Later faults are not reported"
+    )
+
+
+def _worlds(faulted: Any, frame: Any) -> str:
+    worlds = "1 world" if len(faulted) == 1 else f"{len(faulted)} worlds"
+    return f"{worlds} of {len(frame.status)} faulted: {'it is' if len(faulted) == 1 else 'the first of them is'}"
+
+
+def _cure(on_fault: str) -> str:
+    if on_fault == "reset":
+        return ""
+    return (
+        " A faulted world keeps its last good state until a reset: reset(mask=(frame.status & 9) != 0) resets such "
+        'worlds, and launch(on_fault="reset") does so by itself.'
     )
 
 

@@ -141,6 +141,11 @@ class Attributes:
             object.__setattr__(self, name, value)
         except AttributeError:
             raise self._refused(name) from None
+        if name[0] != "_":
+            self._changed(name)
+
+    def _changed(self, attribute: str) -> None:
+        """Take note that a public attribute was set."""
 
     def _refused(self, name: str) -> UnknownAttribute:
         """Return the error of setting an attribute that does not exist, or cannot be set."""

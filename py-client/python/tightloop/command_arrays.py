@@ -12,8 +12,9 @@ from tightloop.errors import CommandRefused
 from tightloop.inputs import as_array, real_numbers, switches
 from tightloop.params import Params
 
-#: An array ``(worlds, dofs)`` for the whole scene, ``(dofs,)`` for identical commands, or a dict of such by robot name.
-Command = ArrayLike | Mapping[str, ArrayLike]
+#: An array ``(worlds, dofs)`` for the whole scene, ``(dofs,)`` for identical commands, or a dict of such by robot,
+#: joint or pattern.
+Command = ArrayLike | Mapping[str, ArrayLike | Mapping[str, ArrayLike]]
 
 
 def ready_arrays(

@@ -7,20 +7,29 @@ from typing import ClassVar
 from tightloop import checks
 from tightloop.attributes import Attributes
 from tightloop.checks import Quaternion, Triple, Vector
+from tightloop.running import Running
 
 
 class Entity(Attributes):
     """A named part of a scene with a pose in the world."""
 
-    __slots__ = ("_name", "_pos", "_quat")
+    __slots__ = ("_name", "_pos", "_quat", "_running")
 
     #: Kind of entity, for messages.
     kind: ClassVar[str]
 
     def __init__(self, name: str, pos: Vector, quat: Vector) -> None:
         self._name = name
+        # of the scene that it becomes part of
+        self._running: Running | None = None
         self.pos = pos
         self.quat = quat
+
+    def _changed(self, attribute: str) -> None:
+        running = getattr(self, "_running", None)  # which a copy gets last
+        if running is not None:
+            moves = getattr(self, "floating", not getattr(self, "fixed", True))
+            running.tell(self._subject(), attribute, self._name, moves=moves)
 
     def _subject(self) -> str:
         return f"{self.kind} `{self.name}`"

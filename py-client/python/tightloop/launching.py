@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, overload
 
 from tightloop import _core, advice, checks
+from tightloop.attributes import suggestion
 from tightloop.daemon import Daemon
 from tightloop.errors import ArgumentError
 from tightloop.groups import Groups
@@ -138,8 +139,8 @@ def launch(
         "worlds": checks.integer("launch: worlds", worlds, error=ArgumentError),
         "device": checks.text("launch: device", device, error=ArgumentError),
         "precision": checks.text("launch: precision", precision, error=ArgumentError),
-        "fields": _joined("fields", fields),
-        "params": _joined("params", params),
+        "fields": _joined("fields", fields, "field", _core.field_names()),
+        "params": _joined("params", params, "parameter", _core.param_names()),
         "name": f"sim-{os.getpid()}-{secrets.token_hex(4)}"
         if name is None
         else checks.text("launch: name", name, error=ArgumentError),
@@ -164,6 +165,8 @@ def launch(
     daemon = Daemon.start(scene.to_toml(), arguments, users=count)
     try:
         sims = [Sim(_core.Client(own, lease=True), daemon) for own in _names(arguments["name"], count)]
+        for sim in sims:
+            scene._running.add(sim)
         for warning in sims[0].info["warnings"]:
             advice.warn(warning)
         if device == "gpu":
@@ -208,11 +211,15 @@ def _bounds(bounds: Mapping[str, float] | None) -> dict[str, float]:
     return arguments
 
 
-def _joined(argument: str, names: Iterable[str]) -> str:
+def _joined(argument: str, names: Iterable[str], kind: str, known: Sequence[str]) -> str:
     checked = [checks.text(f"launch: an entry of {argument}", name, error=ArgumentError) for name in names]
     for name in checked:
         if "," in name:
             raise ArgumentError(f"launch: an entry of {argument} is {name!r}; give each name as an entry of its own")
+        if name not in known:
+            raise ArgumentError(
+                f"launch: {argument} has {name!r}, and there is no such {kind}; {suggestion(name, known)}"
+            )
     return ",".join(checked)
 
 

@@ -12,7 +12,8 @@ from tightloop import _core
 from tightloop._core import Frame
 from tightloop.attributes import nearest
 from tightloop.errors import CommandRefused, ConstantParameter, UnknownField
-from tightloop.inputs import real_numbers
+from tightloop.inputs import as_mask, real_numbers
+from tightloop.params_advice import ParamsAdvice
 from tightloop.signatures import checked_calls
 from tightloop.written_arrays import PropertyArray
 
@@ -66,9 +67,16 @@ class Params:
         CommandRefused: The values do not fit; nothing was written.
     """
 
-    __slots__ = ("_client", "_known", "_numbers", "_state", "_worlds")
+    __slots__ = ("_advice", "_client", "_known", "_numbers", "_state", "_worlds")
 
-    def __init__(self, client: _core.Client, info: Mapping[str, Any], state: Callable[[], NDArray[Any]]) -> None:
+    def __init__(
+        self,
+        client: _core.Client,
+        info: Mapping[str, Any],
+        state: Callable[[], NDArray[Any]],
+        looks: ParamsAdvice | None = None,
+    ) -> None:
+        super().__setattr__("_advice", looks)
         super().__setattr__("_client", client)
         super().__setattr__("_worlds", info["worlds"])
         super().__setattr__("_state", state)
@@ -87,16 +95,13 @@ class Params:
     def __getattr__(self, name: str) -> NDArray[Any]:
         if name.startswith("_"):
             raise AttributeError(name)
-        param = self._varying(name)
-        # parameters are the last values of a world's record
-        first = self._numbers - param["place"]
-        columns = param["info"]["columns"]
+        self._varying(name)
 
         def read() -> NDArray[Any]:
-            return np.array(self._state()[:, -first:][:, :columns]).reshape(self._shape(name))
+            return self._columns(name).reshape(self._shape(name))
 
         def write(values: NDArray[Any]) -> None:
-            self.write(**{name: values})
+            self._write({name: values}, None, entries=True)
 
         return PropertyArray.of(read, write, lambda problem: CommandRefused(f"params.{name} {problem}"))
 
@@ -116,7 +121,20 @@ class Params:
         Returns:
             A frame at the current state. Raises as `Sim.step` does, and UnknownField.
         """
-        return self._client.write_params({name: self.ready(name, value) for name, value in params.items()}, mask)
+        return self._write(params, mask)
+
+    def _write(self, params: Mapping[str, ArrayLike], mask: ArrayLike | None, *, entries: bool = False) -> Frame:
+        given = {name: self.ready(name, value) for name, value in params.items()}
+        if self._advice is not None:
+            worlds = None if mask is None else as_mask("mask", mask, self._worlds)
+            self._advice.look(given, worlds, self._columns, entries=entries)
+        return self._client.write_params(given, mask)
+
+    def _columns(self, name: str) -> NDArray[Any]:
+        """Return a parameter as it is, shape ``(worlds, columns)``, in memory of its own."""
+        # parameters are the last values of a world's record
+        first = self._numbers - self._known[name]["place"]
+        return np.array(self._state()[:, -first:][:, : self._known[name]["info"]["columns"]])
 
     def ready(self, name: str, value: Any) -> NDArray[np.float64]:
         """Convert a value of a parameter to a contiguous float64 array, shape ``(worlds, columns)``.

@@ -71,6 +71,8 @@ class Owner(Protocol):
         """Return the targets that hold the start position."""
         ...
 
+    def _changed(self, attribute: str) -> None: ...
+
 
 class PerDof:
     """A property with one entry per dof; a single value is written to every dof with a drive."""
@@ -176,6 +178,7 @@ class Numbers(PerDof):
                     robot, f"of {self.entry} `{robot.name}/{name}` is {value}; give a number of at least 0"
                 )
         robot._own[self.name] = checked
+        robot._changed(self.name)
 
     def _complete(self, robot: Owner, values: ArrayLike) -> NDArray[np.float64]:
         """Return one value per entry, of an array or a single value."""
@@ -271,6 +274,7 @@ class Modes(PerDof):
                 choices = ", ".join(map(repr, MODES))
                 raise self.error(robot, f"of dof `{robot.name}/{name}` is {mode!r}; choose one of {choices}")
         robot._own[self.name] = modes
+        robot._changed(self.name)
 
 
 def some(names: list[str], most: int = 3) -> str:

@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 from tightloop import _core, advice, checks, notebook
 from tightloop.body import Body
 from tightloop.checks import Vector
-from tightloop.errors import SceneError
+from tightloop.errors import SceneError, UrdfError
+from tightloop.file_kinds import instead
 from tightloop.mujoco_model import MujocoModel
 from tightloop.robot import PER_DOF, Robot
 from tightloop.scene_mujoco import HULL_VERTICES, check_options, keep_beside, read_file, read_model
@@ -124,6 +125,8 @@ class Scene(SceneRandomization):
             UrdfError: The file is missing, is not URDF, or describes a robot that cannot be simulated.
             SceneError: An argument is not valid; the message names it.
         """
+        if wrong := instead("add_urdf: path", path, "robot"):
+            raise UrdfError(wrong)
         urdf = checks.path("add_urdf: path", path)
         touch = checked_surface("add_urdf", surface)
         if isinstance(package_dirs, str) or not isinstance(package_dirs, Sequence):
@@ -157,6 +160,8 @@ class Scene(SceneRandomization):
             summary=summary,
         )
         self.robots[name] = robot
+        robot._running = self._running
+        self._changed("add_urdf")
         for warning in summary["warnings"]:
             advice.warn(f"robot `{name}`: {warning}")
         return robot
@@ -195,6 +200,7 @@ class Scene(SceneRandomization):
         scene = cls(dt=options["dt"], substeps=substeps, gravity=options["gravity"])
         scene.solver(**options["solver"])
         scene.models[found.name] = found
+        found._running = scene._running
         return scene
 
     def add_mujoco(
@@ -234,6 +240,8 @@ class Scene(SceneRandomization):
             options["integrator"] = model_before.options["integrator"]
         check_options(found, options)
         self.models[found.name] = found
+        found._running = self._running
+        self._changed("add_mujoco")
         return found
 
     def add_body(
@@ -270,6 +278,8 @@ class Scene(SceneRandomization):
         name = checks.name("body", self._free_name("body") if name is None else name, self._names())
         body = Body(name, pos=pos, quat=quat, mass=mass, com=com, inertia=inertia, fixed=fixed)
         self.bodies[name] = body
+        body._running = self._running
+        self._changed("add_body")
         return body
 
     @with_surface
@@ -330,6 +340,8 @@ class Scene(SceneRandomization):
             SceneError: The file is missing, or an entry in it is not valid.
             UrdfError: A robot of the scene cannot be read.
         """
+        if wrong := instead("load: path", path, "scene"):
+            raise SceneError(wrong)
         file = checks.path("load: path", path)
         return cls._made_of(_core.load_scene(str(file)), file.parent)
 

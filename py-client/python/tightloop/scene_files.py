@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tightloop.file_kinds import element_of
+
 if TYPE_CHECKING:
     from tightloop.scene import Scene
 
-# The first element of a robot file begins within so many bytes.
-_HEAD_BYTES = 1 << 16
-_BEFORE_ELEMENTS = re.compile(r"\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>", re.DOTALL)
-_ELEMENT = re.compile(r"<(mujoco|robot)[\s>/]")
 _ROBOT_ENDINGS = (".urdf", ".xacro")
 # Drives of a robot from URDF follow their targets with this natural frequency [rad/s], critically damped.
 _FREQUENCY = 30.0
@@ -24,19 +21,10 @@ _FREQUENCY = 30.0
 
 def kind_of(path: Path) -> str | None:
     """Return ``"mujoco"`` or ``"robot"``, what an MJCF or URDF file begins or is named as; None for other files."""
-    try:
-        if not path.is_file():
-            return None
-        with path.open("rb") as file:
-            text = file.read(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
-    except (OSError, ValueError):  # an option's value that is too long for a path, or a file that Rust reports
-        return None
-    at = 0
-    while skipped := _BEFORE_ELEMENTS.match(text, at):
-        at = skipped.end()
-    found = _ELEMENT.match(text, at)
+    element = element_of(path)
     # the reader of URDF says what is wrong with any other
-    return found[1] if found else "robot" if path.suffix.lower() in _ROBOT_ENDINGS else None
+    is_robot = path.suffix.lower() in _ROBOT_ENDINGS and path.is_file()
+    return element if element in ("mujoco", "robot") else "robot" if is_robot else None
 
 
 def scene_of(path: Path) -> Scene:

@@ -8,10 +8,11 @@ from typing import Literal, SupportsFloat, SupportsIndex
 
 import numpy as np
 
-from tightloop import checks
-from tightloop.attributes import Attributes
+from tightloop import _core, checks
+from tightloop.attributes import Attributes, suggestion
 from tightloop.checks import Triple, Vector
 from tightloop.errors import SceneError
+from tightloop.running import Running
 from tightloop.signatures import checked_calls
 
 Cone = Literal["elliptic", "pyramidal"]
@@ -55,12 +56,19 @@ class SceneOptions(Attributes):
         "_gravity",
         "_params",
         "_rows_max",
+        "_running",
         "_solver",
         "_substeps",
     )
 
     def __init__(self) -> None:
+        self._running = Running()
         self._solver = Solver()
+
+    def _changed(self, attribute: str) -> None:
+        running = getattr(self, "_running", None)  # which a copy gets last
+        if running is not None:
+            running.tell("Scene", attribute)
 
     @property
     def dt(self) -> float:
@@ -100,7 +108,13 @@ class SceneOptions(Attributes):
     def params(self, params: Iterable[str]) -> None:
         if isinstance(params, str) or not isinstance(params, Iterable):
             raise SceneError(f"Scene: params is {params!r}; give a list of names")
-        self._params = tuple(checks.text("Scene: an entry of params", param) for param in params)
+        checked = tuple(checks.text("Scene: an entry of params", param) for param in params)
+        for param in checked:
+            if param not in (known := _core.param_names()):
+                raise SceneError(
+                    f"Scene: params has {param!r}, and there is no such parameter; {suggestion(param, known)}"
+                )
+        self._params = checked
 
     @property
     def command_delay_max(self) -> int | None:
@@ -154,6 +168,7 @@ class SceneOptions(Attributes):
             SceneError: A value is out of range; the message names it.
         """
         checks.choice("cone", cone, ("elliptic", "pyramidal"))
+        self._changed("solver")
         self._solver = Solver(
             iterations=checks.integer("solver: iterations", iterations),
             ls_iterations=checks.integer("solver: ls_iterations", ls_iterations),

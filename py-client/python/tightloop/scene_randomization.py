@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tightloop import checks
+from tightloop import _core, checks
+from tightloop.attributes import nearest, suggestion
 from tightloop.distributions import Distribution, Normal, Uniform, from_table
 from tightloop.errors import SceneError
 from tightloop.robot import Robot
@@ -14,6 +15,8 @@ from tightloop.signatures import checked_calls
 
 _POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 _VELOCITY = ("vx", "vy", "vz", "wx", "wy", "wz")
+#: Parts as they are called elsewhere.
+_PARTS_MEANT = {"rx": ["roll"], "ry": ["pitch"], "rz": ["yaw"], "theta": ["yaw"], "heading": ["yaw"]}
 
 Offsets = Mapping[str, Distribution]
 BodyOffsets = Mapping[str, Mapping[str, Distribution]]
@@ -83,6 +86,7 @@ class SceneRandomization(SceneSensors):
             "body_qd": self._bodies("body_qd", body_qd, _VELOCITY),
             "params": _ranges(params),
         }
+        self._changed("randomize")
         for field, tables in given.items():
             if tables:
                 old = self._offsets.setdefault(field, {})
@@ -113,7 +117,7 @@ class SceneRandomization(SceneSensors):
         parts = [dof for dof in found.dof_names if dof.rpartition(".")[0] in kinds]
         owner = joint if joint in kinds else joint.rpartition(".")[0] if joint in parts else None
         if owner is None:
-            raise SceneError(f"{what}: there is no joint {joint!r}; there are: {_some([*kinds])}")
+            raise SceneError(f"{what}: there is no joint {joint!r}; {_meant(joint, [*kinds])}")
         if owner in leaders:
             leader = leaders[owner]
             raise SceneError(f"{what}: it follows `{leader}`; give `{robot}/{leader}` the distribution")
@@ -128,7 +132,10 @@ class SceneRandomization(SceneSensors):
             tables[name] = {}
             for part, distribution in _items(what, given):
                 if part not in parts:
-                    raise SceneError(f"{what}: there is no part {part!r}; use {', '.join(parts)}")
+                    near = "".join(
+                        f"did you mean `{other}`? " for other in _PARTS_MEANT.get(part, ()) if other in parts
+                    )
+                    raise SceneError(f"{what}: there is no part {part!r}; {near}use {', '.join(parts)}")
                 tables[name][part] = _table(f"{what}, {part}", distribution)
         return tables
 
@@ -149,8 +156,9 @@ class SceneRandomization(SceneSensors):
 
     def _robot(self, what: str, name: str) -> Robot:
         if name not in self.robots:
-            known = _some([*self.robots, *self.bodies])
-            raise SceneError(f"{what}: there is no robot or body {name!r}; there are: {known}")
+            raise SceneError(
+                f"{what}: there is no robot or body {name!r}; {_meant(name, [*self.robots, *self.bodies])}"
+            )
         return self.robots[name]
 
     def _load_offsets(self, tables: Mapping[str, Mapping[str, Any]]) -> None:
@@ -181,6 +189,10 @@ def _ranges(params: ParamRanges | None) -> dict[str, Any]:
     tables = {}
     for param, given in _items("randomize: params", params):
         what = f"randomize: params, {param}"
+        if param not in (known := _core.param_names()):
+            raise SceneError(
+                f"randomize: params has {param!r}, and there is no such parameter; {suggestion(param, known)}"
+            )
         if isinstance(given, Uniform | Normal):
             tables[param] = given.table()
         else:
@@ -207,6 +219,12 @@ def _table(what: str, distribution: Any) -> dict[str, list[float]]:
     if not isinstance(distribution, Uniform | Normal):
         raise SceneError(f"{what} is {distribution!r}; give a tightloop.Uniform or a tightloop.Normal")
     return distribution.table()
+
+
+def _meant(name: str, known: list[str]) -> str:
+    """Return the nearest names, or those that there are."""
+    near = nearest(name, known)
+    return f"did you mean {' or '.join(f'`{other}`' for other in near)}?" if near else f"there are: {_some(known)}"
 
 
 def _some(names: list[str]) -> str:

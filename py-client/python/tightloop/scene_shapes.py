@@ -8,10 +8,11 @@ from collections.abc import Container
 from typing import TYPE_CHECKING, Any
 
 from tightloop import _core, checks
-from tightloop.attributes import ByName
+from tightloop.attributes import ByName, nearest
 from tightloop.body import Body
 from tightloop.checks import Vector
 from tightloop.errors import SceneError
+from tightloop.file_kinds import instead
 from tightloop.mujoco_model import MujocoModel
 from tightloop.robot import Link, Robot
 from tightloop.scene_options import SceneOptions
@@ -170,6 +171,8 @@ class SceneShapes(SceneOptions):
         Raises:
             SceneError: The file cannot be used, or a value is out of range; the message names it.
         """
+        if wrong := instead("add_mesh: path", path, "mesh"):
+            raise SceneError(wrong)
         file = checks.path("add_mesh: path", path)
         factors = checked_scale("add_mesh", scale)
         vertices = checks.integer("add_mesh: max_hull_vertices", max_hull_vertices)
@@ -253,6 +256,7 @@ class SceneShapes(SceneOptions):
         values = checked(what, **frame_and_sizes) | checked_surface(what, surface) | (mesh or {})
         shape = Shape(name, kind, body=carrier, density=density, **values)
         self.shapes[name] = shape
+        self._changed("add_ground" if kind == "plane" else f"add_{kind}")
         return shape
 
     def _carrier(self, what: str, body: Body | Link | str) -> str:
@@ -296,6 +300,8 @@ class SceneShapes(SceneOptions):
             names += (f"{robot.name}/{part}" for part in (*robot.link_names, *robot.shape_names))
         if thing not in names:
             known = ", ".join(f"`{name}`" for name in (*shapes, *self.robots, *self.bodies)) or "none yet"
+            if near := nearest(str(thing), names):
+                known = f"{known} (did you mean `{near[0]}`?)"
             raise SceneError(
                 f"{what} is {thing!r}, which is no shape, robot, body or link; there are: {known}, and the "
                 "robots' links and shapes (robot.link_names, robot.shape_names)"

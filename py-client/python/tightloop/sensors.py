@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tightloop.attributes import ByName
 from tightloop.checks import Quaternion, Triple
 
 
@@ -48,4 +49,4 @@ def slices_by_name(names: list[str], places: list[list[int]]) -> dict[str, slice
     slices = {name: slice(*place) for name, place in zip(names, places, strict=True)}
     short = [name.split("/", 1)[-1] for name in names]
     alone = {name: slices[whole] for name, whole in zip(short, names, strict=True) if short.count(name) == 1}
-    return slices | {name: place for name, place in alone.items() if name not in slices}
+    return ByName("sensor", slices | {name: place for name, place in alone.items() if name not in slices})

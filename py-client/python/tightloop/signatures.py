@@ -49,10 +49,64 @@ def with_arguments(*names: str) -> Callable[[Checked], Checked]:
 
 def unknown_argument(call: str, name: str, accepted: Sequence[str]) -> SignatureError:
     """Return the error of a keyword argument that a call does not take."""
-    return SignatureError(f"{call}: {_unknown([name], accepted)} It takes {', '.join(accepted) or 'none'}")
+    return SignatureError(
+        f"{call}: {_unknown(call.partition(' ')[0], [name], accepted)} It takes {', '.join(accepted) or 'none'}"
+    )
 
 
 _FURTHER = "_further_arguments"
+_NO_WINDOW = "a simulation has no window: `sim.view()` opens a viewer, and `sim.picture()` draws"
+_OF_LAUNCH = "it is an argument of `tightloop.launch`"
+_OF_SCENE = "it is an argument of `tightloop.Scene`"
+_OF_ROBOT = "set it on the robot that the call returns, as in `robot.{} = …`"
+_SEED = "`sim.reset(seed=…)` sets it after the launch"
+#: What to do instead of giving arguments that calls of other libraries have, by the call's name.
+_HINTS = {
+    "add_urdf": {
+        **dict.fromkeys(
+            (
+                "joint_q",
+                "joint_target_q",
+                "joint_target_qd",
+                "joint_target_mode",
+                "joint_target_ke",
+                "joint_target_kd",
+                "joint_effort_limit",
+                "joint_limit_ke",
+                "joint_limit_kd",
+                "joint_armature",
+            ),
+            _OF_ROBOT,
+        ),
+        "armature": _OF_ROBOT.format("joint_armature"),
+        "damping": _OF_ROBOT.format("joint_target_kd"),
+        "initial_joint_q": _OF_ROBOT.format("joint_q"),
+        "qpos": _OF_ROBOT.format("joint_q"),
+        "stiffness": _OF_ROBOT.format("joint_target_ke"),
+    },
+    "launch": {
+        "dt": _OF_SCENE,
+        "gravity": _OF_SCENE,
+        "gui": _NO_WINDOW,
+        "headless": f"leave it out: {_NO_WINDOW}",
+        "random_seed": _SEED,
+        "render": _NO_WINDOW,
+        "render_mode": _NO_WINDOW,
+        "seed": _SEED,
+        "substeps": _OF_SCENE,
+        "timestep": f"`dt` {_OF_SCENE.removeprefix('it ')}",
+        "viewer": _NO_WINDOW,
+    },
+    "Scene": {
+        "device": _OF_LAUNCH,
+        "headless": f"leave it out: {_NO_WINDOW}",
+        "num_envs": f"`worlds` {_OF_LAUNCH.removeprefix('it ')}",
+        "num_worlds": f"`worlds` {_OF_LAUNCH.removeprefix('it ')}",
+        "seed": _SEED,
+        "worlds": _OF_LAUNCH,
+    },
+    "environment": {"seed": "`envs.reset(seed=…)` sets it", "headless": "leave it out, and `render_mode` too"},
+}
 #: What makes objects of classes that nobody calls.
 _MADE_BY = {
     "Sim": "`tightloop.launch` and `tightloop.attach`",
@@ -115,7 +169,7 @@ def _problem(call: str, parameters: Sequence[Parameter], given: Sequence[Any], n
     accepted = [*places, *names]
     takes = f"The call is {call}({', '.join(_shown(parameters))})"
     if unknown := [name for name in named if name not in accepted]:
-        return f"{_unknown(unknown, accepted)} {takes}"
+        return f"{_unknown(call, unknown, accepted)} {takes}"
     if len(given) > len(places):
         free = [name for name in names if name not in named]
         most = " and ".join(f"`{name}`" for name in places) or "no argument"
@@ -133,8 +187,11 @@ def _problem(call: str, parameters: Sequence[Parameter], given: Sequence[Any], n
     )
 
 
-def _unknown(names: Sequence[str], accepted: Sequence[str]) -> str:
+def _unknown(call: str, names: Sequence[str], accepted: Sequence[str]) -> str:
     """Return that there are no such arguments, and which may be meant."""
+    hints = [_HINTS[call][name].format(name) for name in names if name in _HINTS.get(call, ())]
+    if hints:
+        return f"there is no argument {' and '.join(f'`{name}`' for name in names)}; {', and '.join(hints)}."
     meant = [f"`{near}`" for name in names for near in nearest(name, accepted)]
     cure = f"did you mean {' or '.join(dict.fromkeys(meant))}?" if meant else "leave it out."
     return f"there is no argument {' and '.join(f'`{name}`' for name in names)}; {cure}"

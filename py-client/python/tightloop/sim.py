@@ -23,6 +23,7 @@ from tightloop.errors import ArgumentError, CommandRefused, SimClosed, UnknownAt
 from tightloop.frames import FrameCopy
 from tightloop.notebook import Shown
 from tightloop.params import Params
+from tightloop.params_advice import ParamsAdvice
 from tightloop.rays import RayHits, Rays, ray_poses
 from tightloop.sensors import slices_by_name
 from tightloop.signatures import checked_calls
@@ -100,6 +101,7 @@ class Sim(Shown, Attributes):
             ByName("robot", {robot["name"]: slice(*robot[range_]) for robot in self.info["robots"]})
             for range_ in ("dofs", "coords", "bodies")
         )
+        self._params_advice = ParamsAdvice(self.info)
         self._sealed = True
 
     def step(
@@ -118,12 +120,12 @@ class Sim(Shown, Attributes):
 
         Args:
             joint_f: Joint torques [N·m or N], shape ``(worlds, dofs)`` or ``(dofs,)``, held over the substeps. The
-                effort limit does not clamp them. This and the two targets may also be a dict of arrays by robot name,
-                with the dofs of that robot.
+                effort limit does not clamp them. This and the two targets may also be a dict by robot, by joint or by
+                pattern, as in ``{"arm": targets, "dog/FL_hip": 0.1}``; dofs that are not named keep their last command.
             joint_target_q: Position targets of the drives [rad or m], same shapes.
             joint_target_qd: Velocity targets of the drives [rad/s or m/s], same shapes.
             ctrl: Controls of the actuators of MuJoCo models, shape ``(worlds, actuators)`` or ``(actuators,)``, or a
-                dict by model. Each is clamped to its ``ctrlrange``.
+                dict likewise. Each is clamped to its ``ctrlrange``.
             mocap_pos: Where the mocap bodies of MuJoCo models are [m], shape ``(worlds, mocaps, 3)`` or
                 ``(mocaps, 3)``, in the order of `mocap_names`.
             mocap_quat: Their quaternions (w, x, y, z), shape ``(worlds, mocaps, 4)`` or ``(mocaps, 4)``. One without
@@ -233,7 +235,9 @@ class Sim(Shown, Attributes):
         more = keyframes.arrays(keyframes.find(self.info["keyframes"], keyframe))
         self._client.reset(mask, seed)
         joint_q, joint_qd = more.pop("joint_q", None), more.pop("joint_qd", None)
-        return self._client.write(joint_q, joint_qd, self._arrays("writes", **more), mask, True)
+        return self._client.write(
+            joint_q, joint_qd, ready_arrays(self.info, lambda: self.params, "writes", more), mask, True
+        )
 
     def write(
         self,
@@ -254,8 +258,8 @@ class Sim(Shown, Attributes):
         A faulted world stays faulted.
 
         Args:
-            joint_q: Joint positions [rad or m], shape ``(worlds, coords)`` or ``(coords,)``, or a dict by robot.
-            joint_qd: Joint velocities [rad/s or m/s], shape ``(worlds, dofs)`` or ``(dofs,)``, or a dict by robot.
+            joint_q: Joint positions [rad or m], shape ``(worlds, coords)`` or ``(coords,)``, or a dict as in `step`.
+            joint_qd: Joint velocities [rad/s or m/s], shape ``(worlds, dofs)`` or ``(dofs,)``, or such a dict.
             act: Activations of the actuators that `activation_names` lists, shape ``(worlds, activations)`` or
                 ``(activations,)``.
             ctrl: Controls, which hold until the next `step` that gives others, shape ``(worlds, actuators)`` or
@@ -268,9 +272,8 @@ class Sim(Shown, Attributes):
         Returns:
             A frame at the new state. Raises as `step` does.
         """
-        more = self._arrays(
-            "writes", act=act, ctrl=ctrl, mocap_pos=mocap_pos, mocap_quat=mocap_quat, eq_active=eq_active
-        )
+        given = {"act": act, "ctrl": ctrl, "mocap_pos": mocap_pos, "mocap_quat": mocap_quat, "eq_active": eq_active}
+        more = ready_arrays(self.info, lambda: self.params, "writes", given)
         return self._client.write(joint_q, joint_qd, more, mask, False)
 
     def forward(self) -> Frame:
@@ -359,7 +362,7 @@ class Sim(Shown, Attributes):
     def params(self) -> Params:
         """Model parameters that vary between worlds; see `tightloop.params.Params`."""
         # a new object for each access: a cached one would form a reference cycle with the simulation
-        return Params(self._client, self.info, lambda: self.snapshot().numbers)
+        return Params(self._client, self.info, lambda: self.snapshot().numbers, self._params_advice)
 
     @functools.cached_property
     def dynamics(self) -> Dynamics:
@@ -451,9 +454,6 @@ class Sim(Shown, Attributes):
         Frames stay valid.
         """
         self._end()
-
-    def _arrays(self, group: str, **given: Command | None) -> dict[str, NDArray[np.float64]]:
-        return ready_arrays(self.info, lambda: self.params, group, given)
 
     def _own_attributes(self) -> list[str]:
         return [name for name in (*vars(self), *super()._own_attributes()) if name[0] != "_"]

@@ -65,6 +65,9 @@ pub struct Description {
     /// `robot/body` of each body that clients place. Older recordings have none.
     #[serde(default)]
     pub mocap_names: Vec<String>,
+    /// Their quaternions (w, x, y, z) at the start, four each. Older recordings have none.
+    #[serde(default)]
+    pub mocap_quat: Vec<f64>,
     /// `robot/equality` of each equality of MuJoCo models. Older recordings have none.
     #[serde(default)]
     pub equality_names: Vec<String>,
@@ -100,7 +103,8 @@ pub struct Description {
     /// What is most likely a mistake in the scene, a sentence or two each. Older recordings have none.
     #[serde(default)]
     pub warnings: Vec<String>,
-    /// Which targets the drive of each dof follows: 1 positions, 2 velocities, 3 both. Older recordings have none.
+    /// Which targets the drive of each dof follows: 1 positions, 2 velocities, 3 both; 4 more where the scene gives
+    /// it a target. Older recordings have none.
     #[serde(default)]
     pub driven: Vec<u8>,
     /// Limits of each dof that turns [rad]; null for the others. Older recordings have none.

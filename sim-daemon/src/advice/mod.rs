@@ -1,5 +1,6 @@
 //! What is valid in a scene and most likely a mistake: told once, when a daemon starts, with the cure.
 
+mod draws;
 mod friction;
 mod robots;
 mod start;

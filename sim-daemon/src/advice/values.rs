@@ -2,12 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use sim_model::{
-    Description, Distribution, Joint, JointDof, JointKind, Pose, Robot, Shape, TargetMode,
-};
+use sim_model::{Description, Joint, JointDof, JointKind, Pose, Robot, Shape, TargetMode};
 use sim_physics::constants::params::Param;
 
-use super::some;
+use super::{draws, some};
 
 /// Physics steps longer than this are rare [s].
 const DT_USUAL: f64 = 0.05;
@@ -23,6 +21,8 @@ const W_FIRST: [f64; 4] = [1.0, 0.0, 0.0, 0.0];
 /// Advice on numbers of the scene.
 pub(super) fn advice(scene: &Description) -> Vec<String> {
     let mut all: Vec<String> = step(scene).into_iter().chain(upwards(scene)).collect();
+    all.extend(empty(scene));
+    all.extend(draws::advice(scene));
     let shapes = scene.shapes.iter();
     all.extend(shapes.filter_map(|shape| turned(&format!("shape `{}`", shape.name), &shape.pose)));
     let sites = scene.sites.iter();
@@ -61,12 +61,25 @@ fn step(scene: &Description) -> Option<String> {
 /// Gravity that lifts what floats off its ground; an arm may well hang from a ceiling.
 fn upwards(scene: &Description) -> Option<String> {
     let [x, y, z] = scene.gravity;
+    (z > 0.0 && has_loose(scene)).then(|| {
+        format!("gravity is ({x}, {y}, {z}), which points up, and z is up. Give (0, 0, -9.81).")
+    })
+}
+
+/// A scene in which nothing can move.
+fn empty(scene: &Description) -> Option<String> {
+    scene.robots.is_empty().then(|| {
+        "the scene has no robot and no body, so nothing happens in it. Add some with add_urdf, add_mujoco or add_body."
+            .to_owned()
+    })
+}
+
+/// Whether something floats above a ground, which gravity holds down.
+pub(super) fn has_loose(scene: &Description) -> bool {
     let mut joints = scene.robots.iter().flat_map(|robot| &robot.joints);
     let floats = joints.any(|joint| joint.kind == JointKind::Free && joint.parent.is_none());
     let has_ground = scene.shapes.iter().any(|shape| shape.shape == Shape::Plane);
-    (z > 0.0 && floats && has_ground).then(|| {
-        format!("gravity is ({x}, {y}, {z}), which points up, and z is up. Give (0, 0, -9.81).")
-    })
+    floats && has_ground
 }
 
 /// A half turn about x that was most likely to be no turn.
@@ -94,10 +107,10 @@ fn turned_shapes(robot: &Robot) -> Vec<String> {
         .collect()
 }
 
-/// Limits of a file, and draws of starts, that look like degrees.
-fn degrees(robot: &Robot, what: &str) -> Vec<String> {
-    let turning = || moving(robot).filter(|joint| joint.kind == JointKind::Revolute);
-    let limits: Vec<String> = turning()
+/// Limits of a file that look like degrees.
+fn degrees(robot: &Robot, what: &str) -> Option<String> {
+    let limits: Vec<String> = moving(robot)
+        .filter(|joint| joint.kind == JointKind::Revolute)
         .filter_map(|joint| {
             let [lower, upper] = joint.range?;
             let largest = lower.abs().max(upper.abs());
@@ -105,36 +118,12 @@ fn degrees(robot: &Robot, what: &str) -> Vec<String> {
                 .then(|| format!("`{}` ({lower} to {upper})", joint.name))
         })
         .collect();
-    let draws: Vec<String> = turning()
-        .filter(|joint| joint.range.is_some())
-        .filter_map(|joint| {
-            let offset = joint.dofs.first()?.offset_q?;
-            (spread(&offset) > TAU)
-                .then(|| format!("`{}` by up to {}", joint.name, spread(&offset)))
-        })
-        .collect();
-    let mut all = Vec::new();
-    if !limits.is_empty() {
-        all.push(format!(
+    (!limits.is_empty()).then(|| {
+        format!(
             "{what}: limits of {} look like degrees: <limit> is in radians. Divide them by 57.29578 in the file.",
             some(&limits)
-        ));
-    }
-    if !draws.is_empty() {
-        all.push(format!(
-            "{what}: a reset moves {}, which looks like degrees: angles are in radians, and np.radians converts degrees.",
-            some(&draws)
-        ));
-    }
-    all
-}
-
-/// The largest value of a distribution, nearly always.
-fn spread(distribution: &Distribution) -> f64 {
-    match *distribution {
-        Distribution::Uniform { low, high } => low.abs().max(high.abs()),
-        Distribution::Normal { mean, std } => mean.abs() + std,
-    }
+        )
+    })
 }
 
 /// Joints that start far outside of their limits.
@@ -222,7 +211,7 @@ fn varies(scene: &Description, param: Param) -> bool {
     scene.params.contains(&param) || scene.param_ranges.contains_key(&param)
 }
 
-fn moving(robot: &Robot) -> impl Iterator<Item = &Joint> {
+pub(super) fn moving(robot: &Robot) -> impl Iterator<Item = &Joint> {
     robot
         .moving_joints()
         .into_iter()

@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tightloop import advice
 from tightloop.errors import SceneError
+from tightloop.file_kinds import instead, kind_of_file
 from tightloop.mujoco import textures
 from tightloop.optional_imports import optional_import
 from tightloop.whole_files import whole_file
@@ -113,10 +115,22 @@ def compiled(model: Any) -> Any:
         if isinstance(model, mujoco.MjSpec):
             return model.compile()
         if isinstance(model, str | os.PathLike):
+            wrong = instead("model", model, "mujoco")
+            is_robot = wrong is not None and kind_of_file(Path(model)) == "robot"
+            if wrong is not None and not is_robot:
+                raise SceneError(wrong)
             path = Path(model)
             if not path.is_file():
                 raise SceneError(f"{path}: there is no such file; give the path of an MJCF file")
-            return mujoco.MjModel.from_xml_path(str(path))
+            try:
+                found = mujoco.MjModel.from_xml_path(str(path))
+            except ValueError:
+                if is_robot:
+                    raise SceneError(str(wrong)) from None
+                raise
+            if is_robot:
+                advice.warn(f"{wrong} with its drives, limits and packages; MuJoCo compiles it without drives")
+            return found
     except (ValueError, RuntimeError) as error:
         where = f"{model}: " if isinstance(model, str | os.PathLike) else ""
         raise SceneError(f"{where}MuJoCo cannot compile it: {error}") from error

@@ -61,6 +61,7 @@ fn description() -> Description {
         actuator_names: Vec::new(),
         activation_names: Vec::new(),
         mocap_names: Vec::new(),
+        mocap_quat: Vec::new(),
         equality_names: Vec::new(),
         keyframes: Vec::new(),
         sensor_names: Vec::new(),
