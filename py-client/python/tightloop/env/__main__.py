@@ -12,6 +12,7 @@ from tightloop import _core
 from tightloop.env.registry import TASKS, make_task
 from tightloop.env.rendering import FIELDS
 from tightloop.env.simulation import DAEMON_OPTIONS, fields_of
+from tightloop.env.task_checks import scene_of
 from tightloop.errors import ArgumentError
 
 
@@ -28,7 +29,7 @@ def arguments_of(
     for name, value in own.items():
         text = value if isinstance(value, str) else ",".join(value) if isinstance(value, Sequence) else f"{value}"
         arguments += [f"--{name.replace('_', '-')}", text]
-    return made.scene().to_toml(), [*arguments, *extra]
+    return scene_of(made).to_toml(), [*arguments, *extra]
 
 
 def main() -> int:

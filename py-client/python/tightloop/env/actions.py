@@ -57,6 +57,15 @@ class Actions:
             control.apply(self.now[:, numbers], frame)
         return self._commands.sent
 
+    def not_finite(self) -> tuple[int, str] | None:
+        """Return the first world whose last action is not finite, and which value it is; None without one."""
+        wrong = np.argwhere(~np.isfinite(self.now))
+        if not len(wrong):
+            return None
+        world, place = (int(index) for index in wrong[0])
+        control = next(control for control, numbers in self._controls if numbers.start <= place < numbers.stop)
+        return world, f"action[{place}] ({type(control).__name__}) is {self.now[world, place]}"
+
     def begin(self, mask: NDArray[np.bool_]) -> None:
         """Clear actions and commands of worlds that begin an episode."""
         self._commands.begin(mask)

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.env.array_pool import ArrayPool
+from tightloop.env.bounds_watch import BoundsWatch
 from tightloop.env.observations import ObservationPacker
 from tightloop.env.results import check_metric_names
-from tightloop.env.task import Array, Task, Worlds
+from tightloop.env.task import Array, Task, Worlds, observed_parts
 from tightloop.errors import ArgumentError
 
 _REAL, _BOOL, _ANY = "fiu", "b", "fiub"
@@ -31,7 +32,8 @@ class Evaluation:
     def __init__(self, task: Task, worlds: int) -> None:
         self._task, self._count = task, worlds
         self._pool, self._tapes = ArrayPool(), {}
-        self._packer = ObservationPacker(task.observed())
+        parts = observed_parts(task)
+        self._packer, self._watch = ObservationPacker(parts), BoundsWatch(type(task).__name__, parts)
         self.observed, self.space = self._packer.size, self._packer.space
         self.worlds = Worlds()
 
@@ -44,7 +46,10 @@ class Evaluation:
 
     def observe(self, out: NDArray[np.float32]) -> bool:
         """Write the observations, shape ``(worlds, size)``; returns whether any is NaN."""
-        return self._packer.pack(self.call("observe"), out)
+        arrays = self.call("observe")
+        spoiled = self._packer.pack(arrays, out)
+        self._watch.look(arrays)
+        return spoiled
 
     def reward(self, out: NDArray[np.float32]) -> None:
         """Write the rewards, shape ``(worlds,)``."""

@@ -10,6 +10,7 @@ from tightloop import checks
 from tightloop.env.registry import make_task
 from tightloop.env.simulation import options_of
 from tightloop.env.task import Task
+from tightloop.env.task_checks import scene_of
 from tightloop.env.vector import VectorEnv
 from tightloop.errors import ArgumentError
 from tightloop.signatures import checked_calls
@@ -70,7 +71,7 @@ def make_groups(
     of_task = {name: options.pop(name) for name in set(options) - _OF_ENVIRONMENTS}
     made = make_task(task, of_task, make_groups)
     own = options_of(made, list(made.controls()), device=device, precision=precision, threads=threads)
-    sims = tl.launch(made.scene(), worlds=num_envs, groups=groups, **own)
+    sims = tl.launch(scene_of(made), worlds=num_envs, groups=groups, **own)
     try:
         return [VectorEnv(made, daemon=sim, first_env=group * sim.worlds, **options) for group, sim in enumerate(sims)]
     except BaseException:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from tightloop.attributes import suggestion
 from tightloop.errors import ArgumentError
 from tightloop.signatures import checked_calls
 
@@ -58,5 +59,6 @@ class Names:
     def _place(self, kind: str, name: str) -> int:
         names = self._places[kind]
         if name not in names:
-            raise ArgumentError(f"there is no {kind} {name!r} in the scene; there are: {', '.join(names) or 'none'}")
+            cure = suggestion(str(name), names) if names else "there are: none"
+            raise ArgumentError(f"there is no {kind} {name!r} in the scene; {cure}")
         return names.index(name)

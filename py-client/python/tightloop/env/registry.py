@@ -10,6 +10,7 @@ from inspect import Parameter, signature
 from pathlib import Path
 from typing import Any
 
+from tightloop.attributes import nearest
 from tightloop.env.controls import Control
 from tightloop.env.task import Task
 from tightloop.errors import ArgumentError
@@ -54,7 +55,8 @@ def make_task(
     if not any(parameter.kind is Parameter.VAR_KEYWORD for parameter in taken.values()):
         for name in options:
             if name not in taken:
-                raise unknown_argument(f"environment of the task {task.__name__}", name, [*of_environments, *taken])
+                what = f"environment of the task {task.__name__}"
+                raise unknown_argument(what, name, [*of_environments, *taken])
     return task(**options)
 
 
@@ -82,7 +84,10 @@ def _named(task: str) -> type[Task]:
     task = task.removeprefix("tightloop/").removesuffix("-v0")
     if task not in TASKS:
         known = ", ".join(TASKS)
-        raise ArgumentError(f"there is no task {task!r}; there are: {known}, and those of your own, FILE.py:CLASS")
+        near = "".join(f"did you mean {other!r}? " for other in nearest(task, TASKS)[:1])
+        raise ArgumentError(
+            f"there is no task {task!r}; {near}there are: {known}, and those of your own, FILE.py:CLASS"
+        )
     module, _, name = TASKS[task].partition(":")
     return getattr(import_module(module), name)
 

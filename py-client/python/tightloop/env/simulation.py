@@ -9,6 +9,7 @@ from typing import Any
 import tightloop as tl
 from tightloop.env.controls import Control
 from tightloop.env.task import Task
+from tightloop.env.task_checks import scene_of
 from tightloop.errors import ArgumentError
 
 #: Only the world with a NaN action fails; draws depend on a world's seed, not on its index.
@@ -46,7 +47,7 @@ def open_simulation(
     Raises:
         ArgumentError: The daemon runs another scene, or another number of worlds.
     """
-    scene = task.scene()
+    scene = scene_of(task)
     if daemon is None:
         options = options_of(task, controls, device=device, precision=precision, threads=threads, fields=fields)
         return scene, tl.launch(scene, worlds=1 if worlds is None else worlds, **options)

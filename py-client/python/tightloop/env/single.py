@@ -17,6 +17,9 @@ from tightloop.errors import ArgumentError, SignatureError
 from tightloop.inputs import whole_seed
 from tightloop.signatures import checked_calls
 
+#: Arguments of environments with many worlds, also as they are mistyped.
+_MANY = {"autoreset_mode", "n_envs", "num_env", "num_envs", "num_worlds", "worlds"}
+
 
 @checked_calls
 class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -37,7 +40,7 @@ class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             task: As of `VectorEnv`.
             **options: As of `VectorEnv`, except ``num_envs`` and ``autoreset_mode``.
         """
-        for name in {"num_envs", "autoreset_mode"} & set(options):
+        for name in _MANY & set(options):
             raise SignatureError(f"Env: {name} is not taken, since it has one world; leave it out, or make a VectorEnv")
         if options.get("daemon") is None:
             options.setdefault("threads", 1)

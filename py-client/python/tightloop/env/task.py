@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import advice, checks
+from tightloop import _core, advice, checks
+from tightloop.attributes import nearest
 from tightloop.env.controls import Control
 from tightloop.env.names import Names
-from tightloop.errors import ArgumentError
+from tightloop.errors import ArgumentError, UnknownAttribute
 from tightloop.scene import Scene
 from tightloop.signatures import checked_calls
 
@@ -46,8 +47,19 @@ class Worlds:
         self.__dict__.update(arrays)
 
     def __getattr__(self, name: str) -> Array:
+        if name.startswith("_"):
+            raise AttributeError(name)
         known = ", ".join(self.__dict__)
-        raise AttributeError(f"worlds have no {name!r}; name it in the task's `fields`; there are: {known}")
+        near = nearest(name, [*self.__dict__, *_core.field_names()])
+        if name in _core.field_names():
+            cure = "name it in the task's `fields`"
+        elif near:
+            cure = f"did you mean `{near[0]}`?" + (
+                "" if near[0] in self.__dict__ else " Name it in the task's `fields`"
+            )
+        else:
+            cure = "`bind` can keep what is constant in the task"
+        raise UnknownAttribute(f"worlds have no {name!r}; {cure}; there are: {known}")
 
     def rows(self, rows: NDArray[np.intp]) -> Worlds:
         """Return copies of some of the worlds, by index."""
@@ -195,12 +207,30 @@ class Task:
     def describe(self) -> str:
         """Return a table of the observation: index, name, range, unit."""
         lines, place = [], 0
-        for part in self.observed():
+        for part in observed_parts(self):
             places = f"{place}" if part.size == 1 else f"{place}–{place + part.size - 1}"
             low, high = part.bounds[0].min(), part.bounds[1].max()
             lines.append(f"{places:<8}{part.name:<32}[{low:.4g}, {high:.4g}]  {part.unit}")
             place += part.size
         return "\n".join(lines)
+
+
+def observed_parts(task: Task) -> list[Observed]:
+    """Return the parts of a task's observation.
+
+    Raises:
+        ArgumentError: They are no list of `Observed`.
+    """
+    own, parts = f"{type(task).__name__}.observed", cast("Any", task.observed())
+    if isinstance(parts, Observed | str | Mapping) or not isinstance(parts, Iterable):
+        raise ArgumentError(f"{own}: got {type(parts).__name__}; return a list of Observed")
+    parts = [*parts]
+    for place, part in enumerate(parts):
+        if not isinstance(part, Observed):
+            given = part if isinstance(part, tuple | list) else (part, "low", "high")
+            cure = f"such as Observed({', '.join(map(repr, given))})" if given else "such as Observed('height', 0, 2)"
+            raise ArgumentError(f"{own}: part {place} is {part!r:.80}; give a tightloop.env.Observed, {cure:.80}")
+    return parts
 
 
 def episode_steps(task: Task, given: float | None) -> int | None:

@@ -14,7 +14,7 @@ from gymnasium.vector import VectorEnv as GymVectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import checks
+from tightloop import advice, checks
 from tightloop.attributes import suggestion
 from tightloop.env.actions import Actions
 from tightloop.env.episodes import Episodes, check_seeds
@@ -27,6 +27,7 @@ from tightloop.env.results import TASK_FAULT, OnNan, check_on_nan, check_options
 from tightloop.env.simulation import open_simulation
 from tightloop.env.step_buffers import BufferRing, StepBuffers
 from tightloop.env.task import Task, episode_steps
+from tightloop.env.task_checks import check_task
 from tightloop.errors import ArgumentError, CommandRefused, DaemonLost, UnknownAttribute
 from tightloop.frames import FAULTED
 from tightloop.signatures import checked_calls
@@ -117,6 +118,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             num_envs = checks.integer("num_envs", num_envs, error=ArgumentError)
         # a task is bound to one environment: two environments would share its arrays
         self.task = copying.deepcopy(make_task(task, options, VectorEnv))
+        check_task(self.task)
         self.autoreset_mode = _mode(autoreset_mode)
         self.max_episode_steps = episode_steps(self.task, max_episode_steps)
         controls = controls_of(self.task)
@@ -261,7 +263,8 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         if not self._in_flight:
             raise CommandRefused("recv: no step is on its way; call send first")
         try:
-            frame = self.sim.recv()
+            with advice.explained_by(self._actions.not_finite):
+                frame = self.sim.recv()
         except KeyboardInterrupt:
             raise  # `recv` may be called again
         except DaemonLost:  # no reset helps, and the next call says so again
