@@ -284,6 +284,31 @@ def test_a_page_outlives_its_daemon_and_goes_on_with_the_next_of_that_name(box, 
                 assert viewer.wait(30) == 0
 
 
+def test_a_page_says_that_the_program_that_opened_it_closed_the_run(box, look, unique):
+    with tl.launch(box, worlds=1, name=unique()) as sim:
+        sim.reset()
+        view = look(sim.view(port=8300).url)
+    view.wait(lambda: "run ended" in view.text.lower(), "it says that the run ended")
+    view.errors.clear()  # the browser tries to reach the viewer again
+
+
+@pytest.mark.parametrize("worlds", [1, 2])
+def test_the_camera_moves_with_robots_that_leave_the_picture(box, look, unique, worlds):
+    with tl.launch(box, worlds=worlds, name=unique(), on_nan="freeze", params=("body_f",)) as sim:
+        sim.reset()
+        view = look(sim.view(port=8300).url, WIDE)
+        view.close_notices()
+        moved = np.array(sim.forward().joint_q)
+        for _ in range(100):
+            moved[:, 1] += 0.1
+            sim.write(joint_q=moved)
+            sim.step()
+            time.sleep(0.02)
+        sim.step(body_f=np.full((worlds, len(sim.body_names), 6), np.nan))
+        view.wait(lambda: is_red(view.shot()).any(), "the frozen boxes are in the picture")
+        view.still(f"follows_{worlds}")
+
+
 def test_what_nobody_sees_is_not_shown_and_a_page_that_comes_later_shows_what_is_now(box, look, unique):
     def mapped() -> int:
         """Pieces of shared memory that the viewer has mapped: fewer while it does not observe."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,11 @@ from numpy.typing import NDArray
 from tightloop.dynamics import Dynamics
 from tightloop.errors import TightloopError
 from tightloop.view import floor
+from tightloop.view.aim import Aim
 from tightloop.view.cameras import camera
 from tightloop.view.display_options import DisplayOptions
 from tightloop.view.drag_spring import DragSpring, drag_spring
-from tightloop.view.frame_stream import FrameStream
+from tightloop.view.frame_stream import FEW_WORLDS, FrameStream
 from tightloop.view.joints import Joint, at_targets, joints
 from tightloop.view.live_driver import LiveDriver
 from tightloop.view.overlay import Overlay
@@ -25,6 +27,8 @@ from tightloop.view.source import CONTACT_FIELDS
 from tightloop.view.stage import add_stage
 from tightloop.view.world_meshes import WorldMeshes
 
+# Cameras are re-aimed this often; the points of many worlds take longer to find.
+_KEEP_SECONDS, _KEEP_MANY_SECONDS = 0.03, 0.25
 # In each frame a following camera moves by a tenth of its distance to the target, which avoids jerks.
 _FOLLOW_PART = 0.1
 # The camera ignores smaller movements [m].
@@ -56,13 +60,21 @@ class Page:
         self._overlay = Overlay(
             server, scene_parts.parts, self.options, self._world_meshes, bodies=len(info["body_names"])
         )
+        self._floats = scene_parts.subject.floats
+        # as films do
+        self._preset = "follow" if self._floats and stream.worlds == 1 else "three-quarter"
+        self.options.follow = self._preset == "follow"
+        self._aims: dict[int, Aim] = {}
+        self._kept_at = 0.0
+        self._panel = Panel(
+            server, stream, self.options, driven=self._driven, aim=self.aim, notes=notes, preset=self._preset
+        )
         self._panel = Panel(server, stream, self.options, driven=self._driven, aim=self.aim, notes=notes)
         self._world_meshes.on_click(lambda world, _: self._panel.follow(world))
         if isinstance(stream.driver, LiveDriver) and stream.driver.can_push and self._dynamics is not None:
             self._world_meshes.on_drag(self._drag)
         # beside the scene, not over it: cameras then aim at what the panel leaves free
         server.gui.main_panel.dock_right()
-        self._preset = "three-quarter"
         server.scene.set_up_direction("+z")
         box = self._world_meshes.box
         add_stage(server.scene, box, self._world_meshes.offsets, floor.height(scene_parts, box))
@@ -110,6 +122,8 @@ class Page:
             self._panel.update(shown, new=new)
         if self.options.follow:
             self._follow(body_q[world])
+        elif self._floats and new:
+            self._keep(body_q)
 
     def aim(self, preset: str) -> None:
         """Point the cameras of all browsers."""
@@ -121,12 +135,21 @@ class Page:
         """Point the camera of one browser, for example when it connects."""
         world = self.options.world if self._preset == "follow" else None
         points = self._world_meshes.points(np.asarray(self._shown.body_q), world)
-        with client.atomic():
-            chosen = camera(self._preset, points, aspect=client.camera.aspect)
-            client.camera.fov = chosen.fov
-            client.camera.up_direction = chosen.up
-            client.camera.position = chosen.position
-            client.camera.look_at = chosen.target
+        aim = self._aims[client.client_id] = Aim(client)
+        aim.point(camera(self._preset, points, aspect=client.camera.aspect))
+
+    def _keep(self, body_q: Array) -> None:
+        """Re-aim the cameras at robots that walk out of the picture, unless users have moved them."""
+        now = time.monotonic()
+        if now - self._kept_at < (_KEEP_SECONDS if len(body_q) <= FEW_WORLDS else _KEEP_MANY_SECONDS):
+            return
+        self._kept_at = now
+        clients = self._server.get_clients()
+        self._aims = {number: aim for number, aim in self._aims.items() if number in clients}
+        if self._aims:
+            points = self._world_meshes.points(body_q, None)
+            for aim in self._aims.values():
+                aim.keep(points)
 
     def _follow(self, body_q: Array) -> None:
         """Move the cameras with the mean position of the followed world's robot."""

@@ -42,6 +42,7 @@ class Panel:
         driven: Joints that get sliders.
         aim: Called with the name of a chosen camera preset.
         notes: What is to be told about the scene's options.
+        preset: Camera preset at the start.
     """
 
     def __init__(
@@ -53,6 +54,7 @@ class Panel:
         driven: list[Joint],
         aim: Callable[[str], None],
         notes: list[str],
+        preset: str = "three-quarter",
     ) -> None:
         self._gui = server.gui
         self._info = info = stream.info
@@ -68,7 +70,7 @@ class Panel:
         with self._gui.add_folder("Time"):
             self._add_time()
         with self._gui.add_folder("Look"):
-            self._add_display(aim)
+            self._add_display(aim, preset)
         self._sliders = None
         if isinstance(driver, LiveDriver):
             with self._gui.add_folder("Joint targets", expand_by_default=0 < len(driven) <= _OPEN_JOINTS):
@@ -163,9 +165,9 @@ class Panel:
             self._of_driver.append(one)
             one.on_click(lambda _: driver.reset(self._options.world))
 
-    def _add_display(self, aim: Callable[[str], None]) -> None:
+    def _add_display(self, aim: Callable[[str], None], preset: str) -> None:
         gui, options = self._gui, self._options
-        camera = gui.add_dropdown("Camera", tuple(PRESETS), initial_value="three-quarter")
+        camera = gui.add_dropdown("Camera", tuple(PRESETS), initial_value=preset)
 
         def choose_camera(_: Any) -> None:
             options.choose(follow=camera.value == "follow")

@@ -23,6 +23,8 @@ _SPACING_SECONDS, _SPACING_MANY_SECONDS = 0.015, 0.025
 _UNSEEN_SECONDS = 0.1
 _WAIT_SECONDS = 0.5
 _PARENT_SECONDS = 0.5
+# Messages reach browsers within this time.
+_FAREWELL_SECONDS = 0.3
 
 
 class Server:
@@ -87,9 +89,14 @@ class Server:
                 time.sleep(_WAIT_SECONDS)
 
     def close(self) -> None:
-        """Detach from the source, and close the page."""
+        """Detach from the source, say on the page that it ended, and close it."""
         if self._stream is not None:
             self._stream.close()
+        if self._viser.get_clients():
+            self._report(
+                "Run ended", "The program that showed this run has ended or closed it. This is its last picture."
+            )
+            time.sleep(_FAREWELL_SECONDS)
         with contextlib.redirect_stdout(io.StringIO()):
             self._viser.stop()
 
@@ -126,11 +133,17 @@ class Server:
             self._stream.close()
         self._stream = self._page = None
         self._reported = ""
-        self._viser.gui.reset()
-        self._viser.gui.set_panel_label(f"tightloop · {self._target}")
-        self._viser.gui.add_markdown(
-            f"## Daemon lost\n{lost}\n\nThis page goes on when a daemon of the name `{self._target}` is started."
+        self._report(
+            "Daemon lost", f"{lost}\n\nThis page goes on when a daemon of the name `{self._target}` is started."
         )
+
+    def _report(self, title: str, text: str) -> None:
+        """Replace the controls by a message, beside the last picture."""
+        self._viser.gui.reset()
+        self._viser.gui.set_panel_label(f"tightloop · {self._target} · {title.lower()}")
+        self._viser.gui.add_markdown(f"## {title}\n{text}")
+        for client in self._viser.get_clients().values():
+            client.add_notification(title, text, auto_close_seconds=None, color="red")
 
     def _await_restart(self) -> None:
         try:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.dynamics import Dynamics
+from tightloop.errors import UnknownField
 from tightloop.robot import Robot
 from tightloop.scene import Scene
 from tightloop.view import dependencies
@@ -38,7 +39,14 @@ def of_simulation(
     size = check_size("picture", size)
     info = sim.info
     picture = Picture(parts(info["scene"], info["scene_folder"], info["body_names"]), *size)
-    return image(picture.render(sim.forward() if frame is None else frame, worlds=worlds, camera=camera))
+    shown = sim.forward() if frame is None else frame
+    if not hasattr(shown, "body_q") and hasattr(shown, "fields"):
+        whose = f"simulation `{sim.name}`, whose frames lack it" if frame is None else "frame, which lacks it"
+        fields = ", ".join(map(repr, ("body_q", *sim.fields[:2])))
+        raise UnknownField(
+            f"picture: the poses of bodies are drawn from `body_q` of the {whose}; launch with fields=({fields}, …)"
+        )
+    return image(picture.render(shown, worlds=worlds, camera=camera))
 
 
 def of_robot(robot: Robot) -> str:
