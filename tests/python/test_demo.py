@@ -17,6 +17,7 @@ import tightloop as tl
 from conftest import PENDULUM, REPOSITORY, URDF
 from tightloop.assets import Policy
 from tightloop.demo import lesson, tour
+from tightloop.demo.any_file import FileScene
 from tightloop.demo.command import main
 from tightloop.demo.scenes import SCENES, DemoScene, Grasp, Many, Target, Torque, Trained
 from tightloop.errors import MissingLibrary
@@ -211,6 +212,27 @@ def test_any_file_has_a_demo_and_a_benchmark(tmp_path, file):
         done = subprocess.run(line, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "out" / f"{path.stem}.png").stat().st_size > 2000
+
+
+@pytest.mark.parametrize(
+    ("efforts", "said"),
+    [
+        ((9, 9), r"worlds of robot\.urdf, which follow waves$"),
+        ((0, 0), r'which hang: each joint has effort="0" in its <limit>.*give the effort in the file$'),
+        ((9, 0), r'of which 1 of 2 joints follow waves: `b` and each other has effort="0".*in the file$'),
+        ((), r"which has no joint that could follow waves$"),
+    ],
+)
+def test_the_demo_of_a_robot_says_whether_its_joints_can_follow(tmp_path, efforts, said):
+    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    joints = [
+        f'<link name="l{name}">{inertial}</link><joint name="{name}" type="revolute"><parent link="base"/>'
+        f'<child link="l{name}"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="{effort}" velocity="1"/>'
+        "</joint>"
+        for name, effort in zip("ab", efforts, strict=False)
+    ]
+    (tmp_path / "robot.urdf").write_text(f'<robot name="r"><link name="base"/>{"".join(joints)}</robot>')
+    assert re.search(said, FileScene(tmp_path / "robot.urdf", 4).title)
 
 
 def test_a_file_that_is_none_is_told(tmp_path):

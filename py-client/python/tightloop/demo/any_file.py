@@ -32,6 +32,9 @@ class FileScene(DemoScene):
         super().__init__(worlds)
         self.name, self.title = path.stem, f"worlds of {path.name}, which follow waves"
         self._scene = scene_of(path)
+        still = _powerless(self._scene)
+        if still:
+            self.title = f"worlds of {path.name}{still}"
         self._ranges = {name: _controls(model) for name, model in self._scene.models.items()}
         self.frames = max(round(_SECONDS / (self._scene.dt * self._scene.substeps)), 1)
 
@@ -60,6 +63,26 @@ class FileScene(DemoScene):
 
     def summary(self) -> str:
         return f"{self._faulted} of {self.worlds} worlds faulted"
+
+
+def _powerless(scene: tl.Scene) -> str:
+    """Return which joints cannot follow waves, and the cure; nothing if all can."""
+    names, joints = [], 0
+    for robot in scene.robots.values():
+        joints += int(np.count_nonzero(robot.dof_driven))
+        names += [
+            name
+            for name, driven, limit in zip(robot.dof_names, robot.dof_driven, robot.joint_effort_limit, strict=True)
+            if driven and limit == 0.0
+        ]
+    if not joints and scene.robots and not scene.models:
+        return ", which has no joint that could follow waves"
+    if not names:
+        return ""
+    cure = 'has effort="0" in its <limit>, so that no drive may push: give the effort in the file'
+    if len(names) == joints:
+        return f", which hang: each joint {cure}"
+    return f", of which {joints - len(names)} of {joints} joints follow waves: `{names[0]}` and each other {cure}"
 
 
 def _controls(model: MujocoModel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
