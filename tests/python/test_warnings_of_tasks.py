@@ -58,7 +58,9 @@ def test_observations_beyond_their_bounds_are_told_with_the_share_and_the_cure()
 
     [warning] = told(Narrow, 200)
     name = CartPoleBalance().observed()[-1].name
-    assert f"Narrow.observe: `{name}` was beyond its bounds, 0.25 to 0.5, in 100% of the steps, at up to ±7" in warning
+    assert (
+        f"Narrow.observe: `{name}` was beyond its bounds, 0.25 to 0.5, in 100% of the steps, by up to 7.25" in warning
+    )
     assert f'Give Observed("{name}", …) wider bounds' in warning
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from tightloop import advice
 from tightloop.env.task import Observed
 
-#: Worlds that are looked at, calls that make a window, and the share of calls between that are looked at later.
-_WORLDS, _WINDOW, _EVERY = 64, 64, 8
+#: Worlds that are looked at, calls that make a window, and of how many later calls one is looked at.
+_WORLDS, _WINDOW, _EVERY = 64, 64, 32
 #: Share of a window in which a value is beyond its bounds, from which on that is told.
 _SHARE = 0.5
 #: A value this far beyond its bounds, as a share of their distance, is not rounding.
@@ -58,7 +58,7 @@ class BoundsWatch:
             beyond = (values < low) | (values > high)
             if beyond.any():
                 self._beyond[place] += beyond.mean(axis=0)
-                where = np.where(beyond, np.abs(values), 0.0)
+                where = np.where(beyond, np.maximum(low - values, values - high), 0.0)
                 self._largest[place] = np.maximum(self._largest[place], where.max(axis=0))
         self._seen += 1
         if self._seen == _WINDOW:
@@ -75,7 +75,7 @@ class BoundsWatch:
             low, high = part.bounds[:, worst]
             advice.warn(
                 f"{self._task}.observe: {value}`{part.name}` was beyond its bounds, {low:g} to {high:g}, in "
-                f"{share:.0%} of the steps, at up to ±{self._largest[place][worst]:.3g}, and was clipped, so that a "
+                f"{share:.0%} of the steps, by up to {self._largest[place][worst]:.3g}, and was clipped, so that a "
                 f'policy cannot tell such values apart. Give Observed("{part.name}", …) wider bounds, or scale what '
                 "`observe` returns. Wrong units have the same effect"
             )
