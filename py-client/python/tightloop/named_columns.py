@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -131,7 +131,7 @@ def _example(names: Sequence[str]) -> str:
     return f"such as {names[-1]!r}" if names else "of which there are none"
 
 
-def _check_quaternions(field: str, places: Any, names: Sequence[str]) -> None:
+def _check_quaternions(field: str, places: Collection[int], names: Sequence[str]) -> None:
     """Refuse a part of a quaternion."""
     for place in places:
         name = names[place]
