@@ -13,7 +13,9 @@ from typing import Any
 from gymnasium.vector import AutoresetMode
 
 from tightloop.env.controls import EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
+from tightloop.env.disturbances import Push
 from tightloop.env.groups import make_groups
+from tightloop.env.mirror import Mirror
 from tightloop.env.names import Names
 from tightloop.env.registration import register
 from tightloop.env.single import Env
@@ -28,8 +30,10 @@ __all__ = [
     "JointDelta",
     "JointTarget",
     "JointTorque",
+    "Mirror",
     "Names",
     "Observed",
+    "Push",
     "Task",
     "VectorEnv",
     "Worlds",

@@ -25,12 +25,14 @@ class Episodes:
     Attributes:
         elapsed: Control steps since the reset, shape ``(worlds,)``, int32.
         goal: Goals, shape ``(worlds, …)``.
+        seeds: Seed of each world, shape ``(worlds,)``.
+        numbers: Episodes since that seed, shape ``(worlds,)``.
     """
 
     def __init__(self, task: Task, worlds: int, first_env: int) -> None:
         self._task, self._first = task, first_env
-        self._seeds = np.zeros(worlds, np.uint64)
-        self._episodes = np.zeros(worlds, np.uint32)
+        self.seeds = np.zeros(worlds, np.uint64)
+        self.numbers = np.zeros(worlds, np.uint32)
         self._goals = np.zeros(worlds, np.uint32)  # of this episode so far
         self.elapsed = np.zeros(worlds, np.int32)
         self.goal: NDArray[Any] = np.zeros((worlds, 0), np.float32)
@@ -47,18 +49,18 @@ class Episodes:
         Raises:
             ArgumentError: A seed is not valid.
         """
-        worlds = len(self._seeds)
+        worlds = len(self.seeds)
         if seed is None and self._known:
-            self._episodes[mask] += 1
+            self.numbers[mask] += 1
             return None
         given = _seeds(seed, worlds, self._first)
         for world in np.flatnonzero(mask):
             own = given[world]
-            self._seeds[world] = entropy.integers(2**63) if own is None else own
-        self._episodes[mask] = 0
+            self.seeds[world] = entropy.integers(2**63) if own is None else own
+        self.numbers[mask] = 0
         # worlds outside the first mask have no seed yet
         self._known = self._known or bool(mask.all())
-        return self._seeds
+        return self.seeds
 
     def set_elapsed(self, steps: ArrayLike) -> None:
         """Set the elapsed steps of all worlds.
@@ -74,7 +76,7 @@ class Episodes:
 
     def next(self, mask: NDArray[np.bool_]) -> None:
         """Count the next episode of the worlds in the mask, as `Sim.reset` without seeds does."""
-        self._episodes[mask] += 1
+        self.numbers[mask] += 1
 
     def begin(self, mask: NDArray[np.bool_], worlds: Worlds) -> None:
         """Start episodes of the worlds in the mask, and draw their goals at the state ``worlds``."""
@@ -98,13 +100,13 @@ class Episodes:
 
     def _draw(self, rows: NDArray[np.intp], worlds: Worlds) -> None:
         count, draws = self._task.goal_draws, np.empty((len(rows), self._task.goal_draws), np.float32)
-        _core.draw(self._seeds[rows], self._episodes[rows], _GOALS, count, draws, self._goals[rows] * np.uint32(count))
+        _core.draw(self.seeds[rows], self.numbers[rows], _GOALS, count, draws, self._goals[rows] * np.uint32(count))
         goal = np.asarray(self._task.goal(np, worlds.rows(rows), draws))
         if goal.ndim == 0 or len(goal) != len(rows) or goal.dtype.kind not in "fiub":
             expected = f"expected numbers of {len(rows)} worlds"
             raise ArgumentError(f"{type(self._task).__name__}.goal: {expected}; got {goal.dtype} of shape {goal.shape}")
         if self.goal.shape[1:] != goal.shape[1:]:
-            self.goal = np.zeros((len(self._seeds), *goal.shape[1:]), np.float32)
+            self.goal = np.zeros((len(self.seeds), *goal.shape[1:]), np.float32)
         self.goal[rows] = goal
 
 

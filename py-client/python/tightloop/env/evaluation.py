@@ -6,12 +6,16 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from tightloop.env.array_pool import ArrayPool
 from tightloop.env.bounds_watch import BoundsWatch
+from tightloop.env.mirror import Mirror, MirrorColumns
 from tightloop.env.observations import ObservationPacker
 from tightloop.env.results import check_metric_names
+from tightloop.env.reward_terms import RewardTerms
+from tightloop.env.step_buffers import aligned
 from tightloop.env.task import Array, Task, Worlds, observed_parts
 from tightloop.errors import ArgumentError
 
@@ -35,24 +39,82 @@ class Evaluation:
         parts = observed_parts(task)
         self._packer, self._watch = ObservationPacker(parts), BoundsWatch(type(task).__name__, parts)
         self.observed, self.space = self._packer.size, self._packer.space
+        privileged = task.privileged_observed()
+        self._privileged = ObservationPacker(privileged) if privileged else None
+        self.terms = RewardTerms(task, worlds)
         self.worlds = Worlds()
 
-    def see(self, frame: Any, **own: NDArray[Any]) -> None:
-        """Show a frame and the environment's own arrays to the functions."""
-        shown = {name: self._pool.wrap(array) for name, array in own.items()}
-        for array in shown.values():
-            array.flags.writeable = False
-        self.worlds = Worlds(**shown, **{name: self._pool.wrap(getattr(frame, name)) for name in self._task.fields})
+    @property
+    def privileged_space(self) -> Box | None:
+        """Space of a privileged observation; None if the task has none."""
+        return None if self._privileged is None else self._privileged.space
 
-    def observe(self, out: NDArray[np.float32]) -> bool:
-        """Write the observations, shape ``(worlds, size)``; returns whether any is NaN."""
+    def mirror(self, actions: int) -> tuple[MirrorColumns, MirrorColumns, MirrorColumns | None] | None:
+        """Return the mirror symmetry of observations, actions and privileged observations; None without symmetry.
+
+        Raises:
+            ArgumentError: It does not fit their parts.
+        """
+        mirror = self._task.mirrored()
+        if mirror is None:
+            return None
+        what = self.function_name("mirrored")
+        if not isinstance(mirror, Mirror):
+            raise ArgumentError(f"{what}: got {type(mirror).__name__}; return a Mirror, or None")
+        privileged = None
+        if self._privileged is not None:
+            privileged = MirrorColumns.of_parts(f"{what}: privileged", mirror.privileged, self._privileged.parts)
+        observed = MirrorColumns.of_parts(f"{what}: observed", mirror.observed, self._packer.parts)
+        return observed, MirrorColumns.of(f"{what}: action", mirror.action, actions), privileged
+
+    def see(self, frame: Any, memory: Mapping[str, NDArray[Any]], **own: NDArray[Any]) -> None:
+        """Show a frame, the task's memory and the environment's own arrays to the functions."""
+
+        def shown(array: NDArray[Any]) -> NDArray[Any]:
+            wrapped = self._pool.wrap(array)
+            wrapped.flags.writeable = False
+            return wrapped
+
+        own_arrays = {name: shown(array) for name, array in own.items()}
+        remembered = {name: shown(array) for name, array in memory.items()}
+        self.worlds = Worlds(
+            **own_arrays,
+            memory=remembered,
+            **{name: self._pool.wrap(getattr(frame, name)) for name in self._task.fields},
+        )
+
+    def advance(self) -> None:
+        """Begin a step: the last observations become history."""
+        self._packer.advance()
+        if self._privileged is not None:
+            self._privileged.advance()
+
+    def observe(self, out: NDArray[np.float32], begun: NDArray[np.bool_] | None = None) -> bool:
+        """Write the observations, shape ``(worlds, size)``; returns whether any is NaN.
+
+        Args:
+            out: The observations.
+            begun: Worlds that begin an episode.
+        """
         arrays = self.call("observe")
-        spoiled = self._packer.pack(arrays, out)
+        spoiled = self._packer.pack(arrays, out, begun)
         self._watch.look(arrays)
         return spoiled
 
+    def privileged(self, begun: NDArray[np.bool_] | None = None) -> NDArray[np.float32] | None:
+        """Return privileged observations, shape ``(worlds, size)``, NaN as 0; None if the task has none."""
+        if self._privileged is None:
+            return None
+        out = aligned((self._count, self._privileged.size), np.float32)
+        if self._privileged.pack(self.call("privileged_observe"), out, begun):
+            np.nan_to_num(out, copy=False)
+        return out
+
     def reward(self, out: NDArray[np.float32]) -> None:
         """Write the rewards, shape ``(worlds,)``."""
+        if self.terms.is_used:
+            self.terms.add(self.call("reward_terms"), out)
+            return
         np.copyto(out, self._checked("reward", _REAL), casting="same_kind")
 
     def terminated(self, out: NDArray[np.bool_]) -> None:
@@ -74,10 +136,10 @@ class Evaluation:
         named = dict(metrics) if success is None else {**metrics, "success": success}
         return {name: np.array(value) for name, value in named.items()}
 
-    def call(self, name: str) -> Any:
+    def call(self, name: str, *more: Any) -> Any:
         """Call a function of the task; its arrays are reused once nobody holds them."""
         self._pool.play(self._tapes.setdefault(name, []))
-        return getattr(self._task, name)(np, self.worlds)
+        return getattr(self._task, name)(np, self.worlds, *more)
 
     def _checked(self, name: str, kinds: str, *, optional: bool = False) -> Array:
         first = name not in self._tapes

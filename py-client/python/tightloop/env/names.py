@@ -20,10 +20,12 @@ class Names:
         dofs: Slice of its entries of ``joint_qd`` and of commands.
         bodies: Slice of its entries of ``body_q``.
         dof_names: ``robot/joint`` of each dof.
+        body_count: Number of bodies, the rows of ``body_q`` and ``body_f``.
     """
 
     def __init__(self, info: dict[str, Any]) -> None:
         self.dof_names: list[str] = info["dof_names"]
+        self.body_count = len(info["body_names"])
         self.coords, self.dofs, self.bodies = (
             {robot["name"]: slice(*robot[places]) for robot in info["robots"]}
             for places in ("coords", "dofs", "bodies")

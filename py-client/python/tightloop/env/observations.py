@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box
@@ -19,7 +20,7 @@ class ObservationPacker:
     """Writes the parts that `Task.observe` returns into one array, clipped to the bounds of `Task.observed`.
 
     Attributes:
-        size: Length of an observation.
+        size: Length of an observation, history included.
         space: Observation space of one world.
     """
 
@@ -27,17 +28,39 @@ class ObservationPacker:
         self._parts = list(parts)
         if not self._parts:
             raise ArgumentError("observed: there is nothing; list the parts of the observation")
-        self.size = sum(part.size for part in self._parts)
-        self._low, self._high = (np.ascontiguousarray(np.concatenate([p.bounds[end] for p in parts])) for end in (0, 1))
+        self.size = sum(part.width for part in self._parts)
+        self._low, self._high = (
+            np.ascontiguousarray(np.concatenate([np.tile(p.bounds[end], p.history) for p in parts])) for end in (0, 1)
+        )
         self.space = Box(self._low, self._high, dtype=np.float32)
+        # values of the steps before, the oldest first, and those of the last call, by index of the part
+        self._past: dict[int, NDArray[np.float32]] = {}
+        self._last: dict[int, NDArray[np.float32]] = {}
+        self._has_history = any(part.history > 1 for part in self._parts)
+
+    @property
+    def parts(self) -> list[tuple[str, int, int]]:
+        """Name, size and history of each part."""
+        return [(part.name, part.size, part.history) for part in self._parts]
+
+    def advance(self) -> None:
+        """Make the values of the last call those of the step before."""
+        for index, past in self._past.items():
+            past[:, :-1] = past[:, 1:]
+            past[:, -1] = self._last[index]
 
     def part(self, column: int) -> str:
         """Return the name of the part that has a column."""
-        ends = np.cumsum([part.size for part in self._parts])
+        ends = np.cumsum([part.width for part in self._parts])
         return self._parts[int(np.searchsorted(ends, column, side="right"))].name
 
-    def pack(self, arrays: Sequence[Array], out: NDArray[np.float32]) -> bool:
+    def pack(self, arrays: Sequence[Array], out: NDArray[np.float32], begun: NDArray[np.bool_] | None = None) -> bool:
         """Write the parts into ``out``, shape ``(worlds, size)``; NaN stays NaN. Returns whether any is NaN.
+
+        Args:
+            arrays: The parts.
+            out: The observations.
+            begun: Worlds that begin an episode, whose history begins here.
 
         Raises:
             ArgumentError: There are more or fewer parts than `Task.observed` lists, or one has another shape.
@@ -54,4 +77,22 @@ class ObservationPacker:
             shape = (len(out),) if part.size == 1 and array.ndim == 1 else (len(out), part.size)
             if array.shape != shape:
                 raise ArgumentError(f"observe: `{part.name}` has shape {array.shape}; `observed` says {shape}")
-        return _core.pack(out, [np.asarray(array) for array in arrays], self._low, self._high)
+        packed = [np.asarray(array) for array in arrays]
+        if self._has_history:
+            self._add_history(packed, begun)
+        return _core.pack(out, packed, self._low, self._high)
+
+    def _add_history(self, packed: list[NDArray[Any]], begun: NDArray[np.bool_] | None) -> None:
+        """Put the steps before in front of the parts that have a history."""
+        for index, part in enumerate(self._parts):
+            if part.history == 1:
+                continue
+            worlds = len(packed[index])
+            if index not in self._past:
+                self._past[index] = np.zeros((worlds, part.history - 1, part.size), np.float32)
+                self._last[index] = np.zeros((worlds, part.size), np.float32)
+            past, last = self._past[index], self._last[index]
+            last[:] = packed[index].reshape(last.shape)
+            if begun is not None:
+                past[begun] = last[begun, None]
+            packed[index] = np.concatenate([past.reshape(worlds, -1), last], axis=1)

@@ -8,6 +8,7 @@ from typing import Any
 
 import tightloop as tl
 from tightloop.env.controls import Control
+from tightloop.env.disturbances import parameters
 from tightloop.env.task import Task
 from tightloop.env.task_checks import scene_of
 from tightloop.errors import ArgumentError
@@ -80,8 +81,10 @@ def options_of(
 ) -> dict[str, Any]:
     """Return the arguments of `launch` for a task, without the number of worlds."""
     read = tuple(dict.fromkeys([*fields_of(task, controls), *fields]))
+    varying = dict.fromkeys([*task.launch_options.get("params", ()), *parameters(task.disturbances())])
     own = {"fields": read, "device": device, "precision": "f32" if precision is None else precision, "threads": threads}
-    return own | DAEMON_OPTIONS | task.launch_options
+    more = {"params": tuple(varying)} if varying else {}
+    return own | DAEMON_OPTIONS | task.launch_options | more
 
 
 def _check(task: Task, scene: tl.Scene, sim: tl.Sim, fields: tuple[str, ...]) -> None:

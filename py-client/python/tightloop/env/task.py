@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop import _core, advice, checks
 from tightloop.attributes import nearest
 from tightloop.env.controls import Control
+from tightloop.env.disturbances import Push
+from tightloop.env.mirror import Mirror
 from tightloop.env.names import Names
 from tightloop.errors import ArgumentError, UnknownAttribute
 from tightloop.scene import Scene
@@ -36,12 +38,16 @@ class Worlds:
         previous_action: Action of the step before.
         goal: Result of `Task.goal`, shape ``(worlds, …)``.
         elapsed: Control steps since the reset, shape ``(worlds,)``, int32.
+        memory: Arrays that `Task.remember` returned, by name.
+        level: Curriculum level of each world, shape ``(worlds,)``, int32; see `Task.next_level`.
     """
 
     action: Array
     previous_action: Array
     goal: Array
     elapsed: Array
+    memory: Mapping[str, Array]
+    level: Array
 
     def __init__(self, **arrays: Array) -> None:
         self.__dict__.update(arrays)
@@ -63,7 +69,13 @@ class Worlds:
 
     def rows(self, rows: NDArray[np.intp]) -> Worlds:
         """Return copies of some of the worlds, by index."""
-        return Worlds(**{name: np.asarray(array)[rows] for name, array in self.__dict__.items()})
+
+        def of_rows(array: Any) -> Any:
+            if isinstance(array, Mapping):
+                return {name: of_rows(part) for name, part in array.items()}
+            return np.asarray(array)[rows]
+
+        return Worlds(**{name: of_rows(array) for name, array in self.__dict__.items()})
 
 
 @checked_calls
@@ -75,8 +87,10 @@ class Observed:
         name: What the part is.
         low: Lower bound, for all values or for each; values are clipped to it.
         high: Upper bound, likewise.
-        size: Number of values.
+        size: Number of values that `Task.observe` returns.
         unit: Unit of the values.
+        history: Steps that the observation holds of this part, the oldest first: the current one and those before it.
+            An episode begins with copies of its first values.
     """
 
     name: str
@@ -84,6 +98,7 @@ class Observed:
     high: ArrayLike
     size: int = 1
     unit: str = "–"
+    history: int = 1
     bounds: NDArray[np.float32] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -92,6 +107,9 @@ class Observed:
         size = checks.integer(f"observation `{name}`: size", self.size, error=ArgumentError)
         if size > _SIZE_MAX:
             raise ArgumentError(f"observation `{name}`: size is {size}; give at most {_SIZE_MAX}")
+        history = checks.integer(f"observation `{name}`: history", self.history, error=ArgumentError)
+        if history * size > _SIZE_MAX:
+            raise ArgumentError(f"observation `{name}`: history is {history}; give at most {_SIZE_MAX // size}")
         try:
             low, high = (np.broadcast_to(np.asarray(end, np.float32), (self.size,)) for end in (self.low, self.high))
         except (TypeError, ValueError):
@@ -101,6 +119,11 @@ class Observed:
         if not (low < high).all():
             raise ArgumentError(f"observation `{self.name}`: low {self.low} must be below high {self.high}")
         object.__setattr__(self, "bounds", np.stack([low, high]))
+
+    @property
+    def width(self) -> int:
+        """Number of values in the observation, history included."""
+        return self.size * self.history
 
 
 class _Undefined(ArgumentError, NotImplementedError):
@@ -139,6 +162,9 @@ class Task:
         goal_draws: Number of random numbers that `goal` takes per world.
         goal_steps: Control steps after which the next goal replaces a goal; None for one goal per episode.
         launch_options: Further arguments of `tightloop.launch`, such as ``bounds``.
+        reward_weights: Weight of each term that `reward_terms` returns.
+        initial_draws: Number of random numbers that `initial_state` takes per world.
+        first_levels: Worlds begin at curriculum levels drawn uniformly from 0 to ``first_levels - 1``.
         goal_radius: Radius of the ball that marks a goal in pictures [m], if the first three values of a goal are a
             position; None for no ball.
     """
@@ -155,6 +181,9 @@ class Task:
     goal_steps: ClassVar[int | None] = None
     launch_options: ClassVar[dict[str, Any]] = {}
     goal_radius: ClassVar[float | None] = None
+    reward_weights: Mapping[str, float] = {}
+    initial_draws: ClassVar[int] = 0
+    first_levels: int = 1
 
     def scene(self) -> Scene:
         """Return the scene with its randomization. ``dt * substeps`` is the length of a control step."""
@@ -176,8 +205,22 @@ class Task:
         raise _undefined(self, "observe")
 
     def reward(self, xp: Namespace, worlds: Worlds) -> Array:
-        """Return the reward of the last step, shape ``(worlds,)``."""
-        raise _undefined(self, "reward")
+        """Return the reward of the last step, shape ``(worlds,)``.
+
+        A task defines either this or `reward_terms`, of which this is the weighted sum.
+        """
+        if type(self).reward_terms is Task.reward_terms:
+            raise _undefined(self, "reward")
+        terms = self.reward_terms(xp, worlds)
+        return sum(self.reward_weights[name] * value for name, value in terms.items())
+
+    def reward_terms(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
+        """Return the terms of the reward by name, each of shape ``(worlds,)``, without their weights.
+
+        The reward is their sum with the weights of ``reward_weights``. In the step that ends an episode,
+        ``infos["return/NAME"]`` has the weighted sum of each term over the episode.
+        """
+        raise _undefined(self, "reward_terms")
 
     def terminated(self, xp: Namespace, worlds: Worlds) -> Array | None:
         """Return which worlds are terminated, bool, shape ``(worlds,)``; None if the task never terminates."""
@@ -190,6 +233,58 @@ class Task:
     def metrics(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
         """Return further values of a step for ``infos``, by name, each of shape ``(worlds,)``."""
         return {}
+
+    def remember(self, xp: Namespace, worlds: Worlds, memory: Mapping[str, Array] | None) -> Mapping[str, Array]:
+        """Return what the task remembers of a step, by name, each of shape ``(worlds, …)``.
+
+        All functions of the task see the result as ``worlds.memory``. It is called once per step, before them, so it
+        may also hold what several of them need. State in ``self`` would not do: the other functions are called several
+        times per step, and worlds start their episodes at different times.
+
+        Args:
+            xp: The namespace.
+            worlds: The worlds after the step; those that begin an episode, without memory.
+            memory: What this function returned at the step before; None for worlds that begin an episode.
+        """
+        return {}
+
+    def initial_state(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
+        """Return states in which worlds start an episode, after the draws of the scene; empty to keep those.
+
+        Args:
+            xp: The namespace.
+            worlds: Only the worlds that start, as the scene starts them; without memory and goal.
+            draws: Uniform random numbers in [0, 1), shape ``(worlds, initial_draws)``.
+
+        Returns:
+            Arrays by name of an argument of `Sim.write`, such as ``joint_q``, shape ``(worlds, coords)``.
+        """
+        return {}
+
+    def next_level(self, xp: Namespace, worlds: Worlds) -> Array | None:
+        """Return curriculum levels for worlds whose episode ends, int, shape ``(worlds,)``; None to keep them.
+
+        Args:
+            xp: The namespace.
+            worlds: Only these worlds, at the end of their episode; ``worlds.level`` is the level of that episode.
+        """
+        return None
+
+    def disturbances(self) -> Sequence[Push]:
+        """Return pushes of bodies at random times."""
+        return ()
+
+    def privileged_observed(self) -> Sequence[Observed]:
+        """Return the parts of the privileged observation, which only a critic sees in training; none by default."""
+        return ()
+
+    def privileged_observe(self, xp: Namespace, worlds: Worlds) -> Sequence[Array]:
+        """Return those parts, like `observe`; ``infos["privileged"]`` has them, shape ``(worlds, size)``."""
+        raise _undefined(self, "privileged_observe")
+
+    def mirrored(self) -> Mirror | None:
+        """Return the mirror symmetry of the task, which learners may use; None if it has none."""
+        return None
 
     def goal(self, xp: Namespace, worlds: Worlds, draws: Array) -> Array:
         """Return goals for worlds that start an episode, or their next goals.
@@ -208,10 +303,10 @@ class Task:
         """Return a table of the observation: index, name, range, unit."""
         lines, place = [], 0
         for part in observed_parts(self):
-            places = f"{place}" if part.size == 1 else f"{place}–{place + part.size - 1}"
+            places = f"{place}" if part.width == 1 else f"{place}–{place + part.width - 1}"
             low, high = part.bounds[0].min(), part.bounds[1].max()
             lines.append(f"{places:<8}{part.name:<32}[{low:.4g}, {high:.4g}]  {part.unit}")
-            place += part.size
+            place += part.width
         return "\n".join(lines)
 
 

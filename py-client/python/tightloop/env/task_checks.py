@@ -28,6 +28,14 @@ _CALLS = {
     "success": _BY_WORLDS,
     "metrics": _BY_WORLDS,
     "goal": (*_BY_WORLDS, "draws"),
+    "remember": (*_BY_WORLDS, "memory"),
+    "reward_terms": _BY_WORLDS,
+    "initial_state": (*_BY_WORLDS, "draws"),
+    "next_level": _BY_WORLDS,
+    "disturbances": (),
+    "privileged_observed": (),
+    "privileged_observe": _BY_WORLDS,
+    "mirrored": (),
 }
 
 

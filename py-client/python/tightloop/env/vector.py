@@ -17,14 +17,18 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop import advice, checks
 from tightloop.attributes import suggestion
 from tightloop.env.actions import Actions
+from tightloop.env.disturbances import Disturbances
 from tightloop.env.episodes import Episodes, check_seeds
 from tightloop.env.evaluation import Evaluation
+from tightloop.env.memory import Memory
+from tightloop.env.mirror import MirrorColumns
 from tightloop.env.names import Names
 from tightloop.env.registry import controls_of, make_task
 from tightloop.env.rendering import FIELDS, MODES, Rendering, marks
 from tightloop.env.rendering import check as check_mode
 from tightloop.env.results import TASK_FAULT, OnNan, check_on_nan, check_options, refuse
 from tightloop.env.simulation import open_simulation
+from tightloop.env.starts import Starts
 from tightloop.env.step_buffers import BufferRing, StepBuffers
 from tightloop.env.task import Task, episode_steps
 from tightloop.env.task_checks import check_task
@@ -43,6 +47,9 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
     Observations are float32, shape ``(num_envs, size)``, clipped to ``single_observation_space``. Actions have shape
     ``(num_envs, actions)`` and are clipped to ``single_action_space``. Rewards are float32.
 
+    ``infos["privileged"]`` has the privileged observations of a task that has them, from `reset` too. In the step that
+    ends an episode, ``infos["return/TERM"]`` has the sum of a term of its rewards.
+
     ``infos["success"]`` says which worlds fulfil the task now, if the task defines success. The values of
     `Task.metrics` are in ``infos`` too. ``infos["_success"]`` and its like say which rows are valid; rows of worlds
     that have just begun an episode are not. A faulted world (not finite, or beyond the task's bounds) is terminated,
@@ -56,8 +63,11 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         max_episode_steps: Control steps after which an episode is truncated; None for never.
         control_dt: Length of a control step [s].
         evaluation: Evaluates the task's functions at the current worlds.
+        mirror: Columns and signs of observations, actions and privileged observations (None without any) in the mirror,
+            if the task has a mirror symmetry; else None.
     """
 
+    mirror: tuple[MirrorColumns, MirrorColumns, MirrorColumns | None] | None
     metadata: dict[str, Any] = {"render_modes": list(MODES)}  # noqa: RUF012
 
     def __init__(
@@ -145,6 +155,9 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             self._actions = Actions(controls, scene, names, self.num_envs)
             self.evaluation = Evaluation(self.task, self.num_envs)
             self._episodes = Episodes(self.task, self.num_envs, first_env)
+            self._starts, self._memory = Starts(self.task, self.num_envs), Memory(self.task, self.num_envs)
+            self._disturbances = Disturbances(self.task.disturbances(), names, self.num_envs, self.control_dt)
+            self.mirror = self.evaluation.mirror(self._actions.space.shape[0])
             self._rendering = None if render_mode is None else Rendering(self.sim, self.task, render_mode)
         except BaseException:
             self.sim.close()
@@ -202,7 +215,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
                 worlds and their observations do not change.
 
         Returns:
-            Observations, shape ``(num_envs, size)``, and an empty dict.
+            Observations, shape ``(num_envs, size)``, and a dict, which is empty without privileged observations.
 
         Raises:
             ArgumentError: The mask, the seed or an option is not valid, or an observation is NaN.
@@ -212,13 +225,17 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         check_seeds(seed, self.num_envs)
         super().reset(seed=seed if isinstance(seed, int) else None)
         seeds = self._episodes.seed(seed, mask, self.np_random)
+        if seeds is not None:
+            self._starts.seed(mask, seeds)
         with self._all_or_none():
             self._begin(mask, self.sim.reset(mask=mask, seed=seeds))
+            self.evaluation.terms.begin(mask)
             self._done[mask] = self._spoiled[mask] = self._spoiled_start[mask] = False
-            buffers = self._next_buffers()
+            buffers, infos = self._next_buffers(), {}
             self._observe(buffers.obs, begun=mask)
+            self._add_privileged(infos, mask)
         self._ready, self._failed = True, False
-        return buffers.obs, {}
+        return buffers.obs, infos
 
     def step(self, actions: ArrayLike) -> Step:
         """Advance all worlds by one control step: `send`, then `recv`. Arguments, results and errors are theirs."""
@@ -244,7 +261,9 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             world = int(np.argmax(self._done))
             problem = f"send: the episode of environment {world} has ended"
             raise CommandRefused(f'{problem}; call reset(options={{"reset_mask": …}}) for those that ended')
-        self.sim.send(**self._actions.take(actions, self._frame))
+        commands = self._actions.take(actions, self._frame)
+        self._disturbances.apply(self._episodes.seeds, self._episodes.numbers)
+        self.sim.send(**commands, **self._disturbances.commands)
         self._in_flight = True
 
     def recv(self) -> Step:
@@ -284,21 +303,26 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             self._rendering.pace(self.control_dt)
         buffers, infos = self._next_buffers(), {}
         begun = self._done if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._done.any() else None
-        if begun is None:
+        self._episodes.elapsed += 1 if begun is None else ~begun
+        if begun is None or self._memory.is_used:
             self._see(frame)
-        else:
+            self._memory.advance(self.evaluation)
+        if begun is not None:
             begun = begun.copy()
             self._episodes.next(begun)
             self._begin(begun, self.sim.reset(mask=begun))
-        self._episodes.elapsed += 1 if begun is None else ~begun
+        self.evaluation.advance()
         self._score(buffers, infos, begun)
         np.logical_or(buffers.terminated, buffers.truncated, out=self._done)
+        self.evaluation.terms.end(self._done, infos)
+        self._starts.end(self._done, self.evaluation)
         due = self._episodes.due()
         if due is not None and (due := due & ~self._done).any():
             self._episodes.renew(due, self.evaluation.worlds)
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._done.any():
             begun = self._end(buffers, infos)
         self._observe(buffers.obs, begun=begun)
+        self._add_privileged(infos, begun)
         return buffers.obs, buffers.reward, buffers.terminated, buffers.truncated, infos
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -324,6 +348,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         """Keep the last observations of episodes that ended, and start the next episodes, in the worlds returned."""
         ended = self._done.copy()
         self._observe(buffers.final_obs)
+        self._add_privileged(infos, None)
         buffers.final_obs[~ended] = 0.0
         # infos of running episodes belong to this step, those of ended episodes to their last step
         infos["final_info"] = {name: mine & ended if name[0] == "_" else mine for name, mine in infos.items()}
@@ -348,16 +373,29 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
     def _begin(self, mask: NDArray[np.bool_], frame: Any) -> None:
         """Start episodes of worlds that the daemon has reset."""
         self._actions.begin(mask)
+        self._starts.begin(mask)
         self._see(frame)
-        self._episodes.begin(mask, self.evaluation.worlds)
-        # the first goals make a new array, which the task's functions must see
+        own = self._episodes
+        written = self._starts.write(self.sim, mask, self.evaluation, own.seeds, own.numbers)
+        if written is not None:
+            frame = written
+            self._see(frame)
+        rows = np.flatnonzero(mask)
+        self._disturbances.begin(rows, own.seeds, own.numbers)
+        own.begin(mask, self.evaluation.worlds)
+        # the first goals and memories make new arrays, which the task's functions must see
         self._see(frame)
+        self._memory.begin(rows, self.evaluation)
+        if self._memory.is_used:
+            self._see(frame)
 
     def _see(self, frame: Any) -> None:
         """Show a frame to the task's functions."""
         self._frame = frame
         self.evaluation.see(
             frame,
+            self._memory.arrays,
+            level=self._starts.level,
             action=self._actions.now,
             previous_action=self._actions.before,
             goal=self._episodes.goal,
@@ -366,7 +404,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
 
     def _observe(self, out: NDArray[np.float32], begun: NDArray[np.bool_] | None = None) -> None:
         """Write observations; those of worlds in ``begun`` are the first ones of an episode."""
-        if self.evaluation.observe(out):
+        if self.evaluation.observe(out, begun):
             # observations of a faulted world may be NaN
             wrong = np.isnan(out)
             healthy = (self._frame.status & FAULTED) == 0
@@ -379,6 +417,12 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
                 self._spoiled_start |= spoiled & begun
         if self._spoiled.any():
             out[self._spoiled if begun is None else self._spoiled & ~begun] = 0.0
+
+    def _add_privileged(self, infos: dict[str, Any], begun: NDArray[np.bool_] | None) -> None:
+        """Write privileged observations into the infos."""
+        privileged = self.evaluation.privileged(begun)
+        if privileged is not None:
+            infos["privileged"], infos["_privileged"] = privileged, self._all.copy()
 
     def _score(self, buffers: StepBuffers, infos: dict[str, Any], begun: NDArray[np.bool_] | None) -> None:
         """Write rewards and ends of the step; worlds that have just begun an episode have neither."""
@@ -395,6 +439,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             buffers.reward[failed & ~np.isfinite(buffers.reward)] = 0.0
             buffers.reward[self._spoiled] = 0.0
             infos["fault"], infos["_fault"] = fault, failed
+        self.evaluation.terms.count(self._all if begun is None else ~begun)
         if begun is not None:
             buffers.reward[begun] = 0.0
             buffers.terminated[begun] = buffers.truncated[begun] = False

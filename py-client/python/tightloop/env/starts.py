@@ -1,0 +1,106 @@
+"""Where episodes start: curriculum levels, and states that a task sets after a reset."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tightloop import _core, checks
+from tightloop.env.evaluation import Evaluation
+from tightloop.env.task import Task
+from tightloop.errors import ArgumentError
+from tightloop.sim import Sim
+
+#: Streams of random numbers: of first levels, and of states at the start.
+_LEVELS, _STATES = 1, 2
+
+
+class Starts:
+    """Levels of the worlds, and their states at the start of an episode.
+
+    Attributes:
+        level: Curriculum level of each world, shape ``(worlds,)``, int32.
+    """
+
+    def __init__(self, task: Task, worlds: int) -> None:
+        self._task, self._name = task, type(task).__name__
+        self._first_levels = checks.integer(f"{self._name}: first_levels", task.first_levels, error=ArgumentError)
+        self._writes = type(task).initial_state is not Task.initial_state
+        self._moves = type(task).next_level is not Task.next_level
+        self.level = np.zeros(worlds, np.int32)
+        self._next = np.zeros(worlds, np.int32)
+        self._arrays: dict[str, NDArray[Any]] = {}
+
+    def seed(self, mask: NDArray[np.bool_], seeds: NDArray[np.uint64]) -> None:
+        """Draw the first levels of worlds that got a seed."""
+        rows = np.flatnonzero(mask)
+        draws = np.empty((len(rows), 1), np.float32)
+        _core.draw(seeds[rows], np.zeros(len(rows), np.uint32), _LEVELS, 1, draws)
+        self._next[rows] = (draws[:, 0] * self._first_levels).astype(np.int32)
+
+    def end(self, ended: NDArray[np.bool_], evaluation: Evaluation) -> None:
+        """Ask the task for the next levels of worlds whose episode ends.
+
+        Raises:
+            ArgumentError: The levels are no whole numbers of at least 0, one per world.
+        """
+        if not self._moves or not ended.any():
+            return
+        rows = np.flatnonzero(ended)
+        level = self._task.next_level(np, evaluation.worlds.rows(rows))
+        if level is None:
+            return
+        given = np.asarray(level)
+        if given.shape != rows.shape or given.dtype.kind not in "iu" or (given < 0).any():
+            raise ArgumentError(
+                f"{self._name}.next_level: got {given.dtype} of shape {given.shape}; return whole numbers of at least "
+                f"0, shape ({len(rows)},)"
+            )
+        self._next[rows] = given
+
+    def begin(self, mask: NDArray[np.bool_]) -> None:
+        """Set the levels of worlds that begin an episode."""
+        self.level[mask] = self._next[mask]
+
+    def write(
+        self,
+        sim: Sim,
+        mask: NDArray[np.bool_],
+        evaluation: Evaluation,
+        seeds: NDArray[np.uint64],
+        episodes: NDArray[np.uint32],
+    ) -> Any:
+        """Write the states that the task chooses; returns the frame there, or None if it chooses none.
+
+        Raises:
+            ArgumentError: The states are no dict of arrays with a row per world.
+            CommandRefused: A value is wrong.
+        """
+        if not self._writes:
+            return None
+        rows = np.flatnonzero(mask)
+        count = self._task.initial_draws
+        draws = np.empty((len(rows), count), np.float32)
+        _core.draw(seeds[rows], episodes[rows], _STATES, count, draws)
+        states = self._task.initial_state(np, evaluation.worlds.rows(rows), draws)
+        if not isinstance(states, Mapping):
+            raise ArgumentError(
+                f"{self._name}.initial_state: got {type(states).__name__}; return a dict of arrays by name"
+            )
+        if not states:
+            return None
+        for name, state in states.items():
+            own = np.asarray(state)
+            if own.ndim == 0 or len(own) != len(rows) or own.dtype.kind not in "fiub":
+                raise ArgumentError(
+                    f"{self._name}.initial_state: {name!r} is {own.dtype} of shape {own.shape}; return numbers of "
+                    f"{len(rows)} worlds"
+                )
+            whole = self._arrays.get(name)
+            if whole is None or whole.shape[1:] != own.shape[1:]:
+                whole = self._arrays[name] = np.zeros((len(mask), *own.shape[1:]), own.dtype)
+            whole[rows] = own
+        return sim.write(mask=mask, **{name: self._arrays[name] for name in states})
