@@ -15,6 +15,7 @@ EPISODE_STEPS = {
     "FrankaPushCube": 50,
     "FrankaPickCube": 50,
     "FrankaLift": 250,
+    "QuadrupedVelocityFlat": 1000,
 }
 
 

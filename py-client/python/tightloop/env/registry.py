@@ -24,6 +24,7 @@ TASKS = {
     "FrankaPushCube": "tightloop.tasks.push_cube:FrankaPushCube",
     "FrankaPickCube": "tightloop.tasks.pick_cube:FrankaPickCube",
     "FrankaLift": "tightloop.tasks.lift:FrankaLift",
+    "QuadrupedVelocityFlat": "tightloop.tasks.quadruped:QuadrupedVelocityFlat",
 }
 
 
