@@ -20,10 +20,10 @@ of a reward are in it if `Task.metrics` returns them; a name should end with its
 from __future__ import annotations
 
 import argparse
-import csv
 import math
 import os
 import time
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -33,22 +33,19 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import numpy as np
 from numpy.typing import NDArray
-from training import needed, report
+from training import draw, needed, report
 
 from evaluation import evaluate, metrics, told, with_unit
 from tightloop.env import AutoresetMode, VectorEnv
+from tightloop.env.mirror import MirrorColumns
 from tightloop.whole_files import whole_file
 
 # torch needs onnxscript only at the end, for the policy's file
 with needed("matplotlib", "onnxscript", "tensorboard", "torch", "tqdm"):
-    import matplotlib
     import torch
     from torch import Tensor, nn
     from torch.utils.tensorboard import SummaryWriter
     from tqdm import tqdm
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
 
 OUT = Path(__file__).resolve().parent.parent / "out" / "ppo"
 
@@ -71,10 +68,13 @@ class Config:
     kl: float = 0.01  # change of the policy that the learning rate aims at, a rollout; a tenth of it at the end
     std: float = 0.6  # standard deviation of actions at the start
     grad_max: float = 1.0  # norm of a gradient, at most
+    symmetry: bool = False  # whether to learn from the mirror image too, if the task has one
     evaluate: float = 15.0  # seconds between evaluations
+    total: int = 0  # env steps after which to stop, instead of minutes; the same run then has the same bits
+    evaluate_steps: int = 1_000_000  # env steps between them, if the run ends by steps
     enough: float = 2.0  # success at which to stop before the time is over; above 1 it never does
     threads: int = 2  # of the simulation
-    torch_threads: int = 1  # more would take cores from the simulation
+    torch_threads: int = 2  # of the learner; it waits while the worlds step
 
 
 PRESETS = {
@@ -89,6 +89,7 @@ PRESETS = {
     "FrankaPickCube": Config(
         60.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=60.0
     ),
+    "QuadrupedVelocityFlat": Config(5.0, 2048, 16, epochs=4, gamma=0.97, kl=0.02, std=0.7, evaluate=60.0),
     "FrankaLift": Config(minutes=30.0, num_envs=2048, gamma=0.98, hidden=256, entropy=0.005, evaluate=60.0),
 }
 
@@ -130,13 +131,13 @@ def mlp(inputs: int, hidden: int, outputs: int, last: float) -> nn.Sequential:
 
 
 class Agent(nn.Module):
-    """An actor, whose actions are normal about its output, and a critic."""
+    """An actor, whose actions are normal about its output, and a critic, which may see more than the actor."""
 
-    def __init__(self, inputs: int, actions: int, config: Config) -> None:
+    def __init__(self, inputs: int, actions: int, critic_inputs: int, config: Config) -> None:
         super().__init__()
-        self.normalizer = Normalizer(inputs)
+        self.normalizer, self.critic_normalizer = (Normalizer(inputs), Normalizer(critic_inputs))
         self.actor = mlp(inputs, config.hidden, actions, 0.01)
-        self.critic = mlp(inputs, config.hidden, 1, 1.0)
+        self.critic = mlp(critic_inputs, config.hidden, 1, 1.0)
         self.log_std = nn.Parameter(torch.full((actions,), math.log(config.std)))
 
     def forward(self, obs: Tensor) -> Tensor:
@@ -144,8 +145,8 @@ class Agent(nn.Module):
         return self.actor(self.normalizer(obs))
 
     def value(self, obs: Tensor) -> Tensor:
-        """What is still to come, ``(…,)``."""
-        return self.critic(self.normalizer(obs)).squeeze(-1)
+        """What is still to come, ``(…,)``, at observations of the critic."""
+        return self.critic(self.critic_normalizer(obs)).squeeze(-1)
 
     def log_prob(self, mean: Tensor, action: Tensor) -> Tensor:
         """Logarithm of the probability of actions about ``mean``, ``(…,)``."""
@@ -156,12 +157,16 @@ class Agent(nn.Module):
 class Rollout:
     """What all worlds did for some steps, ``(steps, worlds, …)``."""
 
-    def __init__(self, steps: int, worlds: int, inputs: int, actions: int, device: torch.device) -> None:
+    def __init__(
+        self, config: Config, inputs: int, actions: int, critic_inputs: int | None, device: torch.device
+    ) -> None:
         def room(*shape: int) -> Tensor:
-            return torch.zeros((steps, worlds, *shape), device=device)
+            return torch.zeros((config.steps, config.num_envs, *shape), device=device)
 
-        self.obs, self.mean, self.action = room(inputs), room(actions), room(actions)
-        self.reward, self.done, self.log_prob, self.value, self.advantage = (room() for _ in range(5))
+        self.obs, self.action = room(inputs), room(actions)
+        # the critic sees the same, or more
+        self.critic_obs = self.obs if critic_inputs is None else room(critic_inputs)
+        self.reward, self.done, self.value, self.advantage = (room() for _ in range(4))
 
     def look_back(self, last: Tensor, config: Config) -> None:
         """Advantages, from the last step to the first; ``last`` is the value of the observations after it."""
@@ -215,68 +220,95 @@ class Trainer:
         self.task, self.seed, self.config, self.folder = task, seed, config, folder
         options: dict[str, Any] = {"threads": config.threads} if daemon is None else {"daemon": daemon}
         self.envs = VectorEnv(task, config.num_envs, autoreset_mode=AutoresetMode.SAME_STEP, copy=False, **options)
-        (inputs,), (actions,) = self.envs.single_observation_space.shape, self.envs.single_action_space.shape
+        (inputs,), (actions,) = (self.envs.single_observation_space.shape, self.envs.single_action_space.shape)
+        space = self.envs.evaluation.privileged_space
+        critic_inputs = None if space is None else space.shape[0]
         self.device = torch.device(device)
-        self.agent = Agent(inputs, actions, config).to(self.device)
+        self.agent = Agent(inputs, actions, inputs if critic_inputs is None else critic_inputs, config).to(self.device)
         self.optimizer = torch.optim.Adam(self.agent.parameters(), lr=config.lr, eps=1e-5)
-        self.rollout = Rollout(config.steps, config.num_envs, inputs, actions, self.device)
+        self.rollout = Rollout(config, inputs, actions, critic_inputs, self.device)
+        self.mirror = self.envs.mirror if config.symmetry else None
+        self.random = torch.Generator(self.device).manual_seed(seed)
         self.statistics = Statistics(config.num_envs)
         self.seconds, self.steps = 0.0, 0
         self.curve: list[dict[str, float]] = []
 
-    def collect(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _seen(self, obs: NDArray[np.float32], infos: dict[str, Any]) -> tuple[Tensor, Tensor]:
+        """What actor and critic see."""
+        own = torch.from_numpy(obs).to(self.device)
+        return own, torch.from_numpy(infos["privileged"]).to(self.device) if "privileged" in infos else own
+
+    def begin(self) -> tuple[Tensor, Tensor]:
+        """Start episodes that no other seed has, and no part of the run before; their ends are spread."""
+        obs, infos = self.envs.reset(seed=(self.seed << 40) + (len(self.curve) << 24))
+        if self.envs.max_episode_steps is not None:
+            spread = np.random.default_rng(len(self.curve))
+            self.envs.elapsed = spread.integers(0, self.envs.max_episode_steps, self.config.num_envs)
+        return self._seen(obs, infos)
+
+    @torch.no_grad()
+    def collect(self, seen: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
         """Fill the rollout, from these observations on; returns those after it."""
-        agent, rollout = self.agent, self.rollout
+        agent, config, rollout = self.agent, self.config, self.rollout
         std = torch.exp(agent.log_std)
-        for step in range(self.config.steps):
-            rollout.obs[step].copy_(torch.from_numpy(obs))
+        for step in range(config.steps):
+            rollout.obs[step].copy_(seen[0])
+            rollout.critic_obs[step].copy_(seen[1])
             mean = agent(rollout.obs[step])
-            action = mean + std * torch.randn_like(mean)
-            rollout.mean[step], rollout.action[step] = mean, action
-            rollout.log_prob[step] = agent.log_prob(mean, action)
-            rollout.value[step] = agent.value(rollout.obs[step])
+            action = mean + std * torch.randn(mean.shape, generator=self.random, device=self.device)
+            rollout.action[step] = action
+            rollout.value[step] = agent.value(rollout.critic_obs[step])
             obs, reward, terminated, truncated, infos = self.envs.step(action.cpu().numpy())
+            seen = self._seen(obs, infos)
             rollout.reward[step].copy_(torch.from_numpy(reward))
             rollout.done[step].copy_(torch.from_numpy(terminated | truncated))
             self.statistics.see(reward, terminated | truncated, infos)
             cut = np.flatnonzero(truncated & ~terminated)
             if len(cut):
-                last = torch.from_numpy(infos["final_obs"][cut]).to(self.device)
-                rollout.reward[step, torch.from_numpy(cut)] += self.config.gamma * agent.value(last)
-        rollout.look_back(agent.value(torch.from_numpy(obs).to(self.device)), self.config)
-        self.steps += self.config.steps * self.config.num_envs
-        return obs
+                last = infos["final_info"].get("privileged", infos["final_obs"])[cut]
+                rollout.reward[step, torch.from_numpy(cut)] += config.gamma * agent.value(
+                    torch.from_numpy(last).to(self.device)
+                )
+        rollout.look_back(agent.value(seen[1]), config)
+        self.steps += config.steps * config.num_envs
+        return seen
 
     def learn(self) -> dict[str, float]:
         """Some epochs of minibatches over the rollout; returns what to log."""
         config, agent, r = self.config, self.agent, self.rollout
-        obs, action, mean_old = (x.flatten(0, 1) for x in (r.obs, r.action, r.mean))
-        log_old, advantage, value_old = (x.flatten() for x in (r.log_prob, r.advantage, r.value))
+        advantage, value_old = (x.flatten() for x in (r.advantage, r.value))
         target = advantage + value_old
         advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
-        std_old = torch.exp(agent.log_std.detach()).clone()
+        std_old = torch.exp(agent.log_std.detach())
+        views = []
+        for obs, critic_obs, action in self._views(r):
+            with torch.no_grad():
+                mean_old = agent(obs)
+                views.append((obs, critic_obs, action, mean_old, agent.log_prob(mean_old, action)))
         moved, losses = [], []
-        for _ in range(config.epochs):
-            for batch in torch.randperm(len(obs), device=self.device).chunk(config.minibatches):
-                mean, value = agent(obs[batch]), agent.value(obs[batch])
-                ratio = torch.exp(agent.log_prob(mean, action[batch]) - log_old[batch])
-                own = advantage[batch]
-                gain = torch.min(ratio * own, ratio.clamp(1.0 - config.clip, 1.0 + config.clip) * own).mean()
+        for epoch in range(config.epochs):
+            order = torch.randperm(len(target), generator=self.random, device=self.device)
+            for batch in order.chunk(config.minibatches):
+                obs, critic_obs, action, mean_old, log_old = (x[batch] for x in views[epoch % len(views)])
+                mean, value = agent(obs), agent.value(critic_obs)
+                ratio, own = torch.exp(agent.log_prob(mean, action) - log_old), advantage[batch]
+                better = torch.min(ratio * own, ratio.clamp(1.0 - config.clip, 1.0 + config.clip) * own)
                 clipped = value_old[batch] + (value - value_old[batch]).clamp(-config.clip, config.clip)
                 off = torch.max((value - target[batch]) ** 2, (clipped - target[batch]) ** 2).mean()
-                loss = -gain + off - config.entropy * agent.log_std.sum()
+                loss = off - better.mean() - config.entropy * agent.log_std.sum()
                 self.optimizer.zero_grad()
                 loss.backward()
                 nn.utils.clip_grad_norm_(agent.parameters(), config.grad_max)
                 with torch.no_grad():
                     std = torch.exp(agent.log_std)
-                    change = (std_old**2 + (mean - mean_old[batch]) ** 2) / (2.0 * std**2)
+                    change = (std_old**2 + (mean - mean_old) ** 2) / (2.0 * std**2)
                     kl = (torch.log(std / std_old) + change - 0.5).sum(-1).mean().item()
                 self._follow(kl)
                 self.optimizer.step()
                 moved.append(kl)
                 losses.append(off.item())
         agent.normalizer.see(r.obs)
+        agent.critic_normalizer.see(r.critic_obs)
         return {
             "learn/kl_nats": float(np.mean(moved)),
             "learn/value_loss": float(np.mean(losses)),
@@ -284,10 +316,30 @@ class Trainer:
             "learn/learning_rate": self.optimizer.param_groups[0]["lr"],
         }
 
+    def _views(self, r: Rollout) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
+        """Observations of actor and critic, and actions: as they were and, for every other epoch, in the mirror."""
+        obs, critic_obs, action = (x.flatten(0, 1) for x in (r.obs, r.critic_obs, r.action))
+        yield obs, critic_obs, action
+        if self.mirror is None:
+            return
+
+        def flip(rows: Tensor, columns: MirrorColumns) -> Tensor:
+            return rows[:, torch.from_numpy(columns.order)] * torch.from_numpy(columns.signs).to(rows.device)
+
+        own, acts, critic = self.mirror
+        yield flip(obs, own), flip(critic_obs, own if critic is None else critic), flip(action, acts)
+
+    @property
+    def progress(self) -> float:
+        """Share of the run that is over, from 0 to 1."""
+        if self.config.total:
+            return min(1.0, self.steps / self.config.total)
+        return min(1.0, self.seconds / (60.0 * self.config.minutes))
+
     def _follow(self, kl: float) -> None:
         """Let the learning rate follow how much the policy changes."""
         group = self.optimizer.param_groups[0]
-        aim = self.config.kl * (1.0 - 0.9 * min(1.0, self.seconds / (60.0 * self.config.minutes)))
+        aim = self.config.kl * (1.0 - 0.9 * self.progress**4)
         if kl > 2.0 * aim:
             group["lr"] = max(1e-5, group["lr"] / 1.2)
         elif 0.0 < kl < 0.5 * aim:
@@ -299,33 +351,37 @@ class Trainer:
         return self.agent(torch.from_numpy(obs).to(self.device)).cpu().numpy()
 
     def run(self, log: SummaryWriter) -> None:
-        """Train until the time is over; checkpoints and evaluations on the way."""
-        limit, begun, shown = 60.0 * self.config.minutes, time.perf_counter() - self.seconds, -math.inf
-        # episodes that no other seed has, and no run before this one
-        obs, _ = self.envs.reset(seed=(self.seed << 40) + (len(self.curve) << 24))
-        with tqdm(total=round(limit), initial=round(self.seconds), unit="s", desc=self.task, disable=None) as bar:
-            while self.seconds < limit and not (
-                self.curve and self.curve[-1].get("success", 0.0) >= self.config.enough
-            ):
+        """Train until the run is over; checkpoints and evaluations on the way."""
+        config, begun, shown = self.config, time.perf_counter() - self.seconds, -math.inf
+        seen = self.begin()
+        with tqdm(total=100, initial=round(100 * self.progress), unit="%", desc=self.task, disable=None) as bar:
+            while self.progress < 1.0 and not (self.curve and self.curve[-1].get("success", 0.0) >= config.enough):
                 rollout_begun = time.perf_counter()
-                with torch.no_grad():
-                    obs = self.collect(obs)
+                seen = self.collect(seen)
                 news = self.learn() | self.statistics.take()
                 now = time.perf_counter()
                 self.seconds = now - begun
-                news["time/steps_per_second"] = self.config.steps * self.config.num_envs / (now - rollout_begun)
+                news["time/steps_per_second"] = config.steps * config.num_envs / (now - rollout_begun)
                 news["time/training_s"] = self.seconds
-                bar.update(round(self.seconds) - bar.n)
-                if self.seconds - shown >= self.config.evaluate or self.seconds >= limit:
-                    shown = self.seconds
-                    found = evaluate(self.task, self.act, threads=self.config.threads)
+                bar.update(round(100 * self.progress) - bar.n)
+                if self._is_due(shown):
+                    shown = self.steps if config.total else self.seconds
+                    found = evaluate(self.task, self.act, threads=config.threads)
                     self.curve.append({**found, "seconds": self.seconds, "steps": self.steps})
                     self.save()
                     bar.set_postfix(told(found) | {"steps": f"{self.steps:,}"})
-                    report(self.task, f"{self.seconds:.0f} of {limit:.0f} s, {self.steps:,} steps", found)
+                    report(self.task, f"{self.seconds:.0f} of {60 * config.minutes:.0f} s, {self.steps:,} steps", found)
                     news |= {f"evaluation/{with_unit(name)}": value for name, value in found.items()}
+                    # a run that goes on from the checkpoint begins the same episodes
+                    seen = self.begin()
                 for name, value in news.items():
                     log.add_scalar(name, value, self.steps)
+
+    def _is_due(self, shown: float) -> bool:
+        """Whether to evaluate, some time after the last one: seconds, or steps if the run ends by these."""
+        if self.config.total:
+            return self.steps - shown >= self.config.evaluate_steps or self.progress >= 1.0
+        return self.seconds - shown >= self.config.evaluate or self.progress >= 1.0
 
     def save(self) -> None:
         """Write the checkpoint."""
@@ -334,7 +390,7 @@ class Trainer:
             "config": asdict(self.config),
             "agent": self.agent.state_dict(),
             "optimizer": self.optimizer.state_dict(),
-            "random": torch.get_rng_state(),
+            "random": self.random.get_state(),
             "seconds": self.seconds,
             "steps": self.steps,
             "curve": self.curve,
@@ -349,13 +405,13 @@ class Trainer:
             raise SystemExit(f"{self.folder / 'checkpoint.pt'} is of {state['task']}, not of {self.task}")
         self.agent.load_state_dict(state["agent"])
         self.optimizer.load_state_dict(state["optimizer"])
-        torch.set_rng_state(state["random"])
-        self.seconds, self.steps, self.curve = state["seconds"], state["steps"], state["curve"]
+        self.random.set_state(state["random"])
+        self.seconds, self.steps, self.curve = (state["seconds"], state["steps"], state["curve"])
 
     def export(self) -> Path:
         """Write the policy as ONNX: ``obs`` (worlds, size) in, ``action`` (worlds, actions) out."""
         path = self.folder / "policy.onnx"
-        agent, obs = self.agent.cpu().eval(), torch.zeros(2, *self.envs.single_observation_space.shape)
+        agent, obs = (self.agent.cpu().eval(), torch.zeros(2, *self.envs.single_observation_space.shape))
         shapes = {"obs": {0: torch.export.Dim("worlds")}}
         with whole_file(path) as part:
             torch.onnx.export(
@@ -375,25 +431,6 @@ class Trainer:
         self.envs.close()
 
 
-def draw(curve: list[dict[str, float]], title: str, path: Path) -> None:
-    """The curve as CSV and PNG: return, success and metrics over minutes."""
-    names = [name for name in curve[-1] if name not in ("seconds", "steps")]
-    with whole_file(path.with_suffix(".csv")) as part, part.open("w", newline="") as file:
-        table = csv.DictWriter(file, ["seconds", "steps", *names], lineterminator="\n")
-        table.writeheader()
-        table.writerows({name: f"{value:.6g}" for name, value in row.items()} for row in curve)
-    figure, axes = plt.subplots(1, len(names), figsize=(4 * len(names), 3), constrained_layout=True, squeeze=False)
-    minutes = [row["seconds"] / 60 for row in curve]
-    for axis, name in zip(axes[0], names, strict=True):
-        axis.plot(minutes, [row.get(name, math.nan) for row in curve], marker=".")
-        axis.set(title=name, xlabel="time [min]")
-        axis.grid(alpha=0.3)
-    figure.suptitle(title)
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=90)
-    plt.close(figure)
-
-
 def main() -> None:
     """Train, evaluate, and leave the curve and the policy."""
     parser = argparse.ArgumentParser(
@@ -406,7 +443,9 @@ def main() -> None:
     parser.add_argument("--device", default="cpu", help="where torch computes")
     parser.add_argument("--out", type=Path, default=OUT, help="folder of all runs")
     for option in fields(Config):
-        parser.add_argument(f"--{option.name.replace('_', '-')}", type=type(option.default), help="changes the preset")
+        kind = type(option.default)
+        how = {"action": argparse.BooleanOptionalAction} if kind is bool else {"type": kind}
+        parser.add_argument(f"--{option.name.replace('_', '-')}", help="changes the preset", **how)
     args = parser.parse_args()
     own = {option.name: getattr(args, option.name) for option in fields(Config)}
     config = replace(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import csv
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -12,6 +14,7 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 
 from evaluation import told
+from tightloop.whole_files import whole_file
 
 # Libraries whose name for pip is not that of their module
 PIP_NAMES = {"rsl_rl": "rsl-rl-lib", "stable_baselines3": "stable-baselines3"}
@@ -46,6 +49,30 @@ def report(task: str, progress: str, found: Mapping[str, float]) -> None:
         return
     # whoever follows a file or a pipe sees each line at once
     print(f"{task}, {progress}: {', '.join(f'{name} {value}' for name, value in told(found).items())}", flush=True)
+
+
+def draw(curve: list[dict[str, float]], title: str, path: Path) -> None:
+    """The curve as CSV and PNG: return, success and metrics over minutes."""
+    names = [name for name in curve[-1] if name not in ("seconds", "steps")]
+    with whole_file(path.with_suffix(".csv")) as part, part.open("w", newline="") as file:
+        table = csv.DictWriter(file, ["seconds", "steps", *names], lineterminator="\n")
+        table.writeheader()
+        table.writerows({name: f"{value:.6g}" for name, value in row.items()} for row in curve)
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(1, len(names), figsize=(4 * len(names), 3), constrained_layout=True, squeeze=False)
+    minutes = [row["seconds"] / 60 for row in curve]
+    for axis, name in zip(axes[0], names, strict=True):
+        axis.plot(minutes, [row.get(name, math.nan) for row in curve], marker=".")
+        axis.set(title=name, xlabel="time [min]")
+        axis.grid(alpha=0.3)
+    figure.suptitle(title)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=90)
+    plt.close(figure)
 
 
 class Sized(Protocol):
