@@ -20,10 +20,12 @@ of a reward are in it if `Task.metrics` returns them; a name should end with its
 from __future__ import annotations
 
 import argparse
+import copy
 import math
 import os
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -73,8 +75,8 @@ class Config:
     total: int = 0  # env steps after which to stop, instead of minutes; the same run then has the same bits
     evaluate_steps: int = 1_000_000  # env steps between them, if the run ends by steps
     enough: float = 2.0  # success at which to stop before the time is over; above 1 it never does
-    threads: int = 2  # of the simulation
-    torch_threads: int = 2  # of the learner; it waits while the worlds step
+    threads: int = 1  # of the simulation
+    torch_threads: int = 1  # of the learner, and of the policy beside the simulation
 
 
 PRESETS = {
@@ -166,7 +168,7 @@ class Rollout:
         self.obs, self.action = room(inputs), room(actions)
         # the critic sees the same, or more
         self.critic_obs = self.obs if critic_inputs is None else room(critic_inputs)
-        self.reward, self.done, self.value, self.advantage = (room() for _ in range(4))
+        self.reward, self.done, self.log_prob, self.value, self.advantage = (room() for _ in range(5))
 
     def look_back(self, last: Tensor, config: Config) -> None:
         """Advantages, from the last step to the first; ``last`` is the value of the observations after it."""
@@ -212,7 +214,11 @@ class Statistics:
 
 
 class Trainer:
-    """A run: environment, agent, optimiser, and how far it is."""
+    """A run: environment, agent, optimiser, and how far it is.
+
+    One thread steps the worlds while another learns from the rollout before. So the actions come from a copy of the
+    agent that is one rollout old.
+    """
 
     def __init__(self, task: str, seed: int, config: Config, folder: Path, *, daemon: str | None, device: str) -> None:
         torch.set_num_threads(config.torch_threads)
@@ -226,9 +232,11 @@ class Trainer:
         self.device = torch.device(device)
         self.agent = Agent(inputs, actions, inputs if critic_inputs is None else critic_inputs, config).to(self.device)
         self.optimizer = torch.optim.Adam(self.agent.parameters(), lr=config.lr, eps=1e-5)
-        self.rollout = Rollout(config, inputs, actions, critic_inputs, self.device)
+        self.acting = copy.deepcopy(self.agent)
+        self.rollouts = [Rollout(config, inputs, actions, critic_inputs, self.device) for _ in range(2)]
         self.mirror = self.envs.mirror if config.symmetry else None
-        self.random = torch.Generator(self.device).manual_seed(seed)
+        # one each: the threads that collect and learn run at once
+        self.noise, self.shuffle = (torch.Generator(self.device).manual_seed(2 * seed + k) for k in range(2))
         self.statistics = Statistics(config.num_envs)
         self.seconds, self.steps = 0.0, 0
         self.curve: list[dict[str, float]] = []
@@ -247,16 +255,17 @@ class Trainer:
         return self._seen(obs, infos)
 
     @torch.no_grad()
-    def collect(self, seen: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
-        """Fill the rollout, from these observations on; returns those after it."""
-        agent, config, rollout = self.agent, self.config, self.rollout
+    def collect(self, seen: tuple[Tensor, Tensor], rollout: Rollout) -> tuple[Tensor, Tensor]:
+        """Fill a rollout, from these observations on; returns those after it."""
+        agent, config = self.acting, self.config
         std = torch.exp(agent.log_std)
         for step in range(config.steps):
             rollout.obs[step].copy_(seen[0])
             rollout.critic_obs[step].copy_(seen[1])
             mean = agent(rollout.obs[step])
-            action = mean + std * torch.randn(mean.shape, generator=self.random, device=self.device)
+            action = mean + std * torch.randn(mean.shape, generator=self.noise, device=self.device)
             rollout.action[step] = action
+            rollout.log_prob[step] = agent.log_prob(mean, action)
             rollout.value[step] = agent.value(rollout.critic_obs[step])
             obs, reward, terminated, truncated, infos = self.envs.step(action.cpu().numpy())
             seen = self._seen(obs, infos)
@@ -273,10 +282,14 @@ class Trainer:
         self.steps += config.steps * config.num_envs
         return seen
 
-    def learn(self) -> dict[str, float]:
-        """Some epochs of minibatches over the rollout; returns what to log."""
-        config, agent, r = self.config, self.agent, self.rollout
-        advantage, value_old = (x.flatten() for x in (r.advantage, r.value))
+    def learn(self, r: Rollout, progress: float) -> dict[str, float]:
+        """Some epochs of minibatches over a rollout; returns what to log. ``progress`` is that of the run.
+
+        The policy that acted is older than the one that learns. Changes are clipped relative to the latter, and its
+        probability relative to the former is a weight (Hilton et al. 2021, arXiv 2110.00641).
+        """
+        config, agent = self.config, self.agent
+        acted, advantage, value_old = (x.flatten() for x in (r.log_prob, r.advantage, r.value))
         target = advantage + value_old
         advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
         std_old = torch.exp(agent.log_std.detach())
@@ -285,9 +298,10 @@ class Trainer:
             with torch.no_grad():
                 mean_old = agent(obs)
                 views.append((obs, critic_obs, action, mean_old, agent.log_prob(mean_old, action)))
+        weight = torch.exp(views[0][-1] - acted).clamp(max=2.0)
         moved, losses = [], []
         for epoch in range(config.epochs):
-            order = torch.randperm(len(target), generator=self.random, device=self.device)
+            order = torch.randperm(len(target), generator=self.shuffle, device=self.device)
             for batch in order.chunk(config.minibatches):
                 obs, critic_obs, action, mean_old, log_old = (x[batch] for x in views[epoch % len(views)])
                 mean, value = agent(obs), agent.value(critic_obs)
@@ -295,7 +309,7 @@ class Trainer:
                 better = torch.min(ratio * own, ratio.clamp(1.0 - config.clip, 1.0 + config.clip) * own)
                 clipped = value_old[batch] + (value - value_old[batch]).clamp(-config.clip, config.clip)
                 off = torch.max((value - target[batch]) ** 2, (clipped - target[batch]) ** 2).mean()
-                loss = off - better.mean() - config.entropy * agent.log_std.sum()
+                loss = off - (weight[batch] * better).mean() - config.entropy * agent.log_std.sum()
                 self.optimizer.zero_grad()
                 loss.backward()
                 nn.utils.clip_grad_norm_(agent.parameters(), config.grad_max)
@@ -303,7 +317,7 @@ class Trainer:
                     std = torch.exp(agent.log_std)
                     change = (std_old**2 + (mean - mean_old) ** 2) / (2.0 * std**2)
                     kl = (torch.log(std / std_old) + change - 0.5).sum(-1).mean().item()
-                self._follow(kl)
+                self._follow(kl, progress)
                 self.optimizer.step()
                 moved.append(kl)
                 losses.append(off.item())
@@ -336,10 +350,10 @@ class Trainer:
             return min(1.0, self.steps / self.config.total)
         return min(1.0, self.seconds / (60.0 * self.config.minutes))
 
-    def _follow(self, kl: float) -> None:
+    def _follow(self, kl: float, progress: float) -> None:
         """Let the learning rate follow how much the policy changes."""
         group = self.optimizer.param_groups[0]
-        aim = self.config.kl * (1.0 - 0.9 * self.progress**4)
+        aim = self.config.kl * (1.0 - 0.9 * progress**4)
         if kl > 2.0 * aim:
             group["lr"] = max(1e-5, group["lr"] / 1.2)
         elif 0.0 < kl < 0.5 * aim:
@@ -348,24 +362,29 @@ class Trainer:
     @torch.no_grad()
     def act(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
         """The most likely actions."""
-        return self.agent(torch.from_numpy(obs).to(self.device)).cpu().numpy()
+        return self.acting(torch.from_numpy(obs).to(self.device)).cpu().numpy()
 
     def run(self, log: SummaryWriter) -> None:
         """Train until the run is over; checkpoints and evaluations on the way."""
         config, begun, shown = self.config, time.perf_counter() - self.seconds, -math.inf
-        seen = self.begin()
-        with tqdm(total=100, initial=round(100 * self.progress), unit="%", desc=self.task, disable=None) as bar:
+        seen, learning, count = self.begin(), None, 0
+        bar = tqdm(total=100, initial=round(100 * self.progress), unit="%", desc=self.task, disable=None)
+        with bar, ThreadPoolExecutor(1, "learner") as learner:
             while self.progress < 1.0 and not (self.curve and self.curve[-1].get("success", 0.0) >= config.enough):
-                rollout_begun = time.perf_counter()
-                seen = self.collect(seen)
-                news = self.learn() | self.statistics.take()
+                rollout_begun, rollout = time.perf_counter(), self.rollouts[count % 2]
+                seen = self.collect(seen, rollout)
+                news = self.statistics.take() | ({} if learning is None else learning.result())
+                self.acting.load_state_dict(self.agent.state_dict())
+                learning, count = learner.submit(self.learn, rollout, self.progress), count + 1
                 now = time.perf_counter()
                 self.seconds = now - begun
                 news["time/steps_per_second"] = config.steps * config.num_envs / (now - rollout_begun)
                 news["time/training_s"] = self.seconds
                 bar.update(round(100 * self.progress) - bar.n)
                 if self._is_due(shown):
-                    shown = self.steps if config.total else self.seconds
+                    news |= learning.result()
+                    self.acting.load_state_dict(self.agent.state_dict())
+                    shown, learning = self.steps if config.total else self.seconds, None
                     found = evaluate(self.task, self.act, threads=config.threads)
                     self.curve.append({**found, "seconds": self.seconds, "steps": self.steps})
                     self.save()
@@ -390,7 +409,7 @@ class Trainer:
             "config": asdict(self.config),
             "agent": self.agent.state_dict(),
             "optimizer": self.optimizer.state_dict(),
-            "random": self.random.get_state(),
+            "random": [self.noise.get_state(), self.shuffle.get_state()],
             "seconds": self.seconds,
             "steps": self.steps,
             "curve": self.curve,
@@ -405,7 +424,9 @@ class Trainer:
             raise SystemExit(f"{self.folder / 'checkpoint.pt'} is of {state['task']}, not of {self.task}")
         self.agent.load_state_dict(state["agent"])
         self.optimizer.load_state_dict(state["optimizer"])
-        self.random.set_state(state["random"])
+        self.acting.load_state_dict(state["agent"])
+        for generator, random in zip((self.noise, self.shuffle), state["random"], strict=True):
+            generator.set_state(random)
         self.seconds, self.steps, self.curve = (state["seconds"], state["steps"], state["curve"])
 
     def export(self) -> Path:
