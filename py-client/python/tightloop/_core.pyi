@@ -120,6 +120,10 @@ class Frame:
     cvel: NDArray[Any]
     """Velocity of each body of MuJoCo models in world axes, ``(worlds, nbody, 6)``: angular [rad/s], then that of the
     point of the body at the centre of mass of its tree [m/s], as MuJoCo's ``cvel``."""
+    cinert: NDArray[Any]
+    """Inertia of each body of MuJoCo models in world axes, about the point that ``cvel`` is about,
+    ``(worlds, nbody, 10)``: xx, yy, zz, xy, xz, yz [kg·m²], then mass times the place of its centre [kg·m], then mass
+    [kg], as MuJoCo's ``cinert``; 0 for the world."""
     subtree_linvel: NDArray[Any]
     """Velocity of the centre of mass of each body of MuJoCo models with all bodies below it, in world axes [m/s],
     ``(worlds, nbody, 3)``."""

@@ -14,7 +14,7 @@ from random_mjcf import CONSTRAINED, random_mjcf
 import tightloop as tl
 
 TREES = int(os.environ.get("TIGHTLOOP_LIVE_TREES", "48")) // 4
-PLACES = tuple("xpos xquat xmat xipos ximat site_xpos site_xmat geom_xpos geom_xmat subtree_com cvel".split())
+PLACES = tuple("xpos xquat xmat xipos ximat site_xpos site_xmat geom_xpos geom_xmat subtree_com cvel cinert".split())
 FORCES = ("qfrc_actuator", "qfrc_constraint", "qfrc_bias", "qfrc_passive")
 FIELDS = (*PLACES, *FORCES)
 TOUCHING = replace(CONSTRAINED, geoms=True, equalities=False, connections=False, option='cone="elliptic"')

@@ -35,6 +35,8 @@ pub type MujocoQuat<F> = [F; 4];
 pub type MujocoMat<F> = [F; 9];
 /// A displacement: linear part, then angular part.
 pub type Row6<F> = [F; 6];
+/// An inertia as MuJoCo has it: xx, yy, zz, xy, xz, yz, first moment, mass.
+pub type MujocoInertia<F> = [F; 10];
 /// Position, then quaternion (x, y, z, w).
 pub type Pose<F> = [F; 7];
 

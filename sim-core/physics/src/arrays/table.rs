@@ -215,6 +215,8 @@ arrays! { m;
             => "subtree_com" [MujocoBodies, Size(3)], "Centre of mass of each body of MuJoCo models with all bodies below it, in the world.";
         cvel: Cvel [Row6; m.mujoco.frames.bodies.len()] Stage "rad/s, m/s"
             => "cvel" [MujocoBodies, Size(6)], "Velocity of each body of MuJoCo models in world axes: angular, then that of the point of the body at the centre of mass of its tree, as MuJoCo's `cvel`.";
+        cinert: Cinert [MujocoInertia; m.mujoco.frames.bodies.len()] Stage "kg·m², kg·m, kg"
+            => "cinert" [MujocoBodies, Size(10)], "Inertia of each body of MuJoCo models in world axes, about the point that `cvel` is about: xx, yy, zz, xy, xz, yz, then mass times the place of its centre, then mass, as MuJoCo's `cinert`; 0 for the world.";
         subtree_linvel: SubtreeLinvel [Vec3; m.mujoco.frames.bodies.len()] Stage "m/s"
             => "subtree_linvel" [MujocoBodies, Size(3)], "Velocity of the centre of mass of each body of MuJoCo models with all bodies below it, in world axes.";
         subtree_angmom: SubtreeAngmom [Vec3; m.mujoco.frames.bodies.len()] Stage "kg·m²/s"

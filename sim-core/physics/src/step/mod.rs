@@ -21,6 +21,7 @@ mod link_forces;
 pub mod mass_matrix;
 pub mod mujoco_forces;
 pub mod mujoco_frames;
+pub mod mujoco_inertias;
 pub mod mujoco_momenta;
 pub mod mujoco_state;
 pub mod mujoco_subtrees;
@@ -105,6 +106,7 @@ macro_rules! every_stage {
             mujoco_sites       [mujoco_frames::Sites]        Evaluation;
             mujoco_geoms       [mujoco_frames::Geoms]        Evaluation;
             mujoco_subtrees    [mujoco_subtrees::Subtrees]   Evaluation;
+            mujoco_inertias    [mujoco_inertias::Inertias]   Evaluation;
             mujoco_momenta     [mujoco_momenta::Momenta]     Evaluation;
             mujoco_forces      [mujoco_forces::Forces]       Evaluation;
             sensor_states      [sensors::States]             Evaluation;
