@@ -171,6 +171,11 @@ pub(crate) struct Serve {
     #[arg(long, default_value = "world")]
     pub(crate) draws: String,
 
+    /// Which state evaluated outputs belong to: frame for the state in the frame, last_substep for the last evaluation of forces, as
+    /// after MuJoCo's mj_step.
+    #[arg(long, default_value = "frame")]
+    pub(crate) outputs_at: String,
+
     /// Most frames that a client can hold at once.
     #[arg(long, default_value_t = 4)]
     pub(crate) frames_held: usize,

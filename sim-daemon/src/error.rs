@@ -165,7 +165,9 @@ impl DaemonError {
                 | BackendError::Lanes { .. }
                 | BackendError::Adapter { .. }
                 | BackendError::CompileLimit { .. }
-                | BackendError::DoubleOnGpu,
+                | BackendError::DoubleOnGpu
+                | BackendError::LastSubstepOnGpu
+                | BackendError::LastSubstepSensors,
             ) => "ArgumentError",
             Backend(BackendError::Memory { .. } | BackendError::DeviceMemory { .. })
             | Protocol(

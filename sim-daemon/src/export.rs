@@ -190,6 +190,7 @@ pub(crate) fn description(
             "refuse".to_owned()
         },
         draws: options.draws.name().to_owned(),
+        outputs_at: options.outputs_at.name().to_owned(),
         state_bytes: 0,
         schema: 0,
     }

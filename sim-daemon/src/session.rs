@@ -7,7 +7,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
 use sim_engine::options::{self, Adapter};
-use sim_engine::simulation::{Device, Draws, Faults, Lanes, Options, Precision, Simulation};
+use sim_engine::simulation::{
+    Device, Draws, Faults, Lanes, Options, OutputsAt, Precision, Simulation,
+};
 use sim_physics::arrays::Field;
 use sim_protocol::daemon_lock::DaemonLock;
 use sim_protocol::descriptors::make_room_for;
@@ -382,6 +384,10 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
         let problem = "unknown; use world or seed".to_owned();
         return wrong("draws", &serve.draws, problem);
     };
+    let Some(outputs_at) = OutputsAt::named(&serve.outputs_at) else {
+        let problem = "unknown; use frame or last_substep".to_owned();
+        return wrong("outputs-at", &serve.outputs_at, problem);
+    };
     for (argument, value) in [
         ("joint-q-max", serve.joint_q_max),
         ("joint-qd-max", serve.joint_qd_max),
@@ -407,6 +413,7 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
             freezes_nan: serve.on_nan == "freeze",
         },
         draws,
+        outputs_at,
         ..Options::default()
     })
 }

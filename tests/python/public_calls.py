@@ -157,6 +157,7 @@ CALLS: dict[str, Call] = {
             "on_fault": "choice",
             "on_nan": "choice",
             "draws": "choice",
+            "outputs_at": "choice",
             "name": "label",
             "log": "new file",
             "frames_held": "count",

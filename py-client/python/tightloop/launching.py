@@ -32,6 +32,7 @@ def launch(
     on_fault: str = "freeze",
     on_nan: str = "refuse",
     draws: str = "world",
+    outputs_at: str = "frame",
     name: str | None = None,
     log: str | os.PathLike[str] | None = None,
     frames_held: int = 4,
@@ -54,6 +55,7 @@ def launch(
     on_fault: str = "freeze",
     on_nan: str = "refuse",
     draws: str = "world",
+    outputs_at: str = "frame",
     name: str | None = None,
     log: str | os.PathLike[str] | None = None,
     frames_held: int = 4,
@@ -76,6 +78,7 @@ def launch(
     on_fault: str = "freeze",
     on_nan: str = "refuse",
     draws: str = "world",
+    outputs_at: str = "frame",
     name: str | None = None,
     log: str | os.PathLike[str] | None = None,
     frames_held: int = 4,
@@ -110,6 +113,11 @@ def launch(
             ``"world"`` is its index and its seed, ``"seed"`` its seed alone, so that an environment draws the same
             values at any index. Worlds with the same seed then have the same draws, and all worlds start with seed 0:
             give ``reset(seed=...)`` a sequence with one seed per world.
+        outputs_at: Which state the evaluated fields of a step belong to. ``"frame"`` is the state in the frame.
+            ``"last_substep"`` is where forces were evaluated last, as MuJoCo's ``mj_step`` leaves its data: the state
+            before the last substep, or the last of the four points of a Runge-Kutta substep. Positions, velocities,
+            activations, commands and counters are those of the frame. Frames of other calls than steps evaluate all
+            fields at their state. It saves an evaluation per step, and needs the CPU. ``sensordata`` does not have it.
         name: Name of the daemon for `attach`; a unique one if left out. With several groups, each has the name and its
             index, such as ``"franka.0"``. With one group, `attach` returns its `Sim`.
         log: File for the daemon's log, such as the number of faulted worlds, with at most one line per second. If left
@@ -155,6 +163,7 @@ def launch(
     arguments["on-fault"] = checks.text("launch: on_fault", on_fault, error=ArgumentError)
     arguments["on-nan"] = checks.text("launch: on_nan", on_nan, error=ArgumentError)
     arguments["draws"] = checks.text("launch: draws", draws, error=ArgumentError)
+    arguments["outputs-at"] = checks.text("launch: outputs_at", outputs_at, error=ArgumentError)
     arguments |= _bounds(bounds)
     if threads is not None:
         arguments["threads"] = checks.integer("launch: threads", threads, error=ArgumentError)

@@ -1,7 +1,7 @@
 //! Options of a run, and the choice of its device.
 
 use crate::backend::{
-    BackendError, Backends, Faults, Groups, Lanes, Precision, available_memory, cpu, gpu,
+    BackendError, Backends, Faults, Groups, Lanes, OutputsAt, Precision, available_memory, cpu, gpu,
 };
 use crate::random::{Draws, Numbering};
 use sim_model::Model;
@@ -62,6 +62,8 @@ pub struct Options {
     pub lanes: Lanes,
     /// Fields of a frame; counters come with every frame.
     pub fields: Vec<Field>,
+    /// Which state the evaluated outputs of a step belong to.
+    pub outputs_at: OutputsAt,
     /// Bounds of faults, and what happens to a faulted world.
     pub faults: Faults,
     /// What the draws of a world depend on.
@@ -81,6 +83,7 @@ impl Default for Options {
             threads: None,
             lanes: Lanes::Auto,
             fields: vec![Field::JointQ, Field::JointQd, Field::BodyQ],
+            outputs_at: OutputsAt::Frame,
             faults: Faults::default(),
             draws: Draws::default(),
             first_world: 0,
@@ -142,10 +145,15 @@ pub(crate) fn backends(
         };
         gpu::create(model, groups, layout, &wanted)
     };
+    let lags = options.outputs_at == OutputsAt::LastSubstep;
     let note = match &options.device {
+        Device::Gpu { .. } if lags => return Err(BackendError::LastSubstepOnGpu),
         Device::Gpu { .. } if precision == Precision::F64 => return Err(BackendError::DoubleOnGpu),
         Device::Gpu { adapter, cache } => return Ok((on_gpu(adapter, cache)?, None)),
         Device::Cpu => None,
+        Device::Auto { .. } if lags => {
+            Some("the processor: a GPU has no outputs of the last substep".to_owned())
+        }
         Device::Auto { .. } if precision == Precision::F64 => {
             Some("the processor: a GPU computes in single precision".to_owned())
         }
@@ -165,7 +173,14 @@ pub(crate) fn backends(
         }
     };
     let threads = threads_of(options);
-    let made = cpu::create(model, groups, precision, options.lanes, layout, threads)?;
+    let made = cpu::create(
+        model,
+        groups,
+        precision,
+        options.lanes,
+        (layout, options.outputs_at),
+        threads,
+    )?;
     Ok((made, note))
 }
 

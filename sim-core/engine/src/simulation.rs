@@ -1,7 +1,8 @@
 //! Many worlds of one model: reset, write, step, read.
 
 pub use crate::backend::{
-    Faults, FirstFrozen, Frozen, Histogram, Lanes, Precision, Profile, ProgramInfo, StageProfile,
+    Faults, FirstFrozen, Frozen, Histogram, Lanes, OutputsAt, Precision, Profile, ProgramInfo,
+    StageProfile,
 };
 pub use crate::options::{AUTO_WORLDS, Device, Options};
 pub use crate::random::Draws;
@@ -61,8 +62,12 @@ impl Simulation {
                 return Err(BackendError::Bound { bound, value });
             }
         }
+        let senses = options.fields.contains(&Field::Sensordata);
+        if senses && options.outputs_at == OutputsAt::LastSubstep {
+            return Err(BackendError::LastSubstepSensors);
+        }
         let refused = model.refused_sensors();
-        if options.fields.contains(&Field::Sensordata) && !refused.is_empty() {
+        if senses && !refused.is_empty() {
             return Err(BackendError::Sensors {
                 reasons: refused.join("; "),
             });

@@ -126,6 +126,9 @@ pub struct Description {
     pub on_nan: String,
     /// What the draws of a world depend on: its number and its seed ("world"), or its "seed" alone.
     pub draws: String,
+    /// Which state evaluated outputs belong to: that in the "frame", or that of the "last_substep". Older recordings have the first.
+    #[serde(default = "in_frame")]
+    pub outputs_at: String,
     /// Size of the state of all worlds, as recorders get it [bytes].
     pub state_bytes: u64,
     /// Hash over the fields, inputs, worlds and dofs; see [`Description::schema_hash`].
@@ -255,6 +258,11 @@ impl Description {
     pub fn busy_threads(&self) -> usize {
         self.threads.min(self.worlds * self.groups).max(1)
     }
+}
+
+/// Where the outputs are in a description that was recorded before there was a choice.
+fn in_frame() -> String {
+    "frame".to_owned()
 }
 
 /// What a description has of groups that was recorded before there were any.

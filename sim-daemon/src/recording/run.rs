@@ -4,7 +4,9 @@ use std::path::Path;
 
 use serde::Deserialize;
 use sim_engine::options::compile_limit;
-use sim_engine::simulation::{Device, Draws, Faults, Lanes, Options, Precision, Simulation};
+use sim_engine::simulation::{
+    Device, Draws, Faults, Lanes, Options, OutputsAt, Precision, Simulation,
+};
 use sim_model::Model;
 use sim_physics::arrays::Field;
 use sim_protocol::host::{Inbox, free_memory};
@@ -141,6 +143,9 @@ impl Run {
             },
             draws: Draws::named(&daemon.draws)
                 .ok_or_else(|| failed(format!("draws by `{}`, unknown here", daemon.draws)))?,
+            outputs_at: OutputsAt::named(&daemon.outputs_at).ok_or_else(|| {
+                failed(format!("outputs at `{}`, unknown here", daemon.outputs_at))
+            })?,
             ..Options::default()
         };
         // a head may claim any number of worlds; the state of all of them is in the file

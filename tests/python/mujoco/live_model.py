@@ -77,6 +77,8 @@ def live(
     device: str = "cpu",
     fields: tuple[str, ...] = (),
     params: tuple[str, ...] = (),
+    substeps: int = 1,
+    outputs_at: str = "frame",
 ) -> Iterator[Live]:
     """Run a model, or that of an XML text; both sides solve to the end."""
     model = mujoco.MjModel.from_xml_string(model) if isinstance(model, str) else model
@@ -85,7 +87,9 @@ def live(
     model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
     scene = tl.Scene.from_mujoco(model, name="m")
     fields = ("qpos", "qvel", "qacc", "joint_q", "joint_qd", *(("act",) if model.na else ()), *fields)
-    with tl.launch(scene, worlds=worlds, precision=precision, fields=fields, device=device, params=params) as sim:
+    scene.substeps = substeps
+    options = {"device": device, "params": params, "outputs_at": outputs_at}
+    with tl.launch(scene, worlds=worlds, precision=precision, fields=fields, **options) as sim:
         yield Live(model, sim)
 
 

@@ -256,6 +256,16 @@ pub enum BackendError {
     /// Double precision on a GPU.
     #[error("a GPU computes in single precision; use precision = f32, or device = cpu")]
     DoubleOnGpu,
+    /// Outputs of the last substep on a GPU.
+    #[error(
+        "a GPU evaluates outputs at the state in the frame; use outputs_at = frame, or device = cpu"
+    )]
+    LastSubstepOnGpu,
+    /// Sensors at the last substep.
+    #[error(
+        "field `sensordata` is evaluated at the state in the frame; use outputs_at = frame, or leave the field out"
+    )]
+    LastSubstepSensors,
 }
 
 impl From<sim_device::DeviceError> for BackendError {

@@ -43,6 +43,34 @@ impl Precision {
     }
 }
 
+/// Which state the evaluated outputs of a step belong to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OutputsAt {
+    /// The state in the frame.
+    #[default]
+    Frame,
+    /// Where forces were evaluated last in the step, as MuJoCo's `mj_step` leaves them: the state before the last substep, or the
+    /// last of the four points of a Runge-Kutta substep. States, commands and counters are those of the frame. The CPU alone has it.
+    LastSubstep,
+}
+
+impl OutputsAt {
+    /// The one of a name.
+    pub fn named(name: &str) -> Option<OutputsAt> {
+        [OutputsAt::Frame, OutputsAt::LastSubstep]
+            .into_iter()
+            .find(|outputs_at| outputs_at.name() == name)
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            OutputsAt::Frame => "frame",
+            OutputsAt::LastSubstep => "last_substep",
+        }
+    }
+}
+
 /// Worlds per block on the CPU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Lanes {

@@ -183,6 +183,14 @@ impl Field {
         matches!(self, Ctrl | MocapPos | MocapQuat | EqActive)
     }
 
+    /// Whether it belongs to the state before the last substep where outputs do, as MuJoCo's data after a step: all but the state
+    /// itself, commands and counters.
+    pub fn lags(self) -> bool {
+        use Field::{JointQMeasured, JointQdMeasured, Qpos, Qvel};
+        let is_state = matches!(self, Qpos | Qvel | JointQMeasured | JointQdMeasured);
+        self.row().group == Group::Derived && !is_state
+    }
+
     /// Elements per world.
     pub fn elements(self, sizes: &Sizes) -> usize {
         self.row()

@@ -87,6 +87,7 @@ fn description() -> Description {
         on_fault: "freeze".to_owned(),
         on_nan: "refuse".to_owned(),
         draws: "world".to_owned(),
+        outputs_at: "frame".to_owned(),
         state_bytes: 0,
         schema: 0,
     }

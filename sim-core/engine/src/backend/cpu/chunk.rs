@@ -4,7 +4,7 @@ use super::contact_kinds::ContactKinds;
 use super::lane_assignment::LaneAssignment;
 use crate::backend::noise::Noise;
 use crate::backend::state::{self, RECORD, Shape};
-use crate::backend::{Faults, Frozen, Values};
+use crate::backend::{Faults, Frozen, OutputsAt, Values};
 use crate::random::Numbering;
 use crate::start::StartDraw;
 use sim_model::{Model, SensedShapes};
@@ -13,7 +13,7 @@ use sim_physics::compiled::Stages;
 use sim_physics::constants::Constants;
 use sim_physics::lane::{Lane, Real};
 use sim_physics::schedule::{evaluation_stages, step_stages};
-use sim_physics::step::StageId;
+use sim_physics::step::{Runs, StageId};
 use std::ops::Range;
 
 /// Data that all chunks share.
@@ -28,6 +28,10 @@ pub(super) struct Job<F: Lane> {
     pub step: Vec<usize>,
     /// Stages that evaluate the fields of the layout.
     pub evaluate: Vec<usize>,
+    /// Stages that evaluate fields of the state in the frame after a step.
+    pub evaluate_now: Vec<usize>,
+    /// Stages that evaluate the other ones before the last stage of a step; none where all belong to the state in the frame.
+    pub evaluate_last: Option<Vec<usize>>,
     /// Whether they detect contacts.
     pub finds_contacts: bool,
     /// Duration of a control frame [s].
@@ -47,15 +51,33 @@ pub(super) struct Job<F: Lane> {
 }
 
 impl<F: Lane> Job<F> {
-    pub fn new(model: &Model, layout: Layout, stages: Stages<F>, numbering: Numbering) -> Job<F> {
+    pub fn new(
+        model: &Model,
+        (layout, outputs_at): (Layout, OutputsAt),
+        stages: Stages<F>,
+        numbering: Numbering,
+    ) -> Job<F> {
         let constants = model.constants().cast();
-        let places = |stages: &[StageId]| stages.iter().map(|stage| stage.index()).collect();
-        let fields = layout.slots.iter().map(|slot| slot.field);
-        let evaluation = evaluation_stages(&constants, fields);
+        let places = |stages: &[StageId]| -> Vec<usize> {
+            stages.iter().map(|stage| stage.index()).collect()
+        };
+        let fields = || layout.slots.iter().map(|slot| slot.field);
+        let evaluation = evaluation_stages(&constants, fields());
+        let lags = outputs_at == OutputsAt::LastSubstep;
+        let now = fields().filter(|field| !lags || !field.lags());
+        let evaluate_now = places(&evaluation_stages(&constants, now));
+        let evaluate_last = lags.then(|| {
+            // what a step runs as well has run already
+            let own = evaluation.iter().copied();
+            let own = own.filter(|stage| stage.row().runs == Runs::Evaluation);
+            places(&own.collect::<Vec<_>>())
+        });
         Job {
             shape: Shape::of(&constants),
             step: places(&step_stages(&constants)),
             evaluate: places(&evaluation),
+            evaluate_now,
+            evaluate_last,
             finds_contacts: state::finds_contacts(&evaluation),
             constants,
             stages,
@@ -93,6 +115,8 @@ pub(super) struct Chunk<F: Lane> {
     /// Worlds that were frozen since the last report.
     pub(super) frozen: Frozen,
     pub block: Block<F, F>,
+    /// Scratch: what an evaluation amid a step must leave as it was.
+    pub(super) kept: Vec<F>,
     /// Scratch memory of the execution context.
     pub memory: Vec<F>,
     /// Scratch: one field of one block.
@@ -122,6 +146,7 @@ impl<F: Lane> Chunk<F> {
             frames: 0,
             frozen: Frozen::default(),
             block: Block::new(&job.constants, F::default()),
+            kept: vec![F::default(); job.constants.dofs.len()],
             memory: vec![F::default(); job.constants.contacts.memory.len],
             staging: vec![F::default(); elements],
             lanes: vec![F::Real::default(); elements * F::WIDTH],

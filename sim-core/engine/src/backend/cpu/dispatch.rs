@@ -3,7 +3,9 @@
 use super::backend::{CompiledStages, Cpu, Workers};
 use super::chunk::{Chunk, Job};
 use super::transfer::Arena;
-use crate::backend::{Backend, BackendError, Backends, Groups, Lanes, Precision, Profile};
+use crate::backend::{
+    Backend, BackendError, Backends, Groups, Lanes, OutputsAt, Precision, Profile,
+};
 use sim_model::Model;
 use sim_physics::arrays::Layout;
 use sim_physics::compiled::Stages;
@@ -64,7 +66,7 @@ pub fn create(
     groups: Groups,
     precision: Precision,
     lanes: Lanes,
-    layout: &Layout,
+    layout: (&Layout, OutputsAt),
     threads: usize,
 ) -> Result<Backends, BackendError> {
     let lanes = match lanes {
@@ -128,7 +130,7 @@ fn baseline<F: Lane>(instructions: &'static str, stages: Stages<F>) -> CompiledS
 fn boxed<F: Lane>(
     model: &Model,
     groups: Groups,
-    layout: &Layout,
+    (layout, outputs_at): (&Layout, OutputsAt),
     threads: usize,
     compiled: CompiledStages<F>,
 ) -> Result<Backends, BackendError> {
@@ -136,7 +138,12 @@ fn boxed<F: Lane>(
     let threads = threads.min(groups.count * groups.worlds.div_ceil(F::WIDTH));
     let workers = Workers::new(threads, groups.count)?;
     let made = groups.numberings().map(|numbering| {
-        let job = Job::new(model, layout.clone(), compiled.stages, numbering);
+        let job = Job::new(
+            model,
+            (layout.clone(), outputs_at),
+            compiled.stages,
+            numbering,
+        );
         let cpu = Cpu::new(job, groups.worlds, threads, workers.clone(), &compiled);
         Box::new(cpu) as Box<dyn Backend>
     });

@@ -76,19 +76,19 @@ impl<F: Lane> Chunk<F> {
                     // before the evaluation, which changes the warm start: reading outputs must not change the run
                     self.store(shape, state.clone());
                 }
-                let stages = if evaluates {
-                    &job.evaluate[..]
-                } else {
-                    &job.step[..]
+                let stages = match (evaluates, substeps) {
+                    (false, _) => &job.step[..],
+                    (true, 0) => &job.evaluate[..],
+                    (true, _) => &job.evaluate_now[..],
                 };
-                for &stage in stages {
-                    let lanes = self.lanes_of(block).len();
-                    probe.before(self.moment(job, lanes, stage, evaluates));
-                    // SAFETY: by contract the processor has the instructions of the job's stages.
-                    unsafe {
-                        job.stages[stage](&job.constants, &mut self.block, &mut self.memory);
+                for (place, &stage) in stages.iter().enumerate() {
+                    // the last stage goes to the next state
+                    if pass + 1 == substeps && place + 1 == stages.len() {
+                        // SAFETY: by contract.
+                        unsafe { self.evaluate_last(job, block, arena, probe) };
                     }
-                    probe.after(self.moment(job, lanes, stage, evaluates));
+                    // SAFETY: by contract.
+                    unsafe { self.run_stage(job, block, stage, evaluates, probe) };
                 }
             }
             if substeps > 0 || job.finds_contacts {
@@ -97,40 +97,9 @@ impl<F: Lane> Chunk<F> {
             if substeps > 0 {
                 self.note_contacts(&job.constants, block);
             }
-            for slot in job
-                .layout
-                .slots
-                .iter()
-                .filter(|slot| !is_counter(slot.field))
-            {
-                // SAFETY: the arena holds the layout, and these worlds are this chunk's alone.
-                unsafe {
-                    if let Source::Contacts(_) = slot.field.row().source {
-                        contacts::export(self, job, slot, block, arena);
-                    } else {
-                        transfer::export(self, &job.constants, slot, block, arena);
-                    }
-                    if slot.field == Field::Sensordata {
-                        for lane in self.lanes_of(block) {
-                            let world = self.assignment.world(lane);
-                            let row = arena.row(slot, self.worlds.start + world);
-                            let time = self.steps[world] as f64 * job.frame_s;
-                            clocks::put(&job.constants, time, row);
-                        }
-                    }
-                    if let Some(noise) = job.noise.of(slot.field) {
-                        for lane in self.lanes_of(block) {
-                            let world = self.assignment.world(lane);
-                            self.add_noise(
-                                job,
-                                noise,
-                                world,
-                                arena.row(slot, self.worlds.start + world),
-                            );
-                        }
-                    }
-                }
-            }
+            let lags = substeps > 0 && job.evaluate_last.is_some();
+            // SAFETY: the arena holds the layout.
+            unsafe { self.put_fields(job, block, arena, |field| !(lags && field.lags())) };
         }
         for slot in job
             .layout
@@ -147,6 +116,95 @@ impl<F: Lane> Chunk<F> {
                 self.reset_frozen(job);
             }
             self.regroup(job);
+        }
+    }
+
+    /// Runs a stage.
+    ///
+    /// # Safety
+    /// The processor has the instructions of the job's stages.
+    #[inline(always)]
+    unsafe fn run_stage(
+        &mut self,
+        job: &Job<F>,
+        block: usize,
+        stage: usize,
+        evaluates: bool,
+        probe: &mut impl Probe<F>,
+    ) {
+        let lanes = self.lanes_of(block).len();
+        probe.before(self.moment(job, lanes, stage, evaluates));
+        // SAFETY: by contract.
+        unsafe {
+            job.stages[stage](&job.constants, &mut self.block, &mut self.memory);
+        }
+        probe.after(self.moment(job, lanes, stage, evaluates));
+    }
+
+    /// Evaluates and writes the fields that belong to the last substep, before its last stage goes to the next state.
+    ///
+    /// # Safety
+    /// As [`Chunk::run`].
+    #[inline(always)]
+    unsafe fn evaluate_last(
+        &mut self,
+        job: &Job<F>,
+        block: usize,
+        arena: Arena,
+        probe: &mut impl Probe<F>,
+    ) {
+        let Some(stages) = &job.evaluate_last else {
+            return;
+        };
+        // the solver's result is its next start too, which outputs must not change
+        self.kept.copy_from_slice(&self.block.joint_qdd);
+        // SAFETY: by contract.
+        unsafe {
+            for &stage in stages {
+                self.run_stage(job, block, stage, true, probe);
+            }
+            self.put_fields(job, block, arena, Field::lags);
+        }
+        self.block.joint_qdd.copy_from_slice(&self.kept);
+    }
+
+    /// Writes those fields of a block that are no counters.
+    ///
+    /// # Safety
+    /// The arena holds the job's layout.
+    #[inline(always)]
+    unsafe fn put_fields(
+        &mut self,
+        job: &Job<F>,
+        block: usize,
+        arena: Arena,
+        is_due: impl Fn(Field) -> bool,
+    ) {
+        let slots = job.layout.slots.iter();
+        for slot in slots.filter(|slot| !is_counter(slot.field) && is_due(slot.field)) {
+            // SAFETY: the arena holds the layout, and these worlds are this chunk's alone.
+            unsafe {
+                if let Source::Contacts(_) = slot.field.row().source {
+                    contacts::export(self, job, slot, block, arena);
+                } else {
+                    transfer::export(self, &job.constants, slot, block, arena);
+                }
+                if slot.field == Field::Sensordata {
+                    for lane in self.lanes_of(block) {
+                        let world = self.assignment.world(lane);
+                        let row = arena.row(slot, self.worlds.start + world);
+                        let time = self.steps[world] as f64 * job.frame_s;
+                        clocks::put(&job.constants, time, row);
+                    }
+                }
+                if let Some(noise) = job.noise.of(slot.field) {
+                    for lane in self.lanes_of(block) {
+                        let world = self.assignment.world(lane);
+                        let row = arena.row(slot, self.worlds.start + world);
+                        self.add_noise(job, noise, world, row);
+                    }
+                }
+            }
         }
     }
 
