@@ -8,17 +8,59 @@ use pyo3::prelude::*;
 
 use crate::errors::raise;
 
-/// Write parts, each `(worlds,)` or `(worlds, columns)`, side by side into `out`, `(worlds, size)`; numbers below `low` or
-/// above `high`, one a column, count as these. NaN stays NaN. Returns whether there is any.
+/// A real number of an observation.
+trait Number: Element + Copy + PartialOrd {
+    fn of(x: f64) -> Self;
+    fn within(self, low: Self, high: Self) -> Self;
+    fn is_nan(self) -> bool;
+}
+
+macro_rules! number {
+    ($($real:ty)*) => {
+        $(impl Number for $real {
+            fn of(x: f64) -> $real {
+                x as $real
+            }
+            fn within(self, low: $real, high: $real) -> $real {
+                self.clamp(low, high)
+            }
+            fn is_nan(self) -> bool {
+                <$real>::is_nan(self)
+            }
+        })*
+    };
+}
+
+number!(f32 f64);
+
+/// Write parts, each `(worlds,)` or `(worlds, columns)`, side by side into `out`, `(worlds, size)`, of `f32` or `f64`; numbers below
+/// `low` or above `high`, one a column, count as these. NaN stays NaN. Returns whether there is any.
 #[pyfunction]
 pub(crate) fn pack(
     py: Python<'_>,
-    mut out: PyReadwriteArray2<'_, f32>,
+    out: &Bound<'_, PyAny>,
     parts: Vec<Bound<'_, PyAny>>,
     low: PyReadonlyArray1<'_, f32>,
     high: PyReadonlyArray1<'_, f32>,
 ) -> PyResult<bool> {
-    let (low, high) = (low.as_slice()?, high.as_slice()?);
+    let bounds = (low.as_slice()?, high.as_slice()?);
+    match out.extract::<PyReadwriteArray2<'_, f64>>() {
+        Ok(out) => pack_into(py, out, &parts, bounds),
+        Err(_) => pack_into(
+            py,
+            out.extract::<PyReadwriteArray2<'_, f32>>()?,
+            &parts,
+            bounds,
+        ),
+    }
+}
+
+fn pack_into<O: Number>(
+    py: Python<'_>,
+    mut out: PyReadwriteArray2<'_, O>,
+    parts: &[Bound<'_, PyAny>],
+    (low, high): (&[f32], &[f32]),
+) -> PyResult<bool> {
     let size = low.len();
     let rows = out.as_array().nrows();
     let within = high.len() == size && low.iter().zip(high).all(|(low, high)| low <= high);
@@ -28,15 +70,23 @@ pub(crate) fn pack(
     }
     let out = out.as_slice_mut()?;
     let mut first = 0;
-    for part in &parts {
+    for part in parts {
         let columns = None
-            .or_else(|| place(part, (&mut *out, rows), first, low, high, |x: f32| x))
-            .or_else(|| place(part, (&mut *out, rows), first, low, high, |x: f64| x as f32))
-            .or_else(|| place(part, (&mut *out, rows), first, low, high, |x: i32| x as f32))
-            .or_else(|| place(part, (&mut *out, rows), first, low, high, |x: i64| x as f32))
+            .or_else(|| {
+                place(part, (&mut *out, rows), first, low, high, |x: f32| {
+                    f64::from(x)
+                })
+            })
+            .or_else(|| place(part, (&mut *out, rows), first, low, high, |x: f64| x))
+            .or_else(|| {
+                place(part, (&mut *out, rows), first, low, high, |x: i32| {
+                    f64::from(x)
+                })
+            })
+            .or_else(|| place(part, (&mut *out, rows), first, low, high, |x: i64| x as f64))
             .or_else(|| {
                 place(part, (&mut *out, rows), first, low, high, |x: bool| {
-                    f32::from(u8::from(x))
+                    f64::from(u8::from(x))
                 })
             });
         let Some(columns) = columns else {
@@ -55,13 +105,13 @@ pub(crate) fn pack(
 }
 
 /// Copies a part into the columns from `first` on; how many it has, or `None` if its type or shape is another.
-fn place<T: Element + Copy>(
+fn place<T: Element + Copy, O: Number>(
     part: &Bound<'_, PyAny>,
-    (out, rows): (&mut [f32], usize),
+    (out, rows): (&mut [O], usize),
     first: usize,
     low: &[f32],
     high: &[f32],
-    real: impl Fn(T) -> f32,
+    real: impl Fn(T) -> f64,
 ) -> Option<usize> {
     let array = part.cast::<PyArrayDyn<T>>().ok()?.try_readonly().ok()?;
     let view = array.as_array();
@@ -79,22 +129,23 @@ fn place<T: Element + Copy>(
     let rows = out
         .chunks_exact_mut(size)
         .map(|row| &mut row[columns.clone()]);
+    let put =
+        |x: T, k: usize| O::of(real(x)).within(O::of(f64::from(low[k])), O::of(f64::from(high[k])));
     if view.ncols() == 1 {
-        let (low, high) = (low[0], high[0]);
         for (to, from) in rows.zip(view.column(0)) {
-            to[0] = real(*from).clamp(low, high);
+            to[0] = put(*from, 0);
         }
     } else {
         for (to, from) in rows.zip(view.rows()) {
             match from.as_slice() {
                 Some(from) => {
                     for (k, to) in to.iter_mut().enumerate() {
-                        *to = real(from[k]).clamp(low[k], high[k]);
+                        *to = put(from[k], k);
                     }
                 }
                 None => {
                     for (k, to) in to.iter_mut().enumerate() {
-                        *to = real(from[k]).clamp(low[k], high[k]);
+                        *to = put(from[k], k);
                     }
                 }
             }
