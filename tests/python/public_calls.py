@@ -309,6 +309,9 @@ ENV_CALLS: dict[str, Call] = {
         {"site": "text", "dofs": "dofs", "pos_scale": "number", "rot_scale": "number"},
         {"site": "tip", "dofs": ["arm/fr3_joint1"], "pos_scale": 1.0},
     ),
+    "ActuatorControl": Call(
+        lambda _: env.ActuatorControl, {"ranges": "ranges", "clips": "flag"}, {"ranges": [(-1.0, 1.0)]}
+    ),
     "Observed": Call(
         lambda _: env.Observed,
         {"name": "text", "low": "observed bound", "high": "observed bound", "size": "count", "unit": "text"},

@@ -12,7 +12,7 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
-from tightloop.env.controls import EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
+from tightloop.env.controls import ActuatorControl, EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
 from tightloop.env.disturbances import Push
 from tightloop.env.groups import make_groups
 from tightloop.env.mirror import Mirror
@@ -23,6 +23,7 @@ from tightloop.env.task import Observed, Task, Worlds
 from tightloop.env.vector import VectorEnv
 
 __all__ = [
+    "ActuatorControl",
     "AutoresetMode",
     "EndEffectorDelta",
     "Env",

@@ -35,14 +35,17 @@ class Actions:
             control.bind(names, self._commands)
             self._controls.append((control, slice(first, first + control.size)))
             first += control.size
-        limits = np.concatenate([np.full(control.size, control.limit, np.float32) for control in controls])
-        self.space = Box(-limits, limits, dtype=np.float32)
-        # a scalar if all limits are equal: NumPy is slow on short rows
-        self._limits = limits[0] if (limits == limits[0]).all() else limits
+        ranges = np.concatenate([_range(control) for control in controls])
+        self.space = Box(ranges[:, 0], ranges[:, 1], dtype=np.float32)
+        for control, numbers in self._controls:
+            if not getattr(control, "clips", True):
+                ranges[numbers] = -np.inf, np.inf
+        # scalars if all ranges are equal: NumPy is slow on short rows
+        self._low, self._high = ranges[0] if (ranges == ranges[0]).all() else np.ascontiguousarray(ranges.T)
         self.now, self.before = (np.zeros((worlds, first), np.float32) for _ in range(2))
 
     def take(self, actions: ArrayLike, frame: Any) -> dict[str, NDArray[np.float32]]:
-        """Apply actions, clipped to the action space; returns the arguments of a step, by name.
+        """Apply actions, clipped to the action space where the control says so; returns the arguments of a step.
 
         Raises:
             ArgumentError: The shape is wrong, or the values are no real numbers.
@@ -52,7 +55,7 @@ class Actions:
             expected = f"expected real numbers of shape {self.now.shape}"
             raise ArgumentError(f"actions: {expected}; got {given.dtype} of shape {given.shape}")
         self.now, self.before = self.before, self.now
-        np.clip(given, -self._limits, self._limits, out=self.now, casting="same_kind")
+        np.clip(given, self._low, self._high, out=self.now, casting="same_kind")
         for control, numbers in self._controls:
             control.apply(self.now[:, numbers], frame)
         return self._commands.sent
@@ -70,3 +73,11 @@ class Actions:
         """Clear actions and commands of worlds that begin an episode."""
         self._commands.begin(mask)
         self.now[mask] = self.before[mask] = 0.0
+
+
+def _range(control: Control) -> NDArray[np.float32]:
+    """Return lower and upper bounds of the values that a control takes, shape ``(size, 2)``."""
+    own = getattr(control, "ranges", None)
+    if own is not None:
+        return np.array(own, np.float32)
+    return np.tile(np.array([-control.limit, control.limit], np.float32), (control.size, 1))

@@ -27,13 +27,13 @@ class Commands:
         for name, robot in scene.robots.items():
             self.start[names.dofs[name]] = robot.joint_target_q
             self.range[names.dofs[name]] = robot.joint_range
-        self._shape = (worlds, dofs)
-        self._names = names.dof_names
+        self._worlds = worlds
+        self._names, self._actuators = names.dof_names, names.actuator_names
         self._arrays: dict[str, NDArray[np.float32]] = {}
         self._taken: set[tuple[str, int]] = set()
 
     def array(self, field: str, dofs: Sequence[int]) -> NDArray[np.float32]:
-        """Return the array of a command, ``joint_f`` or ``joint_target_q``, shape ``(worlds, dofs)``.
+        """Return the array of a command, ``joint_f`` or ``joint_target_q``, shape ``(worlds, dofs)``, or ``ctrl``.
 
         Every later step sends this array.
 
@@ -42,11 +42,14 @@ class Commands:
         """
         for dof in dofs:
             if (field, dof) in self._taken:
-                raise ArgumentError(f"controls: two of them write {field} of {self._names[dof]}; leave one out")
+                name = (self._actuators if field == "ctrl" else self._names)[dof]
+                raise ArgumentError(f"controls: two of them write {field} of {name}; leave one out")
             self._taken.add((field, dof))
         if field not in self._arrays:
-            start = self.start if field == "joint_target_q" else np.zeros_like(self.start)
-            self._arrays[field] = np.tile(start, (self._shape[0], 1))
+            start = np.zeros(len(self._actuators if field == "ctrl" else self._names), np.float32)
+            if field == "joint_target_q":
+                start = self.start
+            self._arrays[field] = np.tile(start, (self._worlds, 1))
         return self._arrays[field]
 
     def begin(self, mask: NDArray[np.bool_]) -> None:

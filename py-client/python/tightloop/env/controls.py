@@ -24,7 +24,8 @@ class Control(Protocol):
 
     #: Number of action values that it takes.
     size: int
-    #: Largest absolute action value.
+    #: Largest absolute action value. A control may have ``ranges`` instead, shape ``(size, 2)``, and ``clips``, which
+    #: is False if values beyond them are taken as they are.
     limit: float
     #: Frame fields that it reads.
     fields: tuple[str, ...]
@@ -150,6 +151,46 @@ class JointDelta(_Joints):
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
         """Increment the targets."""
         self._drive(action, None)
+
+
+class ActuatorControl:
+    """Controls of the actuators of the scene's MuJoCo models, ``ctrl = action``, as MuJoCo takes them."""
+
+    fields: tuple[str, ...] = ()
+    limit = 1.0
+
+    @checked_calls
+    def __init__(self, ranges: ArrayLike, *, clips: bool = True) -> None:
+        """Make a control of all actuators of the scene.
+
+        Args:
+            ranges: Lower and upper bound of the action of each actuator, shape ``(actuators, 2)``.
+            clips: Whether actions are clipped to their ranges. Otherwise the task's functions see them as they are; the
+                simulation clamps them to each actuator's ``ctrlrange`` in any case.
+        """
+        try:
+            given = np.asarray(ranges)
+        except ValueError:  # rows of several lengths
+            given = np.empty(0)
+        fits = given.ndim == 2 and given.shape[1:] == (2,) and len(given) > 0 and given.dtype.kind in "fiu"
+        if not fits or not (np.isfinite(given).all() and (given[:, 0] < given[:, 1]).all()):
+            raise ArgumentError(f"ActuatorControl: ranges is {ranges!r:.80}; give (low, high) of each actuator")
+        self.ranges = given.astype(np.float32)
+        self.size = len(given)
+        self.clips = checks.flag("ActuatorControl: clips", clips, error=ArgumentError)
+
+    def bind(self, names: Names, commands: Commands) -> None:
+        """Check the number of actuators."""
+        if len(names.actuator_names) != self.size:
+            there = len(names.actuator_names)
+            raise ArgumentError(
+                f"ActuatorControl: ranges has {self.size} rows for {there} actuators; give one for each"
+            )
+        self._array = commands.array("ctrl", range(self.size))
+
+    def apply(self, action: NDArray[np.float32], frame: Any) -> None:
+        """Write the controls."""
+        np.copyto(self._array, action)
 
 
 class Gripper(_Joints):

@@ -37,12 +37,13 @@ class Evaluation:
         self._task, self._count = task, worlds
         self._pool, self._tapes = ArrayPool(), {}
         parts = observed_parts(task)
-        self._packer, self._watch = ObservationPacker(parts), BoundsWatch(type(task).__name__, parts)
+        self._packer, self._watch = ObservationPacker(parts, task.dtype), BoundsWatch(type(task).__name__, parts)
         self.observed, self.space = self._packer.size, self._packer.space
         privileged = task.privileged_observed()
         self._privileged = ObservationPacker(privileged) if privileged else None
         self.terms = RewardTerms(task, worlds)
         self.worlds = Worlds()
+        self._has_start_infos = type(task).start_metrics is not Task.start_metrics
 
     @property
     def privileged_space(self) -> Box | None:
@@ -89,7 +90,7 @@ class Evaluation:
         if self._privileged is not None:
             self._privileged.advance()
 
-    def observe(self, out: NDArray[np.float32], begun: NDArray[np.bool_] | None = None) -> bool:
+    def observe(self, out: NDArray[Any], begun: NDArray[np.bool_] | None = None) -> bool:
         """Write the observations, shape ``(worlds, size)``; returns whether any is NaN.
 
         Args:
@@ -110,7 +111,7 @@ class Evaluation:
             np.nan_to_num(out, copy=False)
         return out
 
-    def reward(self, out: NDArray[np.float32]) -> None:
+    def reward(self, out: NDArray[Any]) -> None:
         """Write the rewards, shape ``(worlds,)``."""
         if self.terms.is_used:
             self.terms.add(self.call("reward_terms"), out)
@@ -131,10 +132,31 @@ class Evaluation:
         if first:
             check_metric_names(self.function_name("metrics"), [*metrics])
             for name, value in metrics.items():
-                self._check(f"metrics, {name!r}", value, _ANY)
+                self._check(f"metrics, {name!r}", value, _ANY, also_more=True)
         success = self._checked("success", _BOOL, optional=True)
         named = dict(metrics) if success is None else {**metrics, "success": success}
         return {name: np.array(value) for name, value in named.items()}
+
+    def add_start_infos(self, infos: dict[str, Any], begun: NDArray[np.bool_] | None) -> None:
+        """Write the task's values of worlds that begin an episode into ``infos``."""
+        if begun is None or not self._has_start_infos:
+            return
+        first = "start_metrics" not in self._tapes
+        metrics = self.call("start_metrics")
+        if first and not isinstance(metrics, Mapping):
+            what = self.function_name("start_metrics")
+            raise ArgumentError(f"{what}: got {type(metrics).__name__}; return a dict by name")
+        for name, value in metrics.items():
+            if first:
+                check_metric_names(self.function_name("start_metrics"), [name])
+                self._check(f"start_metrics, {name!r}", value, _ANY, also_more=True)
+            mask, known = f"_{name}", np.asarray(value)
+            if name in infos:  # of worlds that go on
+                known = np.where(begun.reshape(-1, *[1] * (known.ndim - 1)), known, infos[name])
+                infos[mask] = infos[mask] | begun
+            else:
+                known, infos[mask] = np.array(known), begun.copy()
+            infos[name] = known
 
     def call(self, name: str, *more: Any) -> Any:
         """Call a function of the task; its arrays are reused once nobody holds them."""
@@ -148,9 +170,10 @@ class Evaluation:
             self._check(name, value, kinds)
         return value
 
-    def _check(self, what: str, value: Any, kinds: str) -> None:
+    def _check(self, what: str, value: Any, kinds: str, *, also_more: bool = False) -> None:
         got = f"an array of shape {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
-        if not isinstance(value, np.ndarray) or value.shape != (self._count,):
+        shape = value.shape if isinstance(value, np.ndarray) else ()
+        if (shape[:1] if also_more else shape) != (self._count,):
             raise ArgumentError(f"{self.function_name(what)}: got {got}; return an array of shape ({self._count},)")
         if value.dtype.kind not in kinds:
             expected = "bool" if kinds == _BOOL else "real numbers"

@@ -21,11 +21,13 @@ class Names:
         bodies: Slice of its entries of ``body_q``.
         dof_names: ``robot/joint`` of each dof.
         body_count: Number of bodies, the rows of ``body_q`` and ``body_f``.
+        actuator_names: ``model/actuator`` of each actuator, in the order of ``ctrl``.
     """
 
     def __init__(self, info: dict[str, Any]) -> None:
         self.dof_names: list[str] = info["dof_names"]
         self.body_count = len(info["body_names"])
+        self.actuator_names: list[str] = info["actuator_names"]
         self.coords, self.dofs, self.bodies = (
             {robot["name"]: slice(*robot[places]) for robot in info["robots"]}
             for places in ("coords", "dofs", "bodies")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from tightloop import _core
 from tightloop.env.task import Array, Observed
@@ -24,7 +24,7 @@ class ObservationPacker:
         space: Observation space of one world.
     """
 
-    def __init__(self, parts: Sequence[Observed]) -> None:
+    def __init__(self, parts: Sequence[Observed], dtype: DTypeLike = np.float32) -> None:
         self._parts = list(parts)
         if not self._parts:
             raise ArgumentError("observed: there is nothing; list the parts of the observation")
@@ -32,7 +32,7 @@ class ObservationPacker:
         self._low, self._high = (
             np.ascontiguousarray(np.concatenate([np.tile(p.bounds[end], p.history) for p in parts])) for end in (0, 1)
         )
-        self.space = Box(self._low, self._high, dtype=np.float32)
+        self.space = Box(self._low.astype(dtype), self._high.astype(dtype), dtype=np.dtype(dtype).type)  # pyright: ignore[reportArgumentType]
         # values of the steps before, the oldest first, and those of the last call, by index of the part
         self._past: dict[int, NDArray[np.float32]] = {}
         self._last: dict[int, NDArray[np.float32]] = {}
@@ -54,7 +54,7 @@ class ObservationPacker:
         ends = np.cumsum([part.width for part in self._parts])
         return self._parts[int(np.searchsorted(ends, column, side="right"))].name
 
-    def pack(self, arrays: Sequence[Array], out: NDArray[np.float32], begun: NDArray[np.bool_] | None = None) -> bool:
+    def pack(self, arrays: Sequence[Array], out: NDArray[Any], begun: NDArray[np.bool_] | None = None) -> bool:
         """Write the parts into ``out``, shape ``(worlds, size)``; NaN stays NaN. Returns whether any is NaN.
 
         Args:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from tightloop.env.registry import GYMNASIUM_TASKS
 from tightloop.env.single import Env
 
 #: Control steps of an episode, as each task's ``max_episode_steps``.
@@ -18,13 +19,16 @@ EPISODE_STEPS = {
     "QuadrupedVelocityFlat": 1000,
 }
 
+#: The same of gymnasium's tasks, as gymnasium's own.
+GYMNASIUM_STEPS = dict.fromkeys(GYMNASIUM_TASKS, 1000) | {"Pusher-v5": 100, "Reacher-v5": 50}
+
 
 def register() -> None:
     """Register ``tightloop/FrankaReach-v0`` and the other tasks with gymnasium; a second call does nothing."""
     import gymnasium
 
-    for task, steps in EPISODE_STEPS.items():
-        name = f"tightloop/{task}-v0"
+    for task, steps in (EPISODE_STEPS | GYMNASIUM_STEPS).items():
+        name = f"tightloop/{task}" if task in GYMNASIUM_STEPS else f"tightloop/{task}-v0"
         if name not in gymnasium.registry:
             gymnasium.register(
                 name,

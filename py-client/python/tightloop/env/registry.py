@@ -27,6 +27,21 @@ TASKS = {
     "QuadrupedVelocityFlat": "tightloop.tasks.quadruped:QuadrupedVelocityFlat",
 }
 
+#: gymnasium's MuJoCo tasks.
+GYMNASIUM_TASKS = {
+    "Ant-v5": "tightloop.tasks.gymnasium.ant:Ant",
+    "HalfCheetah-v5": "tightloop.tasks.gymnasium.planar:HalfCheetah",
+    "Hopper-v5": "tightloop.tasks.gymnasium.planar:Hopper",
+    "Humanoid-v5": "tightloop.tasks.gymnasium.humanoids:Humanoid",
+    "HumanoidStandup-v5": "tightloop.tasks.gymnasium.humanoids:HumanoidStandup",
+    "InvertedDoublePendulum-v5": "tightloop.tasks.gymnasium.pendulums:InvertedDoublePendulum",
+    "InvertedPendulum-v5": "tightloop.tasks.gymnasium.pendulums:InvertedPendulum",
+    "Pusher-v5": "tightloop.tasks.gymnasium.arms:Pusher",
+    "Reacher-v5": "tightloop.tasks.gymnasium.arms:Reacher",
+    "Swimmer-v5": "tightloop.tasks.gymnasium.planar:Swimmer",
+    "Walker2d-v5": "tightloop.tasks.gymnasium.planar:Walker2d",
+}
+
 
 def make_task(
     task: Task | type[Task] | str, options: Mapping[str, Any], environment: Callable[..., Any] | None = None
@@ -83,13 +98,14 @@ def _named(task: str) -> type[Task]:
         return _of_file(Path(file), name)
     # the name in gymnasium's registry
     task = task.removeprefix("tightloop/").removesuffix("-v0")
-    if task not in TASKS:
-        known = ", ".join(TASKS)
-        near = "".join(f"did you mean {other!r}? " for other in nearest(task, TASKS)[:1])
+    tasks = TASKS | GYMNASIUM_TASKS
+    if task not in tasks:
+        known = ", ".join(tasks)
+        near = "".join(f"did you mean {other!r}? " for other in nearest(task, tasks)[:1])
         raise ArgumentError(
             f"there is no task {task!r}; {near}there are: {known}, and those of your own, FILE.py:CLASS"
         )
-    module, _, name = TASKS[task].partition(":")
+    module, _, name = tasks[task].partition(":")
     return getattr(import_module(module), name)
 
 

@@ -32,7 +32,7 @@ class RewardTerms:
         self._term = np.empty(worlds, np.float32)
         self._now: dict[str, NDArray[np.float32]] = {}
 
-    def add(self, terms: Any, out: NDArray[np.float32]) -> None:
+    def add(self, terms: Any, out: NDArray[Any]) -> None:
         """Write the reward of a step, shape ``(worlds,)``.
 
         Raises:

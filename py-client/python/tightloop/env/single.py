@@ -22,7 +22,7 @@ _MANY = {"autoreset_mode", "n_envs", "num_env", "num_envs", "num_worlds", "world
 
 
 @checked_calls
-class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+class Env(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
     """A task in one world; each step returns new arrays.
 
     An episode of a seed equals that of the world with the same seed in a `VectorEnv`.
@@ -52,8 +52,8 @@ class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start an episode: the first one of a seed, or the next one. Returns the observation and an empty dict.
+    ) -> tuple[NDArray[Any], dict[str, Any]]:
+        """Start an episode: the first one of a seed, or the next one. Returns the observation and the task's infos.
 
         Args:
             seed: Seed of the episode; the next episode if left out.
@@ -66,10 +66,10 @@ class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if seed is not None and whole_seed(seed) is None:
             raise ArgumentError(f"reset: seed is {seed!r}; give a whole number from 0 to 2**64 - 1")
         super().reset(seed=None if seed is None else int(seed))
-        obs, _ = self.vector.reset(seed=seed)
-        return obs[0], {}
+        obs, infos = self.vector.reset(seed=seed)
+        return obs[0], _info(infos)
 
-    def step(self, action: ArrayLike) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+    def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Advance by one control step.
 
         Args:
@@ -85,8 +85,11 @@ class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if given.shape != size or given.dtype.kind not in "fiu":
             raise ArgumentError(f"step: action is {action!r:.80}; give real numbers of shape {size}")
         obs, reward, terminated, truncated, infos = self.vector.step(given[None])
-        info = {name: value[0] for name, value in infos.items() if not name.startswith("_") and infos[f"_{name}"][0]}
-        return obs[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
+        return obs[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), _info(infos)
+
+    def set_state(self, qpos: ArrayLike, qvel: ArrayLike) -> None:
+        """Set positions, shape ``(positions,)``, and velocities, as `VectorEnv.set_state` does."""
+        self.vector.set_state(qpos, qvel)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Render a picture, shape ``(height, width, 3)``, in the mode ``"rgb_array"``; None in other modes."""
@@ -96,3 +99,8 @@ class Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def close(self) -> None:
         """End the simulation."""
         self.vector.close()
+
+
+def _info(infos: dict[str, Any]) -> dict[str, Any]:
+    """Return the infos of the only world."""
+    return {name: value[0] for name, value in infos.items() if not name.startswith("_") and infos[f"_{name}"][0]}

@@ -15,23 +15,23 @@ _ALIGNMENT = 64
 class StepBuffers:
     """The arrays of one step: ``obs`` ``(worlds, size)``, ``reward``, ``terminated``, ``truncated``, ``final_obs``."""
 
-    def __init__(self, worlds: int, size: int) -> None:
-        self.obs = aligned((worlds, size), np.float32)
-        self.reward = aligned((worlds,), np.float32)
+    def __init__(self, worlds: int, size: int, dtype: DTypeLike = np.float32) -> None:
+        self.obs = aligned((worlds, size), dtype)
+        self.reward = aligned((worlds,), dtype)
         self.terminated = aligned((worlds,), np.bool_)
         self.truncated = aligned((worlds,), np.bool_)
 
     @cached_property
-    def final_obs(self) -> NDArray[np.float32]:
+    def final_obs(self) -> NDArray[Any]:
         """Last observations, like ``obs``; made on demand, since most steps end no episode."""
-        return aligned(self.obs.shape, np.float32)
+        return aligned(self.obs.shape, self.obs.dtype)
 
 
 class BufferRing:
     """BufferRing in turn. A ring's arrays are valid until as many further steps were taken as it has slots."""
 
-    def __init__(self, worlds: int, size: int, count: int) -> None:
-        self._ring = [StepBuffers(worlds, size) for _ in range(count)]
+    def __init__(self, worlds: int, size: int, count: int, dtype: DTypeLike = np.float32) -> None:
+        self._ring = [StepBuffers(worlds, size, dtype) for _ in range(count)]
         self._index = 0
 
     def next(self) -> StepBuffers:

@@ -162,6 +162,7 @@ class Task:
         goal_draws: Number of random numbers that `goal` takes per world.
         goal_steps: Control steps after which the next goal replaces a goal; None for one goal per episode.
         launch_options: Further arguments of `tightloop.launch`, such as ``bounds``.
+        dtype: Type of observations and rewards, ``numpy.float32`` or ``numpy.float64``.
         reward_weights: Weight of each term that `reward_terms` returns.
         initial_draws: Number of random numbers that `initial_state` takes per world.
         first_levels: Worlds begin at curriculum levels drawn uniformly from 0 to ``first_levels - 1``.
@@ -180,6 +181,7 @@ class Task:
     goal_draws: ClassVar[int] = 0
     goal_steps: ClassVar[int | None] = None
     launch_options: ClassVar[dict[str, Any]] = {}
+    dtype: ClassVar[type[np.floating[Any]]] = np.float32
     goal_radius: ClassVar[float | None] = None
     reward_weights: Mapping[str, float] = {}
     initial_draws: ClassVar[int] = 0
@@ -231,8 +233,24 @@ class Task:
         return None
 
     def metrics(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
-        """Return further values of a step for ``infos``, by name, each of shape ``(worlds,)``."""
+        """Return further values of a step for ``infos``, by name, each of shape ``(worlds,)`` or ``(worlds, …)``."""
         return {}
+
+    def start_metrics(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
+        """Return values for ``infos`` of worlds that begin an episode, like `metrics`."""
+        return {}
+
+    def state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> Mapping[str, Array]:
+        """Return states for `VectorEnv.set_state`, from positions and velocities as the task defines them.
+
+        Args:
+            qpos: Shape ``(n, positions)``.
+            qvel: Shape ``(n, velocities)``.
+
+        Returns:
+            Arrays by name of an argument of `Sim.write`, such as ``joint_q``, shape ``(n, coords)``.
+        """
+        raise _undefined(self, "state")
 
     def remember(self, xp: Namespace, worlds: Worlds, memory: Mapping[str, Array] | None) -> Mapping[str, Array]:
         """Return what the task remembers of a step, by name, each of shape ``(worlds, …)``.

@@ -29,6 +29,7 @@ from tightloop.env.rendering import check as check_mode
 from tightloop.env.results import TASK_FAULT, OnNan, check_on_nan, check_options, refuse
 from tightloop.env.simulation import open_simulation
 from tightloop.env.starts import Starts
+from tightloop.env.states import SettableState
 from tightloop.env.step_buffers import BufferRing, StepBuffers
 from tightloop.env.task import Task, episode_steps
 from tightloop.env.task_checks import check_task
@@ -37,15 +38,16 @@ from tightloop.frames import FAULTED
 from tightloop.signatures import checked_calls
 from tightloop.sim import Sim
 
-Step = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
+Step = tuple[NDArray[Any], NDArray[Any], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 
 
 @checked_calls
-class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], NDArray[Any]]):
     """A task in many worlds.
 
     Observations are float32, shape ``(num_envs, size)``, clipped to ``single_observation_space``. Actions have shape
     ``(num_envs, actions)`` and are clipped to ``single_action_space``. Rewards are float32.
+    Tasks may have float64 for observations and rewards.
 
     ``infos["privileged"]`` has the privileged observations of a task that has them, from `reset` too. In the step that
     ends an episode, ``infos["return/TERM"]`` has the sum of a term of its rewards.
@@ -166,7 +168,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         self.single_action_space = self._actions.space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._ring = None if copy else BufferRing(self.num_envs, self.evaluation.observed, slots)
+        self._ring = None if copy else BufferRing(self.num_envs, self.evaluation.observed, slots, self.task.dtype)
         self._done = np.zeros(self.num_envs, np.bool_)
         self._all = np.ones(self.num_envs, np.bool_)
         # worlds whose results were NaN in this step, and those whose episode began with such an observation
@@ -202,7 +204,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    ) -> tuple[NDArray[Any], dict[str, Any]]:
         """Start episodes in all worlds, or in those of ``options["reset_mask"]``.
 
         An episode depends only on its seed and on the number of episodes since that seed. ``reset(seed=…)`` repeats the
@@ -253,10 +255,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             CommandRefused: There was no reset, also after a step that failed, or a step is in flight, or, without
                 autoreset, an episode has ended.
         """
-        self._check_idle("send")
-        if not self._ready:
-            why = "the last step or reset failed" if self._failed else "no episode has begun"
-            raise CommandRefused(f"send: {why}; call reset first")
+        self._check_ready("send")
         if self.autoreset_mode is AutoresetMode.DISABLED and self._done.any():
             world = int(np.argmax(self._done))
             problem = f"send: the episode of environment {world} has ended"
@@ -402,7 +401,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             elapsed=self._episodes.elapsed,
         )
 
-    def _observe(self, out: NDArray[np.float32], begun: NDArray[np.bool_] | None = None) -> None:
+    def _observe(self, out: NDArray[Any], begun: NDArray[np.bool_] | None = None) -> None:
         """Write observations; those of worlds in ``begun`` are the first ones of an episode."""
         if self.evaluation.observe(out, begun):
             # observations of a faulted world may be NaN
@@ -419,7 +418,8 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             out[self._spoiled if begun is None else self._spoiled & ~begun] = 0.0
 
     def _add_privileged(self, infos: dict[str, Any], begun: NDArray[np.bool_] | None) -> None:
-        """Write privileged observations into the infos."""
+        """Write privileged observations into the infos, and what the task says of new episodes."""
+        self.evaluation.add_start_infos(infos, begun)
         privileged = self.evaluation.privileged(begun)
         if privileged is not None:
             infos["privileged"], infos["_privileged"] = privileged, self._all.copy()
@@ -468,7 +468,7 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
 
     def _next_buffers(self) -> StepBuffers:
         if self._ring is None:
-            return StepBuffers(self.num_envs, self.evaluation.observed)
+            return StepBuffers(self.num_envs, self.evaluation.observed, self.task.dtype)
         return self._ring.next()
 
     def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
@@ -487,10 +487,6 @@ class VectorEnv(GymVectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
                 "reset: options, reset_mask: the first reset is of all environments; leave the mask out"
             )
         return mask
-
-    def _check_idle(self, call: str) -> None:
-        if self._in_flight:
-            raise CommandRefused(f"{call}: a step is on its way; call recv first")
 
 
 def _mode(mode: AutoresetMode | str) -> AutoresetMode:

@@ -1,0 +1,81 @@
+"""States that a user sets amid an episode."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tightloop.errors import ArgumentError, CommandRefused
+from tightloop.inputs import reals
+
+if TYPE_CHECKING:
+    from tightloop.env.evaluation import Evaluation
+    from tightloop.env.memory import Memory
+    from tightloop.env.task import Task
+    from tightloop.sim import Sim
+
+
+class SettableState:
+    """Mixin of `VectorEnv`."""
+
+    task: Task
+    sim: Sim
+    num_envs: int
+    evaluation: Evaluation
+    _memory: Memory
+    _ready: bool
+    _failed: bool
+    _in_flight: bool
+
+    def set_state(self, qpos: ArrayLike, qvel: ArrayLike, *, mask: NDArray[np.bool_] | None = None) -> None:
+        """Set positions and velocities of worlds, as `Task.state` defines them: for MuJoCo models as MuJoCo does.
+
+        The episodes go on from there; what a task remembers begins again.
+
+        Args:
+            qpos: Positions, shape ``(num_envs, positions)``, or ``(positions,)`` for all worlds.
+            qvel: Velocities, likewise.
+            mask: Worlds to set, bool, shape ``(num_envs,)``; all if left out.
+
+        Raises:
+            ArgumentError: The task defines no `Task.state`, or an argument is not valid.
+            CommandRefused: There was no reset, or a step is in flight.
+        """
+        self._check_ready("set_state")
+        every = np.ones(self.num_envs, np.bool_) if mask is None else np.asarray(mask)
+        if every.shape != (self.num_envs,) or every.dtype != np.bool_ or not every.any():
+            raise ArgumentError(f"set_state: mask is {mask!r:.80}; give bools of shape ({self.num_envs},), one True")
+        given = [_rows(name, array, self.num_envs) for name, array in (("qpos", qpos), ("qvel", qvel))]
+        arrays = {name: np.ascontiguousarray(array) for name, array in self.task.state(*given).items()}
+        # not `write`, which warns of quaternions in MuJoCo's order: any may be meant here
+        joint_q, joint_qd = arrays.pop("joint_q", None), arrays.pop("joint_qd", None)
+        frame = self.sim._client.write(joint_q, joint_qd, self.sim._arrays("writes", **arrays), every, True)
+        self._see(frame)
+        self._memory.begin(np.flatnonzero(every), self.evaluation)
+        self._see(frame)
+
+    def _see(self, frame: Any) -> None:
+        raise NotImplementedError
+
+    def _check_ready(self, call: str) -> None:
+        self._check_idle(call)
+        if not self._ready:
+            why = "the last step or reset failed" if self._failed else "no episode has begun"
+            raise CommandRefused(f"{call}: {why}; call reset first")
+
+    def _check_idle(self, call: str) -> None:
+        if self._in_flight:
+            raise CommandRefused(f"{call}: a step is on its way; call recv first")
+
+
+def _rows(name: str, values: ArrayLike, worlds: int) -> NDArray[np.float64]:
+    given = np.asarray(reals(f"set_state: {name}", values), np.float64)
+    if given.ndim == 1:
+        return np.tile(given, (worlds, 1))
+    if given.ndim != 2 or len(given) != worlds:
+        raise ArgumentError(
+            f"set_state: {name} has shape {given.shape}; give a row for each of {worlds} worlds, or one"
+        )
+    return given
