@@ -5,17 +5,24 @@ from __future__ import annotations
 import sys
 
 from generate.tables import table
-from tightloop.env.registry import TASKS, make_task
+from tightloop.env.registry import GYMNASIUM_TASKS, TASKS, make_task
 
 
 def parts() -> dict[str, str]:
     """Parts of the page `tasks.md`."""
     rows, modules = [], dict[str, list[str]]()
-    for name in TASKS:
+    for name in TASKS | GYMNASIUM_TASKS:
         task = make_task(name, {})
         cls = type(task)
         summary = (cls.__doc__ or "").partition("\n")[0]
-        rows.append([f"`{name}`", f"`tightloop/{name}-v0`", str(task.max_episode_steps), summary])
+        rows.append(
+            [
+                f"`{name}`",
+                f"`tightloop/{name}`" if name in GYMNASIUM_TASKS else f"`tightloop/{name}-v0`",
+                str(task.max_episode_steps),
+                summary,
+            ]
+        )
         modules.setdefault(cls.__module__, []).append(name)
     texts = []
     for module, names in modules.items():
