@@ -68,7 +68,7 @@ class Ant(GymnasiumTask):
         self._first = 2 if exclude_current_positions_from_observation else 0
         self._shows_forces = include_cfrc_ext_in_observation
         self._body = self.body(main_body)
-        self.start_draws = self._model.nq + 2 * self._model.nv  # pyright: ignore[reportAttributeAccessIssue]
+        self.initial_draws = self._model.nq + 2 * self._model.nv  # pyright: ignore[reportAttributeAccessIssue]
 
     def observed(self) -> Sequence[Observed]:
         """The table above."""
@@ -79,7 +79,7 @@ class Ant(GymnasiumTask):
             ("forces", forces, "N·m, N"),
         )
 
-    def start(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
+    def initial_state(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
         """Uniform noise of the positions, normal noise of the velocities."""
         nq = self._model.nq
         return self.around_start(self.spread(draws[:, :nq], self._noise), normal(draws[:, nq:], self._noise))

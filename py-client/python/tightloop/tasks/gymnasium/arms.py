@@ -51,7 +51,7 @@ class Reacher(GymnasiumTask):
         super().__init__(xml_file, frame_skip, {"default_camera_config": default_camera_config, **kwargs})
         self._distance, self._control = reward_dist_weight, reward_control_weight
         self._tip, self._target = self.body("fingertip"), self.body("target")
-        self.start_draws = self._model.nq + self._model.nv  # pyright: ignore[reportAttributeAccessIssue]
+        self.initial_draws = self._model.nq + self._model.nv  # pyright: ignore[reportAttributeAccessIssue]
 
     def observed(self) -> Sequence[Observed]:
         """The table above."""
@@ -69,7 +69,7 @@ class Reacher(GymnasiumTask):
         apart = worlds.memory["apart"][:, :2]
         return xp.cos(joints), xp.sin(joints), worlds.qpos[:, 2:], worlds.qvel[:, :2], apart
 
-    def start(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
+    def initial_state(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
         """Uniform noise of the joints; the target anywhere in its circle."""
         nq = self._model.nq
         positions = self.spread(draws[:, :nq], _JOINT_NOISE)
@@ -110,7 +110,7 @@ class Pusher(GymnasiumTask):
         super().__init__(xml_file, frame_skip, {"default_camera_config": default_camera_config, **kwargs})
         self._near, self._distance, self._control = reward_near_weight, reward_dist_weight, reward_control_weight
         self._bodies = [self.body(name) for name in ("tips_arm", "object", "goal")]
-        self.start_draws = self._model.nv + 2 * _TRIES  # pyright: ignore[reportAttributeAccessIssue]
+        self.initial_draws = self._model.nv + 2 * _TRIES  # pyright: ignore[reportAttributeAccessIssue]
 
     def observed(self) -> Sequence[Observed]:
         """The table above."""
@@ -127,7 +127,7 @@ class Pusher(GymnasiumTask):
         memory = worlds.memory
         return worlds.qpos[:, :_ARM], worlds.qvel[:, :_ARM], memory["tip"], memory["object"], memory["goal"]
 
-    def start(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
+    def initial_state(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
         """The object anywhere in a box, but not near the goal; uniform noise of the arm's velocities."""
         nv = self._model.nv
         tries = np.asarray(draws[:, nv:], np.float64).reshape(-1, _TRIES, 2)

@@ -71,6 +71,10 @@ class GymnasiumTask(Task):
                     "with tightloop.view"
                 )
         self._model = export.compiled(_file_of(kind, xml_file))
+        # the import needs the package of MuJoCo
+        from tightloop.mujoco.batch.joints import JointMap
+
+        self._joints = JointMap(self._model)
         self._frame_skip = frame_skip
         self.dt: float = self._model.opt.timestep * frame_skip
 
@@ -103,16 +107,12 @@ class GymnasiumTask(Task):
 
     def state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> Mapping[str, NDArray[np.float64]]:
         """Convert MuJoCo's positions and velocities."""
-        # the import needs the package of MuJoCo
-        from tightloop.mujoco.batch.joints import JointMap
-
         nq, nv = self._model.nq, self._model.nv
         if qpos.shape[1:] != (nq,) or qvel.shape[1:] != (nv,):
             raise ArgumentError(
                 f"set_state: qpos has {qpos.shape[1:]} values per world and qvel {qvel.shape[1:]}; give {nq} and {nv}"
             )
-        joints = JointMap(self._model)
-        return {"joint_q": joints.positions(qpos), "joint_qd": joints.velocities(qpos, qvel)}
+        return {"joint_q": self._joints.positions(qpos), "joint_qd": self._joints.velocities(qpos, qvel)}
 
     def spread(self, draws: Array, scale: float) -> Array:
         """Return draws as uniform numbers from ``-scale`` to ``scale``, in float64."""

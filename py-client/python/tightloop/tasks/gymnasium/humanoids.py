@@ -55,7 +55,7 @@ class _Humanoid(GymnasiumTask):
         # gymnasium takes nothing but True
         self._shows = [flag is True for flag in rest]
         self._tendons = _tendons(self._model)
-        self.start_draws = self._model.nq + self._model.nv  # pyright: ignore[reportAttributeAccessIssue]
+        self.initial_draws = self._model.nq + self._model.nv  # pyright: ignore[reportAttributeAccessIssue]
         names = ("cinert", "cvel", "qfrc_actuator")
         own = [name for name, shows in zip(names, self._shows, strict=False) if shows]
         more = ("actuator_length", "actuator_velocity", "subtree_com")
@@ -81,7 +81,7 @@ class _Humanoid(GymnasiumTask):
         own = [memory[name][:, first:] for (name, first), shows in zip(lagging, self._shows, strict=True) if shows]
         return (worlds.qpos[:, self._first :], worlds.qvel, *own)
 
-    def start(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
+    def initial_state(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
         """Uniform noise."""
         noise = self.spread(draws, self._noise)
         return self.around_start(noise[:, : self._model.nq], noise[:, self._model.nq :])

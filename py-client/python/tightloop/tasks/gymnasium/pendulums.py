@@ -41,7 +41,7 @@ class InvertedPendulum(GymnasiumTask):
     ) -> None:
         super().__init__(xml_file, frame_skip, {"default_camera_config": default_camera_config, **kwargs})
         self._noise = reset_noise_scale
-        self.start_draws = self._model.nq + self._model.nv  # pyright: ignore[reportAttributeAccessIssue]
+        self.initial_draws = self._model.nq + self._model.nv  # pyright: ignore[reportAttributeAccessIssue]
 
     def observed(self) -> Sequence[Observed]:
         """The table above."""
@@ -51,7 +51,7 @@ class InvertedPendulum(GymnasiumTask):
         """The table above."""
         return worlds.qpos, worlds.qvel
 
-    def start(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
+    def initial_state(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
         """Uniform noise."""
         noise = self.spread(draws, self._noise)
         return self.around_start(noise[:, : self._model.nq], noise[:, self._model.nq :])
@@ -87,7 +87,7 @@ class InvertedDoublePendulum(GymnasiumTask):
     ) -> None:
         super().__init__(xml_file, frame_skip, {"default_camera_config": default_camera_config, **kwargs})
         self._healthy, self._noise = healthy_reward, reset_noise_scale
-        self.start_draws = self._model.nq + 2 * self._model.nv  # pyright: ignore[reportAttributeAccessIssue]
+        self.initial_draws = self._model.nq + 2 * self._model.nv  # pyright: ignore[reportAttributeAccessIssue]
 
     def observed(self) -> Sequence[Observed]:
         """The table above."""
@@ -106,7 +106,7 @@ class InvertedDoublePendulum(GymnasiumTask):
         velocities = xp.clip(worlds.qvel, -_MOST, _MOST)
         return place, xp.sin(angles), xp.cos(angles), velocities, worlds.memory["force"]
 
-    def start(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
+    def initial_state(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
         """Uniform noise of the positions, normal noise of the velocities."""
         nq = self._model.nq
         return self.around_start(self.spread(draws[:, :nq], self._noise), normal(draws[:, nq:], self._noise))

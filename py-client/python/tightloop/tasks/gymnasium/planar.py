@@ -39,7 +39,7 @@ class _Runner(GymnasiumTask):
         self._noise = noise
         self._first = self._plane if excludes else 0
         draws = self._model.nq + (2 if self._normal else 1) * self._model.nv
-        self.start_draws = draws  # pyright: ignore[reportAttributeAccessIssue]
+        self.initial_draws = draws  # pyright: ignore[reportAttributeAccessIssue]
 
     def observed(self) -> Sequence[Observed]:
         """The table above."""
@@ -51,7 +51,7 @@ class _Runner(GymnasiumTask):
         velocities = xp.clip(worlds.qvel, -_FASTEST, _FASTEST) if self._clips else worlds.qvel
         return worlds.qpos[:, self._first :], velocities
 
-    def start(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
+    def initial_state(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
         """Uniform noise of the positions; uniform or normal noise of the velocities."""
         nq = self._model.nq
         velocities = (normal if self._normal else self.spread)(draws[:, nq:], self._noise)
