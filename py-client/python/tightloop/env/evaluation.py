@@ -43,6 +43,9 @@ class Evaluation:
         self._privileged = ObservationPacker(privileged) if privileged else None
         self.terms = RewardTerms(task, worlds)
         self.worlds = Worlds()
+        # arrays that stay, and how the functions see them
+        self._shown: dict[str, tuple[NDArray[Any], NDArray[Any]]] = {}
+        self._memory: dict[str, NDArray[Any]] = {}
         self._has_start_infos = type(task).start_metrics is not Task.start_metrics
 
     @property
@@ -71,16 +74,18 @@ class Evaluation:
     def see(self, frame: Any, memory: Mapping[str, NDArray[Any]], **own: NDArray[Any]) -> None:
         """Show a frame, the task's memory and the environment's own arrays to the functions."""
 
-        def shown(array: NDArray[Any]) -> NDArray[Any]:
-            wrapped = self._pool.wrap(array)
-            wrapped.flags.writeable = False
-            return wrapped
+        def shown(name: str, array: NDArray[Any]) -> NDArray[Any]:
+            known = self._shown.get(name)
+            if known is None or known[0] is not array:
+                known = self._shown[name] = (array, self._pool.wrap(array))
+                known[1].flags.writeable = False
+            return known[1]
 
-        own_arrays = {name: shown(array) for name, array in own.items()}
-        remembered = {name: shown(array) for name, array in memory.items()}
+        if len(self._memory) != len(memory):  # whose arrays stay the same
+            self._memory = {name: shown(f"memory: {name}", array) for name, array in memory.items()}
         self.worlds = Worlds(
-            **own_arrays,
-            memory=remembered,
+            **{name: shown(name, array) for name, array in own.items()},
+            memory=self._memory,
             **{name: self._pool.wrap(getattr(frame, name)) for name in self._task.fields},
         )
 

@@ -68,14 +68,26 @@ class Worlds:
         raise UnknownAttribute(f"worlds have no {name!r}; {cure}; there are: {known}")
 
     def rows(self, rows: NDArray[np.intp]) -> Worlds:
-        """Return copies of some of the worlds, by index."""
+        """Return copies of some of the worlds, by index; each array is copied when it is read first."""
+        return _Rows(self, rows)
+
+
+class _Rows(Worlds):
+    """Some of the worlds."""
+
+    def __init__(self, worlds: Worlds, rows: NDArray[np.intp]) -> None:
+        self.__dict__.update(_worlds=worlds, _rows=rows)
+
+    def __getattr__(self, name: str) -> Any:
+        worlds, rows = self.__dict__["_worlds"], self.__dict__["_rows"]
 
         def of_rows(array: Any) -> Any:
             if isinstance(array, Mapping):
                 return {name: of_rows(part) for name, part in array.items()}
             return np.asarray(array)[rows]
 
-        return Worlds(**{name: of_rows(array) for name, array in self.__dict__.items()})
+        copied = self.__dict__[name] = of_rows(getattr(worlds, name))
+        return copied
 
 
 @checked_calls
