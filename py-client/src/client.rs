@@ -137,12 +137,20 @@ impl Client {
         py: Python<'_>,
         mask: Option<&Bound<'_, PyAny>>,
         seed: Option<&Bound<'_, PyAny>>,
+        joint_q: Option<&Bound<'_, PyAny>>,
+        joint_qd: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
+        let mut inputs = Inputs::new(&self.description);
+        inputs.add("joint_q", Axis::Coords, joint_q)?;
+        inputs.add("joint_qd", Axis::Dofs, joint_qd)?;
         let mask = Mask::new("mask", mask, self.description.worlds)?;
         let seed = Seed::new(seed, self.description.worlds)?;
-        let (mask, seed) = (mask.as_slice()?, seed.as_slice()?);
-        self.frame(py, |hook| connection.reset(mask, seed, hook))
+        let (states, mask, seed) = (inputs.commands()?, mask.as_slice()?, seed.as_slice()?);
+        if !states.is_empty() {
+            self.advice.write(py, &self.description, &states, mask)?;
+        }
+        self.frame(py, |hook| connection.reset_to(&states, mask, seed, hook))
     }
 
     fn forward(&self, py: Python<'_>) -> PyResult<PyFrame> {

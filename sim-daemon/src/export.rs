@@ -352,7 +352,20 @@ pub(crate) fn apply(
                 }
             }
         }
-        Op::Reset => simulation.reset(masked, seeds(inbox)?)?,
+        Op::Reset => {
+            let seeds = seeds(inbox)?;
+            let states = || inbox.arrays().filter(|row| row.name != SEED);
+            simulation.check_mask(masked)?;
+            for row in states() {
+                let (array, columns, values) = input(simulation, inbox, row)?;
+                simulation.check_write(array, &columns, values, masked)?;
+            }
+            simulation.reset(masked, seeds)?;
+            for row in states() {
+                let (array, columns, values) = input(simulation, inbox, row)?;
+                simulation.write(array, columns, values, masked)?;
+            }
+        }
         Op::Forward => {}
         Op::Snapshot => snapshot::save(simulation, inbox)?,
         Op::Restore => snapshot::restore(simulation, inbox, masked)?,
@@ -364,14 +377,13 @@ pub(crate) fn apply(
     })
 }
 
-/// The seeds of a reset, which takes no other array.
+/// Name of the seeds of a reset.
+const SEED: &str = "seed";
+
+/// The seeds of a reset; its other arrays are states.
 fn seeds(inbox: &Inbox) -> Result<Option<&[u64]>, Refusal> {
     let mut seeds = None;
-    for row in inbox.arrays() {
-        if row.name != "seed" {
-            let reason = format!("a reset takes no `{}`; it takes `seed`", row.name);
-            return Err(refusal(RefusalKind::Field, reason));
-        }
+    for row in inbox.arrays().filter(|row| row.name == SEED) {
         let Some(Numbers::U64(values)) = inbox.numbers(row) else {
             let reason = "`seed`: entries must be uint64".to_owned();
             return Err(refusal(RefusalKind::Shape, reason));

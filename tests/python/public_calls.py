@@ -175,7 +175,10 @@ CALLS: dict[str, Call] = {
         lambda world: world.sim.write,
         {"joint_q": "coordinates", "joint_qd": "command", "act": "values", "mask": "mask"} | OF_MODELS,
     ),
-    "Sim.reset": Call(lambda world: world.sim.reset, {"mask": "mask", "seed": "seed", "keyframe": "keyframe"}),
+    "Sim.reset": Call(
+        lambda world: world.sim.reset,
+        {"mask": "mask", "seed": "seed", "keyframe": "keyframe", "joint_q": "coordinates", "joint_qd": "command"},
+    ),
     "Sim.latest": Call(lambda world: world.sim.latest, {"timeout": "least 0"}),
     "Sim.restore": Call(lambda world: world.restore, {"snapshot": "snapshot", "worlds": "mask", "from_world": "index"}),
     "Sim.forward_kinematics": Call(lambda world: world.sim.forward_kinematics, {"joint_q": "coordinates"}),

@@ -57,6 +57,7 @@ def act(sim: tl.Sim, snapshots: list[tl.Snapshot], count: int, seed: int) -> boo
     kinds: list[Callable[[], object]] = [
         lambda: sim.reset(mask=rng.random(WORLDS) > 0.5),
         lambda: sim.reset(seed=rng.integers(0, 100, WORLDS)),
+        lambda: sim.reset(joint_q=rng.normal(size=(WORLDS, 2)), mask=rng.random(WORLDS) > 0.5),
         lambda: sim.write(joint_q=rng.normal(size=(WORLDS, 2)), mask=rng.random(WORLDS) > 0.5),
         lambda: sim.params.write(body_mass_scale=rng.uniform(0.5, 2, (WORLDS, 3))),
         lambda: sim.step(body_f=rng.normal(size=(WORLDS, 3, 6))),

@@ -210,3 +210,37 @@ def test_the_daemon_tells_the_scenes_it_draws_from(scattered, pendulum_urdf):
         assert "normal = [0.0, 0.05]" in drawn.info["scene"]
         assert drawn.info["model_hash"] != same.info["model_hash"]
         assert drawn.dynamics is not None, "the daemon's scene is read again"
+
+
+@pytest.mark.parametrize("precision", ["f32", "f64"])
+def test_a_reset_to_states_is_a_reset_and_a_write(scattered, precision):
+    rng = np.random.default_rng(0)
+    mask = np.array([True, False, True, True, False])
+    frames = []
+    with tl.launch(scattered, worlds=5, precision=precision) as sim:
+        joint_q = rng.normal(size=sim.reset(seed=3).joint_q.shape)
+        joint_qd = {"arm": rng.normal(size=(5, 2))}
+        for in_one in (True, False):
+            sim.reset(seed=7)
+            sim.step(joint_f=np.ones(8))
+            if in_one:
+                frame = sim.reset(mask=mask, seed=9, joint_q=joint_q, joint_qd=joint_qd)
+            else:
+                sim.reset(mask=mask, seed=9)
+                frame = sim.write(joint_q=joint_q, joint_qd=joint_qd, mask=mask)
+            frames.append([state(frame), frame.time.copy(), state(sim.step()), state(sim.reset(mask=mask))])
+    for one, two in zip(*frames, strict=True):
+        np.testing.assert_array_equal(one, two)
+    assert (frames[0][1] == 0).tolist() == mask.tolist()
+
+
+def test_a_reset_to_wrong_states_changes_nothing(pendulum):
+    with tl.launch(pendulum, worlds=2) as sim:
+        before = state(sim.step(joint_f=np.ones(2)))
+        with pytest.raises(tl.CommandRefused, match="joint_q"):
+            sim.reset(joint_q=np.full((2, 2), np.nan))
+        with pytest.raises(tl.CommandRefused, match="joint_qd"):
+            sim.reset(joint_qd=np.zeros((3, 2)))
+        np.testing.assert_array_equal(state(sim.forward()), before)
+        with pytest.raises(tl.ArgumentError, match="joint_q and joint_qd beside a keyframe"):
+            sim.reset(keyframe=0, joint_q=np.zeros(2))

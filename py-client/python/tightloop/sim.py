@@ -204,6 +204,8 @@ class Sim(Shown, Attributes):
         mask: ArrayLike | None = None,
         seed: int | Sequence[int] | NDArray[np.integer[Any]] | None = None,
         keyframe: str | int | None = None,
+        joint_q: Command | None = None,
+        joint_qd: Command | None = None,
     ) -> Frame:
         """Reset worlds to the scene's start or to a keyframe: state, ``time``, drive targets, and ``joint_f`` = 0.
 
@@ -222,18 +224,24 @@ class Sim(Shown, Attributes):
             keyframe: Keyframe of a MuJoCo model to write after the reset: its name, ``model/name``, or its place in
                 `keyframe_names`. It sets positions, velocities, ``act``, ``ctrl`` and mocap bodies of the whole scene:
                 what is not of that model is where the scene starts it, without draws. ``time`` begins at 0.
+            joint_q: Joint positions of these worlds instead of the scene's and of draws [rad or m], as in `write`. Not
+                with a keyframe.
+            joint_qd: Joint velocities, likewise [rad/s or m/s].
 
         Returns:
             A frame at the new state.
 
         Raises:
-            ArgumentError: There is no such keyframe, or several models have one of that name.
+            ArgumentError: There is no such keyframe, or several models have one of that name, or there are joint
+                positions or velocities beside a keyframe.
             TightloopError: As `step`.
         """
         if keyframe is None:
-            return self._client.reset(mask, seed)
+            return self._client.reset(mask, seed, joint_q, joint_qd)
+        if joint_q is not None or joint_qd is not None:
+            raise ArgumentError("reset: joint_q and joint_qd beside a keyframe; leave them out, or write them after it")
         more = keyframes.arrays(keyframes.find(self.info["keyframes"], keyframe))
-        self._client.reset(mask, seed)
+        self._client.reset(mask, seed, None, None)
         joint_q, joint_qd = more.pop("joint_q", None), more.pop("joint_qd", None)
         return self._client.write(
             joint_q, joint_qd, ready_arrays(self.info, lambda: self.params, "writes", more), mask, True

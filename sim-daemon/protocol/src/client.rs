@@ -216,9 +216,23 @@ impl Client {
         seed: Option<&[u64]>,
         hook: Hook<'_>,
     ) -> Result<Frame, ProtocolError> {
+        self.reset_to(&[], mask, seed, hook)
+    }
+
+    /// As [`Client::reset`], and then sets states of these worlds, before the frame is evaluated.
+    ///
+    /// # Errors
+    /// As [`Client::step`].
+    pub fn reset_to(
+        &self,
+        arrays: &[Command<'_>],
+        mask: Option<&[bool]>,
+        seed: Option<&[u64]>,
+        hook: Hook<'_>,
+    ) -> Result<Frame, ProtocolError> {
         let call = Call {
             seed,
-            ..Call::new(Op::Reset, &[], mask)
+            ..Call::new(Op::Reset, arrays, mask)
         };
         self.run(&call, hook)
     }

@@ -79,7 +79,7 @@ impl<'a> Call<'a> {
     pub(crate) fn check(&self, description: &Description) -> Result<(), ProtocolError> {
         let (worlds, arrays) = (description.worlds, self.arrays);
         let (inputs, verb): (&[InputInfo], _) = match self.op {
-            Op::Write => (&description.writes, "written"),
+            Op::Write | Op::Reset => (&description.writes, "written"),
             _ => (&description.commands, "commanded"),
         };
         if arrays.len() >= ROWS_MAX {
