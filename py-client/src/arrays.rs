@@ -131,7 +131,24 @@ fn place<T: Element + Copy, O: Number>(
         .map(|row| &mut row[columns.clone()]);
     let put =
         |x: T, k: usize| O::of(real(x)).within(O::of(f64::from(low[k])), O::of(f64::from(high[k])));
-    if view.ncols() == 1 {
+    let is_free =
+        low.iter().all(|&x| x == f32::NEG_INFINITY) && high.iter().all(|&x| x == f32::INFINITY);
+    if is_free {
+        for (to, from) in rows.zip(view.rows()) {
+            match from.as_slice() {
+                Some(from) => {
+                    for (to, x) in to.iter_mut().zip(from) {
+                        *to = O::of(real(*x));
+                    }
+                }
+                None => {
+                    for (to, x) in to.iter_mut().zip(from) {
+                        *to = O::of(real(*x));
+                    }
+                }
+            }
+        }
+    } else if view.ncols() == 1 {
         for (to, from) in rows.zip(view.column(0)) {
             to[0] = put(*from, 0);
         }
