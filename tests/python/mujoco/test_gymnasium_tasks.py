@@ -361,7 +361,7 @@ def test_states_are_set_in_some_worlds() -> None:
         assert env.step(np.zeros(2, np.float32))[4]["x_position"] == pytest.approx(0.5, abs=0.05)
     with closing(VectorEnv("CartPoleBalance", 1)) as envs:
         envs.reset()
-        with pytest.raises(ArgumentError, match="task CartPoleBalance has no `state`"):
+        with pytest.raises(ArgumentError, match="task CartPoleBalance has no `states_of`"):
             envs.set_state(np.zeros(2), np.zeros(2))
 
 

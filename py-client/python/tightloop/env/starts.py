@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tightloop import _core, checks
+from tightloop.env.episodes import Episodes
 from tightloop.env.evaluation import Evaluation
-from tightloop.env.task import Task
+from tightloop.env.task import Task, Worlds
 from tightloop.errors import ArgumentError
 from tightloop.sim import Sim
 
@@ -65,33 +66,39 @@ class Starts:
         """Set the levels of worlds that begin an episode."""
         self.level[mask] = self._next[mask]
 
-    def write(
+    def reset(
         self,
         sim: Sim,
         mask: NDArray[np.bool_],
-        evaluation: Evaluation,
-        seeds: NDArray[np.uint64],
-        episodes: NDArray[np.uint32],
+        seeds: NDArray[np.uint64] | None,
+        episodes: Episodes,
+        seen: Callable[[Any], Worlds],
     ) -> Any:
-        """Write the states that the task chooses; returns the frame there, or None if it chooses none.
+        """Reset worlds, to the states that the task chooses if it does; returns the frame there.
+
+        Args:
+            sim: The simulation.
+            mask: The worlds.
+            seeds: New seeds of all worlds, if they get any.
+            episodes: The episodes that begin.
+            seen: Makes worlds of a frame.
 
         Raises:
             ArgumentError: The states are no dict of arrays with a row per world.
             CommandRefused: A value is wrong.
         """
         if not self._writes:
-            return None
+            return sim.reset(mask=mask, seed=seeds)
         rows = np.flatnonzero(mask)
+        scene_start = _SceneStart(lambda: sim.reset(mask=mask, seed=seeds), seen, rows)
         count = self._task.initial_draws
         draws = np.empty((len(rows), count), np.float32)
-        _core.draw(seeds[rows], episodes[rows], _STATES, count, draws)
-        states = self._task.initial_state(np, evaluation.worlds.rows(rows), draws)
+        _core.draw(episodes.seeds[rows], episodes.numbers[rows], _STATES, count, draws)
+        states = self._task.initial_state(np, scene_start, draws)
         if not isinstance(states, Mapping):
             raise ArgumentError(
                 f"{self._name}.initial_state: got {type(states).__name__}; return a dict of arrays by name"
             )
-        if not states:
-            return None
         for name, state in states.items():
             own = np.asarray(state)
             if own.ndim == 0 or len(own) != len(rows) or own.dtype.kind not in "fiub":
@@ -103,4 +110,29 @@ class Starts:
             if whole is None or whole.shape[1:] != own.shape[1:]:
                 whole = self._arrays[name] = np.zeros((len(mask), *own.shape[1:]), own.dtype)
             whole[rows] = own
-        return sim.write(mask=mask, **{name: self._arrays[name] for name in states})
+        arrays = {name: self._arrays[name] for name in states}
+        frame = scene_start.frame
+        if frame is None and arrays.keys() <= {"joint_q", "joint_qd"}:
+            return sim.reset(mask=mask, seed=seeds, **arrays)
+        if frame is None:
+            frame = sim.reset(mask=mask, seed=seeds)
+        return sim.write(mask=mask, **arrays) if arrays else frame
+
+
+class _SceneStart(Worlds):
+    """Worlds as the scene starts them; they are reset when a task first reads something of them."""
+
+    def __init__(self, reset: Callable[[], Any], seen: Callable[[Any], Worlds], rows: NDArray[np.intp]) -> None:
+        self.__dict__.update(_reset=reset, _seen=seen, _rows=rows, _worlds=None, _frame=None)
+
+    @property
+    def frame(self) -> Any:
+        """Frame of the reset; None if nothing has been read."""
+        return self.__dict__["_frame"]
+
+    def __getattr__(self, name: str) -> Any:
+        own = self.__dict__
+        if own["_worlds"] is None:
+            own["_frame"] = own["_reset"]()
+            own["_worlds"] = own["_seen"](own["_frame"]).rows(own["_rows"])
+        return getattr(own["_worlds"], name)

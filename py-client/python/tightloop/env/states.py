@@ -30,7 +30,7 @@ class SettableState:
     _in_flight: bool
 
     def set_state(self, qpos: ArrayLike, qvel: ArrayLike, *, mask: NDArray[np.bool_] | None = None) -> None:
-        """Set positions and velocities of worlds, as `Task.state` defines them: for MuJoCo models as MuJoCo does.
+        """Set positions and velocities of worlds, as `Task.states_of` defines them: for MuJoCo models as MuJoCo does.
 
         The episodes go on from there; what a task remembers begins again.
 
@@ -40,7 +40,7 @@ class SettableState:
             mask: Worlds to set, bool, shape ``(num_envs,)``; all if left out.
 
         Raises:
-            ArgumentError: The task defines no `Task.state`, or an argument is not valid.
+            ArgumentError: The task defines no `Task.states_of`, or an argument is not valid.
             CommandRefused: There was no reset, or a step is in flight.
         """
         self._check_ready("set_state")
@@ -48,7 +48,7 @@ class SettableState:
         if every.shape != (self.num_envs,) or every.dtype != np.bool_ or not every.any():
             raise ArgumentError(f"set_state: mask is {mask!r:.80}; give bools of shape ({self.num_envs},), one True")
         given = [_rows(name, array, self.num_envs) for name, array in (("qpos", qpos), ("qvel", qvel))]
-        arrays = {name: np.ascontiguousarray(array) for name, array in self.task.state(*given).items()}
+        arrays = {name: np.ascontiguousarray(array) for name, array in self.task.states_of(*given).items()}
         # not `write`, which warns of quaternions in MuJoCo's order: any may be meant here
         joint_q, joint_qd = arrays.pop("joint_q", None), arrays.pop("joint_qd", None)
         frame = self.sim._client.write(joint_q, joint_qd, self.sim._arrays("writes", **arrays), every, True)

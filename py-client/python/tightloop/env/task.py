@@ -252,7 +252,7 @@ class Task:
         """Return values for ``infos`` of worlds that begin an episode, like `metrics`."""
         return {}
 
-    def state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> Mapping[str, Array]:
+    def states_of(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> Mapping[str, Array]:
         """Return states for `VectorEnv.set_state`, from positions and velocities as the task defines them.
 
         Args:
@@ -262,7 +262,7 @@ class Task:
         Returns:
             Arrays by name of an argument of `Sim.write`, such as ``joint_q``, shape ``(n, coords)``.
         """
-        raise _undefined(self, "state")
+        raise _undefined(self, "states_of")
 
     def remember(self, xp: Namespace, worlds: Worlds, memory: Mapping[str, Array] | None) -> Mapping[str, Array]:
         """Return what the task remembers of a step, by name, each of shape ``(worlds, …)``.

@@ -36,6 +36,8 @@ _CALLS = {
     "privileged_observed": (),
     "privileged_observe": _BY_WORLDS,
     "mirrored": (),
+    "start_metrics": _BY_WORLDS,
+    "states_of": ("qpos", "qvel"),
 }
 
 

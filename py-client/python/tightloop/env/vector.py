@@ -31,7 +31,7 @@ from tightloop.env.simulation import open_simulation
 from tightloop.env.starts import Starts
 from tightloop.env.states import SettableState
 from tightloop.env.step_buffers import BufferRing, StepBuffers
-from tightloop.env.task import Task, episode_steps
+from tightloop.env.task import Task, Worlds, episode_steps
 from tightloop.env.task_checks import check_task
 from tightloop.errors import ArgumentError, CommandRefused, DaemonLost, UnknownAttribute
 from tightloop.frames import FAULTED
@@ -230,7 +230,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         if seeds is not None:
             self._starts.seed(mask, seeds)
         with self._all_or_none():
-            self._begin(mask, self.sim.reset(mask=mask, seed=seeds))
+            self._begin(mask, seeds)
             self.evaluation.terms.begin(mask)
             self._done[mask] = self._spoiled[mask] = self._spoiled_start[mask] = False
             buffers, infos = self._next_buffers(), {}
@@ -309,7 +309,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         if begun is not None:
             begun = begun.copy()
             self._episodes.next(begun)
-            self._begin(begun, self.sim.reset(mask=begun))
+            self._begin(begun)
         self.evaluation.advance()
         self._score(buffers, infos, begun)
         np.logical_or(buffers.terminated, buffers.truncated, out=self._done)
@@ -357,7 +357,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         infos["final_obs"], infos["_final_obs"] = buffers.final_obs, ended
         infos["_final_info"] = ended.copy()
         self._episodes.next(ended)
-        self._begin(ended, self.sim.reset(mask=ended))
+        self._begin(ended)
         return ended
 
     @contextlib.contextmanager
@@ -369,16 +369,13 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
             self._ready, self._failed = False, True
             raise
 
-    def _begin(self, mask: NDArray[np.bool_], frame: Any) -> None:
-        """Start episodes of worlds that the daemon has reset."""
+    def _begin(self, mask: NDArray[np.bool_], seeds: NDArray[np.uint64] | None = None) -> None:
+        """Reset worlds, and start their episodes."""
         self._actions.begin(mask)
         self._starts.begin(mask)
-        self._see(frame)
         own = self._episodes
-        written = self._starts.write(self.sim, mask, self.evaluation, own.seeds, own.numbers)
-        if written is not None:
-            frame = written
-            self._see(frame)
+        frame = self._starts.reset(self.sim, mask, seeds, own, self._see)
+        self._see(frame)
         rows = np.flatnonzero(mask)
         self._disturbances.begin(rows, own.seeds, own.numbers)
         own.begin(mask, self.evaluation.worlds)
@@ -388,8 +385,8 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         if self._memory.is_used:
             self._see(frame)
 
-    def _see(self, frame: Any) -> None:
-        """Show a frame to the task's functions."""
+    def _see(self, frame: Any) -> Worlds:
+        """Show a frame to the task's functions; returns what they see."""
         self._frame = frame
         self.evaluation.see(
             frame,
@@ -400,6 +397,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
             goal=self._episodes.goal,
             elapsed=self._episodes.elapsed,
         )
+        return self.evaluation.worlds
 
     def _observe(self, out: NDArray[Any], begun: NDArray[np.bool_] | None = None) -> None:
         """Write observations; those of worlds in ``begun`` are the first ones of an episode."""

@@ -105,7 +105,7 @@ class GymnasiumTask(Task):
 
     # starts
 
-    def state(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> Mapping[str, NDArray[np.float64]]:
+    def states_of(self, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> Mapping[str, NDArray[np.float64]]:
         """Convert MuJoCo's positions and velocities."""
         nq, nv = self._model.nq, self._model.nv
         if qpos.shape[1:] != (nq,) or qvel.shape[1:] != (nv,):
@@ -120,7 +120,7 @@ class GymnasiumTask(Task):
 
     def around_start(self, positions: Array, velocities: Array) -> Mapping[str, Array]:
         """Return states that differ from the model's start by some positions and velocities."""
-        return self.state(self._model.qpos0 + positions, velocities)
+        return self.states_of(self._model.qpos0 + positions, velocities)
 
     # results, which `remember` has computed
 
