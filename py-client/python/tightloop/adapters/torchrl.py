@@ -118,4 +118,6 @@ class TorchRlEnv(envs.EnvBase):
 
     def _tensor(self, array: NDArray[Any]) -> Any:
         # `torch.tensor` copies, unlike `from_numpy`: rollouts keep these beyond the next step
-        return torch.tensor(array, device=self.device)
+        # policies are float32, also where observations are float64
+        dtype = torch.float32 if array.dtype == np.float64 else None
+        return torch.tensor(array, dtype=dtype, device=self.device)
