@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tightloop.command_arrays import ready_arrays
 from tightloop.errors import ArgumentError, CommandRefused
 from tightloop.inputs import reals
 
@@ -51,7 +52,8 @@ class SettableState:
         arrays = {name: np.ascontiguousarray(array) for name, array in self.task.states_of(*given).items()}
         # not `write`, which warns of quaternions in MuJoCo's order: any may be meant here
         joint_q, joint_qd = arrays.pop("joint_q", None), arrays.pop("joint_qd", None)
-        frame = self.sim._client.write(joint_q, joint_qd, self.sim._arrays("writes", **arrays), every, True)
+        more = ready_arrays(self.sim.info, lambda: self.sim.params, "writes", arrays)
+        frame = self.sim._client.write(joint_q, joint_qd, more, every, True)
         self._see(frame)
         self._memory.begin(np.flatnonzero(every), self.evaluation)
         self._see(frame)
