@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop._core import Frame
+from tightloop.command_arrays import ready_arrays
 from tightloop.frames import FAULTED
 from tightloop.launching import launch
 from tightloop.mujoco.batch.bindings import Bindings
@@ -223,7 +224,8 @@ class Engine:
     def _write_states(self, parts: dict[str, Array], mask: Mask | None = None) -> Frame:
         """Write states of MuJoCo's order, which the warnings of quaternions in another order would not fit."""
         joint_q, joint_qd = parts.pop("joint_q"), parts.pop("joint_qd")
-        return self.sim._client.write(joint_q, joint_qd, self.sim._arrays("writes", **parts), mask, True)
+        more = ready_arrays(self.sim.info, lambda: self.sim.params, "writes", parts)
+        return self.sim._client.write(joint_q, joint_qd, more, mask, True)
 
     def _commands(self, mask: Mask) -> tuple[dict[str, Array], Array]:
         """What worlds shall hold, by name, and joint forces: of the rows in the mask, elsewhere what they hold."""
