@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -12,7 +13,7 @@ from tightloop import _core, checks
 from tightloop.env.episodes import Episodes
 from tightloop.env.evaluation import Evaluation
 from tightloop.env.task import Task, Worlds
-from tightloop.errors import ArgumentError
+from tightloop.errors import ArgumentError, TightloopWarning
 from tightloop.sim import Sim
 
 #: Streams of random numbers: of first levels, and of states at the start.
@@ -112,11 +113,14 @@ class Starts:
             whole[rows] = own
         arrays = {name: self._arrays[name] for name in states}
         frame = scene_start.frame
-        if frame is None and arrays.keys() <= {"joint_q", "joint_qd"}:
-            return sim.reset(mask=mask, seed=seeds, **arrays)
-        if frame is None:
-            frame = sim.reset(mask=mask, seed=seeds)
-        return sim.write(mask=mask, **arrays) if arrays else frame
+        with warnings.catch_warnings():
+            if not self._task.warns_of_starts:
+                warnings.simplefilter("ignore", TightloopWarning)
+            if frame is None and arrays.keys() <= {"joint_q", "joint_qd"}:
+                return sim.reset(mask=mask, seed=seeds, **arrays)
+            if frame is None:
+                frame = sim.reset(mask=mask, seed=seeds)
+            return sim.write(mask=mask, **arrays) if arrays else frame
 
 
 class _SceneStart(Worlds):

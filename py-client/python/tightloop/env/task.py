@@ -174,6 +174,7 @@ class Task:
         goal_draws: Number of random numbers that `goal` takes per world.
         goal_steps: Control steps after which the next goal replaces a goal; None for one goal per episode.
         launch_options: Further arguments of `tightloop.launch`, such as ``bounds``.
+        warns_of_starts: Whether a warning tells of states of `initial_state` that are most likely a mistake.
         dtype: Type of observations and rewards, ``numpy.float32`` or ``numpy.float64``.
         reward_weights: Weight of each term that `reward_terms` returns.
         initial_draws: Number of random numbers that `initial_state` takes per world.
@@ -193,6 +194,7 @@ class Task:
     goal_draws: ClassVar[int] = 0
     goal_steps: ClassVar[int | None] = None
     launch_options: ClassVar[dict[str, Any]] = {}
+    warns_of_starts: ClassVar[bool] = True
     dtype: ClassVar[type[np.floating[Any]]] = np.float32
     goal_radius: ClassVar[float | None] = None
     reward_weights: Mapping[str, float] = {}

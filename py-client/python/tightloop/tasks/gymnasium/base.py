@@ -43,6 +43,8 @@ class GymnasiumTask(Task):
         start_infos: Names in ``infos`` of a reset.
     """
 
+    # Ant begins beyond its joint limits
+    warns_of_starts = False
     dtype = np.float64
     max_episode_steps = 1000
     step_infos: ClassVar[Sequence[str]] = ()
