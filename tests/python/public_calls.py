@@ -263,6 +263,7 @@ LEFT = {
     "Surface": "types of keyword arguments",
 }
 
+STATES = "this task defines no states: tests/python/mujoco/test_gymnasium_tasks.py has one that does"
 ENV_CALLS: dict[str, Call] = {
     "VectorEnv": Call(
         lambda _: env.VectorEnv,
@@ -286,7 +287,11 @@ ENV_CALLS: dict[str, Call] = {
     "VectorEnv.reset": Call(lambda world: world.envs.reset, {"seed": "env seed", "options": "options"}),
     "VectorEnv.send": Call(lambda world: world.envs.send, {"actions": "actions"}),
     "VectorEnv.step": Call(lambda world: world.envs.step, {"actions": "actions"}),
+    "VectorEnv.set_state": Call(
+        lambda world: world.envs.set_state, {}, {}, dict.fromkeys(("qpos", "qvel", "mask"), STATES)
+    ),
     "Env": Call(lambda _: env.Env, {"task": "task"}),
+    "Env.set_state": Call(lambda world: world.single.set_state, {}, {}, dict.fromkeys(("qpos", "qvel"), STATES)),
     "Env.reset": Call(lambda world: world.single.reset, {"seed": "single seed", "options": "options"}),
     "Env.step": Call(lambda world: world.single.step, {"action": "action"}),
     "JointTorque": Call(

@@ -36,6 +36,7 @@ SAID = {
     ("launch", "device"): r"device|adapter|gpu|GPU",
     ("launch", "on_fault"): "on.fault",
     ("launch", "on_nan"): "on.nan",
+    ("launch", "outputs_at"): "outputs.at",
     ("launch", "params"): "parameter|params",
     ("Scene.load", "path"): "path|/nowhere",
     ("Sim.view", "worlds"): r"worlds",
