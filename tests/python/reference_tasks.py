@@ -89,6 +89,37 @@ def lift(world: World) -> Told:
     return Told([*(q[:9] - start), *qd[:9], *cube, *goal, *world["action"]], reward, success=error < 0.025)
 
 
+def quadruped(world: World) -> Told:
+    q, qd, action, command, phase = (world[name] for name in ("joint_q", "joint_qd", "action", "goal", "phase"))
+    x, y, z, w = q[3:7]
+    axes = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
+        [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
+        [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    velocity, turning = ([dot(axis, part) for axis in axes] for part in (qd[:3], qd[3:6]))
+    gravity = [-axis[2] for axis in axes]
+    turned = q[7:] - np.array([0.0, 0.8, -1.6] * 4)
+    lift = [0.07 * max(0.0, math.sin(phase)), 0.07 * max(0.0, -math.sin(phase))]
+    feet = [site[2] - 0.02 - lift[pair] for site, pair in zip(world["site_q"], (0, 1, 1, 0), strict=True)]
+    fell = gravity[2] > -0.5 or q[2] < 0.15
+    terms = (
+        (1.5, math.exp(-4 * math.dist(command[:2], velocity[:2]) ** 2)),
+        (0.75, math.exp(-4 * (command[2] - turning[2]) ** 2)),
+        (-1.0, velocity[2] ** 2),
+        (-0.05, dot(turning[:2], turning[:2])),
+        (-2.5, dot(gravity[:2], gravity[:2])),
+        (-2e-4, dot(world["joint_torque"][6:], world["joint_torque"][6:])),
+        (-0.01, math.dist(action, world["previous_action"]) ** 2),
+        (1.0, math.exp(-200 * dot(feet, feet))),
+        (-0.1, dot(turned, turned)),
+        (-50.0, float(fell)),
+    )
+    clock = [math.sin(phase), math.cos(phase)]
+    obs = [*velocity, *turning, *gravity, *command, *turned, *qd[6:], *action, *clock]
+    return Told(obs, 0.02 * sum(weight * term for weight, term in terms), terminated=fell)
+
+
 PLAIN: dict[str, Callable[[World], Told]] = {
     "CartPoleBalance": cart_pole_balance,
     "CartPoleSwingUp": cart_pole_swing_up,
@@ -96,6 +127,7 @@ PLAIN: dict[str, Callable[[World], Told]] = {
     "FrankaPushCube": push_cube,
     "FrankaPickCube": pick_cube,
     "FrankaLift": lift,
+    "QuadrupedVelocityFlat": quadruped,
 }
 
 
@@ -133,6 +165,8 @@ def any_worlds(envs: Any, count: int, seed: int) -> Worlds:
     arrays["joint_qd"] = near(arrays["joint_qd"], 0.01, 0.25, 5.0)
     arrays["action"], arrays["previous_action"] = rng.uniform(-1, 1, (2, count, *envs.single_action_space.shape))
     arrays["goal"] = np.zeros((count, 0))
+    if "joint_torque" in arrays:
+        return _walking(envs.task, arrays, near, turned, rng)
     if "site_q" in arrays:
         tcp = arrays["site_q"]
         tcp[:, 0, :3], tcp[:, 0, 3:] = near(np.full((count, 3), 0.1), 0.3), turned((count, 4))
@@ -154,6 +188,24 @@ def any_worlds(envs: Any, count: int, seed: int) -> Worlds:
     return Worlds(elapsed=elapsed, **{name: array.astype(np.float32) for name, array in arrays.items()})
 
 
+def _walking(task: Any, arrays: dict[str, Any], near: Any, turned: Any, rng: np.random.Generator) -> Worlds:
+    """Worlds of robots that walk, upright or not, and in any phase."""
+    count = len(arrays["joint_q"])
+    tilt = near(np.zeros((count, 3)), 0.0, 0.1, 1.0)
+    quats = np.concatenate([tilt, np.ones((count, 1))], 1)
+    arrays["joint_q"][:, 3:7] = quats / np.linalg.norm(quats, axis=1, keepdims=True)
+    arrays["joint_q"][:, 2] = near(np.full(count, 0.25), 0.2)
+    arrays["joint_torque"] = near(arrays["joint_torque"], 10.0)
+    arrays["site_q"] = near(arrays["site_q"], 0.1)
+    arrays["goal"] = rng.choice([0.0, 1.0], (count, 1)) * rng.uniform(-1, 1, (count, 3))
+    plain = {name: array.astype(np.float32) for name, array in arrays.items()}
+    before = dict(task.remember(np, Worlds(**plain), None))
+    before["phase"] = rng.uniform(0, 2 * np.pi, count).astype(np.float32)
+    return Worlds(**plain, elapsed=np.zeros(count, np.int32), memory=task.remember(np, Worlds(**plain), before))
+
+
 def one(worlds: Worlds, world: int) -> World:
-    """A world of these, in float64."""
-    return {name: np.asarray(array)[world].astype(np.float64) for name, array in vars(worlds).items()}
+    """A world of these, in float64, what it remembers included."""
+    all_arrays = {**vars(worlds), **vars(worlds).get("memory", {})}
+    arrays = {name: array for name, array in all_arrays.items() if name != "memory"}
+    return {name: np.asarray(array)[world].astype(np.float64) for name, array in arrays.items()}

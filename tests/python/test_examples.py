@@ -19,6 +19,7 @@ RUNS = {
     "franka_grasp.py": ("--worlds 8 --out {out}", r"\d+ of 8 worlds lifted the cube"),
     "newton_lesson.py": ("--worlds 4", r"target demo: joint 4 from -2\.\d+ to -1\.\d+ rad"),
     "own_task.py": ("", r"mean reward of random actions: \d"),
+    "own_quadruped.py": ("", r"mean reward of random actions: -?\d"),
     "randomized_push.py": ("--worlds 32 --out {out}", r"\d+ of 32 within 1 cm"),
 }
 PICTURES = {"franka_lesson.py", "franka_grasp.py", "randomized_push.py"}

@@ -97,7 +97,7 @@ def test_a_world_is_a_function_of_its_seed(envs: Any) -> None:
 def test_functions_on_an_arena_take_no_memory_of_the_size_of_the_worlds(envs: Any) -> None:
     many, pool = 65536, ArrayPool()
     first, second = any_worlds(envs, many, seed=5), any_worlds(envs, many, seed=6)
-    pooled = Worlds(**{field: pool.wrap(array) for field, array in vars(first).items()})
+    pooled = Worlds(**{field: wrapped(pool, array) for field, array in vars(first).items()})
     # an array of one number a world is 256 kB. NumPy's own buffers, for what has another type or no even stride, are of
     # 8192 numbers for each of up to three operands, and go when the operation ends
     least, buffers = 4 * many, 3 * 4 * 8192
@@ -114,9 +114,23 @@ def test_functions_on_an_arena_take_no_memory_of_the_size_of_the_worlds(envs: An
         assert most < buffers < least / 2, f"{function} takes {most} bytes"
         assert kept < least / 8, f"{function} keeps {kept} bytes"
         for field, array in vars(second).items():
-            np.copyto(getattr(first, field), array)
+            overwrite(getattr(first, field), array)
         pool.play(tape)
         same(call(np, pooled), call(np, second))
+
+
+def wrapped(pool: ArrayPool, array: Any) -> Any:
+    """An array in the pool, or all arrays of a memory."""
+    if isinstance(array, dict):
+        return {name: pool.wrap(part) for name, part in array.items()}
+    return pool.wrap(array)
+
+
+def overwrite(array: Any, new: Any) -> None:
+    for name in new if isinstance(new, dict) else ():
+        np.copyto(array[name], new[name])
+    if not isinstance(new, dict):
+        np.copyto(array, new)
 
 
 def same(pooled: Any, plain: Any) -> None:

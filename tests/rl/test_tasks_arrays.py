@@ -38,7 +38,13 @@ def envs(request: pytest.FixtureRequest) -> Iterator[Any]:
 
 def test_functions_are_the_same_on_arrays_of_other_libraries(envs: Any, namespace: Any) -> None:
     task, worlds = envs.task, any_worlds(envs, WORLDS, seed=1)
-    theirs = Worlds(**{field: namespace.asarray(array) for field, array in vars(worlds).items()})
+
+    def converted(array: Any) -> Any:
+        if isinstance(array, dict):
+            return {name: namespace.asarray(part) for name, part in array.items()}
+        return namespace.asarray(array)
+
+    theirs = Worlds(**{field: converted(array) for field, array in vars(worlds).items()})
     draws = np.random.default_rng(2).uniform(size=(WORLDS, max(1, task.goal_draws))).astype(np.float32)
     given, made = task.goal(np, worlds, draws), task.goal(namespace, theirs, namespace.asarray(draws))
     compare(given, made, 1.0)

@@ -126,7 +126,7 @@ class QuadrupedVelocityFlat(Task):
         return xp.stack([most * signed[:, axis] * moves for axis, most in enumerate((SPEED, SIDE, TURN))], 1)
 
     def remember(self, xp: Namespace, worlds: Worlds, memory: Mapping[str, Array] | None) -> Mapping[str, Array]:
-        """Return velocities in the trunk's axes, time of each foot in the air, and the mean error."""
+        """Return velocities in the trunk's axes, the phase, how far feet are from their gait, and the mean error."""
         quats = worlds.joint_q[:, 3:7]
         velocity = rotate_inverse(xp, quats, worlds.joint_qd[:, 0:3])
         turning = rotate_inverse(xp, quats, worlds.joint_qd[:, 3:6])
@@ -136,31 +136,32 @@ class QuadrupedVelocityFlat(Task):
         if memory is not None:
             error = memory["error"] + 0.03 * (error - memory["error"])
             phase = (memory["phase"] + 2.0 * np.pi * GAIT * CONTROL_DT) * (squares(xp, worlds.goal) > 0.0)
+        # a trot: diagonal feet swing together
+        swing = xp.sin(phase)
+        lift = SWING * xp.stack([xp.maximum(swing, 0.0 * swing), xp.maximum(-swing, 0.0 * swing)], 1)
+        feet = worlds.site_q[:, self._feet, 2] - FOOT - lift[:, DIAGONALS]
         return {
             "velocity": velocity,
             "turning": turning,
             "gravity": projected_gravity(xp, quats),
             "phase": phase,
+            "clock": xp.stack([swing, xp.cos(phase)], 1),
+            "feet": squares(xp, feet),
             "error": error,
         }
 
     def observe(self, xp: Namespace, worlds: Worlds) -> Sequence[Array]:
         """Return the parts of the table above."""
         own = worlds.memory
-        turned = worlds.joint_q[:, self._joints] - self._standing
+        turned = worlds.joint_q[:, self._joints] - xp.asarray(self._standing)
         moving = worlds.joint_qd[:, self._dofs]
-        clock = xp.stack([xp.sin(own["phase"]), xp.cos(own["phase"])], 1)
-        return own["velocity"], own["turning"], own["gravity"], worlds.goal, turned, moving, worlds.action, clock
+        return own["velocity"], own["turning"], own["gravity"], worlds.goal, turned, moving, worlds.action, own["clock"]
 
     def reward_terms(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
         """Return the terms, before their weights."""
         own = worlds.memory
         velocity, turning, gravity, command = own["velocity"], own["turning"], own["gravity"], worlds.goal
         turn = command[:, 2] - turning[:, 2]
-        # a trot: diagonal feet swing together
-        swing = xp.sin(own["phase"])
-        lift = SWING * xp.stack([xp.maximum(swing, 0.0 * swing), xp.maximum(-swing, 0.0 * swing)], 1)
-        feet = worlds.site_q[:, self._feet, 2] - FOOT - lift[:, DIAGONALS]
         return {
             "follow velocity": xp.exp(-4.0 * squares(xp, command[:, :2] - velocity[:, :2])),
             "follow turn": xp.exp(-4.0 * turn * turn),
@@ -169,8 +170,8 @@ class QuadrupedVelocityFlat(Task):
             "tilt": squares(xp, gravity[:, :2]),
             "torque": squares(xp, worlds.joint_torque[:, self._dofs]),
             "action rate": squares(xp, worlds.action - worlds.previous_action),
-            "gait": xp.exp(-200.0 * squares(xp, feet)),
-            "pose": squares(xp, worlds.joint_q[:, self._joints] - self._standing),
+            "gait": xp.exp(-200.0 * own["feet"]),
+            "pose": squares(xp, worlds.joint_q[:, self._joints] - xp.asarray(self._standing)),
             "fall": 1.0 * self.terminated(xp, worlds),
         }
 
