@@ -12,7 +12,7 @@ from tightloop.env import AutoresetMode, VectorEnv
 
 WORLDS = 256
 SEED = 1_000_000  # of the first world; no training comes there
-UNITS = {"error": "m"}  # of the metrics of tightloop's tasks; the others have none
+UNITS = {"error": "m", "velocity_error": "mps"}  # of the metrics of tightloop's tasks; the others have none
 NO_METRICS = ("fault", "final_obs", "final_info")  # in infos
 
 

@@ -19,7 +19,7 @@ control at 50 Hz, episodes of 20 s. Rewards and rates follow legged_gym (Rudin e
 | 0–11 | ±4 | a target 0.3 rad from standing |
 
 The reward is the weighted sum of the terms of `QuadrupedVelocityFlat.reward_terms`. An episode ends when the trunk
-tilts by more than 60° or is closer than 15 cm to the ground. ``error`` in ``infos`` is the distance of the velocity
+tilts by more than 60° or is closer than 15 cm to the ground. ``velocity_error`` in ``infos`` is the distance of the velocity
 from the command in the plane [m/s], a mean over about a second.
 """
 
@@ -180,8 +180,8 @@ class QuadrupedVelocityFlat(Task):
         return (worlds.memory["gravity"][:, 2] > -0.5) | (worlds.joint_q[:, 2] < 0.15)
 
     def metrics(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
-        """Return ``error``, the mean distance of the velocity from the command [m/s], and ``fell``."""
-        return {"error": worlds.memory["error"], "fell": self.terminated(xp, worlds)}
+        """Return ``velocity_error``, the mean distance of the velocity from the command [m/s], and ``fell``."""
+        return {"velocity_error": worlds.memory["error"], "fell": self.terminated(xp, worlds)}
 
     def mirrored(self) -> Mirror:
         """Return left and right exchanged."""
