@@ -70,6 +70,7 @@ class Config:
     kl: float = 0.01  # change of the policy that the learning rate aims at, a rollout; a tenth of it at the end
     std: float = 0.6  # standard deviation of actions at the start
     grad_max: float = 1.0  # norm of a gradient, at most
+    reward_scale: float = 1.0  # of the rewards that are learned from, which should be some hundredths a step
     symmetry: bool = False  # whether to learn from the mirror image too, if the task has one
     evaluate: float = 15.0  # seconds between evaluations
     total: int = 0  # env steps after which to stop, instead of minutes; the same run then has the same bits
@@ -92,6 +93,7 @@ PRESETS = {
         60.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=60.0
     ),
     "QuadrupedVelocityFlat": Config(5.0, 2048, 16, epochs=4, gamma=0.97, kl=0.02, std=0.7, evaluate=60.0),
+    "Ant-v5": Config(10.0, 1024, 16, epochs=4, kl=0.02, std=0.4, reward_scale=0.02, evaluate=60.0),
     "FrankaLift": Config(minutes=30.0, num_envs=2048, gamma=0.98, hidden=256, entropy=0.005, evaluate=60.0),
 }
 
@@ -243,7 +245,7 @@ class Trainer:
 
     def _seen(self, obs: NDArray[np.float32], infos: dict[str, Any]) -> tuple[Tensor, Tensor]:
         """What actor and critic see."""
-        own = torch.from_numpy(obs).to(self.device)
+        own = torch.from_numpy(obs).to(self.device, torch.float32)
         return own, torch.from_numpy(infos["privileged"]).to(self.device) if "privileged" in infos else own
 
     def begin(self) -> tuple[Tensor, Tensor]:
@@ -269,14 +271,14 @@ class Trainer:
             rollout.value[step] = agent.value(rollout.critic_obs[step])
             obs, reward, terminated, truncated, infos = self.envs.step(action.cpu().numpy())
             seen = self._seen(obs, infos)
-            rollout.reward[step].copy_(torch.from_numpy(reward))
+            rollout.reward[step].copy_(torch.from_numpy(reward)).mul_(config.reward_scale)
             rollout.done[step].copy_(torch.from_numpy(terminated | truncated))
             self.statistics.see(reward, terminated | truncated, infos)
             cut = np.flatnonzero(truncated & ~terminated)
             if len(cut):
                 last = infos["final_info"].get("privileged", infos["final_obs"])[cut]
                 rollout.reward[step, torch.from_numpy(cut)] += config.gamma * agent.value(
-                    torch.from_numpy(last).to(self.device)
+                    torch.from_numpy(last).to(self.device, torch.float32)
                 )
         rollout.look_back(agent.value(seen[1]), config)
         self.steps += config.steps * config.num_envs
@@ -346,14 +348,12 @@ class Trainer:
     @property
     def progress(self) -> float:
         """Share of the run that is over, from 0 to 1."""
-        if self.config.total:
-            return min(1.0, self.steps / self.config.total)
-        return min(1.0, self.seconds / (60.0 * self.config.minutes))
+        minutes, total = self.config.minutes, self.config.total
+        return min(1.0, self.steps / total if total else self.seconds / (60.0 * minutes))
 
     def _follow(self, kl: float, progress: float) -> None:
         """Let the learning rate follow how much the policy changes."""
-        group = self.optimizer.param_groups[0]
-        aim = self.config.kl * (1.0 - 0.9 * progress**4)
+        group, aim = self.optimizer.param_groups[0], self.config.kl * (1.0 - 0.9 * progress**4)
         if kl > 2.0 * aim:
             group["lr"] = max(1e-5, group["lr"] / 1.2)
         elif 0.0 < kl < 0.5 * aim:
@@ -362,7 +362,7 @@ class Trainer:
     @torch.no_grad()
     def act(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
         """The most likely actions."""
-        return self.acting(torch.from_numpy(obs).to(self.device)).cpu().numpy()
+        return self.acting(torch.from_numpy(obs).to(self.device, torch.float32)).cpu().numpy()
 
     def run(self, log: SummaryWriter) -> None:
         """Train until the run is over; checkpoints and evaluations on the way."""
@@ -398,9 +398,9 @@ class Trainer:
 
     def _is_due(self, shown: float) -> bool:
         """Whether to evaluate, some time after the last one: seconds, or steps if the run ends by these."""
-        if self.config.total:
-            return self.steps - shown >= self.config.evaluate_steps or self.progress >= 1.0
-        return self.seconds - shown >= self.config.evaluate or self.progress >= 1.0
+        by_steps = self.steps - shown >= self.config.evaluate_steps
+        by_time = self.seconds - shown >= self.config.evaluate
+        return (by_steps if self.config.total else by_time) or self.progress >= 1.0
 
     def save(self) -> None:
         """Write the checkpoint."""

@@ -27,6 +27,7 @@ PICTURES = {"franka_lesson.py", "franka_grasp.py", "randomized_push.py"}
 TRAINING = {
     "play.py": "tests/rl/test_ppo.py",
     "ppo.py": "tests/rl/test_ppo.py",
+    "sim2sim.py": "tests/rl/test_trained.py",
     "train_rsl_rl.py": "tests/rl/test_train_examples.py",
     "train_sb3.py": "tests/rl/test_train_examples.py",
 }
@@ -34,6 +35,7 @@ TRAINING = {
 LIBRARIES = {
     "play.py": "matplotlib onnxruntime",
     "ppo.py": "matplotlib onnxscript tensorboard torch tqdm",
+    "sim2sim.py": "mujoco onnxruntime",
     "train_rsl_rl.py": "onnxscript rsl-rl-lib torch tqdm",
     "train_sb3.py": "stable-baselines3 torch tqdm",
 }
