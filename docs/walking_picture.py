@@ -66,9 +66,7 @@ def main() -> None:
     finally:
         envs.close()
     duration = round(1000 * EVERY * envs.control_dt)
-    images[0].save(
-        path, save_all=True, append_images=images[1:], duration=duration, loop=0, quality=QUALITY, method=6
-    )
+    images[0].save(path, save_all=True, append_images=images[1:], duration=duration, loop=0, quality=QUALITY, method=6)
     print(f"{path}: {len(images)} pictures, {path.stat().st_size / 1e3:.0f} kB")
 
 
