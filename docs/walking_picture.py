@@ -2,7 +2,8 @@
 
     python docs/walking_picture.py [FILE]
 
-Runs the trained policy of QuadrupedVelocityFlat, draws on the CPU and writes an animated WebP; two minutes on two cores.
+Runs the trained policy of QuadrupedVelocityFlat, draws on the CPU and writes an animated WebP;
+two minutes on two cores.
 """
 
 from __future__ import annotations
