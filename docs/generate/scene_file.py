@@ -111,6 +111,17 @@ TABLES = (
         "The field `contact_sensor` holds their forces.",
     ),
     Table(
+        "[[height_scan]]",
+        "sensors.rs",
+        "HeightScanTable",
+        ("height_scan",),
+        '[[height_scan]]\nname = "a"\ncounts = [1, 1]\nspacing = [0.1, 0.1]\n',
+        '[[shape]]\nname = "ground"\ntype = "plane"\n\n[[body]]\nname = "foot"\npos = [0, 0, 0.1]\n\n'
+        '[[shape]]\nbody = "foot"\ntype = "sphere"\nradius = 0.05\n\n'
+        '[[height_scan]]\nname = "below"\nbody = "foot"\ncounts = [17, 11]\nspacing = [0.1, 0.1]\n',
+        "The field `height_scan` holds how high the frame is above the ground.",
+    ),
+    Table(
         "[randomize]",
         "randomize.rs",
         "RandomizeTable",

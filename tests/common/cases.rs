@@ -1,6 +1,6 @@
 //! Robots and shapes for tests of stages, and states that take every path through them.
 
-use super::shapes::shapes as every_shape;
+use super::shapes::{on_a_field as every_shape_on_a_field, shapes as every_shape};
 use sim_model::{
     Body, Collision, Cone, Description, Model, MujocoOptions, Pose, Shape, Site, UrdfOptions,
 };
@@ -42,7 +42,7 @@ struct Near {
 }
 
 /// All of them.
-pub fn cases() -> [Case; 10] {
+pub fn cases() -> [Case; 11] {
     [
         fr3(),
         every_joint(),
@@ -54,6 +54,7 @@ pub fn cases() -> [Case; 10] {
         mujoco("implicit"),
         mujoco("runge_kutta"),
         sensors(),
+        fields(),
     ]
 }
 
@@ -151,6 +152,21 @@ pub fn shapes(cone: Cone, contacts_max: Option<usize>) -> Case {
             Cone::Elliptic => "elliptic",
             Cone::Pyramidal => "pyramidal",
         },
+        m: constants(&model),
+        near: Some(Near {
+            joint_q: model.start().joint_q.clone(),
+            share: 0.0,
+            apart: 0.08,
+            turn: 1.0,
+        }),
+    }
+}
+
+/// A body with one shape of every kind on a height field, and a scan of the ground below it.
+pub fn fields() -> Case {
+    let model = every_shape_on_a_field().compile().unwrap();
+    Case {
+        name: "fields",
         m: constants(&model),
         near: Some(Near {
             joint_q: model.start().joint_q.clone(),

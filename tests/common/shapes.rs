@@ -1,7 +1,7 @@
 //! A scene in which shapes of every kind touch.
 
-use sim_model::geometry::{Hull, Mesh, TriMesh};
-use sim_model::{Body, Collision, Cone, Description, Pose, Shape, Surface};
+use sim_model::geometry::{HeightField, Hull, Mesh, TriMesh};
+use sim_model::{Body, Collision, Cone, Description, HeightScan, Pose, Shape, Surface};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -58,6 +58,40 @@ pub fn shapes(cone: Cone) -> Description {
         .shapes
         .push((Collision::new(None, edge, Pose::identity()), 400.0));
     scene.add_body(small).unwrap();
+    scene
+}
+
+/// A body with one shape of every kind but the plane, on rough ground, and a scan of that ground.
+pub fn on_a_field() -> Description {
+    let mut scene = Description::new(1.0 / 480.0, 8);
+    let heights = (0..7 * 9).map(|k: usize| (k * 37 % 11) as f64 * 0.01);
+    let field = HeightField::new([7, 9], heights.collect(), [0.8, 0.6], 0.2).unwrap();
+    let turned = Pose {
+        pos: [0.05, -0.02, 0.01],
+        ..Pose::about([0.0, 0.0, 1.0], 0.4)
+    };
+    scene.add_shape("", Shape::HeightField(Arc::new(field)), turned);
+    let mut body = Body::new("body", Pose::at([0.0, 0.0, 0.12]));
+    let places = [
+        [0.06, 0.0, 0.0],
+        [-0.06, 0.0, 0.0],
+        [0.0, 0.06, 0.0],
+        [0.0, -0.06, 0.0],
+        [0.0, 0.0, 0.06],
+    ];
+    for (shape, place) in every_kind(0.03).into_iter().zip(places) {
+        let shape = Collision::new(None, shape, Pose::at(place));
+        body.shapes.push((shape, 1000.0));
+    }
+    scene.add_body(body).unwrap();
+    scene.height_scans.push(HeightScan {
+        name: "scan".to_owned(),
+        body: Some("body".to_owned()),
+        pos: [0.02, 0.0, 0.0],
+        counts: [4, 3],
+        spacing: [0.06, 0.05],
+        reach: 1.0,
+    });
     scene
 }
 

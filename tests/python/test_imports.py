@@ -49,6 +49,7 @@ LAYERS = (
         "tightloop.body",
         "tightloop.distributions",
         "tightloop.entity",
+        "tightloop.height_fields",
         "tightloop.joint_order",
         "tightloop.mujoco_model",
         "tightloop.robot",
@@ -62,7 +63,7 @@ LAYERS = (
         "tightloop.sensors",
         "tightloop.shapes",
     ),
-    ("tightloop.scene",),
+    ("tightloop.scene", "tightloop.terrain"),
     # what a running simulation is made of
     (
         "tightloop.command_arrays",

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tightloop import assets as assets
+    from tightloop import terrain as terrain
     from tightloop._core import Frame, __version__
     from tightloop.body import Body
     from tightloop.distributions import Normal, Uniform
@@ -166,10 +167,10 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     # Lazy (PEP 562): the daemon also starts through this package, and must not wait for the import of NumPy.
-    if name == "assets":
-        import tightloop.assets
+    if name in ("assets", "terrain"):
+        from importlib import import_module
 
-        return tightloop.assets
+        return import_module(f"tightloop.{name}")
     home = _HOME_OF.get(name)
     if home is None:
         if name.startswith("_"):

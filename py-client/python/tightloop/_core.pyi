@@ -94,6 +94,9 @@ class Frame:
     """Angular velocity of each site, in its own axes [rad/s], ``(worlds, sites, 3)``."""
     accelerometer: NDArray[Any]
     """Acceleration of each site minus gravity, in its own axes [m/s²], ``(worlds, sites, 3)``; 9.81 upwards at rest."""
+    height_scan: NDArray[Any]
+    """Height of each scan's frame above the ground under each of its rays [m], scans one after another, x innermost,
+    ``(worlds, scan_rays)``; negative where the ground is higher than the frame."""
     xpos: NDArray[Any]
     """Origin of each body of MuJoCo models in the world [m], the world of each model first, ``(worlds, nbody, 3)``."""
     xquat: NDArray[Any]

@@ -101,6 +101,12 @@ def triple(what: str, values: Vector, *, error: type[Exception] = SceneError) ->
     return x, y, z
 
 
+def pair(what: str, values: Vector, *, error: type[Exception] = SceneError) -> tuple[float, float]:
+    """Check two finite floats."""
+    x, y = _numbers(what, values, 2, error)
+    return x, y
+
+
 def quaternion(what: str, values: Vector) -> Quaternion:
     """Check and normalise a unit quaternion (x, y, z, w)."""
     x, y, z, w = _numbers(what, values, 4)

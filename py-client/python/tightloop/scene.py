@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tightloop import _core, advice, checks, notebook
+from tightloop import _core, advice, checks, height_fields, notebook
 from tightloop.body import Body
 from tightloop.checks import Vector
 from tightloop.errors import SceneError, UrdfError
@@ -316,8 +316,8 @@ class Scene(SceneRandomization):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the scene as a TOML file. Paths in it are relative if they share a folder with the file.
 
-        MuJoCo models are copied into the folder ``NAME_models`` beside it. An existing file is replaced as a whole or,
-        after an error, not at all.
+        MuJoCo models are copied into the folder ``NAME_models`` beside it, height fields into ``NAME_fields``. An
+        existing file is replaced as a whole or, after an error, not at all.
 
         Args:
             path: The file.
@@ -327,7 +327,12 @@ class Scene(SceneRandomization):
         """
         file = checks.path("save: path", path)
         kept = {model.name: keep_beside(file, model) for model in self.models.values()}
-        _core.save_scene(self._json(kept), str(file))
+        paths = {
+            shape.name: height_fields.keep_beside(file, shape.name, shape.path)
+            for shape in self.shapes.values()
+            if shape.type == "hfield" and shape.path is not None
+        }
+        _core.save_scene(self._json(kept, paths), str(file))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Scene:
@@ -379,13 +384,18 @@ class Scene(SceneRandomization):
         for shape in data.get("shape", ()):
             if "path" in shape:
                 shape["path"] = folder / shape["path"]
-            getattr(scene, f"add_{shape.pop('type')}")(**shape)
+            kind = shape.pop("type")
+            if kind == "hfield":
+                shape["elevation"] = shape.pop("path")
+            getattr(scene, f"add_{kind}")(**shape)
         for pair in data.get("contact_filters", ()):
             scene.filter_contacts(*pair)
         for site in data.get("site", ()):
             scene.add_site(**site)
         for sensor in data.get("contact_sensor", ()):
             scene.add_contact_sensor(**sensor)
+        for scan in data.get("height_scan", ()):
+            scene._load_height_scan(scan)
         scene._load_offsets(data.get("randomize", {}))
         return scene
 
@@ -405,9 +415,10 @@ class Scene(SceneRandomization):
         parts = f"robots={[*self.robots]}, models={[*self.models]}, bodies={[*self.bodies]}, shapes={[*self.shapes]}"
         return f"Scene(dt={self.dt:.6g}, substeps={self.substeps}, {parts})"
 
-    def _json(self, models: Mapping[str, Path] | None = None) -> str:
-        """Return the scene as JSON; ``models`` are files to name in the place of those of the models."""
+    def _json(self, models: Mapping[str, Path] | None = None, fields: Mapping[str, Path] | None = None) -> str:
+        """Return the scene as JSON, with other files of its models and height fields where these are given."""
         files = {name: {"model": str(file)} for name, file in (models or {}).items()}
+        paths = {name: {"path": str(file)} for name, file in (fields or {}).items()}
         return json.dumps(
             {
                 "dt": self.dt,
@@ -421,7 +432,7 @@ class Scene(SceneRandomization):
                 "contact_filters": self.filters,
                 "solver": asdict(self._solver),
                 "randomize": self._offsets,
-                "shape": [shape.table() for shape in self.shapes.values()],
+                "shape": [shape.table() | paths.get(shape.name, {}) for shape in self.shapes.values()],
                 "robot": [robot.table() for robot in self.robots.values()],
                 "mujoco": [model.table() | files.get(model.name, {}) for model in self.models.values()],
                 "body": [body.table() for body in self.bodies.values()],

@@ -11,7 +11,7 @@ from tightloop.checks import Vector
 from tightloop.errors import SceneError
 from tightloop.robot import Link
 from tightloop.scene_shapes import Collidable, SceneShapes, free_name
-from tightloop.sensors import ContactSensor, Site
+from tightloop.sensors import ContactSensor, HeightScan, Site
 from tightloop.shapes import ORIGIN, UPRIGHT
 from tightloop.signatures import checked_calls
 
@@ -20,12 +20,13 @@ from tightloop.signatures import checked_calls
 class SceneSensors(SceneShapes):
     """Mixin of `Scene` with its sensors."""
 
-    __slots__ = ("contact_sensors", "sites")
+    __slots__ = ("contact_sensors", "height_scans", "sites")
 
     def __init__(self) -> None:
         super().__init__()
         self.sites: dict[str, Site] = ByName("site")
         self.contact_sensors: dict[str, ContactSensor] = ByName("contact sensor")
+        self.height_scans: dict[str, HeightScan] = ByName("height scan")
 
     def add_site(
         self,
@@ -110,6 +111,79 @@ class SceneSensors(SceneShapes):
         self.contact_sensors[name] = sensor
         return sensor
 
+    def add_height_scan(
+        self,
+        *,
+        body: Body | Link | str | None = None,
+        pos: Vector = ORIGIN,
+        size: Vector = (1.6, 1.0),
+        shape: tuple[int, int] = (17, 11),
+        reach: float = 10.0,
+        name: str | None = None,
+    ) -> HeightScan:
+        """Add a height scan: how far the ground is below a frame, at the points of a grid that turns with its yaw.
+
+        The ground is the static planes and height fields of the scene; other shapes are not seen. The field
+        ``height_scan``, shape ``(worlds, rays)``, has all scans one after another; ``launch(fields=...)`` asks for it.
+        A value is the height of the frame above the ground [m], negative where the ground is higher.
+
+        Args:
+            body: Body that carries the grid, a robot's link (``robot.link("trunk")``), or the name of either; links of
+                a MuJoCo model as ``"model/body"``. None for a grid that is fixed in the world.
+            pos: Middle of the grid in the frame of the body [m].
+            size: Lengths of the grid along x and y of the frame [m].
+            shape: Rays along x and y.
+            reach: The value where the ground is farther away, or where there is none [m].
+            name: Unique name; ``scan``, ``scan_2``, … if left out.
+
+        Returns:
+            The scan; ``frame.height_scan[:, scan.rays]`` are its values, x innermost.
+
+        Raises:
+            SceneError: A value is out of range, or the body does not exist; the message names it.
+        """
+        taken = self.height_scans
+        name = checks.name("height scan", free_name("scan", taken) if name is None else name, [*taken])
+        what = f"height scan `{name}`"
+        lengths = checks.pair(f"{what}: size", size)
+        counts = tuple(checks.integer(f"{what}: shape", count) for count in shape)
+        if len(counts) != 2:
+            raise SceneError(f"{what}: shape is {shape!r}; give the numbers of rays along x and y")
+        scan = HeightScan(
+            name=name,
+            body=None if body is None else self._bearer(what, body),
+            pos=checks.triple(f"{what}: pos", pos),
+            counts=(counts[0], counts[1]),
+            # a line of one ray has no spacing; any number above 0 will do
+            spacing=(
+                checks.number(f"{what}: size along x", lengths[0], above=0.0) / max(1, counts[0] - 1),
+                checks.number(f"{what}: size along y", lengths[1], above=0.0) / max(1, counts[1] - 1),
+            ),
+            reach=checks.number(f"{what}: reach", reach, above=0.0),
+            first=sum(other.counts[0] * other.counts[1] for other in taken.values()),
+        )
+        self.height_scans[name] = scan
+        return scan
+
+    def _load_height_scan(self, table: dict[str, Any]) -> None:
+        """Add the scan of a table of a scene file."""
+        counts, spacing = table.pop("counts"), table.pop("spacing")
+        size = [max(1, count - 1) * step for count, step in zip(counts, spacing, strict=True)]
+        self.add_height_scan(size=size, shape=tuple(counts), **table)
+
+    def _bearer(self, what: str, body: Body | Link | str) -> str:
+        """Return the name of what carries a sensor: also a body of a MuJoCo model, ``model/body``."""
+        if isinstance(body, str):
+            model, slash, link = body.partition("/")
+            if slash and model in self.models:
+                known = self.models[model].body_names
+                if body not in known and link not in known:
+                    raise SceneError(
+                        f"{what}: model `{model}` has no body `{link}`; its bodies are: {', '.join(known)}"
+                    )
+                return body
+        return self._carrier(what, body)
+
     def _frame(self, what: str, frame: Site | Body | Link | str) -> str:
         """Return the name of a reference frame."""
         if isinstance(frame, Site):
@@ -129,10 +203,14 @@ class SceneSensors(SceneShapes):
     def _sensor_tables(self) -> dict[str, Any]:
         """Return sites and sensors in the form of a scene file."""
 
-        def table(thing: Site | ContactSensor) -> dict[str, Any]:
+        def table(thing: Site | ContactSensor | HeightScan) -> dict[str, Any]:
             return {name: value for name, value in vars(thing).items() if value is not None}
 
         return {
             "site": [table(site) for site in self.sites.values()],
             "contact_sensor": [table(sensor) for sensor in self.contact_sensors.values()],
+            "height_scan": [
+                {name: value for name, value in table(scan).items() if name != "first"}
+                for scan in self.height_scans.values()
+            ],
         }

@@ -7,7 +7,7 @@ import os
 from collections.abc import Container
 from typing import TYPE_CHECKING, Any
 
-from tightloop import _core, checks
+from tightloop import _core, checks, height_fields
 from tightloop.attributes import ByName, nearest
 from tightloop.body import Body
 from tightloop.checks import Vector
@@ -30,6 +30,8 @@ from tightloop.shapes import (
 from tightloop.signatures import checked_calls
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     # typing has it from Python 3.11 on, the package runs on 3.10
     from typing_extensions import Unpack
 
@@ -186,6 +188,50 @@ class SceneShapes(SceneOptions):
             "notes": tuple(summary["notes"]),
         }
         return self._add_shape("mesh", name, body, density, surface, mesh=mesh, pos=pos, quat=quat)
+
+    @with_surface
+    def add_hfield(
+        self,
+        elevation: ArrayLike | str | os.PathLike[str],
+        *,
+        size: Vector,
+        base: float = 1.0,
+        pos: Vector = ORIGIN,
+        quat: Vector = UPRIGHT,
+        name: str | None = None,
+        **surface: Unpack[Surface],
+    ) -> Shape:
+        """Add a height field: terrain that never moves, one for all worlds.
+
+        Each cell has two triangles, as in MuJoCo; their common edge goes from the corner of lowest x and y to that of
+        highest. The solid below each triangle touches on its own. A pair of shapes keeps eight contacts: of more, the
+        deepest and those that are farthest from the ones kept.
+
+        Args:
+            elevation: Elevations [m], shape ``(rows, columns)``, rows along x: row 0 is at the lowest y. Or a ``.npy``
+                file with them.
+            size: Lengths along x and y [m]. The field is centred at ``pos``.
+            base: Thickness of the ground below the lowest elevation [m].
+            pos: Middle of the field in the world; elevations count from its z [m].
+            quat: Orientation in the world (x, y, z, w).
+            name: Unique name; ``hfield``, ``hfield_2``, … if left out.
+            **surface: Contact parameters, see `add_box`.
+
+        Returns:
+            The shape; ``path`` is the file of its elevations.
+
+        Raises:
+            SceneError: A value is out of range; the message names it.
+        """
+        if isinstance(elevation, str | os.PathLike):
+            file = height_fields.checked("add_hfield: elevation", checks.path("add_hfield: elevation", elevation))
+        else:
+            file = height_fields.cached(height_fields.elevations("add_hfield: elevation", elevation))
+        lengths = checks.pair("add_hfield: size", size)
+        checks.number("add_hfield: smallest of size", min(lengths), above=0.0)
+        thickness = checks.number("add_hfield: base", base, above=0.0)
+        field = {"path": file, "size": lengths, "base": thickness}
+        return self._add_shape("hfield", name, None, None, surface, mesh=field, pos=pos, quat=quat)
 
     @with_surface
     def add_plane(

@@ -1,4 +1,4 @@
-"""Sensors of a scene: sites, and sums of contact forces."""
+"""Sensors of a scene: sites, sums of contact forces, and height scans."""
 
 from __future__ import annotations
 
@@ -42,6 +42,34 @@ class ContactSensor:
     name: str
     of: str
     against: str | None
+
+
+@dataclass(frozen=True)
+class HeightScan:
+    """A grid of vertical rays under a frame, made by `Scene.add_height_scan`.
+
+    Attributes:
+        name: Name.
+        body: Body or ``robot/link`` that carries it; None for the world.
+        pos: Middle of the grid in the frame of the body [m].
+        counts: Rays along x and y.
+        spacing: Distances between neighbouring rays along x and y [m].
+        reach: The distance where the ground is farther away, or where there is none [m].
+        first: Its first ray in ``height_scan``.
+    """
+
+    name: str
+    body: str | None
+    pos: Triple
+    counts: tuple[int, int]
+    spacing: tuple[float, float]
+    reach: float
+    first: int
+
+    @property
+    def rays(self) -> slice:
+        """Its rays in the second axis of ``height_scan``, x innermost."""
+        return slice(self.first, self.first + self.counts[0] * self.counts[1])
 
 
 def slices_by_name(names: list[str], places: list[list[int]]) -> dict[str, slice]:

@@ -11,7 +11,7 @@ from tightloop.checks import Quaternion, Triple, Vector
 from tightloop.errors import SceneError
 from tightloop.signatures import with_arguments
 
-ShapeType = Literal["plane", "box", "sphere", "cylinder", "capsule", "mesh"]
+ShapeType = Literal["plane", "box", "sphere", "cylinder", "capsule", "mesh", "hfield"]
 
 ORIGIN = (0.0, 0.0, 0.0)
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -52,7 +52,9 @@ class Shape:
 
     Attributes:
         body: Name of its body, or ``robot/link``; None for a static shape.
-        path: File of a mesh; ``notes`` say how the mesh was changed.
+        path: File of a mesh, ``notes`` say how the mesh was changed; or of the elevations of a height field.
+        size: Lengths of a height field along x and y [m].
+        base: Thickness of a height field below its lowest elevation [m].
     """
 
     name: str
@@ -63,6 +65,8 @@ class Shape:
     radius: float | None = None
     half_height: float | None = None
     path: Path | None = None
+    size: tuple[float, float] | None = None
+    base: float | None = None
     scale: Triple | None = None
     max_hull_vertices: int | None = None
     convex_decomposition: bool | None = None

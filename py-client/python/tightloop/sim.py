@@ -423,7 +423,7 @@ class Sim(Shown, Attributes):
             frame: A frame with ``body_q``, or with ``geom_xpos`` and ``geom_xmat``; that of `forward` if left out.
 
         Raises:
-            ArgumentError: A shape, dtype or value is wrong, or a geom that counts is a height field or an SDF.
+            ArgumentError: A shape, dtype or value is wrong, or a geom that counts is an SDF.
             SceneError: A model's file cannot be read here, or no model of the scene has geoms.
             UnknownField: The frame has no poses.
         """

@@ -148,12 +148,15 @@ pub enum ModelError {
 
     /// A plane that is part of a link or body.
     #[error(
-        "{what}: a plane has no end and thus no mass, so neither link nor body bears one; add it to the scene as a static shape, or make it a box"
+        "{what}: a plane has no end and thus no mass, nor has a height field, so neither link nor body bears one; add it to the scene as a static shape, or make it a box"
     )]
     PlaneBorne {
         /// The shape.
         what: String,
     },
+    /// A height field that cannot be used: which one and why, with the cure.
+    #[error("{0}: {1}")]
+    HeightField(String, String),
 
     /// A robot without any link.
     #[error("robot `{robot}` has no links; a robot needs at least one <link>")]
@@ -416,7 +419,6 @@ pub enum ModelError {
         /// The joints of the circle.
         joints: Vec<String>,
     },
-
     /// A mesh file that cannot be used.
     #[error("{owner}mesh {}: {reason}", path.display())]
     Mesh {

@@ -5,8 +5,10 @@ use crate::distribution::Distribution;
 use sim_physics::constants::Constants;
 use sim_physics::constants::Sizes;
 use sim_physics::constants::contact::FrictionCombine;
+use sim_physics::constants::field::FieldTables;
 use sim_physics::constants::mujoco::Mujoco;
-use sim_physics::lane::Fixed;
+use sim_physics::constants::scan::HeightScan;
+use sim_physics::lane::{Fixed, Table};
 use std::ops::Range;
 
 /// Where a robot's rows lie in the arrays of the scene.
@@ -215,6 +217,7 @@ impl Model {
             contacts: self.contacts_max(),
             shapes: self.shape_names.len(),
             sites: self.site_names.len(),
+            scan_rays: self.constants.scans.iter().map(HeightScan::rays).sum(),
             contact_sensors: self.contact_sensors.len(),
             actuators: self.actuator_names.len(),
             activations: self.constants.mujoco.activations,
@@ -264,10 +267,13 @@ impl Model {
         let text = text.replace(&format!(", mujoco: {:?}", Mujoco::<f64>::default()), "");
         let text = text
             .replace(", mocap_pos: [], mocap_quat: [], eq_active: []", "")
+            .replace(", scans: []", "")
             .replace(", turns: None", "")
             .replace(", link_axes: None", "")
             .replace(&format!(", turning: {:?}", Fixed::default()), "")
             .replace(&no_clusters(), "")
+            .replace(&no_fields()[0], "")
+            .replace(&no_fields()[1], "")
             .replace(&largest_friction(), "");
         text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| {
             (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
@@ -279,6 +285,22 @@ impl Model {
 fn largest_friction() -> String {
     let (combine, none) = (FrictionCombine::Max, Fixed::default());
     format!(", combine: {combine:?}, keeps_max: {none:?}")
+}
+
+/// What the `Debug` text of a model says where it has no height field.
+fn no_fields() -> [String; 2] {
+    let (fields, candidates) = (
+        FieldTables::default(),
+        Table {
+            base: 0,
+            stride: 1,
+            rows: 0,
+        },
+    );
+    [
+        format!(", fields: {fields:?}"),
+        format!(", field_candidates: {candidates:?}, field_prisms: {candidates:?}"),
+    ]
 }
 
 /// What the `Debug` text of a model says where no hull has clusters of vertices.

@@ -45,7 +45,7 @@ impl Body {
     fn inertial(&self) -> Result<Option<Inertial>, ModelError> {
         let mut shapes: Option<Inertial> = None;
         for (index, (collision, density)) in self.shapes.iter().enumerate() {
-            if collision.shape == Shape::Plane {
+            if matches!(collision.shape, Shape::Plane | Shape::HeightField(_)) {
                 let owner = format!("body `{}`", self.name);
                 let what = collision_name(&owner, index, collision);
                 return Err(ModelError::PlaneBorne { what });

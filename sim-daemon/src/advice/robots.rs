@@ -73,7 +73,7 @@ fn falls(scene: &Description, robot: &Robot) -> Option<String> {
 /// Whether a robot could stand on something: on a table alone, one that is held is meant to be held.
 fn has_floor(scene: &Description) -> bool {
     let mut shapes = scene.shapes.iter();
-    shapes.any(|shape| matches!(shape.shape, Shape::Plane))
+    shapes.any(|shape| matches!(shape.shape, Shape::Plane | Shape::HeightField(_)))
 }
 
 /// A robot with feet that hangs at its base.

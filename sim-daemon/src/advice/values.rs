@@ -78,7 +78,9 @@ fn empty(scene: &Description) -> Option<String> {
 pub(super) fn has_loose(scene: &Description) -> bool {
     let mut joints = scene.robots.iter().flat_map(|robot| &robot.joints);
     let floats = joints.any(|joint| joint.kind == JointKind::Free && joint.parent.is_none());
-    let has_ground = scene.shapes.iter().any(|shape| shape.shape == Shape::Plane);
+    let mut shapes = scene.shapes.iter();
+    let has_ground =
+        shapes.any(|shape| matches!(shape.shape, Shape::Plane | Shape::HeightField(_)));
     floats && has_ground
 }
 

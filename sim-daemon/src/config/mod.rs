@@ -29,7 +29,7 @@ pub use randomize::{DistributionTable, ParamTable, RandomizeTable};
 pub use robots::{ModeName, RobotTable};
 pub(crate) use scene::SCENE_MAX;
 pub use scene::{ConeName, SceneFile, SolverTable, load, parse};
-pub use sensors::{ContactSensorTable, SiteTable};
+pub use sensors::{ContactSensorTable, HeightScanTable, SiteTable};
 pub use shapes::{ShapeName, ShapeTable};
 pub use sim_engine::backend::BackendError;
 pub use sim_engine::dynamics::Dynamics;

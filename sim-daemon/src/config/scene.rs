@@ -15,7 +15,7 @@ use super::number::Number;
 use super::paths;
 use super::randomize::{RandomizeTable, param};
 use super::robots::RobotTable;
-use super::sensors::{ContactSensorTable, SiteTable};
+use super::sensors::{ContactSensorTable, HeightScanTable, SiteTable};
 use super::shapes::ShapeTable;
 use crate::output;
 
@@ -90,6 +90,9 @@ pub struct SceneFile {
         skip_serializing_if = "Vec::is_empty"
     )]
     pub contact_sensors: Vec<ContactSensorTable>,
+    /// Grids of vertical rays under frames.
+    #[serde(default, rename = "height_scan", skip_serializing_if = "Vec::is_empty")]
+    pub height_scans: Vec<HeightScanTable>,
 }
 
 fn gravity() -> [Number; 3] {
@@ -334,6 +337,11 @@ impl SceneFile {
         description.sites = self.sites.iter().map(SiteTable::site).collect();
         let sensors = self.contact_sensors.iter();
         description.contact_sensors = sensors.map(ContactSensorTable::sensor).collect();
+        description.height_scans = self
+            .height_scans
+            .iter()
+            .map(HeightScanTable::scan)
+            .collect();
         self.randomize.write(&mut description)?;
         description.validate()?;
         Ok(description)

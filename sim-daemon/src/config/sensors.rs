@@ -1,7 +1,7 @@
-//! What a scene file has of sensors: sites, and sums of contact forces.
+//! What a scene file has of sensors: sites, sums of contact forces, and height scans.
 
 use serde::{Deserialize, Serialize};
-use sim_model::{ContactSensor, Site};
+use sim_model::{ContactSensor, HeightScan, Site};
 
 use super::number::Number;
 use super::pose::{no_rotation, pose};
@@ -44,6 +44,45 @@ pub struct ContactSensorTable {
     /// What they come from, named alike; left out, everything.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub against: Option<String>,
+}
+
+/// A grid of vertical rays under a frame, which turns with its yaw.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HeightScanTable {
+    /// Its name among the height scans.
+    pub name: String,
+    /// Name of the body that carries it, or `robot/link`; left out, it stands in the world.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body: Option<String>,
+    /// Middle of the grid in the world, or in the frame of what carries it [m].
+    #[serde(default)]
+    pub pos: [Number; 3],
+    /// Rays along x and y of the frame.
+    pub counts: [usize; 2],
+    /// Distances between neighbouring rays along x and y [m].
+    pub spacing: [Number; 2],
+    /// The value where the ground is farther away, or where there is none; left out, 10 [m].
+    #[serde(default = "reach")]
+    pub reach: Number,
+}
+
+fn reach() -> Number {
+    Number(10.0)
+}
+
+impl HeightScanTable {
+    /// The scan that it stands for.
+    pub(super) fn scan(&self) -> HeightScan {
+        HeightScan {
+            name: self.name.clone(),
+            body: self.body.clone(),
+            pos: self.pos.map(|x| x.0),
+            counts: self.counts,
+            spacing: self.spacing.map(|x| x.0),
+            reach: self.reach.0,
+        }
+    }
 }
 
 impl SiteTable {

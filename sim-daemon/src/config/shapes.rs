@@ -1,9 +1,10 @@
 //! Shapes of a scene file: static ones, and those of bodies and links.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use sim_model::geometry::MeshOptions;
+use sim_model::geometry::{HeightField, MeshOptions};
 use sim_model::{Collision, Pose, Shape, Surface};
 
 use super::error::ConfigError;
@@ -30,7 +31,7 @@ pub struct ShapeTable {
     /// Half of the height of a cylinder, or of that between the half spheres of a capsule [m].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub half_height: Option<Number>,
-    /// Mesh file.
+    /// Mesh file, or elevations of a height field as numpy.save writes them, rows along x [m].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
     /// Factor on each axis of a mesh file; left out, 1 [–].
@@ -39,6 +40,12 @@ pub struct ShapeTable {
     /// Most vertices of a mesh's convex hull, 8 to 1024; left out, 64.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_hull_vertices: Option<usize>,
+    /// Lengths of a height field along x and y [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub size: Option<[Number; 2]>,
+    /// Thickness of a height field below its lowest elevation; left out, 1 [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base: Option<Number>,
     /// Whether a concave mesh becomes several convex hulls; left out, it becomes one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub convex_decomposition: Option<bool>,
@@ -97,6 +104,8 @@ pub enum ShapeName {
     Capsule,
     /// Triangles of a file, of which the convex hull touches.
     Mesh,
+    /// What lies below a grid of elevations.
+    Hfield,
 }
 
 impl ShapeTable {
@@ -118,6 +127,9 @@ impl ShapeTable {
             }
             (Some(_), _) if self.kind == ShapeName::Plane => {
                 "a plane has no end and thus no mass, so it has no body; leave `body` out, or make it a box".to_owned()
+            }
+            (Some(_), _) if self.kind == ShapeName::Hfield => {
+                "a height field is static, so it has no body; leave `body` out, or make it a mesh".to_owned()
             }
             (Some(_), Some(_)) if self.link().is_some() => {
                 "a link has the mass that its robot's file gives it, so its shape has no density; leave it out".to_owned()
@@ -168,12 +180,14 @@ impl ShapeTable {
             ShapeName::Cylinder => ("cylinder", &["radius", "half_height"]),
             ShapeName::Capsule => ("capsule", &["radius", "half_height"]),
             ShapeName::Mesh => ("mesh", &["path"]),
+            ShapeName::Hfield => ("hfield", &["path", "size"]),
         };
         let given = [
             ("half_extents", self.half_extents.is_some()),
             ("radius", self.radius.is_some()),
             ("half_height", self.half_height.is_some()),
             ("path", self.path.is_some()),
+            ("size", self.size.is_some()),
         ];
         let refuse = |reason| {
             let shape = self.called(index);
@@ -201,6 +215,10 @@ impl ShapeTable {
                 return refuse(format!("a {kind} has no {entry}; leave it out"));
             }
         }
+        if self.base.is_some() && self.kind != ShapeName::Hfield {
+            return refuse(format!("a {kind} has no base; leave it out"));
+        }
+        let path = || base_dir.join(self.path.as_deref().unwrap_or(Path::new("")));
         let radius = self.radius.unwrap_or_default().0;
         let half_height = self.half_height.unwrap_or_default().0;
         Ok(match self.kind {
@@ -218,7 +236,7 @@ impl ShapeTable {
                 half_height,
             },
             ShapeName::Mesh => {
-                let path = base_dir.join(self.path.as_deref().unwrap_or(Path::new("")));
+                let path = path();
                 let scale = self
                     .scale
                     .map_or([1.0; 3], |scale| scale.map(|axis| axis.0));
@@ -228,6 +246,13 @@ impl ShapeTable {
                     convex_decomposition: self.convex_decomposition.unwrap_or_default(),
                 };
                 return Shape::mesh(&path, scale, &options)
+                    .or_else(|error| refuse(error.to_string()));
+            }
+            ShapeName::Hfield => {
+                let size = self.size.unwrap_or_default().map(|length| length.0);
+                let base = self.base.map_or(1.0, |base| base.0);
+                return HeightField::load(&path(), size, base)
+                    .map(|field| Shape::HeightField(Arc::new(field)))
                     .or_else(|error| refuse(error.to_string()));
             }
         })

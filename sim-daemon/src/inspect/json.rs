@@ -87,6 +87,11 @@ fn collision(collision: &Collision) -> Value {
             half_height,
         } => json!({ "radius": radius, "half_height": half_height }),
         Shape::Mesh(mesh) => mesh_properties(mesh),
+        Shape::HeightField(field) => json!({
+            "samples": [field.rows, field.columns],
+            "size": field.half.map(|half| 2.0 * half),
+            "elevation": field.range(),
+        }),
     };
     value["name"] = json!(collision.name);
     value["type"] = json!(collision.shape.kind());

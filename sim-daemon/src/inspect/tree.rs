@@ -202,6 +202,17 @@ fn shape(properties: &Properties, collision: &Collision) -> String {
             short(*radius),
             short(2.0 * half_height)
         ),
+        Shape::HeightField(field) => {
+            let [low, high] = field.range();
+            let [x, y] = field.half.map(|half| short(2.0 * half));
+            format!(
+                "height field of {} × {} samples over {x} × {y} m, {} to {} m high",
+                field.rows,
+                field.columns,
+                short(low),
+                short(high)
+            )
+        }
         Shape::Mesh(mesh) => {
             // meshes of a MuJoCo model have names instead of files
             let file = match &properties.robot.urdf {

@@ -204,13 +204,15 @@ def test_a_shape_of_the_scene_on_a_link_is_seen_with_its_geoms():
     assert {"looks/dressed/extra", "looks/dressed/plain"} <= names and "looks/dressed/hull" not in names
 
 
-def test_what_is_not_shown_is_named():
-    xml = """<mujoco model="m"><asset><hfield name="hills" nrow="3" ncol="3" size="1 1 .1 .1"/></asset><worldbody>
+def test_height_fields_are_seen():
+    xml = """<mujoco model="m"><asset><hfield name="hills" nrow="3" ncol="4" size="1 1 .1 .1"
+    elevation="0 1 2 3 4 5 6 7 8 9 10 11"/></asset><worldbody>
     <geom name="hills" type="hfield" hfield="hills" contype="0" conaffinity="0"/><geom name="ball" size=".1"/>
     </worldbody></mujoco>"""
     found = parts_of(tl.Scene.from_mujoco(spec(xml)))
-    assert [part.name for part in found.of("visual")] == ["m/world/ball"]
-    assert len(found.notes) == 1 and "`hills`" in found.notes[0] and "height field" in found.notes[0]
+    hills = {part.name: part for part in found.of("visual")}["m/world/hills"]
+    assert not found.notes and hills.shape == "hfield"
+    np.testing.assert_allclose([hills.mesh.vertices.min(0), hills.mesh.vertices.max(0)], [(-1, -1, -0.1), (1, 1, 0.1)])
 
 
 def test_a_model_without_geoms_shows_its_joints():

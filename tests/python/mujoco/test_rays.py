@@ -244,12 +244,27 @@ HILL = """<mujoco><asset><hfield name="hill" nrow="3" ncol="3" size="1 1 1 .1" e
 </worldbody></mujoco>"""
 
 
-def test_a_height_field_is_refused_unless_it_is_left_out() -> None:
-    with live(HILL, worlds=2, fields=("body_q",)) as run:
-        with pytest.raises(tl.ArgumentError, match=r"geom `m/hill`: no support for mjGEOM_HFIELD; leave it out"):
-            run.sim.rays((0, 0, 1), (0, 0, -1))
-        found = run.sim.rays((0, 0, 1), (0, 0, -1), geomgroup=[1, 1, 1, 1, 0, 1])
-        np.testing.assert_allclose(found.dist, 0.9)
+def test_rays_meet_height_fields_where_those_of_mujoco_do() -> None:
+    model = mujoco.MjModel.from_xml_string(HILL)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    rng = np.random.default_rng(5)
+    # MuJoCo's field has a box of its base inside, which rays from above never meet
+    pnt = rng.uniform((-1.5, -1.5, 1.0), (1.5, 1.5, 2.7), (400, 3))
+    vec = rng.normal((0, 0, -0.5), 1, (400, 3))
+    geom, normal = np.zeros(1, np.int32), np.zeros(3)
+    far, found = [], []
+    for origin, way in zip(pnt, vec, strict=True):
+        far.append(mujoco.mj_ray(model, data, origin, way, None, True, -1, geom, normal))
+        found.append([geom[0], *normal])
+    with live(HILL, worlds=1, fields=("geom_xpos", "geom_xmat")) as run:
+        hits = run.sim.rays(pnt, vec)
+    far, found = np.array(far), np.array(found)
+    hit = far >= 0
+    assert (found[:, 0] == 0).sum() > 40
+    np.testing.assert_array_equal(hits.geomid[0], np.where(hit, found[:, 0], -1))
+    np.testing.assert_allclose(hits.dist[0], far, atol=1e-9)
+    np.testing.assert_allclose(hits.normal[0][hit], found[hit, 1:], atol=1e-9)
 
 
 def test_two_models_count_their_geoms_and_bodies_one_after_the_other() -> None:

@@ -31,7 +31,7 @@ MODEL = {
     "no effect in a step": "sensor_noise",
     "refused with flexes (nflex)": "flex*",
     "refused with plugins (nplugin)": "plugin* *_plugin",
-    "refused with the geom's type": "hfield_*",
+    "of pictures of height fields": "hfield_pathadr",
     "refused with actuators of those laws": "actuator_cranklength actuator_ctrlspec actuator_lengthrange",
     "refused with delays": "actuator_history* sensor_history*",
     "refused with the flag for sleep": "tree_sleep_policy dof_length",

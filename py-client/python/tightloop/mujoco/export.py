@@ -38,6 +38,7 @@ _ARRAYS = """
     dof_damping dof_frictionloss dof_solref dof_solimp dof_invweight0 qpos0 qpos_spring geom_bodyid geom_pos
     geom_quat geom_size geom_dataid geom_contype geom_conaffinity geom_condim geom_priority geom_solmix
     geom_solref geom_solimp geom_friction geom_margin geom_gap geom_fluid
+    hfield_nrow hfield_ncol hfield_adr hfield_size hfield_data
     mesh_vertadr mesh_vertnum mesh_vert mesh_faceadr mesh_facenum mesh_face exclude_signature
     eq_obj1id eq_obj2id eq_active0 eq_data eq_solref eq_solimp site_bodyid site_pos site_quat
     tendon_adr tendon_num tendon_damping tendon_stiffness tendon_lengthspring tendon_frictionloss tendon_limited

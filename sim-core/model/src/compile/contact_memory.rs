@@ -6,6 +6,7 @@ use sim_physics::constants::clip::Cut;
 use sim_physics::constants::contact::{
     COUNTS, Contacts, Handles, Kind, Memory, pair, row, turning,
 };
+use sim_physics::constants::field::FIELD_CANDIDATES;
 use sim_physics::constants::params::Param;
 use sim_physics::lane::{Fixed, Table};
 
@@ -61,8 +62,11 @@ impl ContactBuilder<'_> {
             pair_indices,
             class_rows,
         };
-        let is_cylinder = |piece: &&Piece| piece.solid.kind == Kind::Cylinder;
-        let cylinders = self.pieces.iter().filter(is_cylinder).count();
+        // whose features are clipped by scratch tables, besides hulls
+        let is_clipped = |piece: &&Piece| matches!(piece.solid.kind, Kind::Cylinder | Kind::Field);
+        let clipped = self.pieces.iter().filter(is_clipped).count();
+        let mut kinds = self.pieces.iter().map(|piece| piece.solid.kind);
+        let has_fields = kinds.any(|kind| kind == Kind::Field);
         let mut len = 0;
         // bases and strides of four: a GPU then reads and writes four numbers at a time
         let mut table = |stride: usize, rows: usize| {
@@ -84,13 +88,21 @@ impl ContactBuilder<'_> {
                 true => table(1, self.pieces.len()),
                 false => contacts.memory.mu,
             },
-            cut: match contacts.hulls.spans.rows + cylinders {
+            cut: match contacts.hulls.spans.rows + clipped {
                 0 => contacts.memory.cut,
                 _ => Cut {
                     corners: table(Cut::CORNERS[1], Cut::CORNERS[0]),
                     candidates: table(Cut::CANDIDATES[1], Cut::CANDIDATES[0]),
                     edges: table(Cut::EDGES[1], Cut::EDGES[0]),
                 },
+            },
+            field_candidates: match has_fields {
+                true => table(row::PAIR + 2, FIELD_CANDIDATES),
+                false => contacts.memory.field_candidates,
+            },
+            field_prisms: match has_fields {
+                true => table(1, FIELD_CANDIDATES),
+                false => contacts.memory.field_prisms,
             },
             len: 0,
         };

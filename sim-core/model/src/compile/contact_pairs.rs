@@ -80,7 +80,7 @@ impl ContactBuilder<'_> {
         row[pair::RADIUS_A] = a.radius + reach;
         row[pair::RADIUS_B] = b.radius + reach;
         row[pair::SMALLER] = match a.solid.kind {
-            Kind::Plane => b.radius,
+            Kind::Plane | Kind::Field => b.radius,
             _ => a.radius.min(b.radius),
         };
         row[pair::SIZE_A..][..3].copy_from_slice(&a.size);

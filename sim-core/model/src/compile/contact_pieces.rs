@@ -9,6 +9,7 @@ use crate::pose::Pose;
 use crate::surface::Surface;
 use sim_physics::constants::Constants;
 use sim_physics::constants::contact::{Contacts, Kind, Solid};
+use sim_physics::constants::field::FIELD_CONTACTS;
 use std::collections::BTreeSet;
 
 /// A shape of the scene, with what carries it.
@@ -67,7 +68,7 @@ pub(super) struct Piece {
     pub size: [f64; 3],
     /// Of the ball around its centre [m].
     pub radius: f64,
-    /// Its row in the table of hulls, if it is one.
+    /// Its row in the table of hulls or of height fields, if it is one.
     pub hull: usize,
 }
 
@@ -75,6 +76,7 @@ pub(super) struct Piece {
 /// share, for boxes with the nearest vertex.
 pub(super) fn contacts_of(kinds: (Kind, Kind)) -> usize {
     match kinds {
+        (Kind::Field, _) => FIELD_CONTACTS,
         (Kind::Sphere, _) | (Kind::Plane, Kind::Sphere) => 1,
         (Kind::Plane, Kind::Capsule) => 2,
         (Kind::Capsule, _) => 3,
@@ -164,9 +166,15 @@ pub(super) fn connected(
 pub(super) fn pieces(shapes: &[PlacedShape<'_>], contacts: &mut Contacts<f64>) -> Vec<Piece> {
     let mut pieces = Vec::new();
     let mut hulls: Vec<Hull> = Vec::new();
+    let mut fields = 0;
     for (index, b) in shapes.iter().enumerate() {
         let (kind, size, radius) = match b.shape {
             Shape::Plane => (Kind::Plane, [0.0; 3], 0.0),
+            Shape::HeightField(_) => {
+                pieces.push(piece(index, b, Kind::Field, b.pose, [0.0; 3], 0.0, fields));
+                fields += 1;
+                continue;
+            }
             Shape::Sphere { radius } => (Kind::Sphere, [*radius, 0.0, 0.0], *radius),
             Shape::Capsule {
                 radius,

@@ -3,6 +3,7 @@
 use super::clusters::clusters;
 use super::contact_pairs::ContactBuilder;
 use super::contact_pieces::{PlacedShape, Rules, contacts_of, pairs, pieces};
+use super::fields::add_fields;
 use super::mujoco_contacts::add_touched_bodies;
 use crate::description::Description;
 use crate::error::ModelError;
@@ -40,6 +41,19 @@ pub(super) fn add_contacts(
         clusters: clusters(constants, shapes.iter().filter_map(|shape| shape.body)),
     };
     let coupled = builder.fill(&mut contacts, &pairs);
+    let numbers = contacts.handles.pair_numbers;
+    let reaches: Vec<f64> = (0..pairs.len())
+        .map(|p| contacts.tables.numbers[numbers.base + p * numbers.stride + pair::REACH])
+        .collect();
+    let names = scene.shape_names();
+    add_fields(
+        &mut contacts,
+        shapes,
+        &pieces,
+        &pairs,
+        |p| reaches[p],
+        &names,
+    )?;
     let softness = builder.softness(&mut contacts, &pairs);
     contacts.solids = pieces.iter().map(|piece| piece.solid.clone()).collect();
     constants.coupled = coupled;

@@ -14,6 +14,7 @@ mod contact_memory;
 mod contact_pairs;
 mod contact_pieces;
 mod contacts;
+mod fields;
 mod inverse_weight;
 mod keyframes;
 mod masses;
@@ -22,6 +23,7 @@ mod mujoco_contacts;
 mod mujoco_frames;
 mod mujoco_sensors;
 mod passive;
+mod scans;
 mod sites;
 mod ties;
 
@@ -100,6 +102,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         varying: Varying::default(),
         delay: Delay::default(),
         sites,
+        scans: Vec::new(),
         mujoco: Mujoco::default(),
     };
     let mut reference = inverse_weight::at_reference(&constants, &builder.dof_names)?;
@@ -154,6 +157,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         mujoco: scene.robots.iter().map(|r| r.mujoco.as_deref()).collect(),
     };
     add_contacts(&mut constants, scene, &placed, &rules)?;
+    constants.scans = scene.placed_scans(&builder.carriers, &constants.contacts)?;
     mujoco_contacts::add_contact_sensors(&mut constants, scene, &placed);
     let surfaces: Vec<f64> = placed.iter().map(|shape| shape.surface.mu).collect();
     let sensors = scene.sensed_shapes()?;

@@ -175,11 +175,12 @@ fn sides(scene: &Description, shapes: &[PlacedShape<'_>]) -> Vec<Side> {
         });
         let kind = match shape.shape {
             Shape::Plane => 0,
-            Shape::Sphere { .. } => 1,
-            Shape::Capsule { .. } => 2,
-            Shape::Cylinder { .. } => 3,
-            Shape::Box { .. } => 4,
-            Shape::Mesh(_) => 5,
+            Shape::HeightField(_) => 1,
+            Shape::Sphere { .. } => 2,
+            Shape::Capsule { .. } => 3,
+            Shape::Cylinder { .. } => 4,
+            Shape::Box { .. } => 5,
+            Shape::Mesh(_) => 6,
         };
         Side {
             of: shape

@@ -31,5 +31,5 @@ pub use mujoco_sensors::{
 pub use param_draws::ParamDraw;
 pub(crate) use robot::BODY_LINK;
 pub use robot::{Collision, Link, Robot};
-pub use scene::{ContactSensor, Description, Site, Solver, StaticShape};
+pub use scene::{ContactSensor, Description, HeightScan, Site, Solver, StaticShape};
 pub(crate) use shapes::named;

@@ -49,6 +49,8 @@ pub struct Description {
     pub sites: Vec<Site>,
     /// Sums of contact forces.
     pub contact_sensors: Vec<ContactSensor>,
+    /// Grids of vertical rays.
+    pub height_scans: Vec<HeightScan>,
 }
 
 /// A frame of interest: in the world, or on a link.
@@ -81,6 +83,23 @@ pub struct ContactSensor {
     pub of: String,
     /// What they come from, named in the same way; `None` is everything.
     pub against: Option<String>,
+}
+
+/// A grid of vertical rays under a frame, turned with the frame about the vertical alone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeightScan {
+    /// Its name, unique among the height scans.
+    pub name: String,
+    /// What carries it: a body, or `robot/link`; `None` is the world.
+    pub body: Option<String>,
+    /// Middle of the grid in the frame of what carries it [m].
+    pub pos: [f64; 3],
+    /// Rays along x and y.
+    pub counts: [usize; 2],
+    /// Distances between neighbouring rays along x and y [m].
+    pub spacing: [f64; 2],
+    /// The distance where the ground is farther away, or where there is none [m].
+    pub reach: f64,
 }
 
 /// Options of the constraint solver, with MuJoCo's meaning.
@@ -154,6 +173,7 @@ impl Description {
             command_delay_max: None,
             sites: Vec::new(),
             contact_sensors: Vec::new(),
+            height_scans: Vec::new(),
         }
     }
 

@@ -36,7 +36,7 @@ pub fn mass_properties(shape: &Shape, density: f64) -> Result<Inertial, ModelErr
         }
     };
     Ok(match shape {
-        Shape::Plane => {
+        Shape::Plane | Shape::HeightField(_) => {
             let what = "a shape with a mass".to_owned();
             return Err(ModelError::PlaneBorne { what });
         }

@@ -3,6 +3,7 @@
 //! Everything is f64 and happens when a description is made, never in a step.
 
 mod cluster;
+mod height_field;
 mod hull;
 mod load;
 mod mass;
@@ -17,6 +18,7 @@ mod trimesh;
 mod vector;
 mod visual;
 
+pub use height_field::{HeightField, SAMPLES_MAX};
 pub use hull::{Edge, Face, Hull};
 pub use load::{FILE_MAX, TRIANGLES_MAX};
 pub use mass::{DENSITY, mass_properties};

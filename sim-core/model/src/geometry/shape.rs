@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::height_field::HeightField;
 use super::mesh::{Mesh, MeshOptions};
 use crate::error::ModelError;
 
@@ -37,6 +38,8 @@ pub enum Shape {
     },
     /// Triangles of a file.
     Mesh(Arc<Mesh>),
+    /// What lies below a grid of elevations. Of static shapes only.
+    HeightField(Arc<HeightField>),
 }
 
 impl Shape {
@@ -49,6 +52,7 @@ impl Shape {
             Shape::Cylinder { .. } => "cylinder",
             Shape::Capsule { .. } => "capsule",
             Shape::Mesh(_) => "mesh",
+            Shape::HeightField(_) => "hfield",
         }
     }
 

@@ -38,6 +38,7 @@ pub fn triangles(shape: &Shape) -> TriMesh {
             radius,
             half_height,
         } => revolved(&half_circles(radius, half_height)),
+        Shape::HeightField(field) => field.surface(),
         Shape::Mesh(mesh) => mesh.triangles.clone(),
     }
 }

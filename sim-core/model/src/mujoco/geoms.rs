@@ -1,5 +1,6 @@
 //! Geoms of a model as shapes of links. Geoms that touch nothing are left to pictures.
 
+use super::fields::height_field;
 use super::format::ModelFile;
 use super::frame;
 use super::meshes::Meshes;
@@ -11,6 +12,7 @@ use crate::description::{Collision, Robot, Shape};
 use crate::error::ModelError;
 use crate::geom_contact::GeomContact;
 use crate::surface::Surface;
+use std::sync::Arc;
 
 /// Adds the geoms that may touch something. Returns of each geom its link, and its place among the link's shapes.
 pub(super) fn add_geoms(
@@ -42,6 +44,7 @@ pub(super) fn add_geoms(
         let shape = match (kinds[geom].as_str(), primitive(&kinds[geom], sizes[geom])) {
             (_, Some(shape)) => shape,
             ("mjGEOM_PLANE", _) => Shape::Plane,
+            ("mjGEOM_HFIELD", _) => Shape::HeightField(Arc::new(height_field(file, meshes[geom])?)),
             ("mjGEOM_MESH", _) => {
                 let mesh = meshes[geom];
                 match known.iter().find(|(other, _)| *other == mesh) {

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use super::fields::height_field;
 use super::format::ModelFile;
 use super::frames::on_links;
 use super::geoms::primitive;
@@ -19,10 +20,7 @@ const GROUPS_SHOWN: i64 = 3;
 /// `rgba` of a geom that has no colour of its own; it then has its material's [–].
 const NO_COLOR: [f64; 4] = [0.5, 0.5, 0.5, 1.0];
 /// Geoms that are not shown: their kinds, and what they are called.
-const LEFT_OUT: [(&str, &str); 2] = [
-    ("mjGEOM_HFIELD", "height field"),
-    ("mjGEOM_SDF", "signed distance field"),
-];
+const LEFT_OUT: [(&str, &str); 1] = [("mjGEOM_SDF", "signed distance field")];
 
 impl Robot {
     /// Reads what the links of a model that MuJoCo compiled look like; nothing where the file has no looks.
@@ -151,6 +149,10 @@ impl<'a> Surfaces<'a> {
             "mjGEOM_ELLIPSOID" => Look::Triangles {
                 kind: "ellipsoid",
                 surface: Arc::new(ellipsoid(size)),
+            },
+            "mjGEOM_HFIELD" => Look::Triangles {
+                kind: "hfield",
+                surface: Arc::new(height_field(self.file, self.chosen[geom])?.surface()),
             },
             "mjGEOM_MESH" => {
                 let mesh = self.chosen[geom];

@@ -7,6 +7,7 @@
 mod actuators;
 mod constraints;
 mod contents;
+mod fields;
 mod format;
 mod frames;
 mod geoms;

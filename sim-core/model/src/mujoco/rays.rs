@@ -5,6 +5,7 @@ use std::collections::hash_map::Entry;
 use std::path::Path;
 use std::sync::Arc;
 
+use super::fields::height_field;
 use super::format::ModelFile;
 use super::frames::on_links;
 use super::meshes::Meshes;
@@ -58,6 +59,11 @@ impl RayScene {
                 "mjGEOM_ELLIPSOID" => Some(RayShape::Ellipsoid([a, b, c])),
                 "mjGEOM_CYLINDER" => Some(RayShape::Cylinder(a, b)),
                 "mjGEOM_BOX" => Some(RayShape::Box([a, b, c])),
+                "mjGEOM_HFIELD" => {
+                    let field = height_field(&file, own_meshes[geom])?;
+                    let tree = TriangleTree::new(&field.surface());
+                    Some(RayShape::Mesh(Arc::new(tree)))
+                }
                 "mjGEOM_MESH" => Some(RayShape::Mesh(tree(own_meshes[geom])?)),
                 _ => None,
             };

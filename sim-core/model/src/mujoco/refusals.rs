@@ -178,7 +178,7 @@ fn geoms(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
         let moves = bodies[geom].is_some_and(|body| welds[body] != 0);
         let shape = match kinds[geom].as_str() {
             "mjGEOM_ELLIPSOID" => Some("contacts of ellipsoids"),
-            "mjGEOM_HFIELD" => Some("contacts of height fields"),
+            "mjGEOM_HFIELD" if moves => Some("height fields on bodies that move"),
             "mjGEOM_SDF" => Some("contacts of signed distance fields"),
             "mjGEOM_PLANE" if moves => Some("planes on bodies that move"),
             _ => None,

@@ -101,7 +101,8 @@ impl Robot {
             shape_sizes(&what, &collision.shape)?;
             collision.surface.validate(&what)?;
             // geoms of the world are shapes of link 0
-            if collision.shape == Shape::Plane && self.mujoco.is_none() {
+            let is_static = matches!(collision.shape, Shape::Plane | Shape::HeightField(_));
+            if is_static && self.mujoco.is_none() {
                 return Err(ModelError::PlaneBorne { what });
             }
         }

@@ -3,10 +3,13 @@
 use super::shape::pose;
 use crate::description::{Description, named};
 use crate::error::ModelError;
-use crate::value_checks::{count, in_range, name, unique};
+use crate::pose::Pose;
+use crate::value_checks::{count, in_range, name, positive, unique};
 
 /// Largest delay of commands [control frames].
 const DELAY_FRAMES_MAX: usize = 1000;
+/// Most rays of a height scan along an axis.
+const SCAN_MAX: usize = 1000;
 /// Least and most damping of an inverse Jacobian [m and rad alike]: its square stays within `f32`, and so does what it is added to.
 const DAMPING: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 
@@ -26,6 +29,21 @@ impl Description {
                 DAMPING.contains(&site.damping),
                 "it must be between 1e-6 and 1e6",
             )?;
+        }
+        let scans = self.height_scans.iter().map(|scan| scan.name.as_str());
+        unique("scene", "height scan", scans).map_err(|(_, error)| error)?;
+        for scan in &self.height_scans {
+            name("height scan", &scan.name)?;
+            let what = format!("height scan `{}`", scan.name);
+            pose(&what, &Pose::at(scan.pos))?;
+            self.bearer(&what, scan.body.as_deref())?;
+            for rays in scan.counts {
+                let rule = "it must be between 1 and 1000 rays along each axis";
+                count(&format!("{what}: shape"), rays, SCAN_MAX, rule)?;
+            }
+            for value in scan.spacing.into_iter().chain([scan.reach]) {
+                positive(&format!("{what}: spacing or reach"), value)?;
+            }
         }
         let sensors = self.contact_sensors.iter();
         let names = sensors.clone().map(|sensor| sensor.name.as_str());

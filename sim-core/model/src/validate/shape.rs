@@ -69,6 +69,6 @@ pub(crate) fn shape_sizes(what: &str, shape: &Shape) -> Result<(), ModelError> {
             size(&format!("{what}: half height of the {kind}"), [half_height])
         }
         // checked when it was read
-        Shape::Mesh(_) => Ok(()),
+        Shape::Mesh(_) | Shape::HeightField(_) => Ok(()),
     }
 }

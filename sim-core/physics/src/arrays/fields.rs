@@ -68,6 +68,8 @@ pub enum Axis {
     Contacts,
     /// Sites.
     Sites,
+    /// Rays of all height scans.
+    ScanRays,
     /// Contact sensors.
     ContactSensors,
     /// Actuators.
@@ -100,6 +102,7 @@ impl Axis {
             Axis::Rows => sizes.rows,
             Axis::Contacts => sizes.contacts,
             Axis::Sites => sizes.sites,
+            Axis::ScanRays => sizes.scan_rays,
             Axis::ContactSensors => sizes.contact_sensors,
             Axis::Actuators => sizes.actuators,
             Axis::Mocaps => sizes.mocaps,
@@ -122,6 +125,7 @@ impl Axis {
             Axis::Rows => "rows".into(),
             Axis::Contacts => "contacts".into(),
             Axis::Sites => "sites".into(),
+            Axis::ScanRays => "scan_rays".into(),
             Axis::ContactSensors => "contact_sensors".into(),
             Axis::Actuators => "actuators".into(),
             Axis::Mocaps => "mocaps".into(),

@@ -185,6 +185,8 @@ arrays! { m;
             => "gyro" [Sites, Size(3)], "Angular velocity of each site, in its own axes.";
         accelerometer: Accelerometer [Vec3; m.sites.len()] Stage "m/s²"
             => "accelerometer" [Sites, Size(3)], "Acceleration of each site less gravity, in its own axes: 9.81 upwards at rest.";
+        height_scan: HeightScan [Scalar; m.scans.iter().map(|scan| scan.rays()).sum::<usize>()] Stage "m"
+            => "height_scan" [ScanRays], "Height of each scan's frame above the ground under each of its rays, scans one after another, x innermost; negative where the ground is higher than the frame.";
         // a row for each dof that moves a site, in the order of `Site::columns`
         site_inverse: SiteInverse [Row6; m.sites.iter().map(|site| site.columns.len()).sum::<usize>()] Stage "rad or m per m or rad";
 

@@ -1,6 +1,7 @@
 //! Shapes of a model as physics code reads them: where they are, which pairs may touch, and how soft they are.
 
 use super::clip::Cut;
+use super::field::FieldTables;
 use super::hull::HullTables;
 use super::recast::{Recast, recast, same};
 use crate::lane::{Fixed, Num, Real, Table, Tables};
@@ -21,6 +22,8 @@ pub enum Cone {
 pub enum Kind {
     /// z ≤ 0.
     Plane,
+    /// A row of the table of height fields; always static.
+    Field,
     /// Around its centre.
     Sphere,
     /// Along z.
@@ -33,7 +36,7 @@ pub enum Kind {
     Hull,
 }
 
-/// Pairs of kinds that can touch, in the order of their stages.
+/// Pairs of kinds that can touch, height fields left out, in the order of their stages.
 pub const PAIR_KINDS: [(Kind, Kind); 20] = {
     use Kind::*;
     [
@@ -88,6 +91,8 @@ recast! {
         pub handles: Handles,
         /// Where the hulls are.
         pub hulls: HullTables,
+        /// Where the height fields are.
+        pub fields: FieldTables,
         /// Where the stages keep what they find.
         pub memory: Memory,
         /// Of each pair, torsional and rolling friction over sliding friction; without rows where no pair has any.
@@ -150,6 +155,10 @@ pub struct Memory {
     pub rows: Table,
     /// Scratch of the narrow phase of faces.
     pub cut: Cut,
+    /// Candidates for contacts with a height field; see `row`.
+    pub field_candidates: Table,
+    /// Prisms of a height field that a shape may touch.
+    pub field_prisms: Table,
     /// Coefficient of friction of each solid, where it varies [–].
     pub mu: Table,
     /// Scalars of all tables.
@@ -327,7 +336,7 @@ pub mod pair {
     pub const ORIGIN: usize = 4;
     /// The class.
     pub const CLASS: usize = 5;
-    /// Hull of the first shape, if it is one.
+    /// Hull of the first shape, if it is one; or its field.
     pub const HULL_A: usize = 6;
     /// Hull of the second shape, if it is one.
     pub const HULL_B: usize = 7;
@@ -443,6 +452,7 @@ impl<R: Real> Contacts<R> {
             },
             handles: Handles::default(),
             hulls: HullTables::default(),
+            fields: FieldTables::default(),
             memory: Memory {
                 poses: table,
                 origins: table,
@@ -454,6 +464,8 @@ impl<R: Real> Contacts<R> {
                     candidates: table,
                     edges: table,
                 },
+                field_candidates: table,
+                field_prisms: table,
                 len: 0,
             },
             turning: Fixed::default(),
@@ -469,4 +481,4 @@ impl<R: Real> Contacts<R> {
     }
 }
 
-same! { Fixed, Cone, FrictionCombine, Kind, Group, Pair, Column, Run, Handles, HullTables, Memory }
+same! { Fixed, Cone, FrictionCombine, Kind, Group, Pair, Column, Run, Handles, HullTables, FieldTables, Memory }

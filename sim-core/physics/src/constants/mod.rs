@@ -3,11 +3,13 @@
 pub mod actuator;
 pub mod clip;
 pub mod contact;
+pub mod field;
 pub mod hull;
 pub mod mujoco;
 pub mod mujoco_frames;
 pub mod params;
 mod recast;
+pub mod scan;
 pub mod sensors;
 pub mod site;
 mod sizes;
@@ -20,6 +22,7 @@ use self::contact::Contacts;
 use self::mujoco::Mujoco;
 use self::params::{COMMAND_NOISES, Varying};
 use self::recast::{recast, same};
+use self::scan::HeightScan;
 use self::site::Site;
 use crate::lane::Real;
 use crate::math::factor::Pattern;
@@ -70,6 +73,8 @@ recast! {
         pub delay: Delay,
         /// Frames of interest.
         pub sites: Vec<Site<R>>,
+        /// Height scans.
+        pub scans: Vec<HeightScan<R>>,
         /// What only models from MuJoCo have.
         pub mujoco: Mujoco<R>,
     }

@@ -17,6 +17,8 @@ pub struct Sizes {
     pub shapes: usize,
     /// Sites.
     pub sites: usize,
+    /// Rays of all height scans.
+    pub scan_rays: usize,
     /// Contact sensors.
     pub contact_sensors: usize,
     /// Actuators.

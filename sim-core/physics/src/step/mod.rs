@@ -14,6 +14,7 @@ pub mod energy;
 pub mod fluid;
 mod free_joints;
 pub mod gravity_compensation;
+pub mod height_scan;
 pub mod integrate;
 mod inverse_dynamics;
 pub mod kinematics;
@@ -66,6 +67,11 @@ macro_rules! every_stage {
             plane_box          [collide::PlaneBox]           Both;
             plane_cylinder     [collide::PlaneCylinder]      Both;
             plane_hull         [collide::PlaneHull]          Both;
+            field_sphere       [collide::FieldSphere]        Both;
+            field_capsule      [collide::FieldCapsule]       Both;
+            field_box          [collide::FieldBox]           Both;
+            field_cylinder     [collide::FieldCylinder]      Both;
+            field_hull         [collide::FieldHull]          Both;
             sphere_sphere      [collide::SphereSphere]       Both;
             sphere_capsule     [collide::SphereCapsule]      Both;
             sphere_box         [collide::SphereBox]          Both;
@@ -100,6 +106,7 @@ macro_rules! every_stage {
             velocities         [velocities::Velocities]      Evaluation;
             sites              [sites::Sites]                Evaluation;
             imu                [sites::Imu]                  Evaluation;
+            height_scan        [height_scan::HeightScans]    Evaluation;
             site_inverse       [site_inverse::SiteInverse]   Evaluation;
             passive            [springs::Passive]            Evaluation;
             mujoco_bodies      [mujoco_frames::Bodies]       Evaluation;

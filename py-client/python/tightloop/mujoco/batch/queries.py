@@ -98,7 +98,7 @@ class Queries:
     def _by_mujoco(
         self, rows: Array, pnt: Array, vec: Array, *, geomgroup: Array | None, flg_static: bool, bodyexclude: Array
     ) -> RayHits:
-        """What rays meet where a geom is a height field or an SDF."""
+        """What rays meet where a geom is an SDF."""
         origins, directions = points("pnt", pnt).astype(np.float64), points("vec", vec).astype(np.float64)
         check_lengths(directions)
         shape = pnt.shape[:2]

@@ -269,7 +269,7 @@ class Batch(NamedViews):
         """Intersect rays with the geoms of each simulation, as ``mj_ray`` does. No simulation and no field changes.
 
         MuJoCo places the geoms of each simulation on one thread; the rays of all run on `num_threads`. In a model with
-        visible height fields, MuJoCo computes the rays one by one.
+        visible SDFs, MuJoCo computes the rays one by one.
 
         Args:
             pnt: Origins in the world [m], ``(num_sims, nray, 3)``, float64 or float32 as all real arrays here.

@@ -13,6 +13,7 @@
 //! | plane, sphere, capsule | closed form | `planes`, `spheres`, `capsules` |
 //! | box and box | separating axes, clipping | `boxes`, `box_faces` |
 //! | with a cylinder or a hull | [`convex`]: axes, GJK, clipping | `cylinders`, `hulls` |
+//! | height field | a convex prism below each of its triangles | `fields`, `prisms`, `prism_hull` |
 
 mod box_faces;
 mod boxes;
@@ -21,6 +22,7 @@ mod clip;
 mod convex;
 mod cylinders;
 mod features;
+mod fields;
 mod gjk;
 mod hull;
 mod hull_axes;
@@ -32,6 +34,9 @@ mod plane_hull;
 mod planes;
 mod points;
 mod posed;
+mod prism;
+mod prism_hull;
+mod prisms;
 mod reduction;
 mod restart;
 mod select;
@@ -52,6 +57,8 @@ use crate::constants::params::Param;
 use crate::lane::{Cx, MaskOf, Num, Real, Table};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
 use crate::{span, when};
+pub(super) use fields::Samples;
+pub use fields::{FieldBox, FieldCapsule, FieldCylinder, FieldHull, FieldSphere};
 pub use narrow::*;
 use points::{Points, Room};
 

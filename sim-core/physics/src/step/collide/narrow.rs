@@ -47,6 +47,15 @@ impl<C: Cx> Shape<C> {
         }
     }
 
+    /// A shape of which neither size nor hull is read; any index will do.
+    #[inline(always)]
+    pub fn none(any: C::I) -> Shape<C> {
+        Shape {
+            size: Vec3([C::F::c(0.0); 3]),
+            hull: any,
+        }
+    }
+
     /// Radius of a sphere, capsule or cylinder [m].
     #[inline(always)]
     pub fn radius(&self) -> C::F {

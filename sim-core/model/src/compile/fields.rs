@@ -1,0 +1,187 @@
+//! Tables of height fields: elevations, the highest around each tile, and how many prisms each pair visits.
+
+use super::contact_pieces::{Piece, PlacedShape};
+use crate::description::Shape;
+use crate::error::ModelError;
+use crate::geometry::{HeightField, SAMPLES_MAX};
+use sim_physics::constants::contact::{Contacts, Kind};
+use sim_physics::constants::field::{FieldTables, TILE, field};
+use sim_physics::lane::Fixed;
+
+/// Most prisms that one shape may lie over: more would take longer than a mesh.
+const PRISMS_MAX: usize = 20_000;
+
+/// The height fields among shapes, in the order of their rows.
+fn fields<'a>(shapes: &'a [PlacedShape<'_>]) -> Vec<(usize, &'a HeightField)> {
+    let of = |(index, shape): (usize, &'a PlacedShape<'_>)| match shape.shape {
+        Shape::HeightField(field) => Some((index, &**field)),
+        _ => None,
+    };
+    shapes.iter().enumerate().filter_map(of).collect()
+}
+
+/// Adds the tables of all height fields to those of the contacts.
+///
+/// # Errors
+/// More samples than the tables hold, or a shape that is too large for the cells of a field.
+pub(super) fn add_fields(
+    contacts: &mut Contacts<f64>,
+    shapes: &[PlacedShape<'_>],
+    pieces: &[Piece],
+    pairs: &[(usize, usize)],
+    reach: impl Fn(usize) -> f64,
+    names: &[String],
+) -> Result<(), ModelError> {
+    let all = fields(shapes);
+    if all.is_empty() {
+        return Ok(());
+    }
+    let refuse = |name: &str, reason| ModelError::HeightField(format!("shape `{name}`"), reason);
+    let samples: usize = all.iter().map(|(_, field)| field.elevations.len()).sum();
+    if samples > SAMPLES_MAX {
+        return Err(refuse(
+            &names[shapes[all[0].0].number],
+            format!(
+                "the scene's height fields have {samples} samples, more than {SAMPLES_MAX}; make them coarser"
+            ),
+        ));
+    }
+    // per pair: how far the second shape reaches from its centre
+    let mut farthest = vec![0.0_f64; all.len()];
+    let mut prisms = vec![0_u32; pairs.len()];
+    for (p, &(a, b)) in pairs.iter().enumerate() {
+        if pieces[a].solid.kind != Kind::Field {
+            continue;
+        }
+        let place = pieces[a].hull;
+        let radius = pieces[b].radius + reach(p);
+        farthest[place] = farthest[place].max(radius);
+        let cell = all[place].1.cell();
+        // a length covers so many cells, however it lies
+        let cells = |axis: usize| ((2.0 * radius / cell[axis]).ceil() as usize).saturating_add(2);
+        let count = 2_usize.saturating_mul(cells(0)).saturating_mul(cells(1));
+        let there = 2 * (all[place].1.rows - 1) * (all[place].1.columns - 1);
+        let count = count.min(there);
+        if count > PRISMS_MAX {
+            let [field, other] = [a, b].map(|piece| &names[shapes[pieces[piece].shape].number]);
+            return Err(refuse(
+                field,
+                format!(
+                    "shape `{other}` lies over {count} of its triangles, more than {PRISMS_MAX}; make its cells larger, \
+                     or keep the two from touching by a contact filter"
+                ),
+            ));
+        }
+        prisms[p] = count as u32;
+    }
+    let (mut sizes, mut heights, mut ceilings) = (Vec::new(), Vec::new(), Vec::new());
+    for (&(index, own), farthest) in all.iter().zip(farthest) {
+        let piece = pieces.iter().find(|piece| piece.shape == index);
+        let solid = &piece.expect("every field is a piece").solid;
+        let [dx, dy] = own.cell();
+        // its centre in its own axes, from the world's origin
+        let center: [f64; 3] =
+            std::array::from_fn(|i| (0..3).map(|k| solid.axes[i][k] * solid.center[k]).sum());
+        let base = [center[0] - own.half[0], center[1] - own.half[1], center[2]];
+        let length = dx.hypot(dy);
+        let extent = (0..2).map(|i| base[i].abs() + 2.0 * own.half[i]);
+        let mut row = [0.0; field::LEN];
+        row[field::BASE..][..3].copy_from_slice(&base);
+        row[field::CELL..][..2].copy_from_slice(&[dx, dy]);
+        row[field::INVERSE..][..2].copy_from_slice(&[1.0 / dx, 1.0 / dy]);
+        row[field::CELLS..][..2]
+            .copy_from_slice(&[own.columns - 1, own.rows - 1].map(|n| n as f64));
+        row[field::FIRST] = heights.len() as f64;
+        row[field::BOTTOM] = own.bottom;
+        row[field::EXTENT] = extent.fold(0.0, f64::max);
+        row[field::TILES_FIRST] = ceilings.len() as f64;
+        row[field::TILES] = (own.columns - 1).div_ceil(TILE) as f64;
+        row[field::ACROSS..][..2].copy_from_slice(&[dy / length, -dx / length]);
+        sizes.extend(row);
+        heights.extend(&own.elevations);
+        ceilings.extend(highest(own, farthest));
+    }
+    let prisms_max = prisms.iter().max().map_or(0, |&most| most as usize);
+    let tables = &mut contacts.tables;
+    let mut numbers = |stride: usize, new: Vec<f64>| {
+        let (base, rows) = (tables.numbers.len(), new.len() / stride);
+        tables.numbers.extend(new);
+        Fixed { base, stride, rows }
+    };
+    contacts.fields = FieldTables {
+        heights: numbers(1, heights),
+        ceilings: numbers(1, ceilings),
+        sizes: numbers(field::LEN, sizes),
+        prisms: Fixed {
+            base: contacts.tables.indices.len(),
+            stride: 1,
+            rows: prisms.len(),
+        },
+        prisms_max,
+    };
+    contacts.tables.indices.extend(prisms);
+    Ok(())
+}
+
+/// The highest elevation around each tile, as far as a shape with its centre in the tile reaches.
+fn highest(field: &HeightField, reach: f64) -> Vec<f64> {
+    let cell = field.cell();
+    let [columns, rows] = [field.columns, field.rows];
+    // one more for rounding
+    let halo = |axis: usize| ((reach / cell[axis]).ceil() as usize).saturating_add(1);
+    let window = |tile: usize, axis: usize, samples: usize| {
+        let first = (tile * TILE).saturating_sub(halo(axis));
+        first
+            ..((tile + 1) * TILE)
+                .saturating_add(halo(axis) + 1)
+                .min(samples)
+    };
+    // along x first, then along y
+    let tiles = [columns - 1, rows - 1].map(|cells| cells.div_ceil(TILE));
+    let mut lines = vec![f64::NEG_INFINITY; rows * tiles[0]];
+    for row in 0..rows {
+        for tile in 0..tiles[0] {
+            let own = &field.elevations[row * columns..][window(tile, 0, columns)];
+            lines[row * tiles[0] + tile] = own.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        }
+    }
+    let mut all = Vec::with_capacity(tiles[0] * tiles[1]);
+    for tile in 0..tiles[1] {
+        for column in 0..tiles[0] {
+            let own = window(tile, 1, rows).map(|row| lines[row * tiles[0] + column]);
+            all.push(own.fold(f64::NEG_INFINITY, f64::max));
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_sample_within_reach_is_above_the_highest() {
+        let (rows, columns) = (13, 18);
+        let elevations = (0..rows * columns).map(|k| ((k * 7919) % 101) as f64 * 0.01);
+        let field = HeightField::new([rows, columns], elevations.collect(), [3.4, 2.4], 1.0);
+        let field = field.unwrap();
+        let reach = 0.33;
+        let all = highest(&field, reach);
+        let [dx, dy] = field.cell();
+        let tiles = (columns - 1).div_ceil(TILE);
+        for row in 0..rows - 1 {
+            for column in 0..columns - 1 {
+                let bound = all[row / TILE * tiles + column / TILE];
+                for (k, &z) in field.elevations.iter().enumerate() {
+                    let [x, y] = [(k % columns) as f64, (k / columns) as f64];
+                    let beyond = |at: f64, cell: usize, edge: f64| {
+                        ((cell as f64 - at).max(at - 1.0 - cell as f64)).max(0.0) * edge
+                    };
+                    if beyond(x, column, dx) <= reach && beyond(y, row, dy) <= reach {
+                        assert!(z <= bound, "sample {k} at {z} above {bound}");
+                    }
+                }
+            }
+        }
+    }
+}
