@@ -261,7 +261,7 @@ def test_rays_meet_height_fields_where_those_of_mujoco_do() -> None:
         hits = run.sim.rays(pnt, vec)
     far, found = np.array(far), np.array(found)
     hit = far >= 0
-    assert (found[:, 0] == 0).sum() > 40
+    assert (found[:, 0] == 0).sum() > 30
     np.testing.assert_array_equal(hits.geomid[0], np.where(hit, found[:, 0], -1))
     np.testing.assert_allclose(hits.dist[0], far, atol=1e-9)
     np.testing.assert_allclose(hits.normal[0][hit], found[hit, 1:], atol=1e-9)
