@@ -81,6 +81,12 @@ CALLS: dict[str, Call] = {
         SHAPE | {"path": "path", "scale": "scale", "max_hull_vertices": "count", "convex_decomposition": "flag"},
         path="",  # a file of the fixture's
     ),
+    "Scene.add_hfield": of_scene(
+        "add_hfield",
+        POSE | SURFACE | {"elevation": "elevation", "size": "positive pair", "base": "positive", "name": "name"},
+        elevation=np.zeros((4, 4)),
+        size=(1.0, 1.0),
+    ),
     "Scene.add_plane": of_scene("add_plane", POSE | SURFACE | {"name": "name"}),
     "Scene.add_ground": of_scene("add_ground", SURFACE | {"z": "number", "name": "name"}),
     "Scene.add_table": of_scene("add_table", SURFACE | {"name": "name"}),
@@ -95,6 +101,17 @@ CALLS: dict[str, Call] = {
     ),
     "Scene.add_contact_sensor": of_scene(
         "add_contact_sensor", {"of": "collidable", "name": "name", "against": "optional collidable"}, of="cube"
+    ),
+    "Scene.add_height_scan": of_scene(
+        "add_height_scan",
+        {
+            "body": "body",
+            "pos": "triple",
+            "size": "positive pair",
+            "shape": "pair of counts",
+            "reach": "positive",
+            "name": "name",
+        },
     ),
     "Scene.filter_contacts": of_scene("filter_contacts", {"a": "collidable", "b": "collidable"}, a="cube", b="cube"),
     "Scene.randomize": of_scene(
@@ -322,8 +339,20 @@ ENV_CALLS: dict[str, Call] = {
     ),
     "Observed": Call(
         lambda _: env.Observed,
-        {"name": "text", "low": "observed bound", "high": "observed bound", "size": "count", "unit": "text"},
+        {
+            "name": "text",
+            "low": "observed bound",
+            "high": "observed bound",
+            "size": "count",
+            "unit": "text",
+            "history": "count",
+        },
         {"name": "angle", "low": -1.0, "high": 1.0},
+    ),
+    "Push": Call(
+        lambda _: env.Push,
+        {"body": "text", "impulse": "positive", "interval": "interval"},
+        {"body": "arm/hand", "impulse": 1.0, "interval": (1.0, 2.0)},
     ),
     "make_groups": Call(
         lambda _: env.make_groups,
@@ -340,6 +369,7 @@ ENV_CALLS: dict[str, Call] = {
 }
 ENV_LEFT = {
     "AutoresetMode": "gymnasium's",
+    "Mirror": "environments check it; test_task_features.py tries wrong ones",
     "Names": "environments make it",
     "Task": "users derive from it; test_env_tasks.py tries wrong ones",
     "Worlds": "environments make it",

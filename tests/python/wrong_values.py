@@ -84,6 +84,10 @@ KINDS: dict[str, tuple[Any, ...]] = {
     "index": tuple(value for value in COUNT if value != 0),
     "triple": TRIPLE,
     "positive triple": (*TRIPLE, (0.0, 1, 1), (-1, 1, 1)),
+    "positive pair": ((0.0, 1), (1, -1), (1, NAN), (1, INF), (1, 2, 3), (1,), "ab", 3, THING),
+    "pair of counts": ((0, 3), (3, -1), (1.5, 2), (1, 2, 3), (1,), "ab", 3, THING, (2**40, 2)),
+    "interval": ((2.0, 1.0), (0.0, 1.0), (1.0, NAN), (1.0, INF), (1.0,), (1.0, 2.0, 3.0), 3.0, "ab", THING),
+    "elevation": (np.zeros(4), np.zeros((1, 4)), np.full((3, 3), NAN), np.full((3, 3), INF), 3.0, THING, "nowhere.npy"),
     "quaternion": QUATERNION,
     "name": NAME,
     # of a daemon

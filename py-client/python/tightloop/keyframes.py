@@ -32,6 +32,16 @@ def find(known: list[dict[str, Any]], keyframe: str | int) -> dict[str, Any]:
     return known[found[0]]
 
 
+def check_alone(joint_q: Any, joint_qd: Any) -> None:
+    """Check that a keyframe is all that a reset sets.
+
+    Raises:
+        ArgumentError: There are positions or velocities, too.
+    """
+    if joint_q is not None or joint_qd is not None:
+        raise ArgumentError("reset: joint_q and joint_qd beside a keyframe; leave them out, or write them after it")
+
+
 def arrays(state: dict[str, Any]) -> dict[str, NDArray[np.float64]]:
     """Return what `Sim.write` takes, for all worlds alike; arrays without entries are left out."""
     found = {name: np.array(value, np.float64) for name, value in state.items() if name != "name"}

@@ -38,8 +38,7 @@ class Sim(Shown, Attributes):
     Attributes:
         name: Name of the daemon, or of this group of worlds, such as ``"franka.0"``.
         pid: Process id of the daemon.
-        device: Device that runs the physics, such as ``"cpu (AVX-512, 16 worlds a block, 2 threads)"`` or ``"gpu
-            (…)"``.
+        device: Device that runs the physics, such as ``"cpu (AVX-512, 16 worlds a block, 2 threads)"``.
         precision: ``"f32"`` or ``"f64"``, the type of every real array.
         worlds: Number of worlds.
         threads: Largest number of threads of a step; all groups of a daemon share them.
@@ -49,8 +48,7 @@ class Sim(Shown, Attributes):
         dof_names: ``robot/joint`` of each dof.
         coord_names: ``robot/joint`` of each coordinate.
         body_names: ``robot/link`` of each body.
-        shape_names: Name of each collision shape: first static shapes, ``shape``, then ``robot/link/shape`` and
-            ``body/shape``.
+        shape_names: Name of each collision shape: static ones, then ``robot/link/shape`` and ``body/shape``.
         site_names: Name of each site, in the order of ``site_q`` and the other site fields.
         contact_sensor_names: Name of each contact sensor, in the order of ``contact_sensor``.
         actuator_names: ``model/actuator`` of each actuator, in the order of ``ctrl``.
@@ -224,28 +222,22 @@ class Sim(Shown, Attributes):
             keyframe: Keyframe of a MuJoCo model to write after the reset: its name, ``model/name``, or its place in
                 `keyframe_names`. It sets positions, velocities, ``act``, ``ctrl`` and mocap bodies of the whole scene:
                 what is not of that model is where the scene starts it, without draws. ``time`` begins at 0.
-            joint_q: Joint positions of these worlds instead of the scene's and of draws [rad or m], as in `write`. Not
-                with a keyframe.
+            joint_q: Joint positions instead of the scene's and of draws [rad or m], as in `write`; not with a keyframe.
             joint_qd: Joint velocities, likewise [rad/s or m/s].
 
         Returns:
             A frame at the new state.
 
         Raises:
-            ArgumentError: There is no such keyframe, or several models have one of that name, or there are joint
-                positions or velocities beside a keyframe.
+            ArgumentError: There is no such keyframe or there are several, or joint positions stand beside one.
             TightloopError: As `step`.
         """
         if keyframe is None:
             return self._client.reset(mask, seed, joint_q, joint_qd)
-        if joint_q is not None or joint_qd is not None:
-            raise ArgumentError("reset: joint_q and joint_qd beside a keyframe; leave them out, or write them after it")
+        keyframes.check_alone(joint_q, joint_qd)
         more = keyframes.arrays(keyframes.find(self.info["keyframes"], keyframe))
         self._client.reset(mask, seed, None, None)
-        joint_q, joint_qd = more.pop("joint_q", None), more.pop("joint_qd", None)
-        return self._client.write(
-            joint_q, joint_qd, ready_arrays(self.info, lambda: self.params, "writes", more), mask, True
-        )
+        return self._client.write(more.pop("joint_q", None), more.pop("joint_qd", None), self._ready(more), mask, True)
 
     def write(
         self,
@@ -281,8 +273,10 @@ class Sim(Shown, Attributes):
             A frame at the new state. Raises as `step` does.
         """
         given = {"act": act, "ctrl": ctrl, "mocap_pos": mocap_pos, "mocap_quat": mocap_quat, "eq_active": eq_active}
-        more = ready_arrays(self.info, lambda: self.params, "writes", given)
-        return self._client.write(joint_q, joint_qd, more, mask, False)
+        return self._client.write(joint_q, joint_qd, self._ready(given), mask, False)
+
+    def _ready(self, given: dict[str, Any]) -> dict[str, NDArray[np.float64]]:
+        return ready_arrays(self.info, lambda: self.params, "writes", given)
 
     def forward(self) -> Frame:
         """Return a frame at the current state and commands without a step. Raises as `step` does."""
@@ -292,15 +286,13 @@ class Sim(Shown, Attributes):
         """Return the newest observer frame: the first ``info["watch_worlds"]`` worlds, whichever client steps them.
 
         An observer needs no control of the daemon; the overhead is about 1 % at most. The daemon publishes states after
-        a step about 60 times per second: half as often for more than 256 observed worlds, less often if it takes long,
-        but at least four times per second. It also publishes every state at which the simulation pauses.
+        a step 4 to 60 times per second, less often for many worlds, and every state at which the simulation pauses.
 
         Args:
             timeout: How long to wait for one [s].
 
         Returns:
-            A frame of those worlds only, whose ``state`` is a snapshot of them as bytes. None if this client has
-            already seen the newest one.
+            A frame of those worlds, whose ``state`` is a snapshot as bytes; None if this client has seen the newest.
 
         Raises:
             ArgumentError: ``timeout`` is not a number, or is below 0.

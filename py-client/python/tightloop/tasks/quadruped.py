@@ -19,8 +19,8 @@ control at 50 Hz, episodes of 20 s. Rewards and rates follow legged_gym (Rudin e
 | 0–11 | ±4 | a target 0.3 rad from standing |
 
 The reward is the weighted sum of the terms of `QuadrupedVelocityFlat.reward_terms`. An episode ends when the trunk
-tilts by more than 60° or is closer than 15 cm to the ground. ``velocity_error`` in ``infos`` is the distance of the velocity
-from the command in the plane [m/s], a mean over about a second.
+tilts by more than 60° or is closer than 15 cm to the ground. ``velocity_error`` in ``infos`` is the distance of the
+velocity from the command in the plane [m/s], a mean over about a second.
 """
 
 from __future__ import annotations

@@ -5,11 +5,14 @@ use crate::description::Shape;
 use crate::error::ModelError;
 use crate::geometry::{HeightField, SAMPLES_MAX};
 use sim_physics::constants::contact::{Contacts, Kind};
-use sim_physics::constants::field::{FieldTables, TILE, field};
+use sim_physics::constants::field::{FIELD_CANDIDATES, FieldTables, TILE, field};
 use sim_physics::lane::Fixed;
 
 /// Most prisms that one shape may lie over: more would take longer than a mesh.
 const PRISMS_MAX: usize = 20_000;
+
+/// Most points that a prism and a shape have in common: two for each edge of a triangle.
+const POINTS_OF_A_PRISM: usize = 6;
 
 /// The height fields among shapes, in the order of their rows.
 fn fields<'a>(shapes: &'a [PlacedShape<'_>]) -> Vec<(usize, &'a HeightField)> {
@@ -108,6 +111,8 @@ pub(super) fn add_fields(
         tables.numbers.extend(new);
         Fixed { base, stride, rows }
     };
+    // what does not fit in the list of a pair is counted; a prism gives few points
+    contacts.may_overflow |= prisms_max * POINTS_OF_A_PRISM > FIELD_CANDIDATES;
     contacts.fields = FieldTables {
         heights: numbers(1, heights),
         ceilings: numbers(1, ceilings),

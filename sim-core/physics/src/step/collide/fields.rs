@@ -349,6 +349,10 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
             let prism = samples.prism(cx, &cells, number, size);
             N::contacts(cx, &shapes, &axes, &prism, &mut found);
         });
+        let (none, full) = (C::F::c(0.0), C::F::c(FIELD_CANDIDATES as f64));
+        let prisms = (cx.pushed(&listed) - full).max(none);
+        let over = prisms + (cx.pushed(&found.list) - full).max(none);
+        out.room.leave_out(cx, over);
         keep(cx, &found, size, &mut out);
     });
 }

@@ -85,6 +85,16 @@ impl<C: Cx> Points<C> {
 }
 
 impl<F: Num> Room<F> {
+    /// Counts what a pair left out before it became a contact, such as prisms of a height field.
+    #[inline(always)]
+    pub(super) fn leave_out<C: Cx<F = F>>(&self, cx: &mut C, count: F) {
+        let left_out = cx.at(self.left_out);
+        when!(cx, F::c(0.5).lt(count), {
+            let more = cx.load(self.counts, left_out, 0) + count;
+            cx.store(self.counts, left_out, 0, more);
+        });
+    }
+
     /// Reserves room for a contact, and returns the worlds that have it.
     #[inline(always)]
     fn reserve<C: Cx<F = F>>(&self, cx: &mut C, mask: MaskOf<C>) -> MaskOf<C> {
