@@ -218,8 +218,7 @@ class Statistics:
 class Trainer:
     """A run: environment, agent, optimiser, and how far it is.
 
-    One thread steps the worlds while another learns from the rollout before. So the actions come from a copy of the
-    agent that is one rollout old.
+    One thread steps the worlds with a copy of the agent, while another learns from the rollout before.
     """
 
     def __init__(self, task: str, seed: int, config: Config, folder: Path, *, daemon: str | None, device: str) -> None:
@@ -366,7 +365,8 @@ class Trainer:
 
     def run(self, log: SummaryWriter) -> None:
         """Train until the run is over; checkpoints and evaluations on the way."""
-        config, begun, shown = self.config, time.perf_counter() - self.seconds, -math.inf
+        config, begun = self.config, time.perf_counter() - self.seconds
+        shown = (self.steps if config.total else self.seconds) if self.curve else -math.inf
         seen, learning, count = self.begin(), None, 0
         bar = tqdm(total=100, initial=round(100 * self.progress), unit="%", desc=self.task, disable=None)
         with bar, ThreadPoolExecutor(1, "learner") as learner:
