@@ -5,7 +5,7 @@ use crate::distribution::Distribution;
 use sim_physics::constants::Constants;
 use sim_physics::constants::Sizes;
 use sim_physics::constants::contact::FrictionCombine;
-use sim_physics::constants::field::FieldTables;
+use sim_physics::constants::height_field::FieldTables;
 use sim_physics::constants::mujoco::Mujoco;
 use sim_physics::constants::scan::HeightScan;
 use sim_physics::lane::{Fixed, Table};

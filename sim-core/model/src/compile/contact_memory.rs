@@ -6,7 +6,7 @@ use sim_physics::constants::clip::Cut;
 use sim_physics::constants::contact::{
     COUNTS, Contacts, Handles, Kind, Memory, pair, row, turning,
 };
-use sim_physics::constants::field::FIELD_CANDIDATES;
+use sim_physics::constants::height_field::FIELD_CANDIDATES;
 use sim_physics::constants::params::Param;
 use sim_physics::lane::{Fixed, Table};
 

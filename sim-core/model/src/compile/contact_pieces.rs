@@ -9,7 +9,7 @@ use crate::pose::Pose;
 use crate::surface::Surface;
 use sim_physics::constants::Constants;
 use sim_physics::constants::contact::{Contacts, Kind, Solid};
-use sim_physics::constants::field::FIELD_CONTACTS;
+use sim_physics::constants::height_field::FIELD_CONTACTS;
 use std::collections::BTreeSet;
 
 /// A shape of the scene, with what carries it.

@@ -5,7 +5,7 @@ use crate::description::Shape;
 use crate::error::ModelError;
 use crate::geometry::{HeightField, SAMPLES_MAX};
 use sim_physics::constants::contact::{Contacts, Kind};
-use sim_physics::constants::field::{FIELD_CANDIDATES, FieldTables, TILE, field};
+use sim_physics::constants::height_field::{FIELD_CANDIDATES, FieldTables, TILE, field};
 use sim_physics::lane::Fixed;
 
 /// Most prisms that one shape may lie over: more would take longer than a mesh.

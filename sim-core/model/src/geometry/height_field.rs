@@ -52,7 +52,7 @@ impl HeightField {
                 elevations.len()
             ));
         }
-        if let Some(x) = elevations.iter().find(|x| !(x.abs() <= 1e6)) {
+        if let Some(x) = elevations.iter().find(|x| x.is_nan() || x.abs() > 1e6) {
             return Err(format!(
                 "it has the elevation {x} m; give finite ones of at most 1e6 m"
             ));

@@ -1,7 +1,7 @@
 //! Shapes of a model as physics code reads them: where they are, which pairs may touch, and how soft they are.
 
 use super::clip::Cut;
-use super::field::FieldTables;
+use super::height_field::FieldTables;
 use super::hull::HullTables;
 use super::recast::{Recast, recast, same};
 use crate::lane::{Fixed, Num, Real, Table, Tables};

@@ -3,7 +3,7 @@
 pub mod actuator;
 pub mod clip;
 pub mod contact;
-pub mod field;
+pub mod height_field;
 pub mod hull;
 pub mod mujoco;
 pub mod mujoco_frames;

@@ -25,7 +25,7 @@ use super::{Stage, axes_of, contact_slack, points_of};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::contact::{Contacts, Kind, pair, row};
-use crate::constants::field::{FIELD_CANDIDATES, FIELD_CONTACTS, FieldTables, TILE, field};
+use crate::constants::height_field::{FIELD_CANDIDATES, FIELD_CONTACTS, FieldTables, TILE, field};
 use crate::lane::{Cx, Fixed, MaskOf, Num, Real, Table};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
 use crate::step::{BlockOf, ConstantsOf};
