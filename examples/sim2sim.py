@@ -20,7 +20,8 @@ from training import needed
 import tightloop as tl
 from tightloop.env import Worlds
 from tightloop.env.names import Names
-from tightloop.tasks import quadruped as own
+from tightloop.tasks import quadruped, velocity
+from tightloop.tasks.quadruped import ROBOT
 
 with needed("mujoco", "onnxruntime"):
     import mujoco
@@ -41,19 +42,19 @@ def mujoco_model() -> mujoco.MjModel:
     for geom in spec.geoms:
         geom.contype, geom.conaffinity = 0, 1  # not against each other
     for joint in spec.joints:
-        joint.armature = own.ARMATURE
+        joint.armature = ROBOT.armature
         actuator = spec.add_actuator(name=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint.name)
         actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
-        actuator.gainprm[0], actuator.biasprm[:3] = own.STIFFNESS, (0, -own.STIFFNESS, -own.DAMPING)
+        actuator.gainprm[0], actuator.biasprm[:3] = ROBOT.stiffness, (0, -ROBOT.stiffness, -ROBOT.damping)
         effort = 36.0 if joint.name.endswith("calf") else 24.0
         actuator.forcelimited, actuator.forcerange = True, (-effort, effort)
         joint.actfrclimited = False
     spec.worldbody.first_body().add_freejoint()
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1))
-    for leg in own.LEGS:
+    for leg in ROBOT.feet:
         spec.body(f"{leg}_foot").add_site(name=leg)
     option = spec.option
-    option.timestep, option.integrator = own.DT, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.timestep, option.integrator = velocity.DT, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.iterations, option.tolerance = 20, 1e-8
     model = spec.compile()
     flexibility = model.dof_invweight0[model.jnt_dofadr] * (1 - IMPEDANCE_MAX)
@@ -67,7 +68,7 @@ class Player:
     """One robot of the task in some simulator, seen by the task's own functions."""
 
     def __init__(self, names: Names) -> None:
-        self.task = own.QuadrupedVelocityFlat(pushes=0.0)
+        self.task = quadruped.QuadrupedVelocityFlat(pushes=0.0)
         self.task.bind(names)
         self.action = np.zeros((1, 12), np.float32)
         self.memory: Any = None
@@ -79,8 +80,8 @@ class Player:
 
     def step(self, action: NDArray[np.float32]) -> NDArray[np.float32]:
         """Take a control step; returns what the policy sees."""
-        self.action[:] = np.clip(action, -own.LIMIT, own.LIMIT)
-        return self._observe(self._step(own.STANDING + own.SCALE * self.action[0].astype(np.float64)))
+        self.action[:] = np.clip(action, -velocity.LIMIT, velocity.LIMIT)
+        return self._observe(self._step(np.array(ROBOT.standing) + ROBOT.scale * self.action[0].astype(np.float64)))
 
     def _observe(self, arrays: dict[str, NDArray[np.float64]]) -> NDArray[np.float32]:
         self.joint_q = arrays["joint_q"]
@@ -112,7 +113,7 @@ class InMujoco(Player):
 
     def _step(self, targets: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         self.data.ctrl[:] = np.clip(targets, *self.model.jnt_range[1:].T)
-        mujoco.mj_step(self.model, self.data, own.SUBSTEPS)
+        mujoco.mj_step(self.model, self.data, velocity.SUBSTEPS)
         return self._arrays()
 
     def _arrays(self) -> dict[str, NDArray[np.float64]]:
@@ -155,7 +156,7 @@ def main() -> None:
     def policy(obs: NDArray[np.float32]) -> NDArray[np.float32]:
         return np.asarray(session.run(["action"], {"obs": obs})[0])
 
-    scene = own.QuadrupedVelocityFlat(pushes=0.0).scene()
+    scene = quadruped.QuadrupedVelocityFlat(pushes=0.0).scene()
     with tl.launch(scene, worlds=1, precision="f64", fields=("joint_q", "joint_qd", "site_q")) as sim:
         start = np.array(sim.reset().joint_q[0], np.float64)
         limits = np.asarray(scene.robots["dog"].joint_range)[-12:].T
@@ -166,7 +167,7 @@ def main() -> None:
             obs, _ = ours.step(action), theirs.step(action)
             if step in (1, 5, 10, 25, OPEN_LOOP):
                 apart = np.abs(ours.joint_q[7:] - theirs.joint_q[7:]).max()
-                print(f"same actions, {step * own.CONTROL_DT:.2f} s: joints are {apart:.1e} rad apart")
+                print(f"same actions, {step * velocity.CONTROL_DT:.2f} s: joints are {apart:.1e} rad apart")
         print("command: ahead, left, turn      error of the velocity: tightloop, MuJoCo C")
         for command in COMMANDS:
             errors = []

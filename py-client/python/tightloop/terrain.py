@@ -139,7 +139,8 @@ def mixed(
     """Return a grid of tiles: one column per kind along x, one row per level of difficulty along y.
 
     Args:
-        kinds: Kinds of tiles, of `KINDS`; one may occur several times, with other draws.
+        kinds: Kinds of tiles, of `KINDS`; one may occur several times, with other draws. Stairs and slopes lead up from
+            the middle of their tiles in the first column of their kind, down in the second, and so on.
         levels: Levels of difficulty; level 0 is nearly flat, the last one as hard as ``hardest`` says.
         tile: Side of a tile [m].
         cell: Distance of neighbouring elevations [m].
@@ -153,6 +154,7 @@ def mixed(
     """
     levels = checks.integer("terrain: levels", levels)
     width = checks.number("terrain: border", border, least=0.0)
+    kinds = [*kinds]
     for kind in kinds:
         checks.choice("terrain: kind", kind, KINDS)
     samples, step = _cells(tile, cell)
@@ -164,7 +166,8 @@ def mixed(
     for level in range(levels):
         share = (level + 1) / levels
         for column, kind in enumerate(kinds):
-            own = _tile(kind, share * sizes[kind], samples, step, (seed, level, column))
+            sign = 1.0 if kinds[:column].count(kind) % 2 else -1.0
+            own = _tile(kind, share * sizes[kind], samples, step, (seed, level, column), sign=sign)
             first = around + level * samples, around + column * samples
             elevation[first[0] : first[0] + samples + 1, first[1] : first[1] + samples + 1] = own
             middle = first[0] + samples // 2, first[1] + samples // 2
@@ -184,6 +187,8 @@ _MIDDLE = 0.8
 _RIM = 0.3
 #: Depth of the gaps between stepping stones [m].
 _GAP_DEPTH = 0.5
+#: Kinds that are hills or pits.
+_SIGNED = ("slopes", "stairs")
 #: Depth of a stair [m].
 _TREAD = 0.3
 
@@ -203,11 +208,18 @@ def _single(kind: str, size: float, tile: float, cell: float, seed: int) -> Terr
     return Terrain(own, step, start, (kind,), samples * step)
 
 
-def _tile(kind: str, size: float, samples: int, cell: float, key: tuple[int, int, int]) -> Array:
-    """Elevations of a tile, shape ``(samples + 1, samples + 1)``; its rim is at 0."""
+def _tile(
+    kind: str, size: float, samples: int, cell: float, key: tuple[int, int, int], *, sign: float | None = None
+) -> Array:
+    """Elevations of a tile, shape ``(samples + 1, samples + 1)``; its rim is at 0.
+
+    ``sign`` is 1 for hills and -1 for pits; None draws it.
+    """
     draws = np.random.default_rng([zlib.crc32(kind.encode()), *(part % 2**32 for part in key)])
     from_middle = np.abs(np.arange(samples + 1) - samples // 2) * cell
     ring = np.maximum(from_middle[:, None], from_middle[None, :])
+    if kind in _SIGNED:
+        size *= draws.choice([-1.0, 1.0]) if sign is None else sign
     found = _MAKERS[kind](size, ring, cell, draws)
     half = 0.5 * samples * cell
     found[ring > half - _RIM] = 0.0
@@ -224,16 +236,16 @@ def _rough(size: float, ring: Array, _cell: float, draws: np.random.Generator) -
     return np.where(ring <= 0.5 * _MIDDLE, 0.0, size * (0.5 * smooth + 0.5 * noise[1:-1, 1:-1]))
 
 
-def _slopes(size: float, ring: Array, _cell: float, draws: np.random.Generator) -> Array:
+def _slopes(size: float, ring: Array, _cell: float, _draws: np.random.Generator) -> Array:
     half = ring.max() - _RIM
-    return draws.choice([-1.0, 1.0]) * size * (half - np.clip(ring, _MIDDLE, half))
+    return size * (half - np.clip(ring, _MIDDLE, half))
 
 
-def _stairs(size: float, ring: Array, _cell: float, draws: np.random.Generator) -> Array:
+def _stairs(size: float, ring: Array, _cell: float, _draws: np.random.Generator) -> Array:
     half = ring.max() - _RIM
     # whole treads from the rim inwards; half a cell keeps rounding off their edges
     count = np.floor((half - np.clip(ring, _MIDDLE, half) + 1e-9) / _TREAD)
-    return draws.choice([-1.0, 1.0]) * size * count
+    return size * count
 
 
 def _steps(size: float, ring: Array, cell: float, draws: np.random.Generator) -> Array:

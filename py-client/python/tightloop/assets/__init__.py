@@ -14,7 +14,7 @@ from tightloop.attributes import suggestion
 from tightloop.errors import ArgumentError
 from tightloop.signatures import checked_calls
 
-__all__ = ["CARTPOLE", "FR3", "POLICIES", "QUADRUPED", "Policy", "policy"]
+__all__ = ["CARTPOLE", "FR3", "HUMANOID", "POLICIES", "QUADRUPED", "Policy", "policy"]
 
 _FOLDER = Path(__file__).parent
 #: URDF of a Franka FR3 with its hand; ``fr3/README.md`` beside it says where it is from.
@@ -23,6 +23,8 @@ FR3 = _FOLDER / "fr3/fr3_franka_hand.urdf"
 CARTPOLE = _FOLDER / "cartpole.urdf"
 #: URDF of a quadruped with 12 joints.
 QUADRUPED = _FOLDER / "quadruped.urdf"
+#: URDF of a humanoid with 23 joints.
+HUMANOID = _FOLDER / "humanoid.urdf"
 #: Files of the trained policies, by task.
 POLICIES = {file.stem: file for file in sorted((_FOLDER / "policies").glob("*.npz"))}
 

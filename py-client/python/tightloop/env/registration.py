@@ -17,6 +17,8 @@ EPISODE_STEPS = {
     "FrankaPickCube": 50,
     "FrankaLift": 250,
     "QuadrupedVelocityFlat": 1000,
+    "QuadrupedVelocityRough": 1000,
+    "HumanoidVelocityFlat": 1000,
 }
 
 #: The same of gymnasium's tasks, as gymnasium's own.

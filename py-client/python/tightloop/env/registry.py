@@ -25,6 +25,8 @@ TASKS = {
     "FrankaPickCube": "tightloop.tasks.pick_cube:FrankaPickCube",
     "FrankaLift": "tightloop.tasks.lift:FrankaLift",
     "QuadrupedVelocityFlat": "tightloop.tasks.quadruped:QuadrupedVelocityFlat",
+    "QuadrupedVelocityRough": "tightloop.tasks.quadruped_rough:QuadrupedVelocityRough",
+    "HumanoidVelocityFlat": "tightloop.tasks.humanoid:HumanoidVelocityFlat",
 }
 
 #: gymnasium's MuJoCo tasks.

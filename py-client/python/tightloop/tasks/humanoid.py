@@ -1,0 +1,118 @@
+"""A humanoid follows velocity commands on flat ground; see `tightloop.tasks.velocity`.
+
+| place | observation | range | unit |
+|---|---|---|---|
+| 0–2 | velocity of the pelvis in its axes | ±10 | m/s |
+| 3–5 | angular velocity of the pelvis in its axes | ±30 | rad/s |
+| 6–8 | direction of gravity in its axes | ±1 | – |
+| 9–11 | command: ahead, left, turn | ±2 | m/s, rad/s |
+| 12–34 | joint positions less those of standing | ±4 | rad |
+| 35–57 | joint velocities | ±60 | rad/s |
+| 58–80 | last action | ±4 | – |
+| 81, 82 | sine and cosine of the gait's phase; 0 and 1 when told to stand | ±1 | – |
+
+| action | range | what 1 means |
+|---|---|---|
+| 0–22 | ±4 | a target 0.25 rad from standing |
+
+The reward is the weighted sum of the terms of `HumanoidVelocityFlat.reward_terms`. An episode ends when the pelvis
+tilts by more than 60° or is closer than 45 cm to the ground. ``velocity_error`` in ``infos`` is the distance of the
+velocity from the command in the plane [m/s], a mean over about a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from tightloop.assets import HUMANOID
+from tightloop.env.names import Names
+from tightloop.env.task import Array, Namespace, Worlds
+from tightloop.tasks.geometry import squares
+from tightloop.tasks.legged import LeggedRobot
+from tightloop.tasks.velocity import CONTROL_DT, VelocityTask
+
+SIDES = ("left", "right")
+LEG = {"hip_pitch": -0.3, "hip_roll": 0.0, "hip_yaw": 0.0, "knee": 0.6, "ankle_pitch": -0.3, "ankle_roll": 0.0}
+WAIST = {"waist_yaw": 0.0, "waist_roll": 0.0, "waist_pitch": 0.0}
+ARM = {"shoulder_pitch": 0.2, "shoulder_roll": 0.2, "shoulder_yaw": 0.0, "elbow": -0.6}
+#: Joints that turn the other way in the mirror image.
+SIDEWAYS = ("roll", "yaw")
+
+
+def _pose() -> dict[str, float]:
+    """Positions of all joints when it stands [rad]."""
+    pose = {f"{side}_{joint}": value for side in SIDES for joint, value in LEG.items()} | WAIST
+    pose |= {f"{side}_{joint}": value for side in SIDES for joint, value in ARM.items()}
+    # arms are a little off the trunk: opposite rolls
+    return pose | {"right_shoulder_roll": -ARM["shoulder_roll"]}
+
+
+def _flip(joints: list[str]) -> tuple[list[int], list[float]]:
+    """Left and right joints exchanged."""
+    swapped = {"left": "right", "right": "left"}
+    twins = ["_".join(swapped.get(part, part) for part in joint.split("_")) for joint in joints]
+    return [joints.index(twin) for twin in twins], [-1.0 if j.endswith(SIDEWAYS) else 1.0 for j in joints]
+
+
+POSE = _pose()
+ROBOT = LeggedRobot(
+    file=HUMANOID,
+    name="humanoid",
+    base="pelvis",
+    joints=tuple(POSE),
+    standing=tuple(POSE.values()),
+    height=0.75,
+    feet={side: (f"{side}_foot", (0.035, 0.0, -0.04)) for side in SIDES},
+    radius=0.0,
+    groups=(0, 1),
+    stiffness={
+        ".*_hip_.*": 100.0,
+        ".*_knee": 150.0,
+        ".*_ankle_.*": 40.0,
+        "waist_.*": 120.0,
+        ".*_(shoulder_.*|elbow)": 40.0,
+    },
+    damping={".*_hip_.*": 3.0, ".*_knee": 4.0, ".*_ankle_.*": 2.0, "waist_.*": 4.0, ".*_(shoulder_.*|elbow)": 1.5},
+    armature={".*_(hip|knee|ankle).*|waist_.*": 0.02, ".*_(shoulder_.*|elbow)": 0.01},
+    scale=0.25,
+    flip=_flip(list(POSE)),
+)
+
+
+class HumanoidVelocityFlat(VelocityTask):
+    """Follow velocity commands with a humanoid. ``pushes`` is the largest push of the pelvis [N·s]; 0 for none."""
+
+    robot = ROBOT
+    gait, swing, lowest = 1.4, 0.08, 0.45
+    command_max = (1.0, 0.4, 1.0)
+    reward_weights: Mapping[str, float] = {
+        "follow velocity": 1.5 * CONTROL_DT,
+        "follow turn": 0.75 * CONTROL_DT,
+        "bounce": -0.5 * CONTROL_DT,
+        "roll and pitch rate": -0.05 * CONTROL_DT,
+        "tilt": -2.5 * CONTROL_DT,
+        "torque": -1e-5 * CONTROL_DT,
+        "action rate": -0.01 * CONTROL_DT,
+        "gait": 1.0 * CONTROL_DT,
+        "pose": -0.05 * CONTROL_DT,
+        "upper body": -0.5 * CONTROL_DT,
+        "fall": -1.0,
+    }
+
+    def __init__(self, pushes: float = 10.0) -> None:
+        self.pushes = pushes
+
+    def bind(self, names: Names) -> None:
+        """Look up the joints and feet."""
+        super().bind(names)
+        # a leg's way ahead is in its pitch joints; all others should stay where they are
+        quiet = [joint for joint in ROBOT.joints if not joint.endswith(("hip_pitch", "knee", "ankle_pitch"))]
+        self._quiet = [names.coord(f"{ROBOT.name}/{joint}") for joint in quiet]
+        self._quiet_standing = np.array([POSE[joint] for joint in quiet], np.float32)
+
+    def reward_terms(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
+        """Return the terms, before their weights."""
+        off = worlds.joint_q[:, self._quiet] - xp.asarray(self._quiet_standing)
+        return {**super().reward_terms(xp, worlds), "upper body": squares(xp, off)}

@@ -1,0 +1,177 @@
+"""A quadruped follows velocity commands on rough ground, slopes, stairs and blocks; see `tightloop.tasks.velocity`.
+
+The ground is one field of tiles (`tightloop.terrain.mixed`): a column for each kind, a row for each level of
+difficulty. An episode starts in the middle of a tile. A robot that walked most of the way that it was told, and away
+from the start, begins its next episode a level higher; one that fell or hardly moved begins it a level lower. After the
+hardest level it begins anywhere.
+
+| place | observation | range | unit |
+|---|---|---|---|
+| 0–49 | those of `QuadrupedVelocityFlat` | | |
+| 50–140 | depth of the ground below the trunk, less that on level ground; 13 rays along it times 7 across | ±1 | m |
+
+Actions, ends and ``velocity_error`` are those of `QuadrupedVelocityFlat`; heights count from the ground below. Rays are
+10 cm apart. The command changes every ten seconds, and 6 of 10 commands are to go straight on. ``infos`` has the level
+of each world's episode, ``level``, and the most distance from its start, ``farthest`` [m].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+import tightloop as tl
+from tightloop import checks, terrain
+from tightloop.env.mirror import Mirror
+from tightloop.env.names import Names
+from tightloop.env.task import Array, Namespace, Observed, Worlds
+from tightloop.errors import ArgumentError
+from tightloop.tasks.geometry import squares
+from tightloop.tasks.quadruped import QuadrupedVelocityFlat
+from tightloop.tasks.velocity import CONTROL_DT, STILL
+
+KINDS = ("rough", "slopes", "slopes", "stairs", "stairs", "steps")
+#: The size of the hardest level of each kind; see `tightloop.terrain`.
+HARDEST = {"flat": 0.0, "rough": 0.08, "slopes": 0.5, "stairs": 0.15, "steps": 0.15, "stones": 0.3}
+LEVELS = 10
+TILE, CELL, BORDER = 8.0, 0.05, 6.0  # [m]
+RAYS, SPACING = (13, 7), 0.1  # [–, m]
+AROUND = 0.5  # robots start this far about the middle of a tile, at most [m]
+STRAIGHT = 0.6  # share of the commands without a turn
+FAR = 0.4 * TILE  # a robot that went up a level was this far from its start [m]
+
+
+class QuadrupedVelocityRough(QuadrupedVelocityFlat):
+    """Follow velocity commands on rough ground.
+
+    Args:
+        pushes: Largest push of the trunk [N·s]; 0 for none.
+        kinds: Kinds of ground, of `tightloop.terrain.KINDS`.
+        level: Level of all episodes; None for levels that follow what each robot can do.
+        first_levels: Number of levels, from the easiest, that the first episodes are spread over.
+    """
+
+    fields = (*QuadrupedVelocityFlat.fields, "height_scan")
+    goal_draws = 5
+    goal_steps = 500
+    initial_draws = 3
+    swing = 0.1
+    reward_weights: Mapping[str, float] = {
+        **QuadrupedVelocityFlat.reward_weights,
+        "bounce": -0.25 * CONTROL_DT,
+        "tilt": -0.5 * CONTROL_DT,
+        "pose": -0.05 * CONTROL_DT,
+    }
+
+    def __init__(
+        self, pushes: float = 4.0, kinds: Sequence[str] = KINDS, level: int | None = None, first_levels: int = 3
+    ) -> None:
+        super().__init__(pushes)
+        self._ground = terrain.mixed(kinds, levels=LEVELS, tile=TILE, cell=CELL, border=BORDER, hardest=HARDEST)
+        self._level = None if level is None else checks.integer("level", level, least=0, error=ArgumentError)
+        if self._level is not None and self._level >= LEVELS:
+            raise ArgumentError(f"level is {level}; give one of 0 to {LEVELS - 1}")
+        self.first_levels = first_levels
+
+    def add_ground(self, scene: tl.Scene) -> None:
+        """Add the field to the scene."""
+        self._ground.add_to(scene)
+
+    def scene(self) -> tl.Scene:
+        """The robot on the field, with rays below its trunk and its feet."""
+        scene = super().scene()
+        size = tuple((count - 1) * SPACING for count in RAYS)
+        scans = [scene.add_height_scan(body=self.robot.body, size=size, shape=RAYS)]
+        for link, place in self.robot.feet.values():
+            scans.append(scene.add_height_scan(body=f"{self.robot.name}/{link}", pos=place, shape=(1, 1)))
+        self._rays = [scan.rays for scan in scans]
+        return scene
+
+    def observed(self) -> Sequence[Observed]:
+        """The table of the module."""
+        return [*super().observed(), Observed("ground", -1, 1, RAYS[0] * RAYS[1], "m")]
+
+    def bind(self, names: Names) -> None:
+        """Look up joints, feet and rays."""
+        super().bind(names)
+        grid, *feet = self._rays
+        self._grid, self._below = grid, grid.start + (grid.stop - grid.start) // 2
+        self._under_feet = slice(feet[0].start, feet[-1].stop)
+
+    def goal(self, xp: Namespace, worlds: Worlds, draws: Array) -> Array:
+        """Return the next command: ahead, left, turn; or to stand."""
+        moves = draws[:, 3] >= STILL
+        turns = moves & (draws[:, 4] >= STRAIGHT)
+        signed, most = 2.0 * draws - 1.0, self.command_max
+        return xp.stack(
+            [most[0] * signed[:, 0] * moves, most[1] * signed[:, 1] * moves, most[2] * signed[:, 2] * turns], 1
+        )
+
+    def initial_state(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
+        """Return places near the middle of a tile of the world's level."""
+        kind = (draws[:, 2] * len(self._ground.kinds)).astype(int)
+        level = np.minimum(worlds.level, LEVELS - 1) if self._level is None else self._level
+        joint_q = np.array(worlds.joint_q)
+        joint_q[:, :2] = self._ground.starts[level, kind, :2] + AROUND * (2.0 * draws[:, :2] - 1.0)
+        joint_q[:, 2] += self._ground.starts[level, kind, 2]
+        return {"joint_q": joint_q}
+
+    def next_level(self, xp: Namespace, worlds: Worlds) -> Array:
+        """Return levels by how far robots walked."""
+        own = worlds.memory
+        fell = self.terminated(xp, worlds)
+        up = ~fell & (own["walked"] > 0.75 * own["told"]) & (own["farthest"] > FAR)
+        down = fell | (own["walked"] < 0.4 * own["told"])
+        level = np.maximum(worlds.level + up - (down & ~up), 0)
+        # digits of a place that no one chose
+        anywhere = (np.abs(worlds.joint_q[:, 0]) * 997.0 % 1.0 * LEVELS).astype(level.dtype)
+        return np.where(level >= LEVELS, np.minimum(anywhere, LEVELS - 1), level)
+
+    def remember(self, xp: Namespace, worlds: Worlds, memory: Mapping[str, Array] | None) -> Mapping[str, Array]:
+        """Return what flat ground needs, and how far a robot walked, was told to walk, and was from its start [m]."""
+        own = super().remember(xp, worlds, memory)
+        command, place = worlds.goal[:, :2], worlds.joint_q[:, :2]
+        speed = xp.sqrt(squares(xp, command))
+        along = xp.vecdot(command, own["velocity"][:, :2]) / xp.maximum(speed, 0.0 * speed + 0.1)
+        if memory is None:
+            return {**own, "start": place, "walked": 0.0 * speed, "told": 0.0 * speed, "farthest": 0.0 * speed}
+        way = place - memory["start"]
+        return {
+            **own,
+            "start": memory["start"],
+            "walked": memory["walked"] + along * CONTROL_DT,
+            "told": memory["told"] + speed * CONTROL_DT,
+            "farthest": xp.maximum(memory["farthest"], xp.sqrt(squares(xp, way))),
+        }
+
+    def foot_heights(self, xp: Namespace, worlds: Worlds) -> Array:
+        """Return how high the soles are above the ground [m], shape ``(worlds, feet)``."""
+        return worlds.height_scan[:, self._under_feet] - self.robot.radius
+
+    def base_height(self, xp: Namespace, worlds: Worlds) -> Array:
+        """Return how high the trunk is above the ground [m], shape ``(worlds,)``."""
+        return worlds.height_scan[:, self._below]
+
+    def observe(self, xp: Namespace, worlds: Worlds) -> Sequence[Array]:
+        """Return the parts of the table of the module."""
+        return [*super().observe(xp, worlds), worlds.height_scan[:, self._grid] - self.robot.height]
+
+    def terminated(self, xp: Namespace, worlds: Worlds) -> Array:
+        """Return which robots fell, or left the field."""
+        edges = [0.5 * length - 0.5 for length in self._ground.size]
+        place = abs(worlds.joint_q[:, :2])
+        return super().terminated(xp, worlds) | (place[:, 0] > edges[0]) | (place[:, 1] > edges[1])
+
+    def metrics(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
+        """Return those of flat ground, ``level``, and ``farthest``, the most distance from the start [m]."""
+        return {**super().metrics(xp, worlds), "level": 1.0 * worlds.level, "farthest": worlds.memory["farthest"]}
+
+    def mirrored(self) -> Mirror | None:
+        """Return left and right exchanged."""
+        mirror = super().mirrored()
+        if mirror is None:
+            return None
+        columns, rows = RAYS
+        order = [row * columns + column for row in reversed(range(rows)) for column in range(columns)]
+        return Mirror({**mirror.observed, "ground": (order, [1] * len(order))}, mirror.action)

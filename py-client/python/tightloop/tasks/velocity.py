@@ -1,0 +1,193 @@
+"""Follow velocity commands on legs: what the tasks of quadrupeds and humanoids have in common.
+
+The command is a velocity ahead and to the left and a turning rate, drawn anew every few seconds. Feet follow a gait: in
+turns, two groups of feet rise and sink by the sine of a phase. Physics at 200 Hz, control at 50 Hz, episodes of 20 s.
+Rewards and rates follow legged_gym (Rudin et al. 2022, arXiv 2109.11978).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+import tightloop as tl
+from tightloop.env.controls import Control, JointTarget
+from tightloop.env.disturbances import Push
+from tightloop.env.mirror import Flip, Mirror
+from tightloop.env.names import Names
+from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
+from tightloop.tasks.geometry import squares
+from tightloop.tasks.kinematics import projected_gravity, rotate_inverse
+from tightloop.tasks.legged import LeggedRobot
+
+LIMIT = 4.0  # of actions
+DT, SUBSTEPS = 1 / 200, 4  # [s, –]
+CONTROL_DT = DT * SUBSTEPS  # [s]
+STILL = 0.1  # share of the commands that are to stand
+#: Signs of vectors and axial vectors in the mirror image.
+POLAR: Flip = ([0, 1, 2], [1, -1, 1])
+AXIAL: Flip = ([0, 1, 2], [-1, 1, -1])
+
+
+class VelocityTask(Task):
+    """The base class of tasks that follow velocity commands.
+
+    Attributes:
+        robot: The robot.
+        pushes: Largest push of its base [N·s]; 0 for none.
+        gait: Steps of a leg per second [Hz].
+        swing: Height of a foot in the middle of its swing [m].
+        command_max: Greatest command ahead, to the left [m/s], and turning [rad/s].
+        lowest: Height of the base over the ground at which a robot has fallen [m].
+    """
+
+    fields = ("joint_q", "joint_qd", "joint_torque", "site_q")
+    max_episode_steps = 1000
+    goal_draws = 4
+    goal_steps = 250
+    robot: LeggedRobot
+    pushes: float = 0.0
+    gait: float = 2.5
+    swing: float = 0.07
+    command_max: tuple[float, float, float] = (1.0, 0.6, 1.0)
+    lowest: float = 0.15
+
+    def scene(self) -> tl.Scene:
+        """The robot on the ground. Each world starts in another direction, with its joints a little off."""
+        scene = tl.Scene(dt=DT, substeps=SUBSTEPS)
+        scene.solver(cone="pyramidal", impratio=1.0)  # MuJoCo's defaults, which feet need no more than
+        self.add_ground(scene)
+        name = self.robot.add_to(scene).name
+        scene.randomize(joint_q={name: tl.Uniform(-0.1, 0.1)}, body_q={name: {"yaw": tl.Uniform(-np.pi, np.pi)}})
+        return scene
+
+    def add_ground(self, scene: tl.Scene) -> None:
+        """Add the ground to the scene."""
+        scene.add_ground()
+
+    def controls(self) -> Sequence[Control]:
+        """Joint targets."""
+        return [JointTarget(self.robot.dofs, self.robot.scale, limit=LIMIT)]
+
+    def disturbances(self) -> Sequence[Push]:
+        """Pushes of the base."""
+        return [Push(self.robot.body, self.pushes, (4.0, 8.0))] if self.pushes else []
+
+    def observed(self) -> Sequence[Observed]:
+        """The table of the module."""
+        joints = len(self.robot.joints)
+        return [
+            Observed("velocity", -10, 10, 3, "m/s"),
+            Observed("angular velocity", -30, 30, 3, "rad/s"),
+            Observed("gravity", -1, 1, 3),
+            Observed("command", -2, 2, 3, "m/s, rad/s"),
+            Observed("joint positions", -4, 4, joints, "rad"),
+            Observed("joint velocities", -60, 60, joints, "rad/s"),
+            Observed("last action", -LIMIT, LIMIT, joints),
+            Observed("phase", -1, 1, 2),
+        ]
+
+    def bind(self, names: Names) -> None:
+        """Look up the joints and feet."""
+        self._joints = _places([names.coord(name) for name in self.robot.dofs])
+        self._dofs = _places([names.dof(name) for name in self.robot.dofs])
+        self._feet = _places([names.site(name) for name in self.robot.feet])
+        self._standing = np.array(self.robot.standing, np.float32)
+
+    def goal(self, xp: Namespace, worlds: Worlds, draws: Array) -> Array:
+        """Return the next command: ahead, left, turn; or to stand."""
+        moves = draws[:, 3] >= STILL
+        signed = 2.0 * draws - 1.0
+        return xp.stack([most * signed[:, axis] * moves for axis, most in enumerate(self.command_max)], 1)
+
+    def foot_heights(self, xp: Namespace, worlds: Worlds) -> Array:
+        """Return how high the soles are above the ground [m], shape ``(worlds, feet)``."""
+        return worlds.site_q[:, self._feet, 2] - self.robot.radius
+
+    def base_height(self, xp: Namespace, worlds: Worlds) -> Array:
+        """Return how high the base is above the ground [m], shape ``(worlds,)``."""
+        return worlds.joint_q[:, 2]
+
+    def remember(self, xp: Namespace, worlds: Worlds, memory: Mapping[str, Array] | None) -> Mapping[str, Array]:
+        """Return velocities in the base's axes, the phase, how far feet are from their gait, and the mean error."""
+        quats = worlds.joint_q[:, 3:7]
+        velocity = rotate_inverse(xp, quats, worlds.joint_qd[:, 0:3])
+        turning = rotate_inverse(xp, quats, worlds.joint_qd[:, 3:6])
+        apart = worlds.goal[:, :2] - velocity[:, :2]
+        error = xp.sqrt(squares(xp, apart))
+        phase = 0.0 * error
+        if memory is not None:
+            error = memory["error"] + 0.03 * (error - memory["error"])
+            phase = (memory["phase"] + 2.0 * np.pi * self.gait * CONTROL_DT) * (squares(xp, worlds.goal) > 0.0)
+        swing = xp.sin(phase)
+        lift = self.swing * xp.stack([xp.maximum(swing, 0.0 * swing), xp.maximum(-swing, 0.0 * swing)], 1)
+        feet = self.foot_heights(xp, worlds) - lift[:, self.robot.groups]
+        return {
+            "velocity": velocity,
+            "turning": turning,
+            "gravity": projected_gravity(xp, quats),
+            "phase": phase,
+            "clock": xp.stack([swing, xp.cos(phase)], 1),
+            "feet": squares(xp, feet),
+            "error": error,
+        }
+
+    def observe(self, xp: Namespace, worlds: Worlds) -> Sequence[Array]:
+        """Return the parts of the table of the module."""
+        own = worlds.memory
+        turned = worlds.joint_q[:, self._joints] - xp.asarray(self._standing)
+        moving = worlds.joint_qd[:, self._dofs]
+        return own["velocity"], own["turning"], own["gravity"], worlds.goal, turned, moving, worlds.action, own["clock"]
+
+    def reward_terms(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
+        """Return the terms, before their weights."""
+        own = worlds.memory
+        velocity, turning, gravity, command = own["velocity"], own["turning"], own["gravity"], worlds.goal
+        turn = command[:, 2] - turning[:, 2]
+        return {
+            "follow velocity": xp.exp(-4.0 * squares(xp, command[:, :2] - velocity[:, :2])),
+            "follow turn": xp.exp(-4.0 * turn * turn),
+            "bounce": velocity[:, 2] * velocity[:, 2],
+            "roll and pitch rate": squares(xp, turning[:, :2]),
+            "tilt": squares(xp, gravity[:, :2]),
+            "torque": squares(xp, worlds.joint_torque[:, self._dofs]),
+            "action rate": squares(xp, worlds.action - worlds.previous_action),
+            "gait": xp.exp(-200.0 * own["feet"]),
+            "pose": squares(xp, worlds.joint_q[:, self._joints] - xp.asarray(self._standing)),
+            "fall": 1.0 * self.terminated(xp, worlds),
+        }
+
+    def terminated(self, xp: Namespace, worlds: Worlds) -> Array:
+        """Return which robots fell."""
+        return (worlds.memory["gravity"][:, 2] > -0.5) | (self.base_height(xp, worlds) < self.lowest)
+
+    def metrics(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
+        """Return ``velocity_error``, the mean distance of the velocity from the command [m/s], and ``fell``."""
+        return {"velocity_error": worlds.memory["error"], "fell": self.terminated(xp, worlds)}
+
+    def mirrored(self) -> Mirror | None:
+        """Return left and right exchanged."""
+        joints = self.robot.flip
+        if joints is None:
+            return None
+        return Mirror(
+            {
+                "velocity": POLAR,
+                "angular velocity": AXIAL,
+                "gravity": POLAR,
+                "command": ([0, 1, 2], [1, -1, -1]),
+                "joint positions": joints,
+                "joint velocities": joints,
+                "last action": joints,
+                "phase": ([0, 1], [-1, -1]),
+            },
+            joints,
+        )
+
+
+def _places(places: list[int]) -> slice | list[int]:
+    """Columns, as a slice where they are side by side."""
+    if places == list(range(places[0], places[0] + len(places))):
+        return slice(places[0], places[0] + len(places))
+    return places
