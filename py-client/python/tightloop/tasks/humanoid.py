@@ -13,7 +13,7 @@
 
 | action | range | what 1 means |
 |---|---|---|
-| 0–22 | ±4 | a target 0.25 rad from standing |
+| 0–22 | ±4 | a target 0.3 rad (pitch of hips, knees, ankles), 0.2 rad (rest of the legs) or 0.1 rad from standing |
 
 The reward is the weighted sum of the terms of `HumanoidVelocityFlat.reward_terms`. An episode ends when the pelvis
 tilts by more than 60° or is closer than 45 cm to the ground. ``velocity_error`` in ``infos`` is the distance of the
@@ -37,6 +37,8 @@ SIDES = ("left", "right")
 LEG = {"hip_pitch": -0.3, "hip_roll": 0.0, "hip_yaw": 0.0, "knee": 0.6, "ankle_pitch": -0.3, "ankle_roll": 0.0}
 WAIST = {"waist_yaw": 0.0, "waist_roll": 0.0, "waist_pitch": 0.0}
 ARM = {"shoulder_pitch": 0.2, "shoulder_roll": 0.2, "shoulder_yaw": 0.0, "elbow": -0.6}
+#: Joints that take a leg ahead.
+AHEAD = ("hip_pitch", "knee", "ankle_pitch")
 #: Joints that turn the other way in the mirror image.
 SIDEWAYS = ("roll", "yaw")
 
@@ -54,6 +56,13 @@ def _flip(joints: list[str]) -> tuple[list[int], list[float]]:
     swapped = {"left": "right", "right": "left"}
     twins = ["_".join(swapped.get(part, part) for part in joint.split("_")) for joint in joints]
     return [joints.index(twin) for twin in twins], [-1.0 if j.endswith(SIDEWAYS) else 1.0 for j in joints]
+
+
+def _scale(joint: str) -> float:
+    """Effect of an action on a joint's target [rad]: most on joints that take a leg ahead."""
+    if joint.endswith(AHEAD):
+        return 0.3
+    return 0.2 if "hip" in joint or "ankle" in joint else 0.1
 
 
 POSE = _pose()
@@ -76,7 +85,7 @@ ROBOT = LeggedRobot(
     },
     damping={".*_hip_.*": 3.0, ".*_knee": 4.0, ".*_ankle_.*": 2.0, "waist_.*": 4.0, ".*_(shoulder_.*|elbow)": 1.5},
     armature={".*_(hip|knee|ankle).*|waist_.*": 0.02, ".*_(shoulder_.*|elbow)": 0.01},
-    scale=0.25,
+    scale=tuple(_scale(joint) for joint in POSE),
     flip=_flip(list(POSE)),
 )
 
@@ -88,7 +97,7 @@ class HumanoidVelocityFlat(VelocityTask):
     gait, swing, lowest = 1.4, 0.08, 0.45
     command_max = (1.0, 0.4, 1.0)
     reward_weights: Mapping[str, float] = {
-        "follow velocity": 1.5 * CONTROL_DT,
+        "follow velocity": 2.0 * CONTROL_DT,
         "follow turn": 0.75 * CONTROL_DT,
         "bounce": -0.5 * CONTROL_DT,
         "roll and pitch rate": -0.05 * CONTROL_DT,
@@ -108,7 +117,7 @@ class HumanoidVelocityFlat(VelocityTask):
         """Look up the joints and feet."""
         super().bind(names)
         # a leg's way ahead is in its pitch joints; all others should stay where they are
-        quiet = [joint for joint in ROBOT.joints if not joint.endswith(("hip_pitch", "knee", "ankle_pitch"))]
+        quiet = [joint for joint in ROBOT.joints if not joint.endswith(AHEAD)]
         self._quiet = [names.coord(f"{ROBOT.name}/{joint}") for joint in quiet]
         self._quiet_standing = np.array([POSE[joint] for joint in quiet], np.float32)
 

@@ -111,7 +111,7 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
     def initial_state(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
         """Return places near the middle of a tile of the world's level."""
         kind = (draws[:, 2] * len(self._ground.kinds)).astype(int)
-        level = np.minimum(worlds.level, LEVELS - 1) if self._level is None else self._level
+        level = self._levels(np, worlds)
         joint_q = np.array(worlds.joint_q)
         joint_q[:, :2] = self._ground.starts[level, kind, :2] + AROUND * (2.0 * draws[:, :2] - 1.0)
         joint_q[:, 2] += self._ground.starts[level, kind, 2]
@@ -165,7 +165,12 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
 
     def metrics(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
         """Return those of flat ground, ``level``, and ``farthest``, the most distance from the start [m]."""
-        return {**super().metrics(xp, worlds), "level": 1.0 * worlds.level, "farthest": worlds.memory["farthest"]}
+        return {**super().metrics(xp, worlds), "level": self._levels(xp, worlds), "farthest": worlds.memory["farthest"]}
+
+    def _levels(self, xp: Namespace, worlds: Worlds) -> Array:
+        """Levels of difficulty that worlds are at."""
+        last = 0 * worlds.level + (LEVELS - 1 if self._level is None else self._level)
+        return xp.minimum(worlds.level, last) if self._level is None else last
 
     def mirrored(self) -> Mirror | None:
         """Return left and right exchanged."""
