@@ -13,6 +13,8 @@ from tightloop.env import AutoresetMode, VectorEnv
 WORLDS = 256
 SEED = 1_000_000  # of the first world; no training comes there
 UNITS = {"error": "m", "velocity_error": "mps"}  # of the metrics of tightloop's tasks; the others have none
+# How tasks are made for evaluations: on ground of all levels
+OPTIONS: dict[str, dict[str, Any]] = {"QuadrupedVelocityRough": {"first_levels": 10}}
 NO_METRICS = ("fault", "final_obs", "final_info")  # in infos
 
 
@@ -43,7 +45,7 @@ def evaluate(task: str, act: Callable[[NDArray[np.float32]], NDArray[Any]], *, t
         Means over the worlds: ``return``, the sum of the rewards; and at the end of the episode, where the task defines
         them, ``success``, from 0 to 1, and the metrics of the task, such as ``error``, the distance from the goal [m].
     """
-    env = VectorEnv(task, WORLDS, autoreset_mode=AutoresetMode.SAME_STEP, threads=threads)
+    env = VectorEnv(task, WORLDS, autoreset_mode=AutoresetMode.SAME_STEP, threads=threads, **OPTIONS.get(task, {}))
     returns, going, last = np.zeros(WORLDS), np.ones(WORLDS, bool), {}
     try:
         obs, _ = env.reset(seed=SEED)

@@ -147,6 +147,7 @@ TYPES = {
     "Number": "number",
     "usize": "whole number",
     "i32": "whole number",
+    "[usize; 2]": "2 whole numbers",
     "bool": "`true` or `false`",
     "String": "text",
     "PathBuf": "path",
