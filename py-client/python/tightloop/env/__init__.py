@@ -15,6 +15,7 @@ from gymnasium.vector import AutoresetMode
 from tightloop.env.controls import ActuatorControl, EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
 from tightloop.env.disturbances import Push
 from tightloop.env.groups import make_groups
+from tightloop.env.metadata import policy_metadata
 from tightloop.env.mirror import Mirror
 from tightloop.env.names import Names
 from tightloop.env.registration import register
@@ -39,6 +40,7 @@ __all__ = [
     "VectorEnv",
     "Worlds",
     "make_groups",
+    "policy_metadata",
 ]
 
 

@@ -29,6 +29,7 @@ class Control(Protocol):
     limit: float
     #: Frame fields that it reads.
     fields: tuple[str, ...]
+    # A control may have `value_names`, `scales` and `offsets`, for the metadata of policies: an entry per value.
 
     def bind(self, names: Names, commands: Commands) -> None:
         """Look up names, and get the commands that it writes."""
@@ -45,6 +46,7 @@ class _Joints:
     fields: tuple[str, ...] = ()
     limit = 1.0
     _field = "joint_target_q"
+    _is_absolute = True
 
     @checked_calls
     def __init__(self, dofs: Sequence[str], scale: ArrayLike) -> None:
@@ -79,6 +81,21 @@ class _Joints:
         self._own = np.empty((0 if self._side_by_side else len(self._array), self._count), np.float32)
         self._start = np.ascontiguousarray(commands.start[places])
         self._low, self._high = (np.ascontiguousarray(end) for end in commands.range[places].T)
+
+    @property
+    def value_names(self) -> list[str]:
+        """Names of the action's values, ``robot/joint``."""
+        return self._dofs
+
+    @property
+    def scales(self) -> NDArray[np.float32]:
+        """What an action of 1 means, shape ``(size,)``."""
+        return self._scale
+
+    @property
+    def offsets(self) -> NDArray[np.float32]:
+        """What an action of 0 means, shape ``(size,)``; 0 for changes of a target."""
+        return self._start if self._is_absolute else np.zeros(self.size, np.float32)
 
     def _drive(self, action: NDArray[np.float32], start: NDArray[np.float32] | None) -> None:
         """Write ``start + scale * action`` or, without a start, add ``scale * action`` to it, within limits."""
@@ -148,6 +165,8 @@ class JointDelta(_Joints):
     An increment starts from the last target, not from the joint position, so that a load causes no drift.
     """
 
+    _is_absolute = False
+
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
         """Increment the targets."""
         self._drive(action, None)
@@ -178,6 +197,7 @@ class ActuatorControl:
         self.ranges = given.astype(np.float32)
         self.size = len(given)
         self.clips = checks.flag("ActuatorControl: clips", clips, error=ArgumentError)
+        self.scales, self.offsets = np.ones(self.size, np.float32), np.zeros(self.size, np.float32)
 
     def bind(self, names: Names, commands: Commands) -> None:
         """Check the number of actuators."""
@@ -187,6 +207,7 @@ class ActuatorControl:
                 f"ActuatorControl: ranges has {self.size} rows for {there} actuators; give one for each"
             )
         self._array = commands.array("ctrl", range(self.size))
+        self.value_names = names.actuator_names
 
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
         """Write the controls."""
@@ -213,6 +234,21 @@ class Gripper(_Joints):
         self.size, self._middle = 1, 0.5 * (high + low)
         self._binary = checks.flag("Gripper: binary", binary, error=ArgumentError)
 
+    @property
+    def value_names(self) -> list[str]:
+        """The first finger stands for all of them."""
+        return super().value_names[:1]
+
+    @property
+    def scales(self) -> NDArray[np.float32]:
+        """Half of the way between closed and open."""
+        return self._scale[:1]
+
+    @property
+    def offsets(self) -> NDArray[np.float32]:
+        """The middle between closed and open."""
+        return self._start[:1]
+
     def bind(self, names: Names, commands: Commands) -> None:
         """Look up the fingers."""
         super().bind(names, commands)
@@ -237,6 +273,7 @@ class EndEffectorDelta(_Joints):
     """
 
     fields = ("site_inverse_jacobian",)
+    _is_absolute = False
 
     @checked_calls
     def __init__(self, site: str, dofs: Sequence[str], pos_scale: float, rot_scale: float | None = None) -> None:
@@ -255,6 +292,16 @@ class EndEffectorDelta(_Joints):
         self._site_name = checks.text("EndEffectorDelta: site", site, error=ArgumentError)
         self.size = 3 if rot_scale is None else 6
         self._step = np.array([pos_scale] * 3 + [rot_scale or 0.0] * 3, np.float32)[: self.size]
+
+    @property
+    def value_names(self) -> list[str]:
+        """Displacements of the site and its rotations."""
+        return [f"{self._site_name}.{axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")[: self.size]]
+
+    @property
+    def scales(self) -> NDArray[np.float32]:
+        """Displacement and rotation of an action of 1."""
+        return self._step
 
     def bind(self, names: Names, commands: Commands) -> None:
         """Look up the site and the dofs."""

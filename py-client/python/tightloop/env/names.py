@@ -44,6 +44,10 @@ class Names:
         """Return the index of a coordinate, ``robot/joint``, in ``joint_q``."""
         return self._place("coordinate", name)
 
+    def has_coord(self, name: str) -> bool:
+        """Return whether there is a coordinate, ``robot/joint``."""
+        return name in self._places["coordinate"]
+
     def dof(self, name: str) -> int:
         """Return the index of a dof, ``robot/joint``, in ``joint_qd`` and in commands."""
         return self._place("dof", name)

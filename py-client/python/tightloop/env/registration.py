@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from tightloop.env.registry import GYMNASIUM_TASKS
+from tightloop.env.registry import GYMNASIUM_TASKS, gymnasium_id
 from tightloop.env.single import Env
 
 #: Control steps of an episode, as each task's ``max_episode_steps``.
@@ -30,7 +30,7 @@ def register() -> None:
     import gymnasium
 
     for task, steps in (EPISODE_STEPS | GYMNASIUM_STEPS).items():
-        name = f"tightloop/{task}" if task in GYMNASIUM_STEPS else f"tightloop/{task}-v0"
+        name = gymnasium_id(task)
         if name not in gymnasium.registry:
             gymnasium.register(
                 name,

@@ -45,6 +45,18 @@ GYMNASIUM_TASKS = {
 }
 
 
+def gymnasium_id(name: str) -> str:
+    """Return the name and version of a task in gymnasium's registry, ``tightloop/FrankaReach-v0``."""
+    return f"tightloop/{name}" if name in GYMNASIUM_TASKS else f"tightloop/{name}-v0"
+
+
+def name_of(task: Task) -> str:
+    """Return the name of a task in gymnasium's registry, or that of its class if it is not there."""
+    place = f"{type(task).__module__}:{type(task).__qualname__}"
+    names = [gymnasium_id(name) for name, known in (TASKS | GYMNASIUM_TASKS).items() if known == place]
+    return names[0] if names else type(task).__qualname__
+
+
 def make_task(
     task: Task | type[Task] | str, options: Mapping[str, Any], environment: Callable[..., Any] | None = None
 ) -> Task:

@@ -318,6 +318,13 @@ class Task:
         """Return the mirror symmetry of the task, which learners may use; None if it has none."""
         return None
 
+    def policy_metadata(self) -> Mapping[str, Any]:
+        """Return further entries of `tightloop.env.policy_metadata`, such as ``command_names``; none by default.
+
+        Values are texts, numbers, or lists of these.
+        """
+        return {}
+
     def goal(self, xp: Namespace, worlds: Worlds, draws: Array) -> Array:
         """Return goals for worlds that start an episode, or their next goals.
 

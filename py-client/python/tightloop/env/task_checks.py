@@ -36,6 +36,7 @@ _CALLS = {
     "privileged_observed": (),
     "privileged_observe": _BY_WORLDS,
     "mirrored": (),
+    "policy_metadata": (),
     "start_metrics": _BY_WORLDS,
     "states_of": ("qpos", "qvel"),
 }
