@@ -288,29 +288,29 @@ class Trainer:
     def learn(self, r: Rollout, progress: float) -> dict[str, float]:
         """Some epochs of minibatches over a rollout; returns what to log. ``progress`` is that of the run.
 
-        The policy that acted is older than the one that learns. Changes are clipped relative to the latter, and its
-        probability relative to the former is a weight (Hilton et al. 2021, arXiv 2110.00641).
+        The agent that acted is older than the one that learns. Changes of policy and values are clipped relative to the
+        latter, and its probability relative to the former is a weight (Hilton et al. 2021, arXiv 2110.00641).
         """
         config, agent = self.config, self.agent
-        acted, advantage, value_old = (x.flatten() for x in (r.log_prob, r.advantage, r.value))
-        target = advantage + value_old
+        acted, advantage, value = (x.flatten() for x in (r.log_prob, r.advantage, r.value))
+        target = advantage + value
         advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
         std_old = torch.exp(agent.log_std.detach())
         views = []
         for obs, critic_obs, action in self._views(r):
             with torch.no_grad():
-                mean_old = agent(obs)
-                views.append((obs, critic_obs, action, mean_old, agent.log_prob(mean_old, action)))
-        weight = torch.exp(views[0][-1] - acted).clamp(max=2.0)
+                mean_old, value_old = agent(obs), agent.value(critic_obs)
+                views.append((obs, critic_obs, action, mean_old, agent.log_prob(mean_old, action), value_old))
+        weight = torch.exp(views[0][4] - acted).clamp(max=2.0)
         moved, losses = [], []
         for epoch in range(config.epochs):
             order = torch.randperm(len(target), generator=self.shuffle, device=self.device)
             for batch in order.chunk(config.minibatches):
-                obs, critic_obs, action, mean_old, log_old = (x[batch] for x in views[epoch % len(views)])
+                obs, critic_obs, action, mean_old, log_old, value_old = (x[batch] for x in views[epoch % len(views)])
                 mean, value = agent(obs), agent.value(critic_obs)
                 ratio, own = torch.exp(agent.log_prob(mean, action) - log_old), advantage[batch]
                 better = torch.min(ratio * own, ratio.clamp(1.0 - config.clip, 1.0 + config.clip) * own)
-                clipped = value_old[batch] + (value - value_old[batch]).clamp(-config.clip, config.clip)
+                clipped = value_old + (value - value_old).clamp(-config.clip, config.clip)
                 off = torch.max((value - target[batch]) ** 2, (clipped - target[batch]) ** 2).mean()
                 loss = off - (weight[batch] * better).mean() - config.entropy * agent.log_std.sum()
                 self.optimizer.zero_grad()

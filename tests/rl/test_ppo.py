@@ -126,6 +126,23 @@ def test_simulation_and_torch_have_a_thread_each(tmp_path: Path) -> None:
     assert done.stdout == "1 1\n"
 
 
+def test_values_that_moved_since_the_rollout_go_on_to_their_targets(tmp_path: Path) -> None:
+    code = """
+import ppo, torch
+trainer = ppo.Trainer('CartPoleBalance', 0, ppo.Config(num_envs=8, steps=8), '.', daemon=None, device='cpu')
+rollout, critic = trainer.rollouts[0], trainer.agent.critic
+# whoever acted said 0, the critic that learns says 1, and 5 is right
+critic[-1].bias.data.fill_(1.0)
+rollout.advantage.fill_(5.0)
+trainer.learn(rollout, 0.0)
+print(trainer.agent.value(rollout.critic_obs).mean().item() > 1.05)
+trainer.close()
+"""
+    beside = os.environ | {"PYTHONPATH": os.pathsep.join([str(EXAMPLES), os.environ.get("PYTHONPATH", "")])}
+    done = subprocess.run([sys.executable, "-c", code], env=beside, capture_output=True, text=True, check=False)
+    assert done.stdout == "True\n", done.stdout + done.stderr
+
+
 def test_a_run_that_ends_by_steps_goes_on_with_the_same_bits(tmp_path: Path) -> None:
     code = f"""
 import ppo, torch
