@@ -17,13 +17,13 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
+from filming import film_of
 from numpy.typing import NDArray
 from training import needed
 
 from tightloop.env import AutoresetMode, VectorEnv
 from tightloop.view import Film
 from tightloop.view.cameras import PRESETS
-from tightloop.view.subject import subject
 
 with needed("matplotlib", "onnxruntime"):
     import matplotlib
@@ -34,7 +34,6 @@ with needed("matplotlib", "onnxruntime"):
 
 OUT = Path(__file__).resolve().parent.parent / "out" / "play"
 SHOWN = 8  # worlds in the picture
-FILMED = 16  # worlds in the film, if their robots stay where they are
 
 
 def play(
@@ -59,14 +58,6 @@ def play(
             kept[name].append(np.where(going.reshape(-1, *[1] * (np.ndim(array) - 1)), array, np.nan))
         going &= ~(terminated | truncated)
     return {name: np.array(arrays) for name, arrays in kept.items()}
-
-
-def film_of(envs: VectorEnv, path: Path, camera: str | None) -> Film:
-    """A film of several worlds side by side, or of one whose robot walks away: the camera follows it."""
-    info = envs.sim.info
-    floats = subject(info["scene"], info["scene_folder"], info["body_names"]).floats
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return Film(path, envs.sim, worlds=1 if floats else min(FILMED, envs.num_envs), camera=camera)
 
 
 def draw(path: Path, kept: dict[str, NDArray[np.float64]], envs: VectorEnv, title: str) -> None:

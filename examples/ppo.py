@@ -9,9 +9,10 @@ continued by the critic's value of its last observation. The learning rate follo
 divergence).
 
 In ``out/ppo/TASK-SEED`` it leaves a checkpoint every few seconds (``--resume`` goes on from it), the log for
-TensorBoard, the curve as CSV and PNG, and the policy as ONNX, which ``examples/play.py`` runs. It writes elsewhere only
-with ``--out``. With ``--daemon NAME`` it joins worlds that ``python -m tightloop.env serve TASK --name NAME`` keeps, so
-that it can be killed and come back.
+TensorBoard, the curve as CSV and PNG, and the policy as ONNX, which ``examples/play.py`` runs.
+``--wandb`` logs to Weights & Biases, too, and ``--film-every 5`` films the policy every five minutes. It writes
+elsewhere only with ``--out``. With ``--daemon NAME`` it joins worlds that ``python -m tightloop.env serve TASK --name
+NAME`` keeps, so that it can be killed and come back.
 
 A terminal shows a progress bar; a file or a pipe gets a line per evaluation. The log has all metrics of the task. Terms
 of a reward are in it if `Task.metrics` returns them; a name should end with its unit, such as ``height_m``.
@@ -36,8 +37,9 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 import numpy as np
 from numpy.typing import NDArray
 from training import draw, needed, report
+from training_log import Films, Log, Statistics
 
-from evaluation import evaluate, metrics, told, with_unit
+from evaluation import FINAL_SEED, episodes, evaluate, told, told_with_intervals, with_unit
 from tightloop.env import AutoresetMode, VectorEnv
 from tightloop.env.mirror import MirrorColumns
 from tightloop.whole_files import whole_file
@@ -46,7 +48,6 @@ from tightloop.whole_files import whole_file
 with needed("matplotlib", "onnxscript", "tensorboard", "torch", "tqdm"):
     import torch
     from torch import Tensor, nn
-    from torch.utils.tensorboard import SummaryWriter
     from tqdm import tqdm
 
 OUT = Path(__file__).resolve().parent.parent / "out" / "ppo"
@@ -73,6 +74,7 @@ class Config:
     reward_scale: float = 1.0  # of the rewards that are learned from, which should be some hundredths a step
     symmetry: bool = False  # whether to learn from the mirror image too, if the task has one
     evaluate: float = 15.0  # seconds between evaluations
+    film_every: float = 0.0  # minutes between films of the policy; 0 for none
     total: int = 0  # env steps after which to stop, instead of minutes; the same run then has the same bits
     evaluate_steps: int = 1_000_000  # env steps between them, if the run ends by steps
     enough: float = 2.0  # success at which to stop before the time is over; above 1 it never does
@@ -185,38 +187,6 @@ class Rollout:
             following = self.value[step]
 
 
-class Statistics:
-    """What the worlds did during a rollout, for the log: means of rewards and metrics, and of ended episodes."""
-
-    def __init__(self, worlds: int) -> None:
-        self._return, self._steps = np.zeros(worlds), np.zeros(worlds, int)
-        self._values: dict[str, list[float]] = {}
-
-    def see(self, reward: NDArray[np.float32], done: NDArray[np.bool_], infos: dict[str, Any]) -> None:
-        """Take a step into account."""
-        self._return += reward
-        self._steps += 1
-        self._note("reward_per_step", reward)
-        for name, value in metrics(infos):
-            self._note(with_unit(name), value)
-        if done.any():
-            self._note("episode_return", self._return[done])
-            self._note("episode_length_steps", self._steps[done])
-            self._return[done], self._steps[done] = 0.0, 0
-
-    def take(self) -> dict[str, float]:
-        """Means since the last call, by name."""
-        means = {f"train/{name}": float(np.mean(values)) for name, values in self._values.items()}
-        self._values = {}
-        return means
-
-    def _note(self, name: str, values: NDArray[Any]) -> None:
-        # a faulted world may have no number
-        numbers = values[np.isfinite(values)]
-        if len(numbers):
-            self._values.setdefault(name, []).append(float(numbers.mean()))
-
-
 class Trainer:
     """A run: environment, agent, optimiser, and how far it is.
 
@@ -241,6 +211,7 @@ class Trainer:
         # one each: the threads that collect and learn run at once
         self.noise, self.shuffle = (torch.Generator(self.device).manual_seed(2 * seed + k) for k in range(2))
         self.statistics = Statistics(config.num_envs)
+        self.films = Films(task, Path(folder), config.film_every, config.threads)
         self.seconds, self.steps = 0.0, 0
         self.curve: list[dict[str, float]] = []
 
@@ -365,7 +336,7 @@ class Trainer:
         """The most likely actions."""
         return self.acting(torch.from_numpy(obs).to(self.device, torch.float32)).cpu().numpy()
 
-    def run(self, log: SummaryWriter) -> None:
+    def run(self, log: Log) -> None:
         """Train until the run is over; checkpoints and evaluations on the way."""
         config, begun = self.config, time.perf_counter() - self.seconds
         shown = (self.steps if config.total else self.seconds) if self.curve else -math.inf
@@ -395,8 +366,8 @@ class Trainer:
                     news |= {f"evaluation/{with_unit(name)}": value for name, value in found.items()}
                     # a run that goes on from the checkpoint begins the same episodes
                     seen = self.begin()
-                for name, value in news.items():
-                    log.add_scalar(name, value, self.steps)
+                log.write(news, self.steps)
+                self.films.take(self.act, self.seconds, self.steps)
 
     def _is_due(self, shown: float) -> bool:
         """Whether to evaluate, some time after the last one: seconds, or steps if the run ends by these."""
@@ -464,6 +435,7 @@ def main() -> None:
     parser.add_argument("--resume", action="store_true", help="go on from the checkpoint in the folder")
     parser.add_argument("--daemon", help="name of a running daemon to join")
     parser.add_argument("--device", default="cpu", help="where torch computes")
+    parser.add_argument("--wandb", action="store_true", help="log to Weights & Biases, too")
     parser.add_argument("--out", type=Path, default=OUT, help="folder of all runs")
     for option in fields(Config):
         kind = type(option.default)
@@ -476,23 +448,22 @@ def main() -> None:
     )
 
     folder = args.out / f"{args.task.rpartition(':')[2]}-{args.seed}"
-    folder.mkdir(parents=True, exist_ok=True)
+    with needed(*(["wandb"] if args.wandb else []), *(["av", "PIL"] if config.film_every else [])):
+        folder.mkdir(parents=True, exist_ok=True)
     trainer = Trainer(args.task, args.seed, config, folder, daemon=args.daemon, device=args.device)
     try:
         if args.resume and (folder / "checkpoint.pt").exists():
             trainer.resume()
             print(f"goes on after {trainer.seconds:.0f} s and {trainer.steps:,} steps")
-        with SummaryWriter(str(folder / "log")) as log:
+        with Log(folder, asdict(config), wandb=args.wandb) as log:
             trainer.run(log)
         end = trainer.curve[-1]
         title = f"{args.task}, seed {args.seed}: {end['steps'] / 1e6:.1f} M steps, {config.threads} threads"
         draw(trainer.curve, title, folder / "curve.png")
         policy = trainer.export()
-        found = {name: value for name, value in end.items() if name not in ("seconds", "steps")}
-        print(
-            f"{end['seconds']:.0f} s, {end['steps']:,} steps: "
-            + ", ".join(f"{name} {value}" for name, value in told(found).items())
-        )
+        # not the episodes by which a run may have ended
+        found = episodes(args.task, trainer.act, threads=config.threads, seed=FINAL_SEED)
+        print(f"{end['seconds']:.0f} s, {end['steps']:,} steps: {told_with_intervals(found)}")
         print(f"curve: {folder / 'curve.png'}; policy: {policy}; python examples/play.py {args.task} {policy}")
     finally:
         trainer.close()

@@ -17,7 +17,7 @@ from evaluation import told
 from tightloop.whole_files import whole_file
 
 # Libraries whose name for pip is not that of their module
-PIP_NAMES = {"rsl_rl": "rsl-rl-lib", "stable_baselines3": "stable-baselines3"}
+PIP_NAMES = {"rsl_rl": "rsl-rl-lib", "stable_baselines3": "stable-baselines3", "PIL": "pillow"}
 
 
 @contextmanager

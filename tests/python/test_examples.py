@@ -25,6 +25,7 @@ RUNS = {
 PICTURES = {"franka_lesson.py", "franka_grasp.py", "randomized_push.py"}
 # Those that need torch or onnxruntime, and the test that runs each, by `make test-rl`.
 TRAINING = {
+    "evaluation.py": "tests/rl/test_policy_file.py",
     "play.py": "tests/rl/test_ppo.py",
     "ppo.py": "tests/rl/test_ppo.py",
     "sim2sim.py": "tests/rl/test_trained.py",
@@ -33,6 +34,7 @@ TRAINING = {
 }
 # Libraries that each needs, as pip names them.
 LIBRARIES = {
+    "evaluation.py": "onnxruntime",
     "play.py": "matplotlib onnxruntime",
     "ppo.py": "matplotlib onnxscript tensorboard torch tqdm",
     "sim2sim.py": "mujoco onnxruntime",
@@ -48,7 +50,7 @@ importlib.util.find_spec = lambda name, package=None: None if name in missing el
 runpy.run_path(sys.argv[0], run_name="__main__")
 """
 # Modules of the others.
-PARTS = {"evaluation.py", "training.py"}
+PARTS = {"filming.py", "training.py", "training_log.py"}
 
 
 @pytest.mark.parametrize("name", RUNS)

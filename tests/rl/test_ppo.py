@@ -16,8 +16,9 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, check=False)
+def run(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    command, environment = [sys.executable, *arguments], os.environ | variables
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
 def curve(folder: Path) -> list[dict[str, str]]:
@@ -114,6 +115,37 @@ def test_the_log_has_all_metrics_of_the_task_with_their_units(tmp_path: Path) ->
     assert [*curve(tmp_path / "Leaning-0")[-1]] == ["seconds", "steps", "return", "success", *METRICS]
 
 
+def test_a_run_leaves_films_and_a_log_of_wandb_and_ends_with_intervals(tmp_path: Path) -> None:
+    done = run(
+        f"{EXAMPLES}/ppo.py", "CartPoleBalance", "--num-envs", "64", "--minutes", "0.1", "--evaluate", "2", "--wandb",
+        "--film-every", "0.05", "--out", str(tmp_path), WANDB_MODE="offline", WANDB_SILENT="true",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "CartPoleBalance-0"
+    films = list((folder / "films").glob("*.mp4"))
+    assert films and all(film.stat().st_size > 5000 for film in films)
+    assert list((folder / "wandb").glob("offline-run-*/*.wandb"))
+    # at the end means have intervals
+    assert re.search(r"steps: return [\d.]+ \([\d.]+ to [\d.]+\)$", done.stdout, re.M), done.stdout
+
+
+def test_what_wandb_and_films_need_is_checked_at_the_start(tmp_path: Path) -> None:
+    (tmp_path / "hide.py").write_text(
+        "import importlib.util, runpy, sys\n"
+        "find_spec = importlib.util.find_spec\n"
+        "hidden, sys.argv = sys.argv[1], sys.argv[2:]\n"
+        "importlib.util.find_spec = lambda name, package=None: None if name == hidden else find_spec(name, package)\n"
+        "runpy.run_path(sys.argv[0], run_name='__main__')\n"
+    )
+    for module, pip, arguments in (("wandb", "wandb", ["--wandb"]), ("PIL", "pillow", ["--film-every", "1"])):
+        done = run(
+            str(tmp_path / "hide.py"), module, f"{EXAMPLES}/ppo.py", "CartPoleBalance", *arguments, "--out",
+            str(tmp_path / "out"), PYTHONPATH=str(EXAMPLES),
+        )  # fmt: skip
+        assert done.returncode == 1 and done.stderr == f"ppo.py: there is no {module}: pip install {pip}\n", done.stderr
+    assert not (tmp_path / "out").exists()
+
+
 def test_simulation_and_torch_have_a_thread_each(tmp_path: Path) -> None:
     code = (
         "import ppo, torch; "
@@ -147,7 +179,7 @@ def test_a_run_that_ends_by_steps_goes_on_with_the_same_bits(tmp_path: Path) -> 
     code = f"""
 import ppo, torch
 from pathlib import Path
-from torch.utils.tensorboard import SummaryWriter
+from training_log import Log
 
 class Stopped(Exception):
     pass
@@ -166,7 +198,7 @@ def run(folder, stop_at=None, resume=False):
             raise Stopped
     trainer.save = saving
     try:
-        with SummaryWriter(str(folder)) as log:
+        with Log(folder) as log:
             trainer.run(log)
     except Stopped:
         pass
