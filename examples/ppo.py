@@ -9,7 +9,7 @@ continued by the critic's value of its last observation. The learning rate follo
 divergence).
 
 In ``out/ppo/TASK-SEED`` it leaves a checkpoint every few seconds (``--resume`` goes on from it), the log for
-TensorBoard, the curve as CSV and PNG, and the policy as ONNX, which ``examples/play.py`` runs.
+TensorBoard, the curve as CSV and PNG, and the policy as ONNX with its metadata, which ``examples/play.py`` runs.
 ``--wandb`` logs to Weights & Biases, too, and ``--film-every 5`` films the policy every five minutes. It writes
 elsewhere only with ``--out``. With ``--daemon NAME`` it joins worlds that ``python -m tightloop.env serve TASK --name
 NAME`` keeps, so that it can be killed and come back.
@@ -36,11 +36,12 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import numpy as np
 from numpy.typing import NDArray
+from policy_file import attach
 from training import draw, needed, report
 from training_log import Films, Log, Statistics
 
 from evaluation import FINAL_SEED, episodes, evaluate, told, told_with_intervals, with_unit
-from tightloop.env import AutoresetMode, VectorEnv
+from tightloop.env import AutoresetMode, VectorEnv, policy_metadata
 from tightloop.env.mirror import MirrorColumns
 from tightloop.whole_files import whole_file
 
@@ -403,7 +404,7 @@ class Trainer:
         self.seconds, self.steps, self.curve = (state["seconds"], state["steps"], state["curve"])
 
     def export(self) -> Path:
-        """Write the policy as ONNX: ``obs`` (worlds, size) in, ``action`` (worlds, actions) out."""
+        """Write the policy as ONNX with its metadata: ``obs`` (worlds, size) in, ``action`` (worlds, actions) out."""
         path = self.folder / "policy.onnx"
         agent, obs = (self.agent.cpu().eval(), torch.zeros(2, *self.envs.single_observation_space.shape))
         shapes = {"obs": {0: torch.export.Dim("worlds")}}
@@ -418,6 +419,7 @@ class Trainer:
                 verbose=False,
                 external_data=False,
             )
+        attach(path, policy_metadata(self.envs) | {"observation_normalization": "in the graph"})
         return path
 
     def close(self) -> None:

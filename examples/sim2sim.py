@@ -1,15 +1,20 @@
-"""Runs a quadruped's policy in MuJoCo C: does it walk there, too?
+"""Runs a walking policy in MuJoCo C, from its file alone: does it walk there, too?
 
     pip install mujoco onnxruntime
     python examples/sim2sim.py out/ppo/QuadrupedVelocityFlat-0/policy.onnx
 
-First both simulators play the same actions from the same state, open loop, and the distance of their joints is printed.
-Then the policy drives each robot for 10 s per command, closed loop, and the error of its velocity is printed.
+The ONNX file's metadata says what the policy sees, what its actions mean, and which gains and rates the robot has. The
+side of MuJoCo C uses nothing else but the robot's URDF file. The side of tightloop is the task itself.
+
+First both simulators play the same actions from the same state, open loop. The distances of their joints and
+observations are printed. Then the policy drives each robot for 10 s per command, closed loop, and the error of its
+velocity is printed.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,43 +23,62 @@ from numpy.typing import NDArray
 from training import needed
 
 import tightloop as tl
-from tightloop.env import Worlds
+from tightloop.env import Task, Worlds
 from tightloop.env.names import Names
-from tightloop.tasks import quadruped, velocity
-from tightloop.tasks.quadruped import ROBOT
+from tightloop.env.registry import make_task
 
 with needed("mujoco", "onnxruntime"):
     import mujoco
     import onnxruntime
 
-COMMANDS = np.array([[0.5, 0, 0], [1, 0, 0], [-0.5, 0, 0], [0, 0.5, 0], [0, 0, 1], [0.7, 0, -0.7]], np.float32)
+ORDER = ("ahead_mps", "left_mps", "turn_radps")
+COMMANDS = np.array([[0.5, 0, 0], [1, 0, 0], [-0.5, 0, 0], [0, 0.5, 0], [0, 0, 1], [0.7, 0, -0.7]])  # in this order
 STEPS, OPEN_LOOP = 500, 50  # control steps of each
 # Joint limits of tightloop: stiffness and damping in force space, and the largest impedance of MuJoCo's default solimp
 LIMIT_KE, LIMIT_KD, IMPEDANCE_MAX = 1e4, 10.0, 0.95
 
 
-def mujoco_model() -> mujoco.MjModel:
-    """The task's robot and ground, from the same URDF file."""
-    text = tl.assets.QUADRUPED.read_text()
+class Facts:
+    """Metadata of a policy, by name."""
+
+    def __init__(self, path: Path, metadata: Mapping[str, str]) -> None:
+        self._path, self._metadata = path, metadata
+
+    def names(self, name: str) -> list[str]:
+        """Return a list of names."""
+        if name not in self._metadata:
+            raise SystemExit(f"{self._path} has no metadata {name!r}; examples/policy_file.py writes that of its task")
+        return self._metadata[name].split(",")
+
+    def numbers(self, name: str) -> NDArray[np.float64]:
+        """Return a list of numbers."""
+        return np.array(self.names(name), np.float64)
+
+    def number(self, name: str) -> float:
+        """Return a single number."""
+        return float(self.numbers(name)[0])
+
+
+def mujoco_model(robot: Path, facts: Facts) -> mujoco.MjModel:
+    """The robot on flat ground, with the drives and the time step of the metadata."""
+    text = robot.read_text()
     head = text.index(">", text.index("<robot")) + 1
     compiler = '<mujoco><compiler fusestatic="false" discardvisual="true"/></mujoco>'
     spec = mujoco.MjSpec.from_string(text[:head] + compiler + text[head:])
     for geom in spec.geoms:
         geom.contype, geom.conaffinity = 0, 1  # not against each other
-    for joint in spec.joints:
-        joint.armature = ROBOT.armature
-        actuator = spec.add_actuator(name=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint.name)
+    drives = (facts.numbers(f"joint_{name}") for name in ("stiffness", "damping", "effort_limit", "armature"))
+    for name, stiffness, damping, effort, armature in zip(facts.names("joint_names"), *drives, strict=True):
+        joint = spec.joint(name)
+        joint.armature, joint.actfrclimited = armature, False
+        actuator = spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name)
         actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
-        actuator.gainprm[0], actuator.biasprm[:3] = ROBOT.stiffness, (0, -ROBOT.stiffness, -ROBOT.damping)
-        effort = 36.0 if joint.name.endswith("calf") else 24.0
+        actuator.gainprm[0], actuator.biasprm[:3] = stiffness, (0, -stiffness, -damping)
         actuator.forcelimited, actuator.forcerange = True, (-effort, effort)
-        joint.actfrclimited = False
     spec.worldbody.first_body().add_freejoint()
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1))
-    for leg in ROBOT.feet:
-        spec.body(f"{leg}_foot").add_site(name=leg)
     option = spec.option
-    option.timestep, option.integrator = velocity.DT, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.timestep, option.integrator = facts.number("dt"), mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.iterations, option.tolerance = 20, 1e-8
     model = spec.compile()
     flexibility = model.dof_invweight0[model.jnt_dofadr] * (1 - IMPEDANCE_MAX)
@@ -65,119 +89,174 @@ def mujoco_model() -> mujoco.MjModel:
 
 
 class Player:
-    """One robot of the task in some simulator, seen by the task's own functions."""
+    """A robot in some simulator, which follows commands.
 
-    def __init__(self, names: Names) -> None:
-        self.task = quadruped.QuadrupedVelocityFlat(pushes=0.0)
-        self.task.bind(names)
-        self.action = np.zeros((1, 12), np.float32)
-        self.memory: Any = None
+    Attributes:
+        obs: What the policy sees, shape ``(1, size)``.
+        joints: Joint positions in the order of ``joint_names`` [rad].
+    """
 
-    def begin(self, joint_q: NDArray[np.float64], command: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Start at rest; returns what the policy sees, shape ``(1, size)``."""
-        self.action[:], self.memory, self.command = 0.0, None, command[None]
-        return self._observe(self._start(joint_q))
+    obs: NDArray[np.float32]
+    joints: NDArray[np.float64]
 
-    def step(self, action: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Take a control step; returns what the policy sees."""
-        self.action[:] = np.clip(action, -velocity.LIMIT, velocity.LIMIT)
-        return self._observe(self._step(np.array(ROBOT.standing) + ROBOT.scale * self.action[0].astype(np.float64)))
+    def __init__(self, facts: Facts) -> None:
+        if {*facts.names("action_types")} != {"JointTarget"}:
+            raise SystemExit(f"the policy's actions are {facts.names('action_types')[0]}; this takes JointTarget only")
+        self.names = facts.names("joint_names")
+        self._driven = [self.names.index(name) for name in facts.names("action_names")]
+        self._scale, self._offset = facts.numbers("action_scale"), facts.numbers("action_offset")
+        self._low, self._high = facts.numbers("action_low"), facts.numbers("action_high")
+        self._targets = facts.numbers("default_joint_pos")
+        sizes, parts = facts.numbers("observation_sizes").astype(int), facts.names("observation_names")
+        first = int(sizes[: parts.index("velocity")].sum())
+        self._velocity = [first, first + 1]
+        self._plane = [facts.names("command_names").index(name) for name in ORDER[:2]]
+        self.command, self.action = np.zeros(3), np.zeros(len(self._driven))
 
-    def _observe(self, arrays: dict[str, NDArray[np.float64]]) -> NDArray[np.float32]:
-        self.joint_q = arrays["joint_q"]
-        seen = {name: array[None].astype(np.float32) for name, array in arrays.items()}
-        seen |= {"goal": self.command, "action": self.action}
-        self.memory = self.task.remember(np, Worlds(**seen), self.memory)
-        parts = self.task.observe(np, Worlds(**seen, memory=self.memory))
-        return np.concatenate([np.asarray(part, np.float32).reshape(1, -1) for part in parts], 1)
+    def begin(self, joint_q: NDArray[np.float64], command: NDArray[np.float64]) -> None:
+        """Start at rest, from positions as tightloop has them."""
+        self.command, self.action = command, np.zeros(len(self._driven))
+        self._start(joint_q)
 
-    def _start(self, joint_q: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    def step(self, action: NDArray[np.float32]) -> None:
+        """Take a control step with an action, shape ``(1, actions)``."""
+        # an environment's actions are float32
+        self.action = np.clip(action[0].astype(np.float64), self._low, self._high)
+        self._targets[self._driven] = self._offset + self._scale * self.action
+        self._step(self._targets)
+
+    def error(self) -> float:
+        """Distance of the velocity from the command, in the plane [m/s]."""
+        return float(np.linalg.norm(self.obs[0, self._velocity] - self.command[self._plane]))
+
+    def _start(self, joint_q: NDArray[np.float64]) -> None:
         raise NotImplementedError
 
-    def _step(self, targets: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    def _step(self, targets: NDArray[np.float64]) -> None:
         raise NotImplementedError
 
 
 class InMujoco(Player):
-    """In MuJoCo C."""
+    """In MuJoCo C, from metadata alone."""
 
-    def __init__(self, names: Names) -> None:
-        super().__init__(names)
-        self.model = mujoco_model()
+    def __init__(self, facts: Facts, robot: Path) -> None:
+        super().__init__(facts)
+        self.model = mujoco_model(robot, facts)
         self.data = mujoco.MjData(self.model)
+        self._coords, self._dofs = (
+            [int(getattr(self.model.joint(name), place)[0]) for name in self.names] for place in ("qposadr", "dofadr")
+        )
+        self._parts, self._rest = facts.names("observation_names"), facts.numbers("default_joint_pos")
+        self._bounds = facts.numbers("observation_low"), facts.numbers("observation_high")
+        if set(facts.numbers("observation_history")) != {1}:
+            raise SystemExit("the policy sees steps before; this shows it the current one only")
+        self._turn = 2 * np.pi * facts.number("gait_hz") * facts.number("control_dt") if "phase" in self._parts else 0.0
+        self._range = self.model.jnt_range[[self.model.joint(name).id for name in self.names]].T
+        self._substeps, self._phase = int(facts.number("substeps")), 0.0
 
-    def _start(self, joint_q: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    def _start(self, joint_q: NDArray[np.float64]) -> None:
         mujoco.mj_resetData(self.model, self.data)
-        self.data.qpos[:] = joint_q[[0, 1, 2, 6, 3, 4, 5, *range(7, 19)]]
-        return self._arrays()
+        self.data.qpos[:7], self.data.qpos[self._coords] = joint_q[[0, 1, 2, 6, 3, 4, 5]], joint_q[7:]
+        self._phase = 0.0
+        self._observe()
 
-    def _step(self, targets: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        self.data.ctrl[:] = np.clip(targets, *self.model.jnt_range[1:].T)
-        mujoco.mj_step(self.model, self.data, velocity.SUBSTEPS)
-        return self._arrays()
+    def _step(self, targets: NDArray[np.float64]) -> None:
+        self.data.ctrl[:] = np.clip(targets, *self._range)
+        mujoco.mj_step(self.model, self.data, self._substeps)
+        # a robot that is to stand marks no time
+        self._phase = (self._phase + self._turn) * self.command.any()
+        self._observe()
 
-    def _arrays(self) -> dict[str, NDArray[np.float64]]:
-        data, velocity = self.data, np.zeros(6)
+    def _observe(self) -> None:
+        data, trunk, twist = self.data, 1, np.zeros(6)
         mujoco.mj_forward(self.model, data)
         # angular, then that of the trunk's centre of mass, in world axes
-        mujoco.mj_objectVelocity(self.model, data, mujoco.mjtObj.mjOBJ_BODY, 1, velocity, 0)
-        return {
-            "joint_q": data.qpos[[0, 1, 2, 4, 5, 6, 3, *range(7, 19)]],
-            "joint_qd": np.concatenate([velocity[3:], velocity[:3], data.qvel[6:]]),
-            "site_q": np.pad(data.site_xpos, ((0, 0), (0, 4))),
+        mujoco.mj_objectVelocity(self.model, data, mujoco.mjtObj.mjOBJ_BODY, trunk, twist, 0)
+        to_trunk = data.xmat[trunk].reshape(3, 3).T
+        self.joints = data.qpos[self._coords]
+        seen = {
+            "velocity": to_trunk @ twist[3:],
+            "angular velocity": to_trunk @ twist[:3],
+            "gravity": to_trunk @ (0.0, 0.0, -1.0),
+            "command": self.command,
+            "joint positions": self.joints - self._rest,
+            "joint velocities": data.qvel[self._dofs],
+            "last action": self.action,
+            "phase": np.array([np.sin(self._phase), np.cos(self._phase)]),
         }
+        if unknown := [name for name in self._parts if name not in seen]:
+            raise SystemExit(f"the policy sees {', '.join(unknown)}, which this cannot show in MuJoCo")
+        self.obs = np.clip(np.concatenate([seen[name] for name in self._parts]), *self._bounds)[None].astype(np.float32)
 
 
 class InTightloop(Player):
-    """In tightloop, in a daemon with one world."""
+    """In tightloop, in a daemon with one world, seen by the task's own functions."""
 
-    def __init__(self, sim: tl.Sim, limits: NDArray[np.float64]) -> None:
-        super().__init__(Names(sim.info))
-        self.sim, self.limits = sim, limits
+    def __init__(self, facts: Facts, task: Task, sim: tl.Sim) -> None:
+        super().__init__(facts)
+        self.task, self.sim, self._memory = task, sim, None
+        names = Names(sim.info)
+        task.bind(names)
+        ((self._robot, robot),) = task.scene().robots.items()
+        self._coords = [names.coord(f"{self._robot}/{name}") for name in self.names]
+        self._range = np.asarray(robot.joint_range)[-len(self.names) :].T
 
-    def _start(self, joint_q: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    def _start(self, joint_q: NDArray[np.float64]) -> None:
         self.sim.reset()
-        return self._arrays(self.sim.write(joint_q=joint_q, joint_qd=np.zeros(18)))
+        self._memory = None
+        self._observe(self.sim.write(joint_q=joint_q, joint_qd=np.zeros(len(self.sim.info["dof_names"]))))
 
-    def _step(self, targets: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        return self._arrays(self.sim.step(joint_target_q={"dog": np.clip(targets, *self.limits)}))
+    def _step(self, targets: NDArray[np.float64]) -> None:
+        self._observe(self.sim.step(joint_target_q={self._robot: np.clip(targets, *self._range)}))
 
-    def _arrays(self, frame: Any) -> dict[str, NDArray[np.float64]]:
-        return {name: np.array(getattr(frame, name)[0], np.float64) for name in ("joint_q", "joint_qd", "site_q")}
+    def _observe(self, frame: Any) -> None:
+        self.joints = np.array(frame.joint_q[0, self._coords], np.float64)
+        seen = {name: np.asarray(getattr(frame, name), np.float32) for name in self.task.fields}
+        seen |= {"goal": self.command[None].astype(np.float32), "action": self.action[None].astype(np.float32)}
+        self._memory = self.task.remember(np, Worlds(**seen), self._memory)
+        parts = self.task.observe(np, Worlds(**seen, memory=self._memory))
+        self.obs = np.concatenate([np.asarray(part, np.float32).reshape(1, -1) for part in parts], 1)
 
 
 def main() -> None:
     """Compare the two."""
-    parser = argparse.ArgumentParser(description="Run a quadruped's policy in MuJoCo C.")
-    parser.add_argument("policy", type=Path, help="ONNX file of QuadrupedVelocityFlat")
+    parser = argparse.ArgumentParser(description="Run a walking policy in MuJoCo C.")
+    parser.add_argument("policy", type=Path, help="ONNX file with metadata, of a task that follows velocities")
+    parser.add_argument("--robot", type=Path, help="URDF file (default: that of this name in tightloop.assets)")
     args = parser.parse_args()
     session = onnxruntime.InferenceSession(args.policy, providers=["CPUExecutionProvider"])
+    facts = Facts(args.policy, session.get_modelmeta().custom_metadata_map)
+    robot = args.robot or tl.assets.QUADRUPED.with_name(facts.names("robot_files")[0])
+    if not robot.is_file():
+        raise SystemExit(f"there is no robot {robot}; name its URDF file by --robot")
+    commands = COMMANDS[:, [ORDER.index(name) for name in facts.names("command_names")]]
 
     def policy(obs: NDArray[np.float32]) -> NDArray[np.float32]:
-        return np.asarray(session.run(["action"], {"obs": obs})[0])
+        return np.asarray(session.run(None, {session.get_inputs()[0].name: obs})[0])
 
-    scene = quadruped.QuadrupedVelocityFlat(pushes=0.0).scene()
-    with tl.launch(scene, worlds=1, precision="f64", fields=("joint_q", "joint_qd", "site_q")) as sim:
+    task = make_task(facts.names("task")[0], {})
+    with tl.launch(task.scene(), worlds=1, precision="f64", fields=task.fields) as sim:
         start = np.array(sim.reset().joint_q[0], np.float64)
-        limits = np.asarray(scene.robots["dog"].joint_range)[-12:].T
-        ours, theirs = InTightloop(sim, limits), InMujoco(Names(sim.info))
-        obs, _ = ours.begin(start, COMMANDS[1]), theirs.begin(start, COMMANDS[1])
+        ours, theirs = InTightloop(facts, task, sim), InMujoco(facts, robot)
+        ours.begin(start, commands[1]), theirs.begin(start, commands[1])
         for step in range(1, OPEN_LOOP + 1):
-            action = policy(obs)
-            obs, _ = ours.step(action), theirs.step(action)
+            action = policy(ours.obs)
+            ours.step(action), theirs.step(action)
             if step in (1, 5, 10, 25, OPEN_LOOP):
-                apart = np.abs(ours.joint_q[7:] - theirs.joint_q[7:]).max()
-                print(f"same actions, {step * velocity.CONTROL_DT:.2f} s: joints are {apart:.1e} rad apart")
+                joints, seen = (np.abs(a - b).max() for a, b in ((ours.joints, theirs.joints), (ours.obs, theirs.obs)))
+                seconds = step * facts.number("control_dt")
+                print(f"same actions, {seconds:.2f} s: joints are {joints:.1e} rad apart, observations {seen:.1e}")
         print("command: ahead, left, turn      error of the velocity: tightloop, MuJoCo C")
-        for command in COMMANDS:
+        for shown, command in zip(COMMANDS, commands, strict=True):
             errors = []
             for player in (ours, theirs):
-                obs, off = player.begin(start, command), []
+                player.begin(start, command)
+                off = []
                 for _ in range(STEPS):
-                    obs = player.step(policy(obs))
-                    off.append(np.linalg.norm(player.memory["velocity"][0, :2] - command[:2]))
+                    player.step(policy(player.obs))
+                    off.append(player.error())
                 errors.append(float(np.mean(off[STEPS // 2 :])))
-            print(f"{command[0]:5.1f} {command[1]:5.1f} {command[2]:5.1f}" + "".join(f"{e:16.3f} m/s" for e in errors))
+            print(f"{shown[0]:5.1f} {shown[1]:5.1f} {shown[2]:5.1f}" + "".join(f"{e:16.3f} m/s" for e in errors))
 
 
 if __name__ == "__main__":

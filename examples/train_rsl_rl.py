@@ -3,7 +3,8 @@
     pip install onnxscript rsl-rl-lib torch tqdm
     python examples/train_rsl_rl.py CartPoleSwingUp --seed 0
 
-In ``out/rsl_rl/TASK-SEED`` it leaves ``model.pt`` for `OnPolicyRunner.load` and the policy as ``policy.onnx``.
+In ``out/rsl_rl/TASK-SEED`` it leaves ``model.pt`` for `OnPolicyRunner.load` and the policy as ``policy.onnx``
+with its metadata.
 """
 
 from __future__ import annotations
@@ -14,9 +15,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from policy_file import attach
 from training import command_line, needed, report
 
 from evaluation import evaluate, told
+from tightloop.env import policy_metadata
 from tightloop.whole_files import whole_file
 
 # torch needs onnxscript only at the end, for the policy's file
@@ -109,6 +112,7 @@ def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> d
         with whole_file(folder / "model.pt") as part:
             runner.save(str(part))
         runner.export_policy_to_onnx(str(folder))
+        attach(folder / "policy.onnx", policy_metadata(env.env) | {"observation_normalization": "in the graph"})
         return found
     finally:
         env.close()

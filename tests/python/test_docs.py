@@ -62,9 +62,9 @@ def test_blocks_that_do_not_run_say_why():
         "needs a notebook": 1,
         "needs a scene file of yours": 1,
         "needs docker": 1,
-        "needs onnxruntime": 1,
-        "needs stable-baselines3": 1,
         "needs mujoco and onnxruntime": 1,
+        "needs onnxruntime": 2,
+        "needs stable-baselines3": 1,
         "needs torch, and minutes": 1,
     }
     assert len(found) - needs.total() >= 40

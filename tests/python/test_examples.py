@@ -27,6 +27,7 @@ PICTURES = {"franka_lesson.py", "franka_grasp.py", "randomized_push.py"}
 TRAINING = {
     "evaluation.py": "tests/rl/test_policy_file.py",
     "play.py": "tests/rl/test_ppo.py",
+    "policy_file.py": "tests/rl/test_policy_file.py",
     "ppo.py": "tests/rl/test_ppo.py",
     "sim2sim.py": "tests/rl/test_trained.py",
     "train_rsl_rl.py": "tests/rl/test_train_examples.py",
@@ -36,6 +37,7 @@ TRAINING = {
 LIBRARIES = {
     "evaluation.py": "onnxruntime",
     "play.py": "matplotlib onnxruntime",
+    "policy_file.py": "onnx",
     "ppo.py": "matplotlib onnxscript tensorboard torch tqdm",
     "sim2sim.py": "mujoco onnxruntime",
     "train_rsl_rl.py": "onnxscript rsl-rl-lib torch tqdm",
