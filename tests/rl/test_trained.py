@@ -11,8 +11,7 @@ import numpy as np
 import onnxruntime
 import pytest
 
-from tightloop import demo
-from tightloop.demo.policy import Policy
+from tightloop import assets
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 sys.path.insert(0, str(EXAMPLES))
@@ -47,18 +46,21 @@ def test_a_quadruped_walks_in_mujoco_as_well() -> None:
     )
     assert done.returncode == 0, done.stderr
     apart = [float(number) for number in re.findall(r"joints are (\S+) rad apart", done.stdout)]
+    seen = [float(number) for number in re.findall(r"observations (\S+)$", done.stdout, re.M)]
     errors = np.array(
         [[float(n) for n in row.split(" m/s")[:2]] for row in re.findall(r"([\d.]+ m/s +[\d.]+ m/s)", done.stdout)]
     )
     # a second of contacts in float64 doubles a rounding some twenty times
     assert len(apart) == 5 and max(apart) < 2.0**-30
+    # fifty additions to a phase of 2π·2.5 in float32, and velocities of some ten rad/s
+    assert len(seen) == 5 and max(seen) < 64 * 16.0 * 2.0**-24
     assert errors.shape == (6, 2) and errors.max() < 0.15 and np.abs(errors[:, 0] - errors[:, 1]).max() < 0.01
 
 
-def test_the_demos_policy_is_the_trained_one() -> None:
-    policy = onnxruntime.InferenceSession(EXAMPLES / "trained/FrankaPickCube.onnx", providers=["CPUExecutionProvider"])
-    obs = np.random.default_rng(0).normal(size=(50, 42)).astype(np.float32)
+@pytest.mark.parametrize("task", assets.POLICIES)
+def test_a_policy_of_the_wheel_is_the_trained_one(task: str) -> None:
+    policy = onnxruntime.InferenceSession(EXAMPLES / f"trained/{task}.onnx", providers=["CPUExecutionProvider"])
+    obs = np.random.default_rng(0).normal(size=(50, policy.get_inputs()[0].shape[1])).astype(np.float32)
     (action,) = policy.run(["action"], {"obs": obs})
-    own = Policy(Path(demo.__file__).with_name("pick_cube.npz"))(obs)
     # some hundred roundings of float32 in each of three layers
-    np.testing.assert_allclose(own, action, rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(assets.policy(task)(obs), action, rtol=1e-4, atol=1e-4)
