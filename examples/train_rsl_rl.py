@@ -57,6 +57,7 @@ PRESETS = {
     "CartPoleBalance": Preset(30, 512, hidden=64),
     "CartPoleSwingUp": Preset(80, 512, steps=64, hidden=64, gamma=0.98, kl=0.02),
     "FrankaReach": Preset(125, 512, gamma=0.9, lam=0.9, kl=0.02, std=0.6),
+    "QuadrupedVelocityFlat": Preset(120, 1024, gamma=0.97, kl=0.02, std=0.7),
 }
 
 

@@ -56,6 +56,7 @@ PRESETS = {
     "CartPoleBalance": Preset(30, 512, hidden=64),
     "CartPoleSwingUp": Preset(80, 512, steps=64, hidden=64, gamma=0.98, lr=2e-3),
     "FrankaReach": Preset(150, 512, gamma=0.9, lam=0.9, std=0.6),
+    "QuadrupedVelocityFlat": Preset(120, 1024, gamma=0.97, std=0.7),
 }
 
 

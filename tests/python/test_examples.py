@@ -32,6 +32,7 @@ TRAINING = {
     "sim2sim.py": "tests/rl/test_trained.py",
     "train_rsl_rl.py": "tests/rl/test_train_examples.py",
     "train_sb3.py": "tests/rl/test_train_examples.py",
+    "train_skrl.py": "tests/rl/test_train_examples.py",
 }
 # Libraries that each needs, as pip names them.
 LIBRARIES = {
@@ -42,6 +43,7 @@ LIBRARIES = {
     "sim2sim.py": "mujoco onnxruntime",
     "train_rsl_rl.py": "onnxscript rsl-rl-lib torch tqdm",
     "train_sb3.py": "stable-baselines3 torch tqdm",
+    "train_skrl.py": "skrl torch tqdm",
 }
 # Runs an example where some modules seem to be missing.
 WITHOUT = """

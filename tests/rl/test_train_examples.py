@@ -1,4 +1,4 @@
-"""``examples/train_sb3.py`` and ``examples/train_rsl_rl.py`` learn to balance, and leave a policy."""
+"""``examples/train_sb3.py``, ``train_rsl_rl.py`` and ``train_skrl.py`` learn to balance, and leave a policy."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
     [
         ("train_sb3", "rollouts", ["model.zip", "normalize.pkl"]),
         ("train_rsl_rl", "iterations", ["model.pt", "policy.onnx"]),
+        ("train_skrl", "updates", ["model.pt"]),
     ],
 )
 def test_it_learns_to_balance_and_leaves_a_policy(name, unit, files, tmp_path):
@@ -24,8 +25,8 @@ def test_it_learns_to_balance_and_leaves_a_policy(name, unit, files, tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     # a file or a pipe gets a line per evaluation, and no bar
-    lines = re.findall(rf"^CartPoleBalance, (\d+) of 30 {unit}: return [\d.]+$", done.stdout, re.MULTILINE)
-    assert len(lines) == 2 and lines[-1] == "30" and "%|" not in done.stderr
+    lines = re.findall(rf"^CartPoleBalance, (\d+) of (\d+) {unit}: return [\d.]+$", done.stdout, re.MULTILINE)
+    assert len(lines) == 2 and lines[-1][0] == lines[-1][1] and "%|" not in done.stderr
     said = re.search(r"return ([\d.]+); ", done.stdout)
     # an untrained policy falls after some 40 steps of 500
     assert said and float(said.group(1)) > 400, done.stdout
