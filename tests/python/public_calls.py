@@ -335,7 +335,7 @@ ENV_CALLS: dict[str, Call] = {
         {"site": "tip", "dofs": ["arm/fr3_joint1"], "pos_scale": 1.0},
     ),
     "ActuatorControl": Call(
-        lambda _: env.ActuatorControl, {"ranges": "ranges", "clips": "flag"}, {"ranges": [(-1.0, 1.0)]}
+        lambda _: env.ActuatorControl, {"ranges": "action ranges", "clips": "flag"}, {"ranges": [(-1.0, 1.0)]}
     ),
     "Observed": Call(
         lambda _: env.Observed,

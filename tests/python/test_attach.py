@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import tightloop as tl
-from processes import alive, left_of, stems_of, wait_until
+from processes import alive, left_of, started, stems_of, wait_until
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def served(pendulum, tmp_path, unique) -> Iterator[tuple[str, int]]:
     pendulum.save(file)
     command = [sys.executable, "-m", "tightloop", "serve", str(file), "--worlds=3", f"--name={name}"]
     command += ["--fields=joint_q,joint_qd,body_q,mass_matrix"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+    with started(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
         try:
             assert process.stdout is not None and process.stdout.readline()
             yield name, process.pid

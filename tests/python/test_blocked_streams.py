@@ -125,7 +125,7 @@ def test_a_launched_daemon_whose_streams_are_full_serves_and_ends(pendulum, full
     try:
         with tl.launch(pendulum, worlds=2) as sim:
             assert sim.step().status.tolist() == [0, 0]
-        with pytest.raises(tl.errors.ArgumentError, match="unknown field"):
+        with pytest.raises(tl.errors.ArgumentError, match="no such field"):
             tl.launch(pendulum, worlds=2, fields=["nonsense"])
     finally:
         os.dup2(kept, 2)

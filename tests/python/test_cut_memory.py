@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 import tightloop as tl
-from processes import stems_of
+from processes import started, stems_of
 from tightloop import _core
 
 SHARED_MEMORY = Path("/dev/shm")
@@ -91,7 +91,7 @@ def attacked(scene_file: Path, name: str, seed: int, attack: Callable[[random.Ra
     rng = random.Random(seed)
     # not of this process, which would have the damaged memory too
     command = [sys.executable, "-m", "tightloop", "serve", str(scene_file), "--worlds=3", f"--name={name}"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as daemon:
+    with started(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as daemon:
         assert daemon.stdout is not None and daemon.stdout.readline()
         first = client(name)
         assert first.stdout is not None and first.stdout.readline() == "ready\n"

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
 import tightloop as tl
-from processes import wait_until
+from processes import started, wait_until
 from tightloop.view import Film, Picture, film
 from tightloop.view.parts import parts
 
@@ -111,7 +111,7 @@ class Recording:
         self.frames: list[tl.FrameCopy] = []
         with tl.launch(scene, worlds=2, name=name) as sim:
             command = [*COMMAND, "record", name, str(self.path)]
-            with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as recorder:
+            with started(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as recorder:
                 assert recorder.stderr is not None
                 assert "recording" in recorder.stderr.readline()
                 self.frames.append(sim.reset().copy())
@@ -174,7 +174,7 @@ def test_a_daemon_is_filmed_as_it_runs(scene: tl.Scene, tmp_path: Path, unique: 
         spin(sim)
         out = tmp_path / "live.gif"
         command = [*COMMAND, "film", name, str(out), "--seconds=1", "--fps=10", "--size=96x64"]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as filming:
+        with started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as filming:
             while filming.poll() is None:
                 sim.step()
             _, news = filming.communicate()
@@ -183,7 +183,7 @@ def test_a_daemon_is_filmed_as_it_runs(scene: tl.Scene, tmp_path: Path, unique: 
             lengths = [frame.info["duration"] for frame in ImageSequence.Iterator(image)]
         # a second of it, where equal pictures are one
         assert sum(lengths) == 1000 and 1 < len(lengths) <= 10
-        with subprocess.Popen([*command[:5], str(tmp_path / "cut"), "--seconds=60"], stdout=subprocess.PIPE) as filming:
+        with started([*command[:5], str(tmp_path / "cut"), "--seconds=60"], stdout=subprocess.PIPE) as filming:
             assert wait_until(lambda: any((tmp_path / "cut").glob("*.png")), 60)
             filming.send_signal(signal.SIGINT)
             assert filming.wait(20) == 0

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import tightloop as tl
-from processes import alive, left_of, stems_of, wait_until
+from processes import alive, left_of, started, stems_of, wait_until
 
 EACH, GROUPS = 7, 3
 WORLDS = EACH * GROUPS
@@ -179,7 +179,7 @@ def test_a_daemon_with_groups_is_one_line_of_the_list_and_one_stop(drawn, tmp_pa
     for stopped in (lambda name: name, lambda name: f"{name}.1"):
         name = unique()
         serve = [*COMMAND, "serve", str(file), "--worlds=6", "--groups=2", f"--name={name}"]
-        with subprocess.Popen(serve, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        with started(serve, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None and process.stderr is not None
             line = process.stdout.readline()
             assert f'"name":"{name}"' in line and '"groups":2' in line and '"worlds":6' in line
@@ -258,7 +258,7 @@ def test_a_launcher_that_is_killed_takes_the_daemon_along(pendulum_urdf, root):
         "os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     command = [sys.executable, "-c", code]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as caller:
+    with started(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as caller:
         assert caller.stdout is not None
         pid = int(caller.stdout.readline())
         stems = stems_of(pid)

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import tightloop as tl
+from processes import started
 
 COMMAND = [sys.executable, "-m", "tightloop"]
 # Nothing here takes long; this only ends a test in which somebody waits for ever [s]
@@ -118,7 +119,7 @@ def test_xml_that_is_no_robot_is_an_error_with_the_cure(tmp_path):
 def test_a_robot_is_served_as_it_is(pendulum_urdf, unique):
     name = unique()
     line = [sys.executable, "-m", "tightloop", "serve", str(pendulum_urdf), "--worlds", "2", "--name", name]
-    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+    with started(line, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         assert process.stdout is not None
         assert f'"name":"{name}"' in process.stdout.readline()
         with tl.attach(name) as sim:

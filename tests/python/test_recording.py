@@ -158,7 +158,9 @@ def test_a_recording_under_a_loop_that_goes_on_ends_when_it_is_told(pendulum, tm
                 steps += 1
             said = recorder.finish()
             frames = int(said.split(" frames")[0].split()[-1])
-            assert "no gaps" in said and 200 <= frames <= 200 + steps, said
+            # 0.3 s may be over before the 200 steps are
+            least = 1 if ending is None else 200
+            assert "no gaps" in said and least <= frames <= 200 + steps, said
             code, told = replay(tmp_path / f"{ending}.tlrec")
             assert code == 0 and f"{frames} frames" in told, told
 

@@ -17,7 +17,7 @@ import pytest
 import viser
 
 import tightloop as tl
-from processes import alive, wait_until
+from processes import alive, started, wait_until
 from tightloop.view import cameras, dependencies, floor, grid
 from tightloop.view.batched_meshes import batched_meshes
 from tightloop.view.command import main
@@ -336,7 +336,7 @@ sim = tl.launch(scene, worlds=1)
 print(sim.view(port=8360).pid, flush=True)
 time.sleep(60)
 """
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+    with started([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         pid = int(process.stdout.readline())
         process.kill()
@@ -346,7 +346,7 @@ time.sleep(60)
 def test_ctrl_c_ends_a_viewer_with_0_and_the_daemon_goes_on(pendulum, unique):
     with tl.launch(pendulum, worlds=1, name=unique()) as sim:
         command = [sys.executable, "-m", "tightloop", "view", sim.name, "--port=8370"]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as viewer:
+        with started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as viewer:
             assert viewer.stdout is not None and viewer.stdout.readline().startswith("http://localhost:")
             os.kill(viewer.pid, signal.SIGINT)
             assert viewer.communicate(timeout=20) == ("", "")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import tightloop as tl
 from browser import WIDE, WIDTH, View, chromium, differing, spots
-from processes import wait_until
+from processes import started, wait_until
 from tightloop import Frame
 from tightloop.view import Picture
 from tightloop.view.parts import parts
@@ -272,7 +272,7 @@ def test_a_page_outlives_its_daemon_and_goes_on_with_the_next_of_that_name(box, 
     with tl.launch(box, worlds=1, name=name) as sim:
         sim.reset()
         command = [sys.executable, "-m", "tightloop", "view", name, "--port=8300"]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as viewer:
+        with started(command, stdout=subprocess.PIPE, text=True) as viewer:
             assert viewer.stdout is not None
             view = look(viewer.stdout.readline().strip())
             os.kill(sim.pid, signal.SIGKILL)
@@ -333,7 +333,7 @@ def test_a_recording_plays_to_its_end_and_again(box, look, unique, tmp_path):
     with tl.launch(box, worlds=2, name=unique()) as sim:
         sim.reset()
         record = [sys.executable, "-m", "tightloop", "record", sim.name, str(file)]
-        with subprocess.Popen(record, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as recorder:
+        with started(record, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as recorder:
             assert recorder.stderr is not None and "recording" in recorder.stderr.readline()
             for _ in range(90):
                 sim.step()
@@ -341,7 +341,7 @@ def test_a_recording_plays_to_its_end_and_again(box, look, unique, tmp_path):
             recorder.send_signal(signal.SIGINT)
             recorder.communicate()
     command = [sys.executable, "-m", "tightloop", "view", str(file), "--port=8300"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as viewer:
+    with started(command, stdout=subprocess.PIPE, text=True) as viewer:
         assert viewer.stdout is not None
         view = look(viewer.stdout.readline().strip())
         view.wait(lambda: "the recording ends here" in view.text and "step 90" in view.text, "it is at its end")

@@ -23,7 +23,7 @@ from websockets.exceptions import ConnectionClosedError, InvalidStatus
 from websockets.sync.client import connect
 
 import tightloop as tl
-from processes import wait_until
+from processes import started, wait_until
 from tightloop.view import Film, guarded_server
 from tightloop.view.command import main
 from tightloop.view.gate import Gate, host_name
@@ -152,7 +152,7 @@ def test_what_is_too_large_is_refused_and_the_page_goes_on(served: Served, sim: 
 
 def test_what_strangers_send_prints_little(sim: tl.Sim) -> None:
     command = [sys.executable, "-m", "tightloop", "view", sim.name, "--port=8380"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as viewer:
+    with started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as viewer:
         assert viewer.stdout is not None
         served = Served(viewer.stdout.readline().strip())
         for number in range(20):
@@ -214,7 +214,7 @@ def test_the_command_line_of_a_browser_has_no_token(sim: tl.Sim, tmp_path: Path)
     browser.chmod(0o755)
     command = [sys.executable, "-m", "tightloop", "view", sim.name, "--port=8380", "--open"]
     env = os.environ | {"BROWSER": f"{browser} %s"}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=env) as viewer:
+    with started(command, stdout=subprocess.PIPE, text=True, env=env) as viewer:
         assert viewer.stdout is not None
         served = Served(viewer.stdout.readline().strip())
         assert wait_until(opened.exists, 60)

@@ -16,7 +16,7 @@ import av
 import pytest
 
 import tightloop as tl
-from processes import wait_until
+from processes import started, wait_until
 from tightloop.view import Film
 from tightloop.whole_files import WholeFile, whole_file
 
@@ -54,7 +54,7 @@ def running(pendulum: tl.Scene, unique: Callable[[], str]):
 def recording(running: tl.Sim, tmp_path: Path) -> Path:
     file = tmp_path / "run.tlrec"
     command = [*COMMAND, "record", running.name, str(file)]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as recorder:
+    with started(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as recorder:
         assert recorder.stderr is not None and "recording" in recorder.stderr.readline()
         for _ in range(30):
             running.step()
@@ -102,7 +102,7 @@ print("filmed", flush=True)
 while True: film.add(sim.step())
 """
     running.release()
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as filming:
+    with started([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as filming:
         assert filming.stdout is not None and filming.stdout.readline() == "filmed\n"
         filming.kill()
     assert out.read_bytes() == OLD
@@ -139,7 +139,7 @@ def test_a_film_that_is_forgotten_leaves_nothing(running: tl.Sim, tmp_path: Path
 def test_a_film_of_a_daemon_that_ends_is_shorter_and_whole(running: tl.Sim, tmp_path: Path) -> None:
     out = tmp_path / "run.mp4"
     command = [*COMMAND, "film", running.name, str(out), "--seconds=3600", "--size=96x64", "--fps=5"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as filming:
+    with started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as filming:
         assert wait_until(lambda: bool(parts_in(tmp_path)), 120)
 
         def steps() -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from tightloop import checks
@@ -14,6 +15,9 @@ from tightloop.scene_shapes import Collidable, SceneShapes, free_name
 from tightloop.sensors import ContactSensor, HeightScan, Site
 from tightloop.shapes import ORIGIN, UPRIGHT
 from tightloop.signatures import checked_calls
+
+#: Rays of a height scan along each axis, at most.
+RAYS_MAX = 1000
 
 
 @checked_calls
@@ -146,9 +150,12 @@ class SceneSensors(SceneShapes):
         name = checks.name("height scan", free_name("scan", taken) if name is None else name, [*taken])
         what = f"height scan `{name}`"
         lengths = checks.pair(f"{what}: size", size)
+        is_pair = isinstance(shape, Sequence) and not isinstance(shape, str) and len(shape) == 2
+        if not is_pair:
+            raise SceneError(f"{what}: shape is {shape!r:.80}; give the numbers of rays along x and y")
         counts = tuple(checks.integer(f"{what}: shape", count) for count in shape)
-        if len(counts) != 2:
-            raise SceneError(f"{what}: shape is {shape!r}; give the numbers of rays along x and y")
+        if max(counts) > RAYS_MAX:
+            raise SceneError(f"{what}: shape is {shape!r}; give at most {RAYS_MAX} rays along each axis")
         scan = HeightScan(
             name=name,
             body=None if body is None else self._bearer(what, body),

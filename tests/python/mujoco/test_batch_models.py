@@ -39,7 +39,7 @@ def test_names_that_are_no_fields_are_refused_with_a_hint() -> None:
             (batch.bind, "geom_friction", r'use expand\("geom_friction"\)'),
             (batch.bind, "gravity", r'use expand\("gravity"\)'),
             (batch.expand, "qpos", r'use bind\("qpos"\)'),
-            (batch.bind, "cinert", "cinert: tightloop does not compute"),
+            (batch.bind, "crb", "crb: tightloop does not compute"),
             (batch.expand, "mesh_vert", "asset"),
         ):
             with pytest.raises(ValueError, match=message):

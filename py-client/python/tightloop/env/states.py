@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop.command_arrays import ready_arrays
 from tightloop.errors import ArgumentError, CommandRefused
 from tightloop.inputs import reals
+from tightloop.signatures import checked_calls
 
 if TYPE_CHECKING:
     from tightloop.env.evaluation import Evaluation
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from tightloop.sim import Sim
 
 
+@checked_calls
 class SettableState:
     """Mixin of `VectorEnv`."""
 
