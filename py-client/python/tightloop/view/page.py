@@ -69,7 +69,6 @@ class Page:
         self._panel = Panel(
             server, stream, self.options, driven=self._driven, aim=self.aim, notes=notes, preset=self._preset
         )
-        self._panel = Panel(server, stream, self.options, driven=self._driven, aim=self.aim, notes=notes)
         self._world_meshes.on_click(lambda world, _: self._panel.follow(world))
         if isinstance(stream.driver, LiveDriver) and stream.driver.can_push and self._dynamics is not None:
             self._world_meshes.on_drag(self._drag)
