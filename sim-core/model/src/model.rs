@@ -299,7 +299,9 @@ fn no_fields() -> [String; 2] {
     );
     [
         format!(", fields: {fields:?}"),
-        format!(", field_candidates: {candidates:?}, field_prisms: {candidates:?}"),
+        format!(
+            ", field_candidates: {candidates:?}, field_cells: {candidates:?}, field_prisms: {candidates:?}"
+        ),
     ]
 }
 

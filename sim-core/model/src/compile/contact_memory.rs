@@ -100,6 +100,8 @@ impl ContactBuilder<'_> {
                 true => table(row::PAIR + 2, FIELD_CANDIDATES),
                 false => contacts.memory.field_candidates,
             },
+            // `add_fields` sets its rows
+            field_cells: contacts.memory.field_cells,
             field_prisms: match has_fields {
                 true => table(1, FIELD_CANDIDATES),
                 false => contacts.memory.field_prisms,

@@ -1,4 +1,4 @@
-//! Tables of height fields: elevations, the highest around each tile, and how many prisms each pair visits.
+//! Tables of height fields: elevations, the highest of each cell and around each tile, and how many cells each pair visits.
 
 use super::contact_pieces::{Piece, PlacedShape};
 use crate::description::Shape;
@@ -6,7 +6,7 @@ use crate::error::ModelError;
 use crate::geometry::{HeightField, SAMPLES_MAX};
 use sim_physics::constants::contact::{Contacts, Kind};
 use sim_physics::constants::height_field::{FIELD_CANDIDATES, FieldTables, TILE, field};
-use sim_physics::lane::Fixed;
+use sim_physics::lane::{Fixed, Table};
 
 /// Most prisms that one shape may lie over: more would take longer than a mesh.
 const PRISMS_MAX: usize = 20_000;
@@ -51,7 +51,7 @@ pub(super) fn add_fields(
     }
     // per pair: how far the second shape reaches from its centre
     let mut farthest = vec![0.0_f64; all.len()];
-    let mut prisms = vec![0_u32; pairs.len()];
+    let mut under = vec![0_u32; pairs.len()];
     for (p, &(a, b)) in pairs.iter().enumerate() {
         if pieces[a].solid.kind != Kind::Field {
             continue;
@@ -75,9 +75,10 @@ pub(super) fn add_fields(
                 ),
             ));
         }
-        prisms[p] = count as u32;
+        under[p] = (count / 2) as u32;
     }
-    let (mut sizes, mut heights, mut ceilings) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut sizes, mut heights) = (Vec::new(), Vec::new());
+    let (mut ceilings, mut tops) = (Vec::new(), Vec::new());
     for (&(index, own), farthest) in all.iter().zip(farthest) {
         let piece = pieces.iter().find(|piece| piece.shape == index);
         let solid = &piece.expect("every field is a piece").solid;
@@ -100,11 +101,20 @@ pub(super) fn add_fields(
         row[field::TILES_FIRST] = ceilings.len() as f64;
         row[field::TILES] = (own.columns - 1).div_ceil(TILE) as f64;
         row[field::ACROSS..][..2].copy_from_slice(&[dy / length, -dx / length]);
+        row[field::DIAGONAL] = 1.0 / (dx * dx + dy * dy);
         sizes.extend(row);
         heights.extend(&own.elevations);
         ceilings.extend(highest(own, farthest));
+        tops.extend(highest_corners(own));
     }
-    let prisms_max = prisms.iter().max().map_or(0, |&most| most as usize);
+    let cells_max = under.iter().max().map_or(0, |&most| most as usize);
+    let memory = &mut contacts.memory;
+    memory.field_cells = Table {
+        base: memory.len,
+        stride: 1,
+        rows: cells_max.max(1),
+    };
+    memory.len += memory.field_cells.rows.next_multiple_of(4);
     let tables = &mut contacts.tables;
     let mut numbers = |stride: usize, new: Vec<f64>| {
         let (base, rows) = (tables.numbers.len(), new.len() / stride);
@@ -112,20 +122,36 @@ pub(super) fn add_fields(
         Fixed { base, stride, rows }
     };
     // what does not fit in the list of a pair is counted; a prism gives few points
-    contacts.may_overflow |= prisms_max * POINTS_OF_A_PRISM > FIELD_CANDIDATES;
+    contacts.may_overflow |= 2 * cells_max * POINTS_OF_A_PRISM > FIELD_CANDIDATES;
     contacts.fields = FieldTables {
         heights: numbers(1, heights),
         ceilings: numbers(1, ceilings),
+        tops: numbers(1, tops),
         sizes: numbers(field::LEN, sizes),
-        prisms: Fixed {
+        cells: Fixed {
             base: contacts.tables.indices.len(),
             stride: 1,
-            rows: prisms.len(),
+            rows: under.len(),
         },
-        prisms_max,
+        cells_max,
     };
-    contacts.tables.indices.extend(prisms);
+    contacts.tables.indices.extend(under);
     Ok(())
+}
+
+/// The highest corner of the cell that begins at each sample; of those past the last cell, the sample itself.
+fn highest_corners(field: &HeightField) -> Vec<f64> {
+    let [columns, rows] = [field.columns, field.rows];
+    let (mut all, heights) = (field.elevations.to_vec(), &field.elevations);
+    for row in 0..rows - 1 {
+        for column in 0..columns - 1 {
+            let at = row * columns + column;
+            all[at] = [at + 1, at + columns, at + columns + 1]
+                .iter()
+                .fold(heights[at], |top, &k| top.max(heights[k]));
+        }
+    }
+    all
 }
 
 /// The highest elevation around each tile, as far as a shape with its centre in the tile reaches.
@@ -163,6 +189,24 @@ fn highest(field: &HeightField, reach: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_cell_has_the_highest_of_its_four_corners() {
+        let (rows, columns) = (4, 5);
+        let z: Vec<f64> = (0..rows * columns)
+            .map(|k| ((k * 37) % 17) as f64)
+            .collect();
+        let field = HeightField::new([rows, columns], z.clone(), [1.0, 1.0], 1.0).unwrap();
+        let tops = highest_corners(&field);
+        assert_eq!(tops.len(), z.len());
+        for row in 0..rows - 1 {
+            for column in 0..columns - 1 {
+                let at = row * columns + column;
+                let corners = [z[at], z[at + 1], z[at + columns], z[at + columns + 1]];
+                assert_eq!(tops[at], corners.into_iter().fold(0.0, f64::max));
+            }
+        }
+    }
 
     #[test]
     fn no_sample_within_reach_is_above_the_highest() {

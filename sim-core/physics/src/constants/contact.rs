@@ -157,6 +157,8 @@ pub struct Memory {
     pub cut: Cut,
     /// Candidates for contacts with a height field; see `row`.
     pub field_candidates: Table,
+    /// Cells of a height field under a shape that reach its lowest point.
+    pub field_cells: Table,
     /// Prisms of a height field that a shape may touch.
     pub field_prisms: Table,
     /// Coefficient of friction of each solid, where it varies [–].
@@ -465,6 +467,7 @@ impl<R: Real> Contacts<R> {
                     edges: table,
                 },
                 field_candidates: table,
+                field_cells: table,
                 field_prisms: table,
                 len: 0,
             },

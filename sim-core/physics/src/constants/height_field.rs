@@ -22,12 +22,14 @@ pub struct FieldTables {
     pub heights: Fixed,
     /// Highest elevation around each tile of cells, as far as any shape of the field's pairs reaches. `(tiles, 1)` [m]
     pub ceilings: Fixed,
+    /// Highest corner of each cell, at the place of its first corner in `heights`. `(samples, 1)` [m]
+    pub tops: Fixed,
     /// Of each field; see [`field`]. `(fields, field::LEN)`
     pub sizes: Fixed,
-    /// Of each pair, the prisms that its second shape may lie over, 0 of pairs without a field. Indices. `(pairs, 1)`
-    pub prisms: Fixed,
+    /// Of each pair, the cells that its second shape may lie over, 0 of pairs without a field. Indices. `(pairs, 1)`
+    pub cells: Fixed,
     /// The most of any pair.
-    pub prisms_max: usize,
+    pub cells_max: usize,
 }
 
 /// Places of the scalars of a field in `sizes`.
@@ -52,6 +54,8 @@ pub mod field {
     pub const TILES: usize = 13;
     /// Unit normal of the diagonals of cells, to the right seen along them (2) [–].
     pub const ACROSS: usize = 14;
+    /// 1 over the squared length of a diagonal, seen from above [1/m²].
+    pub const DIAGONAL: usize = 16;
     /// Scalars.
-    pub const LEN: usize = 16;
+    pub const LEN: usize = 17;
 }

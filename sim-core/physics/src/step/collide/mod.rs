@@ -13,7 +13,7 @@
 //! | plane, sphere, capsule | closed form | `planes`, `spheres`, `capsules` |
 //! | box and box | separating axes, clipping | `boxes`, `box_faces` |
 //! | with a cylinder or a hull | [`convex`]: axes, GJK, clipping | `cylinders`, `hulls` |
-//! | height field | a convex prism below each of its triangles | `fields`, `prisms`, `prism_hull` |
+//! | height field | a convex prism below each of its triangles | `fields`, `field_samples`, `prisms`, `prism_hull` |
 
 mod box_faces;
 mod boxes;
@@ -22,6 +22,7 @@ mod clip;
 mod convex;
 mod cylinders;
 mod features;
+mod field_samples;
 mod fields;
 mod gjk;
 mod hull;
@@ -35,6 +36,7 @@ mod planes;
 mod points;
 mod posed;
 mod prism;
+mod prism_axes;
 mod prism_hull;
 mod prisms;
 mod reduction;
@@ -57,7 +59,7 @@ use crate::constants::params::Param;
 use crate::lane::{Cx, MaskOf, Num, Real, Table};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
 use crate::{span, when};
-pub(super) use fields::Samples;
+pub(super) use field_samples::Samples;
 pub use fields::{FieldBox, FieldCapsule, FieldCylinder, FieldHull, FieldSphere};
 pub use narrow::*;
 use points::{Points, Room};

@@ -7,17 +7,25 @@
 //!   └────────→ x     Its sides are vertical, so their normals have no z.
 //! ```
 
-use super::hull_axes::{Reach, SeparatingAxis};
 use super::restart::Extent;
 use super::select::select;
 use super::support::Support;
 use crate::lane::{Cx, Num};
-use crate::math::vec3::{Mat3, Vec3};
+use crate::math::vec3::Vec3;
 
 /// Squared lengths count as at least this [m²].
 const TINY: f64 = 1e-30;
-/// Squared sine below which an edge lies along an axis of the other shape: their common normal is that of a face.
-const ALONG: f64 = 1e-6;
+
+/// The cells of a field.
+#[derive(Clone, Copy)]
+pub(super) struct Lattice<F> {
+    /// 1 over the edges of a cell [1/m].
+    pub inverse: [F; 2],
+    /// Unit normal of the diagonals, to the right seen along them [–].
+    pub across: [F; 2],
+    /// 1 over the squared length of a diagonal, seen from above [1/m²].
+    pub diagonal: F,
+}
 
 /// A prism.
 #[derive(Clone, Copy)]
@@ -32,68 +40,120 @@ pub(super) struct Prism<F> {
     pub across: [F; 2],
     /// Outward unit normal of the top.
     pub up: Vec3<F>,
+    /// 1 over the squared lengths of PQ, QK and KP, seen from above [1/m²].
+    inverse: [F; 3],
 }
 
-/// The place of a prism that is nearest to a point.
+/// Which prism of its cell one is.
+#[derive(Clone, Copy)]
+pub(super) enum Half<M> {
+    UpperLeft,
+    LowerRight,
+    /// The upper left one where the mask holds.
+    Of(M),
+}
+
+impl<M: Copy> Half<M> {
+    /// `left` for the upper left prism, `right` for the other.
+    #[inline(always)]
+    pub fn pick<F: Num<Mask = M>>(self, left: F, right: F) -> F {
+        match self {
+            Half::UpperLeft => left,
+            Half::LowerRight => right,
+            Half::Of(mask) => F::select(mask, left, right),
+        }
+    }
+}
+
+/// The place of a prism that is nearest to a shape's axis or centre.
 #[derive(Clone, Copy)]
 pub(super) struct Nearest<F> {
     /// The place [m].
     pub place: Vec3<F>,
-    /// Unit vector from the prism to the point.
+    /// Unit vector from the prism to the shape.
     pub normal: Vec3<F>,
-    /// Distance of the point, negative inside [m].
+    /// Their distance, negative inside [m].
     pub distance: F,
 }
 
-/// The best separating axis of a prism and another shape, and the features it belongs to.
-pub(super) struct PrismAxis<F> {
-    /// The best that may be the way out, from the other shape to the prism.
-    pub axis: SeparatingAxis<F>,
-    /// The distance along the best of all axes [m].
-    pub gap: F,
-    /// 0: normal of a face of the prism; 1: of a face of the other; 2: of two edges.
-    pub kind: F,
-    /// A point of the prism's edge, and its unit direction.
-    pub edge: [Vec3<F>; 2],
-    /// Unit direction of the other's edge.
-    pub other: Vec3<F>,
+/// The nearest place so far, by its squared distance: one root for all.
+struct Search<F: Num> {
+    place: Vec3<F>,
+    /// From there to the shape.
+    way: Vec3<F>,
+    square: F,
+    /// Is it on the top? There the way has the top's normal, also without length.
+    on_top: F::Mask,
 }
 
-impl<F: Num> PrismAxis<F> {
-    /// Takes an axis if it is better by the tolerance and faces the top enough; returns whether.
+impl<F: Num> Search<F> {
     #[inline(always)]
-    fn offer(
-        &mut self,
-        normal: Vec3<F>,
-        distance: F,
-        up: Vec3<F>,
-        [tolerance, facing]: [F; 2],
-    ) -> F::Mask {
-        let is = (self.axis.distance + tolerance).lt(distance) & facing.lt(-normal.dot(up));
-        self.axis.normal = select(is, normal, self.axis.normal);
-        self.axis.distance = F::select(is, distance, self.axis.distance);
-        self.gap = self.gap.max(distance);
-        is
+    fn new() -> Search<F> {
+        let (far, zero) = (F::c(1e36), F::c(0.0));
+        Search {
+            place: Vec3::zero(),
+            way: Vec3::zero(),
+            square: far,
+            on_top: far.lt(zero),
+        }
+    }
+
+    /// A place, and the point of the shape that is nearest to it.
+    #[inline(always)]
+    fn offer(&mut self, place: Vec3<F>, x: Vec3<F>) {
+        let way = x - place;
+        let square = way.dot(way);
+        // no distance has no direction: another place stands for it
+        let closer = square.lt(self.square) & F::c(0.0).lt(square);
+        self.place = select(closer, place, self.place);
+        self.way = select(closer, way, self.way);
+        self.square = F::select(closer, square, self.square);
+        self.on_top = self.on_top & !closer;
+    }
+
+    /// The place of an edge of the top that is nearest to a point.
+    #[inline(always)]
+    fn offer_edge(&mut self, [a, edge]: [Vec3<F>; 2], x: Vec3<F>) {
+        let share = edge.dot(x - a).div(edge.dot(edge));
+        let share = share.max(F::c(0.0)).min(F::c(1.0));
+        self.offer(edge.scale_add(share, a), x);
+    }
+
+    /// The place of an edge of the top that is nearest to a segment from `-half` to `half`; see [`nearest_shares`].
+    #[inline(always)]
+    fn offer_segment(&mut self, [a, edge]: [Vec3<F>; 2], half: Vec3<F>, hh: F, inverse: F) {
+        let (s, t) = nearest_shares(half, hh, inverse, a, edge);
+        self.offer(edge.scale_add(t, a), half * s);
+    }
+
+    /// The place of the side below an edge of the top that is nearest to a point; `inverse` is 1 over the squared length of the
+    /// edge, seen from above.
+    #[inline(always)]
+    fn offer_side(&mut self, [a, edge]: [Vec3<F>; 2], inverse: F, x: Vec3<F>, bottom: F) {
+        let way = x - a;
+        let along = edge[0].fma(way[0], edge[1] * way[1]);
+        let share = (along * inverse).max(F::c(0.0)).min(F::c(1.0));
+        let Vec3([u, v, height]) = edge.scale_add(share, a);
+        self.offer(Vec3([u, v, x[2].max(bottom).min(height)]), x);
+    }
+
+    /// The nearest place, of a prism whose top has this normal.
+    #[inline(always)]
+    fn nearest(&self, up: Vec3<F>) -> Nearest<F> {
+        let distance = self.square.sqrt();
+        let unit = F::c(1.0).div(distance.max(F::c(TINY)));
+        Nearest {
+            place: self.place,
+            normal: select(self.on_top, up, self.way * unit),
+            distance,
+        }
     }
 }
 
 impl<F: Num> Nearest<F> {
-    /// The place that a point at the given way from it may be nearest to.
-    #[inline(always)]
-    fn offer(&mut self, place: Vec3<F>, x: Vec3<F>) {
-        let way = x - place;
-        let distance = way.dot(way).sqrt();
-        // no distance has no direction: another place stands for it
-        let closer = distance.lt(self.distance) & F::c(TINY).lt(distance);
-        let unit = F::c(1.0).div(distance.max(F::c(TINY)));
-        self.place = select(closer, place, self.place);
-        self.normal = select(closer, way * unit, self.normal);
-        self.distance = F::select(closer, distance, self.distance);
-    }
-
     /// The nearer of two.
     #[inline(always)]
-    pub fn or(self, other: Nearest<F>) -> Nearest<F> {
+    fn or(self, other: Nearest<F>) -> Nearest<F> {
         let closer = other.distance.lt(self.distance);
         Nearest {
             place: select(closer, other.place, self.place),
@@ -106,15 +166,26 @@ impl<F: Num> Nearest<F> {
 impl<F: Num> Prism<F> {
     /// A prism by the corners of its top.
     #[inline(always)]
-    pub fn new(top: [Vec3<F>; 3], bottom: F, side: F, diagonal: [F; 2]) -> Prism<F> {
-        let up = (top[1] - top[0]).cross(top[2] - top[0]) * side;
-        let unit = F::c(1.0).div(up.dot(up).sqrt());
+    pub fn new(
+        top: [Vec3<F>; 3],
+        bottom: F,
+        half: Half<F::Mask>,
+        lattice: &Lattice<F>,
+    ) -> Prism<F> {
+        let [p, q, k] = [top[0][2], top[1][2], top[2][2]];
+        let [x, y] = lattice.inverse;
+        // how much the top falls along x and y
+        let (u, v) = (half.pick(k - q, p - k) * x, half.pick(p - k, k - q) * y);
+        let unit = F::c(1.0).div(u.fma(u, v.fma(v, F::c(1.0))).sqrt());
+        let side = half.pick(F::c(1.0), F::c(-1.0));
+        let (x, y) = (x * x, y * y);
         Prism {
             top,
             bottom,
             side,
-            across: [diagonal[0] * side, diagonal[1] * side],
-            up: up * unit,
+            across: [lattice.across[0] * side, lattice.across[1] * side],
+            up: Vec3([u * unit, v * unit, unit]),
+            inverse: [lattice.diagonal, half.pick(x, y), half.pick(y, x)],
         }
     }
 
@@ -148,89 +219,95 @@ impl<F: Num> Prism<F> {
     /// The place nearest to a point. From inside, the way out is through the nearest face.
     #[inline(always)]
     pub fn nearest(&self, x: Vec3<F>) -> Nearest<F> {
-        let zero = F::c(0.0);
-        let (beyond, normals) = (self.beyond(x), self.normals());
-        let mut out = Nearest {
-            place: normals[0].scale_add(-beyond[0], x),
-            normal: normals[0],
-            distance: beyond[0],
-        };
-        for (normal, distance) in normals.into_iter().zip(beyond).skip(1) {
-            let nearer = out.distance.lt(distance);
-            out.place = select(nearer, normal.scale_add(-distance, x), out.place);
-            out.normal = select(nearer, normal, out.normal);
-            out.distance = F::select(nearer, distance, out.distance);
-        }
-        let inside = !zero.lt(out.distance);
-        let other = self.nearest_outside(x, beyond);
-        Nearest {
-            place: select(inside, out.place, other.place),
-            normal: select(inside, out.normal, other.normal),
-            distance: F::select(inside, out.distance, other.distance),
+        let (beyond, mut found) = (self.beyond(x), Search::new());
+        self.offer_faces(x, beyond, &mut found);
+        let [pq, qk, kp] = self.top_edges();
+        found.offer_edge(pq, x);
+        found.offer_edge(qk, x);
+        found.offer_edge(kp, x);
+        found.nearest(self.up).or(self.way_out(x, beyond))
+    }
+
+    /// The place nearest to a segment from `-half` to `half` that does not pass through the prism. Of an end inside, its way out.
+    #[inline(always)]
+    pub fn nearest_to_segment(&self, half: Vec3<F>) -> Nearest<F> {
+        let mut found = Search::new();
+        let square = half.dot(half).max(F::c(TINY));
+        let inverse = F::c(1.0).div(square);
+        let [pq, qk, kp] = self.top_edges();
+        found.offer_segment(pq, half, square, inverse);
+        found.offer_segment(qk, half, square, inverse);
+        found.offer_segment(kp, half, square, inverse);
+        self.offer_edges_below(half, square, inverse, &mut found);
+        let (from, to) = (self.beyond(half), self.beyond(-half));
+        self.offer_faces(half, from, &mut found);
+        self.offer_faces(-half, to, &mut found);
+        let near = found.nearest(self.up);
+        near.or(self.way_out(half, from))
+            .or(self.way_out(-half, to))
+    }
+
+    /// The vertical edges below the corners of the top, for a segment with this squared half length, and 1 over it.
+    #[inline(always)]
+    fn offer_edges_below(&self, half: Vec3<F>, square: F, inverse: F, found: &mut Search<F>) {
+        let one = F::c(1.0);
+        let flat = half[0].fma(half[0], half[1] * half[1]);
+        // of a vertical segment any place will do
+        let unit = one.div(flat.max(square * F::c(1e-12)));
+        for i in 0..3 {
+            let Vec3([x, y, z]) = self.top[i];
+            let along = half[0].fma(x, half[1] * y);
+            let s = (along * unit).max(-one).min(one);
+            let height = (half[2] * s).max(self.bottom).min(z);
+            let s = half[2].fma(height, along) * inverse;
+            found.offer(Vec3([x, y, height]), half * s.max(-one).min(one));
         }
     }
 
-    /// The place of its surface that is nearest to a point outside: on the top, on an edge of the top, on a side or an edge
-    /// below it, on the bottom.
+    /// The top, the sides with their edges, and the bottom, for a point this far beyond each face.
     #[inline(always)]
-    fn nearest_outside(&self, x: Vec3<F>, beyond: [F; 5]) -> Nearest<F> {
+    fn offer_faces(&self, x: Vec3<F>, beyond: [F; 5], found: &mut Search<F>) {
         let c = F::c;
-        let (zero, far) = (c(0.0), c(1e18));
+        let zero = c(0.0);
         let above = self.up.scale_add(-beyond[0], x);
         let foot = self.beyond(above);
+        let square = beyond[0] * beyond[0];
         let on_top = !zero.lt(foot[1].max(foot[2]).max(foot[3])) & !beyond[0].lt(zero);
-        let mut found = Nearest {
-            place: above,
-            normal: self.up,
-            distance: F::select(on_top, beyond[0], far),
-        };
-        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-            let (a, b) = (self.top[i], self.top[j]);
-            let (edge, way) = (b - a, x - a);
-            let flat = edge[0].fma(edge[0], edge[1] * edge[1]);
-            let along = edge[0].fma(way[0], edge[1] * way[1]);
-            let share = edge.dot(way).div(edge.dot(edge)).max(zero).min(c(1.0));
-            found.offer(edge.scale_add(share, a), x);
-            // the same height on the side below the edge
-            let share = along.div(flat).max(zero).min(c(1.0));
-            let Vec3([u, v, height]) = edge.scale_add(share, a);
-            found.offer(Vec3([u, v, x[2].max(self.bottom).min(height)]), x);
-        }
+        let on_top = on_top & square.lt(found.square);
+        found.place = select(on_top, above, found.place);
+        found.square = F::select(on_top, square, found.square);
+        found.on_top = found.on_top | on_top;
+        // the side below each edge, at the point's height
+        let ([pq, qk, kp], [u, v, w]) = (self.top_edges(), self.inverse);
+        found.offer_side(pq, u, x, self.bottom);
+        found.offer_side(qk, v, x, self.bottom);
+        found.offer_side(kp, w, x, self.bottom);
         let below = !zero.lt(beyond[1].max(beyond[2]).max(beyond[3])) & zero.lt(beyond[4]);
-        let place = Vec3([x[0], x[1], F::select(below, self.bottom, far)]);
+        let place = Vec3([x[0], x[1], F::select(below, self.bottom, c(1e16))]);
         found.offer(place, x);
-        found
     }
 
-    /// The places of a segment and of the prism's edges that are nearest to each other; the normal is from the edge to the
-    /// segment. The segment reaches from `-half` to `half`.
+    /// The way out through the nearest face, for a point inside; far away for one outside.
     #[inline(always)]
-    pub fn nearest_of_edges(&self, half: Vec3<F>) -> Nearest<F> {
-        let mut found = Nearest {
-            place: Vec3::zero(),
-            normal: self.up,
-            distance: F::c(1e18),
-        };
-        for [a, edge] in self.edges() {
-            let (s, t) = nearest_shares(half, a, edge);
-            found.offer(edge.scale_add(t, a), half * s);
+    fn way_out(&self, x: Vec3<F>, beyond: [F; 5]) -> Nearest<F> {
+        let mut normal = self.up;
+        let mut distance = beyond[0];
+        for (m, beyond) in self.normals().into_iter().zip(beyond).skip(1) {
+            normal = select(distance.lt(beyond), m, normal);
+            distance = distance.max(beyond);
         }
-        found
+        Nearest {
+            place: normal.scale_add(-distance, x),
+            normal,
+            distance: F::select(F::c(0.0).lt(distance), F::c(1e18), distance),
+        }
     }
 
-    /// Edges of the top, then those below its corners: one end, and the way to the other.
+    /// Edges of the top: one end, and the way to the other.
     #[inline(always)]
-    fn edges(&self) -> [[Vec3<F>; 2]; 6] {
+    pub fn top_edges(&self) -> [[Vec3<F>; 2]; 3] {
         let [p, q, k] = self.top;
-        let down = |a: Vec3<F>| Vec3([F::c(0.0), F::c(0.0), self.bottom - a[2]]);
-        [
-            [p, q - p],
-            [q, k - q],
-            [k, p - k],
-            [p, down(p)],
-            [q, down(q)],
-            [k, down(k)],
-        ]
+        [[p, q - p], [q, k - q], [k, p - k]]
     }
 
     /// Its least and greatest reach along a direction.
@@ -247,94 +324,9 @@ impl<F: Num> Prism<F> {
         [low, high]
     }
 
-    /// The best of its faces, the other's faces and the pairs of edges: in penetration that is exact. Edges of its bottom are left
-    /// out. The other shape has the given axes, and its centre is the origin.
-    ///
-    /// Only normals whose cosine to the top's is at least `facing` are the way out: see [`super::prisms`].
-    #[inline(always)]
-    pub fn best_axis<R: Reach<F>>(
-        &self,
-        axes: &Mat3<F>,
-        other: &R,
-        tolerance: F,
-        facing: f64,
-    ) -> PrismAxis<F> {
-        let (zero, beyond) = (F::c(0.0), self.beyond(Vec3::zero()));
-        let distance = beyond[0] - other.reach(axes.transpose_mul(self.up));
-        let mut best = PrismAxis {
-            axis: SeparatingAxis {
-                normal: -self.up,
-                distance,
-            },
-            gap: distance,
-            kind: zero,
-            edge: [Vec3::zero(); 2],
-            other: Vec3::zero(),
-        };
-        let limits = [tolerance, F::c(facing)];
-        for (m, distance) in self.normals().into_iter().zip(beyond).skip(1) {
-            let distance = distance - other.reach(axes.transpose_mul(m));
-            best.offer(-m, distance, self.up, limits);
-        }
-        for &j in R::FACES {
-            let mut unit = [zero; 3];
-            unit[j] = F::c(1.0);
-            let (half, [low, high]) = (other.reach(Vec3(unit)), self.span(axes[j]));
-            for (n, distance) in [(axes[j], low - half), (-axes[j], -high - half)] {
-                let is = best.offer(n, distance, self.up, limits);
-                best.kind = F::select(is, F::c(1.0), best.kind);
-            }
-        }
-        for &j in R::EDGES {
-            // the edges below its corners are parallel: one axis for all three
-            for (i, [a, way]) in self.edges().into_iter().take(4).enumerate() {
-                self.offer_edges(axes, other, limits, (a, way, i < 3), j, &mut best);
-            }
-        }
-        best
-    }
-
-    /// Takes the common normal of an edge and an axis of the other shape if it is better.
-    #[inline(always)]
-    fn offer_edges<R: Reach<F>>(
-        &self,
-        axes: &Mat3<F>,
-        other: &R,
-        limits: [F; 2],
-        (a, way, is_top): (Vec3<F>, Vec3<F>, bool),
-        j: usize,
-        best: &mut PrismAxis<F>,
-    ) {
-        let (c, q) = (F::c, axes[j]);
-        let along = match is_top {
-            true => way * c(1.0).div(way.dot(way).sqrt()),
-            false => Vec3([c(0.0), c(0.0), c(-1.0)]),
-        };
-        let normal = along.cross(q);
-        let square = normal.dot(normal);
-        let unit = c(1.0).div(square.max(c(ALONG)).sqrt());
-        let normal = normal * unit;
-        let ([low, high], half) = (self.span(normal), other.reach(axes.transpose_mul(normal)));
-        // along the normal, and against it: a shape may have passed the edge. Of parallel ones the normal is that of a face
-        let parallel = square.lt(c(ALONG));
-        let far = c(-1e18);
-        for (n, distance) in [(normal, low - half), (-normal, -high - half)] {
-            let distance = F::select(parallel, far, distance);
-            let is = best.offer(n, distance, self.up, limits);
-            let a = match is_top {
-                true => a,
-                false => self.nearest_corner(n),
-            };
-            best.kind = F::select(is, c(2.0), best.kind);
-            best.edge[0] = select(is, a, best.edge[0]);
-            best.edge[1] = select(is, along, best.edge[1]);
-            best.other = select(is, q, best.other);
-        }
-    }
-
     /// The corner of its top that is least along a level direction.
     #[inline(always)]
-    fn nearest_corner(&self, d: Vec3<F>) -> Vec3<F> {
+    pub fn nearest_corner(&self, d: Vec3<F>) -> Vec3<F> {
         let [p, q, k] = self.top;
         let best = select(q.dot(d).lt(p.dot(d)), q, p);
         select(k.dot(d).lt(best.dot(d)), k, best)
@@ -350,23 +342,19 @@ impl<F: Num> Prism<F> {
 }
 
 /// Shares of a segment from `-half` to `half`, and of an edge from `a`, at which they are nearest (Ericson 2005, 5.1.9): -1 to 1
-/// and 0 to 1.
+/// and 0 to 1. `hh` is half · half, and `inverse` 1 over it.
 #[inline(always)]
-fn nearest_shares<F: Num>(half: Vec3<F>, a: Vec3<F>, edge: Vec3<F>) -> (F, F) {
+fn nearest_shares<F: Num>(half: Vec3<F>, hh: F, inverse: F, a: Vec3<F>, edge: Vec3<F>) -> (F, F) {
     let c = F::c;
     let (zero, one) = (c(0.0), c(1.0));
-    let (hh, he, ee) = (
-        half.dot(half).max(c(TINY)),
-        half.dot(edge),
-        edge.dot(edge).max(c(TINY)),
-    );
+    let (he, ee) = (half.dot(edge), edge.dot(edge).max(c(TINY)));
     let (ha, ea) = (half.dot(a), edge.dot(a));
     let square = he.fnma(he, hh * ee);
     // of parallel ones any place will do
     let s = ee.fma(ha, -(he * ea)).div(square.max(hh * ee * c(1e-12)));
     let s = s.max(-one).min(one);
     let t = he.fma(s, -ea).div(ee).max(zero).min(one);
-    let s = he.fma(t, ha).div(hh).max(-one).min(one);
+    let s = (he.fma(t, ha) * inverse).max(-one).min(one);
     (s, t)
 }
 

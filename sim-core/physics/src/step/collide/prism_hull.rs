@@ -8,6 +8,7 @@ use super::manifold::{FeaturePair, Separation, add_manifold};
 use super::narrow::ShapePair;
 use super::points::Points;
 use super::prism::Prism;
+use super::prism_axes::FieldReach;
 use super::prisms::{FACING, FieldNarrow, PrismTop, box_extents, centred, facing, facing_or};
 use super::restart::NoRestart;
 use super::select::select;
@@ -31,6 +32,11 @@ impl FieldNarrow for OfHull {
     #[inline(always)]
     fn reach<F: Num>(size: Vec3<F>, d: Vec3<F>) -> F {
         BoxReach(size).reach(d)
+    }
+    #[inline(always)]
+    fn gap<F: Num>(size: Vec3<F>, axes: &Mat3<F>, prism: &Prism<F>, field: &FieldReach<F>) -> F {
+        // of its bounding box
+        prism.gap(axes, &BoxReach(size), F::c(0.0), field, false)
     }
     #[inline(always)]
     fn contacts<C: Cx>(

@@ -11,12 +11,13 @@
 
 use super::features::{Feature, aligned};
 use super::gjk::closest_points;
-use super::hull_axes::{BoxReach, CylinderReach, Reach, axis_tolerance};
+use super::hull_axes::{BoxReach, CylinderReach, PointReach, Reach, SegmentReach, axis_tolerance};
 use super::manifold::{FeaturePair, Separation, add_manifold};
 use super::narrow::{ShapePair, ShapePose};
 use super::points::Points;
 use super::posed::{FacetedShape, PosedBox, PosedCapsule, PosedCylinder, PosedShape};
-use super::prism::{Nearest, Prism, PrismAxis};
+use super::prism::{Nearest, Prism};
+use super::prism_axes::{FieldReach, PrismAxis};
 use super::restart::{DirectionSamples, NoRestart};
 use super::select::select;
 use super::support::Support;
@@ -43,6 +44,8 @@ pub trait FieldNarrow {
     fn half_extents<F: Num>(size: Vec3<F>, axes: &Mat3<F>) -> Vec3<F>;
     /// How far it reaches along a unit direction of its own axes, or more [m].
     fn reach<F: Num>(size: Vec3<F>, d: Vec3<F>) -> F;
+    /// A lower bound of its distance to a prism, before all that [`FieldNarrow::contacts`] computes.
+    fn gap<F: Num>(size: Vec3<F>, axes: &Mat3<F>, prism: &Prism<F>, field: &FieldReach<F>) -> F;
     /// Adds the contacts of a prism. In the pair the shape is the first one, with the field's axes; `pose_b` is that of the prism.
     fn contacts<C: Cx>(
         cx: &mut C,
@@ -125,6 +128,10 @@ impl FieldNarrow for OfSphere {
         size[0]
     }
     #[inline(always)]
+    fn gap<F: Num>(size: Vec3<F>, axes: &Mat3<F>, prism: &Prism<F>, field: &FieldReach<F>) -> F {
+        prism.gap(axes, &PointReach, size[0], field, false)
+    }
+    #[inline(always)]
     fn contacts<C: Cx>(
         cx: &mut C,
         pair: &ShapePair<'_, C>,
@@ -158,6 +165,10 @@ impl FieldNarrow for OfCapsule {
         d[2].abs().fma(size[1], size[0])
     }
     #[inline(always)]
+    fn gap<F: Num>(size: Vec3<F>, axes: &Mat3<F>, prism: &Prism<F>, field: &FieldReach<F>) -> F {
+        prism.gap(axes, &SegmentReach(size[1]), size[0], field, true)
+    }
+    #[inline(always)]
     fn contacts<C: Cx>(
         cx: &mut C,
         pair: &ShapePair<'_, C>,
@@ -173,10 +184,7 @@ impl FieldNarrow for OfCapsule {
             half: axes[2] * half_height,
         };
         // apart: ends of the axis against the prism, and the axis against edges
-        let mut near = prism.nearest_of_edges(shape.half);
-        for end in [shape.half, -shape.half] {
-            near = near.or(prism.nearest(end));
-        }
+        let near = prism.nearest_to_segment(shape.half);
         let apart = around(&near, radius);
         let mut normal = var3(cx, apart.normal);
         let mut point = var3(cx, apart.point);
@@ -222,6 +230,11 @@ impl FieldNarrow for OfBox {
     #[inline(always)]
     fn reach<F: Num>(size: Vec3<F>, d: Vec3<F>) -> F {
         BoxReach(size).reach(d)
+    }
+    #[inline(always)]
+    fn gap<F: Num>(size: Vec3<F>, axes: &Mat3<F>, prism: &Prism<F>, field: &FieldReach<F>) -> F {
+        // edges cost more than they reject
+        prism.gap(axes, &BoxReach(size), F::c(0.0), field, false)
     }
     #[inline(always)]
     fn contacts<C: Cx>(
@@ -281,6 +294,11 @@ impl FieldNarrow for OfCylinder {
     #[inline(always)]
     fn reach<F: Num>(size: Vec3<F>, d: Vec3<F>) -> F {
         CylinderReach(size[0], size[1]).reach(d)
+    }
+    #[inline(always)]
+    fn gap<F: Num>(size: Vec3<F>, axes: &Mat3<F>, prism: &Prism<F>, field: &FieldReach<F>) -> F {
+        let reach = CylinderReach(size[0], size[1]);
+        prism.gap(axes, &reach, F::c(0.0), field, true)
     }
     #[inline(always)]
     fn contacts<C: Cx>(
