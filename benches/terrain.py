@@ -1,18 +1,25 @@
 """What height fields and height scans cost: gymnasium's ant on rough ground, on a plane, and in MuJoCo C.
 
-Run it as ``python benches/terrain.py --worlds 512 --steps 1000``. One thread per side; needs gymnasium and MuJoCo. The
-sides take turns. It prints physics steps per second, and nanoseconds per world for a scan of 17 x 11 rays.
+    .venv/bin/python benches/terrain.py
+
+One thread per side; needs gymnasium and MuJoCo. The sides take turns, and a ratio is the median over rounds. Prints
+physics steps per second, and nanoseconds per world for a scan of 17 x 11 rays. Writes
+benches/results/MACHINE/terrain.csv.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
+import statistics
+import sys
 import time
 from pathlib import Path
 
 import gymnasium
 import mujoco
 import numpy as np
+from record import print_table, write_results
 
 import tightloop as tl
 from tightloop import terrain
@@ -87,22 +94,49 @@ def theirs(ground: terrain.Terrain | None, steps: int) -> tuple[float, float]:
     return steps / (time.perf_counter() - begun), contacts / steps
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+def measure(name: str, ground: terrain.Terrain | None, worlds: int, steps: int, rounds: int) -> dict[str, str]:
+    """Return a row of the results: both sides on one kind of ground."""
+    runs = [(ours(ground, worlds, steps), theirs(ground, 3 * steps)) for _ in range(rounds)]
+    median = statistics.median
+    return {
+        "ground": name,
+        "worlds": str(worlds),
+        "steps_per_s": f"{median(one[0] for one, _ in runs):.0f}",
+        "contacts": f"{median(one[2] for one, _ in runs):.2f}",
+        "faulted": str(max(one[1] for one, _ in runs)),
+        "mujoco_steps_per_s": f"{median(other[0] for _, other in runs):.0f}",
+        "mujoco_contacts": f"{median(other[1] for _, other in runs):.2f}",
+        "median_ratio": f"{median(one[0] / other[0] for one, other in runs):.2f}",
+    }
+
+
+def main() -> int:
+    """Measure, print and write the results."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--worlds", type=int, default=512)
     parser.add_argument("--steps", type=int, default=1000)
+    parser.add_argument("--rounds", type=int, default=3)
     args = parser.parse_args()
     rough = terrain.rough(amplitude=AMPLITUDE, tile=SIDE, cell=CELL)
-    for name, ground in (("plane", None), ("rough", rough)):
-        rate, faulted, contacts = ours(ground, args.worlds, args.steps)
-        other, their_contacts = theirs(ground, 3 * args.steps)
-        print(
-            f"{name}: {rate:,.0f} steps/s ({contacts:.2f} contacts, {faulted} faulted), "
-            f"MuJoCo C {other:,.0f} ({their_contacts:.2f} contacts): {rate / other:.1f} times"
-        )
-    without, with_scan = (ours(rough, args.worlds, args.steps, scan=scan)[0] for scan in (False, True))
-    print(f"scan of 187 rays: {1e9 / with_scan - 1e9 / without:,.0f} ns per world and step")
+    grounds = (("plane", None), ("rough", rough))
+    rows = [measure(name, ground, args.worlds, args.steps, args.rounds) for name, ground in grounds]
+    print_table(rows)
+    scans = []
+    for _ in range(args.rounds):
+        without, with_scan = (ours(rough, args.worlds, args.steps, scan=scan)[0] for scan in (False, True))
+        scans.append(1e9 / with_scan - 1e9 / without)
+    facts = {
+        "command": f"python benches/terrain.py --worlds {args.worlds} --steps {args.steps} --rounds {args.rounds}",
+        "cores": 1,
+        "load_1_minute": f"{os.getloadavg()[0]:.1f}",
+        "mujoco": mujoco.__version__,
+        "tightloop": tl.__version__,
+        "scan_of_187_rays": f"{statistics.median(scans):.0f} ns per world and step",
+    }
+    print(f"scan of 187 rays: {facts['scan_of_187_rays']}")
+    write_results("terrain", rows, facts)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -257,6 +257,24 @@ that end begin anew.
             "ratio_per_core_s": "ratio per CPU second",
         },
     ),
+    "terrain": Bench(
+        "Rough ground, beside MuJoCo on one thread",
+        """gymnasium's ant with random controls, on a plane and on a height field. Its cells are 25 cm wide, and its
+elevations differ by up to 15 cm. Both sides use one thread.
+
+- A shape touches each prism of a height field alone, on both sides. So rough ground has more contacts.
+- MuJoCo steps one ant. Its mean number of contacts differs with the random controls.
+""",
+        {
+            "ground": "ground",
+            "worlds": "worlds",
+            "steps_per_s": "steps/s",
+            "contacts": "contacts",
+            "mujoco_steps_per_s": "MuJoCo, steps/s",
+            "mujoco_contacts": "contacts of MuJoCo",
+            "median_ratio": "ratio",
+        },
+    ),
     "groups": Bench(
         "Two groups of worlds and a policy",
         """One environment of 4096 worlds waits for the policy. Two groups of 2048 worlds do not: one steps while NumPy
