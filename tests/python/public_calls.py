@@ -334,6 +334,11 @@ ENV_CALLS: dict[str, Call] = {
         {"site": "text", "dofs": "dofs", "pos_scale": "number", "rot_scale": "number"},
         {"site": "tip", "dofs": ["arm/fr3_joint1"], "pos_scale": 1.0},
     ),
+    "ActuatorTarget": Call(
+        lambda _: env.ActuatorTarget,
+        {"start": "actuators", "scale": "per dof", "limit": "positive"},
+        {"start": [0.0], "scale": 1.0},
+    ),
     "ActuatorControl": Call(
         lambda _: env.ActuatorControl, {"ranges": "action ranges", "clips": "flag"}, {"ranges": [(-1.0, 1.0)]}
     ),

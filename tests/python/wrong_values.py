@@ -235,6 +235,7 @@ KINDS |= {
     "single seed": (-1, 1.5, "abc", True, NAN, THING, [1]),
     "action": ("abc", np.zeros(2), np.zeros((1, 1)), [None], THING, np.zeros(1, complex)),
     "per dof": ("abc", [1.0, 2.0, 3.0], THING, NAN, [NAN], 1j, None),
+    "actuators": ("abc", 1.0, [[1.0]], THING, [NAN], [], 1j, None),
     "action ranges": ("abc", [1.0], [(1.0, -1.0)], [(NAN, 1.0)], [(1.0,), (1.0, 2.0)], THING, 1j, None),
     "elapsed": ("abc", np.zeros(3, int), THING, [1.5, 0.5], None),
 }

@@ -12,7 +12,15 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
-from tightloop.env.controls import ActuatorControl, EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
+from tightloop.env.controls import (
+    ActuatorControl,
+    ActuatorTarget,
+    EndEffectorDelta,
+    Gripper,
+    JointDelta,
+    JointTarget,
+    JointTorque,
+)
 from tightloop.env.disturbances import Push
 from tightloop.env.groups import make_groups
 from tightloop.env.metadata import policy_metadata
@@ -25,6 +33,7 @@ from tightloop.env.vector import VectorEnv
 
 __all__ = [
     "ActuatorControl",
+    "ActuatorTarget",
     "AutoresetMode",
     "EndEffectorDelta",
     "Env",

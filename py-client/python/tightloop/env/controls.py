@@ -214,6 +214,58 @@ class ActuatorControl:
         np.copyto(self._array, action)
 
 
+class ActuatorTarget:
+    """Controls of the actuators of the scene's MuJoCo models, ``ctrl = start + scale * action``.
+
+    The simulation clamps them to each actuator's ``ctrlrange``.
+    """
+
+    fields: tuple[str, ...] = ()
+
+    @checked_calls
+    def __init__(self, start: ArrayLike, scale: ArrayLike, *, limit: float = 1.0) -> None:
+        """Make a target control of all actuators of the scene.
+
+        Args:
+            start: Control of each actuator at an action of 0, shape ``(actuators,)``.
+            scale: Effect of an action of 1, for all actuators or for each.
+            limit: Largest absolute action value.
+        """
+        self._start = _finite("ActuatorTarget: start", start, None)
+        self.size = len(self._start)
+        self._scale = _finite("ActuatorTarget: scale", scale, self.size)
+        self.scales, self.offsets = self._scale, self._start
+        self.limit = checks.number("ActuatorTarget: limit", limit, above=0.0, error=ArgumentError)
+
+    def bind(self, names: Names, commands: Commands) -> None:
+        """Check the number of actuators."""
+        if len(names.actuator_names) != self.size:
+            there = len(names.actuator_names)
+            raise ArgumentError(
+                f"ActuatorTarget: start has {self.size} values for {there} actuators; give one for each"
+            )
+        self._array = commands.array("ctrl", range(self.size))
+        self.value_names = names.actuator_names
+
+    def apply(self, action: NDArray[np.float32], frame: Any) -> None:
+        """Write the controls."""
+        np.multiply(action, self._scale, out=self._array)
+        self._array += self._start
+
+
+def _finite(what: str, given: ArrayLike, size: int | None) -> NDArray[np.float32]:
+    """Numbers of all actuators; a single one is for all, if ``size`` says of how many."""
+    try:
+        values = np.asarray(given, np.float32)
+        values = values if size is None else np.broadcast_to(values, (size,))
+    except (TypeError, ValueError):
+        values = np.empty(0, np.float32)
+    if values.ndim != 1 or not len(values) or not np.isfinite(values).all():
+        expected = "one for each actuator" if size is None else f"one, or {size} of them"
+        raise ArgumentError(f"{what} is {given!r:.80}; give finite numbers, {expected}")
+    return np.ascontiguousarray(values)
+
+
 class Gripper(_Joints):
     """One action value for all fingers: their target is ``low`` at -1, ``high`` at 1, and linear in between."""
 

@@ -189,7 +189,7 @@ class Task:
         for name in vars(cls).keys() & _FOREIGN.keys():
             advice.warn(f"task {cls.__name__}: nothing uses its `{name}`; a Task has `{_FOREIGN[name]}`")
 
-    fields: ClassVar[Sequence[str]] = ("joint_q", "joint_qd")
+    fields: Sequence[str] = ("joint_q", "joint_qd")
     max_episode_steps: int = 500
     goal_draws: ClassVar[int] = 0
     goal_steps: ClassVar[int | None] = None
@@ -198,7 +198,7 @@ class Task:
     dtype: ClassVar[type[np.floating[Any]]] = np.float32
     goal_radius: ClassVar[float | None] = None
     reward_weights: Mapping[str, float] = {}
-    initial_draws: ClassVar[int] = 0
+    initial_draws: int = 0
     first_levels: int = 1
 
     def scene(self) -> Scene:

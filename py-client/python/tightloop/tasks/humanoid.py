@@ -23,6 +23,7 @@ velocity from the command in the plane [m/s], a mean over about a second.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -30,8 +31,11 @@ from tightloop.assets import HUMANOID
 from tightloop.env.names import Names
 from tightloop.env.task import Array, Namespace, Worlds
 from tightloop.tasks.geometry import squares
-from tightloop.tasks.legged import LeggedRobot
-from tightloop.tasks.velocity import CONTROL_DT, VelocityTask
+from tightloop.tasks.legged import ByJoint, LeggedRobot, RobotOptions
+from tightloop.tasks.velocity import CONTROL_DT, VelocityTask, columns
+
+if TYPE_CHECKING:
+    from tightloop.scene_mujoco import Model
 
 SIDES = ("left", "right")
 LEG = {"hip_pitch": -0.3, "hip_roll": 0.0, "hip_yaw": 0.0, "knee": 0.6, "ankle_pitch": -0.3, "ankle_roll": 0.0}
@@ -73,6 +77,8 @@ ROBOT = LeggedRobot(
     joints=tuple(POSE),
     standing=tuple(POSE.values()),
     height=0.75,
+    hip_height=0.67,
+    mass=35.2,
     feet={side: (f"{side}_foot", (0.035, 0.0, -0.04)) for side in SIDES},
     radius=0.0,
     groups=(0, 1),
@@ -86,13 +92,25 @@ ROBOT = LeggedRobot(
     damping={".*_hip_.*": 3.0, ".*_knee": 4.0, ".*_ankle_.*": 2.0, "waist_.*": 4.0, ".*_(shoulder_.*|elbow)": 1.5},
     armature={".*_(hip|knee|ankle).*|waist_.*": 0.02, ".*_(shoulder_.*|elbow)": 0.01},
     scale=tuple(_scale(joint) for joint in POSE),
+    quiet=tuple(joint for joint in POSE if not joint.endswith(AHEAD)),
     flip=_flip(list(POSE)),
 )
 
 
 class HumanoidVelocityFlat(VelocityTask):
-    """Follow velocity commands with a humanoid. ``pushes`` is the largest push of the pelvis [N·s]; 0 for none."""
+    """Follow velocity commands with a humanoid.
 
+    Args:
+        pushes: Largest push of the pelvis [N·s], 0 for none; if left out, one of 10 N·s for 35 kg.
+        model: URDF or MJCF of another humanoid: a path, or a model of the package ``mujoco``.
+        standing: Positions of its joints when it stands [rad], by name or pattern; found in the model if left out.
+        stiffness: Gains of the drives [N·m/rad], for all joints or by name or pattern; likewise.
+        damping: Likewise [N·m·s/rad].
+        scale: Effect of an action of 1 on the targets [rad], likewise; those of the own robot's legs and
+            other joints if left out.
+    """
+
+    legs = 2
     robot = ROBOT
     gait, swing, lowest = 1.4, 0.08, 0.45
     command_max = (1.0, 0.4, 1.0)
@@ -110,18 +128,26 @@ class HumanoidVelocityFlat(VelocityTask):
         "fall": -1.0,
     }
 
-    def __init__(self, pushes: float = 10.0) -> None:
-        self.pushes = pushes
+    def __init__(
+        self,
+        pushes: float | None = None,
+        *,
+        model: Model | None = None,
+        standing: Mapping[str, float] | None = None,
+        stiffness: ByJoint | None = None,
+        damping: ByJoint | None = None,
+        scale: ByJoint | None = None,
+    ) -> None:
+        super().__init__(pushes, 10.0, model, RobotOptions(standing, stiffness, damping, scale))
 
     def bind(self, names: Names) -> None:
         """Look up the joints and feet."""
         super().bind(names)
-        # a leg's way ahead is in its pitch joints; all others should stay where they are
-        quiet = [joint for joint in ROBOT.joints if not joint.endswith(AHEAD)]
-        self._quiet = [names.coord(f"{ROBOT.name}/{joint}") for joint in quiet]
-        self._quiet_standing = np.array([POSE[joint] for joint in quiet], np.float32)
+        robot, pose = self.robot, dict(zip(self.robot.joints, self.robot.standing, strict=True))
+        self._quiet = [names.coord(f"{robot.name}/{joint}") for joint in robot.quiet]
+        self._quiet_standing = np.array([pose[joint] for joint in robot.quiet], np.float32)
 
     def reward_terms(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
         """Return the terms, before their weights."""
-        off = worlds.joint_q[:, self._quiet] - xp.asarray(self._quiet_standing)
+        off = columns(xp, worlds.joint_q, self._quiet) - xp.asarray(self._quiet_standing)
         return {**super().reward_terms(xp, worlds), "upper body": squares(xp, off)}

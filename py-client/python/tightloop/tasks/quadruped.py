@@ -23,10 +23,14 @@ velocity from the command in the plane [m/s], a mean over about a second.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from tightloop.assets import QUADRUPED
-from tightloop.tasks.legged import LeggedRobot
+from tightloop.tasks.legged import ByJoint, LeggedRobot, RobotOptions
 from tightloop.tasks.velocity import CONTROL_DT, VelocityTask
+
+if TYPE_CHECKING:
+    from tightloop.scene_mujoco import Model
 
 LEGS = ("FL", "FR", "RL", "RR")
 ROBOT = LeggedRobot(
@@ -36,6 +40,8 @@ ROBOT = LeggedRobot(
     joints=tuple(f"{leg}_{joint}" for leg in LEGS for joint in ("hip", "thigh", "calf")),
     standing=(0.0, 0.8, -1.6) * 4,
     height=0.32,
+    hip_height=0.32,
+    mass=14.68,
     feet={leg: (f"{leg}_foot", (0.0, 0.0, 0.0)) for leg in LEGS},
     radius=0.02,
     groups=(0, 1, 1, 0),  # a trot: diagonal feet swing together
@@ -46,8 +52,18 @@ ROBOT = LeggedRobot(
 
 
 class QuadrupedVelocityFlat(VelocityTask):
-    """Follow velocity commands. ``pushes`` is the largest push of the trunk [N·s]; 0 for none."""
+    """Follow velocity commands.
 
+    Args:
+        pushes: Largest push of the trunk [N·s], 0 for none; if left out, one of 4 N·s for 14.7 kg.
+        model: URDF or MJCF of another quadruped: a path, or a model of the package ``mujoco``.
+        standing: Positions of its joints when it stands [rad], by name or pattern; found in the model if left out.
+        stiffness: Gains of the drives [N·m/rad], for all joints or by name or pattern; likewise.
+        damping: Likewise [N·m·s/rad].
+        scale: Effect of an action of 1 on the targets [rad], likewise; 0.3 if left out.
+    """
+
+    legs = 4
     robot = ROBOT
     reward_weights: Mapping[str, float] = {
         "follow velocity": 1.5 * CONTROL_DT,
@@ -62,5 +78,14 @@ class QuadrupedVelocityFlat(VelocityTask):
         "fall": -1.0,
     }
 
-    def __init__(self, pushes: float = 4.0) -> None:
-        self.pushes = pushes
+    def __init__(
+        self,
+        pushes: float | None = None,
+        *,
+        model: Model | None = None,
+        standing: Mapping[str, float] | None = None,
+        stiffness: ByJoint | None = None,
+        damping: ByJoint | None = None,
+        scale: ByJoint | None = None,
+    ) -> None:
+        super().__init__(pushes, 4.0, model, RobotOptions(standing, stiffness, damping, scale))

@@ -18,6 +18,7 @@ of each world's episode, ``level``, and the most distance from its start, ``fart
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,14 +29,19 @@ from tightloop.env.names import Names
 from tightloop.env.task import Array, Namespace, Observed, Worlds
 from tightloop.errors import ArgumentError
 from tightloop.tasks.geometry import squares
+from tightloop.tasks.legged import ByJoint
 from tightloop.tasks.quadruped import QuadrupedVelocityFlat
 from tightloop.tasks.velocity import CONTROL_DT, STILL
+
+if TYPE_CHECKING:
+    from tightloop.scene_mujoco import Model
 
 KINDS = ("rough", "slopes", "slopes", "stairs", "stairs", "steps")
 #: The size of the hardest level of each kind; see `tightloop.terrain`.
 HARDEST = {"flat": 0.0, "rough": 0.08, "slopes": 0.5, "stairs": 0.15, "steps": 0.15, "stones": 0.3}
 LEVELS = 10
 TILE, CELL, BORDER = 8.0, 0.05, 6.0  # [m]
+PLACE_DRAWS = 3
 RAYS, SPACING = (13, 7), 0.1  # [–, m]
 AROUND = 0.5  # robots start this far about the middle of a tile, at most [m]
 STRAIGHT = 0.6  # share of the commands without a turn
@@ -46,16 +52,21 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
     """Follow velocity commands on rough ground.
 
     Args:
-        pushes: Largest push of the trunk [N·s]; 0 for none.
+        pushes: As of `QuadrupedVelocityFlat`.
         kinds: Kinds of ground, of `tightloop.terrain.KINDS`.
         level: Level of all episodes; None for levels that follow what each robot can do.
         first_levels: Number of levels, from the easiest, that the first episodes are spread over.
+        model: As of `QuadrupedVelocityFlat`, with those below.
+        standing: Positions of joints when it stands.
+        stiffness: Gains of the drives.
+        damping: Likewise.
+        scale: Effect of an action of 1.
     """
 
     fields = (*QuadrupedVelocityFlat.fields, "height_scan")
     goal_draws = 5
     goal_steps = 500
-    initial_draws = 3
+    initial_draws = PLACE_DRAWS
     swing = 0.1
     reward_weights: Mapping[str, float] = {
         **QuadrupedVelocityFlat.reward_weights,
@@ -65,9 +76,22 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
     }
 
     def __init__(
-        self, pushes: float = 4.0, kinds: Sequence[str] = KINDS, level: int | None = None, first_levels: int = 3
+        self,
+        pushes: float | None = None,
+        kinds: Sequence[str] = KINDS,
+        level: int | None = None,
+        first_levels: int = 3,
+        *,
+        model: Model | None = None,
+        standing: Mapping[str, float] | None = None,
+        stiffness: ByJoint | None = None,
+        damping: ByJoint | None = None,
+        scale: ByJoint | None = None,
     ) -> None:
-        super().__init__(pushes)
+        super().__init__(pushes, model=model, standing=standing, stiffness=stiffness, damping=damping, scale=scale)
+        self.fields = (*self.fields, "height_scan")
+        # a place on a tile, before what the robot draws
+        self.initial_draws += PLACE_DRAWS
         self._ground = terrain.mixed(kinds, levels=LEVELS, tile=TILE, cell=CELL, border=BORDER, hardest=HARDEST)
         self._level = None if level is None else checks.integer("level", level, least=0, error=ArgumentError)
         if self._level is not None and self._level >= LEVELS:
@@ -112,7 +136,8 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
         """Return places near the middle of a tile of the world's level."""
         kind = (draws[:, 2] * len(self._ground.kinds)).astype(int)
         level = self._levels(np, worlds)
-        joint_q = np.array(worlds.joint_q)
+        start = super().initial_state(xp, worlds, draws[:, PLACE_DRAWS:])
+        joint_q = np.array(start["joint_q"] if start else worlds.joint_q)
         joint_q[:, :2] = self._ground.starts[level, kind, :2] + AROUND * (2.0 * draws[:, :2] - 1.0)
         joint_q[:, 2] += self._ground.starts[level, kind, 2]
         return {"joint_q": joint_q}

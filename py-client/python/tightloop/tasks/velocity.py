@@ -8,18 +8,22 @@ Rewards and rates follow legged_gym (Rudin et al. 2022, arXiv 2109.11978).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 import tightloop as tl
-from tightloop.env.controls import Control, JointTarget
+from tightloop.env.controls import Control
 from tightloop.env.disturbances import Push
 from tightloop.env.mirror import Flip, Mirror
 from tightloop.env.names import Names
 from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
 from tightloop.tasks.geometry import squares
 from tightloop.tasks.kinematics import projected_gravity, rotate_inverse
-from tightloop.tasks.legged import LeggedRobot
+from tightloop.tasks.legged import LeggedRobot, RobotOptions
+
+if TYPE_CHECKING:
+    from tightloop.scene_mujoco import Model
 
 LIMIT = 4.0  # of actions
 DT, SUBSTEPS = 1 / 200, 4  # [s, –]
@@ -36,6 +40,7 @@ class VelocityTask(Task):
     Attributes:
         robot: The robot.
         pushes: Largest push of its base [N·s]; 0 for none.
+        legs: Number of legs of the robots that the task takes.
         gait: Steps of a leg per second [Hz].
         swing: Height of a foot in the middle of its swing [m].
         command_max: Greatest command ahead, to the left [m/s], and turning [rad/s].
@@ -46,6 +51,7 @@ class VelocityTask(Task):
     max_episode_steps = 1000
     goal_draws = 4
     goal_steps = 250
+    legs: int
     robot: LeggedRobot
     pushes: float = 0.0
     gait: float = 2.5
@@ -53,13 +59,45 @@ class VelocityTask(Task):
     command_max: tuple[float, float, float] = (1.0, 0.6, 1.0)
     lowest: float = 0.15
 
+    def __init__(self, pushes: float | None, push: float, model: Model | None, options: RobotOptions) -> None:
+        """Choose the robot.
+
+        Args:
+            pushes: Largest push of the base [N·s]; None for one in proportion to its mass.
+            push: That of the task's own robot [N·s].
+            model: URDF or MJCF of a robot; None for the task's own.
+            options: What replaces what is found in the model.
+
+        Raises:
+            ArgumentError: The robot has another number of legs, or an option does not fit it.
+            SceneError: The file is no robot that can be simulated.
+        """
+        own = self.robot
+        if model is not None or options.are_given:
+            # the import needs what reads models
+            from tightloop.tasks.legged_models.read import read
+
+            self.robot = read(
+                type(self).__name__,
+                own.file if model is None else model,
+                own=own,
+                count=self.legs,
+                options=options,
+                dt=DT,
+            )
+            size = self.robot.hip_height / own.hip_height
+            self.lowest = self.robot.height - (own.height - self.lowest) * size
+            self.swing *= size
+        self.pushes = push * (self.robot.mass / own.mass) if pushes is None else pushes
+        self.fields = ("joint_q", "joint_qd", self.robot.torque_field, self.robot.site_field)
+        self.initial_draws = self.robot.start_draws
+
     def scene(self) -> tl.Scene:
         """The robot on the ground. Each world starts in another direction, with its joints a little off."""
         scene = tl.Scene(dt=DT, substeps=SUBSTEPS)
         scene.solver(cone="pyramidal", impratio=1.0)  # MuJoCo's defaults, which feet need no more than
         self.add_ground(scene)
-        name = self.robot.add_to(scene).name
-        scene.randomize(joint_q={name: tl.Uniform(-0.1, 0.1)}, body_q={name: {"yaw": tl.Uniform(-np.pi, np.pi)}})
+        self.robot.add_to(scene)
         return scene
 
     def add_ground(self, scene: tl.Scene) -> None:
@@ -68,7 +106,7 @@ class VelocityTask(Task):
 
     def controls(self) -> Sequence[Control]:
         """Joint targets."""
-        return [JointTarget(self.robot.dofs, self.robot.scale, limit=LIMIT)]
+        return [self.robot.control(LIMIT)]
 
     def disturbances(self) -> Sequence[Push]:
         """Pushes of the base."""
@@ -92,8 +130,14 @@ class VelocityTask(Task):
         """Look up the joints and feet."""
         self._joints = _places([names.coord(name) for name in self.robot.dofs])
         self._dofs = _places([names.dof(name) for name in self.robot.dofs])
-        self._feet = _places([names.site(name) for name in self.robot.feet])
+        self._feet = _places(self.robot.sites(names))
+        self._sites, self._torques = self.robot.site_field, self.robot.torque_field
         self._standing = np.array(self.robot.standing, np.float32)
+
+    def initial_state(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
+        """Return random starts of a robot that the scene does not place."""
+        joint_q = self.robot.start(draws)
+        return {} if joint_q is None else {"joint_q": joint_q}
 
     def goal(self, xp: Namespace, worlds: Worlds, draws: Array) -> Array:
         """Return the next command: ahead, left, turn; or to stand."""
@@ -103,7 +147,7 @@ class VelocityTask(Task):
 
     def foot_heights(self, xp: Namespace, worlds: Worlds) -> Array:
         """Return how high the soles are above the ground [m], shape ``(worlds, feet)``."""
-        return worlds.site_q[:, self._feet, 2] - self.robot.radius
+        return getattr(worlds, self._sites)[:, self._feet, 2] - self.robot.radius
 
     def base_height(self, xp: Namespace, worlds: Worlds) -> Array:
         """Return how high the base is above the ground [m], shape ``(worlds,)``."""
@@ -136,8 +180,8 @@ class VelocityTask(Task):
     def observe(self, xp: Namespace, worlds: Worlds) -> Sequence[Array]:
         """Return the parts of the table of the module."""
         own = worlds.memory
-        turned = worlds.joint_q[:, self._joints] - xp.asarray(self._standing)
-        moving = worlds.joint_qd[:, self._dofs]
+        turned = columns(xp, worlds.joint_q, self._joints) - xp.asarray(self._standing)
+        moving = columns(xp, worlds.joint_qd, self._dofs)
         return own["velocity"], own["turning"], own["gravity"], worlds.goal, turned, moving, worlds.action, own["clock"]
 
     def reward_terms(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
@@ -151,10 +195,10 @@ class VelocityTask(Task):
             "bounce": velocity[:, 2] * velocity[:, 2],
             "roll and pitch rate": squares(xp, turning[:, :2]),
             "tilt": squares(xp, gravity[:, :2]),
-            "torque": squares(xp, worlds.joint_torque[:, self._dofs]),
+            "torque": squares(xp, columns(xp, getattr(worlds, self._torques), self._dofs)),
             "action rate": squares(xp, worlds.action - worlds.previous_action),
             "gait": xp.exp(-200.0 * own["feet"]),
-            "pose": squares(xp, worlds.joint_q[:, self._joints] - xp.asarray(self._standing)),
+            "pose": squares(xp, columns(xp, worlds.joint_q, self._joints) - xp.asarray(self._standing)),
             "fall": 1.0 * self.terminated(xp, worlds),
         }
 
@@ -184,6 +228,14 @@ class VelocityTask(Task):
             },
             joints,
         )
+
+
+def columns(xp: Namespace, array: Array, places: slice | list[int]) -> Array:
+    """Return columns of an array, shape ``(worlds, columns)``, with the values of a world side by side."""
+    if isinstance(places, slice):
+        return array[:, places]
+    # an index by a list may put the worlds side by side; sums of rows would then round by their number
+    return xp.take(array, xp.asarray(np.array(places)), axis=1)
 
 
 def _places(places: list[int]) -> slice | list[int]:

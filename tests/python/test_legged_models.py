@@ -1,0 +1,162 @@
+"""Robots of any make in the velocity tasks: what is found in a file, that it stands, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import mujoco
+import numpy as np
+import pytest
+
+import tightloop as tl
+from tightloop.assets import CARTPOLE, FR3, HUMANOID, QUADRUPED
+from tightloop.env import VectorEnv
+from tightloop.tasks.humanoid import HumanoidVelocityFlat
+from tightloop.tasks.quadruped import ROBOT, QuadrupedVelocityFlat
+from tightloop.tasks.quadruped_rough import QuadrupedVelocityRough
+
+ANT = Path(gymnasium.__file__).parent / "envs/mujoco/assets/ant.xml"
+FEET = ("FL_foot", "FR_foot", "RL_foot", "RR_foot")
+
+
+def spec() -> Any:
+    """The quadruped as MuJoCo reads its URDF: fixed links are merged, and its base is fixed to the world."""
+    text = QUADRUPED.read_text()
+    head = text.index(">", text.index("<robot")) + 1
+    keep = '<mujoco><compiler fusestatic="false" discardvisual="true"/></mujoco>'
+    return mujoco.MjSpec.from_string(text[:head] + keep + text[head:])
+
+
+def file_of(tmp_path: Path) -> Path:
+    """The same as MJCF, in a scene with a floor, a ball, motors and a keyframe."""
+    own = spec()
+    own.compile()
+    own.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1))
+    own.worldbody.first_body().add_freejoint()
+    ball = own.worldbody.add_body(name="ball", pos=(2, 0, 1))
+    ball.add_freejoint()
+    ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=(0.1, 0, 0))
+    for joint in ROBOT.joints:
+        motor = own.add_actuator(name=f"{joint}_motor", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint)
+        motor.forcelimited, motor.forcerange = True, (-20.0, 20.0)
+    pose = [0, 0, 0.3, 1, 0, 0, 0, *[0.0, 0.7, -1.4] * 4, 2, 0, 1, 1, 0, 0, 0]
+    own.add_key(name="home", qpos=pose)
+    path = tmp_path / "dog.xml"
+    path.write_text(own.to_xml())
+    return path
+
+
+@pytest.fixture(params=["URDF", "MJCF", "MjSpec", "MjModel", "ant"])
+def model(request: pytest.FixtureRequest, tmp_path: Path) -> Any:
+    given = {
+        "URDF": lambda: QUADRUPED,
+        "MJCF": lambda: file_of(tmp_path),
+        "MjSpec": spec,
+        "MjModel": lambda: spec().compile(),
+        "ant": lambda: str(ANT),
+    }
+    return given[request.param]()
+
+
+@pytest.mark.parametrize("task", ["QuadrupedVelocityFlat", "QuadrupedVelocityRough"])
+def test_a_quadruped_of_any_make_stands(task: str, model: Any, envs: Any) -> None:
+    env = envs(task, 4, model=model, pushes=0.0, **({"level": 0, "kinds": ["flat"]} if "Rough" in task else {}))
+    obs, _ = env.reset(seed=0)
+    own = env.task
+    for step in range(300):
+        obs, reward, terminated, truncated, _ = env.step(np.zeros(env.action_space.shape))
+        assert not (terminated | truncated).any(), f"{0.02 * step:.2f} s"
+        assert np.isfinite(obs).all() and np.isfinite(reward).all()
+        if step > 50:
+            feet = own.foot_heights(np, env.evaluation.worlds)
+            assert np.abs(feet).max() < 0.03 * own.robot.hip_height + 0.01
+    np.testing.assert_allclose(own.base_height(np, env.evaluation.worlds), own.robot.height, rtol=0.1)
+    size = len(own.robot.joints)
+    assert np.abs(obs[:, 12 : 12 + size]).max() < 0.15, "it stands in its pose"
+
+
+def test_its_own_robot_is_found_as_it_is_declared() -> None:
+    robot = QuadrupedVelocityFlat(model=QUADRUPED).robot
+    assert robot.joints == ROBOT.joints and robot.flip is not None and ROBOT.flip is not None
+    assert [link for link, _ in robot.feet.values()] == [*FEET]
+    np.testing.assert_allclose(robot.standing, ROBOT.standing, atol=0.1)
+    np.testing.assert_allclose((robot.height, robot.radius, robot.mass), (0.32, 0.02, 14.68), atol=0.02)
+    np.testing.assert_array_equal(robot.flip[0], ROBOT.flip[0])
+    np.testing.assert_array_equal(robot.flip[1], ROBOT.flip[1])
+    assert isinstance(robot.stiffness, dict) and isinstance(robot.damping, dict)
+    np.testing.assert_allclose([*robot.stiffness.values()], 40.0, rtol=0.15)
+    np.testing.assert_allclose([*robot.damping.values()], 1.0, rtol=0.15)
+
+
+def test_the_humanoid_is_found_as_it_is_declared() -> None:
+    declared, robot = HumanoidVelocityFlat().robot, HumanoidVelocityFlat(model=HUMANOID).robot
+    assert robot.joints == declared.joints and robot.quiet == declared.quiet and robot.flip is not None
+    assert [link for link, _ in robot.feet.values()] == ["left_foot", "right_foot"]
+    np.testing.assert_allclose(robot.standing[:12], declared.standing[:12], atol=0.1)
+    np.testing.assert_allclose((robot.height, robot.mass), (declared.height, declared.mass), atol=0.03)
+    stiffness: Any = robot.stiffness
+    for joint, own in {"left_hip_roll": 100.0, "right_knee": 150.0, "waist_yaw": 120.0, "left_elbow": 40.0}.items():
+        np.testing.assert_allclose(stiffness[joint], own, rtol=0.15)
+
+
+def test_a_model_of_mujoco_is_the_robot_alone(tmp_path: Path) -> None:
+    """The floor, the ball, the motors and what the keyframe says of the ball are gone; its pose stays."""
+    robot: Any = QuadrupedVelocityFlat(model=file_of(tmp_path)).robot
+    assert robot.standing == pytest.approx((0.0, 0.7, -1.4) * 4)
+    assert [robot.model.joint(place).name for place in range(1, robot.model.njnt)] == [*ROBOT.joints]
+    assert robot.model.nu == 12
+    np.testing.assert_allclose(robot.model.actuator_forcerange[:, 1], 20.0)
+    # an MjModel of the same makes the same robot
+    rebuilt: Any = QuadrupedVelocityFlat(model=spec().compile()).robot
+    direct: Any = QuadrupedVelocityFlat(model=spec()).robot
+    np.testing.assert_allclose(rebuilt.standing, direct.standing, atol=1e-6)
+    np.testing.assert_allclose(rebuilt.model.body_inertia, direct.model.body_inertia, rtol=1e-9)
+
+
+def test_options_replace_what_is_found() -> None:
+    task = QuadrupedVelocityFlat(
+        model=QUADRUPED,
+        standing={".*_thigh": 0.6, ".*_calf": -1.2, "FL_thigh": 0.65},
+        stiffness=55.0,
+        damping={".*_calf": 2.0},
+        scale={".*_hip": 0.1},
+    )
+    pose = dict(zip(task.robot.joints, task.robot.standing, strict=True))
+    assert (pose["FL_thigh"], pose["FR_thigh"], pose["RR_calf"]) == (0.65, 0.6, -1.2)
+    stiffness, damping, scale = (getattr(task.robot, name) for name in ("stiffness", "damping", "scale"))
+    assert set(stiffness.values()) == {55.0} and scale[:3] == (0.1, 0.3, 0.3)
+    assert damping["RL_calf"] == 2.0 and damping["RL_hip"] != 2.0
+    assert task.robot.flip is None, "the left thigh is not the right one's mirror image"
+    # without a model they change the task's own robot
+    assert QuadrupedVelocityFlat(stiffness=55.0).robot.stiffness == stiffness
+    assert QuadrupedVelocityRough().robot is ROBOT
+
+
+@pytest.mark.parametrize(
+    ("task", "options", "said"),
+    [
+        (QuadrupedVelocityFlat, {"model": FR3}, r"fr3_franka_hand\.urdf has .*give a quadruped"),
+        (QuadrupedVelocityFlat, {"model": CARTPOLE}, r"cartpole\.urdf:4: .*add <inertial>"),
+        (QuadrupedVelocityFlat, {"model": HUMANOID}, r"2 chains .*give a quadruped.*HumanoidVelocityFlat"),
+        (HumanoidVelocityFlat, {"model": QUADRUPED}, r"4 chains .*give a humanoid.*QuadrupedVelocityFlat"),
+        (QuadrupedVelocityFlat, {"model": "no/dog.urdf"}, r"dog\.urdf does not exist; give the path"),
+        (QuadrupedVelocityFlat, {"model": QUADRUPED.parent}, r"is a folder; give the path"),
+        (QuadrupedVelocityFlat, {"model": Path(__file__)}, r"test_legged_models\.py is neither.*give the path"),
+        (QuadrupedVelocityFlat, {"model": 3}, r"model is int; give the path"),
+        (QuadrupedVelocityFlat, {"standing": {"FL_knee": 1.0}}, r"standing has 'FL_knee', which no joint matches"),
+        (QuadrupedVelocityFlat, {"standing": 1.0}, r"standing is 1\.0; give a dict"),
+        (QuadrupedVelocityFlat, {"stiffness": -1.0}, r"stiffness is -1; it must be at least 0"),
+        (HumanoidVelocityFlat, {"damping": {"left_knee": "soft"}}, r"damping of 'left_knee' is 'soft'; give a number"),
+    ],
+)
+def test_what_no_robot_of_the_task_is_is_refused(task: Any, options: dict[str, Any], said: str) -> None:
+    with pytest.raises((tl.ArgumentError, tl.SceneError), match=said):
+        task(**options)
+
+
+def test_an_environment_takes_a_model_by_name(envs: Any) -> None:
+    assert envs("QuadrupedVelocityFlat", 2, model=str(ANT)).single_action_space.shape == (8,)
+    with pytest.raises(tl.SignatureError, match="model"):
+        VectorEnv("QuadrupedVelocityFlat", 2, modell=str(ANT))
