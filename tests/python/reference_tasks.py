@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.env import Worlds
+from tightloop.env import Task, Worlds
 
 #: Arrays of one world, by name.
 World = Mapping[str, NDArray[np.float64]]
@@ -89,35 +89,90 @@ def lift(world: World) -> Told:
     return Told([*(q[:9] - start), *qd[:9], *cube, *goal, *world["action"]], reward, success=error < 0.025)
 
 
-def quadruped(world: World) -> Told:
+def walking(
+    world: World, *, standing: Vector, soles: Vector, pairs: Sequence[int], swing: float, height: float, lowest: float
+) -> tuple[list[float], dict[str, float], bool]:
+    """Observation, terms of the reward and fall that the velocity tasks have in common; heights over the ground."""
     q, qd, action, command, phase = (world[name] for name in ("joint_q", "joint_qd", "action", "goal", "phase"))
-    x, y, z, w = q[3:7]
-    axes = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
-        [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
-        [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
-    ]
+    axes = axes_of(q[3:7])
     velocity, turning = ([dot(axis, part) for axis in axes] for part in (qd[:3], qd[3:6]))
     gravity = [-axis[2] for axis in axes]
-    turned = q[7:] - np.array([0.0, 0.8, -1.6] * 4)
-    lift = [0.07 * max(0.0, math.sin(phase)), 0.07 * max(0.0, -math.sin(phase))]
-    feet = [site[2] - 0.02 - lift[pair] for site, pair in zip(world["site_q"], (0, 1, 1, 0), strict=True)]
-    fell = gravity[2] > -0.5 or q[2] < 0.15
-    terms = (
-        (1.5, math.exp(-4 * math.dist(command[:2], velocity[:2]) ** 2)),
-        (0.75, math.exp(-4 * (command[2] - turning[2]) ** 2)),
-        (-1.0, velocity[2] ** 2),
-        (-0.05, dot(turning[:2], turning[:2])),
-        (-2.5, dot(gravity[:2], gravity[:2])),
-        (-2e-4, dot(world["joint_torque"][6:], world["joint_torque"][6:])),
-        (-0.01, math.dist(action, world["previous_action"]) ** 2),
-        (1.0, math.exp(-200 * dot(feet, feet))),
-        (-0.1, dot(turned, turned)),
-        (-50.0, float(fell)),
-    )
+    turned = q[7:] - standing
+    lift = [swing * max(0.0, math.sin(phase)), swing * max(0.0, -math.sin(phase))]
+    feet = [sole - lift[pair] for sole, pair in zip(soles, pairs, strict=True)]
+    fell = gravity[2] > -0.5 or height < lowest
+    terms = {
+        "velocity": math.exp(-4 * math.dist(command[:2], velocity[:2]) ** 2),
+        "turn": math.exp(-4 * (command[2] - turning[2]) ** 2),
+        "bounce": velocity[2] ** 2,
+        "rate": dot(turning[:2], turning[:2]),
+        "tilt": dot(gravity[:2], gravity[:2]),
+        "torque": dot(world["joint_torque"][6:], world["joint_torque"][6:]),
+        "action": math.dist(action, world["previous_action"]) ** 2,
+        "gait": math.exp(-200 * dot(feet, feet)),
+        "pose": dot(turned, turned),
+        "fall": float(fell),
+    }
     clock = [math.sin(phase), math.cos(phase)]
-    obs = [*velocity, *turning, *gravity, *command, *turned, *qd[6:], *action, *clock]
-    return Told(obs, 0.02 * sum(weight * term for weight, term in terms), terminated=fell)
+    return [*velocity, *turning, *gravity, *command, *turned, *qd[6:], *action, *clock], terms, fell
+
+
+def weighed(terms: Mapping[str, float], **weights: float) -> float:
+    """A step's reward, from terms and what they are worth in a second."""
+    return 0.02 * sum(weight * terms[name] for name, weight in weights.items())
+
+
+TROT = {"standing": [0.0, 0.8, -1.6] * 4, "pairs": (0, 1, 1, 0), "lowest": 0.15}
+
+
+def quadruped(world: World) -> Told:
+    soles = [site[2] - 0.02 for site in world["site_q"]]
+    obs, terms, fell = walking(world, soles=soles, swing=0.07, height=world["joint_q"][2], **TROT)
+    reward = weighed(
+        terms, velocity=1.5, turn=0.75, bounce=-1.0, rate=-0.05, tilt=-2.5, torque=-2e-4, action=-0.01, gait=1.0,
+        pose=-0.1, fall=-50.0,
+    )  # fmt: skip
+    return Told(obs, reward, terminated=fell)
+
+
+def quadruped_rough(world: World) -> Told:
+    """As on flat ground, with heights over the ground below: 13 x 7 rays under the trunk, and one under each foot."""
+    scan = world["height_scan"]
+    soles = [height - 0.02 for height in scan[91:]]
+    obs, terms, fell = walking(world, soles=soles, swing=0.1, height=scan[45], **TROT)
+    reward = weighed(
+        terms, velocity=1.5, turn=0.75, bounce=-0.25, rate=-0.05, tilt=-0.5, torque=-2e-4, action=-0.01, gait=1.0,
+        pose=-0.05, fall=-50.0,
+    )  # fmt: skip
+    return Told([*obs, *(scan[:91] - 0.32)], reward, terminated=fell)
+
+
+def humanoid(world: World) -> Told:
+    leg, waist, arm = [-0.3, 0.0, 0.0, 0.6, -0.3, 0.0], [0.0] * 3, [0.2, 0.2, 0.0, -0.6]
+    standing = [*leg, *leg, *waist, *arm, 0.2, -0.2, 0.0, -0.6]
+    soles, height = [site[2] for site in world["site_q"]], world["joint_q"][2]
+    obs, terms, fell = walking(
+        world, standing=standing, soles=soles, pairs=(0, 1), swing=0.08, height=height, lowest=0.45
+    )
+    # pitch joints of the legs move ahead
+    quiet = np.delete(world["joint_q"][7:] - standing, [0, 3, 4, 6, 9, 10])
+    reward = weighed(
+        terms | {"quiet": dot(quiet, quiet)}, velocity=2.0, turn=0.75, bounce=-0.5, rate=-0.05, tilt=-2.5, torque=-1e-5,
+        action=-0.01, gait=1.0, pose=-0.05, quiet=-0.5, fall=-50.0,
+    )  # fmt: skip
+    return Told(obs, reward, terminated=fell)
+
+
+def ant_run(world: World) -> Told:
+    q, qd, action = (world[name] for name in ("joint_q", "joint_qd", "action"))
+    axes = axes_of(q[3:7])
+    gravity = [-axis[2] for axis in axes]
+    fell = gravity[2] > 0 or not 0.13 <= q[2] <= 1.0
+    velocity, turning = ([dot(axis, part) for axis in axes] for part in (qd[:3], qd[3:6]))
+    turned = q[7:] - np.array([0.0, 1.1] * 4)
+    obs = [q[2], *gravity, axes[0][0], axes[1][0], *velocity, *turning, *turned, *qd[6:], *action]
+    effort = 0.02 * dot(action, action) + 0.02 * math.dist(action, world["previous_action"]) ** 2
+    return Told(obs, 0.02 * (qd[0] - 0.3 * qd[1] ** 2 - effort) - float(fell), terminated=fell)
 
 
 PLAIN: dict[str, Callable[[World], Told]] = {
@@ -128,11 +183,24 @@ PLAIN: dict[str, Callable[[World], Told]] = {
     "FrankaPickCube": pick_cube,
     "FrankaLift": lift,
     "QuadrupedVelocityFlat": quadruped,
+    "QuadrupedVelocityRough": quadruped_rough,
+    "HumanoidVelocityFlat": humanoid,
+    "AntRun": ant_run,
 }
 
 
 def dot(a: Vector, b: Vector) -> float:
     return math.fsum(x * y for x, y in zip(a, b, strict=True))
+
+
+def axes_of(quat: Vector) -> list[list[float]]:
+    """Axes of a frame, by its quaternion (x, y, z, w)."""
+    x, y, z, w = quat
+    return [
+        [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
+        [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
+        [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
+    ]
 
 
 def holds(hand: Vector, left: Vector, right: Vector) -> bool:
@@ -165,7 +233,7 @@ def any_worlds(envs: Any, count: int, seed: int) -> Worlds:
     arrays["joint_qd"] = near(arrays["joint_qd"], 0.01, 0.25, 5.0)
     arrays["action"], arrays["previous_action"] = rng.uniform(-1, 1, (2, count, *envs.single_action_space.shape))
     arrays["goal"] = np.zeros((count, 0))
-    if "joint_torque" in arrays:
+    if type(envs.task).remember is not Task.remember:
         return _walking(envs.task, arrays, near, turned, rng)
     if "site_q" in arrays:
         tcp = arrays["site_q"]
@@ -194,13 +262,19 @@ def _walking(task: Any, arrays: dict[str, Any], near: Any, turned: Any, rng: np.
     tilt = near(np.zeros((count, 3)), 0.0, 0.1, 1.0)
     quats = np.concatenate([tilt, np.ones((count, 1))], 1)
     arrays["joint_q"][:, 3:7] = quats / np.linalg.norm(quats, axis=1, keepdims=True)
-    arrays["joint_q"][:, 2] = near(np.full(count, 0.25), 0.2)
-    arrays["joint_torque"] = near(arrays["joint_torque"], 10.0)
-    arrays["site_q"] = near(arrays["site_q"], 0.1)
-    arrays["goal"] = rng.choice([0.0, 1.0], (count, 1)) * rng.uniform(-1, 1, (count, 3))
+    arrays["joint_q"][:, 2] = near(np.full(count, task.lowest + 0.1), 0.2)
+    if "joint_torque" in arrays:
+        arrays["joint_torque"] = near(arrays["joint_torque"], 10.0)
+        arrays["site_q"] = near(arrays["site_q"], 0.1)
+        arrays["goal"] = rng.choice([0.0, 1.0], (count, 1)) * rng.uniform(-1, 1, (count, 3))
+    if "height_scan" in arrays:
+        # under the trunk, and under each foot
+        arrays["height_scan"] = near(np.full_like(arrays["height_scan"], task.lowest + 0.1), 0.2)
+        arrays["height_scan"][:, -4:] = near(np.full((count, 4), 0.05), 0.1)
     plain = {name: array.astype(np.float32) for name, array in arrays.items()}
     before = dict(task.remember(np, Worlds(**plain), None))
-    before["phase"] = rng.uniform(0, 2 * np.pi, count).astype(np.float32)
+    if "phase" in before:
+        before["phase"] = rng.uniform(0, 2 * np.pi, count).astype(np.float32)
     return Worlds(**plain, elapsed=np.zeros(count, np.int32), memory=task.remember(np, Worlds(**plain), before))
 
 

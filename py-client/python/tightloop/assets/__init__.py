@@ -14,7 +14,7 @@ from tightloop.attributes import suggestion
 from tightloop.errors import ArgumentError
 from tightloop.signatures import checked_calls
 
-__all__ = ["CARTPOLE", "FR3", "HUMANOID", "POLICIES", "QUADRUPED", "Policy", "policy"]
+__all__ = ["ANT", "CARTPOLE", "FR3", "HUMANOID", "POLICIES", "QUADRUPED", "Policy", "policy"]
 
 _FOLDER = Path(__file__).parent
 #: URDF of a Franka FR3 with its hand; ``fr3/README.md`` beside it says where it is from.
@@ -25,6 +25,8 @@ CARTPOLE = _FOLDER / "cartpole.urdf"
 QUADRUPED = _FOLDER / "quadruped.urdf"
 #: URDF of a humanoid with 23 joints.
 HUMANOID = _FOLDER / "humanoid.urdf"
+#: URDF of an ant: a ball with four legs of two joints.
+ANT = _FOLDER / "ant.urdf"
 #: Files of the trained policies, by task.
 POLICIES = {file.stem: file for file in sorted((_FOLDER / "policies").glob("*.npz"))}
 

@@ -19,6 +19,7 @@ EPISODE_STEPS = {
     "QuadrupedVelocityFlat": 1000,
     "QuadrupedVelocityRough": 1000,
     "HumanoidVelocityFlat": 1000,
+    "AntRun": 1000,
 }
 
 #: The same of gymnasium's tasks, as gymnasium's own.

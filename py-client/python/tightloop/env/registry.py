@@ -27,6 +27,7 @@ TASKS = {
     "QuadrupedVelocityFlat": "tightloop.tasks.quadruped:QuadrupedVelocityFlat",
     "QuadrupedVelocityRough": "tightloop.tasks.quadruped_rough:QuadrupedVelocityRough",
     "HumanoidVelocityFlat": "tightloop.tasks.humanoid:HumanoidVelocityFlat",
+    "AntRun": "tightloop.tasks.ant_run:AntRun",
 }
 
 #: gymnasium's MuJoCo tasks.
