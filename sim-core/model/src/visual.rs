@@ -26,7 +26,7 @@ pub struct Visual {
 /// Geometry of a visual.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Look {
-    /// A box, sphere, cylinder or capsule.
+    /// A box, sphere, cylinder, capsule or height field.
     Shape(Shape),
     /// A part of the plane z = 0 of its frame.
     Sheet {

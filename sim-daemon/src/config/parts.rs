@@ -26,11 +26,12 @@ impl SceneFile {
     /// A part has `kind` (`collision`, `visual`, or `bone`: for a robot of which nothing else can be seen), `name`,
     /// `robot` (`null` for what the scene has itself), `body` (`robot/link` as in the model's list; `null` is the world, and
     /// the world of a MuJoCo model), `pos` and `quat` of its frame in that body's, `shape` (`plane`, `box`, `sphere`,
-    /// `cylinder`, `capsule`, `mesh`, `hfield`; of visuals also `ellipsoid` and `nothing`) and `mesh` (a place in the list of surfaces;
-    /// `null` of a plane and of a visual's file). A visual that is a plane has `half_extents`, `null` where it has no end.
-    /// Collisions also have `added` (whether it is the scene's and not its robot file's) and `whole` (the surface of a mesh
-    /// before it became hulls, else as `mesh`); visuals have `color` (red, green, blue and opacity, 0 to 1, or `null`),
-    /// `texture` (a file or `null`), `file` with `scale` where it is one, and `problem` where it cannot be shown.
+    /// `cylinder`, `capsule`, `mesh`, `hfield`; of visuals also `ellipsoid` and `nothing`) and `mesh` (a place in the list
+    /// of surfaces; `null` of a plane and of a visual's file). A height field has `squares`, the lengths of its squares
+    /// along x and y. A visual that is a plane has `half_extents`, `null` where it has no end. Collisions also have `added`
+    /// (whether it is the scene's and not its robot file's) and `whole` (the surface of a mesh before it became hulls, else
+    /// as `mesh`); visuals have `color` (red, green, blue and opacity, 0 to 1, or `null`), `texture` (a file or `null`),
+    /// `file` with `scale` where it is one, and `problem` where it cannot be shown.
     ///
     /// # Errors
     /// As [`SceneFile::describe`].
@@ -175,6 +176,7 @@ impl Drawing {
     fn collision(&mut self, place: &Place, name: &str, pose: &Pose, shape: &Shape, added: bool) {
         let mut part = place.part("collision", name, pose);
         part["shape"] = json!(shape.kind());
+        part["squares"] = squares(shape);
         part["mesh"] = json!(self.place(shape, false));
         part["whole"] = json!(self.place(shape, true));
         part["added"] = json!(added);
@@ -205,6 +207,7 @@ impl Drawing {
         match &visual.look {
             Look::Shape(shape) => {
                 part["shape"] = json!(shape.kind());
+                part["squares"] = squares(shape);
                 part["mesh"] = json!(self.place(shape, false));
             }
             Look::Sheet { half_extents } => {
@@ -262,14 +265,31 @@ impl Drawing {
         if let Some((_, place)) = alike.find(|(other, _)| other == shape) {
             return Some(*place);
         }
-        let surface = match shape {
-            Shape::Mesh(mesh) if !whole => mesh.hulls.iter().fold(TriMesh::default(), with_hull),
-            other => triangles(other),
+        let place = match shape {
+            Shape::Mesh(mesh) if !whole => {
+                let hulls = mesh.hulls.iter().fold(TriMesh::default(), with_hull);
+                self.add(hulls, "collision")
+            }
+            Shape::HeightField(field) => {
+                let (surface, note) = field.shown();
+                let note = note.map(|note| format!("a height field {note}"));
+                self.notes.extend(note);
+                self.meshes.push(surface);
+                self.meshes.len() - 1
+            }
+            other => self.add(triangles(other), "collision"),
         };
-        let place = self.add(surface, "collision");
         let alike = self.places.entry(key).or_default();
         alike.push((shape.clone(), place));
         Some(place)
+    }
+}
+
+/// Lengths of the squares of a height field along x and y [m], `null` of other shapes.
+fn squares(shape: &Shape) -> Value {
+    match shape {
+        Shape::HeightField(field) => json!(field.squares()),
+        _ => Value::Null,
     }
 }
 

@@ -12,6 +12,7 @@ mod parry;
 mod polytope;
 mod ray_shape;
 mod shape;
+mod shown_field;
 mod tessellate;
 mod triangle_tree;
 mod trimesh;

@@ -12,7 +12,7 @@ use super::meshes::Meshes;
 use super::names::names;
 use crate::description::Robot;
 use crate::error::ModelError;
-use crate::geometry::{TriMesh, ellipsoid};
+use crate::geometry::{Shape, TriMesh, ellipsoid};
 use crate::visual::{Look, Visual, Visuals};
 
 /// Groups of geoms that MuJoCo's viewer shows at first: those below.
@@ -150,10 +150,10 @@ impl<'a> Surfaces<'a> {
                 kind: "ellipsoid",
                 surface: Arc::new(ellipsoid(size)),
             },
-            "mjGEOM_HFIELD" => Look::Triangles {
-                kind: "hfield",
-                surface: Arc::new(height_field(self.file, self.chosen[geom])?.surface()),
-            },
+            "mjGEOM_HFIELD" => {
+                let field = height_field(self.file, self.chosen[geom])?;
+                Look::Shape(Shape::HeightField(Arc::new(field)))
+            }
             "mjGEOM_MESH" => {
                 let mesh = self.chosen[geom];
                 if !self.known.contains_key(&mesh) {
