@@ -5,7 +5,7 @@ use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 use numpy::ndarray::ArrayView2;
 use numpy::{PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use sim_picture::{Instance, Line, Mesh, Shot, View};
+use sim_picture::{Instance, Line, Mesh, Shading, Shot, View};
 
 use crate::errors::raise;
 
@@ -43,18 +43,24 @@ impl Renderer {
         })
     }
 
-    /// Keeps a mesh; returns its number.
+    /// Keeps a mesh, whose triangles may be shaded each on its own; returns its number.
+    #[pyo3(signature = (vertices, faces, colors, flat = false))]
     fn add(
         &self,
         py: Python<'_>,
         vertices: PyReadonlyArray2<'_, f32>,
         faces: PyReadonlyArray2<'_, u32>,
         colors: PyReadonlyArray2<'_, u8>,
+        flat: bool,
     ) -> PyResult<usize> {
         let vertices: Vec<[f32; 3]> = rows(py, "vertices", &vertices.as_array())?;
         let faces: Vec<[u32; 3]> = rows(py, "faces", &faces.as_array())?;
         let colors: Vec<[u8; 4]> = rows(py, "colors", &colors.as_array())?;
-        let made = py.detach(|| Mesh::new(&vertices, &faces, &colors));
+        let shading = match flat {
+            true => Shading::Flat,
+            false => Shading::Smooth,
+        };
+        let made = py.detach(|| Mesh::shaded(&vertices, &faces, &colors, shading));
         let mesh = made.map_err(|error| raise(py, "ArgumentError", format!("mesh: {error}")))?;
         py.detach(|| {
             let mut inner = self.inner.write().unwrap_or_else(PoisonError::into_inner);

@@ -436,13 +436,16 @@ class Renderer:
     """
 
     def __new__(cls, width: int, height: int, threads: int | None = None) -> Renderer: ...
-    def add(self, vertices: NDArray[np.float32], faces: NDArray[np.uint32], colors: NDArray[np.uint8]) -> int:
+    def add(
+        self, vertices: NDArray[np.float32], faces: NDArray[np.uint32], colors: NDArray[np.uint8], flat: bool = False
+    ) -> int:
         """Add a mesh; returns its index.
 
         Args:
             vertices: Shape ``(n, 3)`` [m].
             faces: Shape ``(m, 3)``, counter-clockwise from outside.
             colors: Red, green, blue, opacity of each face, shape ``(m, 4)``.
+            flat: Whether each face is shaded on its own; else faces that meet at less than 35° look round.
         """
 
     def render(

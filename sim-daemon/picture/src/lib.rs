@@ -25,7 +25,7 @@ pub mod vector;
 mod view;
 
 pub use marks::Line;
-pub use mesh::{Mesh, MeshError};
+pub use mesh::{Mesh, MeshError, Shading};
 pub use renderer::{Instance, Renderer, Shot};
 pub use view::View;
 

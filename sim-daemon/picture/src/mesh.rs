@@ -1,14 +1,27 @@
 //! What is drawn: triangles with normals and colours, and coarser copies of them for where they are small.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
-use crate::normals::corner_normals;
+use crate::normals::{corner_normals, facet_normals};
 use crate::vector::{cross, dot};
 
 /// Cells along the longest side of a mesh in its coarser copies.
 const COARSER: [f32; 4] = [128.0, 64.0, 32.0, 16.0];
 /// A copy is worth its memory where it saves this share of the triangles.
 const WORTH: f64 = 0.7;
+
+/// Triangles of the largest mesh that is one piece, and about how many a piece of a larger one has.
+const WHOLE_MAX: usize = 200_000;
+const PIECE: usize = 32_768;
+
+/// How triangles that meet are shaded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shading {
+    /// Those that meet at a small angle look round.
+    Smooth,
+    /// Each is seen as it is: small steps of the ground stay sharp.
+    Flat,
+}
 
 /// Why triangles are no mesh.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,15 +49,22 @@ impl std::error::Error for MeshError {}
 /// A corner, edge or face of it may be seen from both sides, unless it is closed.
 #[derive(Clone, Debug)]
 pub struct Mesh {
-    /// From fine to coarse.
-    pub(crate) levels: Vec<Level>,
+    /// Its triangles; a large mesh has several pieces, each of which is as coarse as its own distance allows.
+    pub(crate) pieces: Vec<Piece>,
     /// Whether it has an inside and faces outwards, so that no triangle is seen from behind.
     pub(crate) closed: bool,
-    /// A ball around it, its frame.
-    pub(crate) centre: [f32; 3],
-    pub(crate) radius: f32,
     /// Whether some face is translucent.
     pub(crate) translucent: bool,
+}
+
+/// Triangles of a mesh that lie together.
+#[derive(Clone, Debug)]
+pub(crate) struct Piece {
+    /// From fine to coarse.
+    pub levels: Vec<Level>,
+    /// A ball around it, in the mesh's frame.
+    pub centre: [f32; 3],
+    pub radius: f32,
 }
 
 /// The triangles of a mesh, or of a coarser copy.
@@ -76,6 +96,19 @@ impl Mesh {
         triangles: &[[u32; 3]],
         colours: &[[u8; 4]],
     ) -> Result<Mesh, MeshError> {
+        Mesh::shaded(vertices, triangles, colours, Shading::Smooth)
+    }
+
+    /// As [`Mesh::new`], shaded in this way.
+    ///
+    /// # Errors
+    /// As [`Mesh::new`].
+    pub fn shaded(
+        vertices: &[[f32; 3]],
+        triangles: &[[u32; 3]],
+        colours: &[[u8; 4]],
+        shading: Shading,
+    ) -> Result<Mesh, MeshError> {
         if let Some(vertex) = vertices
             .iter()
             .position(|v| !v.iter().all(|part| part.is_finite()))
@@ -91,19 +124,40 @@ impl Mesh {
         if colours.len() != triangles.len() {
             return Err(MeshError::Colours);
         }
-        let [low, high] = extent(vertices);
-        let centre: [f32; 3] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
-        let distance = |v: &[f32; 3]| (0..3).map(|k| (v[k] - centre[k]).powi(2)).sum::<f32>();
-        let radius = vertices.iter().map(distance).fold(0.0, f32::max).sqrt();
         // vertices that lie in one place are one vertex: files often repeat them for each triangle
-        let (welded, corners) = merged(vertices, triangles, |v| {
+        let (welded, corners) = merged(vertices, triangles, |_, v| {
             v.map(|part| (part + 0.0).to_bits())
         });
         let closed = is_closed(&corners) && volume(&welded, &corners) > 0.0;
-        let finest = Level::new(0.0, welded, &corners, colours);
+        let whole = Level::new(0.0, welded, &corners, colours, shading);
+        Ok(Mesh {
+            pieces: pieces(whole)
+                .into_iter()
+                .map(|(level, rim)| Piece::new(level, &rim, shading))
+                .collect(),
+            closed,
+            translucent: colours.iter().any(|colour| colour[3] < 255),
+        })
+    }
+}
+
+impl Piece {
+    /// With coarser copies, in which vertices of the rim stay: other pieces have them too, and no gap may open.
+    fn new(finest: Level, rim: &[bool], shading: Shading) -> Piece {
+        let [low, high] = extent(&finest.vertices);
+        let centre: [f32; 3] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
+        let distance = |v: &[f32; 3]| (0..3).map(|k| (v[k] - centre[k]).powi(2)).sum::<f32>();
+        let radius = finest
+            .vertices
+            .iter()
+            .map(distance)
+            .fold(0.0, f32::max)
+            .sqrt();
         let side = (0..3)
             .map(|axis| high[axis] - low[axis])
             .fold(0.0, f32::max);
+        let triangles: Vec<[u32; 3]> = finest.faces.iter().map(|face| face.corners).collect();
+        let colours: Vec<[u8; 4]> = finest.faces.iter().map(|face| face.colour).collect();
         let mut levels = vec![finest];
         for cells in COARSER {
             let cell = side / cells;
@@ -111,31 +165,85 @@ impl Mesh {
             if cell <= 0.0 || last.faces.len() < 200 {
                 break;
             }
-            let places = |v: &[f32; 3]| -> [u32; 3] {
-                std::array::from_fn(|axis| ((v[axis] - low[axis]) / cell) as u32)
+            let places = |index: usize, v: &[f32; 3]| -> [u32; 3] {
+                match rim[index] {
+                    true => [u32::MAX, index as u32, 0],
+                    false => std::array::from_fn(|axis| ((v[axis] - low[axis]) / cell) as u32),
+                }
             };
-            let (vertices, corners) = merged(vertices, triangles, places);
+            let (vertices, corners) = merged(&levels[0].vertices, &triangles, places);
             let count = corners.iter().filter(|corners| is_proper(corners)).count();
             if (count as f64) < WORTH * last.faces.len() as f64 {
-                levels.push(Level::new(cell, vertices, &corners, colours));
+                levels.push(Level::new(cell, vertices, &corners, &colours, shading));
             }
         }
-        Ok(Mesh {
+        Piece {
             levels,
-            closed,
             centre,
             radius,
-            translucent: colours.iter().any(|colour| colour[3] < 255),
-        })
+        }
     }
 
     /// The coarsest level whose error is below this [m].
-    pub(crate) fn level(&self, error: f32) -> usize {
+    pub fn level(&self, error: f32) -> usize {
         let fine = self.levels[1..]
             .iter()
             .take_while(|level| level.error < error);
         fine.count()
     }
+}
+
+/// Triangles cut into pieces by the places of their middles, and which vertices of a piece others have too.
+fn pieces(whole: Level) -> Vec<(Level, Vec<bool>)> {
+    let count = whole.faces.len();
+    if count <= WHOLE_MAX {
+        let rim = vec![false; whole.vertices.len()];
+        return vec![(whole, rim)];
+    }
+    let [low, high] = extent(&whole.vertices);
+    let side = (0..3)
+        .map(|axis| high[axis] - low[axis])
+        .fold(0.0, f32::max);
+    // as many along a side as a surface, not a solid, of this size needs
+    let cell = side / (count as f32 / PIECE as f32).sqrt().ceil();
+    let mut places: BTreeMap<[u32; 3], Vec<Face>> = BTreeMap::new();
+    for face in whole.faces {
+        let corners = face.corners.map(|vertex| whole.vertices[vertex as usize]);
+        let place = std::array::from_fn(|axis| {
+            let middle = corners.iter().map(|v| v[axis] - low[axis]).sum::<f32>() / 3.0;
+            (middle / cell) as u32
+        });
+        places.entry(place).or_default().push(face);
+    }
+    // how many pieces have a vertex, and its number in the last one
+    let mut owners = vec![0_u32; whole.vertices.len()];
+    let mut numbers = vec![(u32::MAX, 0_u32); whole.vertices.len()];
+    let mut cut = Vec::with_capacity(places.len());
+    for (piece, mut faces) in places.into_values().enumerate() {
+        let mut kept = Vec::new();
+        for vertex in faces.iter_mut().flat_map(|face| &mut face.corners) {
+            let number = &mut numbers[*vertex as usize];
+            if number.0 != piece as u32 {
+                *number = (piece as u32, kept.len() as u32);
+                owners[*vertex as usize] += 1;
+                kept.push(*vertex);
+            }
+            *vertex = number.1;
+        }
+        cut.push((faces, kept));
+    }
+    cut.into_iter()
+        .map(|(faces, kept)| {
+            let vertices = kept.iter().map(|&vertex| whole.vertices[vertex as usize]);
+            let level = Level {
+                error: 0.0,
+                vertices: vertices.collect(),
+                faces,
+            };
+            let rim = kept.iter().map(|&vertex| owners[vertex as usize] > 1);
+            (level, rim.collect())
+        })
+        .collect()
 }
 
 impl Level {
@@ -144,6 +252,7 @@ impl Level {
         vertices: Vec<[f32; 3]>,
         corners: &[[u32; 3]],
         colours: &[[u8; 4]],
+        shading: Shading,
     ) -> Level {
         let (corners, colours): (Vec<_>, Vec<_>) = corners
             .iter()
@@ -152,7 +261,10 @@ impl Level {
             .unzip();
         let corners: Vec<[u32; 3]> = corners;
         let wide: Vec<[f64; 3]> = vertices.iter().map(|v| v.map(f64::from)).collect();
-        let normals = corner_normals(&wide, &corners);
+        let normals = match shading {
+            Shading::Smooth => corner_normals(&wide, &corners),
+            Shading::Flat => facet_normals(&wide, &corners),
+        };
         let faces = corners.into_iter().zip(normals).zip(colours);
         let faces = faces.map(|((corners, normals), colour)| Face {
             corners,
@@ -188,14 +300,15 @@ fn extent(vertices: &[[f32; 3]]) -> [[f32; 3]; 2] {
 fn merged(
     vertices: &[[f32; 3]],
     triangles: &[[u32; 3]],
-    place: impl Fn(&[f32; 3]) -> [u32; 3],
+    place: impl Fn(usize, &[f32; 3]) -> [u32; 3],
 ) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     let mut numbers: HashMap<[u32; 3], u32> = HashMap::with_capacity(vertices.len());
     let mut sums: Vec<([f64; 3], f64)> = Vec::new();
     let number: Vec<u32> = vertices
         .iter()
-        .map(|vertex| {
-            let number = *numbers.entry(place(vertex)).or_insert_with(|| {
+        .enumerate()
+        .map(|(index, vertex)| {
+            let number = *numbers.entry(place(index, vertex)).or_insert_with(|| {
                 sums.push(([0.0; 3], 0.0));
                 sums.len() as u32 - 1
             });
@@ -236,13 +349,16 @@ fn volume(vertices: &[[f32; 3]], corners: &[[u32; 3]]) -> f64 {
 
 /// Whether each edge belongs to two triangles, which run along it in opposite directions.
 fn is_closed(corners: &[[u32; 3]]) -> bool {
-    let mut balance: HashMap<(u32, u32), (i32, u32)> = HashMap::new();
-    for [a, b, c] in corners.iter().filter(|corners| is_proper(corners)) {
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            let entry = balance.entry((*from.min(to), *from.max(to))).or_default();
-            entry.0 += if from < to { 1 } else { -1 };
-            entry.1 += 1;
-        }
+    // the ends of an edge, the lower first, and whether it is run along from there
+    let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(3 * corners.len());
+    for &[a, b, c] in corners.iter().filter(|corners| is_proper(corners)) {
+        let sides = [(a, b), (b, c), (c, a)];
+        edges.extend(sides.map(|(from, to)| (from.min(to), from.max(to), from < to)));
     }
-    !balance.is_empty() && balance.values().all(|&(sum, count)| sum == 0 && count == 2)
+    edges.sort_unstable();
+    let (pairs, rest) = edges.as_chunks::<2>();
+    let is_pair = |&[one, other]: &[(u32, u32, bool); 2]| {
+        (one.0, one.1) == (other.0, other.1) && one.2 != other.2
+    };
+    !pairs.is_empty() && rest.is_empty() && pairs.iter().all(is_pair)
 }

@@ -7,17 +7,30 @@ const SMOOTH: f64 = 0.82;
 /// Most facets at a vertex that is smoothed: the pole of a ball has 48. It bounds the work, which is its square.
 const FAN_MAX: usize = 128;
 
+/// Twice the area of each triangle along its normal.
+fn areas(vertices: &[Vector], triangles: &[[u32; 3]]) -> Vec<Vector> {
+    let area = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|vertex| vertices[vertex as usize]);
+        cross(sub(b, a), sub(c, a))
+    };
+    triangles.iter().map(area).collect()
+}
+
+/// Parts in 32767ths.
+fn quantised(normal: Vector) -> [i16; 3] {
+    normal.map(|part| (part * 32767.0).round() as i16)
+}
+
+/// The triangle's own normal at each of its corners; parts in 32767ths.
+pub(crate) fn facet_normals(vertices: &[Vector], triangles: &[[u32; 3]]) -> Vec<[[i16; 3]; 3]> {
+    let areas = areas(vertices, triangles).into_iter();
+    areas.map(|area| [quantised(unit(area)); 3]).collect()
+}
+
 /// Normal at each corner of each triangle: the mean of the facets around that vertex that form one smooth surface with
 /// this one, weighted by area; parts in 32767ths.
 pub(crate) fn corner_normals(vertices: &[Vector], triangles: &[[u32; 3]]) -> Vec<[[i16; 3]; 3]> {
-    // twice the area along the normal
-    let areas: Vec<Vector> = triangles
-        .iter()
-        .map(|corners| {
-            let [a, b, c] = corners.map(|vertex| vertices[vertex as usize]);
-            cross(sub(b, a), sub(c, a))
-        })
-        .collect();
+    let areas = areas(vertices, triangles);
     let mut start = vec![0_usize; vertices.len() + 1];
     for &vertex in triangles.iter().flatten() {
         start[vertex as usize + 1] += 1;
@@ -48,7 +61,6 @@ pub(crate) fn corner_normals(vertices: &[Vector], triangles: &[[u32; 3]]) -> Vec
         }
         unit(sum)
     };
-    let quantised = |normal: Vector| normal.map(|part| (part * 32767.0).round() as i16);
     triangles
         .iter()
         .enumerate()

@@ -1,7 +1,7 @@
 //! Dark lines where what is seen changes from one mesh to another, so that shapes of one colour stay apart.
 
 use crate::Rgb;
-use crate::project::{Chunk, find};
+use crate::project::{Chunk, Placed, find};
 use crate::tile::{FLOOR, NOBODY, Seen};
 
 /// How dark a line is, from 0 to 1.
@@ -27,7 +27,7 @@ impl Surface {
 }
 
 /// The surfaces of a tile, row by row.
-pub(crate) fn surfaces(seen: &Seen<4>, chunks: &[Chunk]) -> Vec<[Surface; 4]> {
+pub(crate) fn surfaces(seen: &Seen<4>, chunks: &[Chunk], placed: &[Placed]) -> Vec<[Surface; 4]> {
     let mut last = (NOBODY, u32::MAX);
     let pixels = seen.who.iter().zip(&seen.near);
     let surface = |(who, near): (&[u32; 4], &[f32; 4])| {
@@ -37,7 +37,8 @@ pub(crate) fn surfaces(seen: &Seen<4>, chunks: &[Chunk]) -> Vec<[Surface; 4]> {
             }
             // neighbours mostly see one triangle
             if who[k] != last.0 {
-                last = (who[k], find(chunks, who[k]).placed);
+                let piece = find(chunks, who[k]).placed;
+                last = (who[k], placed[piece as usize].look);
             }
             Surface {
                 placed: last.1,

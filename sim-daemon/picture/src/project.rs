@@ -2,7 +2,7 @@
 
 use crate::clip::{Ahead, clipped, is_free};
 use crate::cover::{SUB, floor};
-use crate::mesh::{Level, Mesh};
+use crate::mesh::{Level, Piece};
 use crate::threads;
 
 /// Side of a tile [pixels]: what is seen in it stays in cache.
@@ -10,10 +10,14 @@ pub(crate) const TILE: usize = 32;
 /// Faces that a thread takes at once.
 const WORK: usize = 16_384;
 
-/// A mesh at its place, as a camera sees it.
+/// A piece of a mesh at its place, as a camera sees it.
 pub(crate) struct Placed<'a> {
-    pub mesh: &'a Mesh,
+    pub piece: &'a Piece,
     pub level: usize,
+    /// Whether it is seen from outside only.
+    pub closed: bool,
+    /// Which of the placed meshes that are looked at it is a piece of.
+    pub look: u32,
     /// From the mesh's frame to `Ahead`: rows of a matrix, the translation last.
     pub ahead: [[f32; 4]; 3],
     /// Whether what is behind shows through.
@@ -22,7 +26,7 @@ pub(crate) struct Placed<'a> {
 
 impl Placed<'_> {
     pub fn level(&self) -> &Level {
-        &self.mesh.levels[self.level]
+        &self.piece.levels[self.level]
     }
 }
 
@@ -71,7 +75,7 @@ pub(crate) struct Triangle {
     pub near: [f32; 3],
     /// Between these it is everywhere.
     pub range: [f32; 2],
-    /// Which placed mesh it is of, and which of its faces.
+    /// Which placed piece it is of, and which of its faces.
     pub placed: u32,
     pub face: u32,
     pub translucent: bool,
@@ -137,7 +141,7 @@ fn chunk(placed: &[Placed], range: std::ops::Range<usize>, lens: &Lens) -> Chunk
         }));
         let number = (index as u32, one.translucent);
         // as seen from outside they run clockwise, since rows count downwards
-        let turned = one.mesh.closed && !one.translucent;
+        let turned = one.closed && !one.translucent;
         for (face, it) in level.faces.iter().enumerate() {
             let at = it.corners.map(|vertex| &places[vertex as usize]);
             let mut add = |corners: [Corner; 3]| {

@@ -3,7 +3,7 @@
 use crate::clip::NEAREST;
 use crate::cover::SUB;
 use crate::marks::{Line, Mark};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, Piece};
 use crate::outlines::{self, Surface};
 use crate::project::{Chunk, Lens, Placed, TILE, find, project};
 use crate::rays::{Ray, Rays};
@@ -171,43 +171,40 @@ impl<'a> Stage<'a> {
             let [x, y, z, ..] = instance.pose;
             let origin = sub([x, y, z], view.eye);
             let rotation = rotation(&instance.pose);
-            let ball = centre_of(mesh, &rotation, origin);
-            let radius = f64::from(mesh.radius);
             let translucent = instance.opacity < 1.0 || mesh.translucent;
-            let ahead = dot(ball, view.into);
-            // the nearest of it decides how coarse it may be
-            let nearest = match view.perspective {
-                true => (ahead - radius).max(f64::from(lens.nearest)),
-                false => 1.0,
-            };
-            let pixel = nearest / view.scale;
-            if !translucent && is_shading(&light_world, ball, radius) {
-                let texel = (2.0 * shot.reach / crate::shadow::SIDE as f64) as f32;
-                casters.push(Placed {
-                    mesh,
-                    level: mesh.level(ERROR * texel),
-                    ahead: composed(&light_world, &rotation, origin),
-                    translucent: false,
-                });
-            }
-            if instance.opacity > 0.0 && is_ahead(&view, ball, radius) {
-                placed.push(Placed {
-                    mesh,
-                    level: mesh.level(ERROR * pixel as f32),
-                    ahead: composed(&camera_world, &rotation, origin),
+            let texel = (2.0 * shot.reach / crate::shadow::SIDE as f64) as f32;
+            for piece in &mesh.pieces {
+                let ball = centre_of(piece, &rotation, origin);
+                let radius = f64::from(piece.radius);
+                // the nearest of it decides how coarse it may be
+                let nearest = match view.perspective {
+                    true => (dot(ball, view.into) - radius).max(f64::from(lens.nearest)),
+                    false => 1.0,
+                };
+                let pixel = (nearest / view.scale) as f32;
+                let seen = |error: f32, world: &[[f64; 4]; 3], translucent: bool| Placed {
+                    piece,
+                    level: piece.level(error),
+                    closed: mesh.closed,
+                    look: looks.len() as u32,
+                    ahead: composed(world, &rotation, origin),
                     translucent,
-                });
-                let [red, green, blue, tinted] = instance.tint;
-                looks.push(Look {
-                    axes: std::array::from_fn(|axis| {
-                        std::array::from_fn(|k| rotation[k][axis] as f32)
-                    }),
-                    origin: origin.map(|part| part as f32),
-                    tint: light([red, green, blue]),
-                    tinted: f32::from(tinted) / 255.0,
-                    opacity: instance.opacity.clamp(0.0, 1.0),
-                });
+                };
+                if !translucent && is_shading(&light_world, ball, radius) {
+                    casters.push(seen(ERROR * texel, &light_world, false));
+                }
+                if instance.opacity > 0.0 && is_ahead(&view, ball, radius) {
+                    placed.push(seen(ERROR * pixel, &camera_world, translucent));
+                }
             }
+            let [red, green, blue, tinted] = instance.tint;
+            looks.push(Look {
+                axes: std::array::from_fn(|axis| std::array::from_fn(|k| rotation[k][axis] as f32)),
+                origin: origin.map(|part| part as f32),
+                tint: light([red, green, blue]),
+                tinted: f32::from(tinted) / 255.0,
+                opacity: instance.opacity.clamp(0.0, 1.0),
+            });
         }
         let shadow = Shadow::new(
             &casters,
@@ -302,7 +299,7 @@ impl<'a> Stage<'a> {
             mark.draw(&mut lights, &opaque.near, corner);
         }
         let surfaces = match self.outlines {
-            true => outlines::surfaces(&opaque, chunks),
+            true => outlines::surfaces(&opaque, chunks, &self.placed),
             false => Vec::new(),
         };
         (lights.into_iter().map(colour).collect(), surfaces)
@@ -326,7 +323,7 @@ impl<'a> Stage<'a> {
                 let level = self.placed[placed].level();
                 let face = &level.faces[triangle.face as usize];
                 let vertices = face.corners.map(|vertex| level.vertices[vertex as usize]);
-                let look = &self.looks[placed];
+                let look = &self.looks[self.placed[placed].look as usize];
                 self.lights
                     .surface(look, face, vertices, self.rays.at(x, y))
             }
@@ -392,9 +389,9 @@ fn rotation(pose: &[f64; 7]) -> [Vector; 3] {
     ]
 }
 
-/// Where the ball around a mesh is, from the eye [m].
-fn centre_of(mesh: &Mesh, rotation: &[Vector; 3], origin: Vector) -> Vector {
-    let centre = mesh.centre.map(f64::from);
+/// Where the ball around a piece of a mesh is, from the eye [m].
+fn centre_of(piece: &Piece, rotation: &[Vector; 3], origin: Vector) -> Vector {
+    let centre = piece.centre.map(f64::from);
     std::array::from_fn(|k| dot(rotation[k], centre) + origin[k])
 }
 

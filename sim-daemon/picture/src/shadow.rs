@@ -22,6 +22,8 @@ const LEVELS: usize = 5;
 const RADIUS: [f32; 2] = [1.8, ((WINDOW / 2) << (LEVELS - 1)) as f32];
 /// Texels along a side of a block whose tallest blocker is known.
 const BLOCK: usize = 16;
+/// Texels along the rim in which shadows fade: the picture goes on beyond the light's square.
+const FADE: f32 = 64.0;
 /// Steepest surface whose plane is followed [texels of depth a texel].
 const STEEPEST: f32 = 6.0;
 
@@ -257,8 +259,11 @@ impl Shadow {
     pub fn light(&self, point: [f32; 3], normal: [f32; 3]) -> f32 {
         let [x, y, near] = transformed(&self.rows, point);
         let place = [x - 0.5, y - 0.5];
-        let inside = 0.0..(SIDE - 1) as f32;
-        if !inside.contains(&place[0]) || !inside.contains(&place[1]) {
+        let last = (SIDE - 1) as f32;
+        // 0 beside the square, and where a place is not finite
+        let within = place.map(|place| larger(place.min(last - place), 0.0));
+        let share = (within[0].min(within[1]) / FADE).min(1.0);
+        if share <= 0.0 {
             return 1.0;
         }
         let mut plane = Plane {
@@ -292,7 +297,7 @@ impl Shadow {
         let level = level_of(radius);
         let scale = (1 << level) as f32;
         let [count, _, all] = self.levels[level].above(&plane.coarser(scale, 0.0), radius / scale);
-        1.0 - count / all
+        1.0 - share * count / all
     }
 }
 

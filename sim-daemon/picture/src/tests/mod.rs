@@ -3,6 +3,7 @@
 mod cover;
 mod light;
 mod normals;
+mod pieces;
 mod view;
 
 use crate::vector::Vector;
