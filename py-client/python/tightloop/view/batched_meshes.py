@@ -27,6 +27,7 @@ class BatchedMesh:
         faces: Shape ``(faces, 3)``.
         color: Red, green, blue and opacity, 0 to 255.
         bodies: Indices of the bodies in ``body_names``; (-1,) is the world.
+        flat: Whether each face is shaded on its own, as those of height fields.
         closed: Whether the meshes of a body enclose it and face outwards, so that no face is seen from behind.
     """
 
@@ -35,36 +36,50 @@ class BatchedMesh:
     color: tuple[int, int, int, int]
     bodies: tuple[int, ...]
     closed: bool
+    flat: bool
 
 
 def batched_meshes(parts: Sequence[Part]) -> list[BatchedMesh]:
     """Merge parts of one kind into as few meshes as possible."""
-    of_body: dict[int, list[Part]] = {}
+    of_body: dict[tuple[int, bool], list[Part]] = {}
     for part in parts:
-        of_body.setdefault(part.body, []).append(part)
+        of_body.setdefault((part.body, part.shape == "hfield"), []).append(part)
     # bodies with the same meshes at the same poses, such as two fingers, are identical; the world is not a body
-    identical: dict[tuple[Any, ...], list[int]] = {}
-    for body, own in of_body.items():
-        key = (body < 0, *((id(part.mesh), np.asarray(part.pose).tobytes()) for part in own))
-        identical.setdefault(key, []).append(body)
-    return [mesh for bodies in identical.values() for mesh in _meshes_of(of_body[bodies[0]], tuple(bodies))]
+    identical: dict[tuple[Any, ...], list[tuple[int, bool]]] = {}
+    for (body, flat), own in of_body.items():
+        key = (body < 0, flat, *((id(part.mesh), np.asarray(part.pose).tobytes()) for part in own))
+        identical.setdefault(key, []).append((body, flat))
+    return [
+        mesh
+        for same in identical.values()
+        for mesh in _meshes_of(of_body[same[0]], tuple(body for body, _ in same), flat=same[0][1])
+    ]
 
 
-def _meshes_of(parts: list[Part], bodies: tuple[int, ...]) -> list[BatchedMesh]:
+def _meshes_of(parts: list[Part], bodies: tuple[int, ...], *, flat: bool) -> list[BatchedMesh]:
     counts = np.cumsum([0, *(len(part.mesh.vertices) for part in parts)])
     vertices = np.concatenate([place(np.asarray(part.pose), part.mesh.vertices) for part in parts])
     faces = np.concatenate([part.mesh.faces + first for part, first in zip(parts, counts, strict=False)])
     colors, which = _few(np.concatenate([part.mesh.colors for part in parts]))
-    closed = all(_is_closed(part.mesh.vertices, part.mesh.faces) for part in parts)
+    # height fields are closed, and so large that to look takes long
+    closed = flat or all(_is_closed(part.mesh.vertices, part.mesh.faces) for part in parts)
+    surface = _used if flat else _creased
     return [
         BatchedMesh(
-            *_creased(vertices, faces[which == color]),
+            *surface(vertices, faces[which == color]),
             (int(red), int(green), int(blue), int(opacity)),
             bodies,
             closed,
+            flat,
         )
         for color, (red, green, blue, opacity) in enumerate(colors)
     ]
+
+
+def _used(vertices: NDArray[Any], faces: NDArray[Any]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """The same faces without vertices that they do not have."""
+    kept, renumbered = np.unique(faces, return_inverse=True)
+    return vertices[kept].astype(np.float32), renumbered.reshape(-1, 3).astype(np.uint32)
 
 
 def _is_closed(vertices: NDArray[Any], faces: NDArray[Any]) -> bool:
@@ -81,7 +96,8 @@ def _is_closed(vertices: NDArray[Any], faces: NDArray[Any]) -> bool:
 
 def _few(colors: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.intp]]:
     """The distinct colours, and which one each face has; near ones are one where there are too many."""
-    distinct, which = np.unique(colors, axis=0, return_inverse=True)
+    packed, which = np.unique(np.ascontiguousarray(colors).view(np.uint32).ravel(), return_inverse=True)
+    distinct = packed.view(np.uint8).reshape(-1, 4)
     for bits in range(1, 9):
         if len(distinct) <= _COLORS_MAX:
             break

@@ -23,6 +23,8 @@ PRESETS = {
 
 # Fraction of the picture's width or height that the subject fills; the rest is room for motion.
 _FILL = 0.8
+# As seen on a height field by a camera that follows.
+_GROUND_FILL = 0.4
 # A subject that moves is kept within this fraction of the picture.
 _KEEP = 0.96
 _LEAST_DISTANCE = 0.1
@@ -62,7 +64,9 @@ class Camera:
             raise ArgumentError(f"Camera: fov is {fov:g}; give less than π [rad]")
 
 
-def camera(preset: str, points: NDArray[np.float64], *, aspect: float = 1.0, fov: float = 0.7) -> Camera:
+def camera(
+    preset: str, points: NDArray[np.float64], *, aspect: float = 1.0, fov: float = 0.7, ground: bool = False
+) -> Camera:
     """Return a preset camera whose picture some points fill, in width or in height.
 
     Args:
@@ -70,10 +74,12 @@ def camera(preset: str, points: NDArray[np.float64], *, aspect: float = 1.0, fov
         points: The points [m], shape ``(n, 3)``, at least one.
         aspect: Width of the picture divided by its height.
         fov: Vertical field of view [rad].
+        ground: Whether there is ground to see: one robot then leaves more room for it.
     """
     axes = _axes(np.array(PRESETS[preset]))
+    fill = _GROUND_FILL if ground and preset == "follow" else _FILL
     local = points @ axes.T
-    low, high, depth = _nearest(local, _tangents(fov, aspect, _FILL))
+    low, high, depth = _nearest(local, _tangents(fov, aspect, fill))
     nearest, farthest = local[:, 2].min(), local[:, 2].max()
     depth = min(depth, nearest - _LEAST_DISTANCE)
     eye = np.array([*(0.5 * (high - low)), depth])

@@ -23,16 +23,19 @@ def is_floor(part: Part) -> bool:
     return is_flat and bool(np.ptp(part.mesh.vertices[:, :2], axis=0).min() >= _SIZE)
 
 
-def height(parts: Iterable[Part], box: Array) -> float:
+def height(parts: Iterable[Part], box: Array, ground: Array | None = None) -> float:
     """Return the height of the floor [m]: that of the highest one, or below everything else.
 
     Args:
         parts: Parts of one world.
         box: Bounding box of one world [m], shape ``(2, 3)``.
+        ground: Bounding box of its large height fields [m], from `tightloop.view.ground.extent`.
     """
     own = [float(part.pose[2]) for part in parts if is_floor(part) and np.isfinite(part.pose[2])]
     # rounding may put the rim of an object below the floor
     lowest = float(box[0, 2])
+    if ground is not None and not own:
+        return float(ground[0, 2])
     return max(own) if own else (lowest if lowest < -1e-3 else 0.0)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.view import grid
+from tightloop.view import grid, ground
 from tightloop.view.outlines import outline
 from tightloop.view.parts import Part
 from tightloop.view.poses import Array, place, rotate
@@ -30,6 +30,7 @@ class Framing:
 
     def __init__(self, parts: Iterable[Part], subject: Subject) -> None:
         self._parts = list(parts)
+        self._ground = ground.extent(self._parts)
         self._subject = subject
         own: dict[int, list[NDArray[np.float64]]] = {body: [] for body in subject.bodies.tolist()}
         for part in self._parts:
@@ -59,12 +60,19 @@ class Framing:
         for body in sorted(wanted or self._outlines):
             poses = body_q[:, body]
             kept = np.flatnonzero(np.isfinite(poses).all(axis=-1))
-            usual = np.median(poses[kept, :3], axis=0) if len(kept) else np.zeros(3)
-            away = np.linalg.norm(poses[kept, :3] - usual, axis=-1)
-            kept = kept[away <= _STRAY * np.linalg.norm(box[1] - box[0])]
+            kept = kept[self._is_there(poses[kept, :3], box)]
             turned = rotate(poses[kept, None, 3:], self._outlines[body])
             found.append((turned + (poses[kept, :3] + offsets[kept])[:, None]).reshape(-1, 3))
         return np.concatenate(found)
+
+    def _is_there(self, places: NDArray[np.float64], box: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which places of a body in several worlds are to be framed; ``box`` is that of one world."""
+        if self._ground is not None:
+            # worlds start at places of their own on the ground they share
+            on = ground.inside(self._ground, places)
+            return on if on.any() else np.ones_like(on)
+        usual = np.median(places, axis=0) if len(places) else np.zeros(3)
+        return np.linalg.norm(places - usual, axis=-1) <= _STRAY * np.linalg.norm(box[1] - box[0])
 
     def middle(self, body_q: Array) -> NDArray[np.float64] | None:
         """Return the mean position of the main robot's bodies in a world [m], or None if it is not finite.

@@ -1,4 +1,7 @@
-"""Positions of many worlds on a grid whose cells fit one world; the first world is not moved."""
+"""Positions of many worlds on a grid whose cells fit one world; the first world is not moved.
+
+Worlds that share a large height field stay in place.
+"""
 
 from __future__ import annotations
 
@@ -31,9 +34,9 @@ def extent(parts: Iterable[Part], body_q: Array) -> NDArray[np.float64]:
     """
     found: list[Array] = []
     for part in parts:
-        points = outline(part.mesh)
-        if part.body < 0 and np.max(np.ptp(points, axis=0)) > _FLOOR_SIZE:
+        if part.body < 0 and np.max(np.ptp(part.mesh.vertices, axis=0)) > _FLOOR_SIZE:
             continue
+        points = outline(part.mesh)
         placed = place(IDENTITY if part.body < 0 else body_q[part.body], place(part.pose, points))
         if np.isfinite(placed).all():
             found.append(placed)
@@ -43,13 +46,16 @@ def extent(parts: Iterable[Part], body_q: Array) -> NDArray[np.float64]:
     return np.stack([points.min(axis=0), points.max(axis=0)]).astype(np.float64)
 
 
-def offsets(worlds: int, box: NDArray[np.float64]) -> NDArray[np.float32]:
+def offsets(worlds: int, box: NDArray[np.float64], *, in_place: bool = False) -> NDArray[np.float32]:
     """Return the position of each world on the grid [m], shape ``(worlds, 3)``; the first one is zero.
 
     Args:
         worlds: Number of worlds.
         box: Bounding box of one world, from `extent`.
+        in_place: Whether worlds share their ground, so that all positions are zero.
     """
+    if in_place:
+        return np.zeros((worlds, 3), np.float32)
     columns = math.ceil(math.sqrt(worlds))
     size = np.maximum(box[1] - box[0], _LEAST_SIZE) * _ROOM
     index = np.arange(worlds)

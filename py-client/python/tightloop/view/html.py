@@ -94,10 +94,22 @@ class Html:
         self._world_meshes = WorldMeshes(self._server, self._parts, len(body_q), self._options, body_q[0])
         self._overlay = Overlay(self._server, self._parts, self._options, self._world_meshes, bodies=self._bodies)
         scene.set_up_direction("+z")
+        ground = self._world_meshes.ground
         scene.add_grid(
-            "/ground", infinite_grid=True, cell_size=0.1, section_size=1.0, fade_distance=40.0, shadow_opacity=0.2
+            "/ground",
+            infinite_grid=True,
+            cell_size=0.1,
+            section_size=1.0,
+            fade_distance=40.0,
+            shadow_opacity=0.2,
+            # no floor cuts through the pits of a height field
+            position=(0.0, 0.0, 0.0 if ground is None else float(ground[0, 2])),
         )
         points = self._world_meshes.points(body_q)
-        chosen = self._view if isinstance(self._view, Camera) else camera(self._view, points, aspect=_ASPECT)
+        chosen = (
+            self._view
+            if isinstance(self._view, Camera)
+            else camera(self._view, points, aspect=_ASPECT, ground=ground is not None)
+        )
         first = self._server.initial_camera
         first.position, first.look_at, first.up, first.fov = chosen.position, chosen.target, chosen.up, chosen.fov

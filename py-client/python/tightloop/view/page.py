@@ -76,7 +76,9 @@ class Page:
         server.gui.main_panel.dock_right()
         server.scene.set_up_direction("+z")
         box = self._world_meshes.box
-        add_stage(server.scene, box, self._world_meshes.offsets, floor.height(scene_parts, box))
+        ground = self._world_meshes.ground
+        height = floor.height(scene_parts, box, ground)
+        add_stage(server.scene, box if ground is None else ground, self._world_meshes.offsets, height)
         self.show(first, new=True)
 
     def update(self, timeout: float) -> float | None:
@@ -135,7 +137,8 @@ class Page:
         world = self.options.world if self._preset == "follow" else None
         points = self._world_meshes.points(np.asarray(self._shown.body_q), world)
         aim = self._aims[client.client_id] = Aim(client)
-        aim.point(camera(self._preset, points, aspect=client.camera.aspect))
+        ground = self._world_meshes.ground is not None
+        aim.point(camera(self._preset, points, aspect=client.camera.aspect, ground=ground))
 
     def _keep(self, body_q: Array) -> None:
         """Re-aim the cameras at robots that walk out of the picture, unless users have moved them."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+Color = tuple[int, int, int, int]
 Colors = NDArray[np.uint8]
 
 #: What has no colour of its own: robots, what stands still, and the fields of a plane's checkers.
@@ -18,6 +19,9 @@ STILL = (178, 170, 158, 255)
 CHECKERS = ((196, 202, 210, 255), (172, 180, 190, 255))
 # Where a face looks a texture up: its middle, and near its corners.
 _PLACES = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
+# Slopes of the ground from which it is darker [°], and what its colour is multiplied with, on light and dark squares.
+_STEEP = (8.0, 25.0, 45.0)
+_TONES = ((1.0, 0.93), (0.92, 0.86), (0.78, 0.78), (0.66, 0.66))
 # Hues that follow one another by the golden angle are well apart.
 _GOLDEN = 137.507764 / 360
 
@@ -26,6 +30,29 @@ def palette(number: int) -> tuple[int, int, int, int]:
     """The colour of the body with this number where nothing gives it one."""
     red, green, blue = colorsys.hls_to_rgb((0.58 + _GOLDEN * number) % 1, 0.6 if number % 2 == 0 else 0.7, 0.5)
     return round(255 * red), round(255 * green), round(255 * blue), 255
+
+
+def ground(vertices: NDArray[np.float32], faces: NDArray[np.uint32], squares: Sequence[float], color: Color) -> Colors:
+    """Colours of the faces of a height field: darker where it is steeper, in squares of two tones where it is not.
+
+    Args:
+        vertices: Shape ``(vertices, 3)`` [m].
+        faces: Shape ``(faces, 3)``, none of which goes beyond a square.
+        squares: Lengths of a square along x and y [m]; the first begins at the lowest corner.
+        color: Its colour where it is level, of the lighter squares.
+
+    Returns:
+        Shape ``(faces, 4)``.
+    """
+    a, b, c = (vertices[faces[:, corner]].astype(np.float64) for corner in range(3))
+    normal = np.cross(b - a, c - a)
+    upright = normal[:, 2] / np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)
+    steep = np.searchsorted(-np.cos(np.radians(_STEEP)), -upright)
+    place = np.floor(((a + b + c) / 3.0 - vertices.min(axis=0))[:, :2] / squares).astype(int)
+    tones = np.array(_TONES)[steep, place.sum(axis=1) % 2]
+    colors = np.tile(np.array(color, np.float64), (len(faces), 1))
+    colors[:, :3] *= tones[:, None]
+    return np.rint(colors).astype(np.uint8)
 
 
 def of_floats(color: Sequence[float]) -> tuple[int, int, int, int]:

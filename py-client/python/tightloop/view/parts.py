@@ -54,7 +54,7 @@ class Part:
         pose: Its frame in the body's: position [m], then quaternion (x, y, z, w), shape ``(7,)``.
         mesh: Its surface; parts that look alike share one.
         shape: What it is: ``"plane"`` (a sheet around its frame's origin stands for it), ``"box"``, ``"sphere"``,
-            ``"cylinder"``, ``"capsule"``, ``"ellipsoid"`` or ``"mesh"``.
+            ``"cylinder"``, ``"capsule"``, ``"ellipsoid"``, ``"hfield"`` or ``"mesh"``.
     """
 
     body: int
@@ -166,7 +166,7 @@ class _Assembly:
         elif "file" in entry:
             mesh = self._of_file(entry["file"], tuple(entry["scale"]), own)
         else:
-            mesh = self._of_surface(entry["mesh"], own or paint.PLAIN)
+            mesh = self._of_surface(entry["mesh"], own or paint.PLAIN, entry.get("squares"))
         return self._part(entry, "visual", mesh)
 
     def _material(self, entry: dict[str, Any]) -> Color | None:
@@ -204,11 +204,16 @@ class _Assembly:
             self._meshes[key] = Mesh(scaled.vertices, scaled.faces, scaled.filled(own or paint.PLAIN, whole=whole))
         return self._meshes[key]
 
-    def _of_surface(self, place: int, color: Color) -> Mesh:
+    def _of_surface(self, place: int, color: Color, squares: Sequence[float] | None = None) -> Mesh:
+        """A surface in one colour; that of a height field, which has squares, in tones of it."""
         key = place, color
         if key not in self._meshes:
             vertices, faces = self._surfaces[place]
-            self._meshes[key] = Mesh(vertices, faces, np.tile(np.array(color, np.uint8), (len(faces), 1)))
+            if squares is None:
+                colors = np.tile(np.array(color, np.uint8), (len(faces), 1))
+            else:
+                colors = paint.ground(vertices, faces, squares, color)
+            self._meshes[key] = Mesh(vertices, faces, colors)
         return self._meshes[key]
 
     def _sheet(self, half_extents: Sequence[float | None], color: Color | None) -> Mesh:
@@ -225,7 +230,8 @@ class _Assembly:
         color = paint.STILL if body < 0 else paint.palette(body)
         if kind == "visual" and not entry["added"]:
             color = paint.PLAIN
-        return self._part(entry, kind, self._of_surface(entry["mesh" if kind == "collision" else "whole"], color))
+        place = entry["mesh" if kind == "collision" else "whole"]
+        return self._part(entry, kind, self._of_surface(place, color, entry["squares"]))
 
     def _part(self, entry: dict[str, Any], kind: Kind, mesh: Mesh) -> Part:
         pose = np.array([*entry["pos"], *entry["quat"]])

@@ -12,7 +12,7 @@ from tightloop import _core, checks
 from tightloop.errors import ArgumentError
 from tightloop.frames import FAULTED
 from tightloop.signatures import checked_calls
-from tightloop.view import cameras, floor, grid
+from tightloop.view import cameras, floor, grid, ground
 from tightloop.view.arguments import check_camera, check_contacts
 from tightloop.view.cameras import Camera
 from tightloop.view.contact_marks import WORLDS_MAX, contact_marks
@@ -35,6 +35,8 @@ _FORCE_SCALE = 0.01
 _POINT_PART, _FORCE_PART = 0.05, 0.02
 _WIDTH_MIN, _WIDTH_MAX = 1.5, 12.0
 _FOV = 0.6
+# How far shadows on a height field reach around the camera's target, as a fraction of its distance.
+_GROUND_PART = 0.7
 
 
 @checked_calls
@@ -83,11 +85,12 @@ class Picture:
         # a floor is drawn as infinite; a slope is drawn as its mesh
         self._floors = [part for part in own if floor.is_floor(part)]
         self._parts = [part for part in own if not floor.is_floor(part)]
+        self._ground = ground.extent(self._parts)
         self._framing = Framing(self._parts, self._subject)
         numbers: dict[int, int] = {}
         for part in self._parts:
             if id(part.mesh) not in numbers:
-                numbers[id(part.mesh)] = self._add(part.mesh)
+                numbers[id(part.mesh)] = self._add(part.mesh, flat=part.shape == "hfield")
         self._meshes = np.array([numbers[id(part.mesh)] for part in self._parts], np.uint32)
         self._bodies = np.array([part.body for part in self._parts], np.intp)
         self._poses = np.array([part.pose for part in self._parts], float).reshape(-1, 7)
@@ -112,7 +115,8 @@ class Picture:
         Args:
             shown: A frame with ``body_q``. With ``status``, faulted worlds are red. With ``contact_count``,
                 ``contact_pos`` and ``contact_force``, contacts are drawn.
-            worlds: How many worlds are drawn on a grid, the first ones; or a list of them. All if left out.
+            worlds: How many worlds are drawn on a grid, the first ones; or a list of them. All if left out. With a
+                height field wider than 4 m they are drawn in place, on one ground.
             camera: A preset, ``"three-quarter"``, ``"front"``, ``"side"``, ``"top"`` or ``"follow"``, which follows
                 ``world``; or a `Camera`. If left out, it follows a single world whose robot floats, and else is
                 ``"three-quarter"``.
@@ -149,6 +153,13 @@ class Picture:
         faulted = np.asarray(_field(shown, "status", np.zeros(len(body_q), int)))[chosen] & FAULTED
         tints = np.where(faulted[:, None, None] > 0, _RED, _PLAIN).astype(np.uint8)
         tints = np.repeat(tints, len(self._parts), axis=1).reshape(-1, 4)
+        if self._ground is not None:
+            # all worlds have one ground, which is drawn once and in its own colour
+            still = self._bodies < 0
+            tints[: len(still)][still] = _PLAIN
+            kept = np.tile(~still, len(chosen))
+            kept[: len(still)] = True
+            meshes, poses, tints = meshes[kept], poses[kept], tints[kept]
         layers = [(meshes, poses, tints, np.ones(len(meshes), np.float32))]
         if ghost is not None:
             layers.append(self._ghost(np.asarray(ghost, float), offsets[place]))
@@ -173,11 +184,12 @@ class Picture:
             *lines,
         )
 
-    def _add(self, mesh: Mesh) -> int:
+    def _add(self, mesh: Mesh, *, flat: bool = False) -> int:
         return self._renderer.add(
             np.ascontiguousarray(mesh.vertices, np.float32),
             np.ascontiguousarray(mesh.faces, np.uint32),
             np.ascontiguousarray(mesh.colors, np.uint8),
+            flat,
         )
 
     def _chosen(self, worlds: int | Sequence[int] | None, there: int) -> NDArray[np.intp]:
@@ -202,8 +214,8 @@ class Picture:
             first = next((world for world in chosen if np.isfinite(body_q[world]).all()), None)
             # do not keep a box of worlds that are not finite
             box = grid.extent(() if first is None else self._parts, body_q[0 if first is None else first])
-            offsets = grid.offsets(len(chosen), box).astype(float)
-            height = floor.height(self._floors, box)
+            offsets = grid.offsets(len(chosen), box, in_place=self._ground is not None).astype(float)
+            height = floor.height(self._floors, box, self._ground)
             if first is None:
                 return box, offsets, height
             self._stands[key] = box, offsets, height
@@ -271,8 +283,12 @@ class Picture:
             given if isinstance(given, Camera) else self._preset(given, box, body_q[chosen], chosen, place, aims=aims)
         )
         middle = whole.mean(axis=0)
-        size = float(np.linalg.norm(whole[1] - whole[0])) / 2
-        return view, (float(middle[0]), float(middle[1]), float(middle[2]), max(1.6 * size, 1e-3))
+        reach = 0.8 * float(np.linalg.norm(whole[1] - whole[0]))
+        if self._ground is not None:
+            # worlds are anywhere on it, and what is around them has shadows too
+            middle = np.array(view.target)
+            reach = max(reach, _GROUND_PART * float(np.linalg.norm(np.subtract(view.position, view.target))))
+        return view, (float(middle[0]), float(middle[1]), float(middle[2]), max(reach, 1e-3))
 
     def _preset(
         self, name: str, box: Array, body_q: Array, chosen: NDArray[np.intp], place: int, *, aims: Array
@@ -290,7 +306,8 @@ class Picture:
                 # do not keep a camera of worlds that are not finite
                 return cameras.camera(name, box + places.mean(axis=0), aspect=aspect, fov=_FOV)
             first = np.zeros(3) if centre is None else centre
-            self._cameras[key] = cameras.camera(name, points, aspect=aspect, fov=_FOV), first
+            view = cameras.camera(name, points, aspect=aspect, fov=_FOV, ground=self._ground is not None)
+            self._cameras[key] = view, first
         view, first = self._cameras[key]
         if follows and centre is not None:
             view = cameras.shifted(view, centre - first)

@@ -11,7 +11,7 @@ import viser
 from numpy.typing import NDArray
 
 from tightloop.frames import FAULTED
-from tightloop.view import grid
+from tightloop.view import grid, ground
 from tightloop.view.batched_meshes import BatchedMesh, batched_meshes
 from tightloop.view.display_options import DisplayOptions
 from tightloop.view.floor import is_floor
@@ -63,11 +63,21 @@ class WorldMeshes:
         self._options = options
         self.framing = Framing(parts.of("visual") or parts.of("collision"), parts.subject)
         self.box = grid.extent(parts, first)
-        self.offsets = grid.offsets(worlds, self.box)
-        self._batches = {
-            kind: self._batches_of(kind, [part for part in parts if part.kind == kind and not is_floor(part)])
-            for kind in ("visual", "collision")
-        }
+        #: Bounding box of the height field that all worlds share [m], shape ``(2, 3)``, or None.
+        self.ground = ground.extent(parts)
+        self.offsets = grid.offsets(worlds, self.box, in_place=self.ground is not None)
+        seen: dict[str, list[Part]] = {"visual": [], "collision": [], "field": []}
+        for part in parts:
+            if not is_floor(part):
+                seen[part.kind].append(part)
+        # a large field looks as it touches, mostly: browsers then get it once
+        for part in [part for part in seen["visual"] if ground.is_ground(part)]:
+            twins = [other for other in seen["collision"] if other.mesh is part.mesh and other.name == part.name]
+            if twins:
+                seen["visual"].remove(part)
+                seen["collision"].remove(twins[0])
+                seen["field"].append(part)
+        self._batches = {kind: self._batches_of(kind, own) for kind, own in seen.items()}
 
     def points(self, body_q: Array, world: int | None = None) -> NDArray[np.float64]:
         """Return points around the robots and free bodies on the grid [m], shape ``(n, 3)``.
@@ -93,7 +103,8 @@ class WorldMeshes:
                     np.zeros((1, 3)),
                     batched_colors=_light(np.array([mesh.color[:3]])),
                     opacity=None if mesh.color[3] == 255 else mesh.color[3] / 255,
-                    lod="off" if fine else "auto",
+                    lod="off" if fine or mesh.flat else "auto",
+                    flat_shading=mesh.flat,
                     # the browser compares shadows with the faces that are seen from behind where there are any, so that
                     # a closed mesh does not shadow itself; a floor would
                     side="front" if mesh.closed else "double",
@@ -111,7 +122,9 @@ class WorldMeshes:
 
             @batch.handle.on_click
             def _(event: Any, batch: _Batch = batch) -> None:
-                if found := _found(batch, event.instance_index):
+                found = _found(batch, event.instance_index)
+                # ground that all worlds share belongs to none of them
+                if found and (found[1] >= 0 or self.ground is None):
                     click(*found)
 
     def on_drag(self, callback: OnDrag) -> None:
@@ -139,8 +152,13 @@ class WorldMeshes:
         frozen = tuple(world for world in shown if status[world] & FAULTED)
         for kind, batches in self._batches.items():
             for batch in batches:
-                batch.handle.visible = kind == self._options.kind
-                if kind == self._options.kind:
+                visible = batch.handle.visible = kind in (self._options.kind, "field")
+                if not visible:
+                    continue
+                if self.ground is not None and -1 in batch.mesh.bodies:
+                    _move(batch, body_q, (0,), self.offsets)
+                    _tint(batch, (0,), ())
+                else:
                     _move(batch, body_q, shown, self.offsets)
                     _tint(batch, shown, frozen)
 
