@@ -115,6 +115,21 @@ def test_a_model_of_mujoco_is_the_robot_alone(tmp_path: Path) -> None:
     np.testing.assert_allclose(rebuilt.model.body_inertia, direct.model.body_inertia, rtol=1e-9)
 
 
+def test_what_follows_a_robot_in_its_file_is_no_matter(tmp_path: Path) -> None:
+    file = tmp_path / "dog.urdf"
+    file.write_bytes(QUADRUPED.read_bytes() + b"\n\x00")
+    assert QuadrupedVelocityFlat(model=file).robot.mass == pytest.approx(14.68)
+
+
+def test_ball_joints_are_no_joints_of_the_action() -> None:
+    own = spec()
+    for joint in own.joints:
+        joint.type = mujoco.mjtJoint.mjJNT_BALL if joint.name.endswith("_hip") else joint.type
+        joint.limited = False
+    robot = QuadrupedVelocityFlat(model=own).robot
+    assert len(robot.joints) == 8, "thighs and calves are legs of their own"
+
+
 def test_options_replace_what_is_found() -> None:
     task = QuadrupedVelocityFlat(
         model=QUADRUPED,

@@ -105,8 +105,8 @@ class Skeleton:
         self.joints = [known[name.removeprefix(prefix)] for name in dofs if name.removeprefix(prefix) in known]
         self._coords = [coords.index(prefix + joint.name) for joint in self.joints]
         self._dofs = [dofs.index(prefix + joint.name) for joint in self.joints]
-        self._start = np.zeros(len(coords))
-        self._start[6] = 1.0
+        # quaternions of the base and of ball joints
+        self._start = np.array([float(name.endswith(".qw")) for name in coords])
         for place, name in enumerate(coords):
             self._start[place] = source.start.get(name.removeprefix(prefix), self._start[place])
         jacobian = self._dynamics.body_jacobian(self._start)

@@ -42,7 +42,9 @@ def source(path: Path) -> Source:
 def _masses(path: Path) -> dict[str, tuple[float, Array]]:
     """Mass and centre of mass of each link."""
     found = {}
-    for link in ElementTree.parse(path).getroot().iter("link"):
+    data, end = path.read_bytes(), b"</robot>"
+    # some files go on after their robot
+    for link in ElementTree.fromstring(data[: data.rindex(end) + len(end)]).iter("link"):
         mass, origin = link.find("inertial/mass"), link.find("inertial/origin")
         place = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
         if mass is not None:
