@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ SETTLING, STANDING = 50, 250
 
 def check_stands(file: Path) -> None:
     """Check that a quadruped stands in its pose under actions of 0, from random starts."""
-    env = VectorEnv("QuadrupedVelocityFlat", 4, model=file, pushes=0.0, threads=1)
+    env: Any = VectorEnv("QuadrupedVelocityFlat", 4, model=file, pushes=0.0, threads=1)
     try:
         obs, _ = env.reset(seed=0)
         task, robot = env.task, env.task.robot
@@ -32,7 +33,7 @@ def check_stands(file: Path) -> None:
 
 def check_starts(file: Path) -> None:
     """Check that a humanoid starts on its feet and is told in finite numbers until it falls."""
-    env = VectorEnv("HumanoidVelocityFlat", 4, model=file, pushes=0.0, threads=1)
+    env: Any = VectorEnv("HumanoidVelocityFlat", 4, model=file, pushes=0.0, threads=1)
     try:
         obs, _ = env.reset(seed=0)
         soles = np.abs(env.task.foot_heights(np, env.evaluation.worlds)).max()

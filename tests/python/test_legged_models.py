@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import gymnasium
-import mujoco
 import numpy as np
 import pytest
 
@@ -17,6 +17,8 @@ from tightloop.tasks.humanoid import HumanoidVelocityFlat
 from tightloop.tasks.quadruped import ROBOT, QuadrupedVelocityFlat
 from tightloop.tasks.quadruped_rough import QuadrupedVelocityRough
 
+#: Without types.
+mujoco: Any = import_module("mujoco")
 ANT = Path(gymnasium.__file__).parent / "envs/mujoco/assets/ant.xml"
 FEET = ("FL_foot", "FR_foot", "RL_foot", "RR_foot")
 
