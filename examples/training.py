@@ -63,6 +63,8 @@ def draw(curve: list[dict[str, float]], title: str, path: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
+    # the terms of the reward are in the table
+    names = [name for name in names if not name.startswith("return/")]
     figure, axes = plt.subplots(1, len(names), figsize=(4 * len(names), 3), constrained_layout=True, squeeze=False)
     minutes = [row["seconds"] / 60 for row in curve]
     for axis, name in zip(axes[0], names, strict=True):

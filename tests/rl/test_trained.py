@@ -25,6 +25,7 @@ MARKS = {
     "FrankaPushCube": ("success", 0.9),
     "FrankaPickCube": ("success", 0.8),
     "QuadrupedVelocityFlat": ("velocity_error", 0.15),
+    "HumanoidVelocityFlat": ("velocity_error", 0.15),
     "Ant-v5": ("return", 3000.0),
 }
 

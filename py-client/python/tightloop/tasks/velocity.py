@@ -8,7 +8,7 @@ Rewards and rates follow legged_gym (Rudin et al. 2022, arXiv 2109.11978).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -138,6 +138,10 @@ class VelocityTask(Task):
         """Return random starts of a robot that the scene does not place."""
         joint_q = self.robot.start(draws)
         return {} if joint_q is None else {"joint_q": joint_q}
+
+    def policy_metadata(self) -> Mapping[str, Any]:
+        """Return what a policy's file says of its command and gait."""
+        return {"command_names": ("ahead_mps", "left_mps", "turn_radps"), "gait_hz": self.gait}
 
     def goal(self, xp: Namespace, worlds: Worlds, draws: Array) -> Array:
         """Return the next command: ahead, left, turn; or to stand."""
