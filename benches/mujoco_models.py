@@ -60,14 +60,14 @@ State = dict[str, NDArray[Any]]
 class Mjbatch:
     """mjbatch, in a process of its own. `ask` names a method of benches/mjbatch_side.py."""
 
-    def __init__(self) -> None:
+    def __init__(self, side: str = "mjbatch_side.py") -> None:
         python = ENVIRONMENT / "bin/python"
         if not python.exists():
             print(f"installing mjbatch into {ENVIRONMENT.relative_to(REPOSITORY)}", flush=True)
             venv.create(ENVIRONMENT, with_pip=True)
             subprocess.run([python, "-m", "pip", "install", "--quiet", "-r", REQUIREMENTS], check=True)
-        side = REPOSITORY / "benches/mjbatch_side.py"
-        self._process = subprocess.Popen([python, side], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        program = REPOSITORY / "benches" / side
+        self._process = subprocess.Popen([python, program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.versions = self._answer()
 
     def _answer(self) -> dict[str, Any]:

@@ -33,10 +33,11 @@ class Side:
         model.jnt_solref[:] = np.load(solref)
         self.actions, self.count = np.load(actions), 0
         self.limits = model.jnt_range[1:].T
-        # derived fields are those of the state, as in tightloop's frames
-        self.batch = Batch(model, worlds, num_threads=1, forward=True)
-        names = ("qpos", "qvel", "ctrl", "site_xpos", "qfrc_actuator")
-        self.qpos, self.qvel, self.ctrl, self.sites, self.torque = (self.batch.bind(name) for name in names)
+        # heights of feet are those one physics step before, as mj_step leaves them
+        self.batch = Batch(model, worlds, num_threads=1)
+        names = ("qpos", "qvel", "ctrl", "xpos", "qfrc_actuator")
+        self.qpos, self.qvel, self.ctrl, self.places, self.torque = (self.batch.bind(name) for name in names)
+        self.feet = [model.body(f"{leg}_foot").id for leg in ("FL", "FR", "RL", "RR")]
         self.rng = np.random.default_rng(0)
         self.last, self.phase, self.age = np.zeros((worlds, 12)), np.zeros(worlds), np.zeros(worlds, int)
         self.command = np.zeros((worlds, 3))
@@ -80,7 +81,7 @@ class Side:
         self.phase = (self.phase + 2.0 * np.pi * GAIT * CONTROL_DT) * self.command.any(axis=1)
         swing = np.sin(self.phase)
         lift = SWING * np.maximum(np.stack([swing, -swing], 1), 0.0)[:, GROUPS]
-        feet = self.sites[:, :, 2] - RADIUS - lift
+        feet = self.places[:, self.feet, 2] - RADIUS - lift
         turned, torque = self.qpos[:, 7:] - STANDING, self.torque[:, 6:]
         off, turn = self.command[:, :2] - velocity[:, :2], self.command[:, 2] - turning[:, 2]
         fell = (gravity[:, 2] > -0.5) | (self.qpos[:, 2] < 0.15)

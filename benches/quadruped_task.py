@@ -17,16 +17,15 @@ import tempfile
 import time
 from pathlib import Path
 
-import mujoco
 import numpy as np
 from mujoco_models import Mjbatch
 from record import REPOSITORY, print_table, write_results
 
 import tightloop as tl
-from tightloop.env import VectorEnv
+from tightloop.env import VectorEnv, policy_metadata
 
 sys.path.append(str(REPOSITORY / "examples"))
-from sim2sim import mujoco_model  # noqa: E402  (found by the line above)
+from sim2sim import Facts, mujoco_model, mujoco_spec
 
 TASK, ASKED = "QuadrupedVelocityFlat", 15.0
 WORLDS = (2048, 256)  # of tightloop and of mjbatch, each where it is fastest
@@ -66,13 +65,15 @@ def main() -> int:
     os.sched_setaffinity(0, {given.core})
     rng = np.random.default_rng(0)
     actions = [SPREAD * rng.standard_normal((ACTIONS, worlds, 12)).astype(np.float32) for worlds in WORLDS]
-    model, peer = mujoco_model(), Mjbatch("quadruped_peer.py")
+    ours, peer = Ours(actions[0]), Mjbatch("quadruped_peer.py")
+    facts = Facts(Path(TASK), policy_metadata(ours.env))
     with tempfile.TemporaryDirectory() as folder:
-        files = {name: str(Path(folder) / name) for name in ("model.mjb", "actions.npy")}
-        mujoco.mj_saveModel(model, files["model.mjb"])
-        np.save(files["actions.npy"], actions[1])
-        peer.ask("start", model=files["model.mjb"], actions=files["actions.npy"], worlds=WORLDS[1])
-    ours = Ours(actions[0])
+        files = {name: str(Path(folder) / name) for name in ("xml", "solref", "actions")}
+        Path(files["xml"]).write_text(mujoco_spec(tl.assets.QUADRUPED, facts).to_xml())
+        np.save(files["solref"], mujoco_model(tl.assets.QUADRUPED, facts).jnt_solref)
+        np.save(files["actions"], actions[1])
+        suffixed = {name: file if name == "xml" else f"{file}.npy" for name, file in files.items()}
+        peer.ask("start", worlds=WORLDS[1], **suffixed)
     rates: dict[str, list[list[float]]] = {"tightloop": [], "mjbatch": []}
     for count in range(given.rounds + 1):
         seconds = MEASURED_S if count else SETTLED_S
@@ -98,14 +99,14 @@ def main() -> int:
             }
         )
     print_table(rows)
-    facts = {
+    head = {
         "command": f"python benches/quadruped_task.py --rounds {given.rounds}",
         "cores": 1,
         "load_1_minute": f"{os.getloadavg()[0]:.1f}",
         "tightloop": tl.__version__,
         **peer.versions,
     }
-    write_results("quadruped_task", rows, facts)
+    write_results("quadruped_task", rows, head)
     return 0
 
 

@@ -59,7 +59,7 @@ class Facts:
         return float(self.numbers(name)[0])
 
 
-def mujoco_model(robot: Path, facts: Facts) -> mujoco.MjModel:
+def mujoco_spec(robot: Path, facts: Facts) -> mujoco.MjSpec:
     """The robot on flat ground, with the drives and the time step of the metadata."""
     text = robot.read_text()
     head = text.index(">", text.index("<robot")) + 1
@@ -80,7 +80,12 @@ def mujoco_model(robot: Path, facts: Facts) -> mujoco.MjModel:
     option = spec.option
     option.timestep, option.integrator = facts.number("dt"), mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.iterations, option.tolerance = 20, 1e-8
-    model = spec.compile()
+    return spec
+
+
+def mujoco_model(robot: Path, facts: Facts) -> mujoco.MjModel:
+    """The same, with the joint limits of tightloop."""
+    model = mujoco_spec(robot, facts).compile()
     flexibility = model.dof_invweight0[model.jnt_dofadr] * (1 - IMPEDANCE_MAX)
     limited = model.jnt_limited.astype(bool)
     model.jnt_solref[limited, 0] = (2 / (LIMIT_KD * flexibility))[limited]
