@@ -215,6 +215,7 @@ class Trainer:
         self.statistics = Statistics(config.num_envs)
         self.films = Films(task, Path(folder), config.film_every, config.threads)
         self.seconds, self.steps = 0.0, 0
+        self.levels: NDArray[np.int32] | None = None  # of the curriculum, at the last checkpoint
         self.curve: list[dict[str, float]] = []
 
     def _seen(self, obs: NDArray[np.float32], infos: dict[str, Any]) -> tuple[Tensor, Tensor]:
@@ -224,7 +225,8 @@ class Trainer:
 
     def begin(self) -> tuple[Tensor, Tensor]:
         """Start episodes that no other seed has, and no part of the run before; their ends are spread."""
-        obs, infos = self.envs.reset(seed=(self.seed << 40) + (len(self.curve) << 24))
+        options = None if self.levels is None else {"level": self.levels}
+        obs, infos = self.envs.reset(seed=(self.seed << 40) + (len(self.curve) << 24), options=options)
         if self.envs.max_episode_steps is not None:
             spread = np.random.default_rng(len(self.curve))
             self.envs.elapsed = spread.integers(0, self.envs.max_episode_steps, self.config.num_envs)
@@ -362,6 +364,7 @@ class Trainer:
                     shown, learning = self.steps if config.total else self.seconds, None
                     found = evaluate(self.task, self.act, threads=config.threads)
                     self.curve.append({**found, "seconds": self.seconds, "steps": self.steps})
+                    self.levels = self.envs.level
                     self.save()
                     bar.set_postfix(told(found) | {"steps": f"{self.steps:,}"})
                     report(self.task, f"{self.seconds:.0f} of {60 * config.minutes:.0f} s, {self.steps:,} steps", found)
@@ -388,6 +391,7 @@ class Trainer:
             "seconds": self.seconds,
             "steps": self.steps,
             "curve": self.curve,
+            "levels": None if self.levels is None else torch.from_numpy(self.levels),
         }
         with whole_file(self.folder / "checkpoint.pt") as part:
             torch.save(state, part)
@@ -403,6 +407,8 @@ class Trainer:
         for generator, random in zip((self.noise, self.shuffle), state["random"], strict=True):
             generator.set_state(random)
         self.seconds, self.steps, self.curve = (state["seconds"], state["steps"], state["curve"])
+        levels = state.get("levels")
+        self.levels = None if levels is None else levels.numpy()
 
     def export(self) -> Path:
         """Write the policy as ONNX with its metadata: ``obs`` (worlds, size) in, ``action`` (worlds, actions) out."""

@@ -222,6 +222,14 @@ def test_a_task_chooses_where_episodes_start_by_level(mode: str) -> None:
         assert len(np.unique(np.concatenate([starts[:, 0] for starts in seen]))) == len(seen) * WORLDS
         again, _ = envs.reset(seed=5)
         np.testing.assert_array_equal(again, seen[0], "a seed repeats its levels and draws")
+        assert envs.level.tolist() == first.tolist()
+        given = np.arange(WORLDS) % 3
+        chosen, _ = envs.reset(seed=5, options={"level": given})
+        np.testing.assert_array_equal(np.floor(chosen[:, 0] / 0.5), given)
+        assert envs.level.tolist() == given.tolist()
+        for wrong in (given[1:], given - 1, given + 0.5, "hard"):
+            with pytest.raises(tl.errors.ArgumentError, match=r"options, level: .* give whole numbers"):
+                envs.reset(options={"level": wrong})
         alone: Any = VectorEnv(Placed, 1)
         own, _ = alone.reset(seed=5 + 3)
         alone.close()

@@ -43,6 +43,22 @@ class Starts:
         _core.draw(seeds[rows], np.zeros(len(rows), np.uint32), _LEVELS, 1, draws)
         self._next[rows] = (draws[:, 0] * self._first_levels).astype(np.int32)
 
+    def choose(self, mask: NDArray[np.bool_], options: Mapping[str, Any] | None) -> None:
+        """Take the levels of the options of a reset, if they have any.
+
+        Raises:
+            ArgumentError: They are no whole numbers of at least 0, one per world.
+        """
+        if not options or "level" not in options:
+            return
+        level = np.asarray(options["level"])
+        if level.shape != mask.shape or level.dtype.kind not in "iu" or (level < 0).any():
+            raise ArgumentError(
+                f"reset: options, level: got {level.dtype} of shape {level.shape}; give whole numbers of at least 0, "
+                f"shape {mask.shape}"
+            )
+        self._next[mask] = level[mask]
+
     def end(self, ended: NDArray[np.bool_], evaluation: Evaluation) -> None:
         """Ask the task for the next levels of worlds whose episode ends.
 

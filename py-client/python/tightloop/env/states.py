@@ -15,6 +15,7 @@ from tightloop.signatures import checked_calls
 if TYPE_CHECKING:
     from tightloop.env.evaluation import Evaluation
     from tightloop.env.memory import Memory
+    from tightloop.env.starts import Starts
     from tightloop.env.task import Task
     from tightloop.sim import Sim
 
@@ -28,9 +29,15 @@ class SettableState:
     num_envs: int
     evaluation: Evaluation
     _memory: Memory
+    _starts: Starts
     _ready: bool
     _failed: bool
     _in_flight: bool
+
+    @property
+    def level(self) -> NDArray[np.int32]:
+        """Curriculum level of each world's episode, shape ``(num_envs,)``; a copy."""
+        return self._starts.level.copy()
 
     def set_state(self, qpos: ArrayLike, qvel: ArrayLike, *, mask: NDArray[np.bool_] | None = None) -> None:
         """Set positions and velocities of worlds, as `Task.states_of` defines them: for MuJoCo models as MuJoCo does.

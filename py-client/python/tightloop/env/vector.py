@@ -214,7 +214,8 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
             seed: World i gets the seed ``seed + i``. Or a list with one seed per world, None for a random one. If left
                 out, worlds start their next episode; the first reset draws random seeds.
             options: ``{"reset_mask": mask}``, a bool array of shape ``(num_envs,)`` with at least one True. Other
-                worlds and their observations do not change.
+                worlds and their observations do not change. ``{"level": level}`` begins at these curriculum levels,
+                int, shape ``(num_envs,)``.
 
         Returns:
             Observations, shape ``(num_envs, size)``, and a dict, which is empty without privileged observations.
@@ -229,6 +230,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         seeds = self._episodes.seed(seed, mask, self.np_random)
         if seeds is not None:
             self._starts.seed(mask, seeds)
+        self._starts.choose(mask, options)
         with self._all_or_none():
             self._begin(mask, seeds)
             self.evaluation.terms.begin(mask)
@@ -470,8 +472,8 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         return self._ring.next()
 
     def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
-        check_options(options, ("reset_mask",))
-        if not options:
+        check_options(options, ("reset_mask", "level"))
+        if not options or "reset_mask" not in options:
             return self._all
         mask = options["reset_mask"]
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):

@@ -80,7 +80,7 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
         pushes: float | None = None,
         kinds: Sequence[str] = KINDS,
         level: int | None = None,
-        first_levels: int = 3,
+        first_levels: int = 5,
         *,
         model: Model | None = None,
         standing: Mapping[str, float] | None = None,
@@ -146,8 +146,9 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
         """Return levels by how far robots walked."""
         own = worlds.memory
         fell = self.terminated(xp, worlds)
-        up = ~fell & (own["walked"] > 0.75 * own["told"]) & (own["farthest"] > FAR)
-        down = fell | (own["walked"] < 0.4 * own["told"])
+        up = ~fell & (own["walked"] > 0.7 * own["told"]) & (own["farthest"] > FAR)
+        # an episode that was cut short tells little
+        down = fell | ((own["told"] > FAR) & (own["walked"] < 0.4 * own["told"]))
         level = np.maximum(worlds.level + up - (down & ~up), 0)
         # digits of a place that no one chose
         anywhere = (np.abs(worlds.joint_q[:, 0]) * 997.0 % 1.0 * LEVELS).astype(level.dtype)
