@@ -12,7 +12,7 @@
 //! angle. MuJoCo keeps one point per prism and 50 per pair; a shape that lies flat on a triangle has up to four here, and a pair
 //! keeps eight ([`FIELD_CONTACTS`]).
 
-use super::field_samples::Samples;
+use super::field_samples::{Cells, Samples};
 use super::narrow::{Shape, ShapePair, ShapePose};
 use super::points::{Points, Room};
 use super::prism::Prism;
@@ -168,19 +168,6 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
         };
         let mut out = points_of::<C>(cx, t, p, center, origin);
         let mut found = candidates(cx, t.memory.field_candidates, &out);
-        let zero = cx.at(0);
-        let most = cx.index(t.fields.cells, p, 0, t.fields.cells_max + 1);
-        // worlds lie over different cells and prisms: each lists its own first, so that the block visits as many as one world has
-        let (high_cells, table) = (t.memory.field_cells, t.memory.field_prisms);
-        let mut high = cx.list(high_cells.rows);
-        span!(cx, k in zero, most, {
-            let number = cx.number(k);
-            break_if!(cx, !(number + C::F::c(0.5)).lt(count));
-            let top = samples.top_of_cell(cx, &cells, number);
-            push!(cx, high, (-half[2]).lt(top), row, {
-                cx.init(high_cells, row, 0, number);
-            });
-        });
         let body = Body {
             size: shapes.a.half_extents(),
             axes: &axes,
@@ -188,21 +175,8 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
             lowest: -half[2],
             margin,
         };
-        let mut listed = cx.list(FIELD_CANDIDATES);
-        each!(cx, at in high, {
-            let cell = cx.load(high_cells, at, 0);
-            let first = cell + cell;
-            let [left, right] = samples.prisms_of_cell(cx, &cells, cell, size);
-            // a loop over the two is not unrolled
-            let is_near = body.is_near::<N>(&left);
-            push!(cx, listed, is_near, row, {
-                cx.init(table, row, 0, first);
-            });
-            let is_near = body.is_near::<N>(&right);
-            push!(cx, listed, is_near, row, {
-                cx.init(table, row, 0, first + C::F::c(1.0));
-            });
-        });
+        let listed = near_prisms::<C, N>(cx, t, p, (&samples, &cells, size), &body);
+        let table = t.memory.field_prisms;
         each!(cx, at in listed, {
             let number = cx.load(table, at, 0);
             let prism = samples.prism(cx, &cells, number, size);
@@ -214,6 +188,48 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
         out.room.leave_out(cx, over);
         keep(cx, &found, size, &mut out);
     });
+}
+
+/// Lists the prisms that a shape may touch. `ground` has the samples, the cells under the shape, and a bound of its radius.
+///
+/// Worlds lie over different cells and prisms: each lists its own first, so that the block visits as many as one world has.
+#[inline(always)]
+fn near_prisms<C: Cx, N: FieldNarrow>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    p: C::I,
+    (samples, cells, size): (&Samples<C::F>, &Cells<C::F>, C::F),
+    body: &Body<C::F>,
+) -> C::List {
+    let zero = cx.at(0);
+    let most = cx.index(t.fields.cells, p, 0, t.fields.cells_max + 1);
+    let count = cells.count();
+    let (high_cells, table) = (t.memory.field_cells, t.memory.field_prisms);
+    let mut high = cx.list(high_cells.rows);
+    span!(cx, k in zero, most, {
+        let number = cx.number(k);
+        break_if!(cx, !(number + C::F::c(0.5)).lt(count));
+        let top = samples.top_of_cell(cx, cells, number);
+        push!(cx, high, body.lowest.lt(top), row, {
+            cx.init(high_cells, row, 0, number);
+        });
+    });
+    let mut listed = cx.list(FIELD_CANDIDATES);
+    each!(cx, at in high, {
+        let cell = cx.load(high_cells, at, 0);
+        let first = cell + cell;
+        let [left, right] = samples.prisms_of_cell(cx, cells, cell, size);
+        // a loop over the two is not unrolled
+        let is_near = body.is_near::<N>(&left);
+        push!(cx, listed, is_near, row, {
+            cx.init(table, row, 0, first);
+        });
+        let is_near = body.is_near::<N>(&right);
+        push!(cx, listed, is_near, row, {
+            cx.init(table, row, 0, first + C::F::c(1.0));
+        });
+    });
+    listed
 }
 
 /// An empty list of candidates for contacts of a pair whose first shape is not the field.
