@@ -376,6 +376,7 @@ ENV_LEFT = {
     "AutoresetMode": "gymnasium's",
     "Mirror": "environments check it; test_task_features.py tries wrong ones",
     "Names": "environments make it",
+    "policy_metadata": "its argument is an environment; test_policy_metadata.py tries others",
     "Task": "users derive from it; test_env_tasks.py tries wrong ones",
     "Worlds": "environments make it",
 }

@@ -109,3 +109,9 @@ def test_an_entry_that_is_no_text_is_refused(metadata: Callable[..., dict[str, s
 
     with pytest.raises(tl.ArgumentError, match=r"Own.policy_metadata: gait is \{'hz': 2.5\}; give a text, a number"):
         metadata(Own)
+
+
+@pytest.mark.parametrize("envs", [3, None, "CartPoleBalance", CartPoleBalance])
+def test_what_is_no_environment_is_refused(envs: Any) -> None:
+    with pytest.raises(tl.ArgumentError, match=r"policy_metadata: envs is .*; give a tightloop.env.VectorEnv"):
+        policy_metadata(envs)

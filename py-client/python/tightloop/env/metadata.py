@@ -19,7 +19,7 @@ from tightloop.env.commands import Commands
 from tightloop.env.controls import Control
 from tightloop.env.names import Names
 from tightloop.env.registry import controls_of, name_of
-from tightloop.env.task import observed_parts
+from tightloop.env.task import Task, observed_parts
 from tightloop.env.task_checks import scene_of
 from tightloop.env.vector import VectorEnv
 from tightloop.errors import ArgumentError
@@ -36,8 +36,11 @@ def policy_metadata(envs: VectorEnv) -> dict[str, str]:
         envs: An environment of the task.
 
     Raises:
-        ArgumentError: A value of `Task.policy_metadata` is neither text nor a number nor a list of these.
+        ArgumentError: ``envs`` is no `VectorEnv`, or a value of `Task.policy_metadata` is neither text nor a number nor
+            a list of these.
     """
+    if not isinstance(getattr(envs, "task", None), Task):
+        raise ArgumentError(f"policy_metadata: envs is {envs!r:.80}; give a tightloop.env.VectorEnv")
     # controls are bound below, and those of the environment must stay as they are
     task = copy.deepcopy(envs.task)
     scene, names = scene_of(task), Names(envs.sim.info)

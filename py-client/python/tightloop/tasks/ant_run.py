@@ -98,7 +98,7 @@ class AntRun(Task):
         self._standing = np.array(STANDING, np.float32)
 
     def remember(self, xp: Namespace, worlds: Worlds, memory: Mapping[str, Array] | None) -> Mapping[str, Array]:
-        """Return gravity and x axis in the torso's axes, and the mean velocity along x."""
+        """Return velocities, gravity and x axis in the torso's axes, the distance along x [m], and the time [s]."""
         quats = worlds.joint_q[:, 3:7]
         now = worlds.joint_qd[:, 0]
         if memory is None:
@@ -107,6 +107,8 @@ class AntRun(Task):
             distance, time = memory["distance"] + CONTROL_DT * now, memory["time"] + CONTROL_DT
         along = xp.stack([0.0 * now + 1.0, 0.0 * now, 0.0 * now], 1)
         return {
+            "velocity": rotate_inverse(xp, quats, worlds.joint_qd[:, 0:3]),
+            "turning": rotate_inverse(xp, quats, worlds.joint_qd[:, 3:6]),
             "gravity": projected_gravity(xp, quats),
             "ahead": rotate_inverse(xp, quats, along)[:, :2],
             "distance": distance,
@@ -115,11 +117,11 @@ class AntRun(Task):
 
     def observe(self, xp: Namespace, worlds: Worlds) -> Sequence[Array]:
         """Return the parts of the table of the module."""
-        own, quats = worlds.memory, worlds.joint_q[:, 3:7]
-        velocity, turning = (rotate_inverse(xp, quats, worlds.joint_qd[:, part]) for part in (slice(0, 3), slice(3, 6)))
+        own = worlds.memory
         turned = worlds.joint_q[:, self._joints] - xp.asarray(self._standing)
         moving = worlds.joint_qd[:, self._dofs]
-        return worlds.joint_q[:, 2], own["gravity"], own["ahead"], velocity, turning, turned, moving, worlds.action
+        motion = own["gravity"], own["ahead"], own["velocity"], own["turning"]
+        return worlds.joint_q[:, 2], *motion, turned, moving, worlds.action
 
     def reward_terms(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
         """Return the terms, before their weights."""

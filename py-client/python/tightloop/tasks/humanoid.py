@@ -30,7 +30,6 @@ import numpy as np
 from tightloop.assets import HUMANOID
 from tightloop.env.names import Names
 from tightloop.env.task import Array, Namespace, Worlds
-from tightloop.tasks.geometry import squares
 from tightloop.tasks.legged import ByJoint, LeggedRobot, RobotOptions
 from tightloop.tasks.velocity import CONTROL_DT, VelocityTask, columns
 
@@ -143,11 +142,9 @@ class HumanoidVelocityFlat(VelocityTask):
     def bind(self, names: Names) -> None:
         """Look up the joints and feet."""
         super().bind(names)
-        robot, pose = self.robot, dict(zip(self.robot.joints, self.robot.standing, strict=True))
-        self._quiet = [names.coord(f"{robot.name}/{joint}") for joint in robot.quiet]
-        self._quiet_standing = np.array([pose[joint] for joint in robot.quiet], np.float32)
+        self._quiet = np.array([joint in self.robot.quiet for joint in self.robot.joints], np.float32)
 
     def reward_terms(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
         """Return the terms, before their weights."""
-        off = columns(xp, worlds.joint_q, self._quiet) - xp.asarray(self._quiet_standing)
-        return {**super().reward_terms(xp, worlds), "upper body": squares(xp, off)}
+        off = columns(xp, worlds.joint_q, self._joints) - xp.asarray(self._standing)
+        return {**super().reward_terms(xp, worlds), "upper body": xp.vecdot(off * xp.asarray(self._quiet), off)}

@@ -181,7 +181,7 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
 
     def observe(self, xp: Namespace, worlds: Worlds) -> Sequence[Array]:
         """Return the parts of the table of the module."""
-        return [*super().observe(xp, worlds), worlds.height_scan[:, self._grid] - self.robot.height]
+        return *super().observe(xp, worlds), worlds.height_scan[:, self._grid] - self.robot.height
 
     def terminated(self, xp: Namespace, worlds: Worlds) -> Array:
         """Return which robots fell, or left the field."""
