@@ -1,6 +1,6 @@
 """Proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347) in one file, made for the zero-copy loop.
 
-    pip install matplotlib onnxscript tensorboard torch tqdm
+    pip install matplotlib onnx onnxscript tensorboard torch tqdm
     python examples/ppo.py FrankaReach --seed 0
 
 Observations are read where the environment puts them, a ring of slots; each is copied once, into the rollout. What
@@ -36,7 +36,6 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import numpy as np
 from numpy.typing import NDArray
-from policy_file import attach
 from training import draw, needed, report
 from training_log import Films, Log, Statistics
 
@@ -45,9 +44,10 @@ from tightloop.env import AutoresetMode, VectorEnv, policy_metadata
 from tightloop.env.mirror import MirrorColumns
 from tightloop.whole_files import whole_file
 
-# torch needs onnxscript only at the end, for the policy's file
-with needed("matplotlib", "onnxscript", "tensorboard", "torch", "tqdm"):
+# onnx and onnxscript are needed only at the end, for the policy's file
+with needed("matplotlib", "onnx", "onnxscript", "tensorboard", "torch", "tqdm"):
     import torch
+    from policy_file import attach
     from torch import Tensor, nn
     from tqdm import tqdm
 

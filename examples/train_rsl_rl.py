@@ -1,6 +1,6 @@
 """Train a policy with rsl_rl's PPO.
 
-    pip install onnxscript rsl-rl-lib torch tqdm
+    pip install onnx onnxscript rsl-rl-lib torch tqdm
     python examples/train_rsl_rl.py CartPoleSwingUp --seed 0
 
 In ``out/rsl_rl/TASK-SEED`` it leaves ``model.pt`` for `OnPolicyRunner.load` and the policy as ``policy.onnx``
@@ -15,16 +15,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from policy_file import attach
 from training import command_line, needed, report
 
 from evaluation import evaluate, told
 from tightloop.env import policy_metadata
 from tightloop.whole_files import whole_file
 
-# torch needs onnxscript only at the end, for the policy's file
-with needed("onnxscript", "rsl_rl", "torch", "tqdm"):
+# onnx and onnxscript are needed only at the end, for the policy's file
+with needed("onnx", "onnxscript", "rsl_rl", "torch", "tqdm"):
     import torch
+    from policy_file import attach
     from rsl_rl.runners import OnPolicyRunner
     from tqdm import tqdm
 

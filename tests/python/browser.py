@@ -51,6 +51,8 @@ class View:
         self.scene_width = width - PANEL_WIDTH
         self.page.set_default_timeout(PATIENCE_SECONDS * 1000)
         self.errors: list[str] = []
+        # everything that the console said, for whoever looks into an error
+        self.console: list[str] = []
         self.page.on("console", lambda said: self._hear(said.type, said.text))
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         # viser would lower its resolution while it is slow, and pictures could not be compared
@@ -58,6 +60,7 @@ class View:
         self.wait(lambda: "world" in self.text, "the panel shows text")
 
     def _hear(self, kind: str, text: str) -> None:
+        self.console.append(f"{kind}: {text}")
         if kind == "error" and text != _OF_VISER:
             self.errors.append(text)
 

@@ -39,9 +39,9 @@ LIBRARIES = {
     "evaluation.py": "onnxruntime",
     "play.py": "matplotlib onnxruntime",
     "policy_file.py": "onnx",
-    "ppo.py": "matplotlib onnxscript tensorboard torch tqdm",
+    "ppo.py": "matplotlib onnx onnxscript tensorboard torch tqdm",
     "sim2sim.py": "mujoco onnxruntime",
-    "train_rsl_rl.py": "onnxscript rsl-rl-lib torch tqdm",
+    "train_rsl_rl.py": "onnx onnxscript rsl-rl-lib torch tqdm",
     "train_sb3.py": "stable-baselines3 torch tqdm",
     "train_skrl.py": "skrl torch tqdm",
 }

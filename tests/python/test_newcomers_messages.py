@@ -66,7 +66,7 @@ sim.picture(camera="left")                                | camera is 'left'; gi
 sim.picture(size=640)                                     | size is 640; give width and height
 sim.picture(frame=frame.joint_q)                          | picture: frame is .*give a frame
 envs.reset(seed=[1])                                      | seed has 1 entries for 2 environments
-envs.reset(options={"mask": [True, False]})               | 'mask', which is unknown; there are: reset_mask
+envs.reset(options={"mask": [True, False]})               | 'mask', which is unknown; there are: level, reset_mask
 envs.reset(options={"reset_mask": [1, 0]})                | reset_mask: give .*bool
 single.reset(seed=-1)                                     | seed is -1; give
 # shapes, dtypes and units

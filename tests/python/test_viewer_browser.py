@@ -42,7 +42,8 @@ def look(browser) -> Iterator[Callable[..., View]]:
     yield at
     for view in views:
         view.page.close()
-    assert [error for view in views for error in view.errors] == []
+    for view in views:
+        assert view.errors == [], "\n".join(view.console)
 
 
 @pytest.fixture

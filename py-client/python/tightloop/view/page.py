@@ -109,6 +109,10 @@ class Page:
         """Update the panel's text without a new frame."""
         self._panel.update(self._shown, new=False)
 
+    def hide_controls(self) -> None:
+        """Hide the panel's controls and text, beside the last picture."""
+        self._panel.hide()
+
     def show(self, shown: Any, *, new: bool) -> None:
         """Send a frame to the browsers."""
         body_q, world = np.asarray(shown.body_q), self.options.world

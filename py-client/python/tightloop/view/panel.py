@@ -67,20 +67,21 @@ class Panel:
         self.strength = 1.0
         self._gui.set_panel_label(f"tightloop · {info['name']}")
         self._text = self._gui.add_markdown("")
-        with self._gui.add_folder("Time"):
+        self._folders: list[viser.GuiFolderHandle] = []
+        with self._folder("Time"):
             self._add_time()
-        with self._gui.add_folder("Look"):
+        with self._folder("Look"):
             self._add_display(aim, preset)
         self._sliders = None
         if isinstance(driver, LiveDriver):
-            with self._gui.add_folder("Joint targets", expand_by_default=0 < len(driven) <= _OPEN_JOINTS):
+            with self._folder("Joint targets", expanded=0 < len(driven) <= _OPEN_JOINTS):
                 self._sliders = Sliders(self._gui, driven, driver, options, worlds)
-            with self._gui.add_folder("Push", expand_by_default=False):
+            with self._folder("Push", expanded=False):
                 self._add_push(driver)
-        with self._gui.add_folder("Plots", expand_by_default=False):
+        with self._folder("Plots", expanded=False):
             self._add_plots()
         if notes:
-            with self._gui.add_folder("Notes", expand_by_default=False):
+            with self._folder("Notes", expanded=False):
                 self._gui.add_markdown("\n".join(f"- {note}" for note in notes))
 
     @property
@@ -117,9 +118,18 @@ class Panel:
         for plot in self._plots:
             plot.draw()
 
+    def hide(self) -> None:
+        """Hide the controls; a browser that is slow may still get updates of those that are removed."""
+        for part in (self._text, *self._folders):
+            part.visible = False
+
     def follow(self, world: int) -> None:
         """Follow another world, for example after a click on it."""
         self._world.value = world
+
+    def _folder(self, name: str, *, expanded: bool = True) -> viser.GuiFolderHandle:
+        self._folders.append(self._gui.add_folder(name, expand_by_default=expanded))
+        return self._folders[-1]
 
     def _text_of(self, shown: Any, taken: int | None, now: float) -> str:
         world, driver = self._options.world, self._driver

@@ -131,15 +131,18 @@ class Server:
         """Report on the page that the daemon went away, and wait for another of its name."""
         if self._stream is not None:
             self._stream.close()
-        self._stream = self._page = None
         self._reported = ""
         self._report(
             "Daemon lost", f"{lost}\n\nThis page goes on when a daemon of the name `{self._target}` is started."
         )
+        self._stream = self._page = None
 
     def _report(self, title: str, text: str) -> None:
-        """Replace the controls by a message, beside the last picture."""
-        self._viser.gui.reset()
+        """Show a message in place of the controls, beside the last picture."""
+        if self._page is not None:
+            self._page.hide_controls()
+        else:
+            self._viser.gui.reset()
         self._viser.gui.set_panel_label(f"tightloop · {self._target} · {title.lower()}")
         self._viser.gui.add_markdown(f"## {title}\n{text}")
         for client in self._viser.get_clients().values():
