@@ -84,9 +84,11 @@ class View:
         while True:
             self.page.wait_for_timeout(500)
             now = self.shot()
-            if differing(before, now) == 0 and len(np.unique(now.reshape(-1, 3), axis=0)) > 100:
+            moved, colours = differing(before, now), len(np.unique(now.reshape(-1, 3), axis=0))
+            if moved == 0 and colours > 100:
                 return self.shot(name)
-            assert time.monotonic() < deadline, "the page does not come to rest"
+            resting = f"the page does not come to rest: {moved} pixels differ, there are {colours} colours"
+            assert time.monotonic() < deadline, resting
             before = now
 
     @property

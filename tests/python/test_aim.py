@@ -73,3 +73,28 @@ def test_a_browser_that_answers_late_did_not_move_its_camera() -> None:
         client.camera.position, client.camera.look_at = (np.array(part) for part in late[max(step - 3, 0)])
         aim.keep(away(min(0.02 * step, 7.98 / 1.5)))
     assert sees(client, away(5.32))
+
+
+def test_a_browser_that_still_reports_the_camera_before_the_aim_did_not_move_it() -> None:
+    client = browser()
+    before, aim = (client.camera.position, client.camera.look_at), Aim(client)
+    for _ in range(2):  # once when it connects, once when the page is made
+        aim.point(camera("three-quarter", CUBE, aspect=1.5))
+    for step in range(400):
+        reported = client.camera.position, client.camera.look_at
+        if step < 20:
+            client.camera.position, client.camera.look_at = (np.array(part) for part in before)
+        else:
+            client.camera.position, client.camera.look_at = (np.array(part) for part in reported)
+        aim.keep(away(min(0.02 * step, 7.98 / 1.5)))
+    assert sees(client, away(5.32))
+
+
+def test_a_report_between_a_position_and_its_target_is_no_move_of_the_user() -> None:
+    client, aim = aimed()
+    for step in range(400):
+        before = client.camera.position
+        aim.keep(away(min(0.02 * step, 7.98 / 1.5)))
+        if step % 5 == 4:
+            client.camera.position = before
+    assert sees(client, away(5.32))

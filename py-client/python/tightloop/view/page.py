@@ -65,7 +65,7 @@ class Page:
         self._preset = "follow" if self._floats and stream.worlds == 1 else "three-quarter"
         self.options.follow = self._preset == "follow"
         self._aims: dict[int, Aim] = {}
-        self._kept_at = 0.0
+        self._kept_at, self._at_rest = 0.0, False
         self._panel = Panel(
             server, stream, self.options, driven=self._driven, aim=self.aim, notes=notes, preset=self._preset
         )
@@ -103,6 +103,7 @@ class Page:
             self.show(self._shown, new=shown is not None)
         else:
             self.update_text()
+        self._move_cameras(new=shown is not None)
         return None if shown is None else self._stream.came
 
     def update_text(self) -> None:
@@ -125,10 +126,6 @@ class Page:
             held = self._spring
             self._overlay.show_drag(None if held is None else held.ends, world if held is None else held.world)
             self._panel.update(shown, new=new)
-        if self.options.follow:
-            self._follow(body_q[world])
-        elif self._floats and new:
-            self._keep(body_q)
 
     def aim(self, preset: str) -> None:
         """Point the cameras of all browsers."""
@@ -140,9 +137,18 @@ class Page:
         """Point the camera of one browser, for example when it connects."""
         world = self.options.world if self._preset == "follow" else None
         points = self._world_meshes.points(np.asarray(self._shown.body_q), world)
-        aim = self._aims[client.client_id] = Aim(client)
+        aim, self._at_rest = self._aims.setdefault(client.client_id, Aim(client)), False
         ground = self._world_meshes.ground is not None
         aim.point(camera(self._preset, points, aspect=client.camera.aspect, ground=ground))
+
+    def _move_cameras(self, *, new: bool) -> None:
+        """Move the cameras with robots that move, also after their last frame until they are where they belong."""
+        body_q = np.asarray(self._shown.body_q)
+        self._at_rest = self._at_rest and not new
+        if self.options.follow:
+            self._follow(body_q[self.options.world])
+        elif self._floats and not self._at_rest:
+            self._keep(body_q)
 
     def _keep(self, body_q: Array) -> None:
         """Re-aim the cameras at robots that walk out of the picture, unless users have moved them."""
@@ -154,8 +160,7 @@ class Page:
         self._aims = {number: aim for number, aim in self._aims.items() if number in clients}
         if self._aims:
             points = self._world_meshes.points(body_q, None)
-            for aim in self._aims.values():
-                aim.keep(points)
+            self._at_rest = not any([aim.keep(points) for aim in self._aims.values()])
 
     def _follow(self, body_q: Array) -> None:
         """Move the cameras with the mean position of the followed world's robot."""
