@@ -96,7 +96,7 @@ PRESETS = {
         60.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=60.0
     ),
     "QuadrupedVelocityFlat": Config(5.0, 2048, 16, epochs=4, gamma=0.97, kl=0.02, std=0.7, evaluate=60.0),
-    "QuadrupedVelocityRough": Config(60.0, 2048, 16, epochs=4, gamma=0.98, kl=0.02, std=0.7, evaluate=120.0),
+    "QuadrupedVelocityRough": Config(60.0, 1024, 24, epochs=4, gamma=0.98, kl=0.02, std=0.7, evaluate=120.0),
     "HumanoidVelocityFlat": Config(60.0, 2048, 16, epochs=4, gamma=0.98, kl=0.02, std=0.7, evaluate=120.0),
     "AntRun": Config(5.0, 1024, 16, epochs=4, kl=0.02, std=0.6, evaluate=60.0),
     "Ant-v5": Config(10.0, 1024, 16, epochs=4, kl=0.02, std=0.4, reward_scale=0.02, evaluate=60.0),

@@ -90,7 +90,15 @@ def lift(world: World) -> Told:
 
 
 def walking(
-    world: World, *, standing: Vector, soles: Vector, pairs: Sequence[int], swing: float, height: float, lowest: float
+    world: World,
+    *,
+    standing: Vector,
+    soles: Vector,
+    pairs: Sequence[int],
+    swing: float,
+    height: float,
+    lowest: float,
+    nearest: Vector | None = None,
 ) -> tuple[list[float], dict[str, float], bool]:
     """Observation, terms of the reward and fall that the velocity tasks have in common; heights over the ground."""
     q, qd, action, command, phase = (world[name] for name in ("joint_q", "joint_qd", "action", "goal", "phase"))
@@ -100,6 +108,10 @@ def walking(
     turned = q[7:] - standing
     lift = [swing * max(0.0, math.sin(phase)), swing * max(0.0, -math.sin(phase))]
     feet = [sole - lift[pair] for sole, pair in zip(soles, pairs, strict=True)]
+    if nearest is not None:  # soles above the highest ground around them
+        swings = [lift[pair] > 1e-3 for pair in pairs]
+        lacks = [max(0.0, lift[pair] - sole) for sole, pair in zip(nearest, pairs, strict=True)]
+        feet = [lack if swung else sole for swung, lack, sole in zip(swings, lacks, soles, strict=True)]
     fell = gravity[2] > -0.5 or height < lowest
     terms = {
         "velocity": math.exp(-4 * math.dist(command[:2], velocity[:2]) ** 2),
@@ -136,10 +148,11 @@ def quadruped(world: World) -> Told:
 
 
 def quadruped_rough(world: World) -> Told:
-    """As on flat ground, with heights over the ground below: 13 x 7 rays under the trunk, and one under each foot."""
+    """As on flat ground, with heights over the ground below: 13 x 7 rays under the trunk, 3 x 3 about each foot."""
     scan = world["height_scan"]
-    soles = [height - 0.02 for height in scan[91:]]
-    obs, terms, fell = walking(world, soles=soles, swing=0.1, height=scan[45], **TROT)
+    feet = [[height - 0.02 for height in scan[first : first + 9]] for first in range(91, 127, 9)]
+    soles, nearest = [foot[4] for foot in feet], [min(foot) for foot in feet]
+    obs, terms, fell = walking(world, soles=soles, nearest=nearest, swing=0.08, height=scan[45], **TROT)
     reward = weighed(
         terms, velocity=1.5, turn=0.75, bounce=-0.25, rate=-0.05, tilt=-0.5, torque=-2e-4, action=-0.01, gait=1.0,
         pose=-0.05, fall=-50.0,

@@ -43,6 +43,8 @@ LEVELS = 10
 TILE, CELL, BORDER = 8.0, 0.05, 6.0  # [m]
 PLACE_DRAWS = 3
 RAYS, SPACING = (13, 7), 0.1  # [–, m]
+FOOT_RAYS, FOOT_AROUND = (3, 3), 0.16  # under a foot [–, m]
+LEAST_LIFT = 1e-3  # of a foot that swings; the sine of a half turn is not quite 0 [m]
 AROUND = 0.5  # robots start this far about the middle of a tile, at most [m]
 STRAIGHT = 0.6  # share of the commands without a turn
 FAR = 0.4 * TILE  # a robot that went up a level was this far from its start [m]
@@ -67,7 +69,7 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
     goal_draws = 5
     goal_steps = 500
     initial_draws = PLACE_DRAWS
-    swing = 0.1
+    swing = 0.08
     reward_weights: Mapping[str, float] = {
         **QuadrupedVelocityFlat.reward_weights,
         "bounce": -0.25 * CONTROL_DT,
@@ -108,7 +110,10 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
         size = tuple((count - 1) * SPACING for count in RAYS)
         scans = [scene.add_height_scan(body=self.robot.body, size=size, shape=RAYS)]
         for link, place in self.robot.feet.values():
-            scans.append(scene.add_height_scan(body=f"{self.robot.name}/{link}", pos=place, shape=(1, 1)))
+            around = (FOOT_AROUND, FOOT_AROUND)
+            scans.append(
+                scene.add_height_scan(body=f"{self.robot.name}/{link}", pos=place, size=around, shape=FOOT_RAYS)
+            )
         self._rays = [scan.rays for scan in scans]
         return scene
 
@@ -173,7 +178,21 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
 
     def foot_heights(self, xp: Namespace, worlds: Worlds) -> Array:
         """Return how high the soles are above the ground [m], shape ``(worlds, feet)``."""
-        return worlds.height_scan[:, self._under_feet] - self.robot.radius
+        return self._soles(xp, worlds)[:, :, FOOT_RAYS[0] * FOOT_RAYS[1] // 2]
+
+    def gait_errors(self, xp: Namespace, worlds: Worlds, lift: Array) -> Array:
+        """Return how high standing feet are, and how much swinging ones lack above the highest ground around them [m].
+
+        A foot that swings over the edge of a step may so be as high as it has to.
+        """
+        soles = self._soles(xp, worlds)
+        lacking = xp.maximum(lift - xp.min(soles, axis=2), 0.0 * lift)
+        return xp.where(lift > LEAST_LIFT, lacking, soles[:, :, FOOT_RAYS[0] * FOOT_RAYS[1] // 2])
+
+    def _soles(self, xp: Namespace, worlds: Worlds) -> Array:
+        """Heights of soles above the ground under and around them [m], shape ``(worlds, feet, rays)``."""
+        heights = worlds.height_scan[:, self._under_feet] - self.robot.radius
+        return xp.reshape(heights, (len(heights), len(self.robot.feet), -1))
 
     def base_height(self, xp: Namespace, worlds: Worlds) -> Array:
         """Return how high the trunk is above the ground [m], shape ``(worlds,)``."""

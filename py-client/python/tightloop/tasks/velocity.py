@@ -153,6 +153,16 @@ class VelocityTask(Task):
         """Return how high the soles are above the ground [m], shape ``(worlds, feet)``."""
         return getattr(worlds, self._sites)[:, self._feet, 2] - self.robot.radius
 
+    def gait_errors(self, xp: Namespace, worlds: Worlds, lift: Array) -> Array:
+        """Return how far soles are from the heights of their gait [m], shape ``(worlds, feet)``.
+
+        Args:
+            xp: Array namespace.
+            worlds: The worlds.
+            lift: Heights of the gait above the ground [m], shape ``(worlds, feet)``; 0 for feet that stand.
+        """
+        return self.foot_heights(xp, worlds) - lift
+
     def base_height(self, xp: Namespace, worlds: Worlds) -> Array:
         """Return how high the base is above the ground [m], shape ``(worlds,)``."""
         return worlds.joint_q[:, 2]
@@ -170,7 +180,7 @@ class VelocityTask(Task):
             phase = (memory["phase"] + 2.0 * np.pi * self.gait * CONTROL_DT) * (squares(xp, worlds.goal) > 0.0)
         swing = xp.sin(phase)
         lift = self.swing * xp.stack([xp.maximum(swing, 0.0 * swing), xp.maximum(-swing, 0.0 * swing)], 1)
-        feet = self.foot_heights(xp, worlds) - lift[:, self.robot.groups]
+        feet = self.gait_errors(xp, worlds, lift[:, self.robot.groups])
         return {
             "velocity": velocity,
             "turning": turning,
