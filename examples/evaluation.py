@@ -45,6 +45,11 @@ def with_unit(name: str) -> str:
     return f"{name}_{UNITS[name]}" if name in UNITS else name
 
 
+def options_of(task: str) -> dict[str, Any]:
+    """How a task is made for evaluations, by its name, with or without ``tightloop/`` and ``-v0``."""
+    return OPTIONS.get(task.removeprefix("tightloop/").removesuffix("-v0"), {})
+
+
 def episodes(
     task: str, act: Callable[[NDArray[np.float32]], NDArray[Any]], *, threads: int, seed: int = SEED
 ) -> dict[str, NDArray[Any]]:
@@ -60,7 +65,7 @@ def episodes(
         Values of each world by name: ``return``, the sum of the rewards; and at the end of the episode, where the task
         defines them, ``success`` and the metrics of the task, such as ``error``, the distance from the goal [m].
     """
-    env = VectorEnv(task, WORLDS, autoreset_mode=AutoresetMode.SAME_STEP, threads=threads, **OPTIONS.get(task, {}))
+    env = VectorEnv(task, WORLDS, autoreset_mode=AutoresetMode.SAME_STEP, threads=threads, **options_of(task))
     returns, going, last = np.zeros(WORLDS), np.ones(WORLDS, bool), {}
     try:
         obs, _ = env.reset(seed=seed)
@@ -129,14 +134,21 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=1, help="most threads of the simulation (default 1)")
     args = parser.parse_args()
     means: dict[str, list[float]] = {}
+    tasks: set[str] = set()
     for run in args.runs:
         file = run / "policy.onnx" if run.is_dir() else run
         if not file.is_file():
             raise SystemExit(f"there is no policy {file}; give folders of runs that are over, or ONNX files")
-        policy = onnxruntime.InferenceSession(file, providers=["CPUExecutionProvider"])
+        try:
+            policy = onnxruntime.InferenceSession(file, providers=["CPUExecutionProvider"])
+        except Exception as problem:  # its errors have no common base
+            raise SystemExit(f"{file} is no policy as ONNX: {problem}") from None
         task = args.task or policy.get_modelmeta().custom_metadata_map.get("task")
         if task is None:
             raise SystemExit(f"{file} has no metadata; name its task by --task")
+        if tasks and task not in tasks:
+            raise SystemExit(f"{file} is a policy of {task}, and those before are of {tasks.pop()}")
+        tasks.add(task)
 
         def act(obs: NDArray[np.float32], policy: Any = policy) -> NDArray[Any]:
             return policy.run(["action"], {"obs": obs.astype(np.float32)})[0]
@@ -147,7 +159,9 @@ def main() -> None:
             means.setdefault(name, []).append(float(values.mean()))
     if len(args.runs) > 1:
         of_runs = {name: np.array(values) for name, values in means.items()}
-        print(f"mean of {len(args.runs)} runs: {told_with_intervals(of_runs)}")
+        # what only some runs report has no interval over all
+        shared = {name: values for name, values in of_runs.items() if len(values) == len(args.runs)}
+        print(f"mean of {len(args.runs)} runs: {told_with_intervals(shared)}")
 
 
 if __name__ == "__main__":

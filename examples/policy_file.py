@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from training import needed
 
@@ -21,25 +22,78 @@ from tightloop.whole_files import whole_file
 
 with needed("onnx"):
     import onnx
+    from google.protobuf.message import DecodeError
+
+
+if TYPE_CHECKING:
+    from torch import nn
+
+NORMALIZATION = "observation_normalization"  # how the graph takes observations, which no task says
+
+
+def export(policy: nn.Module, inputs: int, path: Path, metadata: Mapping[str, str]) -> None:
+    """Write a policy as ONNX: ``obs`` (worlds, inputs) in, ``action`` (worlds, actions) out.
+
+    Args:
+        policy: The policy, on the processor; it normalizes observations itself.
+        inputs: Numbers of an observation.
+        path: The file.
+        metadata: Texts by name, as `policy_metadata` returns them.
+    """
+    import torch
+
+    with whole_file(path) as part:
+        torch.onnx.export(
+            policy.eval(),
+            (torch.zeros(2, inputs),),
+            part,
+            input_names=["obs"],
+            output_names=["action"],
+            dynamic_shapes=({0: torch.export.Dim("worlds")},),
+            verbose=False,
+            external_data=False,
+        )
+    attach(path, {**metadata, NORMALIZATION: "in the graph"})
 
 
 def attach(path: Path, metadata: Mapping[str, str]) -> None:
-    """Write metadata into an ONNX file; entries of other names stay.
+    """Write metadata into an ONNX file, in place of what it has; only its normalization stays.
 
     Args:
         path: The file.
         metadata: Texts by name, as `policy_metadata` returns them.
+
+    Raises:
+        SystemExit: The policy takes or gives numbers of other sizes.
     """
-    model = onnx.load(path)
-    known = {entry.key: entry.value for entry in model.metadata_props}
+    model = loaded(path)
+    known = {entry.key: entry.value for entry in model.metadata_props if entry.key == NORMALIZATION}
+    for name, tensor in (("observation_low", model.graph.input[0]), ("action_low", model.graph.output[0])):
+        own, size = tensor.type.tensor_type.shape.dim[-1].dim_value, len(metadata[name].split(","))
+        if own != size:
+            raise SystemExit(f"{path}: {tensor.name} has {own} numbers, and the task has {size}: name its own task")
     onnx.helper.set_model_props(model, {**known, **metadata})
     with whole_file(path) as part:
         onnx.save(model, part)
 
 
+def loaded(path: Path) -> onnx.ModelProto:
+    """Return the model of a file.
+
+    Raises:
+        SystemExit: It is missing, or no ONNX file.
+    """
+    try:
+        return onnx.load(path)
+    except FileNotFoundError:
+        raise SystemExit(f"there is no file {path}") from None
+    except (OSError, DecodeError) as problem:
+        raise SystemExit(f"{path} is no policy as ONNX: {problem}") from None
+
+
 def read(path: Path) -> dict[str, str]:
     """Return the metadata of an ONNX file: texts by name."""
-    return {entry.key: entry.value for entry in onnx.load(path).metadata_props}
+    return {entry.key: entry.value for entry in loaded(path).metadata_props}
 
 
 def main() -> None:

@@ -47,7 +47,7 @@ from tightloop.whole_files import whole_file
 # onnx and onnxscript are needed only at the end, for the policy's file
 with needed("matplotlib", "onnx", "onnxscript", "tensorboard", "torch", "tqdm"):
     import torch
-    from policy_file import attach
+    from policy_file import export
     from torch import Tensor, nn
     from tqdm import tqdm
 
@@ -408,25 +408,13 @@ class Trainer:
             generator.set_state(random)
         self.seconds, self.steps, self.curve = (state["seconds"], state["steps"], state["curve"])
         levels = state.get("levels")
-        self.levels = None if levels is None else levels.numpy()
+        # worlds of another number draw their levels anew
+        self.levels = None if levels is None or len(levels) != self.config.num_envs else levels.numpy()
 
     def export(self) -> Path:
         """Write the policy as ONNX with its metadata: ``obs`` (worlds, size) in, ``action`` (worlds, actions) out."""
         path = self.folder / "policy.onnx"
-        agent, obs = (self.agent.cpu().eval(), torch.zeros(2, *self.envs.single_observation_space.shape))
-        shapes = {"obs": {0: torch.export.Dim("worlds")}}
-        with whole_file(path) as part:
-            torch.onnx.export(
-                agent,
-                (obs,),
-                part,
-                input_names=["obs"],
-                output_names=["action"],
-                dynamic_shapes=shapes,
-                verbose=False,
-                external_data=False,
-            )
-        attach(path, policy_metadata(self.envs) | {"observation_normalization": "in the graph"})
+        export(self.agent.cpu(), self.envs.single_observation_space.shape[0], path, policy_metadata(self.envs))
         return path
 
     def close(self) -> None:
@@ -464,7 +452,7 @@ def main() -> None:
         if args.resume and (folder / "checkpoint.pt").exists():
             trainer.resume()
             print(f"goes on after {trainer.seconds:.0f} s and {trainer.steps:,} steps")
-        with Log(folder, asdict(config), wandb=args.wandb) as log:
+        with Log(folder, asdict(config), wandb=args.wandb, resumed=trainer.steps > 0) as log:
             trainer.run(log)
         end = trainer.curve[-1]
         title = f"{args.task}, seed {args.seed}: {end['steps'] / 1e6:.1f} M steps, {config.threads} threads"

@@ -24,7 +24,7 @@ from tightloop.whole_files import whole_file
 # onnx and onnxscript are needed only at the end, for the policy's file
 with needed("onnx", "onnxscript", "rsl_rl", "torch", "tqdm"):
     import torch
-    from policy_file import attach
+    from policy_file import export
     from rsl_rl.runners import OnPolicyRunner
     from tqdm import tqdm
 
@@ -112,8 +112,9 @@ def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> d
                 report(task, f"{done + count} of {preset.iterations} iterations", found)
         with whole_file(folder / "model.pt") as part:
             runner.save(str(part))
-        runner.export_policy_to_onnx(str(folder))
-        attach(folder / "policy.onnx", policy_metadata(env.env) | {"observation_normalization": "in the graph"})
+        policy = runner.alg.get_policy().as_onnx(verbose=False).to("cpu")
+        size = env.env.single_observation_space.shape[0]
+        export(policy, size, folder / "policy.onnx", policy_metadata(env.env))
         return found
     finally:
         env.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -57,13 +58,16 @@ class Log:
     on in the same run there.
     """
 
-    def __init__(self, folder: Path, config: Mapping[str, Any] | None = None, *, wandb: bool = False) -> None:
+    def __init__(
+        self, folder: Path, config: Mapping[str, Any] | None = None, *, wandb: bool = False, resumed: bool = False
+    ) -> None:
         """Open the log.
 
         Args:
             folder: Folder of the run, whose name is that of the run.
             config: Numbers of the run.
             wandb: Whether to log to Weights & Biases, too.
+            resumed: Whether the run goes on from a checkpoint.
         """
         from torch.utils.tensorboard import SummaryWriter
 
@@ -72,8 +76,17 @@ class Log:
             import wandb as library
 
             project = os.environ.get("WANDB_PROJECT", "tightloop")
+            # a run that begins anew in the same folder is another one there
+            known = folder / "wandb.txt"
+            if not (resumed and known.exists()):
+                known.write_text(secrets.token_hex(8))
             self._run = library.init(
-                project=project, name=folder.name, id=folder.name, resume="allow", dir=folder, config=dict(config or {})
+                project=project,
+                name=folder.name,
+                id=known.read_text(),
+                resume="allow",
+                dir=folder,
+                config=dict(config or {}),
             )
 
     def write(self, values: Mapping[str, float], steps: int) -> None:
@@ -109,7 +122,7 @@ class Films:
             threads: Most threads that a step of the simulation may use.
         """
         self._task, self._folder, self._spacing, self._threads = task, folder / "films", 60.0 * minutes, threads
-        self._next = self._spacing
+        self._next: float | None = None
 
     def take(self, act: Callable[[NDArray[np.float32]], NDArray[Any]], seconds: float, steps: int) -> None:
         """Film, if it is time to.
@@ -119,10 +132,14 @@ class Films:
             seconds: Time since the start of the run.
             steps: Env steps since then, the name of the film.
         """
-        if not self._spacing or seconds < self._next:
+        if not self._spacing:
             return
         # a run that was resumed makes no films of the time before
-        self._next = self._spacing * (seconds // self._spacing + 1.0)
+        due = self._next is not None and seconds >= self._next
+        if due or self._next is None:
+            self._next = self._spacing * (seconds // self._spacing + 1.0)
+        if not due:
+            return
         envs = VectorEnv(self._task, FILMED, threads=self._threads, render_mode="rgb_array")
         try:
             obs, _ = envs.reset(seed=0)

@@ -283,7 +283,7 @@ def _walking(task: Any, arrays: dict[str, Any], near: Any, turned: Any, rng: np.
     if "height_scan" in arrays:
         # under the trunk, and under each foot
         arrays["height_scan"] = near(np.full_like(arrays["height_scan"], task.lowest + 0.1), 0.2)
-        arrays["height_scan"][:, -4:] = near(np.full((count, 4), 0.05), 0.1)
+        arrays["height_scan"][:, -36:] = near(np.full((count, 36), 0.05), 0.1)
     plain = {name: array.astype(np.float32) for name, array in arrays.items()}
     before = dict(task.remember(np, Worlds(**plain), None))
     if "phase" in before:

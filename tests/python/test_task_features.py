@@ -191,6 +191,7 @@ class Placed(CartPoleBalance):
 
     max_episode_steps = 3
     initial_draws = 1
+    levels = 4
     first_levels = 2
 
     def initial_state(self, xp, worlds, draws):
@@ -227,13 +228,40 @@ def test_a_task_chooses_where_episodes_start_by_level(mode: str) -> None:
         chosen, _ = envs.reset(seed=5, options={"level": given})
         np.testing.assert_array_equal(np.floor(chosen[:, 0] / 0.5), given)
         assert envs.level.tolist() == given.tolist()
-        for wrong in (given[1:], given - 1, given + 0.5, "hard"):
-            with pytest.raises(tl.errors.ArgumentError, match=r"options, level: .* give whole numbers"):
-                envs.reset(options={"level": wrong})
+        number = int(given[-1])
+        for wrong in (given[1:], given - 1, given + 0.5, given + 2, given + 2**40, "hard", [[1], [2, 3]]):
+            with pytest.raises(tl.errors.ArgumentError, match=r"options, level: .* give (whole numbers|0 to 3)"):
+                envs.reset(seed=99, options={"level": wrong})
+            np.testing.assert_array_equal(envs.level, given)
+        kept, _ = envs.reset(options={"reset_mask": np.ones(WORLDS, bool), "level": given})
+        assert not (kept == chosen).all() and envs.level[-1] == number, "a refused reset draws nothing"
         alone: Any = VectorEnv(Placed, 1)
         own, _ = alone.reset(seed=5 + 3)
         alone.close()
         np.testing.assert_array_equal(own[0], seen[0][3], "whatever the number of worlds")
+    finally:
+        envs.close()
+
+
+class AtEdge(CartPoleBalance):
+    """Ends its episode without a terminal state where the cart leaves the middle."""
+
+    def truncated(self, xp, worlds):
+        return abs(worlds.joint_q[:, 0]) > 0.05
+
+
+def test_a_task_truncates_episodes() -> None:
+    envs: Any = VectorEnv(AtEdge, WORLDS, autoreset_mode="SAME_STEP")
+    try:
+        envs.reset(seed=1)
+        ended = np.zeros(WORLDS, bool)
+        for _ in range(60):
+            _, _, terminated, truncated, infos = envs.step(np.ones((WORLDS, 1)))
+            cut = truncated & ~terminated
+            if cut.any():
+                assert (np.abs(infos["final_obs"][cut, 0]) > 0.05).all()
+            ended |= cut
+        assert ended.all()
     finally:
         envs.close()
 

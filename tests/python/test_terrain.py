@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -202,6 +203,12 @@ def test_a_saved_scene_has_its_field_and_its_scan(tmp_path: Path) -> None:
 def test_wrong_elevations_and_sizes_are_named(message: str, elevation: np.ndarray, size: tuple) -> None:
     with pytest.raises(tl.SceneError, match=message):
         tl.Scene().add_hfield(elevation, size=size)
+
+
+@pytest.mark.parametrize("kinds", [(), None, "rough", ("rough", "sea")])
+def test_wrong_kinds_are_named(kinds: Any) -> None:
+    with pytest.raises(tl.SceneError, match="terrain: kind"):
+        terrain.mixed(kinds)
 
 
 def test_a_scan_without_ground_is_refused() -> None:

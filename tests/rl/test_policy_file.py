@@ -49,6 +49,36 @@ def test_metadata_is_attached_to_a_policy_without(tmp_path: Path) -> None:
     assert onnx.load(path).graph == model.graph
 
 
+def test_a_policy_of_another_task_or_no_policy_is_named(tmp_path: Path) -> None:
+    path, broken = tmp_path / "policy.onnx", tmp_path / "broken.onnx"
+    shutil.copy(TRAINED / "QuadrupedVelocityFlat.onnx", path)
+    broken.write_text("none")
+    before = path.read_bytes()
+    for file, program, said in (
+        (path, "policy_file.py", "obs has 50 numbers, and the task has"),
+        (broken, "policy_file.py", "is no policy as ONNX"),
+        (tmp_path / "lost.onnx", "policy_file.py", "there is no file"),
+        (broken, "evaluation.py", "is no policy as ONNX"),
+    ):
+        done = run(f"{EXAMPLES}/{program}", str(file), "--task", "FrankaReach")
+        assert done.returncode == 1 and said in done.stderr and "Traceback" not in done.stderr, done.stderr
+    assert path.read_bytes() == before
+
+
+def test_levels_of_an_evaluation_do_not_depend_on_how_the_task_is_named() -> None:
+    code = (
+        "import sys, evaluation as e; act = lambda obs: 0 * obs[:, :12]\n"
+        "[print(sorted(set(e.episodes(name, act, threads=1)['level']))) for name in sys.argv[1:]]"
+    )
+    names = ("QuadrupedVelocityRough", "tightloop/QuadrupedVelocityRough-v0")
+    done = subprocess.run(
+        [sys.executable, "-c", code, *names], cwd=EXAMPLES, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    first, second = done.stdout.splitlines()
+    assert first == second and first.count(",") == 9
+
+
 @pytest.mark.parametrize("path", sorted(TRAINED.glob("*.onnx")), ids=lambda path: path.stem)
 def test_trained_policies_carry_the_metadata_of_their_tasks(path: Path) -> None:
     envs = VectorEnv(path.stem, 1)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop import checks
+from tightloop.errors import SceneError
 from tightloop.shapes import Shape, Surface
 
 if TYPE_CHECKING:
@@ -154,7 +155,8 @@ def mixed(
     """
     levels = checks.integer("terrain: levels", levels)
     width = checks.number("terrain: border", border, least=0.0)
-    kinds = [*kinds]
+    if isinstance(kinds, str) or not isinstance(kinds, Sequence) or not kinds:
+        raise SceneError(f"terrain: kinds is {kinds!r:.80}; give a sequence of at least one of {', '.join(KINDS)}")
     for kind in kinds:
         checks.choice("terrain: kind", kind, KINDS)
     samples, step = _cells(tile, cell)
@@ -233,7 +235,7 @@ def _flat(_size: float, ring: Array, _cell: float, _draws: np.random.Generator) 
 def _rough(size: float, ring: Array, _cell: float, draws: np.random.Generator) -> Array:
     noise = np.pad(draws.uniform(-1.0, 1.0, ring.shape), 1, mode="edge")
     smooth = 0.25 * (noise[:-2, 1:-1] + noise[2:, 1:-1] + noise[1:-1, :-2] + noise[1:-1, 2:])
-    return np.where(ring <= 0.5 * _MIDDLE, 0.0, size * (0.5 * smooth + 0.5 * noise[1:-1, 1:-1]))
+    return np.where(ring <= _MIDDLE, 0.0, size * (0.5 * smooth + 0.5 * noise[1:-1, 1:-1]))
 
 
 def _slopes(size: float, ring: Array, _cell: float, _draws: np.random.Generator) -> Array:

@@ -128,6 +128,12 @@ class Evaluation:
         ended = self._checked("terminated", _BOOL, optional=True)
         np.copyto(out, False if ended is None else ended)
 
+    def truncated(self, out: NDArray[np.bool_]) -> None:
+        """Add the worlds that the task truncates to those that are truncated, shape ``(worlds,)``."""
+        ended = self._checked("truncated", _BOOL, optional=True)
+        if ended is not None:
+            np.logical_or(out, ended, out=out)
+
     def infos(self) -> dict[str, NDArray[Any]]:
         """Return copies of the task's metrics and of ``success``, by name."""
         first = "metrics" not in self._tapes

@@ -18,6 +18,8 @@ from tightloop.sim import Sim
 
 #: Streams of random numbers: of first levels, and of states at the start.
 _LEVELS, _STATES = 1, 2
+#: The last level of tasks that state no number of them.
+_LAST = np.iinfo(np.int32).max
 
 
 class Starts:
@@ -29,6 +31,11 @@ class Starts:
 
     def __init__(self, task: Task, worlds: int) -> None:
         self._task, self._name = task, type(task).__name__
+        self._last = (
+            _LAST
+            if task.levels is None
+            else checks.integer(f"{self._name}: levels", task.levels, error=ArgumentError) - 1
+        )
         self._first_levels = checks.integer(f"{self._name}: first_levels", task.first_levels, error=ArgumentError)
         self._writes = type(task).initial_state is not Task.initial_state
         self._moves = type(task).next_level is not Task.next_level
@@ -43,27 +50,26 @@ class Starts:
         _core.draw(seeds[rows], np.zeros(len(rows), np.uint32), _LEVELS, 1, draws)
         self._next[rows] = (draws[:, 0] * self._first_levels).astype(np.int32)
 
-    def choose(self, mask: NDArray[np.bool_], options: Mapping[str, Any] | None) -> None:
-        """Take the levels of the options of a reset, if they have any.
+    def chosen(self, options: Mapping[str, Any] | None, mask: NDArray[np.bool_]) -> NDArray[Any] | None:
+        """Return the levels of the options of a reset; None if they have none.
 
         Raises:
-            ArgumentError: They are no whole numbers of at least 0, one per world.
+            ArgumentError: They are no levels of the task, one per world.
         """
         if not options or "level" not in options:
-            return
-        level = np.asarray(options["level"])
-        if level.shape != mask.shape or level.dtype.kind not in "iu" or (level < 0).any():
-            raise ArgumentError(
-                f"reset: options, level: got {level.dtype} of shape {level.shape}; give whole numbers of at least 0, "
-                f"shape {mask.shape}"
-            )
-        self._next[mask] = level[mask]
+            return None
+        return self._levels("reset: options, level", options["level"], mask.shape, "give")
+
+    def choose(self, mask: NDArray[np.bool_], level: NDArray[Any] | None) -> None:
+        """Take the levels that `chosen` returned for worlds that begin an episode."""
+        if level is not None:
+            self._next[mask] = level[mask]
 
     def end(self, ended: NDArray[np.bool_], evaluation: Evaluation) -> None:
         """Ask the task for the next levels of worlds whose episode ends.
 
         Raises:
-            ArgumentError: The levels are no whole numbers of at least 0, one per world.
+            ArgumentError: The levels are no levels of the task, one per world.
         """
         if not self._moves or not ended.any():
             return
@@ -71,13 +77,22 @@ class Starts:
         level = self._task.next_level(np, evaluation.worlds.rows(rows))
         if level is None:
             return
-        given = np.asarray(level)
-        if given.shape != rows.shape or given.dtype.kind not in "iu" or (given < 0).any():
+        self._next[rows] = self._levels(f"{self._name}.next_level", level, rows.shape, "return")
+
+    def _levels(self, what: str, level: Any, shape: tuple[int, ...], verb: str) -> NDArray[Any]:
+        """Return levels that were checked."""
+        try:
+            given = np.asarray(level)
+        except ValueError as problem:
+            raise ArgumentError(f"{what}: {problem}; {verb} whole numbers, shape {shape}") from None
+        if given.shape != shape or given.dtype.kind not in "iu":
             raise ArgumentError(
-                f"{self._name}.next_level: got {given.dtype} of shape {given.shape}; return whole numbers of at least "
-                f"0, shape ({len(rows)},)"
+                f"{what}: got {given.dtype} of shape {given.shape}; {verb} whole numbers, shape {shape}"
             )
-        self._next[rows] = given
+        wrong = np.flatnonzero((given < 0) | (given > self._last))
+        if len(wrong):
+            raise ArgumentError(f"{what}: got {given[wrong[0]]} at {wrong[0]}; {verb} 0 to {self._last}")
+        return given
 
     def begin(self, mask: NDArray[np.bool_]) -> None:
         """Set the levels of worlds that begin an episode."""

@@ -156,17 +156,19 @@ _FOREIGN = {
     "is_terminated": "terminated",
     "max_episode_length": "max_episode_steps",
     "rewards": "reward",
+    "is_truncated": "truncated",
     "terminations": "terminated",
+    "truncations": "truncated",
 }
 
 
 class Task:
     """The base class of tasks: a subclass defines scene, controls, observation and reward.
 
-    ``examples/own_task.py`` is an example. `observe`, `reward`, `terminated`, `success`, `metrics` and `goal` are pure
-    functions of arrays, for all worlds at once. They use arithmetic and those functions of the namespace ``xp`` that
-    NumPy and the array API share, so that they also run on arrays of torch and JAX. They have no access to a simulation
-    and draw no random numbers.
+    ``examples/own_task.py`` is an example. `observe`, `reward`, `terminated`, `truncated`, `success`, `metrics` and
+    `goal` are pure functions of arrays, for all worlds at once. They use arithmetic and those functions of the
+    namespace ``xp`` that NumPy and the array API share, so that they also run on arrays of torch and JAX. They have no
+    access to a simulation and draw no random numbers.
 
     Attributes:
         fields: Frame fields that the functions read.
@@ -178,6 +180,7 @@ class Task:
         dtype: Type of observations and rewards, ``numpy.float32`` or ``numpy.float64``.
         reward_weights: Weight of each term that `reward_terms` returns.
         initial_draws: Number of random numbers that `initial_state` takes per world.
+        levels: Number of curriculum levels; None for any number.
         first_levels: Worlds begin at curriculum levels drawn uniformly from 0 to ``first_levels - 1``.
         goal_radius: Radius of the ball that marks a goal in pictures [m], if the first three values of a goal are a
             position; None for no ball.
@@ -199,6 +202,7 @@ class Task:
     goal_radius: ClassVar[float | None] = None
     reward_weights: Mapping[str, float] = {}
     initial_draws: int = 0
+    levels: int | None = None
     first_levels: int = 1
 
     def scene(self) -> Scene:
@@ -240,6 +244,14 @@ class Task:
 
     def terminated(self, xp: Namespace, worlds: Worlds) -> Array | None:
         """Return which worlds are terminated, bool, shape ``(worlds,)``; None if the task never terminates."""
+        return None
+
+    def truncated(self, xp: Namespace, worlds: Worlds) -> Array | None:
+        """Return which worlds end their episode without a terminal state, such as at the edge of a terrain.
+
+        Returns:
+            bool, shape ``(worlds,)``; None if ``max_episode_steps`` alone truncates episodes.
+        """
         return None
 
     def success(self, xp: Namespace, worlds: Worlds) -> Array | None:

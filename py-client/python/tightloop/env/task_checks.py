@@ -25,6 +25,7 @@ _CALLS = {
     "observe": _BY_WORLDS,
     "reward": _BY_WORLDS,
     "terminated": _BY_WORLDS,
+    "truncated": _BY_WORLDS,
     "success": _BY_WORLDS,
     "metrics": _BY_WORLDS,
     "goal": (*_BY_WORLDS, "draws"),

@@ -226,11 +226,12 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         self._check_idle("reset")
         mask = self._mask(options)
         check_seeds(seed, self.num_envs)
+        level = self._starts.chosen(options, mask)
         super().reset(seed=seed if isinstance(seed, int) else None)
         seeds = self._episodes.seed(seed, mask, self.np_random)
         if seeds is not None:
             self._starts.seed(mask, seeds)
-        self._starts.choose(mask, options)
+        self._starts.choose(mask, level)
         with self._all_or_none():
             self._begin(mask, seeds)
             self.evaluation.terms.begin(mask)
@@ -432,6 +433,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
             buffers.truncated[:] = False
         else:
             np.greater_equal(self._episodes.elapsed, self.max_episode_steps, out=buffers.truncated)
+        self.evaluation.truncated(buffers.truncated)
         fault = self._faults(buffers, begun)
         if fault.any():
             failed = fault > 0

@@ -10,8 +10,9 @@ hardest level it begins anywhere.
 | 0–49 | those of `QuadrupedVelocityFlat` | | |
 | 50–140 | depth of the ground below the trunk, less that on level ground; 13 rays along it times 7 across | ±1 | m |
 
-Actions, ends and ``velocity_error`` are those of `QuadrupedVelocityFlat`; heights count from the ground below. Rays are
-10 cm apart. The command changes every ten seconds, and 6 of 10 commands are to go straight on. ``infos`` has the level
+Actions, ends and ``velocity_error`` are those of `QuadrupedVelocityFlat`; heights count from the ground below. At the
+edge of the field an episode is truncated. Feet that swing have to clear the highest ground within 8 cm. Rays are 10 cm
+apart. The command changes every ten seconds, and 6 of 10 commands are to go straight on. ``infos`` has the level
 of each world's episode, ``level``, and the most distance from its start, ``farthest`` [m].
 """
 
@@ -44,6 +45,7 @@ TILE, CELL, BORDER = 8.0, 0.05, 6.0  # [m]
 PLACE_DRAWS = 3
 RAYS, SPACING = (13, 7), 0.1  # [–, m]
 FOOT_RAYS, FOOT_AROUND = (3, 3), 0.16  # under a foot [–, m]
+EDGE = 0.5  # an episode ends this far from the edge of the field [m]
 LEAST_LIFT = 1e-3  # of a foot that swings; the sine of a half turn is not quite 0 [m]
 AROUND = 0.5  # robots start this far about the middle of a tile, at most [m]
 STRAIGHT = 0.6  # share of the commands without a turn
@@ -66,6 +68,7 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
     """
 
     fields = (*QuadrupedVelocityFlat.fields, "height_scan")
+    levels = LEVELS
     goal_draws = 5
     goal_steps = 500
     initial_draws = PLACE_DRAWS
@@ -202,11 +205,11 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
         """Return the parts of the table of the module."""
         return *super().observe(xp, worlds), worlds.height_scan[:, self._grid] - self.robot.height
 
-    def terminated(self, xp: Namespace, worlds: Worlds) -> Array:
-        """Return which robots fell, or left the field."""
-        edges = [0.5 * length - 0.5 for length in self._ground.size]
+    def truncated(self, xp: Namespace, worlds: Worlds) -> Array:
+        """Return which robots come to the edge of the field."""
+        edges = [0.5 * length - EDGE for length in self._ground.size]
         place = abs(worlds.joint_q[:, :2])
-        return super().terminated(xp, worlds) | (place[:, 0] > edges[0]) | (place[:, 1] > edges[1])
+        return (place[:, 0] > edges[0]) | (place[:, 1] > edges[1])
 
     def metrics(self, xp: Namespace, worlds: Worlds) -> Mapping[str, Array]:
         """Return those of flat ground, ``level``, and ``farthest``, the most distance from the start [m]."""
