@@ -275,6 +275,24 @@ elevations differ by up to 15 cm. Both sides use one thread.
             "median_ratio": "ratio",
         },
     ),
+    "quadruped_task": Bench(
+        "A quadruped task, beside mjbatch on one core",
+        """`QuadrupedVelocityFlat` with random actions. mjbatch steps the same robot in MuJoCo C, and NumPy computes the
+task there: observations, rewards, ends and resets. All processes of a side share one core.
+
+- The goal of 15 times is missed. Of our time, about 60 % is physics, and 20 % are resets and observations.
+- Each side has the number of worlds at which it is fastest.
+""",
+        {
+            "side": "side",
+            "environments": "worlds",
+            "env_steps_per_s": "env steps/s",
+            "ratio": "ratio",
+            "asked_ratio": "asked",
+            "env_steps_per_core_s": "env steps per CPU second",
+            "ratio_per_core_s": "ratio per CPU second",
+        },
+    ),
     "groups": Bench(
         "Two groups of worlds and a policy",
         """One environment of 4096 worlds waits for the policy. Two groups of 2048 worlds do not: one steps while NumPy
