@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -146,9 +147,31 @@ def test_options_replace_what_is_found() -> None:
     assert set(stiffness.values()) == {55.0} and scale[:3] == (0.1, 0.3, 0.3)
     assert damping["RL_calf"] == 2.0 and damping["RL_hip"] != 2.0
     assert task.robot.flip is None, "the left thigh is not the right one's mirror image"
-    # without a model they change the task's own robot
-    assert QuadrupedVelocityFlat(stiffness=55.0).robot.stiffness == stiffness
+
+
+def test_options_without_a_model_change_nothing_else_of_the_own_robot() -> None:
     assert QuadrupedVelocityRough().robot is ROBOT
+    assert QuadrupedVelocityFlat(standing={}).robot == ROBOT
+    assert QuadrupedVelocityFlat(scale=0.3).robot == replace(ROBOT, scale=(0.3,) * 12)
+    assert QuadrupedVelocityFlat(stiffness=55.0).robot == replace(ROBOT, stiffness=dict.fromkeys(ROBOT.joints, 55.0))
+    declared, task = HumanoidVelocityFlat(), HumanoidVelocityFlat(damping={".*_knee": 5.0})
+    own: Any = task.robot.damping
+    assert (own["left_knee"], own["left_elbow"], own["waist_yaw"]) == (5.0, 1.5, 4.0)
+    assert replace(task.robot, damping=declared.robot.damping) == declared.robot
+    assert (task.lowest, task.swing, task.pushes) == (declared.lowest, declared.swing, declared.pushes)
+    # a lower pose is a lower base, with the feet as high as before; two links of 0.213 m
+    low = QuadrupedVelocityFlat(standing={".*_thigh": 1.0, ".*_calf": -2.0}).robot
+    assert low.standing == (0.0, 1.0, -2.0) * 4 and low.stiffness == 40.0 and low.flip == ROBOT.flip
+    assert ROBOT.height - low.height == pytest.approx(0.426 * (np.cos(0.8) - np.cos(1.0)), abs=1e-5)
+
+
+@pytest.mark.parametrize("option", ["scale", "stiffness", "damping"])
+@pytest.mark.parametrize("model", [None, QUADRUPED])
+def test_one_sided_options_leave_no_mirror_image(option: str, model: Any) -> None:
+    given: dict[str, Any] = {option: {"FL_.*": 10.0}}
+    assert QuadrupedVelocityFlat(model=model, **given).robot.flip is None
+    given = {option: {".*_calf": 10.0}}
+    assert QuadrupedVelocityFlat(model=model, **given).robot.flip is not None
 
 
 @pytest.mark.parametrize(

@@ -102,7 +102,7 @@ class HumanoidVelocityFlat(VelocityTask):
     Args:
         pushes: Largest push of the pelvis [N·s], 0 for none; if left out, one of 10 N·s for 35 kg.
         model: URDF or MJCF of another humanoid: a path, or a model of the package ``mujoco``.
-        standing: Positions of its joints when it stands [rad], by name or pattern; found in the model if left out.
+        standing: Positions of its joints when it stands [rad], by name or pattern; if left out, as declared or found.
         stiffness: Gains of the drives [N·m/rad], for all joints or by name or pattern; likewise.
         damping: Likewise [N·m·s/rad].
         scale: Effect of an action of 1 on the targets [rad], likewise; those of the own robot's legs and

@@ -57,7 +57,7 @@ class QuadrupedVelocityFlat(VelocityTask):
     Args:
         pushes: Largest push of the trunk [N·s], 0 for none; if left out, one of 4 N·s for 14.7 kg.
         model: URDF or MJCF of another quadruped: a path, or a model of the package ``mujoco``.
-        standing: Positions of its joints when it stands [rad], by name or pattern; found in the model if left out.
+        standing: Positions of its joints when it stands [rad], by name or pattern; if left out, as declared or found.
         stiffness: Gains of the drives [N·m/rad], for all joints or by name or pattern; likewise.
         damping: Likewise [N·m·s/rad].
         scale: Effect of an action of 1 on the targets [rad], likewise; 0.3 if left out.

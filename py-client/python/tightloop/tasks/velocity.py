@@ -20,7 +20,7 @@ from tightloop.env.names import Names
 from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
 from tightloop.tasks.geometry import squares
 from tightloop.tasks.kinematics import projected_gravity, rotate_inverse
-from tightloop.tasks.legged import LeggedRobot, RobotOptions
+from tightloop.tasks.legged import LeggedModel, LeggedRobot, RobotOptions
 
 if TYPE_CHECKING:
     from tightloop.scene_mujoco import Model
@@ -66,27 +66,26 @@ class VelocityTask(Task):
             pushes: Largest push of the base [N·s]; None for one in proportion to its mass.
             push: That of the task's own robot [N·s].
             model: URDF or MJCF of a robot; None for the task's own.
-            options: What replaces what is found in the model.
+            options: What replaces what is found in the model, or declared of the task's own robot.
 
         Raises:
             ArgumentError: The robot has another number of legs, or an option does not fit it.
             SceneError: The file is no robot that can be simulated.
         """
-        own = self.robot
-        if model is not None or options.are_given:
-            # the import needs what reads models
+        own, task = self.robot, type(self).__name__
+        if model is None and options.are_given and not isinstance(own, LeggedModel):
+            # the imports need what reads models
+            from tightloop.tasks.legged_models.own import replaced
+
+            self.robot = replaced(task, own, count=self.legs, options=options)
+        elif model is not None or options.are_given:
             from tightloop.tasks.legged_models.read import read
 
-            self.robot = read(
-                type(self).__name__,
-                own.file if model is None else model,
-                own=own,
-                count=self.legs,
-                options=options,
-                dt=DT,
-            )
+            file = own.file if model is None else model
+            self.robot = read(task, file, own=own, count=self.legs, options=options, dt=DT)
+        if self.robot is not own:
             size = self.robot.hip_height / own.hip_height
-            self.lowest = self.robot.height - (own.height - self.lowest) * size
+            self.lowest = self.robot.height - own.height * size + self.lowest * size
             self.swing *= size
         self.pushes = push * (self.robot.mass / own.mass) if pushes is None else pushes
         self.fields = ("joint_q", "joint_qd", self.robot.torque_field, self.robot.site_field)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,16 +12,16 @@ from typing import Any
 import numpy as np
 
 from tightloop import checks
-from tightloop.attributes import suggestion
 from tightloop.errors import ArgumentError
 from tightloop.file_kinds import instead, kind_of_file
 from tightloop.scene_options import Solver
-from tightloop.tasks.legged import ByJoint, LeggedModel, LeggedRobot, RobotOptions
+from tightloop.tasks.legged import LeggedModel, LeggedRobot, RobotOptions
 from tightloop.tasks.legged_models import drives as gains
 from tightloop.tasks.legged_models import legs as chains
 from tightloop.tasks.legged_models import mjcf, urdf
 from tightloop.tasks.legged_models.drives import Drive
 from tightloop.tasks.legged_models.legs import Leg
+from tightloop.tasks.legged_models.options import by_name, values, with_mirror
 from tightloop.tasks.legged_models.pose import Sole, sole
 from tightloop.tasks.legged_models.skeleton import Array, Skeleton
 from tightloop.tasks.legged_models.standing import standing_pose
@@ -61,17 +60,15 @@ def read(task: str, model: Any, *, own: LeggedRobot, count: int, options: RobotO
         spec, source = mjcf.prepare(model, what, dt, Solver(cone="pyramidal", impratio=1.0))
     skeleton = Skeleton(source)
     left_out = chains.small_joints(skeleton) | chains.wheels(skeleton)
-    legs = _legs(what, skeleton, left_out, count)
+    legs = legs_of(what, skeleton, left_out, count)
     in_legs = {joint for leg in legs for joint in leg.joints}
     every = [joint for joint in range(len(skeleton.joints)) if joint not in left_out]
     action = every if count == 2 else sorted(in_legs)
     names = [skeleton.joints[joint].name for joint in action]
     all_names = [hinge.name for hinge in skeleton.joints]
     flip = chains.mirror(skeleton, action)
-    given = _by_name(f"{what}: standing", options.standing, all_names)
+    given = by_name(f"{what}: standing", options.standing, all_names)
     q = standing_pose(skeleton, legs, action, flip, {all_names.index(name): value for name, value in given.items()})
-    if flip is not None and np.abs(q[action][flip[0]] * flip[1] - q[action]).max() > 1e-3:
-        flip = None
     soles = [sole(skeleton, leg, q) for leg in legs]
     frames = skeleton.frames(q[None])
     lowest = min(float(skeleton.lowest(skeleton.moves[leg.joints[-1]], frames)[0]) for leg in legs)
@@ -84,6 +81,9 @@ def read(task: str, model: Any, *, own: LeggedRobot, count: int, options: RobotO
     ahead = [names[p] for p, joint in enumerate(action) if joint in in_legs and abs(axes[joint, 1]) > 0.7]
     leg_names = {skeleton.joints[joint].name for joint in in_legs}
     scales = [_SCALE if count == 4 or n in ahead else _ACROSS if n in leg_names else _UPPER for n in names]
+    scale = values(f"{what}: scale", options.scale, names, scales)
+    used = list(chosen.values())
+    flip = with_mirror(flip, q[action], scale, [drive.stiffness for drive in used], [drive.damping for drive in used])
     same = len({round(foot.radius, 6) for foot in soles}) == 1
     radius = soles[0].radius if same else 0.0
     places = {
@@ -101,7 +101,7 @@ def read(task: str, model: Any, *, own: LeggedRobot, count: int, options: RobotO
         "mass": skeleton.mass,
         "radius": radius,
         "groups": own.groups,
-        "scale": _values(f"{what}: scale", options.scale, names, scales),
+        "scale": scale,
         "quiet": tuple(name for name in names if name not in ahead) if own.quiet else (),
         "flip": flip,
     }
@@ -208,8 +208,8 @@ def _kind(task: str, model: Any) -> tuple[str, bool]:
     return f"{task}: {path.name}", kind == "robot"
 
 
-def _legs(what: str, skeleton: Skeleton, left_out: set[int], count: int) -> list[Leg]:
-    """The legs, from front left to rear right."""
+def legs_of(what: str, skeleton: Skeleton, left_out: set[int], count: int) -> list[Leg]:
+    """Return the legs, from front left to rear right."""
     found = chains.find(skeleton, left_out)
     legs = chains.alike(found, count)
     if len(legs) != count:
@@ -247,44 +247,9 @@ def _place(skeleton: Skeleton, foot: Sole, q: Array, radius: float) -> tuple[flo
 
 def _chosen(what: str, names: Sequence[str], found: Sequence[Drive], options: RobotOptions) -> dict[str, Drive]:
     """The drives of the action's joints, with those gains that the user gave."""
-    stiffness = _values(f"{what}: stiffness", options.stiffness, names, [drive.stiffness for drive in found])
-    damping = _values(f"{what}: damping", options.damping, names, [drive.damping for drive in found])
+    stiffness = values(f"{what}: stiffness", options.stiffness, names, [drive.stiffness for drive in found])
+    damping = values(f"{what}: damping", options.damping, names, [drive.damping for drive in found])
     return {
         name: Drive(ke, kd, drive.armature)
         for name, ke, kd, drive in zip(names, stiffness, damping, found, strict=True)
     }
-
-
-def _values(what: str, given: ByJoint | None, names: Sequence[str], found: Sequence[float]) -> tuple[float, ...]:
-    """A value of each joint: what was given, else what was found."""
-    if given is None:
-        return tuple(found)
-    if not isinstance(given, Mapping):
-        return (checks.number(what, given, least=0.0, error=ArgumentError),) * len(names)
-    own = _by_name(what, given, names)
-    return tuple(
-        checks.number(f"{what} of {name!r}", own[name], least=0.0, error=ArgumentError) if name in own else value
-        for name, value in zip(names, found, strict=True)
-    )
-
-
-def _by_name(what: str, given: Mapping[str, float] | None, names: Sequence[str]) -> dict[str, float]:
-    """Values by the names of joints; patterns are regular expressions for whole names, and names come before them."""
-    if given is None:
-        return {}
-    if not isinstance(given, Mapping):
-        raise ArgumentError(f"{what} is {given!r:.80}; give a dict of numbers by name or pattern of joints")
-    exact, matched = dict[str, float](), dict[str, float]()
-    for pattern, value in given.items():
-        number = checks.number(f"{what} of {pattern!r}", value, error=ArgumentError)
-        if pattern in names:
-            exact[pattern] = number
-            continue
-        try:
-            own = [name for name in names if re.fullmatch(pattern, name)]
-        except (re.error, TypeError):
-            own = []
-        if not own:
-            raise ArgumentError(f"{what} has {pattern!r}, which no joint matches; {suggestion(str(pattern), names)}")
-        matched |= dict.fromkeys(own, number)
-    return matched | exact
