@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -163,6 +164,31 @@ def test_options_without_a_model_change_nothing_else_of_the_own_robot() -> None:
     low = QuadrupedVelocityFlat(standing={".*_thigh": 1.0, ".*_calf": -2.0}).robot
     assert low.standing == (0.0, 1.0, -2.0) * 4 and low.stiffness == 40.0 and low.flip == ROBOT.flip
     assert ROBOT.height - low.height == pytest.approx(0.426 * (np.cos(0.8) - np.cos(1.0)), abs=1e-5)
+
+
+@pytest.mark.parametrize("standing", [{".*_thigh": 0.4}, {"FL_calf": -1.0}, {"F._thigh": 1.2}])
+@pytest.mark.parametrize("kind", ["own", "URDF", "MJCF"])
+def test_it_stands_with_some_joints_given(kind: str, standing: dict[str, float], tmp_path: Path, envs: Any) -> None:
+    model = {"own": lambda: None, "URDF": lambda: QUADRUPED, "MJCF": lambda: file_of(tmp_path)}[kind]()
+    env = envs("QuadrupedVelocityFlat", 4, model=model, pushes=0.0, standing=standing)
+    env.reset(seed=0)
+    robot = env.task.robot
+    ((pattern, value),) = standing.items()
+    assert all(q == value for j, q in zip(robot.joints, robot.standing, strict=True) if re.fullmatch(pattern, j))
+    for _ in range(250):
+        _, _, terminated, _, _ = env.step(np.zeros(env.action_space.shape))
+        assert not terminated.any()
+    assert np.abs(env.task.foot_heights(np, env.evaluation.worlds)).max() < 0.01
+    np.testing.assert_allclose(env.frame.joint_q[:, 2], robot.height, rtol=0.1)
+
+
+@pytest.mark.parametrize("model", [None, QUADRUPED])
+def test_a_pose_that_cannot_be_held_is_refused(model: Any) -> None:
+    with pytest.raises(tl.ArgumentError, match=r"standing of 'FL_calf' is 5; give -2\.7 to -0\.9, its limits"):
+        QuadrupedVelocityFlat(model=model, standing={".*_calf": 5.0})
+    crooked = {"F._thigh": 1.3, "F._calf": -2.6, "R._thigh": 0.6, "R._calf": -1.2}
+    with pytest.raises(tl.ArgumentError, match=r"FL_foot 0\.1\d\d m, .*RR_foot 0\.000 m; give FL_hip, .* too"):
+        QuadrupedVelocityFlat(model=model, standing=crooked)
 
 
 @pytest.mark.parametrize("option", ["scale", "stiffness", "damping"])

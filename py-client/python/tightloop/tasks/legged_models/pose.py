@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,12 +45,18 @@ class Aim:
         turn: Orientation of its body, shape ``(3, 3)``; None for any.
         side: Where its knee should be: 1 ahead of the line from hip to foot, -1 behind it.
         radial: Whether only the distance from the hip counts in the plane, less than the height does.
+        height: Weight of the foot's height, in multiples of that of its place in the plane.
+        held: Joints that stay as they are.
+        margin: Least distance of the others from their limits [rad].
     """
 
     place: Array
     turn: Array | None
     side: float
     radial: bool = False
+    height: float = 2.0
+    held: Container[int] = ()
+    margin: float = 0.0
 
 
 def sole(skeleton: Skeleton, leg: Leg, q: Array) -> Sole:
@@ -98,8 +104,9 @@ def solve(skeleton: Skeleton, leg: Leg, foot: Sole, aim: Aim, q: Array) -> tuple
         aim: The aim.
         q: Positions of the other joints [rad], shape ``(joints,)``.
     """
-    own = list(leg.joints)
-    low, high = skeleton.low[own], skeleton.high[own]
+    own = [joint for joint in leg.joints if joint not in aim.held]
+    middle = 0.5 * (skeleton.low + skeleton.high)[own]
+    low, high = np.minimum(skeleton.low[own] + aim.margin, middle), np.maximum(skeleton.high[own] - aim.margin, middle)
     knee = skeleton.body_of(knee_of(skeleton, leg, foot))
     neutral = np.clip(skeleton.zero[own], low, high)
 
@@ -116,7 +123,7 @@ def solve(skeleton: Skeleton, leg: Leg, foot: Sole, aim: Aim, q: Array) -> tuple
             plane = np.stack([0.2 * (out - wanted) / leg.reach, 0.0 * out], 1)
         else:
             plane = apart[:, :2]
-        parts = [plane, 2.0 * apart[:, 2:], _NEUTRAL * (poses - neutral)]
+        parts = [plane, aim.height * apart[:, 2:], _NEUTRAL * (poses - neutral)]
         if aim.turn is not None:
             turned = frames[1][:, foot.body] - aim.turn
             parts.append(0.5 * turned.reshape(len(poses), 9))
@@ -134,7 +141,9 @@ def solve(skeleton: Skeleton, leg: Leg, foot: Sole, aim: Aim, q: Array) -> tuple
     best = poses[int(np.argmin((misses(poses) ** 2).sum(1)))]
     off = misses(best[None])[0]
     off[3 : 3 + len(own)] = 0.0
-    return best, float(np.linalg.norm(off) * leg.reach)
+    whole = q.copy()
+    whole[own] = best
+    return whole[list(leg.joints)], float(np.linalg.norm(off) * leg.reach)
 
 
 def _least_squares(misses: Callable[[Array], Array], poses: Array, low: Array, high: Array) -> Array:

@@ -21,10 +21,10 @@ from tightloop.tasks.legged_models import legs as chains
 from tightloop.tasks.legged_models import mjcf, urdf
 from tightloop.tasks.legged_models.drives import Drive
 from tightloop.tasks.legged_models.legs import Leg
-from tightloop.tasks.legged_models.options import by_name, values, with_mirror
+from tightloop.tasks.legged_models.options import values, with_mirror
 from tightloop.tasks.legged_models.pose import Sole, sole
 from tightloop.tasks.legged_models.skeleton import Array, Skeleton
-from tightloop.tasks.legged_models.standing import standing_pose
+from tightloop.tasks.legged_models.standing import standing_pose, with_given
 
 #: A robot starts this share of its legs' reach above the ground.
 _GAP = 0.02
@@ -67,8 +67,8 @@ def read(task: str, model: Any, *, own: LeggedRobot, count: int, options: RobotO
     names = [skeleton.joints[joint].name for joint in action]
     all_names = [hinge.name for hinge in skeleton.joints]
     flip = chains.mirror(skeleton, action)
-    given = by_name(f"{what}: standing", options.standing, all_names)
-    q = standing_pose(skeleton, legs, action, flip, {all_names.index(name): value for name, value in given.items()})
+    q = standing_pose(skeleton, legs, action, flip)
+    q = with_given(f"{what}: standing", skeleton, legs, q, options.standing)
     soles = [sole(skeleton, leg, q) for leg in legs]
     frames = skeleton.frames(q[None])
     lowest = min(float(skeleton.lowest(skeleton.moves[leg.joints[-1]], frames)[0]) for leg in legs)

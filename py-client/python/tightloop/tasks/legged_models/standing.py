@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from tightloop.env.mirror import Flip
+from tightloop.errors import ArgumentError
 from tightloop.tasks.legged_models.legs import Leg
-from tightloop.tasks.legged_models.pose import Aim, Sole, mirrored, place_of, sole, solve, stands
+from tightloop.tasks.legged_models.options import by_name
+from tightloop.tasks.legged_models.pose import Aim, Sole, knee_of, mirrored, place_of, sole, solve, stands
 from tightloop.tasks.legged_models.skeleton import Array, Skeleton
 
 #: Heights of a quadruped's hips in shares of the legs' reach, the first of which that keeps its belly off the ground.
@@ -17,15 +20,21 @@ _HEIGHTS = (0.8, 0.87, 0.94)
 _BENT = 0.955
 #: A foot may miss its place by this share of the reach, before another bend of the knees is tried.
 _MISS = 0.04
+#: Feet are level if their heights differ by at most this share of the reach.
+_EVEN = 0.05
+#: Weight of the height of feet whose common height is not chosen yet [–].
+_ANY_HEIGHT = 0.3
+#: Distance from a joint's limits at which its target, within these, can still hold it [rad].
+_MARGIN = 0.15
+#: Positions that a user gives may be rounded so much beyond a limit [rad].
+_ROUNDED = 1e-3
 #: Knees behind the line from hip to foot, else ahead of it.
 _SIDES = (-1.0, 1.0)
 #: A leg whose first joint is more upright than this moves its foot around its hip.
 _UPRIGHT = 0.7
 
 
-def standing_pose(
-    skeleton: Skeleton, legs: Sequence[Leg], action: Sequence[int], flip: Flip | None, given: Mapping[int, float]
-) -> Array:
+def standing_pose(skeleton: Skeleton, legs: Sequence[Leg], action: Sequence[int], flip: Flip | None) -> Array:
     """Return the positions of all hinge joints when a robot stands [rad], shape ``(joints,)``.
 
     Args:
@@ -33,7 +42,6 @@ def standing_pose(
         legs: Its legs.
         action: The joints that ``flip`` is about.
         flip: Left and right exchanged, if known.
-        given: Positions that the user chose, by joint.
     """
     q = skeleton.neutral.copy()
     names = [hinge.name for hinge in skeleton.joints]
@@ -43,24 +51,100 @@ def standing_pose(
             if name in names:
                 kept[names.index(name)] = value
         if stands(skeleton, legs, kept):
-            return _with(kept, given)
-    q = _with(q, given)
-    if all(joint in given for leg in legs for joint in leg.joints):
-        return q
-    left = None if flip is None or given else [leg for leg in legs if leg.hip[1] >= 0]
+            return kept
+    left = None if flip is None else [leg for leg in legs if leg.hip[1] >= 0]
     solved = legs if left is None or 2 * len(left) != len(legs) else left
     find = _humanoid if len(legs) == 2 else _quadruped
     q = find(skeleton, legs, solved, q)
-    if solved is left and flip is not None:
-        q = mirrored(skeleton, action, flip, legs, q)
-    return _with(q, given)
+    return mirrored(skeleton, action, flip, legs, q) if solved is left and flip is not None else q
 
 
-def _with(q: Array, given: Mapping[int, float]) -> Array:
+def with_given(
+    what: str, skeleton: Skeleton, legs: Sequence[Leg], q: Array, standing: Mapping[str, float] | None
+) -> Array:
+    """Return a pose with the joints that the user gives; the others keep the feet in place, at one height.
+
+    Args:
+        what: What the pose is called in messages.
+        skeleton: The robot.
+        legs: Its legs.
+        q: How it stands without [rad], shape ``(joints,)``.
+        standing: Positions of joints [rad], by name or pattern.
+
+    Raises:
+        ArgumentError: A position is beyond its joint's limits, or the feet do not reach the ground together.
+    """
+    names = [hinge.name for hinge in skeleton.joints]
+    given = {names.index(name): value for name, value in by_name(what, standing, names).items()}
     found = q.copy()
     for joint, value in given.items():
+        hinge = skeleton.joints[joint]
+        if not hinge.low - _ROUNDED <= value <= hinge.high + _ROUNDED:
+            raise ArgumentError(
+                f"{what} of {hinge.name!r} is {value:g}; give {hinge.low:.4g} to {hinge.high:.4g}, its limits"
+            )
         found[joint] = value
+    if not any(skeleton.moves[joint, leg.foot] for joint in given for leg in legs):
+        return found
+    soles = [sole(skeleton, leg, q) for leg in legs]
+    apart = _places(skeleton, soles, found) - _places(skeleton, soles, q)
+    reach = min(leg.reach for leg in legs)
+    if np.linalg.norm(apart[:, :2], axis=1).max() > _MISS * reach or np.ptp(apart[:, 2]) > _EVEN * reach:
+        found = _adapted(skeleton, legs, soles, (q, found), given)
+    frames = skeleton.frames(found[None])
+    lowest = np.array([skeleton.lowest(skeleton.moves[leg.joints[-1]], frames)[0] for leg in legs])
+    if np.ptp(lowest) > _EVEN * reach:
+        heights = zip(soles, lowest - lowest.min(), strict=True)
+        feet = ", ".join(f"{skeleton.bodies[foot.body]} {height:.3f} m" for foot, height in heights)
+        free = ", ".join(names[joint] for leg in legs for joint in leg.joints if joint not in given)
+        cure = f"give {free} too" if free else "give positions with which all feet are level"
+        raise ArgumentError(f"{what} leaves feet above the lowest one: {feet}; {cure}")
     return found
+
+
+def _adapted(
+    skeleton: Skeleton,
+    legs: Sequence[Leg],
+    soles: Sequence[Sole],
+    poses: tuple[Array, Array],
+    given: Mapping[int, float],
+) -> Array:
+    """Feet below where they are at the first pose, first at any height and then at one; given joints hold."""
+    q, found = poses[0], poses[1].copy()
+    frames, axes, hips = skeleton.frames(q[None]), skeleton.axes(q), skeleton.frames(found[None])[0][0]
+    aims = _places(skeleton, soles, q)
+
+    def bend(leg: Leg, foot: Sole, place: Array, height: float) -> None:
+        knee = frames[0][0, skeleton.body_of(knee_of(skeleton, leg, foot))]
+        hip = frames[0][0, skeleton.body_of(leg.joints[0])]
+        share = np.clip((knee[2] - hip[2]) / min(place[2] - hip[2], -1e-6), 0.0, 1.0)
+        own_side = float(np.sign(knee[0] - hip[0] - share * (place[0] - hip[0])))
+        turn = frames[1][0, foot.body] if len(legs) == 2 else None
+        is_around = len(legs) != 2 and abs(axes[leg.joints[0], 2]) > _UPRIGHT
+        at_hip = replace(leg, hip=hips[skeleton.body_of(leg.joints[0])])
+        # given joints may need the knee on the other side
+        for side in (own_side, 0.0):
+            aim = Aim(place, turn, side, is_around, height, given.keys(), _MARGIN)
+            joints, miss = solve(skeleton, at_hip, foot, aim, found)
+            if miss < _MISS * leg.reach:
+                break
+        found[list(leg.joints)] = joints
+
+    free = [any(joint not in given for joint in leg.joints) for leg in legs]
+    touched = [any(skeleton.moves[joint, leg.foot] for joint in given) for leg in legs]
+    for at in np.flatnonzero(np.logical_and(free, touched)):
+        bend(legs[at], soles[at], aims[at], _ANY_HEIGHT)
+    change = (_places(skeleton, soles, found) - aims)[:, 2]
+    ground = change[touched if all(free) else ~np.array(free)].mean()
+    for at in np.flatnonzero(free):
+        bend(legs[at], soles[at], aims[at] + np.array([0.0, 0.0, ground]), 2.0)
+    return found
+
+
+def _places(skeleton: Skeleton, soles: Sequence[Sole], q: Array) -> Array:
+    """Where soles are at a pose [m], shape ``(soles, 3)``."""
+    frames = skeleton.frames(q[None])
+    return np.array([place_of(skeleton, foot, frames)[0] for foot in soles])
 
 
 def _quadruped(skeleton: Skeleton, legs: Sequence[Leg], solved: Sequence[Leg], q: Array) -> Array:
