@@ -166,6 +166,23 @@ def test_options_without_a_model_change_nothing_else_of_the_own_robot() -> None:
     assert ROBOT.height - low.height == pytest.approx(0.426 * (np.cos(0.8) - np.cos(1.0)), abs=1e-5)
 
 
+@pytest.mark.parametrize("model", [None, str(ANT)])
+def test_a_subclass_adds_fields_and_draws(model: Any, envs: Any) -> None:
+    class Own(QuadrupedVelocityFlat):
+        fields = (*QuadrupedVelocityFlat.fields, "body_q")
+        initial_draws = 3
+
+        def initial_state(self, xp: Any, worlds: Any, draws: Any) -> Any:
+            assert worlds.body_q.shape[0] == len(draws) and draws.shape[1] == 3 + self.robot.start_draws
+            return super().initial_state(xp, worlds, draws[:, 3:])
+
+    env = envs(Own, 2, model=model)
+    assert np.isfinite(env.reset(seed=0)[0]).all()
+    # without a method of its own, the robot's draws come first
+    Own.initial_state = QuadrupedVelocityFlat.initial_state  # pyright: ignore[reportAttributeAccessIssue]
+    assert np.isfinite(env.reset(seed=1)[0]).all()
+
+
 @pytest.mark.parametrize("standing", [{".*_thigh": 0.4}, {"FL_calf": -1.0}, {"F._thigh": 1.2}])
 @pytest.mark.parametrize("kind", ["own", "URDF", "MJCF"])
 def test_it_stands_with_some_joints_given(kind: str, standing: dict[str, float], tmp_path: Path, envs: Any) -> None:

@@ -88,8 +88,10 @@ class VelocityTask(Task):
             self.lowest = self.robot.height - own.height * size + self.lowest * size
             self.swing *= size
         self.pushes = push * (self.robot.mass / own.mass) if pushes is None else pushes
-        self.fields = ("joint_q", "joint_qd", self.robot.torque_field, self.robot.site_field)
-        self.initial_draws = self.robot.start_draws
+        # a subclass may name more of both
+        further = [field for field in self.fields if field not in VelocityTask.fields]
+        self.fields = ("joint_q", "joint_qd", self.robot.torque_field, self.robot.site_field, *further)
+        self.initial_draws += self.robot.start_draws
 
     def scene(self) -> tl.Scene:
         """The robot on the ground. Each world starts in another direction, with its joints a little off."""
@@ -134,8 +136,8 @@ class VelocityTask(Task):
         self._standing = np.array(self.robot.standing, np.float32)
 
     def initial_state(self, xp: Namespace, worlds: Worlds, draws: Array) -> Mapping[str, Array]:
-        """Return random starts of a robot that the scene does not place."""
-        joint_q = self.robot.start(draws)
+        """Return random starts of a robot that the scene does not place, from the first draws."""
+        joint_q = self.robot.start(draws[:, : self.robot.start_draws])
         return {} if joint_q is None else {"joint_q": joint_q}
 
     def policy_metadata(self) -> Mapping[str, Any]:
