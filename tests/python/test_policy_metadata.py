@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import tightloop as tl
+from tightloop.assets import QUADRUPED
 from tightloop.env import VectorEnv, policy_metadata
 from tightloop.env.registry import GYMNASIUM_TASKS, TASKS
 from tightloop.tasks import velocity
 from tightloop.tasks.cartpole import CartPoleBalance
-from tightloop.tasks.quadruped import ROBOT
+from tightloop.tasks.quadruped import ROBOT, QuadrupedVelocityFlat
 
 
 def numbers(text: str) -> Any:
@@ -72,6 +75,14 @@ def test_scales_and_offsets_are_those_of_each_control(metadata: Callable[..., di
     assert len(said["joint_names"].split(",")) == len(said["default_joint_pos"].split(",")) == 9
 
 
+def test_joints_keep_a_slash_in_their_names(metadata: Callable[..., dict[str, str]], tmp_path: Path) -> None:
+    file = tmp_path / "dog.urdf"
+    file.write_text(re.sub(r'joint name="(.._)(hip|thigh|calf)', r'joint name="\1/\2', QUADRUPED.read_text()))
+    said = metadata(QuadrupedVelocityFlat(model=file))
+    joints = [joint.replace("_", "_/") for joint in ROBOT.joints]
+    assert said["joint_names"].split(",") == said["action_names"].split(",") == joints
+
+
 @pytest.mark.parametrize("task", ["Ant-v5", *TASKS])
 def test_lists_are_as_long_as_what_they_describe(task: str, metadata: Callable[..., dict[str, str]]) -> None:
     said = metadata(task)
@@ -88,10 +99,12 @@ def test_lists_are_as_long_as_what_they_describe(task: str, metadata: Callable[.
 def test_a_task_adds_entries_and_the_environment_goes_on(metadata: Callable[..., dict[str, str]]) -> None:
     class Own(CartPoleBalance):
         def policy_metadata(self) -> dict[str, Any]:
-            return {"command_names": ("none, yet", "more"), "phase_hz": np.float32(2.5), "dt": "own"}
+            more = {"flag": np.True_, "one": np.array(0.1, np.float32), "flags": np.array([True, False])}
+            return {"command_names": ("none, yet", "more"), "phase_hz": np.float32(2.5), "dt": "own", **more}
 
     said = metadata(Own)
     assert said["command_names"] == "none; yet,more" and said["phase_hz"] == "2.5" and said["dt"] == "own"
+    assert (said["flag"], said["one"], said["flags"]) == ("True", "0.1", "True,False")
     assert said["task"].endswith("Own")
     ours, plain = VectorEnv(Own, 4, threads=1), VectorEnv(CartPoleBalance, 4, threads=1)
     ours.reset(seed=1), plain.reset(seed=1)

@@ -8,11 +8,10 @@ mjlab and Isaac Lab write too have the same meaning: ``joint_names``, ``joint_st
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 import tightloop as tl
 from tightloop.env.commands import Commands
@@ -48,7 +47,8 @@ def policy_metadata(envs: VectorEnv) -> dict[str, str]:
     for control in controls:
         control.bind(names, commands)
     # the robot's name says nothing where there is only one
-    prefix = len(scene.robots) + len(scene.models) > 1
+    robots = [*scene.robots, *scene.models]
+    alone = f"{robots[0]}/" if len(robots) == 1 else ""
     parts, space = observed_parts(task), envs.single_action_space
     facts: dict[str, Any] = {
         "task": name_of(task),
@@ -62,35 +62,32 @@ def policy_metadata(envs: VectorEnv) -> dict[str, str]:
         "observation_units": [part.unit for part in parts],
         "observation_low": envs.single_observation_space.low,
         "observation_high": envs.single_observation_space.high,
-        "action_names": [_name(name, prefix=prefix) for name in _joined(controls, "value_names")],
+        "action_names": [name.removeprefix(alone) for name in _joined(controls, "value_names")],
         "action_types": [type(control).__name__ for control in controls for _ in range(control.size)],
         "action_scale": _joined(controls, "scales"),
         "action_offset": _joined(controls, "offsets"),
         "action_low": space.low,
         "action_high": space.high,
     }
-    facts |= _joints(scene, names, prefix=prefix)
+    facts |= _joints(scene, names, alone)
     facts |= task.policy_metadata()
     return {name: _text(f"{type(task).__name__}.policy_metadata: {name}", value) for name, value in facts.items()}
 
 
-def _name(name: str, *, prefix: bool) -> str:
-    return name if prefix else name.rpartition("/")[2]
-
-
-def _joints(scene: tl.Scene, names: Names, *, prefix: bool) -> dict[str, Any]:
+def _joints(scene: tl.Scene, names: Names, alone: str) -> dict[str, Any]:
     """Return the joints with one coordinate, in the order of frames; for robots from URDF with drives and start."""
     found: dict[str, list[Any]] = {"joint_names": [n for n in names.dof_names if names.has_coord(n)]}
     if not scene.models:
         found["robot_files"] = [robot.urdf.name for robot in scene.robots.values()]
         for name in found["joint_names"]:
-            robot = scene.robots[name.partition("/")[0]]
-            dof = robot.dof_names.index(name.partition("/")[2])
+            robot_name, _, joint = name.partition("/")
+            robot = scene.robots[robot_name]
+            dof = robot.dof_names.index(joint)
             for key, attribute in _PROPERTIES.items():
                 found.setdefault(key, []).append(getattr(robot, attribute)[dof])
             coord = robot.coord_names.index(robot.dof_names[dof])
             found.setdefault("default_joint_pos", []).append(robot.joint_q[coord])
-    return found | {"joint_names": [_name(name, prefix=prefix) for name in found["joint_names"]]}
+    return found | {"joint_names": [name.removeprefix(alone) for name in found["joint_names"]]}
 
 
 #: Properties of a robot, by the name that they have in the metadata.
@@ -107,12 +104,14 @@ def _joined(controls: Sequence[Control], name: str) -> list[Any]:
     return [value for control in controls for value in getattr(control, name, ["unknown"] * control.size)]
 
 
-def _text(what: str, value: str | float | ArrayLike | Iterable[Any]) -> str:
+def _text(what: str, value: object) -> str:
     if isinstance(value, str):
         return value
-    if isinstance(value, bool | int | float | np.number):
+    if isinstance(value, np.ndarray):
         # a value of float32 has no more digits than it needs
+        value = value[()] if value.ndim == 0 else [*value]
+    if isinstance(value, bool | int | float | np.number | np.bool_):
         return str(value)
-    if isinstance(value, list | tuple | np.ndarray):
+    if isinstance(value, list | tuple):
         return ",".join(_text(what, entry).replace(",", ";") for entry in value)
     raise ArgumentError(f"{what} is {value!r:.80}; give a text, a number, or a list of these")
