@@ -14,7 +14,7 @@ import pytest
 
 import tightloop as tl
 from tightloop.assets import CARTPOLE, FR3, HUMANOID, QUADRUPED
-from tightloop.env import VectorEnv
+from tightloop.env import VectorEnv, policy_metadata
 from tightloop.tasks.humanoid import HumanoidVelocityFlat
 from tightloop.tasks.quadruped import ROBOT, QuadrupedVelocityFlat
 from tightloop.tasks.quadruped_rough import QuadrupedVelocityRough
@@ -164,6 +164,19 @@ def test_options_without_a_model_change_nothing_else_of_the_own_robot() -> None:
     low = QuadrupedVelocityFlat(standing={".*_thigh": 1.0, ".*_calf": -2.0}).robot
     assert low.standing == (0.0, 1.0, -2.0) * 4 and low.stiffness == 40.0 and low.flip == ROBOT.flip
     assert ROBOT.height - low.height == pytest.approx(0.426 * (np.cos(0.8) - np.cos(1.0)), abs=1e-5)
+
+
+def test_metadata_of_a_robot_from_mjcf_have_its_pose_and_gains(tmp_path: Path, envs: Any) -> None:
+    env = envs("QuadrupedVelocityFlat", 1, model=file_of(tmp_path), stiffness={".*_calf": 50.0})
+    said, robot = policy_metadata(env), env.task.robot
+    lists = {name: text.split(",") for name, text in said.items() if name.startswith(("joint_", "default"))}
+    assert lists["joint_names"] == [*ROBOT.joints] == said["action_names"].split(",")
+    numbers = {name: np.array(texts, float) for name, texts in lists.items() if name != "joint_names"}
+    np.testing.assert_allclose(numbers["default_joint_pos"], robot.standing)
+    np.testing.assert_allclose(numbers["joint_stiffness"], [*robot.stiffness.values()])
+    np.testing.assert_allclose(numbers["joint_damping"], [*robot.damping.values()])
+    assert (numbers["joint_effort_limit"] == 20.0).all() and (numbers["joint_armature"] > 0.0).all()
+    assert numbers["joint_stiffness"][2] == 50.0
 
 
 @pytest.mark.parametrize("model", [None, str(ANT)])

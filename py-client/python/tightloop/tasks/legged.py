@@ -21,6 +21,8 @@ Place = tuple[float, float, float]
 ByJoint = float | Mapping[str, float]
 #: Offsets of joints at the start, at most [rad].
 OFFSET = 0.1
+#: MuJoCo's type of slide joints; that of hinges follows, and those before have several coordinates.
+_SLIDE = 2
 
 
 @dataclass(frozen=True)
@@ -145,6 +147,10 @@ class LeggedRobot:
         """
         return None
 
+    def metadata(self) -> dict[str, Any]:
+        """Return what the metadata of policies cannot read from the scene: nothing of a URDF robot."""
+        return {}
+
 
 @dataclass(frozen=True, kw_only=True)
 class LeggedModel(LeggedRobot):
@@ -189,3 +195,24 @@ class LeggedModel(LeggedRobot):
         half = np.pi * (np.asarray(draws[:, 0], np.float64) - 0.5)
         joint_q[:, 5], joint_q[:, 6] = np.sin(half), np.cos(half)
         return joint_q
+
+    def metadata(self) -> dict[str, Any]:
+        """Return its joints with one coordinate, the pose in which it stands, and their drives or springs."""
+        model, single = self.model, [joint for joint in range(self.model.njnt) if self.model.jnt_type[joint] >= _SLIDE]
+        names, dofs = [model.joint(joint).name for joint in single], model.jnt_dofadr[single]
+        columns = model.jnt_qposadr[single]
+        found = {
+            "joint_names": names,
+            "default_joint_pos": self.start_q[columns],
+            "joint_stiffness": model.jnt_stiffness[single],
+            "joint_damping": model.dof_damping[dofs],
+            "joint_effort_limit": np.full(len(names), np.inf),
+            "joint_armature": model.dof_armature[dofs],
+        }
+        for actuator, joint in enumerate(self.joints):
+            place = names.index(joint)
+            found["joint_stiffness"][place] = model.actuator_gainprm[actuator, 0]
+            found["joint_damping"][place] = -model.actuator_biasprm[actuator, 2]
+            if model.actuator_forcelimited[actuator]:
+                found["joint_effort_limit"][place] = model.actuator_forcerange[actuator, 1]
+        return found

@@ -141,8 +141,12 @@ class VelocityTask(Task):
         return {} if joint_q is None else {"joint_q": joint_q}
 
     def policy_metadata(self) -> Mapping[str, Any]:
-        """Return what a policy's file says of its command and gait."""
-        return {"command_names": ("ahead_mps", "left_mps", "turn_radps"), "gait_hz": self.gait}
+        """Return what a policy's file says of its command and gait, and of a robot from MJCF."""
+        return {
+            "command_names": ("ahead_mps", "left_mps", "turn_radps"),
+            "gait_hz": self.gait,
+            **self.robot.metadata(),
+        }
 
     def goal(self, xp: Namespace, worlds: Worlds, draws: Array) -> Array:
         """Return the next command: ahead, left, turn; or to stand."""
