@@ -121,8 +121,9 @@ def test_a_model_of_mujoco_is_the_robot_alone(tmp_path: Path) -> None:
 
 def test_what_follows_a_robot_in_its_file_is_no_matter(tmp_path: Path) -> None:
     file = tmp_path / "dog.urdf"
-    file.write_bytes(QUADRUPED.read_bytes() + b"\n\x00")
-    assert QuadrupedVelocityFlat(model=file).robot.mass == pytest.approx(14.68)
+    for end in (b"</robot>\n\x00", b"</robot >", b"</robot\n>\n"):
+        file.write_bytes(QUADRUPED.read_bytes().replace(b"</robot>", end))
+        assert QuadrupedVelocityFlat(model=file).robot.mass == pytest.approx(14.68)
 
 
 def test_ball_joints_are_no_joints_of_the_action() -> None:
@@ -240,6 +241,10 @@ def test_one_sided_options_leave_no_mirror_image(option: str, model: Any) -> Non
         (QuadrupedVelocityFlat, {"model": "no/dog.urdf"}, r"dog\.urdf does not exist; give the path"),
         (QuadrupedVelocityFlat, {"model": QUADRUPED.parent}, r"is a folder; give the path"),
         (QuadrupedVelocityFlat, {"model": Path(__file__)}, r"test_legged_models\.py is neither.*give the path"),
+        (QuadrupedVelocityFlat, {"model": ""}, r"model is empty; give the path"),
+        (QuadrupedVelocityFlat, {"pushes": np.nan}, r"pushes is nan; give a finite number"),
+        (HumanoidVelocityFlat, {"pushes": -1}, r"pushes is -1; it must be at least 0"),
+        (QuadrupedVelocityFlat, {"pushes": "x"}, r"pushes is 'x'; give a number"),
         (QuadrupedVelocityFlat, {"model": 3}, r"model is int; give the path"),
         (QuadrupedVelocityFlat, {"standing": {"FL_knee": 1.0}}, r"standing has 'FL_knee', which no joint matches"),
         (QuadrupedVelocityFlat, {"standing": 1.0}, r"standing is 1\.0; give a dict"),

@@ -201,7 +201,7 @@ class LeggedModel(LeggedRobot):
         model, single = self.model, [joint for joint in range(self.model.njnt) if self.model.jnt_type[joint] >= _SLIDE]
         names, dofs = [model.joint(joint).name for joint in single], model.jnt_dofadr[single]
         columns = model.jnt_qposadr[single]
-        found = {
+        found: dict[str, Any] = {
             "joint_names": names,
             "default_joint_pos": self.start_q[columns],
             "joint_stiffness": model.jnt_stiffness[single],

@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import tightloop as tl
+from tightloop import checks
 from tightloop.env.controls import Control
 from tightloop.env.disturbances import Push
 from tightloop.env.mirror import Flip, Mirror
 from tightloop.env.names import Names
 from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
+from tightloop.errors import ArgumentError
 from tightloop.tasks.geometry import squares
 from tightloop.tasks.kinematics import projected_gravity, rotate_inverse
 from tightloop.tasks.legged import LeggedModel, LeggedRobot, RobotOptions
@@ -69,7 +71,7 @@ class VelocityTask(Task):
             options: What replaces what is found in the model, or declared of the task's own robot.
 
         Raises:
-            ArgumentError: The robot has another number of legs, or an option does not fit it.
+            ArgumentError: The robot has another number of legs, an option does not fit it, or ``pushes`` is negative.
             SceneError: The file is no robot that can be simulated.
         """
         own, task = self.robot, type(self).__name__
@@ -87,7 +89,10 @@ class VelocityTask(Task):
             size = self.robot.hip_height / own.hip_height
             self.lowest = self.robot.height - own.height * size + self.lowest * size
             self.swing *= size
-        self.pushes = push * (self.robot.mass / own.mass) if pushes is None else pushes
+        if pushes is None:
+            self.pushes = push * (self.robot.mass / own.mass)
+        else:
+            self.pushes = checks.number(f"{task}: pushes", pushes, least=0.0, error=ArgumentError)
         # a subclass may name more of both
         further = [field for field in self.fields if field not in VelocityTask.fields]
         self.fields = ("joint_q", "joint_qd", self.robot.torque_field, self.robot.site_field, *further)

@@ -197,6 +197,9 @@ def _kind(task: str, model: Any) -> tuple[str, bool]:
                 f"{task}: model is {kind}; give the path of a URDF or MJCF file, an mujoco.MjSpec or an mujoco.MjModel"
             )
         return f"{task}: {kind}", False
+    # Path("") is the working directory
+    if not str(model):
+        raise ArgumentError(f"{task}: model is empty; give the path of a URDF or MJCF file")
     path = checks.path(f"{task}: model", model)
     if not path.is_file():
         problem = "is a folder" if path.is_dir() else "does not exist"

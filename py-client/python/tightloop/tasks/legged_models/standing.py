@@ -132,12 +132,14 @@ def _adapted(
 
     free = [any(joint not in given for joint in leg.joints) for leg in legs]
     touched = [any(skeleton.moves[joint, leg.foot] for joint in given) for leg in legs]
-    for at in np.flatnonzero(np.logical_and(free, touched)):
-        bend(legs[at], soles[at], aims[at], _ANY_HEIGHT)
+    for leg, foot, aim, moves in zip(legs, soles, aims, np.logical_and(free, touched), strict=True):
+        if moves:
+            bend(leg, foot, aim, _ANY_HEIGHT)
     change = (_places(skeleton, soles, found) - aims)[:, 2]
-    ground = change[touched if all(free) else ~np.array(free)].mean()
-    for at in np.flatnonzero(free):
-        bend(legs[at], soles[at], aims[at] + np.array([0.0, 0.0, ground]), 2.0)
+    ground = float(change[touched if all(free) else ~np.array(free)].mean())
+    for leg, foot, aim, moves in zip(legs, soles, aims, free, strict=True):
+        if moves:
+            bend(leg, foot, aim + np.array([0.0, 0.0, ground]), 2.0)
     return found
 
 

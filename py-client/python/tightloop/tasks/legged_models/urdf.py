@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
+from typing import cast
 from xml.etree import ElementTree
 
 import numpy as np
@@ -42,11 +44,23 @@ def source(path: Path) -> Source:
 def _masses(path: Path) -> dict[str, tuple[float, Array]]:
     """Mass and centre of mass of each link."""
     found = {}
-    data, end = path.read_bytes(), b"</robot>"
-    # some files go on after their robot
-    for link in ElementTree.fromstring(data[: data.rindex(end) + len(end)]).iter("link"):
+    for link in _robot(path.read_bytes()).iter("link"):
         mass, origin = link.find("inertial/mass"), link.find("inertial/origin")
         place = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
         if mass is not None:
             found[link.get("name", "")] = float(mass.get("value", "0")), np.array([float(x) for x in place.split()])
     return found
+
+
+def _robot(data: bytes) -> ElementTree.Element:
+    """The first element of a file that the scene's reader accepts."""
+    parser = ElementTree.XMLPullParser(["start", "end"])
+    parser.feed(data)
+    depth, root = 0, None
+    # what follows the robot may be no XML, but its error comes after these events
+    for event, element in cast("Iterator[tuple[str, ElementTree.Element]]", parser.read_events()):
+        root = element if root is None else root
+        depth += 1 if event == "start" else -1
+        if depth == 0:
+            return root
+    raise AssertionError("the scene's reader takes no robot without an end")
