@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from importlib import import_module
@@ -178,6 +179,8 @@ def test_metadata_of_a_robot_from_mjcf_have_its_pose_and_gains(tmp_path: Path, e
     np.testing.assert_allclose(numbers["joint_damping"], [*robot.damping.values()])
     assert (numbers["joint_effort_limit"] == 20.0).all() and (numbers["joint_armature"] > 0.0).all()
     assert numbers["joint_stiffness"][2] == 50.0
+    assert json.loads(said["task_options"]) == {"model": str(tmp_path / "dog.xml"), "stiffness": {".*_calf": 50.0}}
+    assert "task_options" not in policy_metadata(envs("QuadrupedVelocityFlat", 1))
 
 
 @pytest.mark.parametrize("model", [None, str(ANT)])

@@ -75,6 +75,12 @@ def test_scales_and_offsets_are_those_of_each_control(metadata: Callable[..., di
     assert len(said["joint_names"].split(",")) == len(said["default_joint_pos"].split(",")) == 9
 
 
+def test_a_task_of_a_file_has_the_name_that_makes_it(metadata: Callable[..., dict[str, str]], tmp_path: Path) -> None:
+    file = tmp_path / "own.py"
+    file.write_text("from tightloop.tasks.cartpole import CartPoleBalance\nclass Own(CartPoleBalance): pass\n")
+    assert metadata(f"{file}:Own")["task"] == f"{file}:Own"
+
+
 def test_joints_keep_a_slash_in_their_names(metadata: Callable[..., dict[str, str]], tmp_path: Path) -> None:
     file = tmp_path / "dog.urdf"
     file.write_text(re.sub(r'joint name="(.._)(hip|thigh|calf)', r'joint name="\1/\2', QUADRUPED.read_text()))

@@ -45,6 +45,9 @@ GYMNASIUM_TASKS = {
     "Walker2d-v5": "tightloop.tasks.gymnasium.planar:Walker2d",
 }
 
+#: Names by which classes of files were found.
+_OF_FILES: dict[type, str] = {}
+
 
 def gymnasium_id(name: str) -> str:
     """Return the name and version of a task in gymnasium's registry, ``tightloop/FrankaReach-v0``."""
@@ -52,7 +55,9 @@ def gymnasium_id(name: str) -> str:
 
 
 def name_of(task: Task) -> str:
-    """Return the name of a task in gymnasium's registry, or that of its class if it is not there."""
+    """Return the name of a task in gymnasium's registry, else ``FILE.py:CLASS`` if made by that, else its class's."""
+    if type(task) in _OF_FILES:
+        return _OF_FILES[type(task)]
     place = f"{type(task).__module__}:{type(task).__qualname__}"
     names = [gymnasium_id(name) for name, known in (TASKS | GYMNASIUM_TASKS).items() if known == place]
     return names[0] if names else type(task).__qualname__
@@ -134,4 +139,7 @@ def _of_file(path: Path, name: str) -> type[Task]:
     spec.loader.exec_module(module)
     if not isinstance(found := getattr(module, name, None), type):
         raise ArgumentError(f"{path} has no class {name!r}")
+    # a class that the file imports keeps its own name
+    if found.__module__ == spec.name:
+        _OF_FILES[found] = f"{path}:{name}"
     return found

@@ -7,6 +7,8 @@ Rewards and rates follow legged_gym (Rudin et al. 2022, arXiv 2109.11978).
 
 from __future__ import annotations
 
+import json
+import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -60,6 +62,7 @@ class VelocityTask(Task):
     swing: float = 0.07
     command_max: tuple[float, float, float] = (1.0, 0.6, 1.0)
     lowest: float = 0.15
+    _options: str = ""
 
     def __init__(self, pushes: float | None, push: float, model: Model | None, options: RobotOptions) -> None:
         """Choose the robot.
@@ -86,6 +89,7 @@ class VelocityTask(Task):
             file = own.file if model is None else model
             self.robot = read(task, file, own=own, count=self.legs, options=options, dt=DT)
         if self.robot is not own:
+            self._options = _told(model, options)
             size = self.robot.hip_height / own.hip_height
             self.lowest = self.robot.height - own.height * size + self.lowest * size
             self.swing *= size
@@ -146,11 +150,12 @@ class VelocityTask(Task):
         return {} if joint_q is None else {"joint_q": joint_q}
 
     def policy_metadata(self) -> Mapping[str, Any]:
-        """Return what a policy's file says of its command and gait, and of a robot from MJCF."""
+        """Return what a policy's file says of its command, gait and options, and of a robot from MJCF."""
         return {
             "command_names": ("ahead_mps", "left_mps", "turn_radps"),
             "gait_hz": self.gait,
             **self.robot.metadata(),
+            **({"task_options": self._options} if self._options else {}),
         }
 
     def goal(self, xp: Namespace, worlds: Worlds, draws: Array) -> Array:
@@ -260,6 +265,16 @@ def columns(xp: Namespace, array: Array, places: slice | list[int]) -> Array:
         return array[:, places]
     # an index by a list may put the worlds side by side; sums of rows would then round by their number
     return xp.take(array, xp.asarray(np.array(places)), axis=1)
+
+
+def _told(model: Model | None, options: RobotOptions) -> str:
+    """The arguments that change the robot, as JSON; of a model that is no file the type."""
+    file = model if model is None or isinstance(model, str | os.PathLike) else type(model).__name__
+    given = {"model": None if file is None else os.fspath(file), **vars(options)}
+    return json.dumps(
+        {name: value for name, value in given.items() if value is not None},
+        default=lambda value: dict(value) if isinstance(value, Mapping) else float(value),
+    )
 
 
 def _places(places: list[int]) -> slice | list[int]:
