@@ -14,6 +14,7 @@ velocity is printed.
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -46,9 +47,14 @@ class Facts:
 
     def names(self, name: str) -> list[str]:
         """Return a list of names."""
-        if name not in self._metadata:
-            raise SystemExit(f"{self._path} has no metadata {name!r}; examples/policy_file.py writes that of its task")
-        return self._metadata[name].split(",")
+        if name in self._metadata:
+            return self._metadata[name].split(",")
+        if "task" in self._metadata:
+            raise SystemExit(
+                f"{self._path} is a policy of {self._metadata['task']} without metadata {name!r}; only policies of "
+                "velocity tasks run here, with robots from URDF"
+            )
+        raise SystemExit(f"{self._path} has no metadata {name!r}; examples/policy_file.py writes that of its task")
 
     def numbers(self, name: str) -> NDArray[np.float64]:
         """Return a list of numbers."""
@@ -57,6 +63,10 @@ class Facts:
     def number(self, name: str) -> float:
         """Return a single number."""
         return float(self.numbers(name)[0])
+
+    def options(self) -> dict[str, Any]:
+        """Return the arguments that the task was made with."""
+        return json.loads(self._metadata.get("task_options", "{}"))
 
 
 def mujoco_spec(robot: Path, facts: Facts) -> mujoco.MjSpec:
@@ -74,7 +84,8 @@ def mujoco_spec(robot: Path, facts: Facts) -> mujoco.MjSpec:
         actuator = spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name)
         actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
         actuator.gainprm[0], actuator.biasprm[:3] = stiffness, (0, -stiffness, -damping)
-        actuator.forcelimited, actuator.forcerange = True, (-effort, effort)
+        if np.isfinite(effort):
+            actuator.forcelimited, actuator.forcerange = True, (-effort, effort)
     spec.worldbody.first_body().add_freejoint()
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1))
     option = spec.option
@@ -108,6 +119,7 @@ class Player:
         if {*facts.names("action_types")} != {"JointTarget"}:
             raise SystemExit(f"the policy's actions are {facts.names('action_types')[0]}; this takes JointTarget only")
         self.names = facts.names("joint_names")
+        # the task observes these alone; drives hold the others
         self._driven = [self.names.index(name) for name in facts.names("action_names")]
         self._scale, self._offset = facts.numbers("action_scale"), facts.numbers("action_offset")
         self._low, self._high = facts.numbers("action_low"), facts.numbers("action_high")
@@ -156,7 +168,8 @@ class InMujoco(Player):
         if set(facts.numbers("observation_history")) != {1}:
             raise SystemExit("the policy sees steps before; this shows it the current one only")
         self._turn = 2 * np.pi * facts.number("gait_hz") * facts.number("control_dt") if "phase" in self._parts else 0.0
-        self._range = self.model.jnt_range[[self.model.joint(name).id for name in self.names]].T
+        own = [self.model.joint(name).id for name in self.names]
+        self._range = np.where(self.model.jnt_limited[own], self.model.jnt_range[own].T, [[-np.inf], [np.inf]])
         self._substeps, self._phase = int(facts.number("substeps")), 0.0
 
     def _start(self, joint_q: NDArray[np.float64]) -> None:
@@ -184,8 +197,8 @@ class InMujoco(Player):
             "angular velocity": to_trunk @ twist[:3],
             "gravity": to_trunk @ (0.0, 0.0, -1.0),
             "command": self.command,
-            "joint positions": self.joints - self._rest,
-            "joint velocities": data.qvel[self._dofs],
+            "joint positions": (self.joints - self._rest)[self._driven],
+            "joint velocities": data.qvel[self._dofs][self._driven],
             "last action": self.action,
             "phase": np.array([np.sin(self._phase), np.cos(self._phase)]),
         }
@@ -229,9 +242,18 @@ def main() -> None:
     parser.add_argument("policy", type=Path, help="ONNX file with metadata, of a task that follows velocities")
     parser.add_argument("--robot", type=Path, help="URDF file (default: that of this name in tightloop.assets)")
     args = parser.parse_args()
-    session = onnxruntime.InferenceSession(args.policy, providers=["CPUExecutionProvider"])
+    if not args.policy.is_file():
+        raise SystemExit(f"there is no policy {args.policy}; name an ONNX file, such as those in examples/trained")
+    try:
+        session = onnxruntime.InferenceSession(args.policy, providers=["CPUExecutionProvider"])
+    except Exception as error:
+        raise SystemExit(f"{args.policy} is no ONNX file that onnxruntime can read; export it again: {error}") from None
     facts = Facts(args.policy, session.get_modelmeta().custom_metadata_map)
-    robot = args.robot or tl.assets.QUADRUPED.with_name(facts.names("robot_files")[0])
+    options = facts.options()
+    # the policy's own robot, or a copy of its file elsewhere
+    if "model" in options:
+        options["model"] = args.robot = str(args.robot or options["model"])
+    robot = Path(args.robot) if args.robot else tl.assets.QUADRUPED.with_name(facts.names("robot_files")[0])
     if not robot.is_file():
         raise SystemExit(f"there is no robot {robot}; name its URDF file by --robot")
     commands = COMMANDS[:, [ORDER.index(name) for name in facts.names("command_names")]]
@@ -239,7 +261,7 @@ def main() -> None:
     def policy(obs: NDArray[np.float32]) -> NDArray[np.float32]:
         return np.asarray(session.run(None, {session.get_inputs()[0].name: obs})[0])
 
-    task = make_task(facts.names("task")[0], {})
+    task = make_task(facts.names("task")[0], options)
     with tl.launch(task.scene(), worlds=1, precision="f64", fields=task.fields) as sim:
         start = np.array(sim.reset().joint_q[0], np.float64)
         ours, theirs = InTightloop(facts, task, sim), InMujoco(facts, robot)

@@ -11,10 +11,15 @@ import numpy as np
 import onnxruntime
 import pytest
 
+import tightloop as tl
 from tightloop import assets
+from tightloop.env import VectorEnv, policy_metadata
+from tightloop.tasks.quadruped import QuadrupedVelocityFlat
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 sys.path.insert(0, str(EXAMPLES))
+
+from sim2sim import COMMANDS, Facts, InMujoco, InTightloop  # noqa: E402
 
 from evaluation import evaluate  # noqa: E402  (examples are no package)
 
@@ -56,6 +61,54 @@ def test_a_quadruped_walks_in_mujoco_as_well() -> None:
     # fifty additions to a phase of 2π·2.5 in float32, and velocities of some ten rad/s
     assert len(seen) == 5 and max(seen) < 64 * 16.0 * 2.0**-24
     assert errors.shape == (6, 2) and errors.max() < 0.15 and np.abs(errors[:, 0] - errors[:, 1]).max() < 0.01
+
+
+ARM = """
+  <joint name="arm_1" type="revolute"><parent link="trunk"/><child link="upper"/><origin xyz="0.1 0 0.1"/>
+    <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="10" velocity="10"/></joint>
+  <link name="upper"><inertial><mass value="0.3"/>
+    <inertia ixx="1e-3" ixy="0" ixz="0" iyy="1e-3" iyz="0" izz="1e-3"/></inertial></link>
+  <joint name="arm_2" type="continuous"><parent link="upper"/><child link="lower"/><origin xyz="0 0 0.1"/>
+    <axis xyz="0 1 0"/></joint>
+  <link name="lower"><inertial><origin xyz="0 0 0.05"/><mass value="0.2"/>
+    <inertia ixx="1e-3" ixy="0" ixz="0" iyy="1e-3" iyz="0" izz="1e-3"/></inertial></link>
+</robot>"""
+
+
+def test_mujoco_shows_the_joints_of_the_action_alone(tmp_path: Path) -> None:
+    file = tmp_path / "dog.urdf"
+    file.write_text(assets.QUADRUPED.read_text().replace("</robot>", ARM))
+    envs = VectorEnv("QuadrupedVelocityFlat", 1, model=file)
+    facts, task = Facts(tmp_path / "policy.onnx", policy_metadata(envs)), QuadrupedVelocityFlat(model=file)
+    envs.close()
+    assert len(facts.names("joint_names")) == 14
+    with tl.launch(task.scene(), worlds=1, precision="f64", fields=task.fields) as sim:
+        start = np.array(sim.reset().joint_q[0], np.float64)
+        players = InTightloop(facts, task, sim), InMujoco(facts, file)
+        for player in players:
+            player.begin(start, COMMANDS[0])
+            for _ in range(5):
+                player.step(np.full((1, 12), 0.2, np.float32))
+    ours, theirs = (player.obs for player in players)
+    assert ours.shape == theirs.shape == (1, 50)
+    np.testing.assert_allclose(ours, theirs, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("file", "said"),
+    [
+        ("no.onnx", "there is no policy .*no.onnx; name an ONNX file"),
+        ("broken.onnx", "broken.onnx is no ONNX file that onnxruntime can read; export it again"),
+        ("Ant-v5.onnx", "Ant-v5.onnx is a policy of tightloop/Ant-v5 .*only policies of velocity tasks run here"),
+    ],
+)
+def test_sim2sim_names_a_file_that_it_cannot_play(file: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "broken.onnx").write_bytes(b"no ONNX")
+    policy = EXAMPLES / "trained" / file if file.startswith("Ant") else tmp_path / file
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / "sim2sim.py"), str(policy)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1 and re.search(said, done.stderr) and "Traceback" not in done.stderr, done.stderr
 
 
 @pytest.mark.parametrize("task", assets.POLICIES)
