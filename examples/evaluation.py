@@ -10,6 +10,7 @@ episodes, and then the mean of all with its interval over the runs.
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -51,7 +52,12 @@ def options_of(task: str) -> dict[str, Any]:
 
 
 def episodes(
-    task: str, act: Callable[[NDArray[np.float32]], NDArray[Any]], *, threads: int, seed: int = SEED
+    task: str,
+    act: Callable[[NDArray[np.float32]], NDArray[Any]],
+    *,
+    threads: int,
+    seed: int = SEED,
+    options: Mapping[str, Any] | None = None,
 ) -> dict[str, NDArray[Any]]:
     """Play one episode in each world.
 
@@ -60,12 +66,14 @@ def episodes(
         act: Actions for observations, both with the worlds first.
         threads: Most threads that a step may use.
         seed: Seed of the first world.
+        options: How the task is made besides.
 
     Returns:
         Values of each world by name: ``return``, the sum of the rewards; and at the end of the episode, where the task
         defines them, ``success`` and the metrics of the task, such as ``error``, the distance from the goal [m].
     """
-    env = VectorEnv(task, WORLDS, autoreset_mode=AutoresetMode.SAME_STEP, threads=threads, **options_of(task))
+    given = {**options_of(task), **(options or {})}
+    env = VectorEnv(task, WORLDS, autoreset_mode=AutoresetMode.SAME_STEP, threads=threads, **given)
     returns, going, last = np.zeros(WORLDS), np.ones(WORLDS, bool), {}
     try:
         obs, _ = env.reset(seed=seed)
@@ -143,7 +151,8 @@ def main() -> None:
             policy = onnxruntime.InferenceSession(file, providers=["CPUExecutionProvider"])
         except Exception as problem:  # its errors have no common base
             raise SystemExit(f"{file} is no policy as ONNX: {problem}") from None
-        task = args.task or policy.get_modelmeta().custom_metadata_map.get("task")
+        said = policy.get_modelmeta().custom_metadata_map
+        task = args.task or said.get("task")
         if task is None:
             raise SystemExit(f"{file} has no metadata; name its task by --task")
         if tasks and task not in tasks:
@@ -153,7 +162,9 @@ def main() -> None:
         def act(obs: NDArray[np.float32], policy: Any = policy) -> NDArray[Any]:
             return policy.run(["action"], {"obs": obs.astype(np.float32)})[0]
 
-        found = episodes(task, act, threads=args.threads, seed=FINAL_SEED)
+        # a task that is named by hand is made as its file says
+        options = {} if args.task else json.loads(said.get("task_options", "{}"))
+        found = episodes(task, act, threads=args.threads, seed=FINAL_SEED, options=options)
         print(f"{run}: {told_with_intervals(found)}", flush=True)
         for name, values in found.items():
             means.setdefault(name, []).append(float(values.mean()))

@@ -71,7 +71,7 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
     levels = LEVELS
     goal_draws = 5
     goal_steps = 500
-    initial_draws = PLACE_DRAWS
+    initial_draws = PLACE_DRAWS  # before what the robot draws
     swing = 0.08
     reward_weights: Mapping[str, float] = {
         **QuadrupedVelocityFlat.reward_weights,
@@ -94,9 +94,6 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
         scale: ByJoint | None = None,
     ) -> None:
         super().__init__(pushes, model=model, standing=standing, stiffness=stiffness, damping=damping, scale=scale)
-        self.fields = (*self.fields, "height_scan")
-        # a place on a tile, before what the robot draws
-        self.initial_draws += PLACE_DRAWS
         self._ground = terrain.mixed(kinds, levels=LEVELS, tile=TILE, cell=CELL, border=BORDER, hardest=HARDEST)
         self._level = None if level is None else checks.integer("level", level, least=0, error=ArgumentError)
         if self._level is not None and self._level >= LEVELS:
