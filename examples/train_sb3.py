@@ -45,6 +45,7 @@ class Preset:
     lam: float = 0.95  # λ of the advantages
     lr: float = 1e-3  # learning rate at the start; it falls to a tenth
     std: float = 1.0  # standard deviation of actions at the start
+    minibatches: int = 4  # of an epoch
 
     @property
     def total(self) -> int:
@@ -56,7 +57,7 @@ PRESETS = {
     "CartPoleBalance": Preset(30, 512, hidden=64),
     "CartPoleSwingUp": Preset(80, 512, steps=64, hidden=64, gamma=0.98, lr=2e-3),
     "FrankaReach": Preset(150, 512, gamma=0.9, lam=0.9, std=0.6),
-    "QuadrupedVelocityFlat": Preset(120, 1024, gamma=0.97, std=0.7),
+    "QuadrupedVelocityFlat": Preset(160, 1024, gamma=0.97, lr=2e-3, std=0.7, minibatches=8),
 }
 
 
@@ -106,7 +107,7 @@ def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> d
             env,
             learning_rate=lambda left: preset.lr * max(0.1, left),
             n_steps=preset.steps,
-            batch_size=preset.num_envs * preset.steps // 4,
+            batch_size=preset.num_envs * preset.steps // preset.minibatches,
             n_epochs=5,
             gamma=preset.gamma,
             gae_lambda=preset.lam,
