@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnxruntime
@@ -48,8 +49,8 @@ class AheadDown(Ahead):
         return dict(super().initial_state(xp, worlds, draws))
 
 
-def crossed(policy: onnxruntime.InferenceSession, ground: str, level: int) -> tuple[float, float]:
-    """Return the shares of robots that cross the tile, and that fall before they do."""
+def crossed(policy: Any, ground: str, level: int) -> tuple[float, float]:
+    """Return the shares of robots that cross the tile, and that fall before; the policy is a session of onnxruntime."""
     kinds = GROUNDS[ground]
     task = (Ahead if len(kinds) == 1 else AheadDown)(0.0, kinds=kinds, level=level)
     envs = VectorEnv(task, WORLDS, autoreset_mode=AutoresetMode.SAME_STEP, max_episode_steps=STEPS)
@@ -66,7 +67,7 @@ def crossed(policy: onnxruntime.InferenceSession, ground: str, level: int) -> tu
     return float((far > FAR).mean()), float(fell.mean())
 
 
-def rows(policy: onnxruntime.InferenceSession) -> Iterator[tuple[str, float, float, float]]:
+def rows(policy: Any) -> Iterator[tuple[str, float, float, float]]:
     """Ground, its size [m], or slope [–], and the shares that cross and fall."""
     for ground, kinds in GROUNDS.items():
         for level in SHOWN:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from gymnasium.spaces import Box
 
 import tightloop as tl
 from tightloop.env.commands import Commands
@@ -49,7 +50,8 @@ def policy_metadata(envs: VectorEnv) -> dict[str, str]:
     # the robot's name says nothing where there is only one
     robots = [*scene.robots, *scene.models]
     alone = f"{robots[0]}/" if len(robots) == 1 else ""
-    parts, space = observed_parts(task), envs.single_action_space
+    parts, seen, space = observed_parts(task), envs.single_observation_space, envs.single_action_space
+    assert isinstance(seen, Box) and isinstance(space, Box)
     facts: dict[str, Any] = {
         "task": name_of(task),
         "tightloop_version": tl.__version__,
@@ -60,8 +62,8 @@ def policy_metadata(envs: VectorEnv) -> dict[str, str]:
         "observation_sizes": [part.size for part in parts],
         "observation_history": [part.history for part in parts],
         "observation_units": [part.unit for part in parts],
-        "observation_low": envs.single_observation_space.low,
-        "observation_high": envs.single_observation_space.high,
+        "observation_low": seen.low,
+        "observation_high": seen.high,
         "action_names": [name.removeprefix(alone) for name in _joined(controls, "value_names")],
         "action_types": [type(control).__name__ for control in controls for _ in range(control.size)],
         "action_scale": _joined(controls, "scales"),

@@ -148,7 +148,7 @@ class Starts:
             if not self._task.warns_of_starts:
                 warnings.simplefilter("ignore", TightloopWarning)
             if frame is None and arrays.keys() <= {"joint_q", "joint_qd"}:
-                return sim.reset(mask=mask, seed=seeds, **arrays)
+                return sim.reset(mask=mask, seed=seeds, joint_q=arrays.get("joint_q"), joint_qd=arrays.get("joint_qd"))
             if frame is None:
                 frame = sim.reset(mask=mask, seed=seeds)
             return sim.write(mask=mask, **arrays) if arrays else frame

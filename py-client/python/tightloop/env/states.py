@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tightloop.env.evaluation import Evaluation
     from tightloop.env.memory import Memory
     from tightloop.env.starts import Starts
-    from tightloop.env.task import Task
+    from tightloop.env.task import Task, Worlds
     from tightloop.sim import Sim
 
 
@@ -67,7 +67,7 @@ class SettableState:
         self._memory.begin(np.flatnonzero(every), self.evaluation)
         self._see(frame)
 
-    def _see(self, frame: Any) -> None:
+    def _see(self, frame: Any) -> Worlds:
         raise NotImplementedError
 
     def _check_ready(self, call: str) -> None:
