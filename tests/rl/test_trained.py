@@ -32,6 +32,7 @@ MARKS = {
     "QuadrupedVelocityFlat": ("velocity_error", 0.15),
     "QuadrupedVelocityRough": ("farthest", 4.5),
     "HumanoidVelocityFlat": ("velocity_error", 0.15),
+    "AntRun": ("speed", 4.0),
     "Ant-v5": ("return", 3000.0),
 }
 
