@@ -134,3 +134,18 @@ def test_an_entry_that_is_no_text_is_refused(metadata: Callable[..., dict[str, s
 def test_what_is_no_environment_is_refused(envs: Any) -> None:
     with pytest.raises(tl.ArgumentError, match=r"policy_metadata: envs is .*; give a tightloop.env.VectorEnv"):
         policy_metadata(envs)
+
+
+class Chosen(QuadrupedVelocityFlat):
+    """It chooses its robot itself, and takes no option that does."""
+
+    def __init__(self, pushes: float | None = None) -> None:
+        super().__init__(pushes, stiffness={".*_calf": 50.0})
+
+
+def test_options_are_told_of_tasks_that_take_them() -> None:
+    for task, told in ((Chosen(), False), (QuadrupedVelocityFlat(stiffness={".*_calf": 50.0}), True)):
+        envs = VectorEnv(task, 1)
+        metadata = policy_metadata(envs)
+        envs.close()
+        assert ("task_options" in metadata) == told

@@ -7,6 +7,7 @@ Rewards and rates follow legged_gym (Rudin et al. 2022, arXiv 2109.11978).
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 from collections.abc import Mapping, Sequence
@@ -88,7 +89,8 @@ class VelocityTask(Task):
 
             file = own.file if model is None else model
             self.robot = read(task, file, own=own, count=self.legs, options=options, dt=DT)
-        if self.robot is not own:
+        # a class of a file may choose its robot itself, and takes no such options
+        if self.robot is not own and "model" in inspect.signature(type(self)).parameters:
             self._options = _told(model, options)
             size = self.robot.hip_height / own.hip_height
             self.lowest = self.robot.height - own.height * size + self.lowest * size
