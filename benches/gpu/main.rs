@@ -7,6 +7,7 @@ mod build_time;
 mod checks;
 #[path = "../../tests/common/mod.rs"]
 mod common;
+mod dump;
 mod measure;
 mod pages;
 mod report;
@@ -63,6 +64,15 @@ struct Arguments {
     /// What else the head of the file says, as `name: value`.
     #[arg(long)]
     fact: Vec<String>,
+    /// Writes the kernels of the scenes and states of their runs to this folder, without a GPU: benches/gpu/offline reads them.
+    #[arg(long)]
+    dump: Option<PathBuf>,
+    /// Frames before and after which the states are written.
+    #[arg(long, value_delimiter = ',', default_value = "40")]
+    frames: Vec<usize>,
+    /// Writes the kernels of the software driver, not those of hardware.
+    #[arg(long)]
+    software: bool,
     /// Only builds the first scene, with its programs in this folder, and tells how long it took [s]: run by `build_time`.
     #[arg(long, hide = true)]
     build_in: Option<PathBuf>,
@@ -92,6 +102,9 @@ pub fn options(place: &Place, worlds: usize, fields: &[Field]) -> Options {
 fn main() -> anyhow::Result<()> {
     sim_daemon::environment::complete();
     let arguments = Arguments::parse();
+    if let Some(folder) = &arguments.dump {
+        return dump::dump(&arguments, folder);
+    }
     let info = chosen(arguments.adapter.as_deref())?;
     if let Some(folder) = &arguments.build_in {
         return build_time::build_and_print(&arguments, &info, folder);

@@ -1,11 +1,11 @@
-//! Four scenes, the commands of their frames, and how worlds differ.
+//! Five scenes, the commands of their frames, and how worlds differ.
 
 use crate::common::{Demo, FRAMES, command, lesson, lesson_with_table, noise, numbers};
 use crate::robots::{self, Case};
 use clap::ValueEnum;
 use sim_engine::backend::Values;
 use sim_engine::simulation::Simulation;
-use sim_model::Model;
+use sim_model::{Description, Model};
 use sim_physics::arrays::Field;
 use std::sync::Arc;
 
@@ -14,6 +14,9 @@ const PLACE: f64 = 0.004;
 /// Coordinates of the arm, and of the cube behind them.
 const ARM: usize = 9;
 const CUBE: usize = 7;
+/// Hip, thigh and calf of a leg that stands [rad], and the height of the trunk then [m].
+const STAND: [f64; 3] = [0.0, 0.8, -1.6];
+const HEIGHT: f64 = 0.32;
 
 /// A scene by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -27,6 +30,8 @@ pub enum Scene {
     Grasp,
     /// Twelve driven joints on a floating base.
     Quadruped,
+    /// The same robot on the ground, stepping in place.
+    Standing,
 }
 
 impl Scene {
@@ -37,6 +42,7 @@ impl Scene {
             Scene::Target => "target",
             Scene::Grasp => "grasp",
             Scene::Quadruped => "quadruped",
+            Scene::Standing => "standing",
         }
     }
 }
@@ -70,6 +76,40 @@ impl WorldSet {
         let share = |id: &usize| 2.0 * *id as f32 / (self.of - 1).max(1) as f32;
         self.ids.iter().map(|id| 1.0 - share(id)).collect()
     }
+}
+
+/// The quadruped on its feet on the ground, as its velocity task has it.
+fn standing() -> Description {
+    let mut description = Case::Quadruped.scene();
+    description.add_ground("", -HEIGHT);
+    let robot = &mut description.robots[0];
+    let joints = robot
+        .joints
+        .iter_mut()
+        .filter(|joint| joint.range.is_some());
+    for (k, joint) in joints.enumerate() {
+        joint.q[0] = STAND[k % 3];
+        let dof = &mut joint.dofs[0];
+        [dof.target_ke, dof.target_kd] = [40.0, 1.0];
+    }
+    description
+}
+
+/// Targets of a trot in place: diagonal legs lift their feet in turns.
+fn trot(rest: &[f64], frame: usize) -> Vec<f64> {
+    let phase = std::f64::consts::TAU * 1.5 * frame as f64 / 50.0;
+    let mut row = rest.to_vec();
+    for leg in 0..4 {
+        let side = if leg == 0 || leg == 3 {
+            0.0
+        } else {
+            std::f64::consts::PI
+        };
+        let lift = 0.3 * (phase + side).sin().max(0.0);
+        row[6 + 3 * leg + 1] += lift;
+        row[6 + 3 * leg + 2] -= 2.0 * lift;
+    }
+    row
 }
 
 /// A scene, ready to run.
@@ -129,6 +169,21 @@ impl Plan {
                     .collect();
                 let rest = (0..rows[0].len())
                     .map(|dof| rows.iter().map(|row| row[dof]).sum::<f64>() / rows.len() as f64)
+                    .collect();
+                (description, Field::JointTargetQ, rows, rest)
+            }
+            Scene::Standing => {
+                let description = standing();
+                let rest = description.robots[0].moving_joints();
+                let rest = rest.into_iter().flat_map(|index| {
+                    match description.robots[0].joints[index].range {
+                        Some(_) => description.robots[0].joints[index].q.clone(),
+                        None => vec![0.0; 6],
+                    }
+                });
+                let rest: Vec<f64> = rest.collect();
+                let rows = (0..robots::FRAMES)
+                    .map(|frame| trot(&rest, frame))
                     .collect();
                 (description, Field::JointTargetQ, rows, rest)
             }

@@ -17,7 +17,7 @@ use crate::start::StartDraw;
 use sim_device::{AdapterKind, Choice, Device, Replay};
 use sim_model::Model;
 use sim_physics::arrays::Array;
-use sim_physics::arrays::{Field, Layout};
+use sim_physics::arrays::Layout;
 use sim_physics::constants::Constants;
 use sim_physics::schedule::evaluation_stages;
 use sim_record::split::Limits;
@@ -26,7 +26,7 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 /// Limits of kernels for hardware GPUs: few kernels, so that values stay in registers. A guess, not measured.
-const HARDWARE: Limits = Limits {
+pub(super) const HARDWARE: Limits = Limits {
     kernel: 40_000,
     repeated: usize::MAX,
     dispatch: 0,
@@ -94,10 +94,7 @@ impl Gpu {
         check_frame(&device, layout.bytes as u64)?;
         let constants: Constants<f32> = model.constants().cast();
         let m = &constants;
-        let computed: Vec<(Field, usize)> = (layout.slots.iter())
-            .filter(|slot| show::is_computed(slot.field) && slot.bytes > 0)
-            .map(|slot| (slot.field, slot.shape[1..].iter().product()))
-            .collect();
+        let computed = show::computed(layout);
         let mut places = Places::new(m, &computed);
         let fields = layout.slots.iter().map(|slot| slot.field);
         let shown = evaluation_stages(m, fields.clone());

@@ -36,6 +36,7 @@ mod create;
 mod frame;
 mod imported;
 mod mirror;
+mod offline;
 mod places;
 mod programs;
 mod show;
@@ -48,3 +49,4 @@ mod workgroups;
 mod worlds;
 
 pub use create::{Wanted, create};
+pub use offline::{Offline, OfflineKernel, Target};

@@ -21,8 +21,17 @@ pub(super) struct Run {
 }
 
 /// Is it a field that a program of its own makes of several arrays?
-pub(super) fn is_computed(field: Field) -> bool {
+fn is_computed(field: Field) -> bool {
     matches!(field.row().source, Source::Computed(_))
+}
+
+/// The fields of a layout that programs of their own make of several arrays, with their values per world.
+pub(super) fn computed(layout: &Layout) -> Vec<(Field, usize)> {
+    let slots = layout.slots.iter();
+    let slots = slots.filter(|slot| is_computed(slot.field) && slot.bytes > 0);
+    slots
+        .map(|slot| (slot.field, slot.shape[1..].iter().product()))
+        .collect()
 }
 
 /// The arrays that a field is copied from, after an evaluation has written them.

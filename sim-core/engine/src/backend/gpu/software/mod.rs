@@ -19,7 +19,7 @@ use sim_record::split::Limits;
 
 /// Limits of kernels for the software driver. The grasp's Newton loop compiles in three kernels like the others. What crosses from one
 /// kernel to the next costs about a tenth of a step, so they are few.
-const LIMITS: Limits = Limits {
+pub(super) const LIMITS: Limits = Limits {
     kernel: 16_000,
     repeated: 20_000,
     dispatch: 4_000,
