@@ -19,6 +19,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
         &[
             "error",
             "source",
+            "spirv",
             "module",
             "cache",
             "raw_op",

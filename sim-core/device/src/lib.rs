@@ -14,12 +14,13 @@
 //!
 //! # Batches
 //! A recorded batch is a secondary command buffer. An encoder of wgpu that holds nothing else executes it. wgpu tracks nothing of it, so
-//! a full barrier stands before each command, and one for the host at the end of a run. Programs check nothing at run time: a batch is
-//! checked when it is built. The exception is the number of workgroups that a program computes (`dispatch_found`), which the program
+//! a barrier of all work stands before each command, and one for the host at the end of a run. Programs check nothing at run time: a
+//! batch is checked when it is built. The exception is the number of workgroups that a program computes (`dispatch_found`), which the program
 //! must keep within the adapter's limit.
 //!
 //! # Rounding
-//! On Vulkan every sum and product is rounded as written (`NoContraction`), as on the CPU, so that a compensated sum keeps its remainder.
+//! On Vulkan every sum, product and `fma` is rounded as written (`NoContraction`), as on the CPU, so that a compensated sum keeps its
+//! remainder.
 //! On Metal and DirectX wgpu writes the driver's language, and the driver may contract sums: naga writes neither `precise` nor a pragma,
 //! and wgpu 30 compiles Metal with fast mathematics and HLSL without IEEE strictness, with no option for either. Passing our own source
 //! through wgpu would avoid that. It has not been tried for lack of such a system.
@@ -58,6 +59,7 @@ mod raw_op;
 mod run;
 mod software;
 mod source;
+mod spirv;
 mod staging;
 #[cfg_attr(not(target_os = "linux"), path = "vulkan_absent.rs")]
 mod vulkan;
@@ -68,6 +70,8 @@ pub use batch::{Batch, BatchBuilder, Replay};
 pub use device::Device;
 pub use error::DeviceError;
 pub use memory::{Buffer, Read, Staging, Write};
+#[doc(hidden)]
+pub use module::translated;
 pub use program::Program;
 pub use run::lose_after;
 pub use software::leave;

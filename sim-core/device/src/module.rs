@@ -1,6 +1,7 @@
 //! Translates WGSL to SPIR-V: reads and validates it, resolves overrides, and writes it.
 
 use crate::source::Source;
+use crate::spirv;
 use naga::back::spv;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
@@ -88,6 +89,15 @@ pub(crate) fn read(source: &Source, spirv: bool) -> Result<Module, String> {
     })
 }
 
+/// The SPIR-V of a program. For tests.
+///
+/// # Errors
+/// A program that is wrong, with the reason.
+#[doc(hidden)]
+pub fn translated(source: &Source) -> Result<Vec<u32>, String> {
+    Ok(read(source, true)?.spirv)
+}
+
 /// An error and its causes, in one line.
 fn chain(error: &dyn std::error::Error) -> String {
     let causes = std::iter::successors(error.source(), |cause| cause.source());
@@ -114,30 +124,5 @@ fn words(
     };
     let words =
         spv::write_vec(module, info, &options, Some(&pipeline)).map_err(|e| e.to_string())?;
-    Ok(rounded(&words))
-}
-
-/// SPIR-V opcodes of the float sum, difference, product and quotient.
-const ARITHMETIC: [u32; 4] = [129, 131, 133, 136];
-
-/// Decorates every sum, product and quotient with `NoContraction`, so that the driver rounds each as written. Otherwise Mesa simplifies
-/// `a - ((a + b) - b)` to 0, and a compensated sum loses its remainder (Kahan 1965).
-fn rounded(words: &[u32]) -> Vec<u32> {
-    const HEAD: usize = 5;
-    const DECORATE: u32 = 3 << 16 | 71;
-    const NO_CONTRACTION: u32 = 42;
-    let (mut decorations, mut first, mut at) = (Vec::new(), None, HEAD);
-    while at < words.len() {
-        let (length, code) = (words[at] as usize >> 16, words[at] & 0xffff);
-        // decorations (71, 72) stand before types
-        if matches!(code, 19..=39 | 71 | 72) {
-            first.get_or_insert(at);
-        }
-        if ARITHMETIC.contains(&code) {
-            decorations.extend([DECORATE, words[at + 2], NO_CONTRACTION]);
-        }
-        at += length;
-    }
-    let (before, after) = words.split_at(first.unwrap_or(words.len()));
-    [before, &decorations, after].concat()
+    Ok(spirv::patched(&words))
 }

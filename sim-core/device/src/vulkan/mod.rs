@@ -42,6 +42,8 @@ pub(crate) struct Vulkan {
     host: Option<ash::ext::external_memory_host::Device>,
     /// Addresses and sizes of imported memory are multiples of this [bytes].
     host_align: u64,
+    /// Whether a pipeline may go without robust buffer access (`VK_EXT_pipeline_robustness`).
+    trusts_pipelines: bool,
     /// The driver's pipeline cache, which locks itself.
     cache: vk::PipelineCache,
     driver: String,
@@ -76,12 +78,16 @@ pub(crate) fn open(
     adapter: &wgpu::Adapter,
     wanted: &wgpu::DeviceDescriptor,
 ) -> Option<Result<(wgpu::Device, wgpu::Queue, Vulkan), String>> {
-    // SAFETY: the callback adds an extension that the device has, and takes nothing away; the device goes to the adapter that made it.
+    // SAFETY: the callback adds extensions and a feature that the device has, and takes nothing away; the device goes to the adapter that made it.
     unsafe {
         let hal = adapter.as_hal::<Api>()?;
         let imports = hal
             .physical_device_capabilities()
             .supports_extension(ash::ext::external_memory_host::NAME);
+        let trusts_pipelines = trusts_pipelines(&hal);
+        let mut robustness = vk::PhysicalDevicePipelineRobustnessFeaturesEXT::default()
+            .pipeline_robustness(trusts_pipelines);
+        let robustness = &mut robustness;
         let opened = hal.open_with_callback(
             wanted.required_features,
             &wanted.required_limits,
@@ -91,6 +97,12 @@ pub(crate) fn open(
                     arguments
                         .extensions
                         .push(ash::ext::external_memory_host::NAME);
+                }
+                if trusts_pipelines {
+                    arguments
+                        .extensions
+                        .push(ash::ext::pipeline_robustness::NAME);
+                    *arguments.create_info = arguments.create_info.push_next(robustness);
                 }
             })),
         );
@@ -103,14 +115,30 @@ pub(crate) fn open(
             Ok(both) => both,
             Err(e) => return Some(Err(e.to_string())),
         };
-        let vulkan = handles(&device, imports);
+        let vulkan = handles(&device, imports, trusts_pipelines);
         Some(Ok((device, queue, vulkan)))
     }
 }
 
+/// Whether the driver lets a pipeline go without robust buffer access.
+fn trusts_pipelines(hal: &<Api as wgpu::hal::Api>::Adapter) -> bool {
+    let capabilities = hal.physical_device_capabilities();
+    if !capabilities.supports_extension(ash::ext::pipeline_robustness::NAME) {
+        return false;
+    }
+    let mut known = vk::PhysicalDevicePipelineRobustnessFeaturesEXT::default();
+    let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut known);
+    // SAFETY: the handles are only queried, while `hal` is borrowed.
+    unsafe {
+        let instance = hal.shared_instance().raw_instance();
+        instance.get_physical_device_features2(hal.raw_physical_device(), &mut all);
+    }
+    known.pipeline_robustness == vk::TRUE
+}
+
 /// # Safety
-/// `device` is Vulkan's, has the extension if `imports`, and outlives what is returned.
-unsafe fn handles(device: &wgpu::Device, imports: bool) -> Vulkan {
+/// `device` is Vulkan's, has the extensions if `imports` and if `trusts_pipelines`, and outlives what is returned.
+unsafe fn handles(device: &wgpu::Device, imports: bool, trusts_pipelines: bool) -> Vulkan {
     // SAFETY: as promised by the caller.
     unsafe {
         let hal = device.as_hal::<Api>().expect("opened on Vulkan");
@@ -127,6 +155,7 @@ unsafe fn handles(device: &wgpu::Device, imports: bool) -> Vulkan {
         Vulkan {
             host: imports.then(|| ash::ext::external_memory_host::Device::new(&instance, &raw)),
             host_align: host.min_imported_host_pointer_alignment.max(1),
+            trusts_pipelines,
             heaps: instance.get_physical_device_memory_properties(physical),
             family: hal.queue_family_index(),
             cache: vk::PipelineCache::null(),

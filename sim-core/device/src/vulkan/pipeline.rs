@@ -1,4 +1,12 @@
 //! Pipelines of the driver, from SPIR-V.
+//!
+//! # Robust buffer access
+//! wgpu opens devices with robust buffer access, which makes a driver compare every index with the size of its buffer. Our own pipelines
+//! go without it where the driver has `VK_EXT_pipeline_robustness`, since their indices are in range:
+//!
+//! - A batch is checked when it is built: every range that a program sees lies in its buffer (`batch`).
+//! - The owner of a program sizes the buffers by the numbers that the program is made of. sim-engine says which in `backend/gpu/tile.rs`.
+//! - A number that becomes an index is 0 where it is not a number (`spirv`).
 
 use super::{Failure, Vulkan};
 use crate::module::Module;
@@ -50,9 +58,15 @@ impl Vulkan {
                 .stage(vk::ShaderStageFlags::COMPUTE)
                 .module(shader)
                 .name(&entry);
-            let description = vk::ComputePipelineCreateInfo::default()
+            let mut unchecked = vk::PipelineRobustnessCreateInfoEXT::default()
+                .storage_buffers(vk::PipelineRobustnessBufferBehaviorEXT::DISABLED)
+                .uniform_buffers(vk::PipelineRobustnessBufferBehaviorEXT::DISABLED);
+            let mut description = vk::ComputePipelineCreateInfo::default()
                 .layout(made.layout)
                 .stage(stage);
+            if self.trusts_pipelines {
+                description = description.push_next(&mut unchecked);
+            }
             let result = self
                 .device
                 .create_compute_pipelines(self.cache, &[description], None);

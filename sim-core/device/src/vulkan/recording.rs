@@ -47,7 +47,7 @@ impl Vulkan {
             let mut sets = sets.into_iter();
             for op in ops {
                 // also before the first: it waits for earlier batches and for wgpu's own commands
-                barrier(device, made.commands, false);
+                barrier(device, made.commands, Next::of(op));
                 match op {
                     RawOp::Dispatch {
                         pipeline, groups, ..
@@ -167,31 +167,53 @@ impl Vulkan {
                 if !commands.is_empty() {
                     self.device.cmd_execute_commands(primary, &commands);
                 }
-                barrier(&self.device, primary, true);
+                barrier(&self.device, primary, Next::Host);
                 true
             })
         }
     }
 }
 
-/// What was written before is seen after: by programs and copies, and by the host where asked for.
+/// What comes after a barrier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Next {
+    /// A program or a copy.
+    Work,
+    /// A program whose number of workgroups another program may have written.
+    Found,
+    /// The end of a run: any work, and the host.
+    Host,
+}
+
+impl Next {
+    fn of<P, B>(op: &RawOp<'_, P, B>) -> Next {
+        match op {
+            RawOp::Dispatch {
+                groups: RawGroups::Found(..),
+                ..
+            } => Next::Found,
+            _ => Next::Work,
+        }
+    }
+}
+
+/// What was written before is seen after: by programs and copies, and by what comes next.
 ///
 /// # Safety
 /// `commands` is being recorded.
-unsafe fn barrier(device: &ash::Device, commands: vk::CommandBuffer, host: bool) {
+unsafe fn barrier(device: &ash::Device, commands: vk::CommandBuffer, next: Next) {
     use vk::AccessFlags as Access;
     use vk::PipelineStageFlags as Stage;
     let work = Stage::COMPUTE_SHADER | Stage::TRANSFER;
     let written = Access::SHADER_WRITE | Access::TRANSFER_WRITE;
     let used = written | Access::SHADER_READ | Access::TRANSFER_READ;
-    let (to, reads) = if host {
-        (work | Stage::HOST, used | Access::HOST_READ)
-    } else {
-        // a program may have written the number of workgroups
-        (
+    let (to, reads) = match next {
+        Next::Work => (work, used),
+        Next::Found => (
             work | Stage::DRAW_INDIRECT,
             used | Access::INDIRECT_COMMAND_READ,
-        )
+        ),
+        Next::Host => (work | Stage::HOST, used | Access::HOST_READ),
     };
     let memory = [vk::MemoryBarrier::default()
         .src_access_mask(written)

@@ -6,4 +6,5 @@ mod layer;
 mod memory;
 mod refusals;
 mod run;
+mod spirv;
 mod validation;

@@ -2,6 +2,17 @@
 //!
 //! A tile has as many worlds as a buffer can bind. A frame of it is recorded once: the commands that wait, the substeps, the checks for
 //! faults, the evaluation, then a batch that writes the output fields.
+//!
+//! # Sizes
+//! Drivers check no index of our programs (`sim_device`, "Robust buffer access"), so the buffers are as large as the programs assume:
+//!
+//! | buffer | numbers | largest index |
+//! |---|---|---|
+//! | fields | `Places::len` times `width` | a place, and a world below `width`: other threads leave at once |
+//! | contacts | `memory.len` of the model's contacts times `width` | a row below its list's capacity, which `push` and `kept` hold |
+//! | counters, lists of worlds | 4, 1 times `width` | a world below `width` |
+//! | numbers, indices | those of the model's tables | a row that a table names, or that is clamped to the table before it is read |
+//! | frame, runs, pairs | the layout's, the runs', the pairs' | `check_frame` and `show` derive both from one layout |
 
 use super::compiled::{Compiled, Kernels, constant};
 use super::places::Places;
