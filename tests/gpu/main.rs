@@ -11,6 +11,7 @@ mod lost;
 mod programs;
 mod same_bits;
 mod stages;
+mod uploads;
 
 use sim_engine::options::Adapter;
 use sim_engine::simulation::{Device, Options};

@@ -1,6 +1,7 @@
 //! The adapters of this computer, and the choice of one.
 
 use crate::error::DeviceError;
+use std::cell::Cell;
 use std::future::Future;
 use std::pin::pin;
 use std::task::{Context, Poll, Waker};
@@ -47,6 +48,16 @@ pub struct AdapterInfo {
     pub workgroups_max: u32,
     /// Whether host memory can be imported. In the list: the driver has the extension. Of an open device: a test import succeeded.
     pub imports: bool,
+}
+
+thread_local! {
+    static OPENS_AS_DISCRETE: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Opens the adapters of this thread as cards with memory of their own. For tests of that path on a software driver.
+#[doc(hidden)]
+pub fn open_as_discrete(yes: bool) {
+    OPENS_AS_DISCRETE.set(yes);
 }
 
 /// Which adapter.
@@ -116,7 +127,11 @@ pub(crate) fn choose(choice: &Choice) -> Result<(wgpu::Adapter, AdapterInfo), De
             present: present.join(", "),
         });
     };
-    Ok(found.swap_remove(place))
+    let (adapter, mut info) = found.swap_remove(place);
+    if OPENS_AS_DISCRETE.get() {
+        info.kind = AdapterKind::Discrete;
+    }
+    Ok((adapter, info))
 }
 
 fn describe(adapter: &wgpu::Adapter) -> AdapterInfo {

@@ -65,6 +65,8 @@ mod staging;
 mod vulkan;
 mod workers;
 
+#[doc(hidden)]
+pub use adapter::open_as_discrete;
 pub use adapter::{AdapterInfo, AdapterKind, Choice, adapters};
 pub use batch::{Batch, BatchBuilder, Replay};
 pub use device::Device;

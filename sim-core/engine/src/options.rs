@@ -11,7 +11,7 @@ use std::time::Duration;
 
 pub use sim_device::{AdapterInfo, AdapterKind, Choice as Adapter, Replay, adapters, leave};
 #[doc(hidden)]
-pub use sim_device::{compiling, lose_after};
+pub use sim_device::{compiling, lose_after, open_as_discrete};
 
 /// The device that keeps the worlds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

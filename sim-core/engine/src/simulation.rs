@@ -128,6 +128,11 @@ impl Simulation {
     pub fn lose(&mut self) {
         self.backend.lose();
     }
+    /// Sets the bounds and what happens to faulted worlds. For tests: clients give them at the launch.
+    #[doc(hidden)]
+    pub fn set_faults(&mut self, faults: Faults) {
+        self.backend.set_faults(faults);
+    }
     /// Name of the GPU, empty on the CPU.
     pub fn adapter(&self) -> &str {
         self.backend.adapter()

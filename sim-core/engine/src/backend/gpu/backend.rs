@@ -5,7 +5,7 @@ use super::imported::Imported;
 use super::mirror::HostMirror;
 use super::places::Places;
 use super::tile::Tile;
-use super::uploads::Rows;
+use super::uploads::{Bounds, Rows};
 use crate::backend::noise::Noise;
 use crate::backend::{
     Backend, BackendError, Faults, FirstFrozen, Frozen, Input, ProgramInfo, Values,
@@ -22,6 +22,7 @@ use std::sync::OnceLock;
 /// The backend of one group of worlds. Field order matters: batches are dropped before buffers and programs, and those before the device.
 pub(super) struct Gpu {
     pub tiles: Vec<Tile>,
+    pub bounds: Bounds,
     pub compiled: Compiled,
     /// The frame in host memory.
     pub frame: Staging,
@@ -84,9 +85,7 @@ impl Backend for Gpu {
     fn set_faults(&mut self, faults: Faults) {
         self.faults = faults;
         let bounds = [faults.joint_q_max, faults.joint_qd_max].map(|x| (x as f32).to_bits());
-        for tile in &self.tiles {
-            tile.set_bounds(bounds);
-        }
+        self.bounds.set(bounds);
     }
 
     fn freeze_others(&mut self, good: &[bool]) {

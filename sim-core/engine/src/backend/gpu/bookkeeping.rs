@@ -155,24 +155,24 @@ pub(super) fn count_left_out(places: &Places) -> String {
 }
 
 /// Writes rows from the host: row j of `rows`, `columns` wide, becomes values `first..` of a world. The world is j or, where `listed` is
-/// 1, entry j of the list.
+/// 1, entry j of the list. A thread writes a word: neighbours read neighbouring words.
 pub(super) const ROWS: &str = "
 override worlds: u32;
 override workgroup: u32 = 64u;
-@group(0) @binding(0) var<storage, read_write> numbers: array<vec4<u32>>;
+@group(0) @binding(0) var<storage, read_write> numbers: array<u32>;
 @group(0) @binding(1) var<storage, read> rows: array<u32>;
 // count, columns, first, listed, then the list
 @group(0) @binding(2) var<storage, read> what: array<u32>;
 @compute @workgroup_size(workgroup)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let j = id.x;
-    if (j >= what[0]) { return; }
-    var w = j;
-    if (what[3] == 1u) { w = what[4u + j]; }
+fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let columns = what[1];
-    for (var k = 0u; k < columns; k++) {
-        let i = what[2] + k;
-        numbers[(i / 4u) * worlds + w][i % 4u] = rows[j * columns + k];
+    let end = what[0] * columns;
+    for (var n = id.x; n < end; n += groups.x * workgroup) {
+        let j = n / columns;
+        var w = j;
+        if (what[3] == 1u) { w = what[4u + j]; }
+        let i = what[2] + n - j * columns;
+        numbers[((i / 4u) * worlds + w) * 4u + i % 4u] = rows[n];
     }
 }
 ";

@@ -9,12 +9,13 @@ use super::show;
 use super::sizing::{self, check_frame, check_memory};
 use super::software;
 use super::tile::Tile;
+use super::uploads::Bounds;
 use crate::backend::noise::Noise;
 use crate::backend::state::{Shape, finds_contacts, start};
 use crate::backend::{Backend, BackendError, Backends, Faults, Groups};
 use crate::random::Numbering;
 use crate::start::StartDraw;
-use sim_device::{AdapterKind, Choice, Device, Replay};
+use sim_device::{Choice, Device, Replay};
 use sim_model::Model;
 use sim_physics::arrays::Array;
 use sim_physics::arrays::Layout;
@@ -120,10 +121,10 @@ impl Gpu {
         let mut compiled = Compiled::new(&device, m, &places, &programs, outputs, widest, limit)?;
         compiled.replay = asked.replay;
         let frame = device.staging("frame", layout.bytes.max(64) as u64)?;
-        let drawn = match device.info().kind {
-            AdapterKind::Discrete => Some(device.buffer("frame", layout.bytes.max(64) as u64)?),
-            _ => None,
-        };
+        let drawn = sizing::has_own_memory(&device)
+            .then(|| device.buffer("frame", layout.bytes.max(64) as u64));
+        let drawn = drawn.transpose()?;
+        let bounds = Bounds::new(&device)?;
         let pairs = sizing::pairs(m, sensors);
         let runs = show::runs(m, &places, layout);
         let finds_contacts = finds_contacts(&shown);
@@ -131,7 +132,10 @@ impl Gpu {
         let mut tiles = Vec::new();
         for first in (0..worlds).step_by(widest as usize) {
             let part = first..(first + widest as usize).min(worlds);
-            let tile = Tile::new(&device, m, &places, &compiled, part, widest, &runs, &pairs)?;
+            let bounds = &bounds.buffer;
+            let tile = Tile::new(
+                &device, m, &places, &compiled, part, widest, &runs, &pairs, bounds,
+            )?;
             tiles.push(tile);
         }
         for tile in &mut tiles {
@@ -145,6 +149,7 @@ impl Gpu {
         let shape = Shape::of(m);
         let mut gpu = Gpu {
             tiles,
+            bounds,
             compiled,
             frame,
             drawn,

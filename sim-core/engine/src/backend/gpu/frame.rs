@@ -125,6 +125,7 @@ impl Gpu {
         let imported = self.imported.iter().find(|(known, _)| *known == place);
         let shown = imported.map(|(_, imported)| &imported.shown[..]);
         let mut batches = Vec::with_capacity(3 * self.tiles.len());
+        batches.extend(self.bounds.pending());
         for (k, tile) in self.tiles.iter().enumerate() {
             batches.extend(tile.pending());
             batches.push(tile.computes(steps));
@@ -135,6 +136,7 @@ impl Gpu {
         }
         self.device.run(&batches)?;
         let is_staged = shown.is_none();
+        self.bounds.sent();
         for tile in &mut self.tiles {
             tile.sent();
         }

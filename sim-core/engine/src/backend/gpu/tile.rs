@@ -43,7 +43,7 @@ pub(super) struct Tile {
     fields: Buffer,
     scratch: Buffer,
     counters: Buffer,
-    bounds: Staging,
+    bounds: Buffer,
     runs: Buffer,
     pairs: Buffer,
     /// Lists of the worlds that are active in a split loop.
@@ -63,6 +63,7 @@ impl Tile {
         width: u32,
         runs: &[Run],
         pairs: &[[i32; 4]],
+        bounds: &Buffer,
     ) -> Result<Tile, BackendError> {
         let lanes = u64::from(width);
         let bytes = |numbers: u64| 4 * numbers.max(4) * lanes;
@@ -94,7 +95,7 @@ impl Tile {
         }
         read_state.copy(&counters, 0, &state_copy, state, 16 * lanes);
         let commands = StagedCommand::all(device, m, places, compiled, &fields, &worlds, width)?;
-        let rows = RowUpload::new(device, compiled, &fields, &counters, places.state, width)?;
+        let rows = RowUpload::new(device, compiled, places.state, width)?;
         Ok(Tile {
             step: None,
             forward: None,
@@ -108,7 +109,7 @@ impl Tile {
             fields,
             scratch,
             counters,
-            bounds: device.staging("bounds", 16)?,
+            bounds: bounds.clone(),
             runs,
             pairs,
             active: compiled.compaction.allocate(device, width)?,
@@ -218,7 +219,7 @@ impl Tile {
         let buffers = [
             (0, &self.fields, 0..self.fields.bytes()),
             (1, &self.counters, 0..self.counters.bytes()),
-            (2, &*self.bounds, 0..self.bounds.bytes()),
+            (2, &self.bounds, 0..self.bounds.bytes()),
         ];
         batch.dispatch(program, &buffers, self.width.div_ceil(BOOKKEEPING));
     }
@@ -298,11 +299,6 @@ impl Tile {
         self.copy_out.as_ref()
     }
 
-    /// Sets the bounds of the run, as bits.
-    pub fn set_bounds(&self, bounds: [u32; 2]) {
-        self.bounds.write()[..8].copy_from_slice(bytemuck::cast_slice(&bounds));
-    }
-
     /// Takes a command of all worlds, to be sent with the next frame; false if these columns are no whole command.
     pub fn stage(&mut self, input: Input, columns: &Range<usize>, values: &[f32]) -> bool {
         let found = self.commands.iter_mut().find(|c| c.is(input, columns));
@@ -332,16 +328,27 @@ impl Tile {
         row: impl Fn(usize, &mut [u32]),
     ) -> Result<(), BackendError> {
         let lanes = worlds.iter().map(|world| world - self.worlds.start);
-        self.rows.send(device, target, first, columns, lanes, row)
+        let buffer = match target {
+            Rows::Fields => &self.fields,
+            Rows::Counters => &self.counters,
+        };
+        self.rows
+            .send(device, (target, buffer), first, columns, lanes, row)
     }
 
     /// Gives every lane the same state.
     pub fn fill(&self, device: &Device, state: &[u32]) -> Result<(), BackendError> {
         let (lanes, columns) = (0..self.width as usize, state.len() as u32);
-        self.rows
-            .send(device, Rows::Fields, 0, columns, lanes, |_, to| {
+        self.rows.send(
+            device,
+            (Rows::Fields, &self.fields),
+            0,
+            columns,
+            lanes,
+            |_, to| {
                 to.copy_from_slice(state);
-            })
+            },
+        )
     }
 
     /// State and counters, four values of every lane after each other. Commands that wait are included and go on waiting: the frame

@@ -1,18 +1,22 @@
-//! Rows of values from the host to a tile.
+//! Values from the host: rows for a tile, and the bounds of a run.
 //!
 //! A command of all worlds waits in a staging buffer and goes with the next frame ([`StagedCommand`]). All other rows are sent at once
 //! ([`RowUpload`]). Both run the same kernel, [`bookkeeping::ROWS`].
+//!
+//! On a card with its own memory, a program that reads host memory waits for the bus. There the words are copied first ([`Upload`]).
 
 #[cfg(doc)]
 use super::bookkeeping;
-use super::compiled::Compiled;
+use super::compiled::{Compiled, constant};
 use super::places::Places;
+use super::sizing;
 use super::workgroups::BOOKKEEPING;
 use crate::backend::{BackendError, Input};
-use sim_device::{Batch, BatchBuilder, Buffer, Device, Program, Replay, Staging};
+use sim_device::{Batch, BatchBuilder, Buffer, Device, DeviceError, Program, Replay, Staging};
 use sim_physics::arrays::Field;
 use sim_physics::constants::Constants;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// Words of the head that [`bookkeeping::ROWS`] reads before its list of worlds.
 const HEAD: usize = 4;
@@ -46,13 +50,86 @@ pub(super) fn commands(m: &Constants<f32>) -> impl Iterator<Item = (Input, usize
     joints.into_iter().chain(models).chain(loads)
 }
 
+/// Words that the host writes and programs read.
+struct Upload {
+    staged: Staging,
+    /// Where programs read them, on a card with its own memory.
+    own: Option<Buffer>,
+}
+
+impl Upload {
+    fn new(device: &Device, label: &str, bytes: u64) -> Result<Upload, DeviceError> {
+        let own = sizing::has_own_memory(device).then(|| device.buffer(label, bytes));
+        Ok(Upload {
+            staged: device.staging(label, bytes)?,
+            own: own.transpose()?,
+        })
+    }
+
+    /// Records what brings the first bytes to where programs read them.
+    fn send(&self, batch: &mut BatchBuilder, bytes: u64) {
+        if let Some(own) = &self.own {
+            batch.copy(&self.staged, 0, own, 0, bytes.min(own.bytes()));
+        }
+    }
+
+    /// What programs read.
+    fn buffer(&self) -> &Buffer {
+        self.own.as_ref().unwrap_or(&self.staged)
+    }
+}
+
+/// Bounds of the run in device memory. They go with the next frame after they change.
+pub(super) struct Bounds {
+    // dropped before the buffers that it names
+    batch: Batch,
+    staged: Staging,
+    pub buffer: Buffer,
+    is_waiting: bool,
+}
+
+impl Bounds {
+    const BYTES: u64 = 16;
+
+    pub fn new(device: &Device) -> Result<Bounds, DeviceError> {
+        let staged = device.staging("bounds", Bounds::BYTES)?;
+        let buffer = device.buffer("bounds", Bounds::BYTES)?;
+        let mut batch = device.batch(Replay::Recorded);
+        batch.copy(&staged, 0, &buffer, 0, Bounds::BYTES);
+        Ok(Bounds {
+            batch: batch.finish()?,
+            staged,
+            buffer,
+            is_waiting: false,
+        })
+    }
+
+    /// Sets the bounds, as bits.
+    pub fn set(&mut self, bounds: [u32; 2]) {
+        let new: [u8; 8] = bytemuck::cast(bounds);
+        let mut staged = self.staged.write();
+        self.is_waiting |= staged[..8] != new;
+        staged[..8].copy_from_slice(&new);
+    }
+
+    /// What sends the bounds, if they changed.
+    pub fn pending(&self) -> Option<&Batch> {
+        self.is_waiting.then_some(&self.batch)
+    }
+
+    /// The bounds were sent.
+    pub fn sent(&mut self) {
+        self.is_waiting = false;
+    }
+}
+
 /// A command of all worlds that waits for the next frame.
 pub(super) struct StagedCommand {
     input: Input,
     columns: usize,
     // dropped before the buffer that it names
     batch: Batch,
-    rows: Staging,
+    rows: Upload,
     is_waiting: bool,
 }
 
@@ -71,12 +148,16 @@ impl StagedCommand {
             let (group, part) = input.place(m, 0..columns);
             let first = places.of(group).start + part.start as u32;
             let bytes = 4 * columns.max(4) as u64 * u64::from(width);
-            let rows = device.staging("commands", bytes)?;
-            let head = device.staging("head of commands", 4 * HEAD as u64)?;
-            let words = [worlds.len() as u32, columns as u32, first, 0];
-            head.write().copy_from_slice(bytemuck::cast_slice(&words));
+            let rows = Upload::new(device, "commands", bytes)?;
+            let head = [worlds.len() as u32, columns as u32, first, 0];
+            let head = constant(device, "head of commands", &head)?;
             let mut batch = device.batch(compiled.replay);
-            write_rows(&mut batch, &compiled.rows, fields, &rows, &head, width);
+            let words = (worlds.len() * columns) as u64;
+            if words > 0 {
+                rows.send(&mut batch, 4 * words);
+                let target = (device, &compiled.rows, fields);
+                write_rows(&mut batch, target, rows.buffer(), &head, words);
+            }
             Ok(StagedCommand {
                 input,
                 columns,
@@ -97,7 +178,7 @@ impl StagedCommand {
     pub fn stage(&mut self, values: &[f32], worlds: &Range<usize>) {
         let own = worlds.start * self.columns..worlds.end * self.columns;
         let bytes: &[u8] = bytemuck::cast_slice(&values[own]);
-        self.rows.write()[..bytes.len()].copy_from_slice(bytes);
+        self.rows.staged.write()[..bytes.len()].copy_from_slice(bytes);
         self.is_waiting = !bytes.is_empty();
     }
 
@@ -115,50 +196,51 @@ impl StagedCommand {
 /// Rows for some worlds of a tile, sent at once.
 pub(super) struct RowUpload {
     // dropped before the buffers that they name
-    to_fields: Batch,
-    to_counters: Batch,
-    rows: Staging,
-    head: Staging,
+    to_fields: Sizes,
+    to_counters: Sizes,
+    program: Program,
+    rows: Upload,
+    head: Upload,
 }
+
+/// A batch for each power of two of words, recorded when it is first needed: a reset of one world copies and writes little.
+type Sizes = [OnceLock<Batch>; 33];
 
 impl RowUpload {
     /// For a tile, with rows of at most `columns` values.
     pub fn new(
         device: &Device,
         compiled: &Compiled,
-        fields: &Buffer,
-        counters: &Buffer,
         columns: u32,
         width: u32,
     ) -> Result<RowUpload, BackendError> {
         let lanes = u64::from(width);
-        let rows = device.staging("rows", 4 * u64::from(columns.max(4)) * lanes)?;
-        let head = device.staging("worlds of rows", 4 * (HEAD as u64 + lanes))?;
-        let to = |target: &Buffer| {
-            let mut batch = device.batch(Replay::Recorded);
-            write_rows(&mut batch, &compiled.rows, target, &rows, &head, width);
-            batch.finish()
-        };
+        let rows = 4 * u64::from(columns.max(4)) * lanes;
         Ok(RowUpload {
-            to_fields: to(fields)?,
-            to_counters: to(counters)?,
-            rows,
-            head,
+            to_fields: std::array::from_fn(|_| OnceLock::new()),
+            to_counters: std::array::from_fn(|_| OnceLock::new()),
+            program: compiled.rows.clone(),
+            rows: Upload::new(device, "rows", rows)?,
+            head: Upload::new(device, "worlds of rows", 4 * (HEAD as u64 + lanes))?,
         })
     }
 
-    /// Writes `columns` neighbouring values, from `first` on, of some lanes of the tile. `row` gives those of the lane at a place.
+    /// Writes `columns` neighbouring values, from `first` on, of some lanes of a tile. `row` gives those of the lane at a place.
     pub fn send(
         &self,
         device: &Device,
-        target: Rows,
+        target: (Rows, &Buffer),
         first: u32,
         columns: u32,
         lanes: impl ExactSizeIterator<Item = usize>,
         row: impl Fn(usize, &mut [u32]),
     ) -> Result<(), BackendError> {
+        let words = lanes.len() as u64 * u64::from(columns);
+        if words == 0 {
+            return Ok(());
+        }
         {
-            let (mut rows, mut head) = (self.rows.write(), self.head.write());
+            let (mut rows, mut head) = (self.rows.staged.write(), self.head.staged.write());
             let rows: &mut [u32] = bytemuck::cast_slice_mut(&mut rows);
             let head: &mut [u32] = bytemuck::cast_slice_mut(&mut head);
             head[..HEAD].copy_from_slice(&[lanes.len() as u32, columns, first, 1]);
@@ -168,27 +250,54 @@ impl RowUpload {
                 row(j, &mut rows[j * n..(j + 1) * n]);
             }
         }
-        let batch = match target {
+        let (rows, buffer) = target;
+        let sizes = match rows {
             Rows::Fields => &self.to_fields,
             Rows::Counters => &self.to_counters,
         };
+        let size = words.next_power_of_two();
+        let known = &sizes[size.trailing_zeros() as usize];
+        let batch = match known.get() {
+            Some(batch) => batch,
+            None => {
+                let batch = self.batch(device, buffer, size)?;
+                known.get_or_init(|| batch)
+            }
+        };
         Ok(device.run(&[batch])?)
+    }
+
+    /// A batch for at most `words` words. A row has one at least, so there are no more worlds.
+    fn batch(&self, device: &Device, target: &Buffer, words: u64) -> Result<Batch, DeviceError> {
+        let mut batch = device.batch(Replay::Recorded);
+        self.head.send(&mut batch, 4 * (HEAD as u64 + words));
+        self.rows.send(&mut batch, 4 * words);
+        let target = (device, &self.program, target);
+        write_rows(
+            &mut batch,
+            target,
+            self.rows.buffer(),
+            self.head.buffer(),
+            words,
+        );
+        batch.finish()
     }
 }
 
-/// Runs [`bookkeeping::ROWS`] once.
+/// Runs [`bookkeeping::ROWS`] once, with a thread per word as far as the adapter has workgroups.
 fn write_rows(
     batch: &mut BatchBuilder,
-    program: &Program,
-    target: &Buffer,
+    (device, program, target): (&Device, &Program, &Buffer),
     rows: &Buffer,
     head: &Buffer,
-    width: u32,
+    words: u64,
 ) {
     let buffers = [
         (0, target, 0..target.bytes()),
         (1, rows, 0..rows.bytes()),
         (2, head, 0..head.bytes()),
     ];
-    batch.dispatch(program, &buffers, width.div_ceil(BOOKKEEPING));
+    let groups = words.div_ceil(u64::from(BOOKKEEPING));
+    let groups = groups.min(u64::from(device.info().workgroups_max));
+    batch.dispatch(program, &buffers, groups as u32);
 }
