@@ -50,8 +50,8 @@ pub(super) fn begin(places: &Places, saves: bool) -> String {
 }
 
 /// After the substeps: a world that is not finite or beyond its bounds returns to the state before the frame and is frozen; the others
-/// count a step.
-pub(super) fn check_faults(places: &Places, m: &Constants<f32>) -> String {
+/// count a step. `counts`: nothing detects contacts after the substeps, so those that did not fit are counted here.
+pub(super) fn check_faults(places: &Places, m: &Constants<f32>, counts: bool) -> String {
     let mut wgsl = HEAD.to_owned();
     wgsl += "    var lost = false;\n    var outside = false;\n";
     for (slot, bound) in [(Array::JointQ, 0), (Array::JointQd, 1)] {
@@ -84,6 +84,10 @@ pub(super) fn check_faults(places: &Places, m: &Constants<f32>) -> String {
     let converged = status::NOT_CONVERGED;
     let unconverged = places.of(Array::Unconverged).start;
     let (quads, before) = (places.moving / 4, places.before / 4);
+    let count = match counts {
+        true => count_left_out(places),
+        false => String::new(),
+    };
     let _ = write!(
         wgsl,
         "    var count = counters[w];
@@ -98,7 +102,7 @@ pub(super) fn check_faults(places: &Places, m: &Constants<f32>) -> String {
         count.x = count.x + 1u;
         if (count.x == 0u) {{ count.y = count.y + 1u; }}
     }}
-    counters[w] = count;
+{count}    counters[w] = count;
 "
     );
     // outputs are a function of the state: the noise of the next frame is not drawn yet
@@ -139,17 +143,13 @@ fn age(wgsl: &mut String, places: &Places, m: &Constants<f32>) {
     clear(wgsl, places.of(Array::Substep));
 }
 
-/// After contact detection, in steps or for output: counts the contacts that did not fit.
+/// Counts in `count` the contacts that did not fit, after a detection of contacts that a world's state keeps.
 pub(super) fn count_left_out(places: &Places) -> String {
     let (frozen, bit) = (status::FROZEN, status::CONTACTS_LEFT_OUT);
     let left_out = places.of(Array::LeftOut).start;
     format!(
-        "{HEAD}    var count = counters[w];
-    let stays = (count.z & {frozen}u) != 0u;
-    count.w = select(u32(bitcast<f32>(number({left_out}u, w))), 0u, stays);
+        "    count.w = select(u32(bitcast<f32>(number({left_out}u, w))), 0u, (count.z & {frozen}u) != 0u);
     count.z = select(count.z & ~{bit}u, count.z | {bit}u, count.w > 0u);
-    counters[w] = count;
-}}
 "
     )
 }

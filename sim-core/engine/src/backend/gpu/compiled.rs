@@ -3,7 +3,6 @@
 use super::bookkeeping;
 use super::places::Places;
 use super::programs::{KernelSequence, Programs};
-use super::show;
 use super::software::{self, Compaction};
 use super::workgroups::{BOOKKEEPING, PHYSICS};
 use crate::backend::{BackendError, ProgramInfo};
@@ -14,8 +13,10 @@ use std::time::Duration;
 
 /// Kernel sources that depend on the output fields.
 pub(super) struct OutputSources {
-    pub counters: String,
+    pub show: String,
     pub contacts: Option<String>,
+    /// Whether the evaluation finds contacts.
+    pub finds_contacts: bool,
 }
 
 /// Kernels of physics, and the order in which they are dispatched.
@@ -33,10 +34,8 @@ pub(super) struct Compiled {
     pub begin: Program,
     pub begin_evaluation: Program,
     pub check_faults: Program,
-    pub count_left_out: Program,
     pub rows: Program,
     pub show: Program,
-    pub counters: Program,
     pub contacts: Option<Program>,
     /// Lists of active worlds.
     pub compaction: Compaction,
@@ -83,17 +82,11 @@ impl Compiled {
             ),
             source(
                 "check faults",
-                bookkeeping::check_faults(places, m),
-                BOOKKEEPING,
-            ),
-            source(
-                "count left out",
-                bookkeeping::count_left_out(places),
+                bookkeeping::check_faults(places, m, !outputs.finds_contacts),
                 BOOKKEEPING,
             ),
             source("rows", bookkeeping::ROWS.to_owned(), BOOKKEEPING),
-            source("show", show::SHOW.to_owned(), BOOKKEEPING),
-            source("counters", outputs.counters, BOOKKEEPING),
+            source("show", outputs.show, BOOKKEEPING),
         ];
         let steps = sources.len()..sources.len() + programs.step.kernels.len();
         sources.extend(physics("step", &programs.step));
@@ -116,15 +109,7 @@ impl Compiled {
             .collect();
         let mut compiled = device.programs(&sources, limit)?.into_iter();
         let mut next = || compiled.next().expect("a program for every source");
-        let [
-            begin,
-            begin_evaluation,
-            check_faults,
-            count_left_out,
-            rows,
-            show,
-            counters,
-        ] = std::array::from_fn(|_| next());
+        let [begin, begin_evaluation, check_faults, rows, show] = std::array::from_fn(|_| next());
         let mut kernels = |program: &KernelSequence| Kernels {
             kernels: program.kernels.iter().map(|_| next()).collect(),
             order: program.order.clone(),
@@ -140,10 +125,8 @@ impl Compiled {
             begin,
             begin_evaluation,
             check_faults,
-            count_left_out,
             rows,
             show,
-            counters,
             contacts,
             compaction,
             numbers: constant(device, "numbers", &numbers)?,

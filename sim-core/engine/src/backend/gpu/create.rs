@@ -110,9 +110,11 @@ impl Gpu {
         let sensors = model.contact_sensors();
         let shapes = sensors.first().map_or(0, |sensor| sensor.of.len());
         let frame_s = model.substeps() as f64 * model.dt();
+        let finds_contacts = finds_contacts(&shown);
         let outputs = OutputSources {
-            counters: show::counters(layout, frame_s),
+            show: show::show(&places, layout, frame_s, finds_contacts),
             contacts: show::contacts(m, &places, layout, shapes),
+            finds_contacts,
         };
         let widest = sizing::widest(&device, m, &places, worlds);
         let tiles = (worlds as u64).div_ceil(u64::from(widest));
@@ -127,7 +129,6 @@ impl Gpu {
         let bounds = Bounds::new(&device)?;
         let pairs = sizing::pairs(m, sensors);
         let runs = show::runs(m, &places, layout);
-        let finds_contacts = finds_contacts(&shown);
         let target = drawn.as_ref().unwrap_or(&frame);
         let mut tiles = Vec::new();
         for first in (0..worlds).step_by(widest as usize) {
@@ -139,7 +140,7 @@ impl Gpu {
             tiles.push(tile);
         }
         for tile in &mut tiles {
-            tile.record(&device, &compiled, finds_contacts, target)?;
+            tile.record(&device, &compiled, target)?;
         }
         if let Some(last) = tiles.last_mut()
             && let Some(drawn) = &drawn

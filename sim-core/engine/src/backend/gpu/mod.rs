@@ -4,7 +4,8 @@
 //! The physics code is recorded for the model (`programs`). Where nothing touches, all substeps are one recording; otherwise one
 //! substep is, and it is dispatched once per substep. `sim_record::split` partitions a recording into kernels that a driver compiles in
 //! good time. It cuts where few values cross; values that cross go through spare fields. The evaluation of output fields is a second
-//! recording. A few more kernels do the bookkeeping (`bookkeeping`: faults, delays, counters) or write a frame (`show`).
+//! recording. A few more kernels do the bookkeeping (`bookkeeping`: rows, faults, delays) or write a frame (`show`). They are dispatched
+//! once a frame: one for each command that waits, two around the substeps, and one or, with fields of contacts, two for the frame.
 //!
 //! # Memory
 //! Programs read and write *fields* (`places`): value i of world w is component i % 4 of `fields[(i / 4) * worlds + w]`. State and

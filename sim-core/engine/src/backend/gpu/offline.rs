@@ -6,7 +6,7 @@ use super::programs::Programs;
 use super::show;
 use super::workgroups::{BOOKKEEPING, PHYSICS};
 use super::{create, software};
-use crate::backend::state::Shape;
+use crate::backend::state::{Shape, finds_contacts};
 use crate::backend::{BackendError, COUNTERS};
 use sim_model::Model;
 use sim_physics::arrays::{Array, Field, Layout};
@@ -101,13 +101,13 @@ impl Offline {
                 });
             }
         }
+        let counts = finds_contacts(&shown);
+        let check_faults = bookkeeping::check_faults(&places, m, !counts);
         let around = [
             ("rows", Some(bookkeeping::ROWS.to_owned())),
             ("begin", Some(bookkeeping::begin(&places, true))),
-            ("check faults", Some(bookkeeping::check_faults(&places, m))),
-            ("count left out", Some(bookkeeping::count_left_out(&places))),
-            ("show", Some(show::SHOW.to_owned())),
-            ("counters", Some(show::counters(layout, frame_s))),
+            ("check faults", Some(check_faults)),
+            ("show", Some(show::show(&places, layout, frame_s, counts))),
             ("contacts", show::contacts(m, &places, layout, shapes)),
         ];
         for (label, wgsl) in around {

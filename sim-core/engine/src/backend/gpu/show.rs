@@ -1,6 +1,8 @@
 //! Programs that write a frame: arrays of all worlds, world-major, out of a structure of arrays.
 
+use super::bookkeeping;
 use super::places::Places;
+use super::workgroups::BOOKKEEPING;
 use sim_physics::arrays::{Array, Field, Layout, Slot, Source};
 use sim_physics::constants::Constants;
 use sim_physics::constants::contact::row;
@@ -14,10 +16,8 @@ pub(super) struct Run {
     pub from: u32,
     /// Word of the frame at which it begins in the row of the first world.
     pub to: u32,
-    /// How many.
+    /// How many; rows of neighbouring worlds follow each other.
     pub len: u32,
-    /// Words from a world's row to the next.
-    pub stride: u32,
 }
 
 /// Is it a field that a program of its own makes of several arrays?
@@ -73,54 +73,72 @@ fn sources(
 pub(super) fn runs(m: &Constants<f32>, places: &Places, layout: &Layout) -> Vec<Run> {
     let mut runs = Vec::new();
     for array in layout.slots.iter().filter(|array| array.bytes > 0) {
-        let elements = array.shape[1..].iter().product();
+        let elements: usize = array.shape[1..].iter().product();
         if let Some(from) = sources(m, places, array.field, elements) {
+            assert_eq!(from.len(), elements, "a field is a whole array");
             runs.push(Run {
                 from: from.start,
                 to: array.offset as u32 / 4,
                 len: from.end - from.start,
-                stride: elements as u32,
             });
         }
     }
     runs
 }
 
-/// Copies runs of numbers into the frame.
-pub(super) const SHOW: &str = "
-override worlds: u32;
-override workgroup: u32 = 64u;
-@group(0) @binding(0) var<storage, read> fields: array<vec4<u32>>;
-// first world of the tile, its worlds, runs, 0; then a run each: from, to, len, stride
-@group(0) @binding(1) var<storage, read> what: array<vec4<u32>>;
-@group(0) @binding(2) var<storage, read_write> frame: array<u32>;
-@compute @workgroup_size(workgroup)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let w = id.x;
-    if (w >= what[0].y) { return; }
-    let world = what[0].x + w;
-    let runs = what[0].z;
-    for (var r = 1u; r <= runs; r++) {
-        let run = what[r];
-        for (var k = 0u; k < run.z; k++) {
-            let i = run.x + k;
-            frame[run.y + world * run.w + k] = fields[(i / 4u) * worlds + w][i % 4u];
+/// Most words that a thread copies: 2^30 words of a frame then take 2^8 workgroups.
+const WORDS_MAX: u32 = 1 << 16;
+
+/// The table that [`SHOW`] reads, and how many workgroups it takes.
+pub(super) struct ShowTable {
+    pub words: Vec<[u32; 4]>,
+    pub groups: u32,
+}
+
+impl ShowTable {
+    /// For the worlds of a tile. A thread copies at least `words` of a run.
+    pub fn new(runs: &[Run], worlds: &Range<usize>, words: u32, groups_max: u32) -> ShowTable {
+        let (first, shown) = (worlds.start as u32, worlds.len() as u32);
+        let counting = shown.div_ceil(BOOKKEEPING);
+        let groups = |run: &Run, words: u32| (run.len * shown).div_ceil(BOOKKEEPING * words);
+        let mut words = words;
+        let all = |words| runs.iter().map(|run| groups(run, words)).sum::<u32>() + counting;
+        while all(words) > groups_max && words < WORDS_MAX {
+            words *= 2;
+        }
+        let mut end = 0;
+        let mut table = vec![[0; 4]; 2];
+        for run in runs {
+            table.push([run.from, run.to + first * run.len, run.len, end]);
+            end += groups(run, words);
+        }
+        table[0] = [first, shown, runs.len() as u32, end];
+        table[1][0] = words;
+        ShowTable {
+            words: table,
+            groups: end + counting,
         }
     }
 }
-";
 
-/// Writes the counters: `time` is `step` times the duration of a frame, rounded as a processor rounds it.
-pub(super) fn counters(layout: &Layout, frame_s: f64) -> String {
+/// Copies runs of numbers into the frame, and writes the counters. A workgroup has a part of one run, so neighbouring threads write
+/// neighbouring words; the last workgroups have a world per thread. `time` is `step` times the duration of a frame, rounded as a
+/// processor rounds it. `counts`: the evaluation has found contacts, so those that did not fit are counted first.
+pub(super) fn show(places: &Places, layout: &Layout, frame_s: f64, counts: bool) -> String {
     let word = |field: Field| {
         let array = layout.slots.iter().find(|array| array.field == field);
         array.expect("counters are part of every frame").offset / 4
+    };
+    let count = match counts {
+        true => bookkeeping::count_left_out(places) + "    counters[w] = count;\n",
+        false => String::new(),
     };
     // frame_s = mantissa * 2^exponent
     let bits = frame_s.to_bits();
     let mantissa = (bits & ((1 << 52) - 1)) | (1 << 52);
     let exponent = (bits >> 52) as i64 - 1075;
-    COUNTERS
+    SHOW.replace("ACCESS", if counts { "read_write" } else { "read" })
+        .replace("COUNT_LEFT_OUT\n", &count)
         .replace("LOW", &format!("{}u", mantissa as u32))
         .replace("HIGH", &format!("{}u", (mantissa >> 32) as u32))
         .replace("EXPONENT", &format!("{}", exponent + 1023))
@@ -130,12 +148,15 @@ pub(super) fn counters(layout: &Layout, frame_s: f64) -> String {
         .replace("AT_LEFT_OUT", &format!("{}u", word(Field::ContactsLeftOut)))
 }
 
-const COUNTERS: &str = "
+const SHOW: &str = "
 override worlds: u32;
 override workgroup: u32 = 64u;
-@group(0) @binding(0) var<storage, read> counters: array<vec4<u32>>;
+@group(0) @binding(0) var<storage, read> fields: array<u32>;
+// first world of the tile, its worlds, runs, their workgroups; words of a thread; then a run each: from, to, len, first workgroup
 @group(0) @binding(1) var<storage, read> what: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read_write> frame: array<u32>;
+@group(0) @binding(3) var<storage, ACCESS> counters: array<vec4<u32>>;
+fn number(i: u32, w: u32) -> u32 { return fields[((i / 4u) * worlds + w) * 4u + i % 4u]; }
 // a * b + c, low and high word
 fn wide(a: u32, b: u32, c: u32) -> vec2<u32> {
     let al = a & 0xffffu; let ah = a >> 16u; let bl = b & 0xffffu; let bh = b >> 16u;
@@ -181,12 +202,11 @@ fn time_of(low: u32, high: u32) -> vec2<u32> {
     let exponent = u32(i32(top) + (EXPONENT));
     return vec2<u32>(m.x, (m.y & 0xfffffu) | (exponent << 20u));
 }
-@compute @workgroup_size(workgroup)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let w = id.x;
+fn show_counters(w: u32) {
     if (w >= what[0].y) { return; }
     let world = what[0].x + w;
-    let count = counters[w];
+    var count = counters[w];
+COUNT_LEFT_OUT
     let time = time_of(count.x, count.y);
     frame[AT_TIME + 2u * world] = time.x;
     frame[AT_TIME + 2u * world + 1u] = time.y;
@@ -194,6 +214,24 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     frame[AT_STEP + 2u * world + 1u] = count.y;
     frame[AT_STATUS + world] = count.z;
     frame[AT_LEFT_OUT + world] = count.w;
+}
+@compute @workgroup_size(workgroup)
+fn main(@builtin(workgroup_id) at: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let head = what[0];
+    if (at.x >= head.w) {
+        show_counters((at.x - head.w) * workgroup + thread);
+        return;
+    }
+    var r = 2u;
+    while (r <= head.z && what[r + 1u].w <= at.x) { r++; }
+    let run = what[r];
+    let words = what[1].x;
+    let first = (at.x - run.w) * workgroup * words + thread;
+    let end = min(head.y * run.z, first + workgroup * words);
+    for (var n = first; n < end; n += workgroup) {
+        let w = n / run.z;
+        frame[run.y + n] = number(run.x + n - w * run.z, w);
+    }
 }
 ";
 

@@ -16,8 +16,8 @@
 
 use super::compiled::{Compiled, Kernels, constant};
 use super::places::Places;
-use super::show::Run;
-use super::software::ActiveWorlds;
+use super::show::{Run, ShowTable};
+use super::software::{self, ActiveWorlds};
 use super::uploads::{RowUpload, Rows, StagedCommand};
 use super::workgroups::{BOOKKEEPING, PHYSICS};
 use crate::backend::{BackendError, Input};
@@ -45,6 +45,8 @@ pub(super) struct Tile {
     counters: Buffer,
     bounds: Buffer,
     runs: Buffer,
+    /// Workgroups that show its worlds.
+    show_groups: u32,
     pairs: Buffer,
     /// Lists of the worlds that are active in a split loop.
     active: Option<ActiveWorlds>,
@@ -70,17 +72,9 @@ impl Tile {
         let fields = device.buffer("fields", bytes(u64::from(places.len)))?;
         let scratch = device.buffer("contacts", bytes(m.contacts.memory.len as u64))?;
         let counters = device.buffer("counters", bytes(4))?;
-        let mut what = vec![[
-            worlds.start as u32,
-            worlds.len() as u32,
-            runs.len() as u32,
-            0,
-        ]];
-        what.extend(
-            runs.iter()
-                .map(|run| [run.from, run.to, run.len, run.stride]),
-        );
-        let runs = constant(device, "runs", what.as_flattened())?;
+        let words = software::show_words(device.info());
+        let show = ShowTable::new(runs, &worlds, words, device.info().workgroups_max);
+        let runs = constant(device, "runs", show.words.as_flattened())?;
         let pairs: Vec<u32> = pairs
             .as_flattened()
             .iter()
@@ -111,6 +105,7 @@ impl Tile {
             counters,
             bounds: bounds.clone(),
             runs,
+            show_groups: show.groups,
             pairs,
             active: compiled.compaction.allocate(device, width)?,
             state_copy,
@@ -122,7 +117,6 @@ impl Tile {
         &mut self,
         device: &Device,
         compiled: &Compiled,
-        finds_contacts: bool,
         frame: &Buffer,
     ) -> Result<(), BackendError> {
         let mut step = device.batch(compiled.replay);
@@ -136,14 +130,10 @@ impl Tile {
         );
         self.bookkeep(&mut step, &compiled.check_faults);
         self.evaluate(&mut step, compiled);
-        self.bookkeep(&mut step, &compiled.count_left_out);
         self.step = Some(step.finish()?);
         let mut forward = device.batch(compiled.replay);
         self.bookkeep(&mut forward, &compiled.begin_evaluation);
         self.evaluate(&mut forward, compiled);
-        if finds_contacts {
-            self.bookkeep(&mut forward, &compiled.count_left_out);
-        }
         self.forward = Some(forward.finish()?);
         let mut show = device.batch(compiled.replay);
         self.show(&mut show, compiled, frame, 0..frame.bytes());
@@ -232,7 +222,6 @@ impl Tile {
         frame: &Buffer,
         part: Range<u64>,
     ) {
-        let groups = self.width.div_ceil(BOOKKEEPING);
         let whole = |buffer: &Buffer| 0..buffer.bytes();
         let (fields, runs, pairs) = (&self.fields, &self.runs, &self.pairs);
         let (scratch, counters) = (&self.scratch, &self.counters);
@@ -242,17 +231,9 @@ impl Tile {
                 (0, fields, whole(fields)),
                 (1, runs, whole(runs)),
                 (2, frame, part.clone()),
+                (3, counters, whole(counters)),
             ],
-            groups,
-        );
-        batch.dispatch(
-            &compiled.counters,
-            &[
-                (0, counters, whole(counters)),
-                (1, runs, whole(runs)),
-                (2, frame, part.clone()),
-            ],
-            groups,
+            self.show_groups,
         );
         if let Some(contacts) = &compiled.contacts {
             batch.dispatch(
@@ -264,7 +245,7 @@ impl Tile {
                     (3, frame, part.clone()),
                     (4, pairs, whole(pairs)),
                 ],
-                groups,
+                self.width.div_ceil(BOOKKEEPING),
             );
         }
     }

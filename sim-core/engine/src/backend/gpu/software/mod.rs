@@ -30,6 +30,11 @@ pub(super) fn limits(info: &AdapterInfo) -> Option<Limits> {
     is_software(info).then_some(LIMITS)
 }
 
+/// Words of a frame that a thread copies: one on hardware. The software driver starts a workgroup in the time of some words.
+pub(super) fn show_words(info: &AdapterInfo) -> u32 {
+    if is_software(info) { 16 } else { 1 }
+}
+
 /// Whether the adapter is a software driver.
 pub(super) fn is_software(info: &AdapterInfo) -> bool {
     info.kind == AdapterKind::Software
