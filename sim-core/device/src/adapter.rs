@@ -46,6 +46,12 @@ pub struct AdapterInfo {
     pub workgroup_max: u32,
     /// Most workgroups of a dispatch.
     pub workgroups_max: u32,
+    /// Fewest threads of a subgroup.
+    pub subgroup_min: u32,
+    /// Most threads of a subgroup.
+    pub subgroup_max: u32,
+    /// Whether threads of a subgroup can read each other's values (`subgroupShuffle` and its relatives).
+    pub shuffles: bool,
     /// Whether host memory can be imported. In the list: the driver has the extension. Of an open device: a test import succeeded.
     pub imports: bool,
 }
@@ -160,6 +166,10 @@ fn describe(adapter: &wgpu::Adapter) -> AdapterInfo {
             .max_compute_invocations_per_workgroup
             .min(limits.max_compute_workgroup_size_x),
         workgroups_max: limits.max_compute_workgroups_per_dimension,
+        subgroup_min: info.subgroup_min_size,
+        subgroup_max: info.subgroup_max_size,
+        // on Vulkan it asks for SHUFFLE and SHUFFLE_RELATIVE in compute (VkPhysicalDeviceSubgroupProperties)
+        shuffles: adapter.features().contains(wgpu::Features::SUBGROUP),
         imports,
     }
 }

@@ -63,6 +63,10 @@ impl Device {
             reason,
         };
         let wanted = wgpu::DeviceDescriptor {
+            required_features: match info.shuffles {
+                true => wgpu::Features::SUBGROUP,
+                false => wgpu::Features::empty(),
+            },
             required_limits: adapter.limits(),
             memory_hints: wgpu::MemoryHints::Performance,
             ..wgpu::DeviceDescriptor::default()

@@ -27,13 +27,17 @@ pub(crate) struct Module {
 
 /// Reads a program, with its overrides resolved.
 ///
-/// `spirv` requests SPIR-V for Vulkan; the other drivers get the WGSL through wgpu.
-pub(crate) fn read(source: &Source, spirv: bool) -> Result<Module, String> {
-    let module =
-        naga::front::wgsl::parse_str(&source.wgsl).map_err(|e| e.emit_to_string(&source.wgsl))?;
-    let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
+/// `spirv` requests SPIR-V for Vulkan; the other drivers get the WGSL through wgpu. `shuffles`: the device has subgroup operations.
+pub(crate) fn read(source: &Source, spirv: bool, shuffles: bool) -> Result<Module, String> {
+    let wgsl = source.plain();
+    let module = naga::front::wgsl::parse_str(&wgsl).map_err(|e| e.emit_to_string(&wgsl))?;
+    let capabilities = match shuffles {
+        true => Capabilities::SUBGROUP,
+        false => Capabilities::empty(),
+    };
+    let info = Validator::new(ValidationFlags::all(), capabilities)
         .validate(&module)
-        .map_err(|e| e.emit_to_string(&source.wgsl))?;
+        .map_err(|e| e.emit_to_string(&wgsl))?;
     let stage = naga::ShaderStage::Compute;
     let known = |entry: &naga::EntryPoint| entry.name == source.entry && entry.stage == stage;
     if !module.entry_points.iter().any(known) {
@@ -94,8 +98,8 @@ pub(crate) fn read(source: &Source, spirv: bool) -> Result<Module, String> {
 /// # Errors
 /// A program that is wrong, with the reason.
 #[doc(hidden)]
-pub fn translated(source: &Source) -> Result<Vec<u32>, String> {
-    Ok(read(source, true)?.spirv)
+pub fn translated(source: &Source, shuffles: bool) -> Result<Vec<u32>, String> {
+    Ok(read(source, true, shuffles)?.spirv)
 }
 
 /// An error and its causes, in one line.

@@ -16,7 +16,7 @@ pub(crate) fn pipeline(
     .map(|filter| device.push_error_scope(filter));
     let description = wgpu::ShaderModuleDescriptor {
         label: Some(&source.label),
-        source: wgpu::ShaderSource::Wgsl(source.wgsl.as_str().into()),
+        source: wgpu::ShaderSource::Wgsl(source.plain()),
     };
     // SAFETY: as for recorded batches: the caller guarantees its indices and that its loops end.
     let module = unsafe {

@@ -114,13 +114,16 @@ pub(crate) fn build(
 
 /// The SPIR-V of a program: from the cache if it holds it, otherwise translated.
 pub(crate) fn read(device: &Inner, source: &Source) -> Result<Module, String> {
-    let Some(cache) = &device.cache else {
-        return module::read(source, device.vulkan.is_some());
+    let shuffles = device.info.shuffles;
+    // another device may have kept what this one must refuse
+    let is_kept = shuffles || !source.names_subgroups();
+    let Some(cache) = device.cache.as_ref().filter(|_| is_kept) else {
+        return module::read(source, device.vulkan.is_some(), shuffles);
     };
     if let Some(module) = cache.module(source) {
         return Ok(module);
     }
-    let module = module::read(source, true)?;
+    let module = module::read(source, true, shuffles)?;
     cache.keep_module(source, &module);
     Ok(module)
 }

@@ -1,5 +1,6 @@
 //! The SPIR-V of a program: how its sums are rounded, its loops are kept and its indices are bounded.
 
+use crate::common::{PATIENCE, device};
 use sim_device::{Source, translated};
 
 /// A sum, difference, product, quotient and `fma`, two loops, and floats that become indices.
@@ -14,15 +15,22 @@ const PROGRAM: &str = "
         a[id.x] = x;
     }";
 
-/// Opcode and operands of each instruction.
-fn instructions(wgsl: &str) -> Vec<(u32, Vec<u32>)> {
-    let source = Source {
+fn source(wgsl: &str) -> Source {
+    Source {
         label: "words".to_owned(),
         wgsl: wgsl.to_owned(),
         entry: "main".to_owned(),
         constants: Vec::new(),
-    };
-    let words = translated(&source).expect("it is valid");
+    }
+}
+
+fn words(wgsl: &str) -> Vec<u32> {
+    translated(&source(wgsl), true).expect("it is valid")
+}
+
+/// Opcode and operands of each instruction.
+fn instructions(wgsl: &str) -> Vec<(u32, Vec<u32>)> {
+    let words = words(wgsl);
     let mut rest = &words[5..];
     let mut found = Vec::new();
     while let Some(head) = rest.first() {
@@ -93,4 +101,39 @@ fn a_float_that_becomes_an_index_is_clamped_even_if_it_is_no_number() {
         clamps.count()
     };
     assert_eq!((clamps(43), clamps(81)), (0, 2));
+}
+
+const SHUFFLE: &str = "enable subgroups;
+    @group(0) @binding(0) var<storage, read_write> a: array<f32>;
+    @compute @workgroup_size(32) fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+        var x = a[id.x];
+        x += subgroupShuffleXor(x, 1u);
+        x += subgroupShuffleDown(x, 2u);
+        a[id.x] = x;
+    }";
+
+#[test]
+fn shuffles_of_a_subgroup_ask_for_their_capabilities() {
+    const CAPABILITY: u32 = 17;
+    let all = instructions(SHUFFLE);
+    for capability in [65, 66] {
+        assert!(
+            all.contains(&(CAPABILITY, vec![capability])),
+            "{capability}"
+        );
+    }
+    for code in [346, 348] {
+        assert!(all.iter().any(|(found, _)| *found == code), "{code}");
+    }
+    assert_eq!(words(SHUFFLE)[1], 0x1_0300, "SPIR-V 1.3");
+}
+
+#[test]
+fn shuffles_are_refused_where_the_device_has_none() {
+    let refused = translated(&source(SHUFFLE), false).unwrap_err();
+    assert!(refused.to_lowercase().contains("subgroup"), "{refused}");
+    let device = device();
+    let made = device.programs(&[source(SHUFFLE)], PATIENCE);
+    assert_eq!(made.is_ok(), device.info().shuffles);
+    assert!(device.info().subgroup_min <= device.info().subgroup_max);
 }

@@ -4,7 +4,7 @@ use super::bookkeeping;
 use super::places::Places;
 use super::programs::{KernelSequence, Programs};
 use super::software::{self, Compaction};
-use super::workgroups::{BOOKKEEPING, PHYSICS};
+use super::workgroups::{self, BOOKKEEPING};
 use crate::backend::{BackendError, ProgramInfo};
 use sim_device::{Buffer, Device, DeviceError, Program, Replay, Source};
 use sim_physics::constants::Constants;
@@ -67,10 +67,11 @@ impl Compiled {
                 ("workgroup".to_owned(), f64::from(workgroup)),
             ],
         };
+        let threads = workgroups::physics(device.info());
         let physics = |label: &'static str, program: &KernelSequence| {
             let kernels = program.kernels.iter().enumerate();
             let kernels =
-                kernels.map(|(k, wgsl)| source(&format!("{label} {k}"), wgsl.clone(), PHYSICS));
+                kernels.map(|(k, wgsl)| source(&format!("{label} {k}"), wgsl.clone(), threads));
             kernels.collect::<Vec<_>>()
         };
         let mut sources: Vec<Source> = vec![

@@ -27,7 +27,7 @@
 //! `auto`, a GPU that does not start gives way to the CPU, and the daemon's notes say why.
 //!
 //! # What is not measured
-//! These constants were chosen without a hardware GPU at hand: `HARDWARE` in `create` (size of kernels), both sizes in `workgroups`,
+//! These constants were chosen without a hardware GPU at hand: `HARDWARE` in `create` (size of kernels), the sizes in `workgroups`,
 //! `AUTO_WORLDS` in `options`, and that a GPU with its own memory draws a frame there and copies it out.
 
 mod backend;

@@ -4,7 +4,7 @@ use super::bookkeeping;
 use super::places::Places;
 use super::programs::Programs;
 use super::show;
-use super::workgroups::{BOOKKEEPING, PHYSICS};
+use super::workgroups::{BOOKKEEPING, SUBGROUP};
 use super::{create, software};
 use crate::backend::state::{Shape, finds_contacts};
 use crate::backend::{BackendError, COUNTERS};
@@ -97,7 +97,7 @@ impl Offline {
                 kernels.push(OfflineKernel {
                     label: format!("{name} {k}"),
                     wgsl: wgsl.clone(),
-                    workgroup: PHYSICS,
+                    workgroup: SUBGROUP,
                 });
             }
         }

@@ -3,7 +3,7 @@
 use super::places::Places;
 use super::software;
 use super::uploads;
-use super::workgroups::BOOKKEEPING;
+use super::workgroups::{self, BOOKKEEPING};
 use crate::backend::{BackendError, available_memory};
 use sim_device::{AdapterKind, Device};
 use sim_model::SensedShapes;
@@ -17,8 +17,9 @@ pub(super) fn widest(device: &Device, m: &Constants<f32>, places: &Places, world
     let fit = (device.info().binding_max.min(u64::from(u32::MAX)) / (4 * numbers)).max(1);
     let tiles = (worlds as u64).div_ceil(fit);
     let width = (worlds as u64).div_ceil(tiles);
+    let lanes = BOOKKEEPING.max(workgroups::physics(device.info()));
     width
-        .next_multiple_of(u64::from(BOOKKEEPING))
+        .next_multiple_of(u64::from(lanes))
         .min(u64::from(u32::MAX)) as u32
 }
 

@@ -19,7 +19,7 @@ use super::places::Places;
 use super::show::{Run, ShowTable};
 use super::software::{self, ActiveWorlds};
 use super::uploads::{RowUpload, Rows, StagedCommand};
-use super::workgroups::{BOOKKEEPING, PHYSICS};
+use super::workgroups::{self, BOOKKEEPING};
 use crate::backend::{BackendError, Input};
 use sim_device::{Batch, BatchBuilder, Buffer, Device, Program, Replay, Staging};
 use sim_physics::constants::Constants;
@@ -40,6 +40,8 @@ pub(super) struct Tile {
     pub worlds: Range<usize>,
     /// Lanes: its worlds, and padding that runs along.
     pub width: u32,
+    /// Threads of a workgroup of physics; `width` is a multiple of it.
+    workgroup: u32,
     fields: Buffer,
     scratch: Buffer,
     counters: Buffer,
@@ -100,6 +102,7 @@ impl Tile {
             rows,
             worlds,
             width,
+            workgroup: workgroups::physics(device.info()),
             fields,
             scratch,
             counters,
@@ -161,7 +164,7 @@ impl Tile {
             (3, &compiled.indices, 0..compiled.indices.bytes()),
         ];
         let active = self.active.as_ref();
-        let groups = self.width.div_ceil(PHYSICS);
+        let groups = self.width.div_ceil(self.workgroup);
         for part in order {
             match (part, iteration.zip(active)) {
                 (Part::Kernel(k), None) => {

@@ -8,7 +8,7 @@
 //! arrive. It does not affect results.
 
 use crate::backend::BackendError;
-use crate::backend::gpu::workgroups::PHYSICS;
+use crate::backend::gpu::workgroups;
 use sim_device::{BatchBuilder, Buffer, Device, Program, Source};
 use sim_record::split::Part;
 use std::ops::Range;
@@ -146,7 +146,7 @@ pub(in crate::backend::gpu) fn sources(device: &Device, loops: &[Loop], width: u
     for one in loops {
         let constants = [
             ("out", u64::from(one.exited)),
-            ("workgroup", u64::from(PHYSICS)),
+            ("workgroup", u64::from(workgroups::physics(device.info()))),
         ];
         sources.push(source("list", FIRST.to_owned() + APPEND, &constants));
         sources.push(source("list again", AGAIN.to_owned() + APPEND, &constants));
