@@ -1,7 +1,6 @@
 """Predict a scene's speed on cards without one.
 
-    cd benches/gpu
-    python -m offline grasp standing --worlds 4096,16384 --arch sm_90
+    python -m benches.gpu.offline grasp standing --worlds 4096,16384 --arch sm_90
 
 The kernels come from `cargo build --release --workspace --example gpu_bench`. Its dump and what is compiled go below
 `out/offline`. The first run installs NVIDIA's compilers there, from the Python package index. g++ and numpy are needed.
@@ -12,7 +11,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from . import dump, predict, report, results
+from . import check, dump, predict, report, results
 from .constants import CARDS
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -21,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[3]
 def arguments() -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(
-        prog="python -m offline", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+        prog="python -m benches.gpu.offline", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("scenes", nargs="+", help="torque_free, target, grasp, quadruped or standing")
     parser.add_argument("--worlds", default="4096,16384", help="numbers of worlds")
@@ -36,6 +35,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument(
         "--results", type=Path, default=ROOT / "benches/results/gpu_offline", help="folder of the CSV files"
     )
+    parser.add_argument(
+        "--check", action="store_true", help="check the translations against the dumped states, no more"
+    )
     parser.add_argument("--no-results", action="store_true", help="only print")
     return parser.parse_args()
 
@@ -46,15 +48,23 @@ def main() -> None:
     archs = tuple(given.arch.split(","))
     counts = tuple(int(count) for count in given.worlds.split(","))
     folder = given.dump or given.cache / "dump"
+    failed = False
     for name in given.scenes:
         if given.dump is None:
             dump.write(given.binary, folder, name, given.emulated, given.samples)
         scene = dump.read(folder / name)
+        if given.check:
+            checked = check.check(scene, given.cache)
+            print(f"{name}: a frame from the state before it", *checked, sep="\n", flush=True)
+            failed |= not all(one.holds for one in checked)
+            continue
         found = predict.predict(scene, archs, counts, given.cache)
         for prediction in found:
             print(report.table(prediction), flush=True)
         if not given.no_results:
             results.keep(found, given.results, results.commit(ROOT))
+    if failed:
+        raise SystemExit(1)
 
 
 main()

@@ -181,9 +181,9 @@ def emulator(scene: Scene, cache_folder: Path) -> Emulator:
     return Emulator(scene.kernels, (scene.table("numbers"), scene.table("indices")), cache_folder)
 
 
-def worlds_of(scene: Scene, frame: int) -> Worlds:
-    """The worlds of a scene before a frame."""
-    before = scene.state("before", frame)
+def worlds_of(scene: Scene, frame: int, count: int | None = None) -> Worlds:
+    """The worlds of a scene before a frame, or the first of them."""
+    before = scene.state("before", frame)[:count]
     fields = dump.vectors(before, scene.facts["fields"])
     scratch = np.zeros((max(-(-scene.facts["scratch"] // 4), 1), len(before), 4), np.float32)
     pairs = (len(before) + 1) // 2
