@@ -18,7 +18,21 @@ from conftest import REPOSITORY
 
 sys.path.insert(0, str(REPOSITORY / "benches"))
 
-from gpu.offline import bytecode, check, cuda_on_cpu, dump, emulate, parser, slots
+from gpu.offline import (
+    bytecode,
+    check,
+    constants,
+    costs,
+    cuda_on_cpu,
+    dump,
+    emulate,
+    model,
+    parser,
+    sass,
+    slots,
+    timing,
+    toolchain,
+)
 from gpu.offline.tokens import Refused
 
 BINARY = Path(os.environ.get("CARGO_TARGET_DIR", REPOSITORY / "target")) / "release/examples/gpu_bench"
@@ -182,3 +196,90 @@ def test_a_frame_with_another_torque_is_noticed(scene: dump.Scene, cache: Path):
     constants[most, 1] = np.float32(1.01 * constants[most : most + 1, 1].view(np.float32)[0]).view(np.uint32)
     emulator.programs[0] = replace(program, constants=constants)
     assert not check.lockstep(scene, 40, emulator).holds
+
+
+# nvdisasm of a loop over rows for sm_90: what a thread has loaded is squared and added up, then stored
+SASS = """
+	//## File "/tmp/kernel.wgsl", line 10
+        /*0090*/                   LDC.64 R4, c[0x0][0x210] ;   /* 0x00008400ff047b82 */
+                                                                /* 0x000e220000000a00 */
+	//## File "/tmp/kernel.wgsl", line 12
+        /*00d0*/                   MOV R0, RZ ;                 /* 0x000000ff00007202 */
+                                                                /* 0x000fc00000000f00 */
+.L_x_2:
+	//## File "/tmp/kernel.wgsl", line 12
+        /*0100*/                   IMAD.WIDE.U32 R2, R3, 0x10, R4 ;  /* 0x0000001003027825 */
+                                                                /* 0x001fca00078e0004 */
+        /*0110*/                   LDG.E.64 R12, desc[UR4][R2.64] ;  /* 0x00000004020c7981 */
+                                                                /* 0x000ea4000c1e9b00 */
+        /*0120*/                   FADD.FTZ R11, R12, R12 ;     /* 0x0000000c0c0b7221 */
+                                                                /* 0x004fc80000010000 */
+	//## File "/tmp/kernel.wgsl", line 11
+        /*01f0*/              @!P0 BRA `(.L_x_2) ;              /* 0xfffffffc00bc8947 */
+                                                                /* 0x000fea000383ffff */
+.L_x_1:
+	//## File "/tmp/kernel.wgsl", line 14
+        /*0230*/                   STG.E desc[UR4][R2.64], R11 ;  /* 0x0000000b02007986 */
+                                                                /* 0x000fe2000c101904 */
+        /*0240*/                   EXIT ;                       /* 0x000000000000794d */
+                                                                /* 0x000fea0003800000 */
+.L_x_3:
+        /*0250*/                   BRA `(.L_x_3);               /* 0xfffffffc00fc7947 */
+                                                                /* 0x000fc0000383ffff */
+        /*0260*/                   NOP;                         /* 0x0000000000007918 */
+                                                                /* 0x000fc00000000000 */
+"""
+
+
+def test_machine_code_runs_as_often_as_the_lines_in_as_many_loops():
+    # lines 10, then 11 and 12 in a loop, then 14
+    stretches = bytecode.Stretches([10, 11, 14], [0, 1, 0], {10: 0, 11: 1, 12: 1, 14: 2})
+    found = sass.blocks(SASS, stretches)
+    assert [[one.operation for one in block.instructions] for block in found] == [
+        ["LDC", "MOV"],
+        ["IMAD", "LDG", "FADD", "BRA"],
+        ["STG", "EXIT"],
+        ["BRA"],
+    ]
+    # MOV comes from a line in the loop, but stands before it
+    assert [block.stretch for block in found[:3]] == [0, 1, 2] and [block.depth for block in found] == [0, 1, 0, 0]
+    assert [block.agreeing for block in found] == [1, 4, 2, 1]
+    load, add = found[1].instructions[1:3]
+    assert (load.result_barrier, add.waits, add.stall) == (2, 1 << 2, 4)
+
+
+def test_a_warp_waits_for_its_loads():
+    stretches = bytecode.Stretches([10, 11, 14], [0, 1, 0], {10: 0, 11: 1, 12: 1, 14: 2})
+    found, card = sass.blocks(SASS, stretches), constants.CARDS["sm_90"]
+    near, far = (timing.cycles(found, card, load) for load in (40, 263))
+    # the block ends 4 + 5 cycles after the sum is issued, and that waits for the load
+    assert far[1] - near[1] == 223 and near[1] > 40 + 4 + 5
+    assert far[0] == near[0] and far[2] == near[2]
+
+
+def counted(visits: list[list[int]]) -> emulate.Tally:
+    """A dispatch of warps that load 1024 bytes each."""
+    array = np.array(visits, np.uint32)
+    nothing = np.zeros(array.shape[1], np.uint64)
+    sectors = np.full(array.shape[1], 32 * len(visits) // array.shape[1], np.uint64)
+    first = np.tile(np.array([32, 0], np.uint64), (len(visits), 1))
+    return emulate.Tally(array, 0 * array, nothing, nothing, nothing, sectors, nothing, first)
+
+
+def test_few_warps_are_bound_by_the_slowest_and_many_by_what_fits():
+    card = constants.CARDS["sm_90"]
+    compiled = toolchain.Compiled("", registers=255, stack=0, spilled=0, code=4096, seconds=0.0)
+    cycles = np.array([1e4, 1e5])
+    cost = costs.Costs(compiled, np.array([1e3, 1e4]), cycles, cycles, cycles, 0 * cycles, 0 * cycles, 0.0)
+    tally = counted([[1, 0], [1, 1], [1, 0], [1, 0]])
+
+    def dispatch(worlds: int) -> model.Dispatch:
+        return model.dispatch(tally, cost, 32, model.Setting(card, worlds, 128, 0, 1000.0))
+
+    few, many = dispatch(128), dispatch(128 * 1000)
+    assert model.resident(cost, 32, card) == 8
+    assert few.bound == "slowest" and few.seconds == pytest.approx(1.1e5 / card.clock + constants.DISPATCH)
+    assert few.mean == 3.5e4 and few.worst == 1.1e5
+    # 4000 warps, of which 8 fit a multiprocessor
+    assert many.bound == "warps"
+    assert many.seconds == pytest.approx(4000 * 3.5e4 / (8 * 132) / card.clock + constants.DISPATCH)

@@ -11,8 +11,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from . import check, dump, predict, report, results
+from . import check, dump, predict, radv, report, results
 from .constants import CARDS
+from .dump import Scene
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -35,36 +36,62 @@ def arguments() -> argparse.Namespace:
     parser.add_argument(
         "--results", type=Path, default=ROOT / "benches/results/gpu_offline", help="folder of the CSV files"
     )
-    parser.add_argument(
-        "--check", action="store_true", help="check the translations against the dumped states, no more"
-    )
     parser.add_argument("--no-results", action="store_true", help="only print")
+    instead = parser.add_mutually_exclusive_group()
+    instead.add_argument(
+        "--check", action="store_true", help="instead, check the translations against the dumped states"
+    )
+    instead.add_argument(
+        "--amd", metavar="FAMILIES", help=f"instead, what Mesa compiles for these of {', '.join(radv.FAMILIES)}"
+    )
     return parser.parse_args()
 
 
-def main() -> None:
-    """Predicts each scene."""
-    given = arguments()
+def check_scene(scene: Scene, given: argparse.Namespace) -> bool:
+    """Checks the translations of a scene; false where a frame differs."""
+    found = check.check(scene, given.cache)
+    print(f"{scene.name}: a frame from the state before it", *found, sep="\n", flush=True)
+    return all(one.holds for one in found)
+
+
+def compile_for_amd(scene: Scene, given: argparse.Namespace) -> None:
+    """Prints and keeps what Mesa compiles."""
+    for family in given.amd.split(","):
+        found = radv.programs(scene, family, given.cache)
+        print(radv.table(scene, family, found), flush=True)
+        if not given.no_results:
+            results.keep_amd(found, scene.name, family, given.results, results.commit(ROOT))
+
+
+def predict_scene(scene: Scene, given: argparse.Namespace) -> None:
+    """Prints and keeps a scene's rates."""
     archs = tuple(given.arch.split(","))
     counts = tuple(int(count) for count in given.worlds.split(","))
+    found = predict.predict(scene, archs, counts, given.cache)
+    for prediction in found:
+        print(report.table(prediction), flush=True)
+    if not given.no_results:
+        results.keep(found, given.results, results.commit(ROOT))
+
+
+def main() -> None:
+    """Does what the command line asks with each scene."""
+    given = arguments()
     folder = given.dump or given.cache / "dump"
-    failed = False
+    agrees = True
     for name in given.scenes:
         if given.dump is None:
             dump.write(given.binary, folder, name, given.emulated, given.samples)
         scene = dump.read(folder / name)
         if given.check:
-            checked = check.check(scene, given.cache)
-            print(f"{name}: a frame from the state before it", *checked, sep="\n", flush=True)
-            failed |= not all(one.holds for one in checked)
-            continue
-        found = predict.predict(scene, archs, counts, given.cache)
-        for prediction in found:
-            print(report.table(prediction), flush=True)
-        if not given.no_results:
-            results.keep(found, given.results, results.commit(ROOT))
-    if failed:
+            agrees &= check_scene(scene, given)
+        elif given.amd:
+            compile_for_amd(scene, given)
+        else:
+            predict_scene(scene, given)
+    if not agrees:
         raise SystemExit(1)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from . import costs, emulate, frame_ends, model
+from . import costs, emulate, frame_ends, model, toolchain
 from .constants import CARDS
 from .costs import Costs
 from .dump import Scene
@@ -91,26 +91,29 @@ class Frame:
     stored: float
 
 
-def frame(job: tuple[Scene, int, tuple[str, ...], tuple[int, ...], Path]) -> Frame:
+Known = dict[str, dict[int, Costs]]
+"""Costs of the kernels, by architecture."""
+
+
+def frame(job: tuple[Scene, int, Known, tuple[int, ...], Path]) -> Frame:
     """Emulates a frame and times its dispatches."""
-    scene, number, archs, counts, cache = job
+    scene, number, known, counts, cache = job
     emulator = emulate.emulator(scene, cache)
-    known = {arch: {k: costs.costs(kernel, arch, cache) for k, kernel in scene.kernels.items()} for arch in archs}
     worlds = emulate.worlds_of(scene, number)
     order = scene.step + scene.evaluate
     tallies = [(k, emulator.run(k, worlds)) for k in order]
     times = {}
-    for arch in archs:
-        code = sum(one.compiled.code for one in known[arch].values())
+    for arch, by_kernel in known.items():
+        code = sum(one.compiled.code for one in by_kernel.values())
         for count in counts:
             tile = count // tile_count(scene, count)
             setting = model.Setting(CARDS[arch], tile, scene.worlds, code, worlds.footprint)
             times[arch, count] = [
-                (k, model.dispatch(tally, known[arch][k], scene.kernels[k].workgroup, setting)) for k, tally in tallies
+                (k, model.dispatch(tally, by_kernel[k], scene.kernels[k].workgroup, setting)) for k, tally in tallies
             ]
     lanes = {
-        arch: sum(float(tally.lanes @ known[arch][k].instructions) for k, tally in tallies) / emulate.LANES
-        for arch in archs
+        arch: sum(float(tally.lanes @ by_kernel[k].instructions) for k, tally in tallies) / emulate.LANES
+        for arch, by_kernel in known.items()
     }
     of_steps = tallies[: len(scene.step)]
     loaded, stored = (sum(float(getattr(tally, name).sum()) for _, tally in of_steps) for name in ("loaded", "stored"))
@@ -125,12 +128,17 @@ def tile_count(scene: Scene, worlds: int) -> int:
 def predict(scene: Scene, archs: tuple[str, ...], counts: tuple[int, ...], cache: Path) -> list[Prediction]:
     """Predictions for each architecture and number of worlds."""
     emulate.library(cache)
-    parts = {arch: {k: costs.costs(kernel, arch, cache) for k, kernel in scene.kernels.items()} for arch in archs}
+    toolchain.folder(cache)
+    known: Known = {}
+    for arch in archs:
+        with ThreadPoolExecutor(PROCESSES) as compilers:
+            found = compilers.map(lambda kernel, arch=arch: costs.costs(kernel, arch, cache), scene.kernels.values())
+            known[arch] = dict(zip(scene.kernels, found, strict=True))
     weights = scene.weights()
     with ProcessPoolExecutor(PROCESSES) as pool:
-        frames = list(pool.map(frame, [(scene, number, archs, counts, cache) for number in scene.sampled]))
+        frames = list(pool.map(frame, [(scene, number, known, counts, cache) for number in scene.sampled]))
     return [
-        gather(scene, arch, worlds, parts[arch], dict(zip(weights.items(), frames, strict=True)))
+        gather(scene, arch, worlds, known[arch], dict(zip(weights.items(), frames, strict=True)))
         for arch in archs
         for worlds in counts
     ]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from .constants import CARDS, MODEL
 from .predict import Prediction
+from .radv import Program
 
 KEY = ("commit", "model", "scene", "worlds", "arch")
 Row = dict[str, str]
@@ -66,11 +67,31 @@ def kernels(prediction: Prediction, of: str) -> list[Row]:
             "stack_bytes": compiled.stack,
             "spill_bytes": compiled.spilled,
             "code_kb": f"{compiled.code / 1024:.1f}",
+            "moved_percent": f"{100 * part.costs.unclear:.0f}",
             "share_percent": f"{100 * part.seconds / whole:.1f}",
             "bound": part.bound,
         }
         found.append({name: str(value) for name, value in row.items()})
     return found
+
+
+def amd(found: list[Program], scene: str, family: str, of: str) -> list[Row]:
+    """The rows of a scene's kernels for a card of AMD."""
+    return [
+        {
+            "commit": of,
+            "scene": scene,
+            "family": family,
+            "kernel": one.kernel,
+            "wave": str(one.subgroup),
+            "registers": str(one.registers),
+            "spilled_registers": str(one.spilled),
+            "spilled_scalars": str(one.spilled_scalars),
+            "code_kb": f"{one.code / 1024:.1f}",
+            "waves": str(one.waves),
+        }
+        for one in found
+    ]
 
 
 def read(path: Path) -> list[Row]:
@@ -93,10 +114,17 @@ def write(path: Path, rows: list[Row]) -> None:
 def keep(predictions: list[Prediction], folder: Path, of: str) -> None:
     """Adds predictions to the files of a folder; earlier ones with the same key go."""
     rows = [summary(one, of) for one in predictions]
-    new = {tuple(row[name] for name in KEY) for row in rows}
-    path = folder / "predictions.csv"
-    old = [row for row in read(path) if tuple(row[name] for name in KEY) not in new]
-    write(path, old + rows)
-    path = folder / "kernels.csv"
-    old = [row for row in read(path) if row["commit"] == of and tuple(row[name] for name in KEY) not in new]
-    write(path, old + [row for one in predictions for row in kernels(one, of)])
+    merge(folder / "predictions.csv", rows, KEY)
+    merge(folder / "kernels.csv", [row for one in predictions for row in kernels(one, of)], KEY, of)
+
+
+def keep_amd(found: list[Program], scene: str, family: str, folder: Path, of: str) -> None:
+    """Adds a scene's kernels for a card of AMD."""
+    merge(folder / "amd.csv", amd(found, scene, family, of), ("commit", "scene", "family"), of)
+
+
+def merge(path: Path, rows: list[Row], key: tuple[str, ...], of: str | None = None) -> None:
+    """Adds rows to a file. Earlier ones with the same key go, and those of other commits than `of` if it is given."""
+    new = {tuple(row[name] for name in key) for row in rows}
+    old = [row for row in read(path) if tuple(row[name] for name in key) not in new]
+    write(path, [row for row in old if of in (None, row["commit"])] + rows)
