@@ -11,6 +11,8 @@ from .predict import Prediction
 from .radv import Program
 
 KEY = ("commit", "model", "scene", "worlds", "arch")
+KERNELS_OF = 4096
+"""Worlds of the runs whose kernels are kept one by one."""
 Row = dict[str, str]
 
 
@@ -115,7 +117,8 @@ def keep(predictions: list[Prediction], folder: Path, of: str) -> None:
     """Adds predictions to the files of a folder; earlier ones with the same key go."""
     rows = [summary(one, of) for one in predictions]
     merge(folder / "predictions.csv", rows, KEY)
-    merge(folder / "kernels.csv", [row for one in predictions for row in kernels(one, of)], KEY, of)
+    shown = [one for one in predictions if one.worlds == KERNELS_OF]
+    merge(folder / "kernels.csv", [row for one in shown for row in kernels(one, of)], KEY, of)
 
 
 def keep_amd(found: list[Program], scene: str, family: str, folder: Path, of: str) -> None:
@@ -127,4 +130,5 @@ def merge(path: Path, rows: list[Row], key: tuple[str, ...], of: str | None = No
     """Adds rows to a file. Earlier ones with the same key go, and those of other commits than `of` if it is given."""
     new = {tuple(row[name] for name in key) for row in rows}
     old = [row for row in read(path) if tuple(row[name] for name in key) not in new]
-    write(path, [row for row in old if of in (None, row["commit"])] + rows)
+    if kept := [row for row in old if of in (None, row["commit"])] + rows:
+        write(path, kept)
